@@ -1,0 +1,11 @@
+"""Array types used in signatures."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+IntArray = npt.NDArray[np.int64]
+Matrix = Any  # dense ndarray or scipy.sparse.csr_array: scipy ships no types

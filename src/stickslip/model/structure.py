@@ -1,0 +1,90 @@
+"""A linear structure: matrices, named dofs, named sets, and the way back to the full model."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse
+
+from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.errors import did_you_mean, input_error
+from stickslip.model.dofs import Dofs, join_dofs
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """A linear structure ``M ü + C u̇ + K u = f``.
+
+    Parameters
+    ----------
+    mass, damping, stiffness
+        (n, n) matrices in kg, N s/m, N/m; dense or SciPy CSR.
+    dofs
+        Table of the n coordinates.
+    sets
+        Name -> dof indices, in an order that has a meaning.
+    basis
+        (n_full, n) matrix with ``full = basis @ reduced``; None where nothing was reduced.
+
+    Raises
+    ------
+    ValueError
+        If shapes do not agree.
+    """
+
+    mass: Matrix
+    damping: Matrix
+    stiffness: Matrix
+    dofs: Dofs
+    sets: Mapping[str, IntArray] = field(default_factory=dict)
+    basis: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.dofs)
+        for name in ("mass", "damping", "stiffness"):
+            shape = getattr(self, name).shape
+            if shape != (n, n):
+                raise ValueError(f"Structure.{name}: shape {shape} for {n} dofs")
+
+    @property
+    def n(self) -> int:
+        """Number of dofs."""
+        return len(self.dofs)
+
+    def dof_set(self, name: str) -> IntArray:
+        """Return the dof indices of the set `name`; an `InputError` names the known sets."""
+        if name not in self.sets:
+            raise input_error("Structure", f"there is no set {name!r}", did_you_mean(name, list(self.sets)))
+        return self.sets[name]
+
+    def expand(self, vector: FloatArray) -> FloatArray:
+        """Return the full-model vector(s) of reduced coordinates `vector` (n,) or (n, k)."""
+        return vector if self.basis is None else self.basis @ vector
+
+    def with_damping(self, damping: Matrix) -> "Structure":
+        """Return the same structure with another damping matrix."""
+        return replace(self, damping=damping)
+
+
+def join(**parts: Structure) -> Structure:
+    """Put structures side by side, uncoupled.
+
+    Sets are renamed ``part.set``; a set ``part`` holds all dofs of each part. The way back to full models is not kept:
+    ask the parts.
+    """
+    offsets = np.cumsum([0, *(s.n for s in parts.values())])
+    sets: dict[str, IntArray] = {}
+    for (name, part), offset in zip(parts.items(), offsets, strict=False):
+        sets[name] = np.arange(offset, offset + part.n)
+        sets.update({f"{name}.{key}": index + offset for key, index in part.sets.items()})
+
+    def stack(which: str) -> Matrix:
+        blocks = [getattr(s, which) for s in parts.values()]
+        if any(scipy.sparse.issparse(b) for b in blocks):
+            return scipy.sparse.block_diag(blocks, format="csr")
+        return scipy.linalg.block_diag(*blocks)
+
+    return Structure(
+        stack("mass"), stack("damping"), stack("stiffness"), join_dofs({k: s.dofs for k, s in parts.items()}), sets
+    )
