@@ -1,0 +1,74 @@
+# The README's two commands are `make run` and `make test`. Everything is installed into .venv from
+# requirements.lock; nothing else needs to be on the machine but Python 3.11, make and pip.
+
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+STUDY  ?= examples/two_blades/study.toml
+WORKERS ?= 2
+
+VENV := .venv
+BIN := $(VENV)/bin
+INSTALLED := $(VENV)/.installed
+DOCS_INSTALLED := $(VENV)/.docs-installed
+LOCK_FLAGS := --quiet --generate-hashes --strip-extras --no-header \
+	--no-emit-index-url --no-emit-find-links --no-emit-trusted-host
+# Two test workers on two cores: a threaded BLAS under each would only make them wait for each other.
+ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+
+.PHONY: help install run test lint docs bench validate lock clean
+.DELETE_ON_ERROR:
+
+help:  ## list the targets
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+
+install: $(INSTALLED)  ## make .venv and install the locked versions
+
+$(INSTALLED): requirements.lock pyproject.toml
+	@test -n "$(PYTHON)" || { echo "No Python found. Install Python 3.11 or name it: make PYTHON=/path/to/python3.11"; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || \
+		{ echo "$(PYTHON) is not Python 3.11, for which requirements.lock is made. Name one: make PYTHON=/path/to/python3.11"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@$(BIN)/python .ci/system_libraries.py
+	@touch $@
+
+run: $(INSTALLED)  ## solve the example of two blades and a damper, and write its report
+	@status=0; $(BIN)/stickslip run $(STUDY) || status=$$?; \
+	for page in $(dir $(STUDY))results/*/report.html $(dir $(STUDY))results/report.html; do \
+		if [ -e "$$page" ]; then echo "Open $$page in a browser."; fi; done; exit $$status
+
+test: $(INSTALLED)  ## run the tests and report their coverage
+	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --cov --cov-report=term:skip-covered
+
+lint: $(INSTALLED)  ## style, types and the direction of imports
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+$(DOCS_INSTALLED): $(INSTALLED) docs/requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r docs/requirements.lock
+	@touch $@
+
+docs: $(DOCS_INSTALLED)  ## build the documentation; any warning is an error
+	$(ONE_THREAD) $(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	@echo "Open docs/_build/html/index.html in a browser."
+
+bench: $(INSTALLED)  ## run every benchmark; writes benchmarks/out/results.json
+	$(ONE_THREAD) $(BIN)/python -m benchmarks
+
+validate: $(INSTALLED)  ## compare with closed forms, other codes and the literature
+	$(ONE_THREAD) $(BIN)/python -m validation
+	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) -m validation
+
+lock: $(INSTALLED)  ## resolve the newest versions and write both lock files
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check pip-tools
+	$(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra fe --extra report --extra test \
+		--build-deps-for editable -o requirements.lock pyproject.toml
+	$(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra docs \
+		-c requirements.lock -o docs/requirements.lock pyproject.toml
+
+clean:  ## remove everything that the other targets made, .venv included
+	rm -rf $(VENV) .coverage* htmlcov .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache \
+		docs/_build docs/auto_examples docs/generated benchmarks/out validation/out examples/*/results
+	find src tests benchmarks validation docs examples -name __pycache__ -type d -prune -exec rm -rf {} +
