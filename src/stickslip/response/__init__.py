@@ -1,1 +1,1 @@
-
+"""The questions engineers ask, as functions of a system and a load."""

@@ -1,1 +1,1 @@
-
+"""Contact laws, one a file."""

@@ -1,0 +1,64 @@
+"""Unilateral normal spring with two independent Jenkins springs whose limit follows the normal force."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.errors import input_error
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ElasticCoulomb:
+    """Node-to-node contact that sticks, slips and lifts off (Gastaldi & Berruti 2017, section 5.1).
+
+    ``N = max(0, preload - k_n g_n)``; each tangential spring is limited to ``mu N`` and is free while the contact is open.
+    A constant limit is ``k_n = 0`` with a preload, an initial gap is ``preload = -k_n gap``.
+
+    Parameters
+    ----------
+    k_t, k_w
+        Tangential contact stiffnesses along t and w, N/m.
+    k_n
+        Normal contact stiffness, N/m.
+    mu
+        Friction coefficient.
+    preload
+        Normal force at zero normal gap, N; negative for a contact with a clearance.
+    residual_traction
+        None: each tangential spring is unstretched at zero displacement, so that full stick is a plain spring, static part
+        included. A number m in [-1, 1]: the tangential force just before t = 0 is ``m mu N`` (Ferhatoglu & Zucca's start
+        value), which chooses one of the admissible mean forces of a contact that does not slip.
+
+    Raises
+    ------
+    InputError
+        If a parameter is not finite or out of its range.
+    """
+
+    k_t: float
+    k_w: float
+    k_n: float
+    mu: float
+    preload: float = 0.0
+    residual_traction: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("k_t", "k_w", "k_n", "mu"):
+            value = getattr(self, name)
+            if not np.isfinite(value) or value < 0:
+                raise input_error(f"ElasticCoulomb.{name}", f"must be finite and not negative, got {value}", "Give it in SI units.")
+        if not np.isfinite(self.preload):
+            raise input_error("ElasticCoulomb.preload", f"must be finite, got {self.preload}", "Give it in newtons.")
+        if max(self.k_t, self.k_w, self.k_n) == 0.0:
+            raise input_error(
+                "ElasticCoulomb", "all contact stiffnesses are zero", "Give at least one, or remove the contact."
+            )
+        m = self.residual_traction
+        if m is not None and not -1.0 <= m <= 1.0:
+            raise input_error("ElasticCoulomb.residual_traction", f"must lie in [-1, 1], got {m}", "It is a share of mu N.")
+
+    def parameters(self) -> FloatArray:
+        """Return ``(k_t, k_w, k_n, mu, preload, residual_traction or NaN)`` for the compiled kernels."""
+        m = np.nan if self.residual_traction is None else self.residual_traction
+        return np.array([self.k_t, self.k_w, self.k_n, self.mu, self.preload, m])

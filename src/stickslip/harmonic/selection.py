@@ -1,0 +1,66 @@
+"""Which harmonics a frequency needs: the Jacobian Alert (Gastaldi & Berruti 2017, section 4)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.harmonic.balance import HarmonicBalance
+
+FLOOR = 1e-3  # outputs moving less than this share of the largest have no meaningful relative error
+
+
+@dataclass(frozen=True, eq=False)
+class Alert:
+    """What the alert says at one frequency.
+
+    Attributes
+    ----------
+    error
+        Predicted relative change of the first harmonic (eq. 22, as a fraction); infinite where the enlarged Jacobian is singular.
+    worst
+        Position, among the dofs asked for, of the dof with that error.
+    start
+        Scaled unknowns ``q + Δq`` of the high-order problem.
+    seconds_contact
+        Time of the one contact evaluation.
+    """
+
+    error: float
+    worst: int
+    start: FloatArray
+    seconds_contact: float
+
+
+def jacobian_alert(low: HarmonicBalance, high: HarmonicBalance, x: FloatArray, omega: float, dofs: IntArray) -> Alert:
+    """Predict how the missing harmonics would change a low-order solution.
+
+    One Newton step in the larger space from the padded solution, ``Δq = -J̃⁻¹ r̃(q)``. Where the contact forces are homogeneous of
+    degree one this equals the published ``J̃ (q + Δq) = F`` (eq. 21); with preloads or gaps only the Newton form is right.
+
+    Parameters
+    ----------
+    low, high
+        The same problem with few and with many harmonics.
+    x
+        Scaled solution of `low`.
+    omega
+        Frequency, rad/s.
+    dofs
+        Structure dofs over which the largest relative change of harmonic 1 is taken; those that move less than a thousandth of the
+        largest are left out.
+    """
+    q = low.coefficients(x)
+    padded = high.unknowns(q)
+    at = high.linearise(padded, omega)
+    try:
+        change = np.linalg.solve(at.jac, -at.residual)
+    except np.linalg.LinAlgError:
+        return Alert(np.inf, 0, padded, at.seconds_contact)
+    dq = high.coefficients(change)
+    before = np.abs(low.linear.recover(omega, q)[1, dofs])
+    moved = np.abs(low.linear.recover_change(omega, dq)[1, dofs])
+    relevant = before > FLOOR * before.max(initial=0.0)
+    error = np.where(relevant, moved / np.where(relevant, before, 1.0), 0.0)
+    worst = int(np.argmax(error))
+    return Alert(float(error[worst]), worst, padded + change, at.seconds_contact)

@@ -1,0 +1,79 @@
+"""A structure with its contacts: what every analysis needs."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.contact.interface import Interface
+from stickslip.errors import input_error
+from stickslip.model.structure import Structure
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """A reduced structure, its contacts, and the dofs that are solved for and reported.
+
+    Parameters
+    ----------
+    structure
+        Blades joined with dampers, reduced.
+    interface
+        Contacts on the structure's dofs.
+    outputs
+        Dof indices whose motion is reported.
+    alert_outputs
+        Positions in `outputs` over which the Jacobian Alert takes its error; None: all of them.
+    free
+        Dofs of rigid bodies that only contacts hold; they are retained whether or not a contact touches them.
+    """
+
+    structure: Structure
+    interface: Interface
+    outputs: IntArray
+    alert_outputs: IntArray | None = None
+    free: IntArray | None = None
+
+    def __post_init__(self) -> None:
+        if self.interface.gap_operator.shape[1] != self.structure.n:
+            raise input_error(
+                "System",
+                f"the gap operator has {self.interface.gap_operator.shape[1]} columns for {self.structure.n} dofs",
+                "Build the interface on the joined structure.",
+            )
+
+    @property
+    def retained(self) -> IntArray:
+        """Dofs that stay unknown: those of the contacts and of free bodies, sorted."""
+        free = np.zeros(0, dtype=np.int64) if self.free is None else self.free
+        return np.union1d(self.interface.coordinates(), free)
+
+    @property
+    def retained_labels(self) -> tuple[str, ...]:
+        """Names of the retained coordinates."""
+        labels = self.structure.dofs.labels
+        return tuple(labels[i] for i in self.retained)
+
+    def with_retention(self, stiffness: float) -> "System":
+        """Return the system with a spring of `stiffness` (N/m, rotations N m/rad per m²) from each free dof to ground.
+
+        Rotational dofs get the stiffness times the squared radius of gyration of the body, so that one number serves all six.
+        """
+        if self.free is None or stiffness == 0.0:
+            return self
+        added = np.zeros(self.structure.n)
+        mass = np.asarray(self.structure.mass[self.free][:, self.free])
+        translation = [i for i, d in enumerate(self.free) if not self.structure.dofs.component[d].startswith("r")]
+        body_mass = float(np.max(np.diagonal(mass)[translation])) if translation else 1.0
+        for i, dof in enumerate(self.free):
+            rotation = self.structure.dofs.component[dof].startswith("r")
+            added[dof] = stiffness * (mass[i, i] / body_mass if rotation else 1.0)
+        diagonal = scipy.sparse.diags_array(added) if scipy.sparse.issparse(self.structure.stiffness) else np.diag(added)
+        return replace(self, structure=replace(self.structure, stiffness=self.structure.stiffness + diagonal))
+
+    def stuck_structure(self) -> Structure:
+        """Return the linear structure with every contact bonded through its springs."""
+        b = self.interface.gap_operator
+        springs = b.T @ (self.interface.stuck_stiffness()[:, None] * b)
+        return replace(self.structure, stiffness=self.structure.stiffness + springs)

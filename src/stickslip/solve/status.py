@@ -1,0 +1,34 @@
+"""Why a solver stopped, as a value with advice."""
+
+from enum import IntEnum
+
+
+class Status(IntEnum):
+    """How a point ended; the numbers are those written to result files."""
+
+    CONVERGED = 0
+    TOO_MANY_ITERATIONS = 1
+    STALLED = 2
+    SINGULAR = 3
+    NOT_FINITE = 4
+    STEP_TOO_SMALL = 5
+
+    @property
+    def converged(self) -> bool:
+        """Whether the point is a solution."""
+        return self is Status.CONVERGED
+
+    @property
+    def advice(self) -> str:
+        """What it means and what to do."""
+        return _ADVICE[self]
+
+
+_ADVICE = {
+    Status.CONVERGED: "converged",
+    Status.TOO_MANY_ITERATIONS: "Newton used all its iterations; a smaller frequency step usually helps",
+    Status.STALLED: "no step reduced the residual; contact states switch here, use more samples or a smaller step",
+    Status.SINGULAR: "the Jacobian is singular: a rigid body is held by no contact, give it a retention stiffness",
+    Status.NOT_FINITE: "the iteration left the finite numbers; check loads and stiffnesses",
+    Status.STEP_TOO_SMALL: "the continuation step shrank below its smallest value",
+}
