@@ -1,0 +1,96 @@
+"""What a section of the page holds, and the look all figures share."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import plotly.graph_objects as go
+
+FONT = "Inter, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', sans-serif"
+INK, MUTED, GRID, ALARM = "#1c2530", "#5b6673", "#e4e8ed", "#c0262d"
+# Okabe and Ito's colours, distinct for colour-blind readers and in grey
+STATE_COLOURS = ("#0072b2", "#e69f00", "#d8dce2")
+STATE_NAMES = ("stick", "slip", "open")
+LEFT_SIDE, RIGHT_SIDE = "#0072b2", "#d55e00"
+
+
+@dataclass(frozen=True, eq=False)
+class Plot:
+    """One numbered figure of the page.
+
+    Parameters
+    ----------
+    key
+        Name of the figure in the page, unique.
+    title
+        Its heading.
+    caption
+        HTML: what to see, in words and numbers taken from the data.
+    figure
+        The figure, or None where the result does not hold it; the caption then says so.
+    case_captions
+        Load case -> HTML added to the caption while that case is chosen; empty if the figure does not depend
+        on the choice. Traces of such a figure carry the load case in ``meta``.
+    """
+
+    key: str
+    title: str
+    caption: str
+    figure: go.Figure | None = None
+    case_captions: Mapping[int, str] = field(default_factory=dict)
+
+
+def absent(key: str, title: str, reason: str) -> Plot:
+    """Return the place of a figure that this result cannot show."""
+    return Plot(key, title, f"Not shown: {reason}.")
+
+
+def styled(figure: go.Figure, height: int, *, legend_title: str = "") -> go.Figure:
+    """Give `figure` the look of the page; returns it."""
+    figure.update_layout(
+        template="none",
+        height=height,
+        autosize=True,
+        font={"family": FONT, "size": 13, "color": INK},
+        margin={"l": 70, "r": 20, "t": 40, "b": 55},
+        paper_bgcolor="white",
+        plot_bgcolor="white",
+        hoverlabel={"font": {"family": FONT, "size": 12}},
+        legend={
+            "title": {"text": legend_title, "font": {"size": 12}},
+            "font": {"size": 12},
+            "x": 1.02,
+            "y": 1,
+            "tracegroupgap": 12,
+            "groupclick": "toggleitem",
+        },
+    )
+    axis = {
+        "showline": True,
+        "linecolor": MUTED,
+        "mirror": True,
+        "ticks": "outside",
+        "ticklen": 4,
+        "tickcolor": MUTED,
+        "gridcolor": GRID,
+        "zeroline": False,
+        "automargin": True,
+        "title": {"standoff": 8},
+        "exponentformat": "power",
+    }
+    figure.update_xaxes(**axis)
+    figure.update_yaxes(**axis)
+    figure.update_annotations(font_size=13)
+    return figure
+
+
+def key_marker(name: str, symbol: str, group: str, group_title: str = "") -> go.Scatter:
+    """Return a legend entry that explains a marker and draws nothing."""
+    return go.Scatter(
+        x=[None],
+        y=[None],
+        mode="markers",
+        name=name,
+        legendgroup=group,
+        legendgrouptitle={"text": group_title} if group_title else None,
+        marker={"symbol": symbol, "size": 9, "color": MUTED, "line": {"width": 1.4, "color": MUTED}},
+    )

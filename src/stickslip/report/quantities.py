@@ -1,0 +1,83 @@
+"""Numbers as engineers read them: few digits, prefixes, thin spaces."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+
+_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+NARROW_SPACE = "\u202f"
+NONE = "–"
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A factor and the unit that goes with it: ``values * factor`` are in ``unit``."""
+
+    factor: float
+    unit: str
+
+
+def scale_for(values: FloatArray, unit: str) -> Scale:
+    """Choose the engineering prefix that suits the largest finite magnitude of `values` in `unit`."""
+    finite = np.abs(values[np.isfinite(values)])
+    largest = float(finite.max()) if finite.size else 0.0
+    if largest == 0.0:
+        return Scale(1.0, unit)
+    # a hair above the power of ten, so that 1e-6 m is 1 µm in spite of its rounding
+    exponent = 3 * math.floor(math.log10(largest * (1 + 1e-12)) / 3)
+    exponent = min(max(exponent, min(_PREFIXES)), max(_PREFIXES))
+    return Scale(10.0**-exponent, _PREFIXES[exponent] + unit)
+
+
+def number(value: float, digits: int = 3) -> str:
+    """Write `value` with `digits` significant digits, powers of ten only where they are shorter."""
+    if not math.isfinite(value):
+        return NONE
+    if value == 0:
+        return "0"
+    exponent = math.floor(math.log10(abs(value)))
+    if exponent < -4 or exponent > 6:
+        mantissa = f"{value / 10.0**exponent:.{digits - 1}f}"
+        return f"{mantissa}·10<sup>{exponent}</sup>".replace("-", "−")
+    rounded = round(value, digits - 1 - exponent)
+    decimals = max(0, digits - 1 - exponent)
+    text = f"{rounded:,.{decimals}f}".replace(",", NARROW_SPACE)
+    if "." in text:
+        text = text.rstrip("0").rstrip(".")
+    return text.replace("-", "−")
+
+
+def fixed(value: float, decimals: int) -> str:
+    """Write `value` with a fixed number of decimals, for columns."""
+    if not math.isfinite(value):
+        return NONE
+    text = f"{value:,.{decimals}f}".replace(",", NARROW_SPACE)
+    return text.replace("-", "−")
+
+
+def quantity(value: float, unit: str, digits: int = 3) -> str:
+    """Write `value` in `unit` with an engineering prefix, e.g. ``12.3 µm``."""
+    scale = scale_for(np.array([value]), unit)
+    return f"{number(value * scale.factor, digits)} {scale.unit}" if math.isfinite(value) else NONE
+
+
+def percent(value: float, digits: int = 2) -> str:
+    """Write a value in percent; what is below a ten thousandth is said to be so."""
+    if math.isfinite(value) and 0 < abs(value) < 1e-4:
+        return "< 0.0001 %"
+    return f"{number(value, digits)} %" if math.isfinite(value) else NONE
+
+
+def joined(words: list[str]) -> str:
+    """Join words as a sentence does."""
+    if len(words) < 2:
+        return "".join(words)
+    return ", ".join(words[:-1]) + " and " + words[-1]
+
+
+def counted(n: int, word: str) -> str:
+    """Write a count with its noun."""
+    return f"{n} {word}" if n == 1 else f"{n} {word}s"

@@ -1,0 +1,230 @@
+"""A result file as the report sees it: the dataset, and the few things every figure asks of it."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.errors import input_error
+from stickslip.report.quantities import number
+
+NEEDED = (
+    "load_ratio",
+    "excitation_n",
+    "case",
+    "frequency_hz",
+    "order",
+    "status",
+    "amplitude",
+)
+RATIO = "F<sub>CL</sub>/F<sub>HE</sub>"
+_STUCK, _NONLINEAR = (38, 24, 110), (240, 128, 48)
+_BETWEEN = ((120, 22, 150), (198, 54, 120))
+
+
+@dataclass(frozen=True)
+class Case:
+    """One load case.
+
+    Parameters
+    ----------
+    index
+        Position along ``load_case`` in the dataset.
+    ratio
+        Static over harmonic load, F_CL/F_HE.
+    excitation
+        Amplitude of the harmonic load in N.
+    colour
+        CSS colour, dark for the most stuck case and orange for the most nonlinear one.
+    """
+
+    index: int
+    ratio: float
+    excitation: float
+    colour: str
+
+    @property
+    def label(self) -> str:
+        """The ratio as text."""
+        return number(self.ratio, 4)
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """A result in memory.
+
+    Parameters
+    ----------
+    data
+        The dataset of docs/design.md; any of its variables but those of `NEEDED` may be missing.
+    cases
+        Load cases from the most stuck (largest ratio) to the most nonlinear.
+    """
+
+    data: xr.Dataset
+    cases: tuple[Case, ...]
+
+    def has(self, *names: str) -> bool:
+        """Say whether all the variables are there and none is empty."""
+        return all(name in self.data and self.data[name].size > 0 for name in names)
+
+    def array(self, name: str) -> npt.NDArray[np.generic]:
+        """Return the values of a variable."""
+        return np.asarray(self.data[name].values)
+
+    def floats(self, name: str) -> FloatArray:
+        """Return the values of a variable as floats; NaN of the shape of ``point`` if it is missing."""
+        if name not in self.data:
+            return np.full(self.data.sizes["point"], np.nan)
+        return np.asarray(self.data[name].values, dtype=np.float64)
+
+    def complexes(self, name: str) -> ComplexArray:
+        """Return a variable with a trailing (re, im) dimension as complex numbers."""
+        parts = np.asarray(self.data[name].transpose(..., "part").values, dtype=np.float64)
+        return np.asarray(parts[..., 0] + 1j * parts[..., 1])
+
+    def labels(self, dimension: str) -> tuple[str, ...]:
+        """Return the labels of a dimension, escaped for HTML; numbers where it has none."""
+        if dimension in self.data.coords:
+            return tuple(escape(str(v)) for v in self.data[dimension].values)
+        return tuple(str(i) for i in range(self.data.sizes.get(dimension, 0)))
+
+    def text(self, attribute: str, default: str = "") -> str:
+        """Return an attribute as text, not escaped."""
+        value = self.data.attrs.get(attribute, default)
+        return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+    def scalar(self, attribute: str, default: float) -> float:
+        """Return an attribute as a number, the default where it is missing or no number."""
+        try:
+            return float(np.asarray(self.data.attrs.get(attribute, default)).reshape(-1)[0])
+        except (ValueError, IndexError):
+            return default
+
+    @property
+    def output(self) -> int:
+        """Position of the report output along ``output``."""
+        names = [str(v) for v in self.data["output"].values] if "output" in self.data.coords else []
+        wanted = self.text("report_output")
+        return names.index(wanted) if wanted in names else 0
+
+    @property
+    def output_name(self) -> str:
+        """Label of the report output, escaped."""
+        return self.labels("output")[self.output]
+
+    @property
+    def converged(self) -> npt.NDArray[np.bool_]:
+        """(point,) True where the point was accepted: the flag that means ``converged``, else zero."""
+        attributes = self.data["status"].attrs
+        meanings = str(attributes.get("flag_meanings", "")).split()
+        values = np.atleast_1d(np.asarray(attributes.get("flag_values", [])))
+        good = [v for v, m in zip(values, meanings, strict=False) if m == "converged"]
+        return np.isin(self.array("status"), good or [0])
+
+    @property
+    def flagged(self) -> npt.NDArray[np.bool_]:
+        """(point,) True where the predicted error is above the threshold."""
+        return np.nan_to_num(self.floats("predicted_error_percent")) > self.threshold
+
+    @property
+    def threshold(self) -> float:
+        """Threshold of the alert in percent."""
+        return self.scalar("alert_threshold_percent", 5.0)
+
+    @property
+    def low(self) -> int:
+        """Low harmonic order."""
+        return int(self.scalar("low_order", 1))
+
+    @property
+    def high(self) -> int:
+        """High harmonic order."""
+        return int(self.scalar("high_order", 5))
+
+    def response(self, name: str = "amplitude") -> FloatArray:
+        """(point,) amplitude of the report output divided by the excitation, m/N."""
+        force = self.floats("excitation_n")[self.array("case").astype(int)]
+        values = self.data[name].isel(output=self.output).values
+        return np.asarray(values, dtype=np.float64) / force
+
+    def points(self, case: Case) -> IntArray:
+        """Points of a case in the order in which a curve joins them, the unconverged ones included.
+
+        A branch that folds back keeps its order and leaves out the peak refinements, whose place on it is
+        not stored; otherwise the order is that of frequency.
+        """
+        index = np.flatnonzero(self.array("case") == case.index)
+        hz = self.floats("frequency_hz")[index]
+        refined = np.nan_to_num(self.floats("refinement")[index]) > 0
+        along = np.diff(hz[~refined])
+        if np.any(along > 0) and np.any(along < 0):
+            return index[~refined]
+        return index[np.argsort(hz, kind="stable")]
+
+    def peak(self, case: Case) -> int:
+        """Position of the peak along ``point``; -1 if there is none."""
+        if "peak_point" not in self.data:
+            return -1
+        value = self.floats("peak_point")[case.index]
+        inside = np.isfinite(value) and 0 <= value < self.data.sizes["point"]
+        return int(value) if inside else -1
+
+    @property
+    def peaked(self) -> tuple[Case, ...]:
+        """The cases that have a peak."""
+        return tuple(c for c in self.cases if self.peak(c) >= 0)
+
+
+def _colours(n: int) -> list[str]:
+    """Return `n` colours from dark (stuck) to orange (nonlinear), all readable on white."""
+    stops = np.array([_STUCK, *_BETWEEN, _NONLINEAR], dtype=float)
+    at = np.linspace(0, len(stops) - 1, n) if n > 1 else np.array([0.0])
+    mix = np.stack([np.interp(at, np.arange(len(stops)), stops[:, k]) for k in range(3)], axis=1)
+    return [f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in mix]
+
+
+def _cases(data: xr.Dataset) -> tuple[Case, ...]:
+    ratio = np.atleast_1d(np.asarray(data["load_ratio"].values, dtype=float))
+    force = np.atleast_1d(np.asarray(data["excitation_n"].values, dtype=float))
+    order = np.argsort(-ratio, kind="stable")
+    return tuple(
+        Case(int(i), float(ratio[i]), float(force[i]), colour)
+        for i, colour in zip(order, _colours(len(order)), strict=True)
+    )
+
+
+def _missing(names: Iterable[str], data: xr.Dataset) -> list[str]:
+    return [name for name in names if name not in data]
+
+
+def load_result(path: Path) -> Result:
+    """Read a result file.
+
+    Parameters
+    ----------
+    path
+        netCDF-4 file written by ``stickslip run``, finished or not.
+    """
+    if not path.is_file():
+        raise input_error(str(path), "no such file", "Give the result.nc that `stickslip run` wrote.")
+    try:
+        with xr.open_dataset(path, decode_times=False) as file:
+            data = file.load()
+    except (OSError, ValueError) as error:
+        raise input_error(
+            str(path), f"not a netCDF-4 file ({error})", "Give the result.nc that `stickslip run` wrote."
+        ) from error
+    missing = _missing(NEEDED, data)
+    if missing:
+        raise input_error(
+            str(path),
+            f"variables {', '.join(missing)} are missing",
+            "This is not a result of `stickslip run`; run the study again.",
+        )
+    return Result(data, _cases(data))
