@@ -110,7 +110,11 @@ def add_contact_jacobian(blocks, columns, values, n, factor, jac):  # type: igno
         b = values[c]
         for q in range(m):
             for p in range(m):
-                tt, ww, nn = factor * blocks[c, TT, p, q], factor * blocks[c, WW, p, q], factor * blocks[c, NN, p, q]
+                tt, ww, nn = (
+                    factor * blocks[c, TT, p, q],
+                    factor * blocks[c, WW, p, q],
+                    factor * blocks[c, NN, p, q],
+                )
                 tn, wn = factor * blocks[c, TN, p, q], factor * blocks[c, WN, p, q]
                 if tt == 0.0 and ww == 0.0 and nn == 0.0 and tn == 0.0 and wn == 0.0:
                     continue
@@ -120,4 +124,6 @@ def add_contact_jacobian(blocks, columns, values, n, factor, jac):  # type: igno
                     row_n = nn * b[2, j]
                     col = q * n + columns[c, j]
                     for i in range(width):
-                        jac[p * n + columns[c, i], col] += b[0, i] * row_t + b[1, i] * row_w + b[2, i] * row_n
+                        jac[p * n + columns[c, i], col] += (
+                            b[0, i] * row_t + b[1, i] * row_w + b[2, i] * row_n
+                        )

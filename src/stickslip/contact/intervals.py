@@ -45,7 +45,11 @@ def prefix_sums(order: int, samples: int) -> tuple[FloatArray, FloatArray, Float
     basis[:, 1::2] = cos[:, 1 : order + 1]
     basis[:, 2::2] = sin[:, 1 : order + 1]
     zero = np.zeros((1, 2 * order + 1))
-    return basis, np.vstack([zero, np.cumsum(cos, axis=0)]), np.vstack([zero, np.cumsum(sin, axis=0)])
+    return (
+        basis,
+        np.vstack([zero, np.cumsum(cos, axis=0)]),
+        np.vstack([zero, np.cumsum(sin, axis=0)]),
+    )
 
 
 @numba.njit(cache=True)
@@ -120,9 +124,24 @@ def _march_tangent(x, normal, is_open, k, mu, start, force, state, anchor, ancho
 
 @numba.njit(cache=True)
 def _tangent_blocks(  # type: ignore[no-untyped-def]
-    state, anchor, anchor_sign, k, mu, k_n, basis, cos_table, sin_table, order, cos_stick, sin_stick, cos_slip, sin_slip, block_x, block_n
+    state,
+    anchor,
+    anchor_sign,
+    k,
+    mu,
+    k_n,
+    basis,
+    cos_table,
+    sin_table,
+    order,
+    cos_stick,
+    sin_stick,
+    cos_slip,
+    sin_slip,
+    block_x,
+    block_n,
 ):
-    """Derivatives of one tangential force by its own displacement and by the normal gap, from its intervals."""
+    """Add the derivatives of one tangential force by its own displacement and by the normal gap, from its intervals."""
     n = state.size
     cos_stick[:] = 0.0
     sin_stick[:] = 0.0
@@ -142,7 +161,9 @@ def _tangent_blocks(  # type: ignore[no-untyped-def]
             if a >= 0:
                 _outer(cos_row, sin_row, basis[a], order, -k / n, block_x)
                 if anchor_sign[i] != 0.0:
-                    _outer(cos_row, sin_row, basis[a], order, -anchor_sign[i] * mu * k_n / n, block_n)
+                    _outer(
+                        cos_row, sin_row, basis[a], order, -anchor_sign[i] * mu * k_n / n, block_n
+                    )
         elif state[i] == SLIP:
             while j < n and state[j] == SLIP and anchor_sign[j] == anchor_sign[i]:
                 j += 1
@@ -204,7 +225,16 @@ def contact_period(gap, parameters, basis, cos_table, sin_table, force, state, b
         for d in range(2):
             k = parameters[c, d]
             _march_tangent(
-                gap[c, d], normal, is_open, k, mu, parameters[c, 5], force[c, d], state[c, d], anchor, anchor_sign
+                gap[c, d],
+                normal,
+                is_open,
+                k,
+                mu,
+                parameters[c, 5],
+                force[c, d],
+                state[c, d],
+                anchor,
+                anchor_sign,
             )
             _tangent_blocks(
                 state[c, d], anchor, anchor_sign, k, mu, k_n, basis, cos_table, sin_table, order,

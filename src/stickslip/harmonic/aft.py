@@ -40,7 +40,9 @@ def _tables(order: int, samples: int) -> tuple[FloatArray, FloatArray, FloatArra
     return basis, cos_table, sin_table, analysis
 
 
-def contact_forces(gap_coefficients: FloatArray, parameters: FloatArray, samples: int) -> ContactPeriod:
+def contact_forces(
+    gap_coefficients: FloatArray, parameters: FloatArray, samples: int
+) -> ContactPeriod:
     """Evaluate contacts whose gaps have the given Fourier coefficients.
 
     Parameters

@@ -1,6 +1,7 @@
 """Harmonic balance: residual and Jacobian of ``r(q, ω) = Z q + B λ(Bᵀ q) - F`` in scaled unknowns."""
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from time import perf_counter
 
 import numpy as np
@@ -9,8 +10,8 @@ from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.contact.interface import Interface, SparseRows, add_contact_jacobian, sparse_rows
 from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces
-from stickslip.harmonic.dynamic_stiffness import CondensedStiffness
-from stickslip.harmonic.fourier import padded, real_block, to_complex, to_real
+from stickslip.harmonic.dynamic_stiffness import Condensed, CondensedStiffness
+from stickslip.harmonic.fourier import padded, to_complex, to_real
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +22,27 @@ class Linearisation:
     jac: FloatArray  # (size, size)
     jac_p: FloatArray  # (size,), by the parameter ω
     seconds_contact: float
+
+
+@dataclass(frozen=True, eq=False)
+class _LinearPart:
+    condensed: Condensed
+    matrix: FloatArray  # (n (2H+1), n (2H+1)) real form of the block-diagonal dynamic stiffness
+
+
+@lru_cache(maxsize=4)
+def _linear_part(linear: CondensedStiffness, order: int, omega: float) -> _LinearPart:
+    """Assemble the linear side at one frequency; kept, because a Newton iteration at fixed frequency asks for it at every step."""
+    condensed = linear.condensed(omega, order)
+    n = linear.n
+    matrix = np.zeros((n * (2 * order + 1), n * (2 * order + 1)), order="F")
+    matrix[:n, :n] = condensed.stiffness[0].real
+    for h in range(1, order + 1):
+        cos, sin = slice((2 * h - 1) * n, 2 * h * n), slice(2 * h * n, (2 * h + 1) * n)
+        matrix[cos, cos] = matrix[sin, sin] = condensed.stiffness[h].real
+        matrix[cos, sin] = condensed.stiffness[h].imag
+        matrix[sin, cos] = -condensed.stiffness[h].imag
+    return _LinearPart(condensed, matrix)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,23 +83,22 @@ class HarmonicBalance:
     def linearise(self, x: FloatArray, omega: float) -> Linearisation:
         """Return residual, Jacobian and ω-derivative at scaled unknowns `x` (size,) and `omega` (rad/s)."""
         n, m = self.linear.n, 2 * self.order + 1
-        condensed = self.linear.condensed(omega, self.order)
-        jac = np.zeros((self.size, self.size), order="F")
         factor = self.displacement_scale / self.force_scale
-        jac[:n, :n] = factor * condensed.stiffness[0].real
-        for h in range(1, self.order + 1):
-            block = slice((2 * h - 1) * n, (2 * h + 1) * n)
-            jac[block, block] = factor * real_block(condensed.stiffness[h])
+        part = _linear_part(self.linear, self.order, omega)
+        jac = factor * part.matrix
         q = self.coefficients(x)[:, :, None]
-        linear = (condensed.stiffness @ q)[:, :, 0] - condensed.load
-        slope = (condensed.derivative @ q)[:, :, 0] - condensed.load_derivative
+        linear = (part.condensed.stiffness @ q)[:, :, 0] - part.condensed.load
+        slope = (part.condensed.derivative @ q)[:, :, 0] - part.condensed.load_derivative
         start = perf_counter()
         period = self.contacts(x)
         add_contact_jacobian(period.blocks, self.rows.columns, self.rows.values, n, factor, jac)
         seconds = perf_counter() - start
         residual = to_real(linear) + period.coefficients @ self.interface.gap_operator
         return Linearisation(
-            residual.reshape(m * n) / self.force_scale, jac, to_real(slope).reshape(m * n) / self.force_scale, seconds
+            residual.reshape(m * n) / self.force_scale,
+            jac,
+            to_real(slope).reshape(m * n) / self.force_scale,
+            seconds,
         )
 
     def with_order(self, order: int) -> "HarmonicBalance":
@@ -85,7 +106,9 @@ class HarmonicBalance:
         return replace(self, order=order, samples=_checked_samples(self.samples, order))
 
 
-def harmonic_balance(linear: CondensedStiffness, interface: Interface, order: int, samples: int) -> HarmonicBalance:
+def harmonic_balance(
+    linear: CondensedStiffness, interface: Interface, order: int, samples: int
+) -> HarmonicBalance:
     """Set up the periodic problem.
 
     Parameters
@@ -106,7 +129,11 @@ def harmonic_balance(linear: CondensedStiffness, interface: Interface, order: in
     """
     missing = np.setdiff1d(interface.coordinates(), linear.retained)
     if missing.size:
-        raise input_error("harmonic_balance", f"contact dofs {missing[:5].tolist()} are not retained", "Retain all contact dofs.")
+        raise input_error(
+            "harmonic_balance",
+            f"contact dofs {missing[:5].tolist()} are not retained",
+            "Retain all contact dofs.",
+        )
     local = interface.restricted(linear.retained)
     force_scale = linear.load.scale
     if force_scale == 0.0:
@@ -134,6 +161,8 @@ def _typical_stiffness(contact: FloatArray, linear: CondensedStiffness) -> float
 def _checked_samples(samples: int, order: int) -> int:
     if samples < 4 * order + 1:
         raise input_error(
-            "samples", f"{samples} samples a period for {order} harmonics", f"Give at least {max(8 * order, 16)} (eight a harmonic)."
+            "samples",
+            f"{samples} samples a period for {order} harmonics",
+            f"Give at least {max(8 * order, 16)} (eight a harmonic).",
         )
     return samples

@@ -16,7 +16,9 @@ from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
 
-DIAGONAL_TOLERANCE = 1e-10  # off-diagonal modal damping below this share of the largest counts as proportional
+DIAGONAL_TOLERANCE = (
+    1e-10  # off-diagonal modal damping below this share of the largest counts as proportional
+)
 LARGEST_INTERIOR = 5000  # dense eigenproblem of the interior; reduce larger structures first
 
 
@@ -64,11 +66,12 @@ class CondensedStiffness:
         f_n, f_l = self._loads(order)
         d_nn, g_nn = _dynamic(self.nn, s)
         d_nl, g_nl = _dynamic(self.nl, s)
-        solved = self._solve_interior(s, np.concatenate([d_nl.transpose(0, 2, 1), f_l[:, :, None]], axis=2))
-        x_n, x_f = solved[:, :, :-1], solved[:, :, -1:]
+        solved = self._solve_interior(
+            s, np.concatenate([d_nl.transpose(0, 2, 1), f_l[:, :, None]], axis=2)
+        )
         _, g_ll = self._interior_dynamic(s)
         g_x = g_ll * solved if self.diagonal else g_ll @ solved
-        x_nt = x_n.transpose(0, 2, 1)
+        x_nt = solved[:, :, :-1].transpose(0, 2, 1)
         d_x = d_nl @ solved
         g_nl_x = g_nl @ solved
         stiffness = d_nn - d_x[:, :, :-1]
@@ -125,7 +128,9 @@ class CondensedStiffness:
         return np.linalg.solve(d_ll, right)
 
 
-def _dynamic(blocks: tuple[FloatArray, FloatArray, FloatArray], s: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+def _dynamic(
+    blocks: tuple[FloatArray, FloatArray, FloatArray], s: FloatArray
+) -> tuple[ComplexArray, ComplexArray]:
     """Return K + is C - s² M and its derivative by s, stacked over the frequencies `s` (H+1, 1, 1)."""
     k, c, m = blocks
     return k + 1j * s * c - s**2 * m, 1j * c - 2.0 * s * m
@@ -149,10 +154,16 @@ def condense(structure: Structure, retained: IntArray, load: HarmonicLoad) -> Co
         If a matrix is not symmetric, the interior is too large, or it can move freely.
     """
     if load.static.size != structure.n:
-        raise input_error("HarmonicLoad", f"{load.static.size} entries for {structure.n} dofs", "Give one a dof.")
+        raise input_error(
+            "HarmonicLoad", f"{load.static.size} entries for {structure.n} dofs", "Give one a dof."
+        )
     interior = np.setdiff1d(np.arange(structure.n), retained)
     if interior.size > LARGEST_INTERIOR:
-        raise input_error("condense", f"{interior.size} interior dofs", "Reduce the structure first (craig_bampton).")
+        raise input_error(
+            "condense",
+            f"{interior.size} interior dofs",
+            "Reduce the structure first (craig_bampton).",
+        )
     full = tuple(_dense_symmetric(structure, name) for name in ("stiffness", "damping", "mass"))
     nn = tuple(a[np.ix_(retained, retained)] for a in full)
     nl = tuple(a[np.ix_(retained, interior)] for a in full)
@@ -160,7 +171,14 @@ def condense(structure: Structure, retained: IntArray, load: HarmonicLoad) -> Co
     modes, diagonal = _interior_modes(*ll)
     ll = tuple(modes.T @ a @ modes for a in ll)
     return CondensedStiffness(
-        np.asarray(retained), interior, _three(nn), _three(tuple(a @ modes for a in nl)), _three(ll), modes, diagonal, load
+        np.asarray(retained),
+        interior,
+        _three(nn),
+        _three(tuple(a @ modes for a in nl)),
+        _three(ll),
+        modes,
+        diagonal,
+        load,
     )
 
 
@@ -169,7 +187,9 @@ def _three(blocks: tuple[FloatArray, ...]) -> tuple[FloatArray, FloatArray, Floa
     return k, c, m
 
 
-def _interior_modes(stiffness: FloatArray, damping: FloatArray, mass: FloatArray) -> tuple[FloatArray, bool]:
+def _interior_modes(
+    stiffness: FloatArray, damping: FloatArray, mass: FloatArray
+) -> tuple[FloatArray, bool]:
     """Return mass-normalised interior modes and whether they diagonalise the damping too; unit vectors if M is singular."""
     if stiffness.shape[0] == 0:
         return np.eye(0), True
@@ -192,7 +212,15 @@ def _dense_symmetric(structure: Structure, name: str) -> FloatArray:
     matrix = getattr(structure, name)
     dense = np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix, dtype=float)
     if not np.all(np.isfinite(dense)):
-        raise input_error(f"Structure.{name}", "contains NaN or infinite entries", "Check the model that was read.")
+        raise input_error(
+            f"Structure.{name}",
+            "contains NaN or infinite entries",
+            "Check the model that was read.",
+        )
     if np.max(np.abs(dense - dense.T), initial=0.0) > 1e-8 * np.max(np.abs(dense), initial=0.0):
-        raise input_error(f"Structure.{name}", "is not symmetric", "Give both triangles; gyroscopic terms are not supported yet.")
+        raise input_error(
+            f"Structure.{name}",
+            "is not symmetric",
+            "Give both triangles; gyroscopic terms are not supported yet.",
+        )
     return dense

@@ -31,7 +31,9 @@ class HarmonicLoad:
     def __post_init__(self) -> None:
         for order, amplitude in self.harmonics.items():
             if order < 1 or np.shape(amplitude) != self.static.shape:
-                raise ValueError(f"HarmonicLoad: harmonic {order} with shape {np.shape(amplitude)} for {self.static.shape}")
+                raise ValueError(
+                    f"HarmonicLoad: harmonic {order} with shape {np.shape(amplitude)} for {self.static.shape}"
+                )
 
     def coefficients(self, order: int) -> ComplexArray:
         """Return the (order+1, n) complex coefficients, harmonic 0 being the static load."""
@@ -45,4 +47,6 @@ class HarmonicLoad:
     @property
     def scale(self) -> float:
         """Largest force amplitude, N."""
-        return float(max(np.max(np.abs(f), initial=0.0) for f in (self.static, *self.harmonics.values())))
+        return float(
+            max(np.max(np.abs(f), initial=0.0) for f in (self.static, *self.harmonics.values()))
+        )

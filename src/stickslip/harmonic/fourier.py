@@ -32,8 +32,3 @@ def padded(coefficients: ComplexArray, order: int) -> ComplexArray:
     keep = min(order + 1, coefficients.shape[0])
     out[:keep] = coefficients[:keep]
     return out
-
-
-def real_block(matrix: ComplexArray) -> FloatArray:
-    """Return the real (2n, 2n) form of a complex (n, n) `matrix` acting on ``C - i S``, in the coordinates ``[C, S]``."""
-    return np.block([[matrix.real, matrix.imag], [-matrix.imag, matrix.real]])

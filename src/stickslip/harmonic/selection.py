@@ -32,7 +32,9 @@ class Alert:
     seconds_contact: float
 
 
-def jacobian_alert(low: HarmonicBalance, high: HarmonicBalance, x: FloatArray, omega: float, dofs: IntArray) -> Alert:
+def jacobian_alert(
+    low: HarmonicBalance, high: HarmonicBalance, x: FloatArray, omega: float, dofs: IntArray
+) -> Alert:
     """Predict how the missing harmonics would change a low-order solution.
 
     One Newton step in the larger space from the padded solution, ``Δq = -J̃⁻¹ r̃(q)``. Where the contact forces are homogeneous of

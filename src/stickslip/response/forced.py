@@ -26,7 +26,16 @@ from stickslip.solve.status import Status
 
 Selection = Literal["jacobian_alert", "always_low", "always_high"]
 Stage = Literal["low", "high", "peak"]
-LOAD_SHARES = (0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)  # excitation ramp where the first point does not converge at once
+LOAD_SHARES = (
+    0.05,
+    0.1,
+    0.2,
+    0.4,
+    0.6,
+    0.8,
+    1.0,
+)  # excitation ramp where the first point does not converge at once
+PEAK_RESOLUTION = 5e-4  # width of the bracket of the peak, relative to its frequency, at which it counts as resolved
 RESTARTS = 10  # gaps that a branch may have before it is given up
 
 
@@ -64,24 +73,30 @@ class Sweep:
     selection: Selection = "jacobian_alert"
     points: int = 40
     frequencies: int = 0
-    peak_points: int = 8
+    peak_points: int = 12
     newton: Newton = Newton()  # noqa: RUF009  # frozen
 
     def __post_init__(self) -> None:
         first, last = self.omega_range
         if not 0.0 < first < last:
             raise input_error(
-                "Sweep.omega_range", f"must be positive and growing, got {first:g} to {last:g} rad/s", "Swap the two ends."
+                "Sweep.omega_range",
+                f"must be positive and growing, got {first:g} to {last:g} rad/s",
+                "Swap the two ends.",
             )
         if not 1 <= self.low <= self.high:
-            raise input_error("Sweep", f"harmonics low = {self.low}, high = {self.high}", "Give 1 <= low <= high.")
+            raise input_error(
+                "Sweep", f"harmonics low = {self.low}, high = {self.high}", "Give 1 <= low <= high."
+            )
 
     @property
     def control(self) -> StepControl:
         """Step control of the branch: a step is at most a `points`-th of the range."""
         first, last = self.omega_range
         largest = 0.25
-        return StepControl(scale=(last - first) / (self.points * largest), first=0.05, largest=largest)
+        return StepControl(
+            scale=(last - first) / (self.points * largest), first=0.05, largest=largest
+        )
 
     @property
     def first_order(self) -> int:
@@ -227,7 +242,9 @@ def _alerted(problem: ForcedProblem, point: ForcedPoint) -> bool:
 # ---- first passage ----------------------------------------------------------------------------------------------------
 
 
-def _first_passage(problem: ForcedProblem, load: HarmonicLoad, done: list[ForcedPoint]) -> Iterator[ForcedPoint]:
+def _first_passage(
+    problem: ForcedProblem, load: HarmonicLoad, done: list[ForcedPoint]
+) -> Iterator[ForcedPoint]:
     balance, sweep = problem.low, problem.sweep
     weights = problem.weights(balance)
     end = sweep.omega_range[1]
@@ -256,10 +273,14 @@ def _first_passage(problem: ForcedProblem, load: HarmonicLoad, done: list[Forced
             restarts += 1
 
 
-def _steps(balance: HarmonicBalance, start: Point, sweep: Sweep, weights: FloatArray) -> Iterator[Point]:
+def _steps(
+    balance: HarmonicBalance, start: Point, sweep: Sweep, weights: FloatArray
+) -> Iterator[Point]:
     first, last = sweep.omega_range
     if not sweep.frequencies:
-        yield from trace(balance, start, last, options=sweep.newton, control=sweep.control, weights=weights)
+        yield from trace(
+            balance, start, last, options=sweep.newton, control=sweep.control, weights=weights
+        )
         return
     for omega in np.linspace(first, last, sweep.frequencies):
         if omega > start.p:
@@ -276,7 +297,9 @@ def _first_point(problem: ForcedProblem, load: HarmonicLoad, omega: float) -> Po
     bonded = balance.coefficients(bonded_start(balance, omega, problem.system))
     guess = bonded.copy()
     guess[0] = preload(problem.system, load.static)
-    point = start_point(balance, balance.unknowns(guess), omega, sweep.newton, sweep.control, weights)
+    point = start_point(
+        balance, balance.unknowns(guess), omega, sweep.newton, sweep.control, weights
+    )
     if point.solution.status.converged:
         return point
     x = balance.unknowns(np.concatenate([guess[:1], LOAD_SHARES[0] * guess[1:]]))
@@ -305,11 +328,18 @@ def _low_point(problem: ForcedProblem, point: Point, index: int, began: float) -
 
 def _as_branch_point(balance: HarmonicBalance, point: ForcedPoint) -> Point:
     x = balance.unknowns(point.coefficients)
-    return Point(x, point.omega, point.tangent, point.step, Solution(x, point.status, 0, 0.0, 0.0, 0.0))
+    return Point(
+        x, point.omega, point.tangent, point.step, Solution(x, point.status, 0, 0.0, 0.0, 0.0)
+    )
 
 
 def _forced_point(
-    balance: HarmonicBalance, solution: Solution, stage: Stage, index: int, omega: float, seconds: float
+    balance: HarmonicBalance,
+    solution: Solution,
+    stage: Stage,
+    index: int,
+    omega: float,
+    seconds: float,
 ) -> ForcedPoint:
     return ForcedPoint(
         stage, index, omega, balance.coefficients(solution.x), np.zeros(0), 0.0, solution.status, solution.iterations,
@@ -325,7 +355,9 @@ def _nearest_high(high: dict[int, ForcedPoint], index: int) -> ForcedPoint | Non
     return min(converged, key=lambda p: abs(p.index - index), default=None)
 
 
-def _repeat(problem: ForcedProblem, point: ForcedPoint, neighbour: ForcedPoint | None) -> ForcedPoint:
+def _repeat(
+    problem: ForcedProblem, point: ForcedPoint, neighbour: ForcedPoint | None
+) -> ForcedPoint:
     """Solve a frequency with more harmonics: from q + Δq, from q, or along the branch from a repeated neighbour."""
     began = perf_counter()
     balance, options = problem.high, problem.sweep.newton
@@ -338,7 +370,9 @@ def _repeat(problem: ForcedProblem, point: ForcedPoint, neighbour: ForcedPoint |
             break
     if not spent[-1].status.converged and neighbour is not None:
         spent.append(_along_branch(problem, neighbour, point.omega))
-    made = _forced_point(balance, spent[-1], "high", point.index, point.omega, perf_counter() - began)
+    made = _forced_point(
+        balance, spent[-1], "high", point.index, point.omega, perf_counter() - began
+    )
     return replace(
         made,
         iterations=sum(s.iterations for s in spent),
@@ -365,14 +399,11 @@ def _resolve_peak(
     """Add points at the vertex of the parabola through the highest point and its neighbours on the branch."""
     known = [p for p in accepted if p.converged]
     heights = [problem.amplitude(p) for p in known]
-    span = problem.sweep.omega_range[1] - problem.sweep.omega_range[0]
     for index in range(problem.sweep.peak_points):
         omega = _vertex(known, heights)
         if omega is None:
             return
         top = int(np.argmax(heights))
-        if min(abs(p.omega - omega) for p in known[top - 1 : top + 2]) < 1e-6 * span:
-            return
         if index < len(done):
             point = done[index]
         else:
@@ -386,24 +417,19 @@ def _resolve_peak(
 
 
 def _vertex(known: list[ForcedPoint], heights: list[float]) -> float | None:
-    """Frequency of the parabola's vertex; None at the ends of the branch or where it folds."""
-    if not heights:
-        return None
-    top = int(np.argmax(heights))
+    """Where to look next for the peak; None when it is resolved, at the ends of the branch, or where it folds."""
+    top = int(np.argmax(heights)) if heights else 0
     if top in (0, len(known) - 1):
         return None
     a, b, c = (known[i].omega for i in (top - 1, top, top + 1))
-    if not a < b < c:
-        return None
     u, v, w = (heights[i] for i in (top - 1, top, top + 1))
-    below, above = (b - a) * (v - w), (b - c) * (v - u)
-    if below == above:
+    if not a < b < c or c - a < PEAK_RESOLUTION * b:
         return None
-    vertex = b - 0.5 * ((b - a) * below - (b - c) * above) / (below - above)
-    # a kinked peak puts the vertex onto the old point: halve the wider side instead
-    if abs(vertex - b) < 1e-3 * (c - a):
-        vertex = b + 0.5 * (c - b) if c - b > b - a else b - 0.5 * (b - a)
-    return float(vertex) if (c - a) > 1e-5 * b else None
+    below, above = (b - a) * (v - w), (b - c) * (v - u)
+    # a kink holds the parabola on one side of the peak: halve the other side once it is three times as wide
+    if max(c - b, b - a) > 3.0 * min(c - b, b - a) or below == above:
+        return 0.5 * (b + c) if c - b > b - a else 0.5 * (a + b)
+    return float(b - 0.5 * ((b - a) * below - (b - c) * above) / (below - above))
 
 
 def _peak_point(problem: ForcedProblem, top: ForcedPoint, omega: float, index: int) -> ForcedPoint:
@@ -411,10 +437,14 @@ def _peak_point(problem: ForcedProblem, top: ForcedPoint, omega: float, index: i
     sweep = problem.sweep
     balance = problem.low if top.order == problem.low.order else problem.high
     weights = problem.weights(balance)
-    start = start_point(balance, balance.unknowns(top.coefficients), top.omega, sweep.newton, sweep.control, weights)
+    start = start_point(
+        balance, balance.unknowns(top.coefficients), top.omega, sweep.newton, sweep.control, weights
+    )
     point = step_to(balance, start, omega, sweep.newton, sweep.control, weights)
     if balance is problem.low:
-        made = replace(_low_point(problem, point, index, began), stage="peak", tangent=np.zeros(0), step=0.0)
+        made = replace(
+            _low_point(problem, point, index, began), stage="peak", tangent=np.zeros(0), step=0.0
+        )
         if not _alerted(problem, made):
             return made
         repeated = _repeat(problem, made, None)

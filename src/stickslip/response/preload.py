@@ -12,7 +12,14 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.system import System
 from stickslip.solve.newton import Newton, Solution, newton, solve_dense
 
-RAMP = (0.1, 0.2, 0.4, 0.6, 0.8, 1.0)  # shares of the load when the full one does not converge at once
+RAMP = (
+    0.1,
+    0.2,
+    0.4,
+    0.6,
+    0.8,
+    1.0,
+)  # shares of the load when the full one does not converge at once
 
 
 def preload(system: System, static_load: FloatArray, options: Newton | None = None) -> FloatArray:

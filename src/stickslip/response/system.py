@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse
 
-from stickslip.arrays import FloatArray, IntArray
+from stickslip.arrays import IntArray
 from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
 from stickslip.model.structure import Structure
@@ -64,13 +64,23 @@ class System:
             return self
         added = np.zeros(self.structure.n)
         mass = np.asarray(self.structure.mass[self.free][:, self.free])
-        translation = [i for i, d in enumerate(self.free) if not self.structure.dofs.component[d].startswith("r")]
+        translation = [
+            i
+            for i, d in enumerate(self.free)
+            if not self.structure.dofs.component[d].startswith("r")
+        ]
         body_mass = float(np.max(np.diagonal(mass)[translation])) if translation else 1.0
         for i, dof in enumerate(self.free):
             rotation = self.structure.dofs.component[dof].startswith("r")
             added[dof] = stiffness * (mass[i, i] / body_mass if rotation else 1.0)
-        diagonal = scipy.sparse.diags_array(added) if scipy.sparse.issparse(self.structure.stiffness) else np.diag(added)
-        return replace(self, structure=replace(self.structure, stiffness=self.structure.stiffness + diagonal))
+        diagonal = (
+            scipy.sparse.diags_array(added)
+            if scipy.sparse.issparse(self.structure.stiffness)
+            else np.diag(added)
+        )
+        return replace(
+            self, structure=replace(self.structure, stiffness=self.structure.stiffness + diagonal)
+        )
 
     def stuck_structure(self) -> Structure:
         """Return the linear structure with every contact bonded through its springs."""

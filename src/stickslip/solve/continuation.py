@@ -120,18 +120,29 @@ def _border(problem: Problem, y: FloatArray, row: FloatArray, value: float) -> _
     return _Bordered(np.append(at.residual, row @ y - value), jac, at.seconds_contact)
 
 
-def start_point(problem: Problem, x: FloatArray, p: float, options: Newton, control: StepControl, weights: FloatArray) -> Point:
+def start_point(
+    problem: Problem,
+    x: FloatArray,
+    p: float,
+    options: Newton,
+    control: StepControl,
+    weights: FloatArray,
+) -> Point:
     """Solve at fixed `p` from the guess `x` and find the direction of growing parameter."""
     solution = newton(lambda v: problem.linearise(v, p), x, options)
     tangent = np.zeros(x.size + 1)
     tangent[-1] = 1.0
     if solution.status.converged:
-        tangent = _tangent(problem, np.append(solution.x, p), tangent, _measure(solution.x, weights, control))
+        tangent = _tangent(
+            problem, np.append(solution.x, p), tangent, _measure(solution.x, weights, control)
+        )
     return Point(solution.x, p, tangent, control.first, solution)
 
 
-def _tangent(problem: Problem, y: FloatArray, previous: FloatArray, measure: _Measure) -> FloatArray:
-    """Unit tangent at a solution, on the side of `previous`; `previous` itself at a singular point."""
+def _tangent(
+    problem: Problem, y: FloatArray, previous: FloatArray, measure: _Measure
+) -> FloatArray:
+    """Return the unit tangent at a solution, on the side of `previous`; `previous` itself at a singular point."""
     at = _border(problem, y, previous, 0.0)
     right = np.zeros(y.size)
     right[-1] = 1.0
@@ -142,7 +153,13 @@ def _tangent(problem: Problem, y: FloatArray, previous: FloatArray, measure: _Me
 
 
 def trace(
-    problem: Problem, start: Point, end: float, *, options: Newton, control: StepControl, weights: FloatArray
+    problem: Problem,
+    start: Point,
+    end: float,
+    *,
+    options: Newton,
+    control: StepControl,
+    weights: FloatArray,
 ) -> Iterator[Point]:
     """Follow a branch from `start` until its parameter passes `end`.
 
@@ -177,7 +194,12 @@ def trace(
 
 
 def _advance(
-    problem: Problem, point: Point, end: float, options: Newton, control: StepControl, weights: FloatArray
+    problem: Problem,
+    point: Point,
+    end: float,
+    options: Newton,
+    control: StepControl,
+    weights: FloatArray,
 ) -> Point:
     measure = _measure(point.x, weights, control)
     unit = point.tangent / measure.of(point.tangent)
@@ -200,12 +222,26 @@ def _advance(
         iterations += solution.iterations
         moved = measure.of(solution.x - y)
         if solution.status.converged and moved <= 4.0 * step:
-            tangent = _tangent(problem, solution.x, unit if not passes else point.tangent, _measure(solution.x[:-1], weights, control))
+            tangent = _tangent(
+                problem,
+                solution.x,
+                unit if not passes else point.tangent,
+                _measure(solution.x[:-1], weights, control),
+            )
             turn = _cosine(unit, tangent, measure)
             if turn > 0.5 or step < 4 * control.smallest:
                 p = end if passes else float(solution.x[-1])
-                done = Solution(solution.x[:-1], Status.CONVERGED, iterations, solution.residual_norm, contact, linear)
-                return Point(done.x, p, tangent, _next_step(step, solution.iterations, turn, control), done)
+                done = Solution(
+                    solution.x[:-1],
+                    Status.CONVERGED,
+                    iterations,
+                    solution.residual_norm,
+                    contact,
+                    linear,
+                )
+                return Point(
+                    done.x, p, tangent, _next_step(step, solution.iterations, turn, control), done
+                )
         step *= 0.5
     failed = Solution(point.x, Status.STEP_TOO_SMALL, iterations, np.nan, contact, linear)
     return Point(point.x, point.p, point.tangent, control.first, failed)
@@ -224,7 +260,14 @@ def _next_step(step: float, iterations: int, turn: float, control: StepControl) 
     return float(np.clip(step * factor, control.smallest, control.largest))
 
 
-def step_to(problem: Problem, point: Point, p: float, options: Newton, control: StepControl, weights: FloatArray) -> Point:
+def step_to(
+    problem: Problem,
+    point: Point,
+    p: float,
+    options: Newton,
+    control: StepControl,
+    weights: FloatArray,
+) -> Point:
     """Go from `point` to the parameter value `p`: one predicted step, or the branch between where that fails.
 
     Returns
@@ -244,8 +287,13 @@ def step_to(problem: Problem, point: Point, p: float, options: Newton, control: 
     contact, linear = direct.solution.seconds_contact, direct.solution.seconds_linear
     for last in trace(problem, point, p, options=options, control=control, weights=weights):
         iterations += last.solution.iterations
-        contact, linear = contact + last.solution.seconds_contact, linear + last.solution.seconds_linear
+        contact, linear = (
+            contact + last.solution.seconds_contact,
+            linear + last.solution.seconds_linear,
+        )
     reached = last.p == p and last.solution.status.converged
     ended = last if reached else direct
-    solution = replace(ended.solution, iterations=iterations, seconds_contact=contact, seconds_linear=linear)
+    solution = replace(
+        ended.solution, iterations=iterations, seconds_contact=contact, seconds_linear=linear
+    )
     return replace(ended, p=p, solution=solution)

@@ -58,7 +58,9 @@ class Solution:
     seconds_linear: float
 
 
-def newton(evaluate: Callable[[FloatArray], Evaluation], x: FloatArray, options: Newton) -> Solution:
+def newton(
+    evaluate: Callable[[FloatArray], Evaluation], x: FloatArray, options: Newton
+) -> Solution:
     """Solve ``residual(x) = 0``.
 
     A step is shortened until the residual norm falls below the largest of the last few (non-monotone line search after Grippo et al.
@@ -102,14 +104,20 @@ def newton(evaluate: Callable[[FloatArray], Evaluation], x: FloatArray, options:
         x = x + share * step
         at = trial
         norms.append(norm)
-    return Solution(x, Status.TOO_MANY_ITERATIONS, options.max_iterations, norms[-1], contact, linear)
+    return Solution(
+        x, Status.TOO_MANY_ITERATIONS, options.max_iterations, norms[-1], contact, linear
+    )
 
 
 def solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
     """Solve a dense system by LU; None if the matrix is singular to working precision. `matrix` is overwritten."""
     lu, pivots, info = scipy.linalg.lapack.dgetrf(matrix, overwrite_a=True)
     diagonal = np.abs(np.diagonal(lu))
-    if info != 0 or not np.all(np.isfinite(diagonal)) or diagonal.min() <= SINGULAR * diagonal.max():
+    if (
+        info != 0
+        or not np.all(np.isfinite(diagonal))
+        or diagonal.min() <= SINGULAR * diagonal.max()
+    ):
         return None
     solution, _ = scipy.linalg.lapack.dgetrs(lu, pivots, right)
     return np.asarray(solution, dtype=float)

@@ -47,16 +47,30 @@ class ElasticCoulomb:
         for name in ("k_t", "k_w", "k_n", "mu"):
             value = getattr(self, name)
             if not np.isfinite(value) or value < 0:
-                raise input_error(f"ElasticCoulomb.{name}", f"must be finite and not negative, got {value}", "Give it in SI units.")
+                raise input_error(
+                    f"ElasticCoulomb.{name}",
+                    f"must be finite and not negative, got {value}",
+                    "Give it in SI units.",
+                )
         if not np.isfinite(self.preload):
-            raise input_error("ElasticCoulomb.preload", f"must be finite, got {self.preload}", "Give it in newtons.")
+            raise input_error(
+                "ElasticCoulomb.preload",
+                f"must be finite, got {self.preload}",
+                "Give it in newtons.",
+            )
         if max(self.k_t, self.k_w, self.k_n) == 0.0:
             raise input_error(
-                "ElasticCoulomb", "all contact stiffnesses are zero", "Give at least one, or remove the contact."
+                "ElasticCoulomb",
+                "all contact stiffnesses are zero",
+                "Give at least one, or remove the contact.",
             )
         m = self.residual_traction
         if m is not None and not -1.0 <= m <= 1.0:
-            raise input_error("ElasticCoulomb.residual_traction", f"must lie in [-1, 1], got {m}", "It is a share of mu N.")
+            raise input_error(
+                "ElasticCoulomb.residual_traction",
+                f"must lie in [-1, 1], got {m}",
+                "It is a share of mu N.",
+            )
 
     def parameters(self) -> FloatArray:
         """Return ``(k_t, k_w, k_n, mu, preload, residual_traction or NaN)`` for the compiled kernels."""

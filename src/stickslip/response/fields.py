@@ -1,0 +1,77 @@
+"""Everything that is reported at one point of a response, recovered from its retained coordinates."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.harmonic.aft import contact_forces
+from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.response.forced import ForcedPoint, ForcedProblem
+
+
+@dataclass(frozen=True, eq=False)
+class Fields:
+    """Harmonics 0..order of all that is reported.
+
+    Attributes
+    ----------
+    outputs
+        (order+1, n_outputs) displacement of the output dofs, m.
+    gaps, forces
+        (order+1, n_contacts, 3) gaps in m and contact forces in N, along t, w, n.
+    energy
+        (n_contacts,) energy dissipated per cycle, J.
+    """
+
+    outputs: ComplexArray
+    gaps: ComplexArray
+    forces: ComplexArray
+    energy: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """One period at the contacts.
+
+    Attributes
+    ----------
+    time
+        (samples,) s.
+    gap, force
+        (n_contacts, 3, samples) in m and N.
+    state
+        (n_contacts, 2, samples): 0 stick, 1 slip, 2 open, for t and w.
+    """
+
+    time: FloatArray
+    gap: FloatArray
+    force: FloatArray
+    state: IntArray
+
+
+def fields(problem: ForcedProblem, point: ForcedPoint) -> Fields:
+    """Recover outputs, gaps, forces and dissipated energy at a point.
+
+    The energy is the work of the tangential forces over the sampled period, which is exact for the harmonics kept:
+    ``E = π Σ_h h Im(conj(G_h) Λ_h)`` (the normal spring is conservative and drops out).
+    """
+    linear, interface = problem.low.linear, problem.low.interface
+    outputs = linear.recover(point.omega, point.coefficients)[:, problem.system.outputs]
+    gaps = point.coefficients @ interface.gap_operator.T
+    period = contact_forces(to_real(gaps), problem.low.parameters, problem.sweep.samples)
+    forces = to_complex(period.coefficients)
+    h = np.arange(gaps.shape[0])[:, None]
+    work = np.pi * np.sum(h * np.imag(np.conj(gaps) * forces), axis=0)
+    shape = (gaps.shape[0], interface.n_contacts, 3)
+    energy = work.reshape(interface.n_contacts, 3)[:, :2].sum(axis=1)
+    return Fields(outputs, gaps.reshape(shape), forces.reshape(shape), energy)
+
+
+def signals(problem: ForcedProblem, point: ForcedPoint) -> Signals:
+    """Return one period of gaps, forces and states at the contacts, at the samples of the sweep."""
+    gaps = point.coefficients @ problem.low.interface.gap_operator.T
+    period = contact_forces(to_real(gaps), problem.low.parameters, problem.sweep.samples)
+    samples = problem.sweep.samples
+    time = np.arange(samples) / samples * 2.0 * np.pi / point.omega
+    return Signals(time, period.gap, period.force, period.state)
