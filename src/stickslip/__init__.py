@@ -1,3 +1,127 @@
-"""stickslip: vibration of bladed disks coupled by friction joints."""
+"""stickslip: vibration of bladed disks coupled by friction joints.
+
+The public names below can be imported from here; their modules are loaded when a name is first used (PEP 562), so
+that ``import stickslip`` loads neither numba nor a mesher, and ``stickslip --help`` answers at once.
+"""
+
+import importlib
+from typing import TYPE_CHECKING
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from stickslip.contact.interface import Interface
+    from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+    from stickslip.errors import (
+        InputError,
+        SingularError,
+        StickslipError,
+    )
+    from stickslip.harmonic.aft import contact_forces
+    from stickslip.harmonic.excitation import HarmonicLoad
+    from stickslip.model.damper import (
+        ContactPoints,
+        FlatCurvedDamper,
+    )
+    from stickslip.model.dofs import Dofs
+    from stickslip.model.rigid_body import RigidBody
+    from stickslip.model.structure import (
+        Structure,
+        join,
+    )
+    from stickslip.report.page import write_report
+    from stickslip.response.fields import (
+        Fields,
+        Signals,
+        fields,
+        signals,
+    )
+    from stickslip.response.forced import (
+        ForcedPoint,
+        Sweep,
+        accepted_points,
+        forced_response,
+    )
+    from stickslip.response.preload import preload
+    from stickslip.response.system import System
+    from stickslip.response.transient import (
+        TimeStepping,
+        TransientResult,
+        integrate,
+    )
+    from stickslip.solve.newton import Newton
+    from stickslip.solve.status import Status
+    from stickslip.study.schema import (
+        Study,
+        read_study,
+    )
+
+_MODULES = {
+    "stickslip.contact.interface": ("Interface",),
+    "stickslip.contact.laws.elastic_coulomb": ("ElasticCoulomb",),
+    "stickslip.errors": ("InputError", "SingularError", "StickslipError"),
+    "stickslip.harmonic.aft": ("contact_forces",),
+    "stickslip.harmonic.excitation": ("HarmonicLoad",),
+    "stickslip.model.damper": ("ContactPoints", "FlatCurvedDamper"),
+    "stickslip.model.dofs": ("Dofs",),
+    "stickslip.model.rigid_body": ("RigidBody",),
+    "stickslip.model.structure": ("Structure", "join"),
+    "stickslip.report.page": ("write_report",),
+    "stickslip.response.fields": ("Fields", "Signals", "fields", "signals"),
+    "stickslip.response.forced": ("ForcedPoint", "Sweep", "accepted_points", "forced_response"),
+    "stickslip.response.preload": ("preload",),
+    "stickslip.response.system": ("System",),
+    "stickslip.response.transient": ("TimeStepping", "TransientResult", "integrate"),
+    "stickslip.solve.newton": ("Newton",),
+    "stickslip.solve.status": ("Status",),
+    "stickslip.study.schema": ("Study", "read_study"),
+}
+_HOME = {name: module for module, names in _MODULES.items() for name in names}
+
+__all__ = [
+    "ContactPoints",
+    "Dofs",
+    "ElasticCoulomb",
+    "Fields",
+    "FlatCurvedDamper",
+    "ForcedPoint",
+    "HarmonicLoad",
+    "InputError",
+    "Interface",
+    "Newton",
+    "RigidBody",
+    "Signals",
+    "SingularError",
+    "Status",
+    "StickslipError",
+    "Structure",
+    "Study",
+    "Sweep",
+    "System",
+    "TimeStepping",
+    "TransientResult",
+    "__version__",
+    "accepted_points",
+    "contact_forces",
+    "fields",
+    "forced_response",
+    "integrate",
+    "join",
+    "preload",
+    "read_study",
+    "signals",
+    "write_report",
+]
+
+
+def __getattr__(name: str) -> object:
+    """Load the module of a public name when it is first asked for."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'stickslip' has no attribute {name!r}")
+    value: object = getattr(importlib.import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,63 @@
+"""Run every benchmark and write ``benchmarks/out/results.json``.
+
+A benchmark is a module ``benchmarks/bench_*.py`` with a function ``run()`` that returns a list of records with
+the keys of `KEYS`: ``name`` like ``forced/newton_over_lapack``, the ``value`` measured, the ``goal`` as a text with
+its unit (``"<= 2"``), whether it ``holds``, and a ``note`` on what was measured how. A goal that is missed stays in the list.
+
+    python -m benchmarks            # all
+    python -m benchmarks forced     # only modules whose name contains the word; nothing is written
+"""
+
+import importlib
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+HERE = Path(__file__).parent
+KEYS = {"name", "value", "goal", "holds", "note"}
+
+
+def collect(word: str = "") -> list[dict[str, Any]]:
+    """Run the modules whose name contains `word` and return their records."""
+    records = []
+    for path in sorted(HERE.glob("bench_*.py")):
+        if word not in path.stem:
+            continue
+        for record in importlib.import_module(f"benchmarks.{path.stem}").run():
+            if set(record) != KEYS:
+                raise ValueError(
+                    f"{path.name}: a record has the keys {sorted(record)}, not {sorted(KEYS)}"
+                )
+            records.append(record)
+    return records
+
+
+def table(records: list[dict[str, Any]]) -> Table:
+    """Lay the records out for the terminal."""
+    out = Table("benchmark", "value", "goal", "holds", "note", title="Benchmarks")
+    for record in records:
+        holds = "yes" if record["holds"] else "[bold red]no[/]"
+        value = record["value"]
+        shown = f"{value:.4g}" if isinstance(value, float) else str(value)
+        out.add_row(record["name"], shown, str(record["goal"]), holds, record["note"])
+    return out
+
+
+def main() -> int:
+    """Run, print and write; a missed goal is a result, not a failure."""
+    word = sys.argv[1] if len(sys.argv) > 1 else ""
+    records = collect(word)
+    Console().print(table(records))
+    if not word:
+        out = HERE / "out" / "results.json"
+        out.parent.mkdir(exist_ok=True)
+        out.write_text(json.dumps(records, indent=1) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

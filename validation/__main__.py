@@ -1,0 +1,72 @@
+"""Run every comparison and write ``validation/out/results.json``.
+
+A case is a module ``validation/case_*.py`` with a function ``run()`` that returns a list of records with the keys of
+`KEYS`: the ``case``, the ``quantity`` with its unit, the value that is ``ours``, the ``reference``, the ``tolerance``
+(relative unless the quantity says otherwise), whether it ``holds``, and the ``source`` of the reference. The page
+``docs/validation.md`` shows the list.
+
+    python -m validation            # all
+    python -m validation jenkins    # only modules whose name contains the word; nothing is written
+
+The exit code is 1 when a comparison does not hold.
+"""
+
+import importlib
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+HERE = Path(__file__).parent
+KEYS = {"case", "quantity", "ours", "reference", "tolerance", "holds", "source"}
+
+
+def collect(word: str = "") -> list[dict[str, Any]]:
+    """Run the modules whose name contains `word` and return their records."""
+    records = []
+    for path in sorted(HERE.glob("case_*.py")):
+        if word not in path.stem:
+            continue
+        for record in importlib.import_module(f"validation.{path.stem}").run():
+            if set(record) != KEYS:
+                raise ValueError(
+                    f"{path.name}: a record has the keys {sorted(record)}, not {sorted(KEYS)}"
+                )
+            records.append(record)
+    return records
+
+
+def table(records: list[dict[str, Any]]) -> Table:
+    """Lay the records out for the terminal."""
+    out = Table(
+        "case", "quantity", "ours", "reference", "tolerance", "holds", "source", title="Validation"
+    )
+    for record in records:
+        numbers = [
+            f"{record[key]:.9g}" if isinstance(record[key], float) else str(record[key])
+            for key in ("ours", "reference", "tolerance")
+        ]
+        holds = "yes" if record["holds"] else "[bold red]no[/]"
+        out.add_row(record["case"], record["quantity"], *numbers, holds, record["source"])
+    return out
+
+
+def main() -> int:
+    """Run, print and write; 1 when a comparison does not hold."""
+    word = sys.argv[1] if len(sys.argv) > 1 else ""
+    records = collect(word)
+    Console().print(table(records))
+    failed = [record for record in records if not record["holds"]]
+    Console().print(f"{len(records) - len(failed)} of {len(records)} comparisons hold.")
+    if not word:
+        out = HERE / "out" / "results.json"
+        out.parent.mkdir(exist_ok=True)
+        out.write_text(json.dumps(records, indent=1) + "\n")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
