@@ -50,9 +50,7 @@ def response(hz: FloatArray, excitation: float, ratio: float) -> FloatArray:
     return low
 
 
-def march(
-    gap: FloatArray, preload: FloatArray
-) -> tuple[FloatArray, IntArray]:
+def march(gap: FloatArray, preload: FloatArray) -> tuple[FloatArray, IntArray]:
     """Force and state (0 stick, 1 slip, 2 open) of elastic Coulomb points over the last of two periods.
 
     `gap` is (..., contact, 3, sample); returns force of that shape and state (..., contact, 2, sample).
@@ -77,8 +75,8 @@ def contact_motion(amplitude: FloatArray) -> FloatArray:
     """Gaps (point, contact, 3, sample) in m that go with a tip amplitude (point,)."""
     phase = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
     contact = np.arange(len(CONTACTS))
-    share = 0.02 * (1 + 0.12 * np.sin(1.7 * contact))[:, None]
-    lag = 0.3 * contact[:, None]
+    share = 0.006 * (1 + 0.12 * np.sin(1.7 * contact))[:, None]
+    lag = 0.25 * contact[:, None]
     wave = np.stack(
         [
             share * np.cos(phase - 0.1 * lag),
@@ -102,7 +100,9 @@ def parts(values: np.ndarray) -> FloatArray:
     return np.stack([values.real, values.imag], axis=-1)
 
 
-def box(lower: Sequence[float], upper: Sequence[float], n: Sequence[int]) -> tuple[FloatArray, IntArray]:
+def box(
+    lower: Sequence[float], upper: Sequence[float], n: Sequence[int]
+) -> tuple[FloatArray, IntArray]:
     """Triangulated surface of a box."""
     points, faces, start = [], [], 0
     for axis in range(3):
@@ -165,8 +165,7 @@ def branch(ratio: float, n: int, failed: int) -> dict[str, np.ndarray]:
     refinement = np.repeat([0, 1], [n, 3])
     hz = np.concatenate([hz, fine])
     amplitude = response(hz, excitation, ratio)
-    share = amplitude / excitation / 3e-6
-    error = 60.0 / (1 + (ratio / 6) ** 2) * np.clip(share - 0.15, 0, None) ** 1.5
+    error = 70.0 / (1 + (ratio / 4) ** 4) * (coarse.max() / amplitude) ** -1.6
     error = np.where(error > 1e-3, error, 1e-12)
     order = np.where(error > 5.0, HIGH, 1)
     real = np.where(order == HIGH, 0.8 * error * (1 + 0.3 * np.cos(hz)), np.nan)
@@ -186,7 +185,9 @@ def _variable(dims: str, values: object, units: str, long_name: str) -> xr.Varia
     return xr.Variable(tuple(dims.split()), np.asarray(values), attributes)
 
 
-def _case_variables(table: dict[str, np.ndarray], ratios: FloatArray, peak: IntArray) -> dict[str, xr.Variable]:
+def _case_variables(
+    table: dict[str, np.ndarray], ratios: FloatArray, peak: IntArray
+) -> dict[str, xr.Variable]:
     case, status, order = table["case"], table["status"], table["order"]
     cases = range(len(ratios))
 
@@ -230,10 +231,27 @@ def _point_variables(table: dict[str, np.ndarray], preload: FloatArray) -> dict[
     share = np.array([1.0, 0.04, 0.7])
     output = np.zeros((n, HIGH + 1, len(OUTPUTS)), dtype=complex)
     output[:, 1] = amplitude[:, None] * share
-    units = {"frequency_hz": "Hz", "predicted_error_percent": "percent", "real_error_percent": "percent"}
-    plain = ("case", "frequency_hz", "order", "status", "predicted_error_percent", "real_error_percent", "refinement")
-    result = {k: _variable("point", table[k], units.get(k, "1"), k.replace("_", " ")) for k in plain}
-    result["status"].attrs |= {"flag_values": [0, 1, 2], "flag_meanings": "converged max_iterations small_step"}
+    units = {
+        "frequency_hz": "Hz",
+        "predicted_error_percent": "percent",
+        "real_error_percent": "percent",
+    }
+    plain = (
+        "case",
+        "frequency_hz",
+        "order",
+        "status",
+        "predicted_error_percent",
+        "real_error_percent",
+        "refinement",
+    )
+    result = {
+        k: _variable("point", table[k], units.get(k, "1"), k.replace("_", " ")) for k in plain
+    }
+    result["status"].attrs |= {
+        "flag_values": [0, 1, 2],
+        "flag_meanings": "converged max_iterations small_step",
+    }
     return result | {
         "newton_iterations": _variable("point", np.full(n, 4), "1", "Newton iterations"),
         "seconds": _variable("point", np.full(n, 0.011), "s", "time of the point"),
@@ -249,7 +267,9 @@ def _point_variables(table: dict[str, np.ndarray], preload: FloatArray) -> dict[
     }  # fmt: skip
 
 
-def _peak_variables(table: dict[str, np.ndarray], peak: IntArray, preload: FloatArray) -> dict[str, xr.Variable]:
+def _peak_variables(
+    table: dict[str, np.ndarray], peak: IntArray, preload: FloatArray
+) -> dict[str, xr.Variable]:
     gap = contact_motion(table["amplitude"][peak])
     force, state = march(gap, preload)
     time = np.arange(SAMPLES) / SAMPLES / table["frequency_hz"][peak][:, None]
@@ -259,8 +279,12 @@ def _peak_variables(table: dict[str, np.ndarray], peak: IntArray, preload: Float
     result = {
         "peak_time": _variable("load_case sample", time, "s", "time in the period"),
         "peak_gap": _variable("load_case contact direction sample", gap, "m", "gap at the peak"),
-        "peak_force": _variable("load_case contact direction sample", force, "N", "force at the peak"),
-        "peak_state": _variable("load_case contact tangent sample", state, "1", "state at the peak"),
+        "peak_force": _variable(
+            "load_case contact direction sample", force, "N", "force at the peak"
+        ),
+        "peak_state": _variable(
+            "load_case contact tangent sample", state, "1", "state at the peak"
+        ),
     }
     result["peak_state"].attrs |= {"flag_values": [0, 1, 2], "flag_meanings": "stick slip open"}
     return result
@@ -280,7 +304,9 @@ def _model_variables(preload: FloatArray) -> dict[str, xr.Variable]:
     result = {k: _variable("mode", v, "Hz", k.replace("_", " ")) for k, v in modes.items()}
     return result | {
         "static_gap": _variable("contact direction", static, "m", "gap of the static solve"),
-        "static_force": _variable("contact direction", static - [0, 0, 1] * preload[:, None], "N", "static force"),
+        "static_force": _variable(
+            "contact direction", static - [0, 0, 1] * preload[:, None], "N", "static force"
+        ),
         "contact_position": _variable("contact xyz", position, "m", "contact point"),
         "contact_frame": _variable("contact xyz direction", frame, "1", "contact frame"),
         "surface_point": _variable("surface_node xyz", points, "m", "skin of the blades"),
@@ -295,7 +321,9 @@ def _check_variables(table: dict[str, np.ndarray], n_cases: int) -> dict[str, xr
     balance = table["amplitude"][first + at]
     return {
         "verify_case": _variable("check", case, "1", "load case"),
-        "verify_frequency_hz": _variable("check", table["frequency_hz"][first + at], "Hz", "frequency"),
+        "verify_frequency_hz": _variable(
+            "check", table["frequency_hz"][first + at], "Hz", "frequency"
+        ),
         "verify_transient": _variable("check", 1.004 * balance, "m", "amplitude by integration"),
         "verify_balance": _variable("check", balance, "m", "amplitude by balance"),
         "verify_difference_percent": _variable("check", np.full(3, -0.4), "percent", "difference"),
@@ -316,14 +344,19 @@ def _attributes() -> dict[str, object]:
 
 
 def synthetic_result(
-    ratios: Sequence[float] = (200, 50, 20, 10, 5, 3.5, 2), n: int = 46, failed: int = 0, verify: bool = True
+    ratios: Sequence[float] = (200, 50, 20, 10, 5, 3.5, 2),
+    n: int = 46,
+    failed: int = 0,
+    verify: bool = True,
 ) -> xr.Dataset:
     """Build the whole dataset; `failed` points in the middle of the last load case did not converge."""
     runs = [branch(r, n, failed if i == len(ratios) - 1 else 0) for i, r in enumerate(ratios)]
     table = {k: np.concatenate([run[k] for run in runs]) for k in runs[0]}
     table["case"] = np.repeat(np.arange(len(ratios)), [len(run["order"]) for run in runs])
     amplitude = np.where(table["status"] == 0, table["amplitude"], -1)
-    peak = np.array([np.argmax(np.where(table["case"] == i, amplitude, -2)) for i in range(len(ratios))])
+    peak = np.array(
+        [np.argmax(np.where(table["case"] == i, amplitude, -2)) for i in range(len(ratios))]
+    )
     preload = CENTRIFUGAL / np.array([8.0] * 3 + [16.0] * 3 + [6.0] * 3)
     preload *= np.tile([1.1, 1.0, 0.9], 3) / 3 * 2
     variables = _case_variables(table, np.array(ratios, dtype=float), peak)

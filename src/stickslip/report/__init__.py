@@ -1,1 +1,1 @@
-
+"""A dataset in, one HTML page out; never calls a solver."""

@@ -26,7 +26,8 @@ def edges(points: FloatArray, triangles: IntArray) -> tuple[IntArray, np.ndarray
         (n,) True where the two faces make an angle of more than 30 degrees, or there is only one.
     """
     normal = np.cross(
-        points[triangles[:, 1]] - points[triangles[:, 0]], points[triangles[:, 2]] - points[triangles[:, 0]]
+        points[triangles[:, 1]] - points[triangles[:, 0]],
+        points[triangles[:, 2]] - points[triangles[:, 0]],
     )
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = normal / np.where(length > 0, length, 1.0)
@@ -60,6 +61,13 @@ def _skin(points: FloatArray, triangles: IntArray, opacity: float) -> go.Mesh3d:
     )  # fmt: skip
 
 
+def _inside(points: FloatArray, parts: IntArray, low: FloatArray, high: FloatArray) -> IntArray:
+    """Keep the triangles or edges whose bounding box meets the box from `low` to `high`."""
+    corners = points[parts]
+    meets = (corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)
+    return np.asarray(parts[meets.all(axis=1)])
+
+
 def _points(result: Result, position: FloatArray, *, named: bool) -> list[go.Scatter3d]:
     right = np.array(right_side(result))
     names = np.array(result.labels("contact"))
@@ -79,16 +87,21 @@ def _points(result: Result, position: FloatArray, *, named: bool) -> list[go.Sca
     return traces
 
 
+def _neighbourhood(position: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Corners of a box around the contact points."""
+    margin = 0.35 * float(np.ptp(position, axis=0).max())
+    return position.min(axis=0) - margin, position.max(axis=0) + margin
+
+
 def _scene(position: FloatArray, points: FloatArray, *, close: bool) -> dict[str, object]:
     """Axes of a view: of all, or of the neighbourhood of the contact points; equal lengths on all axes."""
     if close:
-        margin = 0.35 * float(np.ptp(position, axis=0).max())
-        low, high = position.min(axis=0) - margin, position.max(axis=0) + margin
-        mode, eye = "manual", {"x": 0.35, "y": -1.5, "z": 0.75}
+        low, high = _neighbourhood(position)
+        eye, size = {"x": 0.75, "y": -1.3, "z": 0.95}, 1.0
     else:
         low, high = points.min(axis=0), points.max(axis=0)
-        mode, eye = "data", {"x": 1.1, "y": -1.7, "z": 0.55}
-    span = (high - low) / (high - low).max()
+        eye, size = {"x": 1.0, "y": -1.5, "z": 0.55}, 1.25
+    span = size * (high - low) / (high - low).max()
     axes = {
         f"{name}axis": {
             "range": [float(a), float(b)], "title": {"text": f"{name} (mm)"}, "showbackground": False,
@@ -96,19 +109,22 @@ def _scene(position: FloatArray, points: FloatArray, *, close: bool) -> dict[str
         }
         for name, a, b in zip("xyz", low, high, strict=True)
     }  # fmt: skip
-    scene: dict[str, object] = {**axes, "aspectmode": mode, "camera": {"eye": eye}, "dragmode": "orbit"}
-    if close:
-        scene["aspectratio"] = dict(zip("xyz", span.tolist(), strict=True))
-    return scene
+    return {
+        **axes,
+        "aspectmode": "manual",
+        "aspectratio": dict(zip("xyz", span.tolist(), strict=True)),
+        "camera": {"eye": eye, "projection": {"type": "orthographic"}},
+        "dragmode": "orbit",
+    }
 
 
 def mesh_picture(result: Result) -> Plot:
-    """The blades' skin with its mesh, whole and near the damper."""
+    """Show the blades' skin with its mesh, whole and near the damper."""
     key, title = "mesh", "The meshed blades and the contact points of the damper"
     if not result.has("surface_point", "surface_triangle"):
         return absent(key, title, "the skin of the mesh is not in this result")
     points = result.floats("surface_point") * 1e3
-    triangles = result.array("surface_triangle").astype(np.int64)
+    triangles = result.integers("surface_triangle")
     has_contacts = result.has("contact_position")
     position = result.floats("contact_position") * 1e3 if has_contacts else points
     pairs, sharp = edges(points, triangles)
@@ -118,10 +134,13 @@ def mesh_picture(result: Result) -> Plot:
         1, views, specs=[[{"type": "scene"}] * views], horizontal_spacing=0.02,
         subplot_titles=("whole", "near the damper")[:views],
     )  # fmt: skip
+    low, high = _neighbourhood(position)
     for view in range(views):
         close = view == 1
-        figure.add_trace(_skin(points, triangles, 0.45 if close else 1.0), row=1, col=view + 1)
-        figure.add_trace(_lines(points, drawn, "#8593a3", 1.0), row=1, col=view + 1)
+        faces = _inside(points, triangles, low, high) if close else triangles
+        lines = _inside(points, drawn, low, high) if close else drawn
+        figure.add_trace(_skin(points, faces, 0.45 if close else 1.0), row=1, col=view + 1)
+        figure.add_trace(_lines(points, lines, "#8593a3", 1.0), row=1, col=view + 1)
         for trace in _points(result, position, named=close) if has_contacts else []:
             figure.add_trace(trace, row=1, col=view + 1)
     styled(figure, 620)

@@ -13,6 +13,8 @@ from stickslip.report.plot import (
     STATE_NAMES,
     Plot,
     absent,
+    legend_above,
+    log_ticks,
     styled,
 )
 from stickslip.report.quantities import counted, joined, number, percent, quantity, scale_for
@@ -64,12 +66,6 @@ def _state_keys() -> list[go.Scatter]:
     ]  # fmt: skip
 
 
-def _above(figure: go.Figure) -> None:
-    """Put the legend above the panels, in a row."""
-    legend = {"orientation": "h", "x": 1, "xanchor": "right", "y": 1.02, "yanchor": "bottom"}
-    figure.update_layout(legend=legend)
-
-
 def _loop(gap: FloatArray, force: FloatArray, state: IntArray | None, name: str) -> go.Scatter:
     """One closed loop, its points coloured by state."""
     closed = np.append(np.arange(len(gap)), 0)
@@ -89,8 +85,13 @@ def _loop(gap: FloatArray, force: FloatArray, state: IntArray | None, name: str)
 
 
 def _loop_caption(result: Result, case: Case, direction: int) -> str:
-    gap, force = period(result, case, "peak_gap")[:, direction], period(result, case, "peak_force")[:, direction]
-    area = np.abs(np.sum(0.5 * (force + np.roll(force, -1, -1)) * (np.roll(gap, -1, -1) - gap), axis=-1))
+    gap, force = (
+        period(result, case, "peak_gap")[:, direction],
+        period(result, case, "peak_force")[:, direction],
+    )
+    area = np.abs(
+        np.sum(0.5 * (force + np.roll(force, -1, -1)) * (np.roll(gap, -1, -1) - gap), axis=-1)
+    )
     names = result.labels("contact")
     if not area.any():
         return "No loop encloses an area: nothing is dissipated in this direction."
@@ -116,7 +117,11 @@ def hysteresis(result: Result, direction: str) -> Plot:
     width = max(len(r) for r in rows)
     titles = [names[r[k]] if k < len(r) else "" for r in rows for k in range(width)]
     figure = make_subplots(
-        len(rows), width, subplot_titles=titles, horizontal_spacing=0.07, vertical_spacing=0.23 / len(rows)
+        len(rows),
+        width,
+        subplot_titles=titles,
+        horizontal_spacing=0.07,
+        vertical_spacing=0.23 / len(rows),
     )
     for case in cases:
         gap, force = period(result, case, "peak_gap"), period(result, case, "peak_force")
@@ -124,12 +129,14 @@ def hysteresis(result: Result, direction: str) -> Plot:
         for i, row in enumerate(rows):
             for j, contact in enumerate(row):
                 known = state[contact, column] if state is not None else None
-                loop = _loop(gap[contact, column] * 1e6, force[contact, column], known, names[contact])
+                loop = _loop(
+                    gap[contact, column] * 1e6, force[contact, column], known, names[contact]
+                )
                 figure.add_trace(loop.update(meta=case.index), row=i + 1, col=j + 1)
     for trace in _state_keys() if result.has("peak_state") else []:
         figure.add_trace(trace, row=1, col=1)
     styled(figure, 130 + 215 * len(rows))
-    _above(figure)
+    legend_above(figure)
     figure.update_yaxes(nticks=6, title_text="force (N)", col=1)
     figure.update_xaxes(nticks=6, title_text="relative displacement (µm)", row=len(rows))
     caption = (
@@ -177,7 +184,7 @@ def state_map(result: Result) -> Plot:
         )  # fmt: skip
     figure.add_traces(_state_keys())
     styled(figure, 130 + 21 * len(rows))
-    _above(figure)
+    legend_above(figure)
     figure.update_xaxes(title_text="time / period", range=[0, 1], showgrid=False)
     figure.update_yaxes(autorange="reversed", showgrid=False, ticks="", tickfont={"size": 12})
     caption = "Each row is a contact point in one tangential direction; read from left to right through one cycle."
@@ -220,7 +227,9 @@ def _damper_caption(result: Result, case: Case) -> str:
 def damper(result: Result) -> Plot:
     """Motion of the damper over one period at the peak and its orbit."""
     key, title = "damper", "Motion of the damper at the peak"
-    labels = [str(v) for v in result.data["retained"].values] if "retained" in result.data.coords else []
+    labels = (
+        [str(v) for v in result.data["retained"].values] if "retained" in result.data.coords else []
+    )
     wanted = {f"damper.{c}" for c in ("x", "y", "z", "rx", "ry", "rz")}
     cases = result.peaked if result.has("retained_displacement") else ()
     if not cases or not wanted <= set(labels):
@@ -228,7 +237,10 @@ def damper(result: Result) -> Plot:
     turns = np.concatenate([damper_motion(result, c)[1][3:].ravel() for c in cases])
     angle = scale_for(turns, "rad")
     figure = make_subplots(
-        1, 3, horizontal_spacing=0.1, subplot_titles=("translation", "rotation", "orbit in the x–z plane")
+        1,
+        3,
+        horizontal_spacing=0.1,
+        subplot_titles=("translation", "rotation", "orbit in the x–z plane"),
     )
     styles = (("#0072b2", "solid"), ("#d55e00", "dash"), ("#009e73", "dot"))
     for case in cases:
@@ -237,15 +249,27 @@ def damper(result: Result) -> Plot:
         for k, (colour, dash) in enumerate(styles):
             line = {"color": colour, "dash": dash, "width": 2}
             name = "xyz"[k]
-            shared = {"line": line, "legendgroup": name, "meta": case.index, "mode": "lines", "name": name}
+            shared = {
+                "line": line,
+                "legendgroup": name,
+                "meta": case.index,
+                "mode": "lines",
+                "name": name,
+            }
             figure.add_scatter(x=time, y=motion[k] * 1e6, row=1, col=1, **shared)
             turn = motion[3 + k] * angle.factor
             figure.add_scatter(x=time, y=turn, row=1, col=2, **{**shared, "showlegend": False})
-        orbit = {"mode": "lines", "line": {"color": case.colour, "width": 2}, "showlegend": False, "name": "orbit"}
-        figure.add_scatter(x=motion[0] * 1e6, y=motion[2] * 1e6, row=1, col=3, meta=case.index, **orbit)
+        orbit = {
+            "mode": "lines",
+            "line": {"color": case.colour, "width": 2},
+            "showlegend": False,
+            "name": "orbit",
+        }
+        figure.add_scatter(
+            x=motion[0] * 1e6, y=motion[2] * 1e6, row=1, col=3, meta=case.index, **orbit
+        )
     styled(figure, 380)
-    _above(figure)
-    figure.update_layout(legend={"y": 1.1, "x": 0, "xanchor": "left"}, margin={"t": 70})
+    legend_above(figure)
     for column, unit in ((1, "µm"), (2, angle.unit)):
         figure.update_xaxes(title_text="time / period", col=column)
         figure.update_yaxes(title_text=f"motion about the mean ({unit})", col=column)
@@ -291,7 +315,10 @@ def energy(result: Result) -> Plot:
     values = result.floats("dissipated_energy")
     total = np.where(result.converged, np.nansum(values, axis=1), np.nan)
     figure = make_subplots(
-        1, 2, horizontal_spacing=0.12, subplot_titles=("at the peak, by contact", "all contacts, against frequency")
+        1,
+        2,
+        horizontal_spacing=0.12,
+        subplot_titles=("at the peak, by contact", "all contacts, against frequency"),
     )
     sums, bars = scale_for(total, "J"), scale_for(values, "J")
     for case in result.cases:
@@ -308,16 +335,20 @@ def energy(result: Result) -> Plot:
         )  # fmt: skip
     styled(figure, 400, legend_title=f"load ratio {RATIO}")
     figure.update_yaxes(title_text=f"energy ({bars.unit})", rangemode="tozero", col=1)
-    top = np.nanmax(total) * sums.factor if np.nanmax(total) > 0 else 1.0
-    figure.update_yaxes(
-        title_text=f"energy ({sums.unit})", type="log", dtick=1, range=[np.log10(top) - 6, np.log10(2 * top)], col=2
-    )
+    drawn = total[np.isfinite(total) & (total > 0)] * sums.factor
+    if drawn.size:
+        top = float(drawn.max())
+        span = [np.log10(max(top * 1e-6, float(drawn.min()) / 1.5)), np.log10(1.6 * top)]
+        figure.update_yaxes(type="log", range=span, **log_ticks(drawn, steps=(1,)), col=2)
+    figure.update_yaxes(title_text=f"energy ({sums.unit})", col=2)
     figure.update_xaxes(title_text="frequency (Hz)", col=2)
     caption = (
         "Work of the friction forces in one cycle. Left: blue bars on the left blade, orange on the right one. "
         + _widest_range(result, total)
     )
-    return Plot(key, title, caption, figure, {c.index: _energy_caption(result, c) for c in result.peaked})
+    return Plot(
+        key, title, caption, figure, {c.index: _energy_caption(result, c) for c in result.peaked}
+    )
 
 
 def _widest_range(result: Result, total: FloatArray) -> str:

@@ -5,7 +5,17 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.report.plot import ALARM, INK, MUTED, Plot, absent, key_marker, styled
+from stickslip.report.plot import (
+    ALARM,
+    GRID,
+    INK,
+    MUTED,
+    Plot,
+    absent,
+    key_marker,
+    log_ticks,
+    styled,
+)
 from stickslip.report.quantities import Scale, counted, joined, number, percent, scale_for
 from stickslip.report.result import RATIO, Case, Result
 
@@ -35,7 +45,7 @@ def peak_hz(result: Result, case: Case) -> float:
 
 def _curve(result: Result, case: Case, scale: Scale) -> go.Scatter:
     at = result.points(case)
-    order = result.array("order")[at]
+    order = result.integers("order")[at]
     error = result.floats("predicted_error_percent")[at]
     high = order > result.low
     return go.Scatter(
@@ -48,7 +58,7 @@ def _curve(result: Result, case: Case, scale: Scale) -> go.Scatter:
         line={"color": case.colour, "width": 1.6},
         marker={
             "symbol": np.where(high, "diamond", "circle-open").tolist(),
-            "size": np.where(high, 6.5, 5.0).tolist(),
+            "size": np.where(high, 7.0, 5.5).tolist(),
             "color": case.colour,
             "line": {"width": 1.1, "color": case.colour},
         },
@@ -78,9 +88,14 @@ def _failures(result: Result, scale: Scale) -> go.Scatter:
 
 
 def _scale_buttons(logarithmic: bool) -> list[dict[str, object]]:
+    ticks = {"log": "array", "linear": "auto"}
     buttons = [
-        {"label": f"{kind} scale", "method": "relayout", "args": [{"yaxis.type": kind}]}
-        for kind in ("log", "linear")
+        {
+            "label": f"{kind} scale",
+            "method": "relayout",
+            "args": [{"yaxis.type": kind, "yaxis.tickmode": mode, "yaxis.autorange": True}],
+        }
+        for kind, mode in ticks.items()
     ]
     return [
         {
@@ -95,13 +110,14 @@ def _scale_buttons(logarithmic: bool) -> list[dict[str, object]]:
             "pad": {"t": 0, "b": 4},
             "font": {"size": 11},
             "showactive": True,
+            "bordercolor": GRID,
         }
     ]
 
 
 def _frf_caption(result: Result, scale: Scale) -> str:
     converged = result.converged
-    high = converged & (result.array("order") > result.low)
+    high = converged & (result.integers("order") > result.low)
     hz = result.floats("frequency_hz")
     text = f"First harmonic of {result.output_name} divided by the amplitude of the excitation. "
     if result.peaked:
@@ -111,12 +127,20 @@ def _frf_caption(result: Result, scale: Scale) -> str:
             f"{number(peak_hz(result, c), 5)} Hz for {RATIO} = {c.label}"
             for c in ends
         ]
-        text += "The peak goes from " + " to ".join(peaks) + ". " if len(ends) > 1 else f"Peak: {peaks[0]}. "
+        text += (
+            "The peak goes from " + " to ".join(peaks) + ". "
+            if len(ends) > 1
+            else f"Peak: {peaks[0]}. "
+        )
     text += (
         f"{int(high.sum())} of {counted(int(converged.sum()), 'accepted point')} stand at "
         f"H = {result.high} (filled diamonds)"
     )
-    text += f", from {number(hz[high].min(), 4)} to {number(hz[high].max(), 4)} Hz; " if high.any() else "; "
+    text += (
+        f", from {number(hz[high].min(), 4)} to {number(hz[high].max(), 4)} Hz; "
+        if high.any()
+        else "; "
+    )
     text += f"the rest needed H = {result.low} only (open circles)."
     if not converged.all():
         n = counted(int((~converged).sum()), "point")
@@ -138,7 +162,8 @@ def frequency_response(result: Result) -> Plot:
     styled(figure, 540)
     figure.update_layout(updatemenus=_scale_buttons(logarithmic=True))
     figure.update_xaxes(title_text="frequency (Hz)")
-    figure.update_yaxes(title_text=f"amplitude / force ({scale.unit})", type="log", dtick="D2")
+    ticks = log_ticks(accepted_response(result) * scale.factor)
+    figure.update_yaxes(title_text=f"amplitude / force ({scale.unit})", type="log", **ticks)
     return Plot(key, title, _frf_caption(result, scale), figure)
 
 
@@ -187,7 +212,10 @@ def low_order(result: Result) -> Plot:
     styled(figure, 440)
     figure.update_layout(updatemenus=_scale_buttons(logarithmic=False))
     figure.update_xaxes(title_text="frequency (Hz)")
-    figure.update_yaxes(title_text=f"amplitude / force ({scale.unit})")
+    ticks = log_ticks(accepted * scale.factor)
+    figure.update_yaxes(
+        title_text=f"amplitude / force ({scale.unit})", **{**ticks, "tickmode": "auto"}
+    )
     return Plot(key, title, _low_caption(result, cases, low), figure)
 
 
@@ -207,9 +235,23 @@ def _error_traces(figure: go.Figure, result: Result) -> list[Case]:
     for case in result.cases:
         at = result.points(case)
         line = {"color": case.colour, "width": 1.6}
-        add(case, at, predicted, 1, mode="lines", name=case.label, line=line, legendgrouptitle=heading)
+        add(
+            case,
+            at,
+            predicted,
+            1,
+            mode="lines",
+            name=case.label,
+            line=line,
+            legendgrouptitle=heading,
+        )
         if case in both:
-            mark = {"color": case.colour, "size": 6, "symbol": "circle-open", "line": {"width": 1.4}}
+            mark = {
+                "color": case.colour,
+                "size": 6,
+                "symbol": "circle-open",
+                "line": {"width": 1.4},
+            }
             add(case, at, predicted, 2, mode="lines", name=case.label, line=line, showlegend=False)
             add(case, at, real, 2, mode="markers", name="real", marker=mark, showlegend=False)
     return both
@@ -225,7 +267,7 @@ def _error_caption(result: Result) -> str:
         f"H = {result.high}. "
     )
     worst = int(np.nanargmax(error))
-    ratio = number(float(result.floats("load_ratio")[int(result.array("case")[worst])]))
+    ratio = number(float(result.floats("load_ratio")[result.integers("case")[worst]]))
     hz = number(float(result.floats("frequency_hz")[worst]), 5)
     text += f"The largest, {percent(float(error[worst]))}, is at {hz} Hz for {RATIO} = {ratio}. "
     real = np.isfinite(result.floats("real_error_percent"))
@@ -258,8 +300,9 @@ def errors(result: Result) -> Plot:
     top = float(np.nanmax(np.concatenate([error, real, [result.threshold]])))
     figure.add_hline(y=result.threshold, line={"dash": "dash", "color": ALARM, "width": 1.4})
     figure.update_xaxes(title_text="frequency (Hz)")
+    ticks = log_ticks(np.array([_SMALLEST_ERROR, top]), steps=(1,))
     figure.update_yaxes(
-        type="log", range=[np.log10(_SMALLEST_ERROR), np.log10(2 * top)], dtick=1, ticksuffix=" %"
+        type="log", range=[np.log10(_SMALLEST_ERROR), np.log10(2 * top)], ticksuffix=" %", **ticks
     )
     figure.update_yaxes(title_text="error of the output dofs", col=1)
     return Plot(key, title, _error_caption(result), figure)
@@ -274,9 +317,14 @@ def error_scatter(result: Result) -> Plot:
         return absent(key, title, "no point was solved at both orders")
     figure = go.Figure()
     for case in result.cases:
-        at = np.flatnonzero(known & (result.array("case") == case.index))
+        at = np.flatnonzero(known & (result.integers("case") == case.index))
         if at.size:
-            mark = {"color": case.colour, "size": 7, "symbol": "circle-open", "line": {"width": 1.5}}
+            mark = {
+                "color": case.colour,
+                "size": 7,
+                "symbol": "circle-open",
+                "line": {"width": 1.5},
+            }
             hover = "predicted %{x:.3g} %<br>real %{y:.3g} %<br>%{customdata:.2f} Hz<extra></extra>"
             figure.add_scatter(
                 x=predicted[at], y=real[at], mode="markers", name=case.label, marker=mark,
@@ -290,7 +338,12 @@ def error_scatter(result: Result) -> Plot:
     dash = {"dash": "dash", "color": ALARM, "width": 1.2}
     figure.add_hline(y=result.threshold, line=dash)
     figure.add_vline(x=result.threshold, line=dash)
-    axis = {"type": "log", "range": np.log10(ends).tolist(), "dtick": 1, "ticksuffix": " %"}
+    axis = {
+        "type": "log",
+        "range": np.log10(ends).tolist(),
+        "ticksuffix": " %",
+        **log_ticks(values),
+    }
     figure.update_xaxes(title_text="predicted error", **axis)
     figure.update_yaxes(title_text="real error", scaleanchor="x", constrain="domain", **axis)
     figure.update_xaxes(constrain="domain")
@@ -305,7 +358,7 @@ def error_scatter(result: Result) -> Plot:
     return Plot(key, title, caption, figure)
 
 
-def _optimum_caption(result: Result, ratio: FloatArray, peak: FloatArray, hz: FloatArray) -> str:
+def _optimum_caption(ratio: FloatArray, peak: FloatArray, hz: FloatArray) -> str:
     best = int(np.nanargmin(peak))
     text = (
         f"Among the ratios computed the damper works best at {RATIO} = {number(ratio[best], 4)}: the peak is "
@@ -324,7 +377,7 @@ def _optimum_caption(result: Result, ratio: FloatArray, peak: FloatArray, hz: Fl
 def optimisation(result: Result) -> Plot:
     """Peak amplitude and frequency against the load ratio (seed 1, fig. 9)."""
     key, title = "optimisation", "Optimisation curves of the damper"
-    cases = result.peaked
+    cases = [c for c in result.peaked if np.isfinite(peak_response(result, c))]
     if len(cases) < 2:
         return absent(key, title, "the curves need the peaks of at least two load cases")
     ratio = np.array([c.ratio for c in cases])
@@ -341,8 +394,16 @@ def optimisation(result: Result) -> Plot:
         )  # fmt: skip
     styled(figure, 380)
     figure.update_xaxes(
-        type="log", title_text=f"load ratio {RATIO}", tickvals=ratio, ticktext=[c.label for c in cases]
+        type="log",
+        title_text=f"load ratio {RATIO}",
+        tickvals=ratio,
+        ticktext=[c.label for c in cases],
     )
-    figure.update_yaxes(title_text=f"peak amplitude / force ({scale.unit})", type="log", dtick="D2", col=1)
+    figure.update_yaxes(
+        title_text=f"peak amplitude / force ({scale.unit})",
+        type="log",
+        **log_ticks(peak * scale.factor),
+        col=1,
+    )
     figure.update_yaxes(title_text="peak frequency (Hz)", col=2)
-    return Plot(key, title, _optimum_caption(result, ratio, peak, hz), figure)
+    return Plot(key, title, _optimum_caption(ratio, peak, hz), figure)

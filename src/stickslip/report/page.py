@@ -30,7 +30,11 @@ _RESPONSE: tuple[Callable[[Result], Plot], ...] = (
     error_scatter,
     optimisation,
 )
-_CONFIG = {"responsive": True, "displaylogo": False, "modeBarButtonsToRemove": ["select2d", "lasso2d"]}
+_CONFIG = {
+    "responsive": True,
+    "displaylogo": False,
+    "modeBarButtonsToRemove": ["select2d", "lasso2d"],
+}
 
 
 def _show_case(plot: Plot, case: Case) -> None:
@@ -84,7 +88,13 @@ def _versions(result: Result) -> dict[str, str]:
 
 def _body(result: Result) -> str:
     chosen = result.peaked[-1] if result.peaked else None
-    contact = [hysteresis(result, "t"), hysteresis(result, "w"), state_map(result), damper(result), energy(result)]
+    contact = [
+        hysteresis(result, "t"),
+        hysteresis(result, "w"),
+        state_map(result),
+        damper(result),
+        energy(result),
+    ]
     plots = [figure(result) for figure in _RESPONSE], contact, [mesh_picture(result)]
     drawn, count = [], 0
     for group in plots:
@@ -133,5 +143,7 @@ def write_report(dataset_path: Path, html_path: Path) -> None:
         html_path.write_text(page, encoding="utf-8")
     except OSError as error:
         raise input_error(
-            str(html_path), f"cannot be written ({error.strerror})", "Choose a folder that exists and is writable."
+            str(html_path),
+            f"cannot be written ({error.strerror})",
+            "Choose a folder that exists and is writable.",
         ) from error

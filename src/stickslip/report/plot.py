@@ -3,7 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
 import plotly.graph_objects as go
+
+from stickslip.arrays import FloatArray
 
 FONT = "Inter, 'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', sans-serif"
 INK, MUTED, GRID, ALARM = "#1c2530", "#5b6673", "#e4e8ed", "#c0262d"
@@ -44,6 +47,31 @@ def absent(key: str, title: str, reason: str) -> Plot:
     return Plot(key, title, f"Not shown: {reason}.")
 
 
+def legend_above(figure: go.Figure) -> None:
+    """Put the legend in a row above the panels, away from the tool bar on the right."""
+    row = {
+        "orientation": "h",
+        "x": 0,
+        "xanchor": "left",
+        "yref": "container",
+        "y": 0.995,
+        "yanchor": "top",
+    }
+    figure.update_layout(legend=row, margin={"t": 74})
+
+
+def log_ticks(values: FloatArray, *, steps: tuple[int, ...] = (1, 2, 5)) -> dict[str, object]:
+    """Ticks of a logarithmic axis over the positive `values`, written as plain numbers."""
+    positive = values[np.isfinite(values) & (values > 0)]
+    if not positive.size:
+        return {}
+    decades = range(
+        int(np.floor(np.log10(positive.min()))), int(np.ceil(np.log10(positive.max()))) + 1
+    )
+    ticks = [step * 10.0**k for k in decades for step in steps]
+    return {"tickmode": "array", "tickvals": ticks, "ticktext": [f"{t:.12g}" for t in ticks]}
+
+
 def styled(figure: go.Figure, height: int, *, legend_title: str = "") -> go.Figure:
     """Give `figure` the look of the page; returns it."""
     figure.update_layout(
@@ -74,8 +102,9 @@ def styled(figure: go.Figure, height: int, *, legend_title: str = "") -> go.Figu
         "gridcolor": GRID,
         "zeroline": False,
         "automargin": True,
-        "title": {"standoff": 8},
+        "title": {"standoff": 8, "font": {"size": 14}},
         "exponentformat": "power",
+        "tickfont": {"size": 12},
     }
     figure.update_xaxes(**axis)
     figure.update_yaxes(**axis)
@@ -92,5 +121,10 @@ def key_marker(name: str, symbol: str, group: str, group_title: str = "") -> go.
         name=name,
         legendgroup=group,
         legendgrouptitle={"text": group_title} if group_title else None,
-        marker={"symbol": symbol, "size": 9, "color": MUTED, "line": {"width": 1.4, "color": MUTED}},
+        marker={
+            "symbol": symbol,
+            "size": 9,
+            "color": MUTED,
+            "line": {"width": 1.4, "color": MUTED},
+        },
     )

@@ -73,9 +73,9 @@ class Result:
         """Say whether all the variables are there and none is empty."""
         return all(name in self.data and self.data[name].size > 0 for name in names)
 
-    def array(self, name: str) -> npt.NDArray[np.generic]:
-        """Return the values of a variable."""
-        return np.asarray(self.data[name].values)
+    def integers(self, name: str) -> IntArray:
+        """Return the values of a variable as integers."""
+        return np.asarray(self.data[name].values).astype(np.int64)
 
     def floats(self, name: str) -> FloatArray:
         """Return the values of a variable as floats; NaN of the shape of ``point`` if it is missing."""
@@ -125,7 +125,7 @@ class Result:
         meanings = str(attributes.get("flag_meanings", "")).split()
         values = np.atleast_1d(np.asarray(attributes.get("flag_values", [])))
         good = [v for v, m in zip(values, meanings, strict=False) if m == "converged"]
-        return np.isin(self.array("status"), good or [0])
+        return np.isin(self.integers("status"), good or [0])
 
     @property
     def flagged(self) -> npt.NDArray[np.bool_]:
@@ -149,9 +149,9 @@ class Result:
 
     def response(self, name: str = "amplitude") -> FloatArray:
         """(point,) amplitude of the report output divided by the excitation, m/N."""
-        force = self.floats("excitation_n")[self.array("case").astype(int)]
+        force = self.floats("excitation_n")[self.integers("case")]
         values = self.data[name].isel(output=self.output).values
-        return np.asarray(values, dtype=np.float64) / force
+        return np.asarray(np.asarray(values, dtype=np.float64) / force)
 
     def points(self, case: Case) -> IntArray:
         """Points of a case in the order in which a curve joins them, the unconverged ones included.
@@ -159,7 +159,7 @@ class Result:
         A branch that folds back keeps its order and leaves out the peak refinements, whose place on it is
         not stored; otherwise the order is that of frequency.
         """
-        index = np.flatnonzero(self.array("case") == case.index)
+        index = np.flatnonzero(self.integers("case") == case.index)
         hz = self.floats("frequency_hz")[index]
         refined = np.nan_to_num(self.floats("refinement")[index]) > 0
         along = np.diff(hz[~refined])
@@ -212,13 +212,17 @@ def load_result(path: Path) -> Result:
         netCDF-4 file written by ``stickslip run``, finished or not.
     """
     if not path.is_file():
-        raise input_error(str(path), "no such file", "Give the result.nc that `stickslip run` wrote.")
+        raise input_error(
+            str(path), "no such file", "Give the result.nc that `stickslip run` wrote."
+        )
     try:
         with xr.open_dataset(path, decode_times=False) as file:
             data = file.load()
     except (OSError, ValueError) as error:
         raise input_error(
-            str(path), f"not a netCDF-4 file ({error})", "Give the result.nc that `stickslip run` wrote."
+            str(path),
+            f"not a netCDF-4 file ({error})",
+            "Give the result.nc that `stickslip run` wrote.",
         ) from error
     missing = _missing(NEEDED, data)
     if missing:

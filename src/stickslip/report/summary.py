@@ -41,7 +41,11 @@ def _shift_card(result: Result) -> str:
     stuck, slipping = result.peaked[0], result.peaked[-1]
     a, b = peak_hz(result, stuck), peak_hz(result, slipping)
     note = f"from {number(a, 5)} Hz at {stuck.label} to {number(b, 5)} Hz at {slipping.label}"
-    return _card(f"{number(b - a)} Hz", "peak, stuck to slip", note)
+    return _card(
+        f"{number(b - a)} Hz",
+        f"shift of the peak, stuck to slip ({percent(100 * (b / a - 1))})",
+        note,
+    )
 
 
 def _alert_card(result: Result) -> str:
@@ -58,13 +62,13 @@ def _worst_card(result: Result) -> str:
     if not np.isfinite(error).any():
         return _card("–", "worst predicted error", "no predicted error was computed")
     at = int(np.nanargmax(error))
-    ratio = number(float(result.floats("load_ratio")[int(result.array("case")[at])]), 4)
+    ratio = number(float(result.floats("load_ratio")[result.integers("case")[at]]), 4)
     note = f"at {number(float(result.floats('frequency_hz')[at]), 5)} Hz, {RATIO} = {ratio}"
     return _card(percent(float(error[at])), f"worst predicted error at H = {result.low}", note)
 
 
 def headline(result: Result) -> str:
-    """The four numbers that sum the run up."""
+    """Return the four numbers that sum the run up."""
     cards = (_optimum_card(result), _shift_card(result), _alert_card(result), _worst_card(result))
     return f'<div class="cards">{"".join(cards)}</div>'
 
@@ -82,7 +86,7 @@ def _unconverged(result: Result) -> list[str]:
     bad = ~result.converged
     warnings = []
     for case in result.cases:
-        at = np.flatnonzero(bad & (result.array("case") == case.index))
+        at = np.flatnonzero(bad & (result.integers("case") == case.index))
         if at.size:
             hz = result.floats("frequency_hz")[at]
             between = f"between {number(hz.min(), 5)} and {number(hz.max(), 5)} Hz"
@@ -97,15 +101,21 @@ def _unconverged(result: Result) -> list[str]:
 def _doubts(result: Result) -> list[str]:
     """Warnings that follow from numbers: a peak that hangs on the retention, a check that failed."""
     warnings = []
-    shift = result.floats("retention_peak_shift") if result.has("retention_peak_shift") else np.array([])
-    for case in result.cases if shift.size else ():
-        if abs(np.nan_to_num(shift[case.index])) > _LARGE_SHIFT:
-            warnings.append(
-                f"For {RATIO} = {case.label} the peak changes by {percent(100 * float(shift[case.index]))} when the "
-                "damper's retention stiffness is ten times smaller: it depends on a stiffness that is not physical."
-            )
+    shift = (
+        result.floats("retention_peak_shift")
+        if result.has("retention_peak_shift")
+        else np.array([])
+    )
+    warnings += [
+        f"For {RATIO} = {case.label} the peak changes by {percent(100 * float(shift[case.index]))} when the "
+        "damper's retention stiffness is ten times smaller: it depends on a stiffness that is not physical."
+        for case in (result.cases if shift.size else ())
+        if abs(np.nan_to_num(shift[case.index])) > _LARGE_SHIFT
+    ]
     if result.has("verify_difference_percent"):
-        large = np.abs(np.nan_to_num(result.floats("verify_difference_percent"))) > _LARGE_DIFFERENCE
+        large = (
+            np.abs(np.nan_to_num(result.floats("verify_difference_percent"))) > _LARGE_DIFFERENCE
+        )
         if large.any():
             warnings.append(
                 f"Time integration and harmonic balance differ by more than {percent(_LARGE_DIFFERENCE)} in "
@@ -129,7 +139,7 @@ def all_warnings(result: Result) -> list[str]:
 
 
 def warnings_box(result: Result) -> str:
-    """The warnings, or the statement that there are none."""
+    """Return the warnings, or the statement that there are none."""
     warnings = all_warnings(result)
     if not warnings:
         n = counted(len(result.converged), "point")
@@ -175,22 +185,26 @@ def _harmonic_share(result: Result, at: IntArray) -> float:
 
 
 def _why(result: Result, case: Case) -> str:
-    """What the contact does at the peak of a case, and what the higher harmonics carry."""
+    """Say what the contact does at the peak of a case and what the higher harmonics carry."""
     reasons = []
     if result.has("peak_state") and result.peak(case) >= 0:
         state = states(result, case)
         slipping, open_ = (state == 1).any(axis=(1, 2)), (state == 2).any(axis=(1, 2))
         n = len(state)
         if slipping.any() or open_.any():
-            reasons.append(f"at the peak {int(slipping.sum())} of {n} contacts slip, {int(open_.sum())} lift off")
+            reasons.append(
+                f"at the peak {int(slipping.sum())} of {n} contacts slip, {int(open_.sum())} lift off"
+            )
         else:
             reasons.append("at the peak all contacts stick: the system is linear")
-    mine = result.array("case") == case.index
-    high = np.flatnonzero(mine & result.converged & (result.array("order") > result.low))
+    mine = result.integers("case") == case.index
+    high = np.flatnonzero(mine & result.converged & (result.integers("order") > result.low))
     share = _harmonic_share(result, high)
     if np.isfinite(share):
         above = result.low + 1
-        reasons.append(f"harmonics {above} to {result.high} carry up to {number(share, 2)} % of the contact force")
+        reasons.append(
+            f"harmonics {above} to {result.high} carry up to {number(share, 2)} % of the contact force"
+        )
     return "; ".join(reasons) or "–"
 
 
@@ -202,7 +216,8 @@ def alert(result: Result) -> str:
     for case in result.cases:
         ranges = flagged_ranges(result, case)
         where = "<br>".join(
-            f"{number(a, 5)} Hz" if a == b else f"{number(a, 5)} to {number(b, 5)} Hz" for a, b, _, _ in ranges
+            f"{number(a, 5)} Hz" if a == b else f"{number(a, 5)} to {number(b, 5)} Hz"
+            for a, b, _, _ in ranges
         )
         worst = max(ranges, key=lambda r: r[2]) if ranges else None
         peak = f"{percent(worst[2])} at {number(worst[3], 5)} Hz" if worst else "–"
@@ -217,4 +232,4 @@ def alert(result: Result) -> str:
     stored = escape(result.text("alert_explanation"))
     text += f"<p>{stored}</p>" if stored else ""
     head = [RATIO, f"H = {result.high} asked for", "largest predicted error", "why"]
-    return text + html_table(head, rows)
+    return text + html_table(head, rows, numeric=False)

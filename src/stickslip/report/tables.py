@@ -10,11 +10,12 @@ from stickslip.report.quantities import NONE, fixed, number, percent, quantity, 
 from stickslip.report.result import RATIO, Result
 
 
-def html_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table; the cells are HTML already."""
+def html_table(head: Sequence[str], rows: Sequence[Sequence[str]], *, numeric: bool = True) -> str:
+    """Return a table; the cells are HTML already, and set flush right from the second column if numeric."""
+    kind = ' class="numeric"' if numeric else ""
     top = "".join(f'<th scope="col">{cell}</th>' for cell in head)
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
-    return f'<div class="wide"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
+    return f'<div class="wide"><table{kind}><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
 def _reduction_rows(result: Result, full: str, reduced: str, name: str) -> list[list[str]]:
@@ -22,7 +23,12 @@ def _reduction_rows(result: Result, full: str, reduced: str, name: str) -> list[
         return []
     a, b = result.floats(full), result.floats(reduced)
     return [
-        [f"{name} {k + 1}", fixed(x, 3), fixed(y, 3), percent(100 * (y / x - 1) if x else float("nan"))]
+        [
+            f"{name} {k + 1}",
+            fixed(x, 3),
+            fixed(y, 3),
+            percent(100 * (y / x - 1) if x else float("nan")),
+        ]
         for k, (x, y) in enumerate(zip(a, b, strict=True))
     ]
 
@@ -30,7 +36,9 @@ def _reduction_rows(result: Result, full: str, reduced: str, name: str) -> list[
 def reduction(result: Result) -> str:
     """Frequencies of the full against the reduced model."""
     rows = _reduction_rows(result, "frequency_full_hz", "frequency_reduced_hz", "free")
-    rows += _reduction_rows(result, "frequency_stuck_full_hz", "frequency_stuck_reduced_hz", "stuck")
+    rows += _reduction_rows(
+        result, "frequency_stuck_full_hz", "frequency_stuck_reduced_hz", "stuck"
+    )
     if not rows:
         return "<p>The reduction was not checked in this run.</p>"
     differences = [
@@ -64,7 +72,11 @@ def load_cases(result: Result) -> str:
     rows = []
     for case in result.cases:
         response = peak_response(result, case)
-        row = [case.label, quantity(case.excitation, "N"), quantity(response * case.excitation, "m")]
+        row = [
+            case.label,
+            quantity(case.excitation, "N"),
+            quantity(response * case.excitation, "m"),
+        ]
         row += [number(response * scale.factor, 4), fixed(peak_hz(result, case), 2)]
         row += [fixed(_optional(result, name, case.index), 0) for name in counts]
         row += [fixed(_optional(result, name, case.index), 2) for name in clocks]
@@ -90,7 +102,9 @@ def verification(result: Result) -> str:
     """Time integration against harmonic balance."""
     names = ("verify_case", "verify_frequency_hz", "verify_transient", "verify_balance")
     if not result.has(*names, "verify_difference_percent"):
-        return "<p>Time integration was not asked for in this run (option <code>--verify</code>).</p>"
+        return (
+            "<p>Time integration was not asked for in this run (option <code>--verify</code>).</p>"
+        )
     difference = result.floats("verify_difference_percent")
     rows = []
     for k, case in enumerate(result.floats("verify_case")):
@@ -119,9 +133,15 @@ def verification(result: Result) -> str:
 
 def retention(result: Result) -> str:
     """How much the small retention stiffness of the damper moves the peak."""
-    shift = result.floats("retention_peak_shift") if result.has("retention_peak_shift") else np.array([])
+    shift = (
+        result.floats("retention_peak_shift")
+        if result.has("retention_peak_shift")
+        else np.array([])
+    )
     if not np.isfinite(shift).any():
-        return "<p>The influence of the damper's retention stiffness was not computed in this run.</p>"
+        return (
+            "<p>The influence of the damper's retention stiffness was not computed in this run.</p>"
+        )
     known = [c for c in result.cases if np.isfinite(shift[c.index])]
     worst = max(known, key=lambda c: abs(shift[c.index]))
     rows = [
@@ -150,7 +170,7 @@ def provenance(result: Result, versions: dict[str, str]) -> str:
         ["harmonic orders", f"{result.low} and {result.high}"],
     ]
     study = escape(result.text("study_toml"))
-    text = html_table(["", ""], rows)
+    text = html_table(["", ""], rows, numeric=False)
     if study:
         text += f"<details><summary>The study file</summary><pre>{study}</pre></details>"
     return text
