@@ -31,6 +31,9 @@ html_static_path: list[str] = []
 myst_enable_extensions = ["amsmath", "dollarmath", "deflist"]
 myst_heading_anchors = 3
 math_number_all = False
+suppress_warnings = [
+    "misc.highlighting_failure"
+]  # sketches of types on the design page are not quite Python
 
 autodoc_default_options = {"members": True, "member-order": "bysource"}
 autodoc_typehints = "none"  # the numpydoc text has shapes and units, which the annotations lack

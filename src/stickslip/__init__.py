@@ -24,6 +24,12 @@ if TYPE_CHECKING:
         FlatCurvedDamper,
     )
     from stickslip.model.dofs import Dofs
+    from stickslip.model.mesh import (
+        BladePair,
+        SolidMesh,
+        mesh_blade_pair,
+        write_mesh,
+    )
     from stickslip.model.rigid_body import RigidBody
     from stickslip.model.structure import (
         Structure,
@@ -38,8 +44,10 @@ if TYPE_CHECKING:
     )
     from stickslip.response.forced import (
         ForcedPoint,
+        ForcedProblem,
         Sweep,
         accepted_points,
+        forced_problem,
         forced_response,
     )
     from stickslip.response.preload import preload
@@ -51,6 +59,7 @@ if TYPE_CHECKING:
     )
     from stickslip.solve.newton import Newton
     from stickslip.solve.status import Status
+    from stickslip.study.run import run_study
     from stickslip.study.schema import (
         Study,
         read_study,
@@ -64,27 +73,38 @@ _MODULES = {
     "stickslip.harmonic.excitation": ("HarmonicLoad",),
     "stickslip.model.damper": ("ContactPoints", "FlatCurvedDamper"),
     "stickslip.model.dofs": ("Dofs",),
+    "stickslip.model.mesh": ("BladePair", "SolidMesh", "mesh_blade_pair", "write_mesh"),
     "stickslip.model.rigid_body": ("RigidBody",),
     "stickslip.model.structure": ("Structure", "join"),
     "stickslip.report.page": ("write_report",),
     "stickslip.response.fields": ("Fields", "Signals", "fields", "signals"),
-    "stickslip.response.forced": ("ForcedPoint", "Sweep", "accepted_points", "forced_response"),
+    "stickslip.response.forced": (
+        "ForcedPoint",
+        "ForcedProblem",
+        "Sweep",
+        "accepted_points",
+        "forced_problem",
+        "forced_response",
+    ),
     "stickslip.response.preload": ("preload",),
     "stickslip.response.system": ("System",),
     "stickslip.response.transient": ("TimeStepping", "TransientResult", "integrate"),
     "stickslip.solve.newton": ("Newton",),
     "stickslip.solve.status": ("Status",),
+    "stickslip.study.run": ("run_study",),
     "stickslip.study.schema": ("Study", "read_study"),
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
+    "BladePair",
     "ContactPoints",
     "Dofs",
     "ElasticCoulomb",
     "Fields",
     "FlatCurvedDamper",
     "ForcedPoint",
+    "ForcedProblem",
     "HarmonicLoad",
     "InputError",
     "Interface",
@@ -92,6 +112,7 @@ __all__ = [
     "RigidBody",
     "Signals",
     "SingularError",
+    "SolidMesh",
     "Status",
     "StickslipError",
     "Structure",
@@ -104,12 +125,16 @@ __all__ = [
     "accepted_points",
     "contact_forces",
     "fields",
+    "forced_problem",
     "forced_response",
     "integrate",
     "join",
+    "mesh_blade_pair",
     "preload",
     "read_study",
+    "run_study",
     "signals",
+    "write_mesh",
     "write_report",
 ]
 

@@ -1,0 +1,187 @@
+"""What keeps the package readable, checked: imports, sizes, docstrings, names, and what the README promises."""
+
+import ast
+import dataclasses
+import inspect
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import stickslip
+
+ROOT = Path(__file__).parent.parent
+SOURCE = ROOT / "src" / "stickslip"
+MODULES = sorted(SOURCE.rglob("*.py"))
+PUBLIC = [name for name in stickslip.__all__ if not name.startswith("_")]
+LONGEST_MODULE = 400
+LONGEST_FUNCTION = (
+    60  # lines of code without the docstring; the 90th percentile has its own, smaller limit
+)
+USUAL_FUNCTION = 40
+
+
+def functions(path: Path) -> list[ast.FunctionDef]:
+    """Return every function and method of a module."""
+    return [
+        node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef)
+    ]
+
+
+def body_lines(node: ast.FunctionDef) -> int:
+    """Count the lines from the first statement that is not the docstring."""
+    body = node.body[1:] if ast.get_docstring(node) else node.body
+    return node.end_lineno - body[0].lineno + 1 if body else 0
+
+
+def tracked_files() -> list[Path]:
+    """Return what git tracks; skips where there is no repository, as in an unpacked archive."""
+    try:
+        listed = subprocess.run(
+            ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True
+        )
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("not a git checkout")
+    return [ROOT / name for name in listed.stdout.splitlines() if (ROOT / name).is_file()]
+
+
+def in_fresh_python(code: str) -> str:
+    """Return what `code` prints in a new interpreter."""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+def test_imports_point_one_way():
+    done = subprocess.run(
+        [Path(sys.executable).parent / "lint-imports", "--no-cache"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(SOURCE)))
+def test_modules_are_short(path):
+    assert len(path.read_text().splitlines()) <= LONGEST_MODULE
+
+
+def test_functions_are_short():
+    lengths = {
+        f"{path.relative_to(SOURCE)}:{node.name}": body_lines(node)
+        for path in MODULES
+        for node in functions(path)
+    }
+    too_long = {name: lines for name, lines in lengths.items() if lines > LONGEST_FUNCTION}
+    assert not too_long
+    usual = sorted(lengths.values())[int(0.9 * len(lengths))]
+    assert usual <= USUAL_FUNCTION
+
+
+def test_no_module_for_leftovers():
+    assert not [
+        path
+        for path in MODULES
+        if path.stem in {"utils", "util", "common", "core", "helpers", "misc"}
+    ]
+
+
+def test_import_loads_nothing_heavy():
+    heavy = ["numpy", "scipy", "numba", "pydantic", "xarray", "plotly", "gmsh", "skfem", "meshio"]
+    code = f"import sys, stickslip; print([name for name in {heavy} if name in sys.modules])"
+    assert in_fresh_python(code) == "[]"
+
+
+def test_public_names_resolve_to_where_they_are_declared():
+    tree = ast.parse((SOURCE / "__init__.py").read_text())
+    declared = {
+        alias.name: node.module
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.module.startswith("stickslip.")
+        for alias in node.names
+    }
+    assert set(declared) == set(PUBLIC), "the block for type checkers and __all__ differ"
+    assert {name: getattr(stickslip, name).__module__ for name in PUBLIC} == declared
+    assert set(PUBLIC) <= set(dir(stickslip))
+
+
+def test_unknown_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="no attribute 'elastic_coulomb'"):
+        stickslip.elastic_coulomb  # noqa: B018  # the access is the test
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_public_names_have_docstrings(name):
+    thing = getattr(stickslip, name)
+    text = inspect.getdoc(thing)
+    assert text
+    assert not text.startswith(f"{name}("), "the docstring is the one that dataclasses make up"
+
+
+def nomenclature_names() -> set[str]:
+    """Return the code names in the tables of the nomenclature."""
+    page = (ROOT / "docs" / "nomenclature.md").read_text()
+    rows = [line for line in page.splitlines() if line.startswith("|")]
+    return {word for row in rows for word in re.findall(r"`([A-Za-z_]\w*)`", row)}
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_parameters_stand_in_the_nomenclature(name):
+    thing = getattr(stickslip, name)
+    if inspect.isclass(thing) and not dataclasses.is_dataclass(thing):
+        return  # errors and enumerations have no parameters of their own
+    missing = set(inspect.signature(thing).parameters) - nomenclature_names()
+    assert not missing, f"docs/nomenclature.md lacks {sorted(missing)}, parameters of {name}"
+
+
+def test_nomenclature_gives_one_row_to_each_name():
+    page = (ROOT / "docs" / "nomenclature.md").read_text()
+    rows = page.split("## Parameters in the code")[1].splitlines()
+    names = [
+        word
+        for row in rows
+        if row.startswith("| `")
+        for word in re.findall(r"`(\w+)`", row.split("|")[1])
+    ]
+    assert names
+    assert len(names) == len(set(names)), sorted({name for name in names if names.count(name) > 1})
+
+
+def test_readme_commands_are_make_targets():
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE))
+    for page in ("README.md", "CONTRIBUTING.md", "docs/install.md"):
+        used = set(re.findall(r"(?:`|\$ )make ([a-z]+)", (ROOT / page).read_text()))
+        assert used <= targets, page
+        assert used, page
+
+
+def test_readme_links_lead_somewhere():
+    page = (ROOT / "README.md").read_text()
+    links = [link for link in re.findall(r"\]\(([^)#]+)\)", page) if "://" not in link]
+    assert links
+    assert [link for link in links if not (ROOT / link).exists()] == []
+
+
+def test_no_tracked_file_knows_this_machine():
+    suspicious = re.compile(
+        r"(?<![\w.$}/-])/(?:work|opt|home|root|Users|tmp)/\w|file:///|--(?:extra-)?index-url|--find-links"
+    )
+    found = []
+    for path in tracked_files():
+        if path.suffix in {".png", ".nc", ".gz"} or path == Path(__file__):
+            continue
+        text = path.read_text(encoding="utf-8", errors="replace")
+        found += [f"{path.relative_to(ROOT)}: {hit.group()}" for hit in suspicious.finditer(text)]
+    assert found == []
+
+
+def test_locked_requirements_have_hashes():
+    for name in ("requirements.lock", "docs/requirements.lock"):
+        pinned = re.findall(
+            r"^[\w.-]+==\S+ \\\n    --hash=sha256:", (ROOT / name).read_text(), flags=re.MULTILINE
+        )
+        stated = re.findall(r"^[\w.-]+", (ROOT / name).read_text(), flags=re.MULTILINE)
+        assert len(pinned) == len(stated) > 0
