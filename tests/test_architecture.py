@@ -64,6 +64,10 @@ def test_imports_point_one_way():
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+def test_only_the_public_names_hide_from_the_import_contracts():
+    assert [path for path in MODULES if "TYPE_CHECKING" in path.read_text()] == [SOURCE / "__init__.py"]
+
+
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(SOURCE)))
 def test_modules_are_short(path):
     assert len(path.read_text().splitlines()) <= LONGEST_MODULE
