@@ -1,0 +1,158 @@
+"""Small models shared by the tests of the numerical core, and a second, plain evaluation of a contact."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.contact.interface import Interface
+from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.model.dofs import Dofs
+from stickslip.model.structure import Structure
+from stickslip.response.system import System
+
+STICK, SLIP, OPEN = 0, 1, 2
+
+
+def table(names: tuple[str, ...]) -> Dofs:
+    return Dofs(np.arange(len(names)), names, np.zeros((len(names), 3)))
+
+
+# ---- a contact, sample by sample ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Twin:
+    force: FloatArray  # (3, samples)
+    state: FloatArray  # (2, samples) of the second period
+    history: FloatArray  # (2, 2 samples): state times sign of slip, both periods
+    margin: FloatArray  # (2, samples) distance of the tangential force from the limit, second period
+
+
+def twin(gap: FloatArray, law: ElasticCoulomb) -> Twin:
+    """Sliders marched sample by sample through two periods; knows neither intervals nor anchors."""
+    samples = gap.shape[1]
+    pressure = law.preload - law.k_n * gap[2]
+    normal = np.maximum(pressure, 0.0)
+    force = np.zeros((3, samples))
+    force[2] = -normal
+    state = np.zeros((2, samples), dtype=int)
+    history = np.zeros((2, 2 * samples))
+    margin = np.zeros((2, samples))
+    for d, k in enumerate((law.k_t, law.k_w)):
+        slider = 0.0
+        # a spring that comes back to where it slipped lies on its limit again: rounding must not make that a second slip
+        rounding = 1e-13 * (k * np.max(np.abs(gap[d])) + law.mu * np.max(normal))
+        if law.residual_traction is not None:
+            slider = gap[d, -1] - law.residual_traction * law.mu * normal[-1] / k
+        for step in range(2 * samples):
+            i = step % samples
+            x, limit = gap[d, i], law.mu * normal[i]
+            spring = k * (x - slider)
+            margin[d, i] = abs(abs(spring) - limit)
+            if pressure[i] < 0.0:
+                slider, force[d, i], state[d, i] = x, 0.0, OPEN
+                margin[d, i] = abs(pressure[i])
+            elif abs(spring) > limit + rounding:
+                force[d, i], state[d, i] = np.sign(spring) * limit, SLIP
+                slider = x - force[d, i] / k if k > 0 else 0.0
+            else:
+                force[d, i], state[d, i] = spring, STICK
+            history[d, step] = state[d, i] * (np.sign(spring) if state[d, i] == SLIP else 1.0)
+    return Twin(force, state, history, margin)
+
+
+def basis(order: int, samples: int) -> FloatArray:
+    """(samples, 2 order + 1) Fourier basis 1, cos, sin, cos 2, ..."""
+    tau = 2 * np.pi * np.arange(samples) / samples
+    columns = [np.ones(samples)]
+    for h in range(1, order + 1):
+        columns += [np.cos(h * tau), np.sin(h * tau)]
+    return np.array(columns).T
+
+
+def analyse(signal: FloatArray, order: int) -> FloatArray:
+    """Real Fourier coefficients of the last axis by FFT: (..., 2 order + 1)."""
+    spectrum = np.fft.rfft(signal) / signal.shape[-1]
+    out = np.empty((*signal.shape[:-1], 2 * order + 1))
+    out[..., 0] = spectrum[..., 0].real
+    for h in range(1, order + 1):
+        out[..., 2 * h - 1] = 2 * spectrum[..., h].real
+        out[..., 2 * h] = -2 * spectrum[..., h].imag
+    return out
+
+
+# ---- systems ------------------------------------------------------------------------------------------------------------
+
+
+def griffin(limit: float) -> tuple[System, HarmonicLoad]:
+    """One mass with a friction damper of constant limit (benchmark B3): m = k = 1, c = 0.02, kd = 0.5, force 0.1."""
+    one = np.ones((1, 1))
+    structure = Structure(one, 0.02 * one, one.copy(), table(("x",)))
+    law = ElasticCoulomb(k_t=0.5, k_w=0.0, k_n=0.0, mu=1.0, preload=limit)
+    system = System(structure, Interface(("d",), (law,), np.array([[1.0], [0.0], [0.0]])), np.array([0]))
+    return system, HarmonicLoad(np.zeros(1), {1: np.array([0.1 + 0j])})
+
+
+def blades_and_damper(
+    *, m: float | None = 0.0, excitation: float = 1.0, length: float = 1.0, force: float = 1.0, phase: float = 0.0,
+    mirrored: bool = False,
+) -> tuple[System, HarmonicLoad]:  # fmt: skip
+    """Blade, damper, blade with variable normal load (benchmark B6, after Ferhatoglu & Zucca 2021).
+
+    `length` and `force` are the sizes of the units in m and N; `phase` shifts the excitation; `mirrored` swaps left and right.
+    """
+    mass = np.diag([1.0, 1, 1, 1, 0.1, 0.1])
+    damping = np.diag([20.0, 20, 20, 20, 0, 0])
+    stiffness = np.diag([3e5] * 4 + [0.0, 0.0])
+    for a, b, k in ((0, 1, 3e5), (2, 3, 3e5), (0, 2, 7e5), (1, 3, 7e5), (4, 5, 3e5)):
+        stiffness[[a, b], [a, b]] += k
+        stiffness[[a, b], [b, a]] -= k
+    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    flip = np.diag([1.0, -1.0])  # the benchmark's normal is positive in compression
+    one, none = np.eye(2), np.zeros((2, 2))
+    gap = np.zeros((6, 6))
+    gap[[0, 2]] = flip @ np.array([[c, s], [-s, c]]) @ np.hstack([-one, none, one])
+    gap[[3, 5]] = flip @ np.array([[c, -s], [s, c]]) @ np.hstack([none, -one, one])
+    per_length = length / force
+    law = ElasticCoulomb(
+        k_t=3e5 * per_length, k_w=0.0, k_n=3e5 * per_length, mu=0.5, residual_traction=m
+    )
+    shake = excitation * np.array([0, -20, 5, 0, 0, 0.0]) * (-1j) * np.exp(1j * phase)
+    static = np.array([0, 0, 0, 0, 0, 120.0])
+    if mirrored:
+        gap = np.diag([-1.0, 1, 1, -1, 1, 1]) @ gap  # the tangents turn round, the physics must not notice
+    structure = Structure(
+        mass * per_length, damping * per_length, stiffness * per_length, table(("x1", "y1", "x2", "y2", "xD", "yD"))
+    )
+    system = System(structure, Interface(("1", "2"), (law, law), gap), np.array([3, 0, 1, 2]), free=np.array([4, 5]))
+    return system, HarmonicLoad(static / force, {1: shake / force})
+
+
+def free_body_3d(seed: int = 0, preload: float = 30.0) -> tuple[System, HarmonicLoad]:
+    """Two grounded masses and a free body of six coordinates between them, two contacts in general position."""
+    rng = np.random.default_rng(seed)
+    n = 12
+    mass = np.diag([1.0, 1, 1, 1, 1, 1, 0.2, 0.2, 0.2, 2e-2, 2e-2, 2e-2])
+    grounded = rng.standard_normal((6, 6))
+    stiffness = np.zeros((n, n))
+    stiffness[:6, :6] = 1e5 * (grounded @ grounded.T / 6 + 2 * np.eye(6))
+    damping = 1e-4 * stiffness + np.diag([3.0] * 6 + [0.0] * 6)
+    gap = np.zeros((6, n))
+    for contact, (arm, blade) in enumerate(((np.array([0.2, -0.1, 0.3]), 0), (np.array([-0.3, 0.2, 0.1]), 3))):
+        frame = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+        cross = np.array([[0, -arm[2], arm[1]], [arm[2], 0, -arm[0]], [-arm[1], arm[0], 0]])
+        rows = slice(3 * contact, 3 * contact + 3)
+        gap[rows, blade : blade + 3] = frame.T
+        gap[rows, 6:9] = -frame.T
+        gap[rows, 9:12] = frame.T @ cross
+    laws = tuple(ElasticCoulomb(k_t=2e5, k_w=1e5, k_n=3e5, mu=0.4, preload=p) for p in (preload, 0.5 * preload))
+    names = tuple(f"b{i}.{c}" for i in (1, 2) for c in "xyz")
+    dofs = table((*names, "x", "y", "z", "rx", "ry", "rz"))
+    system = System(
+        Structure(mass, damping, stiffness, dofs), Interface(("1", "2"), laws, gap), np.arange(6), free=np.arange(6, 12)
+    )
+    shake = np.zeros(n, dtype=complex)
+    shake[:6] = 10.0 * (rng.standard_normal(6) + 1j * rng.standard_normal(6))
+    return system, HarmonicLoad(5.0 * rng.standard_normal(n), {1: shake})
