@@ -315,8 +315,8 @@ def _model_variables(preload: FloatArray) -> dict[str, xr.Variable]:
 
 
 def _check_variables(table: dict[str, np.ndarray], n_cases: int) -> dict[str, xr.Variable]:
-    at = np.array([5, 20, 30])
     case = np.full(3, n_cases - 1)
+    at = np.array([5, 20, 30]) % int(np.sum(table["case"] == n_cases - 1))
     first = int(np.argmax(table["case"] == n_cases - 1))
     balance = table["amplitude"][first + at]
     return {

@@ -97,15 +97,15 @@ def _scene(position: FloatArray, points: FloatArray, *, close: bool) -> dict[str
     """Axes of a view: of all, or of the neighbourhood of the contact points; equal lengths on all axes."""
     if close:
         low, high = _neighbourhood(position)
-        eye, size = {"x": 0.75, "y": -1.3, "z": 0.95}, 1.0
+        eye, size = {"x": 0.75, "y": -1.3, "z": 0.95}, 1.45
     else:
         low, high = points.min(axis=0), points.max(axis=0)
-        eye, size = {"x": 1.0, "y": -1.5, "z": 0.55}, 1.25
+        eye, size = {"x": 1.0, "y": -1.5, "z": 0.55}, 1.9
     span = size * (high - low) / (high - low).max()
     axes = {
         f"{name}axis": {
-            "range": [float(a), float(b)], "title": {"text": f"{name} (mm)"}, "showbackground": False,
-            "gridcolor": "#dfe4ea", "zeroline": False, "nticks": 6, "tickfont": {"size": 11},
+            "range": [float(a), float(b)], "title": {"text": f"{name} (mm)", "font": {"size": 12}}, "showbackground": False,
+            "gridcolor": "#dfe4ea", "zeroline": False, "nticks": 6 if close else 3, "tickfont": {"size": 11},
         }
         for name, a, b in zip("xyz", low, high, strict=True)
     }  # fmt: skip

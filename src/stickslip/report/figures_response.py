@@ -299,12 +299,13 @@ def errors(result: Result) -> Plot:
     real = result.floats("real_error_percent")
     top = float(np.nanmax(np.concatenate([error, real, [result.threshold]])))
     figure.add_hline(y=result.threshold, line={"dash": "dash", "color": ALARM, "width": 1.4})
-    figure.update_xaxes(title_text="frequency (Hz)")
+    hz = result.floats("frequency_hz")
+    figure.update_xaxes(title_text="frequency (Hz)", range=[float(hz.min()), float(hz.max())])
     ticks = log_ticks(np.array([_SMALLEST_ERROR, top]), steps=(1,))
     figure.update_yaxes(
         type="log", range=[np.log10(_SMALLEST_ERROR), np.log10(2 * top)], ticksuffix=" %", **ticks
     )
-    figure.update_yaxes(title_text="error of the output dofs", col=1)
+    figure.update_yaxes(title_text="error of the output dofs (%)", col=1)
     return Plot(key, title, _error_caption(result), figure)
 
 
@@ -341,11 +342,10 @@ def error_scatter(result: Result) -> Plot:
     axis = {
         "type": "log",
         "range": np.log10(ends).tolist(),
-        "ticksuffix": " %",
         **log_ticks(values),
     }
-    figure.update_xaxes(title_text="predicted error", **axis)
-    figure.update_yaxes(title_text="real error", scaleanchor="x", constrain="domain", **axis)
+    figure.update_xaxes(title_text="predicted error (%)", **axis)
+    figure.update_yaxes(title_text="real error (%)", scaleanchor="x", constrain="domain", **axis)
     figure.update_xaxes(constrain="domain")
     larger = int((real[known] > predicted[known]).sum())
     missed = int(((real > result.threshold) & (predicted <= result.threshold))[known].sum())
