@@ -1,0 +1,214 @@
+"""Fourier coefficients, loads, and the condensation against the whole linear system."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.sparse
+from models import table
+
+from stickslip.errors import InputError
+from stickslip.harmonic.dynamic_stiffness import condense
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.fourier import padded, to_complex, to_real
+from stickslip.model.structure import Structure
+
+RETAINED = np.array([1, 4, 5])
+OMEGA, ORDER = 3.1, 4
+
+
+# ---- Fourier ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shape", [(1, 3), (4, 3), (6, 2, 5)])
+def test_real_and_complex_round_trip(shape):
+    rng = np.random.default_rng(0)
+    real = rng.standard_normal((2 * shape[0] - 1, *shape[1:]))
+    assert np.array_equal(to_real(to_complex(real)), real)
+    complex_ = rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+    complex_[0] = complex_[0].real
+    assert np.array_equal(to_complex(to_real(complex_)), complex_)
+
+
+def test_convention_of_the_signal():
+    # q(t) = Q0 + Re Q1 e^{iτ} = C cos τ + S sin τ with Q = C - iS
+    q = np.array([[0.5], [2.0 - 3.0j]])
+    real = to_real(q)[:, 0]
+    tau = np.linspace(0, 6, 7)
+    signal = q[0, 0].real + np.real(q[1, 0] * np.exp(1j * tau))
+    assert np.allclose(signal, real[0] + real[1] * np.cos(tau) + real[2] * np.sin(tau), atol=1e-14)
+
+
+def test_padding_adds_zeros_or_drops():
+    q = np.arange(8.0).reshape(4, 2) + 1j
+    assert np.array_equal(padded(q, 6)[:4], q)
+    assert not np.any(padded(q, 6)[4:])
+    assert np.array_equal(padded(padded(q, 6), 3), q)
+    assert np.array_equal(padded(q, 1), q[:2])
+
+
+def test_load_refuses_what_is_no_harmonic():
+    with pytest.raises(ValueError, match="harmonic 0"):
+        HarmonicLoad(np.zeros(3), {0: np.zeros(3, complex)})
+    with pytest.raises(ValueError, match=r"harmonic 1 with shape \(2,\) for \(3,\)"):
+        HarmonicLoad(np.zeros(3), {1: np.zeros(2, complex)})
+    load = HarmonicLoad(np.array([1.0, -7.0, 0]), {2: np.array([0, 3 + 4j, 0])})
+    assert load.scale == 7.0
+    assert np.array_equal(load.coefficients(1)[1], np.zeros(3))
+
+
+# ---- condensation -------------------------------------------------------------------------------------------------------
+
+
+def positive(rng, n):
+    a = rng.standard_normal((n, n))
+    return a @ a.T / n + np.eye(n)
+
+
+def structure_of(kind, seed=0, n=9):
+    rng = np.random.default_rng(seed)
+    mass, stiffness = positive(rng, n), 20 * positive(rng, n)
+    damping = {"proportional": 0.01 * mass + 0.02 * stiffness, "general": 0.3 * positive(rng, n), "none": np.zeros((n, n))}
+    if kind == "massless":
+        mass[0] = mass[:, 0] = 0.0
+        mass[7] = mass[:, 7] = 0.0
+    if kind == "sparse":
+        return Structure(
+            scipy.sparse.csr_array(mass), scipy.sparse.csr_array(damping["general"]), scipy.sparse.csr_array(stiffness),
+            table(("q",) * n),
+        )  # fmt: skip
+    return Structure(mass, damping.get(kind, damping["general"]), stiffness, table(("q",) * n))
+
+
+def loaded(seed, n=9):
+    rng = np.random.default_rng(seed + 100)
+    return HarmonicLoad(
+        rng.standard_normal(n), {h: rng.standard_normal(n) + 1j * rng.standard_normal(n) for h in (1, 3)}
+    )
+
+
+def dense(matrix):
+    return matrix.toarray() if scipy.sparse.issparse(matrix) else matrix
+
+
+def dynamic(structure, w):
+    return dense(structure.stiffness) + 1j * w * dense(structure.damping) - w**2 * dense(structure.mass)
+
+
+def schur(structure, load, omega, order):
+    inner = np.setdiff1d(np.arange(structure.n), RETAINED)
+    f = load.coefficients(order)
+    out, loads = [], []
+    for h in range(order + 1):
+        d = dynamic(structure, h * omega)
+        x = np.linalg.solve(d[np.ix_(inner, inner)], np.column_stack([d[np.ix_(inner, RETAINED)], f[h, inner]]))
+        out.append(d[np.ix_(RETAINED, RETAINED)] - d[np.ix_(RETAINED, inner)] @ x[:, :-1])
+        loads.append(f[h, RETAINED] - d[np.ix_(RETAINED, inner)] @ x[:, -1])
+    return np.array(out), np.array(loads)
+
+
+KINDS = ["proportional", "general", "none", "massless", "sparse"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_condensed_is_the_schur_complement(kind):
+    structure, load = structure_of(kind), loaded(0)
+    linear = condense(structure, RETAINED, load)
+    assert linear.diagonal == (kind in ("proportional", "none"))
+    got = linear.condensed(OMEGA, ORDER)
+    stiffness, force = schur(structure, load, OMEGA, ORDER)
+    # an undamped interior may be close to resonance: the tolerance leaves room for its condition
+    assert np.allclose(got.stiffness, stiffness, rtol=1e-9, atol=1e-9 * np.abs(stiffness).max())
+    assert np.allclose(got.load, force, rtol=1e-9, atol=1e-9 * np.abs(force).max())
+    assert np.all(got.load[0].imag == 0.0)
+    assert np.all(got.derivative[0] == 0.0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_derivatives_by_frequency(kind):
+    structure, load = structure_of(kind), loaded(0)
+    linear = condense(structure, RETAINED, load)
+    got = linear.condensed(OMEGA, ORDER)
+    step = 1e-5
+    up, down = (linear.condensed(OMEGA + s, ORDER) for s in (step, -step))
+    # central differences: error (step²/6) d³D/dω³, with resonances of the interior near by
+    for value, slope in (("stiffness", got.derivative), ("load", got.load_derivative)):
+        difference = (getattr(up, value) - getattr(down, value)) / (2 * step)
+        assert np.allclose(slope, difference, rtol=0, atol=1e-6 * np.abs(difference).max()), value
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_condensed_solution_and_recovery_are_the_full_solution(kind):
+    structure, load = structure_of(kind, seed=3), loaded(3)
+    linear = condense(structure, RETAINED, load)
+    condensed = linear.condensed(OMEGA, ORDER)
+    f = load.coefficients(ORDER)
+    full = np.array([np.linalg.solve(dynamic(structure, h * OMEGA), f[h]) for h in range(ORDER + 1)])
+    q = np.linalg.solve(condensed.stiffness, condensed.load[:, :, None])[:, :, 0]
+    assert np.allclose(q, full[:, RETAINED], rtol=0, atol=1e-9 * np.abs(full).max())
+    assert np.allclose(linear.recover(OMEGA, q), full, rtol=0, atol=1e-9 * np.abs(full).max())
+
+
+def test_change_of_all_dofs_is_the_difference_of_two_recoveries():
+    structure, load = structure_of("general"), loaded(1)
+    linear = condense(structure, RETAINED, load)
+    rng = np.random.default_rng(9)
+    q, dq = (rng.standard_normal((3, 3)) + 1j * rng.standard_normal((3, 3)) for _ in range(2))
+    difference = linear.recover(OMEGA, q + dq) - linear.recover(OMEGA, q)
+    assert np.allclose(linear.recover_change(OMEGA, dq), difference, atol=1e-12)
+
+
+def test_another_load_on_the_same_structure():
+    structure = structure_of("proportional")
+    moved = condense(structure, RETAINED, loaded(0)).with_load(loaded(5)).condensed(OMEGA, ORDER)
+    fresh = condense(structure, RETAINED, loaded(5)).condensed(OMEGA, ORDER)
+    assert np.array_equal(moved.load, fresh.load)
+    assert np.array_equal(moved.load_derivative, fresh.load_derivative)
+
+
+def test_nothing_to_condense():
+    structure, load = structure_of("general"), loaded(0)
+    linear = condense(structure, np.arange(9), load)
+    got = linear.condensed(OMEGA, 2)
+    for h in range(3):
+        assert np.allclose(got.stiffness[h], dynamic(structure, h * OMEGA), atol=1e-12)
+    assert np.array_equal(got.load, load.coefficients(2))
+    assert np.array_equal(linear.recover(OMEGA, got.load), got.load)
+
+
+def test_retained_in_any_order():
+    structure, load = structure_of("general"), loaded(0)
+    order = np.array([2, 0, 1])
+    a = condense(structure, RETAINED, load).condensed(OMEGA, 2)
+    b = condense(structure, RETAINED[order], load).condensed(OMEGA, 2)
+    assert np.allclose(b.stiffness, a.stiffness[:, order][:, :, order], atol=1e-12)
+    assert np.allclose(b.load, a.load[:, order], atol=1e-12)
+
+
+# ---- messages -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_free_interior_is_refused():
+    structure = structure_of("proportional")
+    inner = np.setdiff1d(np.arange(9), RETAINED)
+    stiffness = np.array(structure.stiffness)
+    stiffness[inner[0]] = stiffness[:, inner[0]] = 0.0
+    with pytest.raises(InputError, match=r"can move without stiffness .*Retain the dofs of free bodies"):
+        condense(replace(structure, stiffness=stiffness), RETAINED, loaded(0))
+
+
+@pytest.mark.parametrize("name", ["mass", "damping", "stiffness"])
+def test_a_matrix_that_is_not_symmetric_is_named(name):
+    structure = structure_of("general")
+    skew = np.array(getattr(structure, name))
+    skew[0, 3] += 1.0
+    with pytest.raises(InputError, match=rf"Structure\.{name}: is not symmetric"):
+        condense(replace(structure, **{name: skew}), RETAINED, loaded(0))
+    skew[0, 3] = np.nan
+    with pytest.raises(InputError, match=rf"Structure\.{name}: contains NaN"):
+        condense(replace(structure, **{name: skew}), RETAINED, loaded(0))
+
+
+def test_load_of_another_structure_is_refused():
+    with pytest.raises(InputError, match="4 entries for 9 dofs"):
+        condense(structure_of("general"), RETAINED, HarmonicLoad(np.zeros(4)))
