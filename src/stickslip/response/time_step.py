@@ -185,7 +185,9 @@ def _solve_contacts(
 
     Within a contact state the force is affine in the gap, so that a step which ends in the state it was taken in is exact.
     """
-    scale = np.max(np.abs(free)) + np.max(np.abs(work.gap))
+    scale = 0.0
+    for i in range(free.size):
+        scale = max(scale, abs(free[i]), abs(work.gap[i]))
     for iteration in range(NEWTON_STEPS):
         largest = _evaluate(free, ops, before, work)
         if largest <= GAP_TOLERANCE * scale:

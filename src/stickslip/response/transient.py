@@ -176,11 +176,8 @@ class RefinedResult:
 
 def rest(n: int, laws: Sequence[ElasticCoulomb]) -> TransientStart:
     """Return zero displacement and velocity of `n` coordinates, with the residual traction of each law."""
-    shares = np.array([[law.residual_traction or 0.0] for law in laws])
-    limits = np.array([[law.mu * max(law.preload, 0.0)] for law in laws])
-    return TransientStart(
-        np.zeros(n), np.zeros(n), np.repeat(shares * limits, 2, axis=1).reshape(-1, 2)
-    )
+    held = [(law.residual_traction or 0.0) * law.mu * max(law.preload, 0.0) for law in laws]
+    return TransientStart(np.zeros(n), np.zeros(n), np.tile(held, (2, 1)).T)
 
 
 def start_from_harmonics(
