@@ -9,7 +9,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 DOCS_INSTALLED := $(VENV)/.docs-installed
-LOCK_FLAGS := --quiet --generate-hashes --strip-extras --no-header \
+LOCK_FLAGS := --quiet --generate-hashes --strip-extras \
 	--no-emit-index-url --no-emit-find-links --no-emit-trusted-host
 # Two test workers on two cores: a threaded BLAS under each would only make them wait for each other.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
@@ -63,9 +63,9 @@ validate: $(INSTALLED)  ## compare with closed forms, other codes and the litera
 
 lock: $(INSTALLED)  ## resolve the newest versions and write both lock files
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check pip-tools
-	$(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra fe --extra report --extra test \
+	CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra fe --extra report --extra test \
 		--build-deps-for editable -o requirements.lock pyproject.toml
-	$(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra docs \
+	CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra docs \
 		-c requirements.lock -o docs/requirements.lock pyproject.toml
 
 clean:  ## remove everything that the other targets made, .venv included

@@ -20,9 +20,9 @@ law = ss.ElasticCoulomb(k_t=k_t, k_w=0.0, k_n=0.0, mu=0.5, preload=100.0)
 slip_at = limit / k_t  # m
 
 
-def period(amplitude: float, samples: int, order: int = 1) -> "np.ndarray":
+def period(amplitude, samples):
     """Evaluate the contact under ``g_t = amplitude cos(tau)``."""
-    gap = np.zeros((2 * order + 1, 3))  # rows 1, cos, sin; columns t, w, n
+    gap = np.zeros((3, 3))  # rows 1, cos, sin; columns t, w, n
     gap[1, 0] = amplitude
     return ss.contact_forces(gap, law.parameters()[None, :], samples)
 
@@ -30,12 +30,12 @@ def period(amplitude: float, samples: int, order: int = 1) -> "np.ndarray":
 # %%
 # Loops at one and a half, two and five times the displacement at which the spring begins to slip.
 
-figure, axes = plt.subplots()
+figure, axes = plt.subplots(layout="constrained")
 for ratio in (1.5, 2.0, 5.0):
     at = period(ratio * slip_at, 512)
-    axes.plot(at.gap[0, 0] * 1e6, at.force[0, 0], label=f"A = {ratio:g} x slip displacement")
+    axes.plot(at.gap[0, 0] * 1e6, at.force[0, 0], label=f"A = {ratio:g} slip lengths")
 axes.set(xlabel="tangential gap, µm", ylabel="friction force, N", title="Hysteresis loops")
-axes.legend()
+axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 # %%
 # The describing function :math:`T_1/A = k_r + i k_i`. With :math:`Q_1 = C_1 - iS_1` the imaginary part is minus the
@@ -43,7 +43,7 @@ axes.legend()
 
 
 def closed_form(ratio: float) -> complex:
-    """Griffin's describing function over k, for an amplitude of `ratio` slip displacements."""
+    """Griffin's describing function over k, for an amplitude of `ratio` slip lengths."""
     theta = np.arccos(1.0 - 2.0 / ratio)
     real = (theta - np.sin(2.0 * theta) / 2.0) / np.pi
     return complex(real, 4.0 / (np.pi * ratio) * (1.0 - 1.0 / ratio))
