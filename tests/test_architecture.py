@@ -65,7 +65,9 @@ def test_imports_point_one_way():
 
 
 def test_only_the_public_names_hide_from_the_import_contracts():
-    assert [path for path in MODULES if "TYPE_CHECKING" in path.read_text()] == [SOURCE / "__init__.py"]
+    assert [path for path in MODULES if "TYPE_CHECKING" in path.read_text()] == [
+        SOURCE / "__init__.py"
+    ]
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(SOURCE)))
@@ -152,6 +154,15 @@ def test_nomenclature_gives_one_row_to_each_name():
     ]
     assert names
     assert len(names) == len(set(names)), sorted({name for name in names if names.count(name) > 1})
+
+
+@pytest.mark.parametrize("pattern", ["benchmarks/bench_*.py", "validation/case_*.py"])
+def test_modules_found_by_name_can_be_run(pattern):
+    for path in ROOT.glob(pattern):
+        run = next((node for node in functions(path) if node.name == "run"), None)
+        assert run is not None, f"{path.name} has no run()"
+        needed = len(run.args.args) - len(run.args.defaults)
+        assert needed == 0, f"{path.name}: run() is called without arguments"
 
 
 def test_readme_commands_are_make_targets():
