@@ -58,13 +58,15 @@ def main() -> int:
     """Run, print and write; 1 when a comparison does not hold."""
     word = sys.argv[1] if len(sys.argv) > 1 else ""
     records = collect(word)
-    Console().print(table(records))
+    # redirected output has no width of its own; 80 columns would fold every row
+    console = Console(width=None if sys.stdout.isatty() else 180)
+    console.print(table(records))
     failed = [record for record in records if not record["holds"]]
-    Console().print(f"{len(records) - len(failed)} of {len(records)} comparisons hold.")
+    console.print(f"{len(records) - len(failed)} of {len(records)} comparisons hold.")
     if not word:
         out = HERE / "out" / "results.json"
         out.parent.mkdir(exist_ok=True)
-        out.write_text(json.dumps(records, indent=1) + "\n")
+        out.write_text(json.dumps(records, indent=1, default=lambda number: number.item()) + "\n")
     return 1 if failed else 0
 
 
