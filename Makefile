@@ -33,9 +33,8 @@ $(INSTALLED): requirements.lock pyproject.toml
 	@touch $@
 
 run: $(INSTALLED)  ## solve the example of two blades and a damper, and write its report
-	@status=0; $(BIN)/stickslip run $(STUDY) || status=$$?; \
-	for page in $(dir $(STUDY))results/*/report.html $(dir $(STUDY))results/report.html; do \
-		if [ -e "$$page" ]; then echo "Open $$page in a browser."; fi; done; exit $$status
+	@status=0; $(BIN)/stickslip run $(STUDY) || status=$$?; page=$(dir $(STUDY))results/report.html; \
+	if [ -e "$$page" ]; then echo "Open $$page in a browser."; fi; exit $$status
 
 test: $(INSTALLED)  ## run the tests and report their coverage
 	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --cov --cov-report=term:skip-covered
