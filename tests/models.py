@@ -7,12 +7,16 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.harmonic.balance import harmonic_balance
+from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.response.system import System
+from stickslip.solve.newton import Newton, newton
 
 STICK, SLIP, OPEN = 0, 1, 2
+SAMPLES = 64
 
 
 def table(names: tuple[str, ...]) -> Dofs:
@@ -156,3 +160,32 @@ def free_body_3d(seed: int = 0, preload: float = 30.0) -> tuple[System, Harmonic
     shake = np.zeros(n, dtype=complex)
     shake[:6] = 10.0 * (rng.standard_normal(6) + 1j * rng.standard_normal(6))
     return system, HarmonicLoad(5.0 * rng.standard_normal(n), {1: shake})
+
+
+# ---- solutions ----------------------------------------------------------------------------------------------------------
+
+
+def balance_of(system, load, order=3, samples=SAMPLES):
+    return harmonic_balance(condense(system.structure, system.retained, load), system.interface, order, samples)
+
+
+def solved(system, load, omega, order=3, samples=SAMPLES, start=None):
+    balance = balance_of(system, load, order, samples)
+    if start is None:
+        start = bonded(system, load, omega, balance)
+    solution = newton(lambda v: balance.linearise(v, omega), balance.unknowns(start), Newton(max_iterations=60))
+    assert solution.status.converged, solution.status
+    return balance, solution
+
+
+def bonded(system, load, omega, balance):
+    structure = system.stuck_structure()
+    f = load.coefficients(balance.order)
+    f[0] = f[0] - system.interface.gap_operator.T @ np.concatenate(
+        [[0, 0, -law.preload] for law in system.interface.laws]
+    )
+    q = []
+    for h in range(balance.order + 1):
+        w = h * omega
+        q.append(np.linalg.solve(structure.stiffness + 1j * w * structure.damping - w**2 * structure.mass, f[h]))
+    return np.array(q)[:, system.retained]
