@@ -1,0 +1,83 @@
+"""Rigid bodies: six degrees of freedom and no stiffness of their own."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.errors import input_error
+from stickslip.model.dofs import Dofs
+from stickslip.model.structure import Structure
+
+COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigidBody:
+    """A rigid body whose principal axes are x, y, z.
+
+    Parameters
+    ----------
+    mass
+        Mass in kg.
+    inertia
+        Moments of inertia about the axes x, y, z through `centre`, in kg m².
+    centre
+        Centre of mass in metres.
+
+    Raises
+    ------
+    InputError
+        If mass or inertia are not positive, or no body can have these moments of inertia.
+    """
+
+    mass: float
+    inertia: tuple[float, float, float]
+    centre: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.mass) and self.mass > 0):
+            raise input_error(
+                "RigidBody.mass", f"must be positive, got {self.mass}", "Give kilograms."
+            )
+        if np.shape(self.inertia) != (3,) or not all(
+            math.isfinite(i) and i > 0 for i in self.inertia
+        ):
+            raise input_error(
+                "RigidBody.inertia",
+                f"needs three positive moments of inertia, got {self.inertia}",
+                "Give them about x, y and z through the centre of mass, in kg m².",
+            )
+        if 2 * max(self.inertia) > sum(self.inertia) * (1 + 1e-9):
+            raise input_error(
+                "RigidBody.inertia",
+                f"the largest moment exceeds the sum of the other two, got {self.inertia}",
+                "No distribution of mass has such moments: check their order and units (kg m²).",
+            )
+        if np.shape(self.centre) != (3,) or not all(math.isfinite(c) for c in self.centre):
+            raise input_error(
+                "RigidBody.centre", f"needs three finite numbers, got {self.centre}", "Give metres."
+            )
+
+    def structure(self) -> Structure:
+        """Return six dofs ``x y z rx ry rz`` at the centre of mass: no stiffness, no damping."""
+        dofs = Dofs(np.zeros(6, dtype=np.int64), COMPONENTS, np.tile(self.centre, (6, 1)))
+        mass = np.diag([self.mass] * 3 + list(self.inertia)).astype(float)
+        return Structure(mass, np.zeros((6, 6)), np.zeros((6, 6)), dofs)
+
+    def displacement_operator(self, points: FloatArray) -> FloatArray:
+        """Return the (p, 3, 6) operator to the displacement ``u_G + θ × r`` of material points.
+
+        Parameters
+        ----------
+        points
+            (p, 3) positions in metres.
+        """
+        operator = np.zeros((len(points), 3, 6))
+        operator[:, :, :3] = np.eye(3)
+        x, y, z = (np.asarray(points, dtype=float) - self.centre).T
+        operator[:, 0, 4], operator[:, 0, 5] = z, -y
+        operator[:, 1, 3], operator[:, 1, 5] = -z, x
+        operator[:, 2, 3], operator[:, 2, 4] = y, -x
+        return operator
