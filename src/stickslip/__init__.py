@@ -22,20 +22,36 @@ if TYPE_CHECKING:
     from stickslip.model.damper import (
         ContactPoints,
         FlatCurvedDamper,
+        gap_operator,
     )
+    from stickslip.model.damping import rayleigh_damping
     from stickslip.model.dofs import Dofs
+    from stickslip.model.lumped import (
+        chain,
+        lumped,
+    )
     from stickslip.model.mesh import (
         BladePair,
         SolidMesh,
         mesh_blade_pair,
         write_mesh,
     )
+    from stickslip.model.modes import natural_frequencies
     from stickslip.model.rigid_body import RigidBody
+    from stickslip.model.solid import (
+        Material,
+        assemble_solid,
+    )
     from stickslip.model.structure import (
         Structure,
         join,
     )
+    from stickslip.reduction.craig_bampton import craig_bampton
     from stickslip.report.page import write_report
+    from stickslip.response.drift import (
+        Drift,
+        drift,
+    )
     from stickslip.response.fields import (
         Fields,
         Signals,
@@ -71,12 +87,18 @@ _MODULES = {
     "stickslip.errors": ("InputError", "SingularError", "StickslipError"),
     "stickslip.harmonic.aft": ("contact_forces",),
     "stickslip.harmonic.excitation": ("HarmonicLoad",),
-    "stickslip.model.damper": ("ContactPoints", "FlatCurvedDamper"),
+    "stickslip.model.damper": ("ContactPoints", "FlatCurvedDamper", "gap_operator"),
+    "stickslip.model.damping": ("rayleigh_damping",),
     "stickslip.model.dofs": ("Dofs",),
+    "stickslip.model.lumped": ("chain", "lumped"),
     "stickslip.model.mesh": ("BladePair", "SolidMesh", "mesh_blade_pair", "write_mesh"),
+    "stickslip.model.modes": ("natural_frequencies",),
     "stickslip.model.rigid_body": ("RigidBody",),
+    "stickslip.model.solid": ("Material", "assemble_solid"),
     "stickslip.model.structure": ("Structure", "join"),
+    "stickslip.reduction.craig_bampton": ("craig_bampton",),
     "stickslip.report.page": ("write_report",),
+    "stickslip.response.drift": ("Drift", "drift"),
     "stickslip.response.fields": ("Fields", "Signals", "fields", "signals"),
     "stickslip.response.forced": (
         "ForcedPoint",
@@ -100,6 +122,7 @@ __all__ = [
     "BladePair",
     "ContactPoints",
     "Dofs",
+    "Drift",
     "ElasticCoulomb",
     "Fields",
     "FlatCurvedDamper",
@@ -108,6 +131,7 @@ __all__ = [
     "HarmonicLoad",
     "InputError",
     "Interface",
+    "Material",
     "Newton",
     "RigidBody",
     "Signals",
@@ -123,14 +147,22 @@ __all__ = [
     "TransientResult",
     "__version__",
     "accepted_points",
+    "assemble_solid",
+    "chain",
     "contact_forces",
+    "craig_bampton",
+    "drift",
     "fields",
     "forced_problem",
     "forced_response",
+    "gap_operator",
     "integrate",
     "join",
+    "lumped",
     "mesh_blade_pair",
+    "natural_frequencies",
     "preload",
+    "rayleigh_damping",
     "read_study",
     "run_study",
     "signals",
