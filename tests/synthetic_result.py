@@ -218,16 +218,22 @@ def _case_variables(
     return result
 
 
-def _point_variables(table: dict[str, np.ndarray], preload: FloatArray) -> dict[str, xr.Variable]:
+def _retained(table: dict[str, np.ndarray]) -> np.ndarray:
+    """Retained coordinates (point, harmonic, retained): only the damper moves."""
     amplitude, n = table["amplitude"], len(table["case"])
-    gap = contact_motion(amplitude)
-    force, _ = march(gap, preload)
-    energy = np.sum(force[..., :2, :] * (np.roll(gap, -1, -1) - gap)[..., :2, :], axis=(-1, -2))
     retained = np.zeros((n, HIGH + 1, len(RETAINED)), dtype=complex)
     six = np.array([0.03, 0.002, 0.02j, 0.05, 0.8 + 0.3j, 0.1])
     retained[:, 1, -6:] = amplitude[:, None] * six
     retained[:, 3, -6:] = 0.05 * amplitude[:, None] * six * (table["order"] == HIGH)[:, None]
     retained[:, 0, -6:-3] = 1e-5
+    return retained
+
+
+def _point_variables(table: dict[str, np.ndarray], preload: FloatArray) -> dict[str, xr.Variable]:
+    amplitude, n = table["amplitude"], len(table["case"])
+    gap = contact_motion(amplitude)
+    force, _ = march(gap, preload)
+    energy = np.sum(force[..., :2, :] * (np.roll(gap, -1, -1) - gap)[..., :2, :], axis=(-1, -2))
     share = np.array([1.0, 0.04, 0.7])
     output = np.zeros((n, HIGH + 1, len(OUTPUTS)), dtype=complex)
     output[:, 1] = amplitude[:, None] * share
@@ -260,7 +266,7 @@ def _point_variables(table: dict[str, np.ndarray], preload: FloatArray) -> dict[
             "point output", table["amplitude_low"][:, None] * share, "m", "first harmonic at low order"
         ),
         "output_displacement": _variable("point harmonic output part", parts(output), "m", "output"),
-        "retained_displacement": _variable("point harmonic retained part", parts(retained), "m", "retained"),
+        "retained_displacement": _variable("point harmonic retained part", parts(_retained(table)), "m", "retained"),
         "gap": _variable("point harmonic contact direction part", fourier(gap), "m", "contact gap"),
         "contact_force": _variable("point harmonic contact direction part", fourier(force), "N", "force"),
         "dissipated_energy": _variable("point contact", energy, "J", "energy lost in a cycle"),

@@ -97,10 +97,10 @@ def _scene(position: FloatArray, points: FloatArray, *, close: bool) -> dict[str
     """Axes of a view: of all, or of the neighbourhood of the contact points; equal lengths on all axes."""
     if close:
         low, high = _neighbourhood(position)
-        eye, size = {"x": 0.75, "y": -1.3, "z": 0.95}, 1.45
+        eye, size = {"x": 0.75, "y": -1.3, "z": 0.95}, 1.3
     else:
         low, high = points.min(axis=0), points.max(axis=0)
-        eye, size = {"x": 1.0, "y": -1.5, "z": 0.55}, 1.9
+        eye, size = {"x": 1.0, "y": -1.5, "z": 0.55}, 1.65
     span = size * (high - low) / (high - low).max()
     axes = {
         f"{name}axis": {
@@ -116,6 +116,22 @@ def _scene(position: FloatArray, points: FloatArray, *, close: bool) -> dict[str
         "camera": {"eye": eye, "projection": {"type": "orthographic"}},
         "dragmode": "orbit",
     }
+
+
+def _caption(result: Result, points: FloatArray, triangles: IntArray) -> str:
+    size = np.ptp(points, axis=0)
+    caption = (
+        f"Skin of the mesh: {counted(len(triangles), 'triangle')} between {len(np.unique(triangles))} corner nodes, "
+        f"{number(size[0])} × {number(size[1])} × {number(size[2])}{NARROW_SPACE}mm. Drag to turn, scroll to zoom."
+    )
+    if result.has("contact_position"):
+        n_right = sum(right_side(result))
+        n_left = len(right_side(result)) - n_right
+        caption += (
+            f" The rigid damper is not meshed: it touches the left blade at {n_left} points (blue) and the right "
+            f"blade at {n_right} (orange)."
+        )
+    return caption
 
 
 def mesh_picture(result: Result) -> Plot:
@@ -140,7 +156,7 @@ def mesh_picture(result: Result) -> Plot:
         faces = _inside(points, triangles, low, high) if close else triangles
         lines = _inside(points, drawn, low, high) if close else drawn
         figure.add_trace(_skin(points, faces, 0.45 if close else 1.0), row=1, col=view + 1)
-        figure.add_trace(_lines(points, lines, "#8593a3", 1.0), row=1, col=view + 1)
+        figure.add_trace(_lines(points, lines, "#6f7f91", 1.0), row=1, col=view + 1)
         for trace in _points(result, position, named=close) if has_contacts else []:
             figure.add_trace(trace, row=1, col=view + 1)
     styled(figure, 620)
@@ -151,15 +167,4 @@ def mesh_picture(result: Result) -> Plot:
     )
     if has_contacts:
         figure.update_layout(scene2=_scene(position, points, close=True))
-    size = np.ptp(points, axis=0)
-    caption = (
-        f"Skin of the mesh: {counted(len(triangles), 'triangle')} between {len(np.unique(triangles))} corner nodes, "
-        f"{number(size[0])} × {number(size[1])} × {number(size[2])}{NARROW_SPACE}mm. Drag to turn, scroll to zoom."
-    )
-    if has_contacts:
-        n_right = sum(right_side(result))
-        caption += (
-            f" The rigid damper is not meshed: it touches the left blade at {len(position) - n_right} points (blue) "
-            f"and the right blade at {n_right} (orange)."
-        )
-    return Plot(key, title, caption, figure)
+    return Plot(key, title, _caption(result, points, triangles), figure)

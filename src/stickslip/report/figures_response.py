@@ -1,14 +1,13 @@
-"""Figures of the response: curves of all load cases, the alert's errors, the optimisation curves."""
+"""Figures of the response: curves of all load cases, low against accepted order, the optimisation curves."""
 
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from stickslip.arrays import FloatArray, IntArray
+from stickslip.arrays import FloatArray
 from stickslip.report.plot import (
     ALARM,
     GRID,
-    INK,
     MUTED,
     Plot,
     absent,
@@ -19,8 +18,7 @@ from stickslip.report.plot import (
 from stickslip.report.quantities import Scale, counted, joined, number, percent, scale_for
 from stickslip.report.result import RATIO, Case, Result
 
-_COMPARED = 3  # curves of the most nonlinear cases that stay legible in one panel
-_SMALLEST_ERROR = 1e-3  # percent; below it the axis would only show rounding
+COMPARED = 3  # curves of the most nonlinear cases that stay legible in one panel
 
 
 def accepted_response(result: Result, name: str = "amplitude") -> FloatArray:
@@ -149,7 +147,7 @@ def _frf_caption(result: Result, scale: Scale) -> str:
 
 
 def frequency_response(result: Result) -> Plot:
-    """FRFs of all load cases with the order at which each point was accepted (seed 1, fig. 4b)."""
+    """FRFs of all load cases with the order at which each point was accepted (Gastaldi and Berruti 2017, fig. 4b)."""
     key, title = "frf", "Frequency response of all load ratios"
     if not np.isfinite(accepted_response(result)).any():
         return absent(key, title, "no point of the run has converged yet")
@@ -186,13 +184,13 @@ def _low_caption(result: Result, cases: list[Case], low: FloatArray) -> str:
 
 
 def low_order(result: Result) -> Plot:
-    """Low-order against accepted curves of the most nonlinear cases (seed 1, fig. 4a)."""
+    """Low-order against accepted curves of the most nonlinear cases (Gastaldi and Berruti 2017, fig. 4a)."""
     key, title = "low-order", f"What H = {result.low} alone would have given"
     if not result.has("amplitude_low"):
         return absent(key, title, "the low-order amplitudes are not in this result")
     low = result.response("amplitude_low")
     accepted = accepted_response(result)
-    cases = [c for c in result.cases if np.isfinite(low[result.points(c)]).any()][-_COMPARED:]
+    cases = [c for c in result.cases if np.isfinite(low[result.points(c)]).any()][-COMPARED:]
     if not cases:
         return absent(key, title, "no load case has a low-order solution")
     scale = _response_scale(result)
@@ -219,145 +217,6 @@ def low_order(result: Result) -> Plot:
     return Plot(key, title, _low_caption(result, cases, low), figure)
 
 
-def _error_traces(figure: go.Figure, result: Result) -> list[Case]:
-    """Add predicted errors of all cases (left) and both errors of some (right); return those."""
-    hz = result.floats("frequency_hz")
-    predicted, real = result.floats("predicted_error_percent"), result.floats("real_error_percent")
-    both = [c for c in result.cases if np.isfinite(real[result.points(c)]).any()][-_COMPARED:]
-
-    def add(case: Case, at: IntArray, y: FloatArray, column: int, **style: object) -> None:
-        keep = at[np.isfinite(y[at])]
-        hover = f"{RATIO} = {case.label}<br>%{{x:.2f}} Hz: %{{y:.3g}} %<extra></extra>"
-        options = {"legendgroup": "cases", "hovertemplate": hover, **style}
-        figure.add_scatter(x=hz[keep], y=y[keep], row=1, col=column, **options)
-
-    heading = {"text": f"load ratio {RATIO}"}
-    for case in result.cases:
-        at = result.points(case)
-        line = {"color": case.colour, "width": 1.6}
-        add(
-            case,
-            at,
-            predicted,
-            1,
-            mode="lines",
-            name=case.label,
-            line=line,
-            legendgrouptitle=heading,
-        )
-        if case in both:
-            mark = {
-                "color": case.colour,
-                "size": 6,
-                "symbol": "circle-open",
-                "line": {"width": 1.4},
-            }
-            add(case, at, predicted, 2, mode="lines", name=case.label, line=line, showlegend=False)
-            add(case, at, real, 2, mode="markers", name="real", marker=mark, showlegend=False)
-    return both
-
-
-def _error_caption(result: Result) -> str:
-    error = result.floats("predicted_error_percent")
-    known, above = np.isfinite(error), result.flagged
-    text = (
-        f"The alert's predicted error of the H = {result.low} solution on the output dofs; the dashed line "
-        f"is the threshold of {percent(result.threshold)}. {int(above.sum())} of "
-        f"{counted(int(known.sum()), 'checked point')} lie above it and were asked to repeat at "
-        f"H = {result.high}. "
-    )
-    worst = int(np.nanargmax(error))
-    ratio = number(float(result.floats("load_ratio")[result.integers("case")[worst]]))
-    hz = number(float(result.floats("frequency_hz")[worst]), 5)
-    text += f"The largest, {percent(float(error[worst]))}, is at {hz} Hz for {RATIO} = {ratio}. "
-    real = np.isfinite(result.floats("real_error_percent"))
-    if real.any():
-        text += (
-            f"Right: the real error (open circles), the difference of the two orders, where both were "
-            f"solved ({counted(int(real.sum()), 'point')}; at most {_COMPARED} load cases are drawn). "
-        )
-    hidden = int((error < _SMALLEST_ERROR).sum())
-    if hidden:
-        text += f"{counted(hidden, 'point')} below {number(_SMALLEST_ERROR)} % lie under the axis."
-    return text
-
-
-def errors(result: Result) -> Plot:
-    """Predicted and real error against frequency (seed 1, fig. 6)."""
-    key, title = "errors", "The alert: predicted and real error against frequency"
-    error = result.floats("predicted_error_percent")
-    if not np.isfinite(error).any():
-        return absent(key, title, "no predicted error was computed")
-    some_real = np.isfinite(result.floats("real_error_percent")).any()
-    titles = ("predicted, all load cases", "predicted (line) and real (circles)")
-    columns = 2 if some_real else 1
-    figure = make_subplots(
-        1, columns, shared_yaxes=True, horizontal_spacing=0.04, subplot_titles=titles[:columns]
-    )
-    _error_traces(figure, result)
-    styled(figure, 430)
-    real = result.floats("real_error_percent")
-    top = float(np.nanmax(np.concatenate([error, real, [result.threshold]])))
-    figure.add_hline(y=result.threshold, line={"dash": "dash", "color": ALARM, "width": 1.4})
-    hz = result.floats("frequency_hz")
-    figure.update_xaxes(title_text="frequency (Hz)", range=[float(hz.min()), float(hz.max())])
-    ticks = log_ticks(np.array([_SMALLEST_ERROR, top]), steps=(1,))
-    figure.update_yaxes(
-        type="log", range=[np.log10(_SMALLEST_ERROR), np.log10(2 * top)], ticksuffix=" %", **ticks
-    )
-    figure.update_yaxes(title_text="error of the output dofs (%)", col=1)
-    return Plot(key, title, _error_caption(result), figure)
-
-
-def error_scatter(result: Result) -> Plot:
-    """Real against predicted error (seed 1, fig. 7a)."""
-    key, title = "error-scatter", "Does the prediction hold? Real against predicted error"
-    predicted, real = result.floats("predicted_error_percent"), result.floats("real_error_percent")
-    known = np.isfinite(predicted) & np.isfinite(real) & (predicted > 0) & (real > 0)
-    if not known.any():
-        return absent(key, title, "no point was solved at both orders")
-    figure = go.Figure()
-    for case in result.cases:
-        at = np.flatnonzero(known & (result.integers("case") == case.index))
-        if at.size:
-            mark = {
-                "color": case.colour,
-                "size": 7,
-                "symbol": "circle-open",
-                "line": {"width": 1.5},
-            }
-            hover = "predicted %{x:.3g} %<br>real %{y:.3g} %<br>%{customdata:.2f} Hz<extra></extra>"
-            figure.add_scatter(
-                x=predicted[at], y=real[at], mode="markers", name=case.label, marker=mark,
-                customdata=result.floats("frequency_hz")[at], hovertemplate=hover,
-            )  # fmt: skip
-    values = np.concatenate([predicted[known], real[known], [result.threshold]])
-    ends = np.array([values.min() / 1.5, values.max() * 1.5])
-    dotted = {"color": INK, "width": 1, "dash": "dot"}
-    figure.add_scatter(x=ends, y=ends, mode="lines", name="real = predicted", line=dotted)
-    styled(figure, 520, legend_title=f"load ratio {RATIO}")
-    dash = {"dash": "dash", "color": ALARM, "width": 1.2}
-    figure.add_hline(y=result.threshold, line=dash)
-    figure.add_vline(x=result.threshold, line=dash)
-    axis = {
-        "type": "log",
-        "range": np.log10(ends).tolist(),
-        **log_ticks(values),
-    }
-    figure.update_xaxes(title_text="predicted error (%)", **axis)
-    figure.update_yaxes(title_text="real error (%)", scaleanchor="x", constrain="domain", **axis)
-    figure.update_xaxes(constrain="domain")
-    larger = int((real[known] > predicted[known]).sum())
-    missed = int(((real > result.threshold) & (predicted <= result.threshold))[known].sum())
-    caption = (
-        f"{counted(int(known.sum()), 'point')} solved at both orders; on the dotted line the prediction is "
-        f"exact. In {larger} of them the real error is larger than predicted; {missed} "
-        f"{'lies' if missed == 1 else 'lie'} in the upper left corner, where the alert would have missed an "
-        f"error above {percent(result.threshold)} (dashed)."
-    )
-    return Plot(key, title, caption, figure)
-
-
 def _optimum_caption(ratio: FloatArray, peak: FloatArray, hz: FloatArray) -> str:
     best = int(np.nanargmin(peak))
     text = (
@@ -375,7 +234,7 @@ def _optimum_caption(ratio: FloatArray, peak: FloatArray, hz: FloatArray) -> str
 
 
 def optimisation(result: Result) -> Plot:
-    """Peak amplitude and frequency against the load ratio (seed 1, fig. 9)."""
+    """Peak amplitude and frequency against the load ratio (Gastaldi and Berruti 2017, fig. 9)."""
     key, title = "optimisation", "Optimisation curves of the damper"
     cases = [c for c in result.peaked if np.isfinite(peak_response(result, c))]
     if len(cases) < 2:

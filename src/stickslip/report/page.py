@@ -10,14 +10,10 @@ from plotly.offline import get_plotlyjs
 from stickslip.errors import input_error
 from stickslip.report import tables
 from stickslip.report.figure_mesh import mesh_picture
-from stickslip.report.figures_contact import damper, energy, hysteresis, state_map
-from stickslip.report.figures_response import (
-    error_scatter,
-    errors,
-    frequency_response,
-    low_order,
-    optimisation,
-)
+from stickslip.report.figures_contact import hysteresis, state_map
+from stickslip.report.figures_damper import damper, energy
+from stickslip.report.figures_error import error_scatter, errors
+from stickslip.report.figures_response import frequency_response, low_order, optimisation
 from stickslip.report.page_style import SCRIPT, STYLE
 from stickslip.report.plot import Plot
 from stickslip.report.result import RATIO, Case, Result, load_result

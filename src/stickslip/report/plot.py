@@ -13,6 +13,7 @@ INK, MUTED, GRID, ALARM = "#1c2530", "#5b6673", "#e4e8ed", "#c0262d"
 # Okabe and Ito's colours, distinct for colour-blind readers and in grey
 STATE_COLOURS = ("#0072b2", "#e69f00", "#d8dce2")
 STATE_NAMES = ("stick", "slip", "open")
+_FEW_DECADES = 2.5  # up to here 1-2-5 ticks are far enough apart
 LEFT_SIDE, RIGHT_SIDE = "#0072b2", "#d55e00"
 
 
@@ -60,15 +61,16 @@ def legend_above(figure: go.Figure) -> None:
     figure.update_layout(legend=row, margin={"t": 74})
 
 
-def log_ticks(values: FloatArray, *, steps: tuple[int, ...] = (1, 2, 5)) -> dict[str, object]:
+def log_ticks(values: FloatArray) -> dict[str, object]:
     """Ticks of a logarithmic axis over the positive `values`, written as plain numbers."""
     positive = values[np.isfinite(values) & (values > 0)]
     if not positive.size:
         return {}
-    decades = range(
-        int(np.floor(np.log10(positive.min()))), int(np.ceil(np.log10(positive.max()))) + 1
-    )
-    ticks = [step * 10.0**k for k in decades for step in steps]
+    low, high = np.log10(positive.min()), np.log10(positive.max())
+    steps = (1, 2, 5) if high - low < _FEW_DECADES else (1,)
+    ticks = [
+        step * 10.0**k for k in range(int(np.floor(low)), int(np.ceil(high)) + 1) for step in steps
+    ]
     return {"tickmode": "array", "tickvals": ticks, "ticktext": [f"{t:.12g}" for t in ticks]}
 
 

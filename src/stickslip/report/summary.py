@@ -13,7 +13,7 @@ from stickslip.report.result import RATIO, Case, Result
 from stickslip.report.tables import html_table
 
 _LARGE_SHIFT = 0.01  # relative change of the peak worth a warning
-_LARGE_DIFFERENCE = 1.0  # percent between time integration and balance (seed 1: below it at H = 5)
+_LARGE_DIFFERENCE = 1.0  # percent between time integration and balance (Gastaldi and Berruti 2017: below it at H = 5)
 
 
 def _card(value: str, label: str, note: str) -> str:

@@ -1,0 +1,163 @@
+"""Figures of the alert: predicted and real error of the low-order solution."""
+
+import numpy as np
+import numpy.typing as npt
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.report.figures_response import COMPARED
+from stickslip.report.plot import ALARM, INK, Plot, absent, log_ticks, styled
+from stickslip.report.quantities import counted, number, percent
+from stickslip.report.result import RATIO, Case, Result
+
+_SMALLEST_ERROR = 1e-3  # percent; below it the axis would only show rounding
+
+
+def _error_traces(figure: go.Figure, result: Result) -> list[Case]:
+    """Add predicted errors of all cases (left) and both errors of some (right); return those."""
+    hz = result.floats("frequency_hz")
+    predicted, real = result.floats("predicted_error_percent"), result.floats("real_error_percent")
+    both = [c for c in result.cases if np.isfinite(real[result.points(c)]).any()][-COMPARED:]
+
+    def add(case: Case, at: IntArray, y: FloatArray, column: int, **style: object) -> None:
+        keep = at[np.isfinite(y[at])]
+        hover = f"{RATIO} = {case.label}<br>%{{x:.2f}} Hz: %{{y:.3g}} %<extra></extra>"
+        options = {"legendgroup": "cases", "hovertemplate": hover, **style}
+        figure.add_scatter(x=hz[keep], y=y[keep], row=1, col=column, **options)
+
+    heading = {"text": f"load ratio {RATIO}"}
+    for case in result.cases:
+        at = result.points(case)
+        line = {"color": case.colour, "width": 1.6}
+        add(
+            case,
+            at,
+            predicted,
+            1,
+            mode="lines",
+            name=case.label,
+            line=line,
+            legendgrouptitle=heading,
+        )
+        if case in both:
+            mark = {
+                "color": case.colour,
+                "size": 6,
+                "symbol": "circle-open",
+                "line": {"width": 1.4},
+            }
+            add(case, at, predicted, 2, mode="lines", name=case.label, line=line, showlegend=False)
+            add(case, at, real, 2, mode="markers", name="real", marker=mark, showlegend=False)
+    return both
+
+
+def _error_caption(result: Result) -> str:
+    error = result.floats("predicted_error_percent")
+    known, above = np.isfinite(error), result.flagged
+    text = (
+        f"The alert's predicted error of the H = {result.low} solution on the output dofs; the dashed line "
+        f"is the threshold of {percent(result.threshold)}. {int(above.sum())} of "
+        f"{counted(int(known.sum()), 'checked point')} lie above it and were asked to repeat at "
+        f"H = {result.high}. "
+    )
+    worst = int(np.nanargmax(error))
+    ratio = number(float(result.floats("load_ratio")[result.integers("case")[worst]]))
+    hz = number(float(result.floats("frequency_hz")[worst]), 5)
+    text += f"The largest, {percent(float(error[worst]))}, is at {hz} Hz for {RATIO} = {ratio}. "
+    real = np.isfinite(result.floats("real_error_percent"))
+    if real.any():
+        text += (
+            f"Right: the real error (open circles), the difference of the two orders, where both were "
+            f"solved ({counted(int(real.sum()), 'point')}; at most {COMPARED} load cases are drawn). "
+        )
+    hidden = int((error < _SMALLEST_ERROR).sum())
+    if hidden:
+        text += f"{counted(hidden, 'point')} below {number(_SMALLEST_ERROR)} % lie under the axis."
+    return text
+
+
+def errors(result: Result) -> Plot:
+    """Predicted and real error against frequency (Gastaldi and Berruti 2017, fig. 6)."""
+    key, title = "errors", "The alert: predicted and real error against frequency"
+    error = result.floats("predicted_error_percent")
+    if not np.isfinite(error).any():
+        return absent(key, title, "no predicted error was computed")
+    some_real = np.isfinite(result.floats("real_error_percent")).any()
+    titles = ("predicted, all load cases", "predicted (line) and real (circles)")
+    columns = 2 if some_real else 1
+    figure = make_subplots(
+        1, columns, shared_yaxes=True, horizontal_spacing=0.04, subplot_titles=titles[:columns]
+    )
+    _error_traces(figure, result)
+    styled(figure, 430)
+    real = result.floats("real_error_percent")
+    top = float(
+        np.concatenate(
+            [error[np.isfinite(error)], real[np.isfinite(real)], [result.threshold]]
+        ).max()
+    )
+    figure.add_hline(y=result.threshold, line={"dash": "dash", "color": ALARM, "width": 1.4})
+    hz = result.floats("frequency_hz")
+    figure.update_xaxes(title_text="frequency (Hz)", range=[float(hz.min()), float(hz.max())])
+    ticks = log_ticks(np.array([_SMALLEST_ERROR, top]))
+    figure.update_yaxes(type="log", range=[np.log10(_SMALLEST_ERROR), np.log10(2 * top)], **ticks)
+    figure.update_yaxes(title_text="error of the output dofs (%)", col=1)
+    return Plot(key, title, _error_caption(result), figure)
+
+
+def _scatter(
+    result: Result, predicted: FloatArray, real: FloatArray, known: npt.NDArray[np.bool_]
+) -> go.Figure:
+    """Scatter the `known` points, one trace a load case."""
+    figure = go.Figure()
+    for case in result.cases:
+        at = np.flatnonzero(known & (result.integers("case") == case.index))
+        if at.size:
+            mark = {
+                "color": case.colour,
+                "size": 7,
+                "symbol": "circle-open",
+                "line": {"width": 1.5},
+            }
+            hover = "predicted %{x:.3g} %<br>real %{y:.3g} %<br>%{customdata:.2f} Hz<extra></extra>"
+            figure.add_scatter(
+                x=predicted[at], y=real[at], mode="markers", name=case.label, marker=mark,
+                customdata=result.floats("frequency_hz")[at], hovertemplate=hover,
+            )  # fmt: skip
+    return figure
+
+
+def error_scatter(result: Result) -> Plot:
+    """Real against predicted error (Gastaldi and Berruti 2017, fig. 7a)."""
+    key, title = "error-scatter", "Does the prediction hold? Real against predicted error"
+    predicted, real = result.floats("predicted_error_percent"), result.floats("real_error_percent")
+    known = np.isfinite(predicted) & np.isfinite(real) & (predicted > 0) & (real > 0)
+    if not known.any():
+        return absent(key, title, "no point was solved at both orders")
+    figure = _scatter(result, predicted, real, known)
+    values = np.concatenate([predicted[known], real[known], [result.threshold]])
+    ends = np.array([values.min() / 1.5, values.max() * 1.5])
+    dotted = {"color": INK, "width": 1, "dash": "dot"}
+    figure.add_scatter(x=ends, y=ends, mode="lines", name="real = predicted", line=dotted)
+    styled(figure, 520, legend_title=f"load ratio {RATIO}")
+    dash = {"dash": "dash", "color": ALARM, "width": 1.2}
+    figure.add_hline(y=result.threshold, line=dash)
+    figure.add_vline(x=result.threshold, line=dash)
+    axis = {
+        "type": "log",
+        "range": np.log10(ends).tolist(),
+        **log_ticks(values),
+    }
+    figure.update_xaxes(title_text="predicted error (%)", **axis)
+    figure.update_yaxes(title_text="real error (%)", scaleanchor="x", constrain="domain", **axis)
+    figure.update_xaxes(constrain="domain")
+    larger = int((real[known] > predicted[known]).sum())
+    missed = int(((real > result.threshold) & (predicted <= result.threshold))[known].sum())
+    caption = (
+        f"{counted(int(known.sum()), 'point')} solved at both orders; on the dotted line the prediction is "
+        f"exact. In {larger} of them the real error is larger than predicted; {missed} "
+        f"{'lies' if missed == 1 else 'lie'} in the upper left corner, where the alert would have missed an "
+        f"error above {percent(result.threshold)} (dashed)."
+    )
+    return Plot(key, title, caption, figure)
