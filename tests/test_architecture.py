@@ -64,10 +64,12 @@ def test_imports_point_one_way():
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_only_the_public_names_hide_from_the_import_contracts():
-    assert [path for path in MODULES if "TYPE_CHECKING" in path.read_text()] == [
-        SOURCE / "__init__.py"
-    ]
+def test_type_checking_imports_do_not_hide_from_the_contracts():
+    # import-linter leaves such imports out, for the sake of the public names; the command line is on top of all layers
+    hidden = {
+        str(path.relative_to(SOURCE)) for path in MODULES if "TYPE_CHECKING" in path.read_text()
+    }
+    assert hidden <= {"__init__.py", "cli.py"}
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(SOURCE)))
@@ -95,9 +97,10 @@ def test_no_module_for_leftovers():
     ]
 
 
-def test_import_loads_nothing_heavy():
+@pytest.mark.parametrize("module", ["stickslip", "stickslip.cli"])
+def test_import_loads_nothing_heavy(module):
     heavy = ["numpy", "scipy", "numba", "pydantic", "xarray", "plotly", "gmsh", "skfem", "meshio"]
-    code = f"import sys, stickslip; print([name for name in {heavy} if name in sys.modules])"
+    code = f"import sys, {module}; print([name for name in {heavy} if name in sys.modules])"
     assert in_fresh_python(code) == "[]"
 
 
