@@ -1,0 +1,210 @@
+"""Forced response: published peaks, resuming, stages, and what is refused."""
+
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+import pytest
+from models import blades_and_damper, griffin
+
+from stickslip.errors import InputError
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.forced import Sweep, accepted_points, forced_problem, forced_response
+
+HZ = 2 * np.pi
+SHORT = Sweep(omega_range=(155 * HZ, 166 * HZ), samples=64, points=12, peak_points=3)
+
+
+def peak_of(system, load, sweep):
+    problem = forced_problem(system, load, sweep)
+    points = accepted_points(list(forced_response(system, load, sweep)))
+    assert all(p.converged for p in points)
+    heights = [problem.amplitude(p) for p in points]
+    return max(heights), points[int(np.argmax(heights))].omega
+
+
+@pytest.mark.parametrize(
+    ("limit", "peak", "omega"),
+    [
+        (0.02, 3.7388820, 1.000334), (0.05, 1.9693838, 1.004519), (0.08, 0.8446513, 1.031849),
+        (0.10, 0.6260618, 1.065886), (0.14, 0.5509276, 1.119652), (0.2, 0.6038447, 1.161950),
+        (0.5, 1.1288107, 1.211484), (1.0, 2.0803123, 1.221983),
+    ],
+)  # fmt: skip
+def test_damper_optimisation_curve(limit, peak, omega):
+    """Benchmark B3 (Griffin 1980): peaks of the one-harmonic response, closed form."""
+    system, load = griffin(limit)
+    sweep = Sweep(omega_range=(0.8, 1.3), selection="always_low", samples=512)
+    height, where = peak_of(system, load, sweep)
+    # sampling of the contact (512) and a bracket of 5e-4 of the frequency: second order in both at a smooth maximum
+    assert height == pytest.approx(peak, rel=5e-4)
+    assert where == pytest.approx(omega, rel=1e-3)
+
+
+def test_stuck_damper_is_a_spring():
+    system, load = griffin(2.0)
+    sweep = Sweep(omega_range=(0.8, 1.1), selection="always_low", points=10, peak_points=0)
+    problem = forced_problem(system, load, sweep)
+    for p in forced_response(system, load, sweep):
+        assert problem.amplitude(p) == pytest.approx(abs(0.1 / (1.5 - p.omega**2 + 0.02j * p.omega)), rel=1e-9)
+
+
+@pytest.mark.parametrize(("limit", "omega", "amplitude"), [(0.1, 1.1, 0.56839426), (0.1, 1.2, 0.38916153), (0.2, 1.15, 0.59978456)])
+def test_many_harmonics_are_the_exact_response(limit, omega, amplitude):
+    """Benchmark B3, event-driven solution."""
+    system, load = griffin(limit)
+    sweep = Sweep(
+        omega_range=(omega - 0.02, omega), low=11, high=11, samples=2048, selection="always_low", points=4, frequencies=3,
+        peak_points=0,
+    )  # fmt: skip
+    last = list(forced_response(system, load, sweep))[-1]
+    assert last.omega == omega
+    assert forced_problem(system, load, sweep).amplitude(last) == pytest.approx(amplitude, rel=2e-5)
+
+
+# ---- stages -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def run():
+    system, load = blades_and_damper()
+    return system, load, list(forced_response(system, load, SHORT))
+
+
+def test_stages_in_order(run):
+    system, _, points = run
+    stages = [p.stage for p in points]
+    assert stages == sorted(stages, key=["low", "high", "peak"].index)
+    assert set(stages) == {"low", "high", "peak"}
+    low = [p for p in points if p.stage == "low"]
+    assert [p.index for p in low] == list(range(len(low)))
+    assert low[0].omega == SHORT.omega_range[0]
+    assert low[-1].omega == SHORT.omega_range[1]
+    assert all(p.order == 1 for p in low)
+    for p in low:
+        assert p.coefficients.shape == (2, system.retained.size)
+    high = [p for p in points if p.stage == "high"]
+    assert [p.index for p in high] == [p.index for p in low if p.predicted_error > SHORT.threshold]
+    for p in high:
+        assert p.order == 5
+        assert p.omega == low[p.index].omega
+        assert p.predicted_error == low[p.index].predicted_error
+    assert [p.index for p in points if p.stage == "peak"] == list(range(stages.count("peak")))
+
+
+def test_accepted_points_replace_what_was_repeated(run):
+    _, _, points = run
+    accepted = accepted_points(points)
+    low = sum(p.stage == "low" for p in points)
+    assert len(accepted) == low + sum(p.stage == "peak" for p in points)
+    repeated = {p.index for p in points if p.stage == "high"}
+    assert all((p.order == 5) == (p.index in repeated) for p in accepted[:low])
+
+
+def test_every_point_solves_its_equations(run):
+    system, load, points = run
+    problem = forced_problem(system, load, SHORT)
+    for p in points:
+        balance = problem.low if p.order == 1 else problem.high
+        residual = balance.linearise(balance.unknowns(p.coefficients), p.omega).residual
+        assert np.max(np.abs(residual)) <= 1.01 * SHORT.newton.tolerance
+
+
+def test_peak_points_raise_the_peak(run):
+    system, load, points = run
+    problem = forced_problem(system, load, SHORT)
+    before = max(problem.amplitude(p) for p in accepted_points([p for p in points if p.stage != "peak"]))
+    after = max(problem.amplitude(p) for p in accepted_points(points))
+    assert after >= before
+
+
+@pytest.mark.parametrize(("selection", "order"), [("always_low", 1), ("always_high", 5)])
+def test_one_order_everywhere(selection, order):
+    system, load = blades_and_damper()
+    points = list(forced_response(system, load, replace(SHORT, selection=selection, points=6)))
+    assert {p.order for p in points} == {order}
+    assert {p.stage for p in points} == {"low", "peak"}
+    assert all(np.isnan(p.predicted_error) for p in points)
+
+
+def test_stepping_through_frequencies():
+    system, load = blades_and_damper()
+    sweep = replace(SHORT, frequencies=8, peak_points=0, selection="always_low")
+    points = list(forced_response(system, load, sweep))
+    assert [p.omega for p in points] == np.linspace(*SHORT.omega_range, 8).tolist()
+    assert all(p.converged for p in points)
+    # the same solutions as along the branch: solutions are unique where all contacts slip, and here in stick
+    problem = forced_problem(system, load, sweep)
+    branch = list(forced_response(system, load, replace(SHORT, selection="always_low", peak_points=0, points=40)))
+    curve = np.interp([p.omega for p in points], [p.omega for p in branch], [problem.amplitude(p) for p in branch])
+    assert [problem.amplitude(p) for p in points] == pytest.approx(curve.tolist(), rel=2e-2)  # linear interpolation
+
+
+# ---- resuming -----------------------------------------------------------------------------------------------------------
+
+
+def assert_same(a, b):
+    """Equal but for the rounding of a point that went through metres and back."""
+    assert (a.stage, a.index, a.status, a.iterations) == (b.stage, b.index, b.status, b.iterations)
+    assert a.omega == pytest.approx(b.omega, rel=1e-12)
+    assert np.allclose(a.coefficients, b.coefficients, rtol=0, atol=1e-9 * np.abs(b.coefficients).max())
+    assert np.allclose(a.tangent, b.tangent, rtol=1e-8, atol=1e-8 * np.abs(b.tangent).max(initial=0.0))
+    assert a.step == pytest.approx(b.step, rel=1e-9)
+    assert a.predicted_error == pytest.approx(b.predicted_error, rel=1e-6, abs=1e-9, nan_ok=True)
+
+
+@pytest.mark.parametrize("where", ["first", "early", "late low", "last low", "first high", "in high", "peak", "all"])
+def test_resuming_gives_what_would_have_come(run, where):
+    system, load, points = run
+    low = sum(p.stage == "low" for p in points)
+    low_and_high = low + sum(p.stage == "high" for p in points)
+    k = {
+        "first": 1, "early": 3, "late low": low - 2, "last low": low, "first high": low + 1,
+        "in high": (low + low_and_high) // 2, "peak": low_and_high + 1, "all": len(points),
+    }[where]  # fmt: skip
+    rest = list(forced_response(system, load, SHORT, done=points[:k]))
+    assert len(rest) == len(points) - k
+    for a, b in zip(rest, points[k:], strict=True):
+        assert_same(a, b)
+
+
+def test_resuming_frequencies():
+    system, load = blades_and_damper()
+    sweep = replace(SHORT, frequencies=6, peak_points=0, selection="always_low")
+    points = list(forced_response(system, load, sweep))
+    for k in (1, 4):
+        for a, b in zip(forced_response(system, load, sweep, done=points[:k]), points[k:], strict=True):
+            assert_same(a, b)
+
+
+def test_points_come_one_by_one():
+    system, load = blades_and_damper()
+    first = list(islice(forced_response(system, load, SHORT), 2))
+    assert [p.index for p in first] == [0, 1]
+
+
+# ---- messages -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ends", [(20.0, 10.0), (10.0, 10.0), (0.0, 10.0), (-5.0, 10.0)])
+def test_range_must_grow(ends):
+    with pytest.raises(InputError, match=rf"Sweep\.omega_range: must be positive and growing, got {ends[0]:g} to {ends[1]:g}"):
+        Sweep(omega_range=ends)
+
+
+@pytest.mark.parametrize(("low", "high"), [(0, 5), (3, 2)])
+def test_harmonics_must_make_sense(low, high):
+    with pytest.raises(InputError, match=rf"harmonics low = {low}, high = {high}"):
+        Sweep(omega_range=(1.0, 2.0), low=low, high=high)
+
+
+def test_no_load_is_refused():
+    system, _ = griffin(0.1)
+    with pytest.raises(InputError, match="HarmonicLoad: is zero"):
+        next(forced_response(system, HarmonicLoad(np.zeros(1)), Sweep(omega_range=(0.5, 1.0))))
+
+
+def test_load_of_another_system_is_refused():
+    system, _ = griffin(0.1)
+    with pytest.raises(InputError, match="3 entries for 1 dofs"):
+        next(forced_response(system, HarmonicLoad(np.ones(3)), Sweep(omega_range=(0.5, 1.0))))
