@@ -7,8 +7,16 @@ from typing import Protocol
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.solve.newton import Newton, Solution, newton, solve_dense
+from stickslip.solve.newton import Newton, Solution, newton, solve_signed
 from stickslip.solve.status import Status
+
+SHARP_TURN = (
+    0.5  # cosine between successive tangents below which the step is shortened, as far as that goes
+)
+BACKWARD = (
+    0.1  # share of the range by which a branch may fall back behind its start before it is left
+)
+SMOOTH_TURN = 0.9  # cosine above which a change of orientation is a bifurcation, not a corner
 
 
 class ParameterEvaluation(Protocol):
@@ -55,7 +63,7 @@ class StepControl:
     first: float = 0.1
     smallest: float = 1e-3
     largest: float = 0.25
-    max_points: int = 2000
+    max_points: int = 500
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +80,8 @@ class Point:
         Length of the next step.
     solution
         How Newton ended; x is a solution only if its status says so.
+    orientation
+        Sign of the determinant of the Jacobian bordered by the tangent; 0: not known yet.
     """
 
     x: FloatArray
@@ -79,6 +89,7 @@ class Point:
     tangent: FloatArray
     step: float
     solution: Solution
+    orientation: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +113,11 @@ class _Measure:
     p: float
 
     def of(self, vector: FloatArray) -> float:
-        return float(np.sqrt(np.sum((self.x * vector[:-1]) ** 2) + (self.p * vector[-1]) ** 2))
+        return float(np.sqrt(self.row(vector) @ vector))
+
+    def row(self, vector: FloatArray) -> FloatArray:
+        """Return the row whose product with another vector is their inner product."""
+        return np.append(self.x**2 * vector[:-1], self.p**2 * vector[-1])
 
 
 def _measure(x: FloatArray, weights: FloatArray, control: StepControl) -> _Measure:
@@ -130,26 +145,39 @@ def start_point(
 ) -> Point:
     """Solve at fixed `p` from the guess `x` and find the direction of growing parameter."""
     solution = newton(lambda v: problem.linearise(v, p), x, options)
-    tangent = np.zeros(x.size + 1)
-    tangent[-1] = 1.0
-    if solution.status.converged:
-        tangent = _tangent(
-            problem, np.append(solution.x, p), tangent, _measure(solution.x, weights, control)
-        )
-    return Point(solution.x, p, tangent, control.first, solution)
+    upward = np.zeros(x.size + 1)
+    upward[-1] = 1.0
+    if not solution.status.converged:
+        return Point(solution.x, p, upward, control.first, solution)
+    measure = _measure(solution.x, weights, control)
+    tangent, sign = _tangent(problem, np.append(solution.x, p), upward, measure)
+    return Point(solution.x, p, tangent, control.first, solution, sign)
 
 
 def _tangent(
     problem: Problem, y: FloatArray, previous: FloatArray, measure: _Measure
-) -> FloatArray:
-    """Return the unit tangent at a solution, on the side of `previous`; `previous` itself at a singular point."""
-    at = _border(problem, y, previous, 0.0)
+) -> tuple[FloatArray, float]:
+    """Return the unit tangent on the side of `previous` and its orientation; `previous` itself where it is undetermined."""
+    at = _border(problem, y, measure.row(previous), 0.0)
     right = np.zeros(y.size)
     right[-1] = 1.0
-    tangent = solve_dense(at.jac, right)
+    tangent, sign = solve_signed(at.jac, right)
     if tangent is None:
-        return previous
-    return tangent / measure.of(tangent)
+        return previous, 0.0
+    return tangent / measure.of(tangent), sign
+
+
+def _oriented(
+    tangent: FloatArray, sign: float, point: Point, turn: float
+) -> tuple[FloatArray, float]:
+    """Keep the direction of travel across a kink.
+
+    Where contact states change the branch may turn back sharply, so that the tangent nearest to the old one leads back to the kink. The
+    sign of the bordered determinant is the same along a piecewise smooth path (Allgower & Georg 1990); a sign that changes although the
+    tangent hardly turned is a bifurcation point, which is passed straight on.
+    """
+    reversed_ = sign * point.orientation < 0.0 and turn < SMOOTH_TURN
+    return (-tangent, -sign) if reversed_ else (tangent, sign)
 
 
 def trace(
@@ -179,17 +207,22 @@ def trace(
     Yields
     ------
     Point
-        Each point that was reached. If no step, however short, converges, a last point with status
+        Each point that was reached, until the end, `max_points`, or a return to before the start. If no step, however short, converges, a last point with status
         `Status.STEP_TOO_SMALL` and the state it came from.
     """
     point = start
     # the tangent is oriented towards growing p; a branch to the left starts against it
     if (end - start.p) * start.tangent[-1] < 0:
-        point = replace(point, tangent=-start.tangent)
+        point = replace(point, tangent=-start.tangent, orientation=-start.orientation)
+    if point.orientation == 0.0:
+        measure = _measure(point.x, weights, control)
+        _, sign = _tangent(problem, np.append(point.x, point.p), point.tangent, measure)
+        point = replace(point, orientation=sign)
     for _ in range(control.max_points):
         point = _advance(problem, point, end, options, control, weights)
         yield point
-        if not point.solution.status.converged or point.p == end:
+        left = (point.p - start.p) * (end - start.p) < -BACKWARD * (end - start.p) ** 2
+        if not point.solution.status.converged or point.p == end or left:
             return
 
 
@@ -209,47 +242,40 @@ def _advance(
     iterations = 0
     while step >= control.smallest:
         guess = y + step * unit
+        row = measure.row(unit)
         passes = (guess[-1] - end) * (point.p - end) <= 0.0
         if passes:
             guess = y + (end - point.p) / unit[-1] * unit
-            row = np.zeros(y.size)
-            row[-1] = 1.0 / control.scale
-        else:
-            row = np.append(measure.x**2 * unit[:-1], measure.p**2 * unit[-1])
+            row = np.append(np.zeros(point.x.size), 1.0 / control.scale)
         value = float(row @ guess)
         solution = newton(lambda v, r=row, b=value: _border(problem, v, r, b), guess, options)  # type: ignore[misc]
         contact, linear = contact + solution.seconds_contact, linear + solution.seconds_linear
         iterations += solution.iterations
-        moved = measure.of(solution.x - y)
-        if solution.status.converged and moved <= 4.0 * step:
-            tangent = _tangent(
-                problem,
-                solution.x,
-                unit if not passes else point.tangent,
-                _measure(solution.x[:-1], weights, control),
-            )
+        p = end if passes else float(solution.x[-1])
+        # a corrector that slides past the end of the range is taken back like one that slides too far
+        near = measure.of(solution.x - y) <= 4.0 * step and (p - end) * (point.p - end) >= 0.0
+        if solution.status.converged and near:
+            x = solution.x[:-1]
+            tangent, sign = _tangent(problem, solution.x, unit, _measure(x, weights, control))
             turn = _cosine(unit, tangent, measure)
-            if turn > 0.5 or step < 4 * control.smallest:
-                p = end if passes else float(solution.x[-1])
-                done = Solution(
-                    solution.x[:-1],
-                    Status.CONVERGED,
-                    iterations,
-                    solution.residual_norm,
-                    contact,
-                    linear,
+            if turn > SHARP_TURN or step < 4 * control.smallest:
+                next_step = _next_step(step, solution.iterations, turn, control)
+                tangent, sign = _oriented(tangent, sign, point, turn)
+                spent = replace(
+                    solution,
+                    x=x,
+                    iterations=iterations,
+                    seconds_contact=contact,
+                    seconds_linear=linear,
                 )
-                return Point(
-                    done.x, p, tangent, _next_step(step, solution.iterations, turn, control), done
-                )
+                return Point(x, p, tangent, next_step, spent, sign)
         step *= 0.5
     failed = Solution(point.x, Status.STEP_TOO_SMALL, iterations, np.nan, contact, linear)
-    return Point(point.x, point.p, point.tangent, control.first, failed)
+    return Point(point.x, point.p, point.tangent, control.first, failed, point.orientation)
 
 
 def _cosine(a: FloatArray, b: FloatArray, measure: _Measure) -> float:
-    inner = float(np.sum(measure.x**2 * a[:-1] * b[:-1]) + measure.p**2 * a[-1] * b[-1])
-    return inner / (measure.of(a) * measure.of(b))
+    return float(measure.row(a) @ b) / (measure.of(a) * measure.of(b))
 
 
 def _next_step(step: float, iterations: int, turn: float, control: StepControl) -> float:

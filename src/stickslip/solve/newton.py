@@ -111,13 +111,17 @@ def newton(
 
 def solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
     """Solve a dense system by LU; None if the matrix is singular to working precision. `matrix` is overwritten."""
+    return solve_signed(matrix, right)[0]
+
+
+def solve_signed(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray | None, float]:
+    """Solve a dense system by LU and return the sign of its determinant too (0 if singular). `matrix` is overwritten."""
     lu, pivots, info = scipy.linalg.lapack.dgetrf(matrix, overwrite_a=True)
-    diagonal = np.abs(np.diagonal(lu))
-    if (
-        info != 0
-        or not np.all(np.isfinite(diagonal))
-        or diagonal.min() <= SINGULAR * diagonal.max()
-    ):
-        return None
+    pivot = np.diagonal(lu)
+    size = np.abs(pivot)
+    if info != 0 or not np.all(np.isfinite(size)) or size.min() <= SINGULAR * size.max():
+        return None, 0.0
     solution, _ = scipy.linalg.lapack.dgetrs(lu, pivots, right)
-    return np.asarray(solution, dtype=float)
+    swaps = np.count_nonzero(pivots != np.arange(pivots.size))
+    flips = swaps + np.count_nonzero(pivot < 0.0)
+    return np.asarray(solution, dtype=float), 1.0 if flips % 2 == 0 else -1.0
