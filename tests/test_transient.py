@@ -351,6 +351,26 @@ def test_periods_that_run_out_are_said_to_be_unsettled() -> None:
     assert result.remaining > 1e-5
 
 
+def test_average_sees_through_a_mode_that_never_stops_ringing() -> None:
+    # Two uncoupled oscillators make one output; the undamped one rings at a frequency that fits no period.
+    structure = structure_of(np.eye(2), np.diag([0.5, 0.0]), np.diag([4.0, 30.0]))
+    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
+    mixed = structure_of(
+        *(turn @ m @ turn.T for m in (structure.mass, structure.damping, structure.stiffness))
+    )
+    force, omega = np.array([1.0, 0.0]), 1.5
+    start = TransientStart(turn @ np.array([0.0, 0.3]), np.zeros(2), np.zeros((0, 2)))
+    load = HarmonicLoad(np.zeros(2), {1: (turn @ force).astype(complex)})
+    stepping = TimeStepping(steps_per_period=32, max_periods=300, tolerance=1e-4)
+    result = integrate(mixed, np.zeros((0, 2)), [], load, omega, np.array([0]), start, stepping)
+    exact = turn[0, 0] / (4.0 - omega**2 + 0.5j * omega)
+    assert result.status == "unsettled"
+    assert result.scatter > 0.02
+    # A hundred periods of a ringing of a few per cent, which adds up to no more than a few of its amplitudes.
+    assert abs(result.average[0] / exact - 1) < 2e-3
+    assert result.drifting == ()
+
+
 def test_slow_decay_is_not_taken_for_a_settled_motion() -> None:
     # Changes of 1e-6 a period that decay by a thousandth a period leave 1e-3 to come.
     slow = [1e-6 * 0.999**i for i in range(60)]
@@ -379,7 +399,8 @@ def test_a_motion_that_overflows_is_reported_and_gives_no_number() -> None:
         )
     assert result.status == "diverged"
     assert result.periods < 200
-    for array in (result.harmonics, result.outputs, result.drift, result.final.displacement):
+    assert result.harmonics.shape == (8, 1)
+    for array in (result.harmonics, result.average, result.drift, result.final.displacement):
         assert np.all(np.isnan(array))
     assert np.isnan(result.change)
     assert not result.settled

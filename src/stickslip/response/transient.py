@@ -7,8 +7,7 @@ or flies freely is then integrated without error; the switches between states le
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from stickslip.response.propagator import (
     require_array,
     step_operators,
 )
-from stickslip.response.settling import period_harmonics, remaining_change
+from stickslip.response.settling import Progress, Status, period_harmonics
 from stickslip.response.time_step import (
     StepOperators,
     StepRecord,
@@ -102,16 +101,21 @@ class TransientResult:
         overflowed, and all arrays are NaN.
     harmonics
         (n_h + 1, n_outputs) complex amplitudes over the last period, m.
+    average
+        (n_outputs,) first harmonic averaged over the last third of the periods, m: the number to use where undamped
+        modes of a damper on its contact springs go on ringing and nothing settles.
+    scatter
+        Largest distance of a period's first harmonic from that average, relative to it.
     periods
         Number of periods integrated.
     change
         Largest relative change of the first harmonic from one period to the next over the last few periods.
     remaining
-        What is left to come of such changes if they go on decaying as they did (see `remaining_change`).
+        What is left to come of such changes if they go on decaying as they did (see `stickslip.response.settling`).
     contact_failures
         Time steps in which the contact equations were not solved to rounding.
     drift
-        (n,) change of the mean displacement over one period, m (rad), at the end.
+        (n,) change of the mean displacement per period over the last third of the periods, m (rad).
     swing
         (n,) half of peak to peak displacement over the last period, m (rad).
     labels
@@ -124,8 +128,10 @@ class TransientResult:
         (steps, n_contacts, 3) gaps (m) and forces ``T_t, T_w, -N`` (N) at the same times.
     """
 
-    status: Literal["settled", "unsettled", "diverged"]
+    status: Status
     harmonics: ComplexArray
+    average: ComplexArray
+    scatter: float
     periods: int
     change: float
     remaining: float
@@ -161,9 +167,10 @@ class RefinedResult:
     Parameters
     ----------
     first_harmonic
-        (n_outputs,) complex, m; extrapolated to a vanishing step as for an error of second order.
+        (n_outputs,) complex, m; extrapolated to a vanishing step as for an error of second order. Made of averages
+        where the motion has not settled.
     error
-        Estimated error of `first_harmonic`, relative to its largest amplitude.
+        Estimated error of `first_harmonic`, relative to its largest amplitude, with the scatter of such averages.
     coarse, fine
         Results of the two integrations.
     """
@@ -268,10 +275,11 @@ def integrate_refined(
     halved = replace(stepping, steps_per_period=2 * stepping.steps_per_period)
     begin = start if coarse.status == "diverged" else coarse.final
     fine = integrate(structure, gap_operator, laws, load, omega, outputs, begin, halved)
-    difference = fine.harmonics[1] - coarse.harmonics[1]
-    largest = np.max(np.abs(fine.harmonics[1]))
+    first, finer = (r.harmonics[1] if r.settled else r.average for r in (coarse, fine))
+    difference, largest = finer - first, np.max(np.abs(finer))
+    scatter = sum(0.0 if r.settled else r.scatter for r in (coarse, fine))
     error = float(np.max(np.abs(difference)) / largest) if largest != 0.0 else 0.0
-    return RefinedResult(fine.harmonics[1] + difference / 3.0, error, coarse, fine)
+    return RefinedResult(finer + difference / 3.0, error + scatter, coarse, fine)
 
 
 def _initial_state(
@@ -287,20 +295,6 @@ def _initial_state(
     )
 
 
-@dataclass(slots=True)
-class _Progress:
-    """What is known after some periods."""
-
-    harmonics: ComplexArray  # (n_h + 1, n_outputs) of the last period
-    mean: FloatArray  # (n,) over the last period
-    drift: FloatArray  # (n,) change of that mean
-    status: Literal["settled", "unsettled", "diverged"] = "unsettled"
-    periods: int = 0
-    failures: int = 0
-    remaining: float = np.inf
-    changes: list[float] = field(default_factory=list)
-
-
 def _settle(
     structure: Structure,
     operators: StepOperators,
@@ -314,33 +308,18 @@ def _settle(
     record = StepRecord(np.empty((steps, n)), np.empty((steps, k)), np.empty((steps, k)))
     work = step_workspace(k)
     unknown = np.full((stepping.harmonics + 1, len(outputs)), np.nan, dtype=complex)
-    now = _Progress(unknown, np.full(n, np.nan), np.full(n, np.nan))
+    now = Progress(unknown, np.full(n, np.nan))
     while now.periods < stepping.max_periods and now.status == "unsettled":
         began = state.x[:n].copy()
         failed = run_period(operators, state, work, record)
-        now.periods += 1
         if failed < 0:
-            now.status = "diverged"
+            now.periods, now.status = now.periods + 1, "diverged"
             break
-        now.failures += failed
         modal = period_harmonics(began, record.motion, stepping.harmonics)
-        mean = modes.basis @ modal[0].real
-        now.drift, now.mean = mean - now.mean, mean
-        _compare(now, modal @ modes.basis[outputs].T, stepping.tolerance)
+        now.take_in(
+            modal @ modes.basis[outputs].T, modes.basis @ modal[0].real, failed, stepping.tolerance
+        )
     return _result(structure, modes, state, record, outputs, now)
-
-
-def _compare(now: _Progress, harmonics: ComplexArray, tolerance: float) -> None:
-    """Take in the harmonics of another period and judge whether the first one has settled."""
-    before, now.harmonics = now.harmonics, harmonics
-    if now.periods == 1:
-        return
-    size = float(np.max(np.abs(harmonics[1])))
-    now.changes.append(
-        float(np.max(np.abs(harmonics[1] - before[1]))) / size if size > 0.0 else 0.0
-    )
-    now.remaining = remaining_change(now.changes)
-    now.status = "settled" if now.remaining < tolerance else "unsettled"
 
 
 def _result(
@@ -349,7 +328,7 @@ def _result(
     state: StepState,
     record: StepRecord,
     outputs: IntArray,
-    now: _Progress,
+    now: Progress,
 ) -> TransientResult:
     known = (
         np.nan if now.status == "diverged" else 1.0
@@ -360,8 +339,10 @@ def _result(
     return TransientResult(
         status=now.status,
         harmonics=np.asarray(known * now.harmonics),
+        average=np.asarray(known * now.average),
+        scatter=known * now.scatter,
         periods=now.periods,
-        change=known * max(now.changes[-4:], default=np.nan),
+        change=known * now.change,
         remaining=known * now.remaining,
         contact_failures=now.failures,
         drift=known * now.drift,
