@@ -37,7 +37,9 @@ class Curve:
 
 
 CIRCLE = Curve(lambda x, p: x * x + p * p - 1, lambda x, _: 2 * x, lambda _, p: 2 * p)
-FOLD = Curve(lambda x, p: p - x**3 + x, lambda x, _: -3 * x * x + 1, lambda _x, _p: 1.0)  # folds at x = ±1/√3
+FOLD = Curve(
+    lambda x, p: p - x**3 + x, lambda x, _: -3 * x * x + 1, lambda _x, _p: 1.0
+)  # folds at x = ±1/√3
 
 
 def follow(curve, x, p, end, control, weights=None):
@@ -62,9 +64,18 @@ def test_circle_without_folds(end):
 
 def test_circle_round_both_ends():
     # the branch that starts to the right turns at p = 1 and comes back on the other side of the circle
-    start = start_point(CIRCLE, np.array([0.8, 1.0]), 0.6, NEWTON, StepControl(scale=1.0), np.ones(2))
+    start = start_point(
+        CIRCLE, np.array([0.8, 1.0]), 0.6, NEWTON, StepControl(scale=1.0), np.ones(2)
+    )
     angles = [np.arctan2(start.x[0], start.p)]
-    for point in trace(CIRCLE, start, 5.0, options=NEWTON, control=StepControl(scale=1.0, max_points=60), weights=np.ones(2)):
+    for point in trace(
+        CIRCLE,
+        start,
+        5.0,
+        options=NEWTON,
+        control=StepControl(scale=1.0, max_points=60),
+        weights=np.ones(2),
+    ):
         assert point.solution.status.converged
         assert point.x[0] ** 2 + point.p**2 == pytest.approx(1.0, abs=1e-11)
         angles.append(np.arctan2(point.x[0], point.p))
@@ -112,7 +123,10 @@ class Duffing:
         r = np.array([k * a - self.c * p * b - self.force, k * b + self.c * p * a])
         stretch = 1.5 * self.beta
         jac = np.array(
-            [[k + stretch * a * a, stretch * a * b - self.c * p], [stretch * a * b + self.c * p, k + stretch * b * b]],
+            [
+                [k + stretch * a * a, stretch * a * b - self.c * p],
+                [stretch * a * b + self.c * p, k + stretch * b * b],
+            ],
             order="F",
         )
         return At(r, jac, np.array([-2 * p * a - self.c * b, -2 * p * b + self.c * a]))
@@ -125,7 +139,9 @@ def test_duffing_lies_on_its_closed_form():
     points = list(trace(problem, start, 3.0, options=NEWTON, control=control, weights=np.ones(2)))
     ps = np.array([point.p for point in points])
     amplitude = np.array([np.hypot(*point.x) for point in points])
-    closed = amplitude**2 * ((1 - ps**2 + 0.75 * problem.beta * amplitude**2) ** 2 + (problem.c * ps) ** 2)
+    closed = amplitude**2 * (
+        (1 - ps**2 + 0.75 * problem.beta * amplitude**2) ** 2 + (problem.c * ps) ** 2
+    )
     assert np.allclose(closed, problem.force**2, rtol=0, atol=1e-10)
     assert np.sum(np.diff(np.sign(np.diff(ps))) != 0) == 2
     # on the backbone the phase is 90° and c ω A = F: no point is higher
@@ -150,14 +166,21 @@ def test_step_too_small_where_the_curve_ends():
 
 def test_start_that_does_not_converge_says_so():
     curve = Curve(lambda x, _: x * x + 1, lambda x, _: 2 * x, lambda _x, _p: 0.0)
-    start = start_point(curve, np.array([0.3, 1.0]), 0.0, NEWTON, StepControl(scale=1.0), np.ones(2))
+    start = start_point(
+        curve, np.array([0.3, 1.0]), 0.0, NEWTON, StepControl(scale=1.0), np.ones(2)
+    )
     assert not start.solution.status.converged
 
 
 def test_a_branch_without_end_stops_after_its_points():
-    start = start_point(CIRCLE, np.array([1.0, 1.0]), 0.0, NEWTON, StepControl(scale=1.0), np.ones(2))
+    start = start_point(
+        CIRCLE, np.array([1.0, 1.0]), 0.0, NEWTON, StepControl(scale=1.0), np.ones(2)
+    )
     control = StepControl(scale=1.0, max_points=7)
-    assert len(list(trace(CIRCLE, start, 5.0, options=NEWTON, control=control, weights=np.ones(2)))) == 7
+    assert (
+        len(list(trace(CIRCLE, start, 5.0, options=NEWTON, control=control, weights=np.ones(2))))
+        == 7
+    )
 
 
 def branch(problem, start, end, control):
@@ -198,7 +221,12 @@ def test_step_to_where_one_step_is_too_far():
     curve = Curve(
         lambda x, p: np.arctan(20 * (x - np.tanh(40 * (p - 0.5)))),
         lambda x, p: 20 / (1 + (20 * (x - np.tanh(40 * (p - 0.5)))) ** 2),
-        lambda x, p: -20 / (1 + (20 * (x - np.tanh(40 * (p - 0.5)))) ** 2) * 40 / np.cosh(40 * (p - 0.5)) ** 2,
+        lambda x, p: (
+            -20
+            / (1 + (20 * (x - np.tanh(40 * (p - 0.5)))) ** 2)
+            * 40
+            / np.cosh(40 * (p - 0.5)) ** 2
+        ),
     )
     few = Newton(tolerance=1e-12, max_iterations=6)
     control = StepControl(scale=0.1)
@@ -213,12 +241,16 @@ def test_step_to_where_one_step_is_too_far():
 
 
 def test_step_to_a_place_that_cannot_be_reached():
-    start = start_point(CIRCLE, np.array([0.8, 1.0]), 0.6, NEWTON, StepControl(scale=1.0, max_points=30), np.ones(2))
+    start = start_point(
+        CIRCLE, np.array([0.8, 1.0]), 0.6, NEWTON, StepControl(scale=1.0, max_points=30), np.ones(2)
+    )
     point = step_to(CIRCLE, start, 1.2, NEWTON, StepControl(scale=1.0, max_points=30), np.ones(2))
     assert not point.solution.status.converged
     assert point.p == 1.2
 
 
 def test_step_to_here_is_the_same_point():
-    start = start_point(CIRCLE, np.array([0.8, 1.0]), 0.6, NEWTON, StepControl(scale=1.0), np.ones(2))
+    start = start_point(
+        CIRCLE, np.array([0.8, 1.0]), 0.6, NEWTON, StepControl(scale=1.0), np.ones(2)
+    )
     assert step_to(CIRCLE, start, 0.6, NEWTON, StepControl(scale=1.0), np.ones(2)) is start

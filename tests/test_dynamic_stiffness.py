@@ -68,7 +68,11 @@ def positive(rng, n):
 def structure_of(kind, seed=0, n=9):
     rng = np.random.default_rng(seed)
     mass, stiffness = positive(rng, n), 20 * positive(rng, n)
-    damping = {"proportional": 0.01 * mass + 0.02 * stiffness, "general": 0.3 * positive(rng, n), "none": np.zeros((n, n))}
+    damping = {
+        "proportional": 0.01 * mass + 0.02 * stiffness,
+        "general": 0.3 * positive(rng, n),
+        "none": np.zeros((n, n)),
+    }
     if kind == "massless":
         mass[0] = mass[:, 0] = 0.0
         mass[7] = mass[:, 7] = 0.0
@@ -83,7 +87,8 @@ def structure_of(kind, seed=0, n=9):
 def loaded(seed, n=9):
     rng = np.random.default_rng(seed + 100)
     return HarmonicLoad(
-        rng.standard_normal(n), {h: rng.standard_normal(n) + 1j * rng.standard_normal(n) for h in (1, 3)}
+        rng.standard_normal(n),
+        {h: rng.standard_normal(n) + 1j * rng.standard_normal(n) for h in (1, 3)},
     )
 
 
@@ -92,7 +97,11 @@ def dense(matrix):
 
 
 def dynamic(structure, w):
-    return dense(structure.stiffness) + 1j * w * dense(structure.damping) - w**2 * dense(structure.mass)
+    return (
+        dense(structure.stiffness)
+        + 1j * w * dense(structure.damping)
+        - w**2 * dense(structure.mass)
+    )
 
 
 def schur(structure, load, omega, order):
@@ -101,7 +110,9 @@ def schur(structure, load, omega, order):
     out, loads = [], []
     for h in range(order + 1):
         d = dynamic(structure, h * omega)
-        x = np.linalg.solve(d[np.ix_(inner, inner)], np.column_stack([d[np.ix_(inner, RETAINED)], f[h, inner]]))
+        x = np.linalg.solve(
+            d[np.ix_(inner, inner)], np.column_stack([d[np.ix_(inner, RETAINED)], f[h, inner]])
+        )
         out.append(d[np.ix_(RETAINED, RETAINED)] - d[np.ix_(RETAINED, inner)] @ x[:, :-1])
         loads.append(f[h, RETAINED] - d[np.ix_(RETAINED, inner)] @ x[:, -1])
     return np.array(out), np.array(loads)
@@ -144,7 +155,9 @@ def test_condensed_solution_and_recovery_are_the_full_solution(kind):
     linear = condense(structure, RETAINED, load)
     condensed = linear.condensed(OMEGA, ORDER)
     f = load.coefficients(ORDER)
-    full = np.array([np.linalg.solve(dynamic(structure, h * OMEGA), f[h]) for h in range(ORDER + 1)])
+    full = np.array(
+        [np.linalg.solve(dynamic(structure, h * OMEGA), f[h]) for h in range(ORDER + 1)]
+    )
     q = np.linalg.solve(condensed.stiffness, condensed.load[:, :, None])[:, :, 0]
     assert np.allclose(q, full[:, RETAINED], rtol=0, atol=1e-9 * np.abs(full).max())
     assert np.allclose(linear.recover(OMEGA, q), full, rtol=0, atol=1e-9 * np.abs(full).max())
@@ -194,7 +207,9 @@ def test_a_free_interior_is_refused():
     inner = np.setdiff1d(np.arange(9), RETAINED)
     stiffness = np.array(structure.stiffness)
     stiffness[inner[0]] = stiffness[:, inner[0]] = 0.0
-    with pytest.raises(InputError, match=r"can move without stiffness .*Retain the dofs of free bodies"):
+    with pytest.raises(
+        InputError, match=r"can move without stiffness .*Retain the dofs of free bodies"
+    ):
         condense(replace(structure, stiffness=stiffness), RETAINED, loaded(0))
 
 

@@ -46,10 +46,15 @@ def test_stuck_damper_is_a_spring():
     sweep = Sweep(omega_range=(0.8, 1.1), selection="always_low", points=10, peak_points=0)
     problem = forced_problem(system, load, sweep)
     for p in forced_response(system, load, sweep):
-        assert problem.amplitude(p) == pytest.approx(abs(0.1 / (1.5 - p.omega**2 + 0.02j * p.omega)), rel=1e-9)
+        assert problem.amplitude(p) == pytest.approx(
+            abs(0.1 / (1.5 - p.omega**2 + 0.02j * p.omega)), rel=1e-9
+        )
 
 
-@pytest.mark.parametrize(("limit", "omega", "amplitude"), [(0.1, 1.1, 0.56839426), (0.1, 1.2, 0.38916153), (0.2, 1.15, 0.59978456)])
+@pytest.mark.parametrize(
+    ("limit", "omega", "amplitude"),
+    [(0.1, 1.1, 0.56839426), (0.1, 1.2, 0.38916153), (0.2, 1.15, 0.59978456)],
+)
 def test_many_harmonics_are_the_exact_response(limit, omega, amplitude):
     """Benchmark B3, event-driven solution."""
     system, load = griffin(limit)
@@ -113,7 +118,9 @@ def test_every_point_solves_its_equations(run):
 def test_peak_points_raise_the_peak(run):
     system, load, points = run
     problem = forced_problem(system, load, SHORT)
-    before = max(problem.amplitude(p) for p in accepted_points([p for p in points if p.stage != "peak"]))
+    before = max(
+        problem.amplitude(p) for p in accepted_points([p for p in points if p.stage != "peak"])
+    )
     after = max(problem.amplitude(p) for p in accepted_points(points))
     assert after >= before
 
@@ -135,9 +142,17 @@ def test_stepping_through_frequencies():
     assert all(p.converged for p in points)
     # the same solutions as along the branch: solutions are unique where all contacts slip, and here in stick
     problem = forced_problem(system, load, sweep)
-    branch = list(forced_response(system, load, replace(SHORT, selection="always_low", peak_points=0, points=40)))
-    curve = np.interp([p.omega for p in points], [p.omega for p in branch], [problem.amplitude(p) for p in branch])
-    assert [problem.amplitude(p) for p in points] == pytest.approx(curve.tolist(), rel=2e-2)  # linear interpolation
+    branch = list(
+        forced_response(
+            system, load, replace(SHORT, selection="always_low", peak_points=0, points=40)
+        )
+    )
+    curve = np.interp(
+        [p.omega for p in points], [p.omega for p in branch], [problem.amplitude(p) for p in branch]
+    )
+    assert [problem.amplitude(p) for p in points] == pytest.approx(
+        curve.tolist(), rel=2e-2
+    )  # linear interpolation
 
 
 # ---- resuming -----------------------------------------------------------------------------------------------------------
@@ -147,13 +162,19 @@ def assert_same(a, b):
     """Equal but for the rounding of a point that went through metres and back."""
     assert (a.stage, a.index, a.status, a.iterations) == (b.stage, b.index, b.status, b.iterations)
     assert a.omega == pytest.approx(b.omega, rel=1e-12)
-    assert np.allclose(a.coefficients, b.coefficients, rtol=0, atol=1e-9 * np.abs(b.coefficients).max())
-    assert np.allclose(a.tangent, b.tangent, rtol=1e-8, atol=1e-8 * np.abs(b.tangent).max(initial=0.0))
+    assert np.allclose(
+        a.coefficients, b.coefficients, rtol=0, atol=1e-9 * np.abs(b.coefficients).max()
+    )
+    assert np.allclose(
+        a.tangent, b.tangent, rtol=1e-8, atol=1e-8 * np.abs(b.tangent).max(initial=0.0)
+    )
     assert a.step == pytest.approx(b.step, rel=1e-9)
     assert a.predicted_error == pytest.approx(b.predicted_error, rel=1e-6, abs=1e-9, nan_ok=True)
 
 
-@pytest.mark.parametrize("where", ["first", "early", "late low", "last low", "first high", "in high", "peak", "all"])
+@pytest.mark.parametrize(
+    "where", ["first", "early", "late low", "last low", "first high", "in high", "peak", "all"]
+)
 def test_resuming_gives_what_would_have_come(run, where):
     system, load, points = run
     low = sum(p.stage == "low" for p in points)
@@ -173,7 +194,9 @@ def test_resuming_frequencies():
     sweep = replace(SHORT, frequencies=6, peak_points=0, selection="always_low")
     points = list(forced_response(system, load, sweep))
     for k in (1, 4):
-        for a, b in zip(forced_response(system, load, sweep, done=points[:k]), points[k:], strict=True):
+        for a, b in zip(
+            forced_response(system, load, sweep, done=points[:k]), points[k:], strict=True
+        ):
             assert_same(a, b)
 
 
@@ -188,7 +211,10 @@ def test_points_come_one_by_one():
 
 @pytest.mark.parametrize("ends", [(20.0, 10.0), (10.0, 10.0), (0.0, 10.0), (-5.0, 10.0)])
 def test_range_must_grow(ends):
-    with pytest.raises(InputError, match=rf"Sweep\.omega_range: must be positive and growing, got {ends[0]:g} to {ends[1]:g}"):
+    with pytest.raises(
+        InputError,
+        match=rf"Sweep\.omega_range: must be positive and growing, got {ends[0]:g} to {ends[1]:g}",
+    ):
         Sweep(omega_range=ends)
 
 
