@@ -1,0 +1,230 @@
+"""The commands. Everything heavy is imported inside them, so that ``--help`` is quick."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from stickslip import __version__
+from stickslip.errors import InputError, StickslipError, input_error
+
+if TYPE_CHECKING:
+    from stickslip.study.summary import RunSummary
+    from stickslip.study.verify import Check
+
+DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+app = typer.Typer(
+    help="Vibration of bladed disks coupled by friction joints.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file.")]
+
+
+def main() -> None:
+    """Entry point of the ``stickslip`` command."""
+    app()
+
+
+class ScreenSink:
+    """Progress on a terminal as a bar, elsewhere as plain lines.
+
+    Parameters
+    ----------
+    console
+        Where to write.
+    progress
+        The bar, or None where the output is no terminal.
+    """
+
+    def __init__(self, console: Console, progress: Progress | None) -> None:
+        self._console = console
+        self._progress = progress
+        self._task = None if progress is None else progress.add_task("model", total=1.0, state="")
+
+    def say(self, text: str) -> None:
+        """Write a line."""
+        self._console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    def begin(self, title: str) -> None:
+        """Start a load case."""
+        if self._progress is None or self._task is None:
+            self.say(title)
+        else:
+            self._progress.reset(self._task, description=title, total=1.0, state="")
+
+    def advance(self, fraction: float, text: str) -> None:
+        """Move the bar, or write the line."""
+        if self._progress is None or self._task is None:
+            self.say(f"  {text}")
+        else:
+            self._progress.update(self._task, completed=fraction, state=text)
+
+
+@app.callback(invoke_without_command=True)
+def common(
+    *, version: Annotated[bool, typer.Option("--version", help="Print the version and leave.")] = False
+) -> None:
+    """Vibration of bladed disks coupled by friction joints."""
+    if version:
+        typer.echo(f"stickslip {__version__}")
+        raise typer.Exit
+
+
+@app.command()
+def run(
+    study: StudyFile,
+    *,
+    verify: Annotated[bool, typer.Option("--verify", help="Integrate in time at three frequencies and compare.")] = False,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Forget what the results folder holds.")] = False,
+    report: Annotated[bool, typer.Option("--report/--no-report", help="Write the HTML report.")] = True,
+) -> None:
+    """Run a study; an interrupted run goes on where it stopped."""
+    with _errors_as_text():
+        from stickslip.study.run import run_study
+
+        with _screen() as sink:
+            summary = run_study(study, verify_in_time=verify, fresh=fresh, sink=sink)
+        files = [*summary.files]
+        if report:
+            files.append(_write_report(summary.result))
+        _print_summary(summary, files)
+    raise typer.Exit(NOT_CONVERGED if summary.failed else DONE)
+
+
+@app.command()
+def check(study: StudyFile) -> None:
+    """Do everything but the solve: read, mesh, reduce, place the damper."""
+    with _errors_as_text():
+        from stickslip.study.run import check_study
+
+        with _screen() as sink:
+            warnings = check_study(study, sink)
+        console = _console()
+        for text in warnings:
+            console.print(f"WARNING: {text}", markup=False, highlight=False, soft_wrap=True)
+        console.print(f"{study}: good to run", markup=False, highlight=False)
+
+
+@app.command()
+def new(name: Annotated[Path, typer.Argument(help="A folder to make.")]) -> None:
+    """Write a commented example study to NAME/study.toml."""
+    with _errors_as_text():
+        from stickslip.study.example import example_text
+
+        target = name / "study.toml"
+        try:
+            name.mkdir(parents=True, exist_ok=True)
+            with target.open("x", encoding="utf-8", newline="\n") as stream:
+                stream.write(example_text())
+        except FileExistsError:
+            raise input_error(str(target), "exists already", "Give another name: nothing is overwritten.") from None
+        except OSError as error:
+            raise input_error(str(target), f"cannot be written ({error.strerror})", "Give a folder you may write to.") from None
+        typer.echo(f"{target} written. Next: stickslip run {target}")
+
+
+@app.command()
+def report(
+    result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.nc, or the folder that holds one.")],
+) -> None:
+    """Write the HTML report of a result."""
+    with _errors_as_text():
+        typer.echo(f"{_write_report(result / 'result.nc' if result.is_dir() else result)} written")
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of study files."""
+    from stickslip.study.schema import json_schema
+
+    typer.echo(json_schema())
+
+
+@contextmanager
+def _errors_as_text() -> Iterator[None]:
+    """Turn the package's errors into text and an exit code."""
+    try:
+        yield
+    except StickslipError as error:
+        typer.echo(str(error), err=True)
+        stopped = type(error).__name__ == "Interrupted"
+        raise typer.Exit(INTERRUPTED if stopped else BAD_INPUT if isinstance(error, InputError) else NOT_CONVERGED) from None
+    except KeyboardInterrupt:
+        typer.echo("Interrupted.", err=True)
+        raise typer.Exit(INTERRUPTED) from None
+
+
+def _console() -> Console:
+    return Console(file=sys.stdout)
+
+
+@contextmanager
+def _screen() -> Iterator[ScreenSink]:
+    """Give a sink, with a bar where the output is a terminal."""
+    console = _console()
+    if not console.is_terminal:
+        yield ScreenSink(console, None)
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[state]}"))
+    with Progress(*columns, console=console, transient=True) as progress:
+        yield ScreenSink(console, progress)
+
+
+def _write_report(result: Path) -> Path:
+    from stickslip.report.page import write_report
+
+    target = result.with_name("report.html")
+    write_report(result, target)
+    return target
+
+
+def _print_summary(summary: "RunSummary", files: list[Path]) -> None:
+    console = _console()
+    console.print(_table(summary))
+
+    def lines(title: str, texts: list[str]) -> None:
+        if texts:
+            console.print(f"\n{title}", markup=False, highlight=False)
+        for text in texts:
+            console.print(f"  {text}", markup=False, highlight=False, soft_wrap=True)
+
+    lines("Where the Jacobian Alert asked for more harmonics", list(summary.alerts))
+    lines("Against time integration", [_check_line(c) for c in summary.checks])
+    lines("Warnings", list(summary.warnings))
+    if summary.failed:
+        lines("Not converged", [f"{summary.failed} points did not converge; they are marked in the result, not filled in"])
+    lines("Files", [str(f) for f in files])
+
+
+def _table(summary: "RunSummary") -> Table:
+    table = Table(title="Forced response")
+    names = ("F_CL/F_HE", "peak mm", "at Hz", "points", f"H = {summary.low}", f"H = {summary.high}", "failed", "Newton")
+    for name in (*names, "contact s", "linear s", "rest s"):
+        table.add_column(name, justify="right")
+    for r in summary.rows:
+        counts = (r.points, r.points_low, r.points_high, r.points_failed, r.newton_steps)
+        table.add_row(
+            f"{r.ratio:g}",
+            f"{1e3 * r.peak_amplitude:.5g}",
+            f"{r.peak_frequency_hz:.3f}",
+            *(str(c) for c in counts),
+            *(f"{s:.2f}" for s in r.seconds),
+        )
+    return table
+
+
+def _check_line(check: "Check") -> str:
+    settled = "" if check.settled else ", which did NOT become periodic"
+    return (
+        f"{check.frequency_hz:.3f} Hz: balance {check.balance:.5e} m, integration {check.transient:.5e} m, "
+        f"difference {check.difference_percent:+.3f} % ({check.periods} periods{settled})"
+    )

@@ -1,0 +1,172 @@
+"""From a study to a model that can be solved: mesh, reduction, damper, contacts, loads."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.contact.interface import Interface
+from stickslip.errors import InputError
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.model.damper import ContactPoints, FlatCurvedDamper
+from stickslip.model.structure import Structure
+from stickslip.response.forced import Sweep
+from stickslip.response.preload import preload
+from stickslip.response.system import System
+from stickslip.study.assembly import join_damper
+from stickslip.study.blades import ReducedBlades, reduced_blades
+from stickslip.study.journal import Journal
+from stickslip.study.schema import Study, StudyTables
+
+OUTPUT_NODES = ("tip1", "edge1", "tip2")
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A study as a model.
+
+    Parameters
+    ----------
+    blades
+        The reduced blade pair, and how well it stands for the full one.
+    system, bare_system
+        Blades, damper and contacts, with and without the retention.
+    contacts
+        Where the contact points are.
+    sweep
+        How the response is computed.
+    ratios
+        F_CL/F_HE of each load case.
+    centrifugal
+        Static load on the damper, N.
+    retention
+        Stiffness that holds the damper's mean position, N/m.
+    force_dof
+        Where the harmonic force acts.
+    output_labels
+        Names of the outputs.
+    static_gap, static_force
+        (n_contacts, 3) gaps (m) and forces (N) under the centrifugal load alone.
+    """
+
+    blades: ReducedBlades
+    system: System
+    bare_system: System
+    contacts: ContactPoints
+    sweep: Sweep
+    ratios: tuple[float, ...]
+    centrifugal: float
+    retention: float
+    force_dof: int
+    output_labels: tuple[str, ...]
+    static_gap: FloatArray
+    static_force: FloatArray
+    report_output: int = 0  # the first output is the one whose peak the solver resolves
+
+    def with_retention(self, stiffness: float) -> System:
+        """Return the system with another retention stiffness, N/m."""
+        return self.bare_system.with_retention(stiffness)
+
+    def load(self, ratio: float) -> HarmonicLoad:
+        """Return the loads of the load case with F_CL/F_HE = `ratio`."""
+        n = self.system.structure.n
+        force = np.zeros(n, dtype=complex)
+        force[self.force_dof] = self.centrifugal / ratio
+        return HarmonicLoad(static_load(self.system, self.centrifugal), {1: force})
+
+
+def case_of(study: Study, journal: Journal | None, say: Callable[[str], None]) -> Case:
+    """Build the model of a study; the reduced blades are kept in the journal.
+
+    Parameters
+    ----------
+    study
+        The study.
+    journal
+        Where the reduced blades of an earlier start are found and kept; None: built anew and kept nowhere.
+    say
+        Takes a line of progress.
+
+    Raises
+    ------
+    InputError
+        If the parts do not fit together, or the estimated cost exceeds the study's limits.
+    SingularError
+        If the centrifugal load does not press the damper into an equilibrium.
+    """
+    t = study.tables
+    geometry = t.blades.library()
+    try:
+        damper = t.damper.library(geometry)
+        blades = reduced_blades(study, damper, journal, say)
+    except InputError as error:
+        text = str(error)
+        raise error if str(study.path) in text else InputError(f"{study.path}: [blades] with [damper]: {text}") from None
+    return make_case(t, blades, damper)
+
+
+def make_case(tables: StudyTables, blades: ReducedBlades, damper: FlatCurvedDamper) -> Case:
+    """Join reduced blades and damper, and place the damper under its static load."""
+    contacts = damper.contact_points()
+    system, labels = system_of(tables, blades.structure, damper)
+    held = system.with_retention(tables.retention.stiffness_n_per_m)
+    displacement = preload(held, static_load(held, tables.loads.centrifugal_n))
+    gap = (system.interface.gap_operator[:, held.retained] @ displacement).reshape(-1, 3)
+    axis = AXES.index(tables.loads.excitation_direction)
+    return Case(
+        blades=blades,
+        system=held,
+        bare_system=system,
+        contacts=contacts,
+        sweep=sweep_of(tables),
+        ratios=tuple(tables.loads.ratios),
+        centrifugal=tables.loads.centrifugal_n,
+        retention=tables.retention.stiffness_n_per_m,
+        force_dof=int(system.structure.dof_set("blades.force")[axis]),
+        output_labels=labels,
+        static_gap=gap,
+        static_force=static_contact_force(system.interface, gap),
+    )
+
+
+def sweep_of(tables: StudyTables) -> Sweep:
+    """Return the sweep of a study."""
+    lowest, highest = (2 * np.pi * f for f in tables.sweep.frequency_hz)
+    h = tables.harmonics
+    return Sweep(
+        omega_range=(lowest, highest),
+        low=h.low,
+        high=h.high,
+        samples=h.samples,
+        threshold=h.alert_threshold_percent / 100,
+        selection=h.selection,
+        points=tables.sweep.points,
+        peak_points=tables.sweep.peak_points,
+    )
+
+
+def system_of(tables: StudyTables, blades: Structure, damper: FlatCurvedDamper) -> tuple[System, tuple[str, ...]]:
+    """Return the system of blades and damper, without retention, and the labels of its outputs."""
+    joined, interface = join_damper(tables, blades, damper)
+    outputs = joined.dof_set("blades.output")
+    labels = tuple(f"{node}.{axis}" for node in OUTPUT_NODES for axis in AXES)
+    # the error of the alert is taken where the motion is: along the excitation
+    along = np.array([i for i, label in enumerate(labels) if label.endswith(tables.loads.excitation_direction)])
+    return System(joined, interface, outputs, alert_outputs=along, free=joined.dof_set("damper")), labels
+
+
+def static_load(system: System, centrifugal: float) -> FloatArray:
+    """Return the (n,) static forces: the centrifugal load on the damper, outward (+z)."""
+    force = np.zeros(system.structure.n)
+    force[system.structure.dof_set("damper")[2]] = centrifugal
+    return force
+
+
+def static_contact_force(interface: Interface, gap: FloatArray) -> FloatArray:
+    """Return the (n_contacts, 3) forces t, w, n of contacts loaded once from rest to `gap`."""
+    k_t, k_w, k_n, mu, n0, _ = interface.parameters().T
+    normal = np.maximum(0.0, n0 - k_n * gap[:, 2])
+    tangent = np.clip(np.stack([k_t, k_w], 1) * gap[:, :2], -(mu * normal)[:, None], (mu * normal)[:, None])
+    return np.column_stack([tangent, -normal])

@@ -1,0 +1,181 @@
+"""The points of one load case, put in order: what was accepted, its fields, its peak, its counts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.harmonic.selection import FLOOR
+from stickslip.response.fields import Fields, Signals, fields, signals
+from stickslip.response.forced import ForcedPoint, ForcedProblem
+
+HZ = 2 * np.pi
+NO_SHIFT = (float("nan"), float("nan"))
+
+
+@dataclass(frozen=True, eq=False)
+class Accepted:
+    """A frequency of the response, with the solution that stands for it.
+
+    Parameters
+    ----------
+    point
+        The solution with most harmonics; not a solution where its status says so.
+    low
+        The low-order point at the same frequency, or None (peak refinements).
+    fields, low_fields
+        What they look like everywhere; None where the point did not converge.
+    real_error
+        Difference between both, a fraction; NaN unless both orders were solved.
+    """
+
+    point: ForcedPoint
+    low: ForcedPoint | None
+    fields: Fields | None
+    low_fields: Fields | None
+    real_error: float
+
+    @property
+    def predicted_error(self) -> float:
+        """Error that the alert predicted for the low-order solution, a fraction; NaN where it was not asked."""
+        return (self.low or self.point).predicted_error
+
+    def amplitudes(self, n_outputs: int) -> FloatArray:
+        """Return the (n_outputs,) amplitudes of harmonic 1, m; NaN where the point did not converge."""
+        return _amplitudes(self.fields, n_outputs)
+
+    def low_amplitudes(self, n_outputs: int) -> FloatArray:
+        """Return the same of the low-order point."""
+        return _amplitudes(self.low_fields, n_outputs)
+
+
+@dataclass(frozen=True, eq=False)
+class CaseResult:
+    """A finished load case.
+
+    Parameters
+    ----------
+    ratio, excitation
+        F_CL/F_HE, and F_HE in N.
+    solved
+        Every point that was solved, accepted or not, in the order of solution.
+    accepted
+        One entry a frequency, along the branch, peak refinements last.
+    peak
+        Position of the largest amplitude of the report output in `accepted`, -1 if nothing converged.
+    signals
+        One period at the peak; None if nothing converged.
+    report_output
+        Position of the output whose peak counts.
+    low_order
+        Harmonics of the first passage.
+    retention_shift
+        Relative change of the peak amplitude and change of its frequency (Hz) with a tenth of the retention; NaN: not computed.
+    """
+
+    ratio: float
+    excitation: float
+    solved: tuple[ForcedPoint, ...]
+    accepted: tuple[Accepted, ...]
+    peak: int
+    signals: Signals | None
+    report_output: int
+    low_order: int
+    retention_shift: tuple[float, float] = NO_SHIFT
+
+    @property
+    def points_low(self) -> int:
+        """Number of accepted points with few harmonics."""
+        return sum(a.point.order == self.low_order for a in self.accepted)
+
+    @property
+    def peak_amplitude(self) -> float:
+        """Largest amplitude of the report output, m; NaN if nothing converged."""
+        if self.peak < 0:
+            return float("nan")
+        return float(self.accepted[self.peak].amplitudes(self.report_output + 1)[self.report_output])
+
+    @property
+    def peak_frequency_hz(self) -> float:
+        """Frequency of the peak, Hz."""
+        return float("nan") if self.peak < 0 else self.accepted[self.peak].point.omega / HZ
+
+    @property
+    def failed(self) -> int:
+        """Number of accepted points that did not converge."""
+        return sum(not a.point.converged for a in self.accepted)
+
+    @property
+    def newton_steps(self) -> int:
+        """Newton iterations of all points solved."""
+        return sum(p.iterations for p in self.solved)
+
+    @property
+    def seconds(self) -> tuple[float, float, float]:
+        """Seconds in contact, linear algebra and the rest, over all points solved."""
+        contact = sum(p.seconds_contact for p in self.solved)
+        linear = sum(p.seconds_linear for p in self.solved)
+        return contact, linear, sum(p.seconds_total for p in self.solved) - contact - linear
+
+
+def collect(
+    problem: ForcedProblem, points: Sequence[ForcedPoint], *, ratio: float, excitation: float, report_output: int
+) -> CaseResult:
+    """Put the points of a load case in order and recover what they look like.
+
+    Parameters
+    ----------
+    problem
+        What was solved.
+    points
+        All points in the order of solution.
+    ratio, excitation
+        F_CL/F_HE, and F_HE in N.
+    report_output
+        Position of the output whose peak counts.
+    """
+    accepted = tuple(_accept(problem, point, low) for point, low in _pairs(points))
+    peak = _peak(accepted, report_output)
+    period = None if peak < 0 else signals(problem, accepted[peak].point)
+    return CaseResult(ratio, excitation, tuple(points), accepted, peak, period, report_output, problem.sweep.low)
+
+
+def _pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, ForcedPoint | None]]:
+    """Return the accepted point of each frequency with its low-order companion."""
+    high = {p.index: p for p in points if p.stage == "high"}
+    low = [p for p in points if p.stage == "low"]
+    pairs: list[tuple[ForcedPoint, ForcedPoint | None]] = [(high.get(p.index, p), p) for p in low]
+    return pairs + [(p, None) for p in points if p.stage == "peak"]
+
+
+def _accept(problem: ForcedProblem, point: ForcedPoint, low: ForcedPoint | None) -> Accepted:
+    found = fields(problem, point) if point.converged else None
+    if low is None or not low.converged:
+        return Accepted(point, low, found, None, float("nan"))
+    if low is point:
+        return Accepted(point, low, found, found, float("nan"))
+    below = fields(problem, low)
+    return Accepted(point, low, found, below, _real_error(problem, below, found))
+
+
+def _real_error(problem: ForcedProblem, low: Fields, high: Fields | None) -> float:
+    """Return the largest relative change of harmonic 1 over the outputs of the alert (Gastaldi & Berruti 2017, eq. 29), a fraction."""
+    if high is None:
+        return float("nan")
+    chosen = problem.system.alert_outputs
+    at = slice(None) if chosen is None else chosen
+    before, after = low.outputs[1, at], high.outputs[1, at]
+    relevant = np.abs(before) > FLOOR * np.abs(before).max(initial=0.0)
+    return float(np.max(np.abs(after - before)[relevant] / np.abs(before)[relevant], initial=0.0))
+
+
+def _peak(accepted: Sequence[Accepted], output: int) -> int:
+    amplitude = np.array([a.amplitudes(output + 1)[output] for a in accepted])
+    return int(np.nanargmax(amplitude)) if np.any(np.isfinite(amplitude)) else -1
+
+
+def _amplitudes(found: Fields | None, n_outputs: int) -> FloatArray:
+    if found is None:
+        return np.full(n_outputs, np.nan)
+    return np.abs(found.outputs[1, :n_outputs])

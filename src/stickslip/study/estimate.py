@@ -1,0 +1,83 @@
+"""What a run will cost, told before it starts."""
+
+from dataclasses import dataclass
+
+from stickslip.errors import input_error
+from stickslip.study.schema import Study
+
+BYTES_A_NODE = 35e3  # assembly and factorisation of second-order tetrahedra, measured at 10 to 30 thousand nodes
+BASE_GB = 0.35  # interpreter and libraries
+NEWTON_A_POINT = 5  # Newton steps of a point, the slower ones near a peak included
+REPEATED = 0.4  # share of points that the alert repeats
+FLOPS = 4e9  # of a small dense factorisation on one core
+SECONDS_A_NODE = 1.2e-3  # assembly, reduction and the full model's frequencies
+RETAINED = 6  # damper coordinates beside three a contact
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Cost of a run.
+
+    Parameters
+    ----------
+    nodes
+        Of the mesh of both blades.
+    memory_gb
+        Largest memory.
+    newton_steps
+        Of all load cases.
+    seconds
+        Of one core: model and solver together, without time integration.
+    """
+
+    nodes: int
+    memory_gb: float
+    newton_steps: int
+    seconds: float
+
+    def __str__(self) -> str:
+        return (
+            f"estimate: {self.nodes} nodes, {self.memory_gb:.1f} GB of memory, {self.newton_steps} Newton steps, "
+            f"{self.seconds:.0f} s"
+        )
+
+
+def estimate(study: Study, nodes: int) -> Estimate:
+    """Estimate memory and work of `study` on a mesh of `nodes` nodes."""
+    t = study.tables
+    coordinates = 9 * len(t.damper.sections_m) + RETAINED
+    points = len(t.loads.ratios) * (t.sweep.points + t.sweep.peak_points)
+    share_high = {"jacobian_alert": REPEATED, "always_low": 0.0, "always_high": 1.0}[t.harmonics.selection]
+    low, high = ((2 * h + 1) * coordinates for h in (t.harmonics.low, t.harmonics.high))
+    alerts = points if t.harmonics.selection == "jacobian_alert" else 0
+    steps_high = points * share_high * NEWTON_A_POINT + alerts
+    steps_low = points * NEWTON_A_POINT if t.harmonics.selection != "always_high" else 0
+    seconds = (steps_low * low**3 + steps_high * high**3) * 4 / FLOPS + nodes * SECONDS_A_NODE
+    stored = points * (t.harmonics.high + 1) * 10 * coordinates * 16 / 1e9
+    memory = BASE_GB + nodes * BYTES_A_NODE / 1e9 + stored + 6 * high**2 * 8 / 1e9
+    return Estimate(nodes, memory, round(steps_low + steps_high), seconds)
+
+
+def check_limits(study: Study, cost: Estimate) -> None:
+    """Refuse a run that is estimated above the study's limits.
+
+    Raises
+    ------
+    InputError
+        Naming the limit.
+    """
+    limits = study.tables.limits
+    advice = "Take a coarser mesh, fewer points, ratios or harmonics, or raise the limit."
+    if cost.memory_gb > limits.memory_gb:
+        raise input_error(
+            f"{study.path}: limits.memory_gb",
+            f"the run is estimated at {cost.memory_gb:.1f} GB ({cost.nodes} nodes), the limit is {limits.memory_gb:g} GB",
+            advice,
+        )
+    if cost.seconds > limits.work_s:
+        raise input_error(
+            f"{study.path}: limits.work_s",
+            f"the run is estimated at {cost.seconds:.0f} s ({cost.newton_steps} Newton steps), the limit is "
+            f"{limits.work_s:g} s",
+            advice,
+        )

@@ -1,0 +1,261 @@
+"""A study from its file to its results, every finished point safe on the disk."""
+
+import json
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from hashlib import sha256
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from time import perf_counter
+from typing import Protocol
+
+import numpy as np
+
+from stickslip import __version__
+from stickslip.errors import SingularError, StickslipError
+from stickslip.response.drift import drift
+from stickslip.response.forced import ForcedPoint, ForcedProblem, Sweep, forced_problem, forced_response
+from stickslip.study.build import Case, case_of
+from stickslip.study.collect import HZ, CaseResult, collect
+from stickslip.study.folder import JOURNAL, LOG, MESHES, RESULT, prepare_folder
+from stickslip.study.journal import Journal
+from stickslip.study.retention import peak_shift
+from stickslip.study.schema import Study, read_study
+from stickslip.study.store import Provenance, dataset, write_dataset
+from stickslip.study.summary import RunSummary, alert_sentence, row
+from stickslip.study.verify import Check, verify
+
+LIBRARIES = ("numpy", "scipy", "numba", "gmsh", "scikit-fem", "pydantic", "xarray", "h5netcdf")
+
+
+class Interrupted(StickslipError):  # noqa: N818  stopping a run is no error
+    """The user stopped a run; what is finished is kept."""
+
+
+class Sink(Protocol):
+    """Where a run tells how far it is."""
+
+    def say(self, text: str) -> None:
+        """Take a line of text."""
+        ...
+
+    def begin(self, title: str) -> None:
+        """Take the title of a load case that starts."""
+        ...
+
+    def advance(self, fraction: float, text: str) -> None:
+        """Take the share of the load case that is done, and its state in words."""
+        ...
+
+
+def run_study(path: Path, *, verify_in_time: bool = False, fresh: bool = False, sink: Sink) -> RunSummary:
+    """Run a study, going on from what an interrupted run has finished.
+
+    Parameters
+    ----------
+    path
+        The study file.
+    verify_in_time
+        Integrate in time at three frequencies and compare.
+    fresh
+        Forget what the results folder holds.
+    sink
+        Where progress is told.
+
+    Raises
+    ------
+    InputError
+        If the study, its folder or its estimated cost do not allow a run.
+    Interrupted
+        If the user stops it; the message says how to go on.
+    """
+    study = read_study(path)
+    prepare_folder(study.folder, fresh=fresh)
+    versions = library_versions()
+    with Journal(study.folder / JOURNAL, fingerprint(study, versions), ForcedPoint) as journal:
+        log = _Log(study.folder / LOG, sink)
+        try:
+            return _run(_Run(study, versions, journal, log), verify_in_time=verify_in_time)
+        except KeyboardInterrupt:
+            log.say("interrupted by the user")
+            raise Interrupted(
+                f"Interrupted. What is finished is kept in {study.folder}. The same command goes on from there."
+            ) from None
+
+
+def check_study(path: Path, sink: Sink) -> list[str]:
+    """Do everything but the solve; return warnings.
+
+    Nothing is written: neither results nor what the model's building could be spared of later.
+    """
+    study = read_study(path)
+    sink.say(f"{path}: read, {len(study.tables.loads.ratios)} load cases")
+    case = case_of(study, None, sink.say)
+    normal = -case.static_force[:, 2]
+    sink.say(f"static equilibrium: normal forces {normal.min():.3g} to {normal.max():.3g} N")
+    return case.blades.frequencies.warnings()
+
+
+def fingerprint(study: Study, versions: dict[str, str]) -> str:
+    """Return a hash of all that the numbers of a run depend on."""
+    return sha256(json.dumps([study.content_hash, versions], sort_keys=True).encode()).hexdigest()
+
+
+def library_versions() -> dict[str, str]:
+    """Return the versions of this package, Python and the libraries that make numbers."""
+    found = {"stickslip": __version__, "python": platform.python_version()}
+    for name in LIBRARIES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Log:
+    """Every line of the run on the disk, and on to the user's sink."""
+
+    path: Path
+    sink: Sink
+
+    def say(self, text: str) -> None:
+        with self.path.open("a", encoding="utf-8") as stream:
+            stream.write(f"{datetime.now(UTC).isoformat(timespec='seconds')} {text}\n")
+        self.sink.say(text)
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """What every step of a run needs."""
+
+    study: Study
+    versions: dict[str, str]
+    journal: Journal
+    log: _Log
+    began: float = field(default_factory=perf_counter)
+    created: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
+    warnings: list[str] = field(default_factory=list)
+
+    def warn(self, text: str) -> None:
+        self.warnings.append(text)
+        self.log.say(f"WARNING: {text}")
+
+
+def _run(run: _Run, *, verify_in_time: bool) -> RunSummary:
+    run.log.say(f"stickslip {__version__}, study {run.study.path}")
+    case = case_of(run.study, run.journal, run.log.say)
+    for text in case.blades.frequencies.warnings():
+        run.warn(text)
+    results: list[CaseResult] = []
+    for i in range(len(case.ratios)):
+        results.append(_load_case(run, case, i))
+        _write(run, case, results, [], complete=False)
+    checks = verify(case, results, run.journal, run.log.say) if verify_in_time else []
+    _write(run, case, results, checks, complete=True)
+    target = run.study.folder / RESULT
+    files = [target, *(run.study.folder / name for name in (*MESHES, LOG))]
+    return RunSummary(
+        rows=tuple(row(r) for r in results),
+        low=case.sweep.low,
+        high=case.sweep.high,
+        alerts=tuple(_alerts(case, results)),
+        checks=tuple(checks),
+        warnings=tuple(run.warnings),
+        result=target,
+        files=tuple(f for f in files if f.exists()),
+    )
+
+
+def _load_case(run: _Run, case: Case, i: int) -> CaseResult:
+    ratio = case.ratios[i]
+    problem = forced_problem(case.system, case.load(ratio), case.sweep)
+    run.log.sink.begin(f"load case {i + 1} of {len(case.ratios)}: F_CL/F_HE = {ratio:g}")
+    points = _points(run, case, i)
+    result = collect(
+        problem, points, ratio=ratio, excitation=case.centrifugal / ratio, report_output=case.report_output
+    )
+    _warn_drift(run, problem, result)
+    result = replace(result, retention_shift=peak_shift(case, result, i, run.journal))
+    run.log.say(
+        f"F_CL/F_HE = {ratio:g}: peak {result.peak_amplitude:.4e} m at {result.peak_frequency_hz:.3f} Hz, "
+        f"{len(result.accepted)} points, {result.failed} not converged, {result.newton_steps} Newton steps"
+    )
+    return result
+
+
+def _points(run: _Run, case: Case, i: int) -> list[ForcedPoint]:
+    """Return all points of a load case, each journalled as it comes."""
+    load = case.load(case.ratios[i])
+    done: list[ForcedPoint] = run.journal.points(i)
+    finished = f"finished.{i}"
+    if run.journal.get(finished) is not None:
+        return done
+    if done:
+        run.log.say(f"{len(done)} points of load case {i + 1} are already there")
+    points = list(done)
+    try:
+        for point in forced_response(case.system, load, case.sweep, done=done):
+            run.journal.add(i, point)
+            points.append(point)
+            run.log.sink.advance(*progress(point, case.sweep))
+    except (SingularError, FloatingPointError, np.linalg.LinAlgError) as error:
+        # a load case without an equilibrium must not take the finished ones with it
+        run.warn(f"F_CL/F_HE = {case.ratios[i]:g}: no solution ({error})")
+    run.journal.put(finished, {"points": len(points)})
+    return points
+
+
+def progress(point: ForcedPoint, sweep: Sweep) -> tuple[float, str]:
+    """Return how much of a load case is done, and a line that says so."""
+    first, last = sweep.omega_range
+    along = min(max((point.omega - first) / (last - first), 0.0), 1.0)
+    shares = {"low": (0.0, 0.4), "high": (0.4, 0.55), "peak": (0.95, 0.05)}
+    begin, width = shares[point.stage]
+    state = "" if point.converged else f", {point.status.advice}"
+    return begin + width * along, f"{point.stage} {point.index + 1}: {point.omega / HZ:.2f} Hz, H = {point.order}{state}"
+
+
+def _warn_drift(run: _Run, problem: ForcedProblem, result: CaseResult) -> None:
+    """Warn where friction leaves the mean position of the damper free."""
+    chosen = [a.point for a in result.accepted if not a.point.converged]
+    if result.peak >= 0:
+        chosen = [result.accepted[result.peak].point, *chosen]
+    for point in chosen:
+        found = drift(problem, point)
+        if found.undetermined:
+            run.warn(
+                f"F_CL/F_HE = {result.ratio:g}, {point.omega / HZ:.2f} Hz: every contact slips or opens in each cycle, the "
+                f"mean position of {found.coordinate} is undetermined and the damper may drift. Give [retention] a small "
+                "stiffness_n_per_m (1e-6 of the contact stiffness); the result then says how far it moves the peak."
+            )
+            return
+
+
+def _alerts(case: Case, results: Sequence[CaseResult]) -> list[str]:
+    if case.sweep.selection != "jacobian_alert":
+        return []
+    return [alert_sentence(r, 100 * case.sweep.threshold, case.sweep.high) for r in results]
+
+
+def _write(
+    run: _Run, case: Case, results: Sequence[CaseResult], checks: Sequence[Check], *, complete: bool
+) -> None:
+    provenance = Provenance(
+        title=run.study.tables.title,
+        study_toml=run.study.text,
+        stickslip_version=__version__,
+        versions=run.versions,
+        created=run.created,
+        wall_seconds=perf_counter() - run.began,
+        threshold_percent=100 * case.sweep.threshold,
+        low_order=case.sweep.low,
+        high_order=case.sweep.high,
+        samples=case.sweep.samples,
+        alert_explanation=" ".join(_alerts(case, results)),
+        warnings=run.warnings,
+        complete=complete,
+    )
+    write_dataset(dataset(case, results, checks, provenance), run.study.folder / RESULT)

@@ -1,0 +1,301 @@
+"""Results as one labelled dataset, written so that any netCDF-4 reader opens it.
+
+Complex numbers have a trailing dimension ``part = (re, im)``, flags are small integers, texts are attributes or variable-length
+strings: no compound types, no booleans, nothing that needs this package.
+"""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.errors import input_error
+from stickslip.response.fields import Fields
+from stickslip.solve.status import Status
+from stickslip.study.build import Case
+from stickslip.study.collect import HZ, Accepted, CaseResult
+from stickslip.study.verify import Check
+
+DIRECTIONS = ("t", "w", "n")
+STATES = {"flag_values": np.array([0, 1, 2], dtype=np.int64), "flag_meanings": "stick slip open"}
+CASE_QUANTITIES = {
+    "load_ratio": ("1", "centrifugal load over excitation amplitude, F_CL/F_HE"),
+    "excitation_n": ("N", "amplitude of the harmonic force"),
+    "centrifugal_n": ("N", "centrifugal load on the damper"),
+    "peak_amplitude": ("m", "largest first-harmonic amplitude of the report output"),
+    "peak_frequency_hz": ("Hz", "frequency of the peak"),
+    "peak_point": ("1", "index of the peak into point, -1 if none"),
+    "points": ("1", "accepted points"),
+    "points_low": ("1", "accepted points with few harmonics"),
+    "points_high": ("1", "accepted points with many harmonics"),
+    "points_failed": ("1", "points that did not converge"),
+    "newton_steps": ("1", "Newton iterations"),
+    "seconds_contact": ("s", "time in contact forces"),
+    "seconds_linear": ("s", "time in linear algebra"),
+    "seconds_rest": ("s", "other time of the solver"),
+    "retention_peak_shift": ("1", "relative change of the peak amplitude with a tenth of the retention stiffness"),
+    "retention_frequency_shift_hz": ("Hz", "change of the peak frequency with a tenth of the retention stiffness"),
+}
+POINT_QUANTITIES = {
+    "frequency_hz": ("Hz", "excitation frequency"),
+    "case": ("1", "load case"),
+    "order": ("1", "harmonics kept"),
+    "status": ("1", "how the solver ended"),
+    "predicted_error_percent": ("percent", "error of the few harmonics predicted by the Jacobian Alert"),
+    "real_error_percent": ("percent", "difference of few and many harmonics where both were solved"),
+    "newton_iterations": ("1", "Newton iterations"),
+    "seconds": ("s", "time of the point"),
+    "refinement": ("1", "1 if the point was added to resolve the peak"),
+}
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a result comes from: attributes of the dataset."""
+
+    title: str
+    study_toml: str
+    stickslip_version: str
+    versions: Mapping[str, str]
+    created: str
+    wall_seconds: float
+    threshold_percent: float
+    low_order: int
+    high_order: int
+    samples: int
+    alert_explanation: str
+    warnings: Sequence[str]
+    complete: bool
+
+    def attributes(self) -> dict[str, Any]:
+        """Return them as netCDF attributes: texts and numbers only."""
+        return {
+            "title": self.title,
+            "study_toml": self.study_toml,
+            "stickslip_version": self.stickslip_version,
+            "versions": json.dumps(dict(self.versions)),
+            "created": self.created,
+            "wall_seconds": float(self.wall_seconds),
+            "alert_threshold_percent": float(self.threshold_percent),
+            "low_order": self.low_order,
+            "high_order": self.high_order,
+            "samples": self.samples,
+            "alert_explanation": self.alert_explanation,
+            "warnings": json.dumps(list(self.warnings)),
+            "complete": int(self.complete),
+        }
+
+
+def dataset(case: Case, results: Sequence[CaseResult], checks: Sequence[Check], provenance: Provenance) -> xr.Dataset:
+    """Assemble the dataset described in the design notes.
+
+    Parameters
+    ----------
+    case
+        The model.
+    results
+        Finished load cases.
+    checks
+        Comparisons with time integration; empty when none were asked for.
+    provenance
+        Attributes.
+    """
+    high = provenance.high_order
+    data = _case_variables(case, results) | _point_variables(case, results, high) | _peak_variables(case, results)
+    data |= _model_variables(case)
+    if checks:
+        data |= _check_variables(checks)
+    coordinates = {
+        "output": list(case.output_labels),
+        "retained": list(case.system.retained_labels),
+        "contact": list(case.contacts.names),
+        "harmonic": np.arange(high + 1),
+        "direction": list(DIRECTIONS),
+        "tangent": list(DIRECTIONS[:2]),
+        "part": ["re", "im"],
+        "xyz": ["x", "y", "z"],
+    }
+    attributes = provenance.attributes() | {"report_output": case.output_labels[case.report_output]}
+    return xr.Dataset(data, coords=coordinates, attrs=attributes)
+
+
+def write_dataset(data: xr.Dataset, path: Path) -> None:
+    """Write netCDF-4 under a temporary name and put it in place, so that `path` is always a whole file.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written.
+    """
+    temporary = path.with_suffix(".nc.part")
+    try:
+        data.to_netcdf(temporary, engine="h5netcdf", format="NETCDF4")
+        os.replace(temporary, path)
+    except OSError as error:
+        raise input_error(
+            str(path), f"cannot be written ({error.strerror or error})", "Make room or free the folder and run again: no point is lost."
+        ) from error
+
+
+def _variable(dims: str, values: object, units: str, long_name: str) -> xr.Variable:
+    return xr.Variable(tuple(dims.split()), np.asarray(values), {"units": units, "long_name": long_name})
+
+
+def _parts(values: ComplexArray) -> FloatArray:
+    return np.stack([values.real, values.imag], axis=-1)
+
+
+def _case_variables(case: Case, results: Sequence[CaseResult]) -> dict[str, xr.Variable]:
+    first = np.cumsum([0, *(len(r.accepted) for r in results)])
+    rows = [
+        {
+            "load_ratio": r.ratio,
+            "excitation_n": r.excitation,
+            "centrifugal_n": case.centrifugal,
+            "peak_amplitude": r.peak_amplitude,
+            "peak_frequency_hz": r.peak_frequency_hz,
+            "peak_point": -1 if r.peak < 0 else int(first[i]) + r.peak,
+            "points": len(r.accepted),
+            "points_low": r.points_low,
+            "points_high": len(r.accepted) - r.points_low,
+            "points_failed": r.failed,
+            "newton_steps": r.newton_steps,
+            "seconds_contact": r.seconds[0],
+            "seconds_linear": r.seconds[1],
+            "seconds_rest": r.seconds[2],
+            "retention_peak_shift": r.retention_shift[0],
+            "retention_frequency_shift_hz": r.retention_shift[1],
+        }
+        for i, r in enumerate(results)
+    ]
+    return {
+        name: _variable("load_case", [row[name] for row in rows], units, about)
+        for name, (units, about) in CASE_QUANTITIES.items()
+    }
+
+
+def _point_variables(case: Case, results: Sequence[CaseResult], high: int) -> dict[str, xr.Variable]:
+    pairs = [(i, a) for i, r in enumerate(results) for a in r.accepted]
+    n_out = len(case.output_labels)
+    rows = [_point_row(i, a) for i, a in pairs]
+    found = {
+        name: _variable("point", np.array([row[name] for row in rows]), units, about)
+        for name, (units, about) in POINT_QUANTITIES.items()
+    }
+    found["status"].attrs |= {
+        "flag_values": np.array([int(s) for s in Status], dtype=np.int64),
+        "flag_meanings": " ".join(s.name.lower() for s in Status),
+    }
+    n_contacts, n_retained = len(case.contacts.names), case.system.retained.size
+    every = [a for _, a in pairs]
+
+    def block(shape: tuple[int, ...], name: str) -> FloatArray:
+        return _parts(np.stack([_padded(_of(a.fields, name), high, shape) for a in every]))
+
+    retained = [_padded(a.point.coefficients if a.fields else None, high, (n_retained,)) for a in every]
+    energy = [np.full(n_contacts, np.nan) if a.fields is None else a.fields.energy for a in every]
+    contact = "point harmonic contact direction part"
+    return found | {
+        "amplitude": _variable("point output", [a.amplitudes(n_out) for a in every], "m", "first-harmonic amplitude"),
+        "amplitude_low": _variable(
+            "point output", [a.low_amplitudes(n_out) for a in every], "m", "first-harmonic amplitude with few harmonics"
+        ),
+        "output_displacement": _variable(
+            "point harmonic output part", block((n_out,), "outputs"), "m", "displacement of the outputs"
+        ),
+        "retained_displacement": _variable(
+            "point harmonic retained part",
+            _parts(np.stack(retained)),
+            "m",
+            "displacement of contact and damper coordinates, rotations in rad",
+        ),
+        "gap": _variable(contact, block((n_contacts, 3), "gaps"), "m", "relative displacement at the contacts"),
+        "contact_force": _variable(contact, block((n_contacts, 3), "forces"), "N", "contact force"),
+        "dissipated_energy": _variable("point contact", energy, "J", "energy dissipated in a cycle"),
+    }
+
+
+def _point_row(load_case: int, accepted: Accepted) -> dict[str, float | int]:
+    point = accepted.point
+    return {
+        "frequency_hz": point.omega / HZ,
+        "case": load_case,
+        "order": point.order,
+        "status": int(point.status),
+        "predicted_error_percent": 100 * accepted.predicted_error,
+        "real_error_percent": 100 * accepted.real_error,
+        "newton_iterations": point.iterations,
+        "seconds": point.seconds_total,
+        "refinement": int(accepted.low is None),
+    }
+
+
+def _of(found: Fields | None, name: str) -> ComplexArray | None:
+    return None if found is None else getattr(found, name)
+
+
+def _padded(values: ComplexArray | None, high: int, shape: tuple[int, ...]) -> ComplexArray:
+    """Return harmonics 0..high: zero where they were not kept, NaN where there is no solution."""
+    out = np.zeros((high + 1, *shape), dtype=complex)
+    if values is None:
+        out[:] = complex(np.nan, np.nan)
+    else:
+        out[: len(values)] = values
+    return out
+
+
+def _peak_variables(case: Case, results: Sequence[CaseResult]) -> dict[str, xr.Variable]:
+    samples = max((r.signals.time.size for r in results if r.signals), default=0)
+    n = len(case.contacts.names)
+    time = np.full((len(results), samples), np.nan)
+    gap, force = (np.full((len(results), n, 3, samples), np.nan) for _ in range(2))
+    state = np.full((len(results), n, 2, samples), -1)
+    for i, result in enumerate(results):
+        if result.signals is not None:
+            time[i], gap[i], force[i] = result.signals.time, result.signals.gap, result.signals.force
+            state[i] = result.signals.state
+    found = {
+        "peak_time": _variable("load_case sample", time, "s", "time within the period at the peak"),
+        "peak_gap": _variable("load_case contact direction sample", gap, "m", "contact gap at the peak"),
+        "peak_force": _variable("load_case contact direction sample", force, "N", "contact force at the peak"),
+        "peak_state": _variable("load_case contact tangent sample", state, "1", "contact state at the peak, -1 if none"),
+    }
+    found["peak_state"].attrs |= STATES
+    return found
+
+
+def _model_variables(case: Case) -> dict[str, xr.Variable]:
+    checked = case.blades.frequencies
+    modes = {
+        "frequency_full_hz": (checked.free_full, "natural frequency, full model, no damper"),
+        "frequency_reduced_hz": (checked.free_reduced, "natural frequency, reduced model, no damper"),
+        "frequency_stuck_full_hz": (checked.stuck_full, "natural frequency, full model, contacts stuck"),
+        "frequency_stuck_reduced_hz": (checked.stuck_reduced, "natural frequency, reduced model, contacts stuck"),
+    }
+    return {name: _variable("mode", values, "Hz", about) for name, (values, about) in modes.items()} | {
+        "static_gap": _variable("contact direction", case.static_gap, "m", "contact gap under the centrifugal load"),
+        "static_force": _variable("contact direction", case.static_force, "N", "contact force under the centrifugal load"),
+        "contact_position": _variable("contact xyz", case.contacts.position, "m", "position of the contact points"),
+        "contact_frame": _variable("contact xyz direction", case.contacts.frame, "1", "axes t, w, n of the contact frames"),
+        "surface_point": _variable("surface_node xyz", case.blades.surface_point, "m", "skin of the meshed blades"),
+        "surface_triangle": _variable("face corner", case.blades.surface_triangle, "1", "triangles of the skin"),
+    }
+
+
+def _check_variables(checks: Sequence[Check]) -> dict[str, xr.Variable]:
+    columns = {
+        "verify_case": ([c.load_case for c in checks], "1", "load case"),
+        "verify_frequency_hz": ([c.frequency_hz for c in checks], "Hz", "frequency"),
+        "verify_transient": ([c.transient for c in checks], "m", "first-harmonic amplitude by time integration"),
+        "verify_balance": ([c.balance for c in checks], "m", "first-harmonic amplitude by harmonic balance"),
+        "verify_difference_percent": ([c.difference_percent for c in checks], "percent", "their difference"),
+        "verify_settled": ([int(c.settled) for c in checks], "1", "1 if the integration became periodic"),
+        "verify_periods": ([c.periods for c in checks], "1", "periods integrated"),
+    }
+    return {name: _variable("check", *column) for name, column in columns.items()}
