@@ -371,6 +371,17 @@ def test_average_sees_through_a_mode_that_never_stops_ringing() -> None:
     assert result.drifting == ()
 
 
+def test_refinement_of_an_unsettled_motion_does_not_extrapolate_and_widens_its_error() -> None:
+    structure = structure_of(np.eye(1), 0.02 * np.eye(1), np.eye(1))
+    load, stepping = load_of(1, {1: [0.1]}), TimeStepping(steps_per_period=32, max_periods=12)
+    refined = integrate_refined(
+        structure, np.zeros((0, 1)), [], load, 1.1, np.array([0]), stepping=stepping
+    )
+    assert not refined.fine.settled
+    np.testing.assert_array_equal(refined.first_harmonic, refined.fine.average)
+    assert refined.error >= refined.coarse.scatter + refined.fine.scatter > 0.0
+
+
 def test_slow_decay_is_not_taken_for_a_settled_motion() -> None:
     # Changes of 1e-6 a period that decay by a thousandth a period leave 1e-3 to come.
     slow = [1e-6 * 0.999**i for i in range(60)]

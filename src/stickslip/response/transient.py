@@ -167,7 +167,7 @@ class RefinedResult:
     Parameters
     ----------
     first_harmonic
-        (n_outputs,) complex, m; extrapolated to a vanishing step as for an error of second order. Made of averages
+        (n_outputs,) complex, m; extrapolated to a vanishing step as for an error of second order; the finer average
         where the motion has not settled.
     error
         Estimated error of `first_harmonic`, relative to its largest amplitude, with the scatter of such averages.
@@ -279,7 +279,8 @@ def integrate_refined(
     difference, largest = finer - first, np.max(np.abs(finer))
     scatter = sum(0.0 if r.settled else r.scatter for r in (coarse, fine))
     error = float(np.max(np.abs(difference)) / largest) if largest != 0.0 else 0.0
-    return RefinedResult(finer + difference / 3.0, error + scatter, coarse, fine)
+    share = 1.0 / 3.0 if coarse.settled and fine.settled else 0.0  # noise must not be extrapolated
+    return RefinedResult(finer + share * difference, error + scatter, coarse, fine)
 
 
 def _initial_state(
