@@ -1,25 +1,33 @@
 """Static equilibrium: where the centrifugal load puts the damper before anything vibrates."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.arrays import FloatArray
 from stickslip.errors import SingularError
-from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
+from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.system import System
+from stickslip.solve.continuation import StepControl, start_point, trace
 from stickslip.solve.newton import Newton, Solution, newton, solve_dense
+from stickslip.solve.status import Status
 
-RAMP = (
-    0.1,
-    0.2,
-    0.4,
-    0.6,
-    0.8,
-    1.0,
-)  # shares of the load when the full one does not converge at once
+HOLDING = StepControl(scale=1.0, first=0.05, largest=0.5, smallest=1e-5)
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """The balance with a spring on every coordinate, as a share p of the typical contact stiffness; p = 0 is the real problem."""
+
+    balance: HarmonicBalance
+
+    def linearise(self, x: FloatArray, p: float) -> Linearisation:
+        at = self.balance.linearise(x, 0.0)
+        return Linearisation(
+            at.residual + p * x, at.jac + p * np.eye(x.size), x, at.seconds_contact
+        )
 
 
 def preload(system: System, static_load: FloatArray, options: Newton | None = None) -> FloatArray:
@@ -49,28 +57,34 @@ def preload(system: System, static_load: FloatArray, options: Newton | None = No
     options = options or Newton(max_iterations=60)
     linear = condense(system.structure, system.retained, HarmonicLoad(static_load))
     balance = harmonic_balance(linear, system.interface, 0, 1)
-    bonded = balance.coefficients(bonded_start(balance, 0.0, system))
-    q, solution = _at_share(balance, bonded, static_load, options)
-    if solution.status.converged:
-        return q[0].real
-    # from the bonded state every share of the load is the same problem scaled, unless there are preloads or gaps: ramp from small
-    q = RAMP[0] * bonded
-    for share in RAMP:
-        q, solution = _at_share(balance, q, share * static_load, options)
+    start = bonded_start(balance, 0.0, system)
+    solution = newton(lambda v: balance.linearise(v, 0.0), start, options)
+    if not solution.status.converged:
+        solution = _released(balance, options)
     if not solution.status.converged:
         raise SingularError(
             f"static equilibrium: {solution.status.advice} (residual {solution.residual_norm:.2e} of the load). "
-            "Check that the centrifugal load presses the damper against both platforms, or give it a retention stiffness."
+            "Check that the centrifugal load presses the damper against both platforms, between the lines of its flat side, "
+            "or give it a retention stiffness."
         )
-    return q[0].real
+    return np.asarray(balance.coefficients(solution.x)[0].real)
 
 
-def _at_share(
-    balance: HarmonicBalance, q: ComplexArray, load: FloatArray, options: Newton
-) -> tuple[ComplexArray, Solution]:
-    loaded = replace(balance, linear=balance.linear.with_load(HarmonicLoad(load)))
-    solution = newton(lambda v: loaded.linearise(v, 0.0), loaded.unknowns(q), options)
-    return loaded.coefficients(solution.x), solution
+def _released(balance: HarmonicBalance, options: Newton) -> Solution:
+    """Hold every coordinate by a spring and let go of it by continuation.
+
+    A wedged damper that rolls onto its seat passes states from which Newton finds no way: everything slips, one line is open.
+    """
+    held = _Held(balance)
+    weights = np.ones(balance.size)
+    start = start_point(held, np.zeros(balance.size), 1.0, options, HOLDING, weights)
+    points = [start]
+    if start.solution.status.converged:
+        points += trace(held, start, 0.0, options=options, control=HOLDING, weights=weights)
+    last = points[-1]
+    if last.p > 0.0 and last.solution.status.converged:
+        return replace(last.solution, status=Status.TOO_MANY_ITERATIONS)
+    return last.solution
 
 
 def bonded_start(balance: HarmonicBalance, omega: float, system: System) -> FloatArray:
