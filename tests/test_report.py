@@ -284,6 +284,12 @@ def _only_first_case_done(data: xr.Dataset) -> xr.Dataset:
     return data
 
 
+def _nothing_done(data: xr.Dataset) -> xr.Dataset:
+    data = _without("verify")(data.isel(load_case=slice(0, 0), point=slice(0, 0)))
+    data.attrs["complete"] = 0
+    return data
+
+
 def _bare(data: xr.Dataset) -> xr.Dataset:
     bare = data[list(NEEDED)]
     bare.attrs = {}
@@ -297,7 +303,8 @@ PARTIAL = {
     "nothing flagged": (_nothing_flagged, "nowhere"),
     "nothing converged": (_nothing_converged, "no point of the run has converged yet"),
     "no predicted error": (_without("predicted"), "No predicted error was computed"),
-    "one case done": (_only_first_case_done, "1 of 3 load cases have a peak"),
+    "one case done": (_only_first_case_done, "this file holds 3 load cases, 1 of them with a peak"),
+    "nothing done": (_nothing_done, "this file holds 0 load cases"),
     "no mesh": (_without("surface"), "the skin of the mesh is not in this result"),
     "no contact geometry": (_without("contact_position", "contact_frame"), "The meshed blades"),
     "no energy": (_without("dissipated"), "the dissipated energy is not in this result"),
@@ -400,6 +407,15 @@ def test_damper_motion_is_the_fourier_series(tmp_path: Path) -> None:
     # Re(3 e^{2iτ} − 2i e^{3iτ}) = 3 cos 2τ + 2 sin 3τ, to rounding
     np.testing.assert_allclose(motion[3], 3 * np.cos(2 * phase) + 2 * np.sin(3 * phase), atol=1e-13)
     assert not motion[[0, 1, 2, 4, 5]].any()
+
+
+def test_a_stuck_contact_dissipates_nothing_in_spite_of_rounding(tmp_path: Path) -> None:
+    data = synthetic_result(ratios=(5000,), n=6)
+    data["dissipated_energy"][:] = 1e-19
+    text = page_text(report(data, tmp_path))
+    assert text.count("No loop encloses an area: nothing is dissipated in this direction.") == 2
+    assert "At the peak nothing is dissipated: every point sticks." in text
+    assert "No point dissipates energy." in text
 
 
 def test_edges_of_a_cube() -> None:

@@ -5,7 +5,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.report.figures_contact import right_side
+from stickslip.report.figures_contact import contact_lines, right_side
 from stickslip.report.plot import INK, LEFT_SIDE, RIGHT_SIDE, Plot, absent, styled
 from stickslip.report.quantities import NARROW_SPACE, counted, number
 from stickslip.report.result import Result
@@ -71,6 +71,10 @@ def _inside(points: FloatArray, parts: IntArray, low: FloatArray, high: FloatArr
 def _points(result: Result, position: FloatArray, *, named: bool) -> list[go.Scatter3d]:
     right = np.array(right_side(result))
     names = np.array(result.labels("contact"))
+    # names of neighbouring contact lines go above and below their points, so that they do not cover each other
+    place = np.empty(len(names), dtype=object)
+    for line, members in enumerate(contact_lines(result.labels("contact"))):
+        place[members] = "bottom center" if line % 2 else "top center"
     traces = []
     for side, mask, colour in (("left", ~right, LEFT_SIDE), ("right", right, RIGHT_SIDE)):
         if mask.any():
@@ -79,12 +83,26 @@ def _points(result: Result, position: FloatArray, *, named: bool) -> list[go.Sca
                 go.Scatter3d(
                     x=x, y=y, z=z, mode="markers+text" if named else "markers",
                     name=f"contact with the {side} blade", legendgroup=side, showlegend=named,
-                    text=names[mask], textposition="top center", textfont={"size": 12, "color": INK},
+                    text=names[mask], textposition=place[mask], textfont={"size": 12, "color": INK},
                     marker={"size": 5 if named else 3, "color": colour},
                     hovertemplate="%{text}: x %{x:.2f}, y %{y:.2f}, z %{z:.2f} mm<extra></extra>",
                 )
             )  # fmt: skip
     return traces
+
+
+def _sections(result: Result, position: FloatArray) -> go.Scatter3d:
+    """Join the contact points of each section of the damper: names that end alike."""
+    rows: dict[str, list[int]] = {}
+    for index, name in enumerate(result.labels("contact")):
+        rows.setdefault(name.rpartition(".")[2], []).append(index)
+    gap = np.full((1, 3), np.nan)
+    paths = [np.vstack([position[[*row, row[0]]], gap]) for row in rows.values() if len(row) > 2]
+    x, y, z = np.vstack([*paths, gap]).T
+    line = {"color": INK, "width": 3}
+    return go.Scatter3d(
+        x=x, y=y, z=z, mode="lines", line=line, hoverinfo="skip", name="sections of the damper"
+    )
 
 
 def _neighbourhood(position: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -97,7 +115,7 @@ def _scene(position: FloatArray, points: FloatArray, *, close: bool) -> dict[str
     """Axes of a view: of all, or of the neighbourhood of the contact points; equal lengths on all axes."""
     if close:
         low, high = _neighbourhood(position)
-        eye, size = {"x": 0.75, "y": -1.3, "z": 0.95}, 1.3
+        eye, size = {"x": 0.2, "y": -1.55, "z": -0.75}, 1.3
     else:
         low, high = points.min(axis=0), points.max(axis=0)
         eye, size = {"x": 1.0, "y": -1.5, "z": 0.55}, 1.65
@@ -129,7 +147,7 @@ def _caption(result: Result, points: FloatArray, triangles: IntArray) -> str:
         n_left = len(right_side(result)) - n_right
         caption += (
             f" The rigid damper is not meshed: it touches the left blade at {n_left} points (blue) and the right "
-            f"blade at {n_right} (orange)."
+            f"blade at {n_right} (orange); black triangles join the points of each of its sections."
         )
     return caption
 
@@ -148,17 +166,19 @@ def mesh_picture(result: Result) -> Plot:
     views = 2 if has_contacts else 1
     figure = make_subplots(
         1, views, specs=[[{"type": "scene"}] * views], horizontal_spacing=0.02,
-        subplot_titles=("whole", "near the damper")[:views],
+        subplot_titles=("whole", "near the damper, from below")[:views],
     )  # fmt: skip
     low, high = _neighbourhood(position)
     for view in range(views):
         close = view == 1
         faces = _inside(points, triangles, low, high) if close else triangles
         lines = _inside(points, drawn, low, high) if close else drawn
-        figure.add_trace(_skin(points, faces, 0.45 if close else 1.0), row=1, col=view + 1)
+        figure.add_trace(_skin(points, faces, 0.35 if close else 1.0), row=1, col=view + 1)
         figure.add_trace(_lines(points, lines, "#6f7f91", 1.0), row=1, col=view + 1)
         for trace in _points(result, position, named=close) if has_contacts else []:
             figure.add_trace(trace, row=1, col=view + 1)
+    if has_contacts:
+        figure.add_trace(_sections(result, position), row=1, col=2)
     styled(figure, 620)
     figure.update_layout(
         scene=_scene(position, points, close=False),

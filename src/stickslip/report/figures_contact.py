@@ -17,6 +17,7 @@ from stickslip.report.plot import (
 from stickslip.report.quantities import counted, joined, percent, quantity
 from stickslip.report.result import Case, Result
 
+_ROUNDING = 1e-9  # area of a loop over that of its bounding box, below which it is a line
 _STATE_SCALE = [[a, colour] for k, colour in enumerate(STATE_COLOURS) for a in (k / 3, (k + 1) / 3)]
 
 
@@ -90,13 +91,13 @@ def _loop_caption(result: Result, case: Case, direction: int) -> str:
         np.sum(0.5 * (force + np.roll(force, -1, -1)) * (np.roll(gap, -1, -1) - gap), axis=-1)
     )
     names = result.labels("contact")
-    if not area.any():
+    stroke, span = np.ptp(gap, axis=-1), np.ptp(force, axis=-1)
+    if not (area > _ROUNDING * stroke * span).any():
         return "No loop encloses an area: nothing is dissipated in this direction."
     widest = int(np.argmax(area))
-    stroke = np.ptp(gap, axis=-1)
     return (
         f"The widest loop is that of {names[widest]} ({quantity(float(area[widest]), 'J')} a cycle), with a stroke "
-        f"of {quantity(float(stroke[widest]), 'm')} and a force range of {quantity(float(np.ptp(force[widest])), 'N')}; "
+        f"of {quantity(float(stroke[widest]), 'm')} and a force range of {quantity(float(span[widest]), 'N')}; "
         f"{int((area > 0.01 * area.max()).sum())} of {counted(len(names), 'point')} enclose more than a hundredth of "
         "its area."
     )  # fmt: skip

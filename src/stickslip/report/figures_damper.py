@@ -19,6 +19,7 @@ from stickslip.report.quantities import Scale, number, percent, quantity, scale_
 from stickslip.report.result import RATIO, Case, Result
 
 _COORDINATES = tuple(f"damper.{c}" for c in ("x", "y", "z", "rx", "ry", "rz"))
+_NOTHING = 1e-12  # J a cycle: what rounding leaves of newtons times micrometres
 _AXIS_LINES = (
     {"color": "#0072b2", "dash": "solid", "width": 2},
     {"color": "#d55e00", "dash": "dash", "width": 2},
@@ -118,7 +119,7 @@ def _energy_caption(result: Result, case: Case) -> str:
     energy = result.floats("dissipated_energy")[result.peak(case)]
     names = result.labels("contact")
     total = float(np.nansum(energy))
-    if total <= 0:
+    if total <= _NOTHING:
         return "At the peak nothing is dissipated: every point sticks."
     most = int(np.nanargmax(energy))
     right = np.array(right_side(result))
@@ -152,6 +153,7 @@ def energy(result: Result) -> Plot:
         return absent(key, title, "the dissipated energy is not in this result")
     values = result.floats("dissipated_energy")
     total = np.where(result.converged, np.nansum(values, axis=1), np.nan)
+    total = np.where(total < _NOTHING, 0.0, total)
     bars, sums = scale_for(values, "J"), scale_for(total, "J")
     titles = ("at the peak, by contact", "all contacts, against frequency")
     figure = make_subplots(1, 2, horizontal_spacing=0.12, subplot_titles=titles)

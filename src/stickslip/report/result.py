@@ -23,8 +23,8 @@ NEEDED = (
     "amplitude",
 )
 RATIO = "F<sub>CL</sub>/F<sub>HE</sub>"
-_STUCK, _NONLINEAR = (38, 24, 110), (240, 128, 48)
-_BETWEEN = ((120, 22, 150), (198, 54, 120))
+# from navy (stuck) over purple and red to dark gold (nonlinear): darker means stiffer, in grey as well
+_STOPS = ((20, 24, 96), (112, 30, 158), (200, 44, 110), (232, 100, 40), (212, 156, 0))
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Case:
     excitation
         Amplitude of the harmonic load in N.
     colour
-        CSS colour, dark for the most stuck case and orange for the most nonlinear one.
+        CSS colour, dark for the most stuck case and gold for the most nonlinear one.
     """
 
     index: int
@@ -182,9 +182,9 @@ class Result:
 
 
 def _colours(n: int) -> list[str]:
-    """Return `n` colours from dark (stuck) to orange (nonlinear), all readable on white."""
-    stops = np.array([_STUCK, *_BETWEEN, _NONLINEAR], dtype=float)
-    at = np.linspace(0, len(stops) - 1, n) if n > 1 else np.array([0.0])
+    """Return `n` colours from dark (stuck) to gold (nonlinear), all readable on white."""
+    stops = np.array(_STOPS, dtype=float)
+    at = np.linspace(0, len(stops) - 1, n)
     mix = np.stack([np.interp(at, np.arange(len(stops)), stops[:, k]) for k in range(3)], axis=1)
     return [f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in mix]
 

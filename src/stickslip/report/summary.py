@@ -29,7 +29,7 @@ def _optimum_card(result: Result) -> str:
     scale = scale_for(peaks[best : best + 1], "m/N")
     note = f"smallest peak: {number(float(peaks[best]) * scale.factor)} {scale.unit}"
     if len(cases) > 1:
-        note += f", {number(100 * float(peaks[best] / peaks.max()))} % of the largest"
+        note += f", {percent(100 * float(peaks[best] / peaks.max()))} of the largest"
     if len(cases) > 1 and best in (0, len(cases) - 1):
         note += "; at the end of the range"
     return _card(f"{RATIO} = {cases[best].label}", "damper optimum", note)
@@ -130,10 +130,10 @@ def all_warnings(result: Result) -> list[str]:
     """Everything the reader must know before using the numbers, as HTML sentences."""
     warnings = []
     if not result.scalar("complete", 1):
-        done = len(result.peaked)
+        held = counted(len(result.cases), "load case")
         warnings.append(
-            f"The run is not complete: {done} of {counted(len(result.cases), 'load case')} have a peak. Run the study "
-            "again to resume it."
+            f"The run is not complete: this file holds {held}, {len(result.peaked)} of them with a peak. Run the study "
+            "again: it resumes where it stopped."
         )
     return warnings + _stored_warnings(result) + _unconverged(result) + _doubts(result)
 
@@ -230,6 +230,8 @@ def alert(result: Result) -> str:
         "</p>"
     )
     stored = escape(result.text("alert_explanation"))
-    text += f"<p>{stored}</p>" if stored else ""
+    log = (
+        f"<details><summary>As the run put it</summary><p>{stored}</p></details>" if stored else ""
+    )
     head = [RATIO, f"H = {result.high} asked for", "largest predicted error", "why"]
-    return text + html_table(head, rows, numeric=False)
+    return text + html_table(head, rows, numeric=False) + log

@@ -15,7 +15,8 @@ def html_table(head: Sequence[str], rows: Sequence[Sequence[str]], *, numeric: b
     kind = ' class="numeric"' if numeric else ""
     top = "".join(f'<th scope="col">{cell}</th>' for cell in head)
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
-    return f'<div class="wide"><table{kind}><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
+    top = f"<thead><tr>{top}</tr></thead>" if head else ""
+    return f'<div class="wide"><table{kind}>{top}<tbody>{body}</tbody></table></div>'
 
 
 def _reduction_rows(result: Result, full: str, reduced: str, name: str) -> list[list[str]]:
@@ -170,7 +171,7 @@ def provenance(result: Result, versions: dict[str, str]) -> str:
         ["harmonic orders", f"{result.low} and {result.high}"],
     ]
     study = escape(result.text("study_toml"))
-    text = html_table(["", ""], rows, numeric=False)
+    text = html_table([], rows, numeric=False)
     if study:
         text += f"<details><summary>The study file</summary><pre>{study}</pre></details>"
     return text
