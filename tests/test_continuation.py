@@ -63,25 +63,68 @@ def test_circle_without_folds(end):
 
 
 def test_circle_round_both_ends():
-    # the branch that starts to the right turns at p = 1 and comes back on the other side of the circle
-    start = start_point(
-        CIRCLE, np.array([0.8, 1.0]), 0.6, NEWTON, StepControl(scale=1.0), np.ones(2)
-    )
+    # the branch that starts to the right turns at p = 1 and comes back on the other side of the circle; its end is so far away that
+    # the way back does not count as leaving the range
+    control = StepControl(scale=1.0, max_points=60)
+    start = start_point(CIRCLE, np.array([0.8, 1.0]), 0.6, NEWTON, control, np.ones(2))
     angles = [np.arctan2(start.x[0], start.p)]
-    for point in trace(
-        CIRCLE,
-        start,
-        5.0,
-        options=NEWTON,
-        control=StepControl(scale=1.0, max_points=60),
-        weights=np.ones(2),
-    ):
+    for point in trace(CIRCLE, start, 50.0, options=NEWTON, control=control, weights=np.ones(2)):
         assert point.solution.status.converged
         assert point.x[0] ** 2 + point.p**2 == pytest.approx(1.0, abs=1e-11)
         angles.append(np.arctan2(point.x[0], point.p))
     turned = np.diff(np.unwrap(angles))
     assert np.all(turned < 0)
     assert turned.sum() < -2 * np.pi
+
+
+def test_a_branch_that_falls_back_behind_its_start_is_left():
+    control = StepControl(scale=1.0)
+    start = start_point(CIRCLE, np.array([0.8, 1.0]), 0.6, NEWTON, control, np.ones(2))
+    points = list(trace(CIRCLE, start, 1.6, options=NEWTON, control=control, weights=np.ones(2)))
+    assert all(point.solution.status.converged for point in points)
+    assert all(point.p >= 0.5 for point in points[:-1])
+    assert 0.0 < points[-1].p < 0.5
+    assert points[-1].x[0] < 0.0, "round the fold, not back the way it came"
+
+
+@pytest.mark.parametrize("slope", [0.2, 0.4, 0.6])
+def test_a_corner_is_gone_round(slope):
+    # p = 1 - slope |x|: contact laws make such corners. From a right angle on (slope 1), no plane across the old direction
+    # meets the rest of the branch, and the branch ends with STEP_TOO_SMALL
+    curve = Curve(
+        lambda x, p: p - 1 + slope * abs(x),
+        lambda x, _: slope * (1.0 if x > 0 else -1.0),
+        lambda _x, _p: 1.0,
+    )
+    control = StepControl(scale=1.0, max_points=80)
+    start = start_point(curve, np.array([-0.7 / slope, 1.0]), 0.3, NEWTON, control, np.ones(2))
+    points = list(trace(curve, start, 9.0, options=NEWTON, control=control, weights=np.ones(2)))
+    assert all(point.solution.status.converged for point in points)
+    xs = np.array([point.x[0] for point in points])
+    assert np.all(np.diff(xs) > 0)
+    assert xs[-1] > 0.2 / slope
+
+
+@pytest.mark.parametrize(("x_unit", "p_unit"), [(1.0, 1e5), (1e-3, 1e3), (1e3, 1.0)])
+def test_units_do_not_move_the_points(x_unit, p_unit):
+    plain = Duffing()
+
+    class Scaled:
+        def linearise(self, x, p):
+            at = plain.linearise(x / x_unit, p / p_unit)
+            return At(at.residual, np.asfortranarray(at.jac / x_unit), at.jac_p / p_unit)
+
+    branches = []
+    for problem, x_size, p_size in ((plain, 1.0, 1.0), (Scaled(), x_unit, p_unit)):
+        control = StepControl(scale=0.4 * p_size, first=0.05)
+        start = start_point(
+            problem, np.array([0.3 * x_size, 0.0]), 0.3 * p_size, NEWTON, control, np.ones(2)
+        )
+        branches.append(
+            [(*(q.x / x_size), q.p / p_size) for q in branch(problem, start, 3.0 * p_size, control)]
+        )
+    assert len(branches[0]) == len(branches[1])
+    assert np.allclose(branches[0], branches[1], rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize(("x", "p", "end"), [(-1.5, -1.875, 1.0), (1.5, 1.875, -1.0)])

@@ -1,7 +1,10 @@
 """Where contacts are, and the assembly of their derivatives."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from models import griffin
 
 from stickslip.contact.interface import Interface, add_contact_jacobian, sparse_rows
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
@@ -51,3 +54,9 @@ def test_sparse_assembly_is_the_dense_product(empty_contact):
         b = gap[3 * c : 3 * c + 3]
         want += np.einsum("ia,ijpq,jb->paqb", b, full, b).reshape(m * n, m * n)
     assert np.allclose(jac - before, 0.7 * want, rtol=0, atol=1e-12)
+
+
+def test_system_needs_an_interface_on_its_own_dofs():
+    system, _ = griffin(0.1)
+    with pytest.raises(InputError, match="the gap operator has 2 columns for 1 dofs"):
+        replace(system, interface=Interface(("a",), (LAW,), np.zeros((3, 2))))
