@@ -74,7 +74,8 @@ def _points(result: Result, position: FloatArray, *, named: bool) -> list[go.Sca
     # names of neighbouring contact lines go above and below their points, so that they do not cover each other
     place = np.empty(len(names), dtype=object)
     for line, members in enumerate(contact_lines(result.labels("contact"))):
-        place[members] = "bottom center" if line % 2 else "top center"
+        below = line % 2 == 1 or right[members].all()
+        place[members] = "bottom center" if below else "top center"
     traces = []
     for side, mask, colour in (("left", ~right, LEFT_SIDE), ("right", right, RIGHT_SIDE)):
         if mask.any():
@@ -115,7 +116,7 @@ def _scene(position: FloatArray, points: FloatArray, *, close: bool) -> dict[str
     """Axes of a view: of all, or of the neighbourhood of the contact points; equal lengths on all axes."""
     if close:
         low, high = _neighbourhood(position)
-        eye, size = {"x": 0.2, "y": -1.55, "z": -0.75}, 1.3
+        eye, size = {"x": 0.32, "y": -1.5, "z": -0.8}, 1.3
     else:
         low, high = points.min(axis=0), points.max(axis=0)
         eye, size = {"x": 1.0, "y": -1.5, "z": 0.55}, 1.65
