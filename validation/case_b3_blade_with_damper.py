@@ -107,7 +107,7 @@ def optimum() -> tuple[float, float, float]:
 
 def time_domain(limit: float, omega: float) -> RefinedResult:
     """Integrate to the steady state; the error of the step is below 1e-9."""
-    stepping = TimeStepping(steps_per_period=16384, tolerance=1e-9, max_periods=1000)
+    stepping = TimeStepping(steps_per_period=32768, tolerance=1e-9, max_periods=1000)
     return integrated(blade_with_damper(limit), B3_LOAD, omega, 11, stepping)
 
 

@@ -10,7 +10,7 @@ from validation.compare import Record, bound
 from validation.reference_data import NlvibCase, has_complete, nlvib
 
 NAMES = ("b_two_dof_unilateral", "g_chain20_jenkins")
-DISTURBANCE = 1e-3  # of the row, random
+DISTURBANCE = 1e-6  # of the largest entry, random; near the folds of case b, 1e-4 already lands on the other branch
 
 
 def residuals(case: NlvibCase) -> list[float]:

@@ -21,7 +21,6 @@ from stickslip.response.transient import (
     TimeStepping,
     TransientStart,
     integrate_refined,
-    rest,
     start_from_harmonics,
 )
 from stickslip.solve.newton import Newton, newton
@@ -202,23 +201,19 @@ def integrated(
 ) -> RefinedResult:
     """Integrate to the steady state with two step lengths.
 
-    Order 0 starts at rest. Any other order starts from the harmonic balance of that order, which shortens the transient and no more
-    where the periodic motion is unique: the integration settles where its own equations take it.
+    Order 0 starts from the static equilibrium without tangential forces. Any other order starts from the harmonic balance of that
+    order, which shortens the transient and no more where the periodic motion is unique.
     """
+    n, n_contacts = problem.structure.n, problem.interface.n_contacts
     if order == 0:
-        return _refined(
-            problem, load, omega, rest(problem.structure.n, problem.interface.laws), stepping
+        start = TransientStart(
+            preload(problem, load.static), np.zeros(n), np.zeros((n_contacts, 2))
         )
-    balance = balance_of(problem, load, order, 1024)
-    x = solve(balance, omega, bonded(problem, balance, load, omega))
-    traction = balance.contacts(x).force[:, :2, 0]
-    start = start_from_harmonics(motion(balance, omega, x), omega, traction)
-    return _refined(problem, load, omega, start, stepping)
-
-
-def _refined(
-    problem: System, load: HarmonicLoad, omega: float, start: TransientStart, stepping: TimeStepping
-) -> RefinedResult:
+    else:
+        balance = balance_of(problem, load, order, 1024)
+        x = solve(balance, omega, bonded(problem, balance, load, omega))
+        traction = balance.contacts(x).force[:, :2, 0]
+        start = start_from_harmonics(motion(balance, omega, x), omega, traction)
     return integrate_refined(
         problem.structure,
         problem.interface.gap_operator,
