@@ -380,5 +380,5 @@ def synthetic_result(
 
 def write_result(dataset: xr.Dataset, path: Path) -> Path:
     """Write `dataset` as netCDF-4 and return the path."""
-    dataset.to_netcdf(path)
+    dataset.to_netcdf(path, engine="h5netcdf")
     return path

@@ -216,7 +216,7 @@ def load_result(path: Path) -> Result:
             str(path), "no such file", "Give the result.nc that `stickslip run` wrote."
         )
     try:
-        with xr.open_dataset(path, decode_times=False) as file:
+        with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as file:
             data = file.load()
     except (OSError, ValueError) as error:
         raise input_error(
