@@ -85,16 +85,16 @@ class FlatCurvedDamper:
         Centre of mass in metres: offset (x, y, z) from the apex at y = 0.
     """
 
-    apex: tuple[float, float] = (0.025, 0.0505)
+    apex: tuple[float, float] = (0.025, 0.0715)
     flat_angle: float = math.radians(45)
     curved_angle: float = math.radians(45)
-    flat_distances: tuple[float, float] = (0.0050, 0.0075)
-    curved_distance: float = 0.0170
+    flat_distances: tuple[float, float] = (0.0105, 0.0120)
+    curved_distance: float = 0.0180
     curved_radius: float = 0.025
     sections: tuple[float, ...] = (-0.016, 0.0, 0.016)
-    mass: float = 0.080
-    inertia: tuple[float, float, float] = (1.0e-5, 4.0e-6, 1.0e-5)
-    centre: tuple[float, float, float] = (0.0023, 0.0, -0.010)
+    mass: float = 0.069
+    inertia: tuple[float, float, float] = (1.165e-5, 3.34e-6, 1.395e-5)
+    centre: tuple[float, float, float] = (0.00204, 0.0, -0.01325)
 
     def __post_init__(self) -> None:
         for name in ("flat_angle", "curved_angle"):
@@ -185,8 +185,7 @@ class FlatCurvedDamper:
         arc = right + self.curved_radius * (
             np.outer(np.cos(angle) - 1, out) + np.outer(np.sin(angle), up)
         )
-        reach = (self.flat_distances[1] + self.curved_distance) / 2 * math.cos(self.flat_angle)
-        base = np.array([apex[0] - reach, arc[-1, 1]])
+        base = np.array([second[0], arc[-1, 1]])
         return np.vstack([first, arc, base, second])
 
     def _apex_at(self, y: float) -> FloatArray:

@@ -77,23 +77,23 @@ class BladePair:
     foot_width: float = 0.034
     foot_depth: float = 0.048
     foot_height: float = 0.020
-    shank_thickness: float = 0.014
+    shank_thickness: float = 0.009
     platform_gap: float = 0.001
     platform_depth: float = 0.048
-    platform_height: float = 0.054
+    platform_height: float = 0.075
     platform_edge: float = 0.004
     flat_angle: float = math.radians(45)
     curved_angle: float = math.radians(45)
-    airfoil_length: float = 0.150
+    airfoil_length: float = 0.165
     hub_chord: float = 0.046
     tip_chord: float = 0.040
     hub_thickness: float = 0.0075
     tip_thickness: float = 0.0050
     camber: float = 0.04
     twist: float = math.radians(8)
-    airfoil_size: float = 0.0055
-    platform_size: float = 0.0050
-    foot_size: float = 0.0070
+    airfoil_size: float = 0.0060
+    platform_size: float = 0.0055
+    foot_size: float = 0.0080
 
     def __post_init__(self) -> None:
         for field in fields(self):
