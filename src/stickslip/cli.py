@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from stickslip.study.summary import RunSummary
     from stickslip.study.verify import Check
 
+PLAIN_WIDTH = 130  # columns of a table that is not on a terminal
 DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 app = typer.Typer(
@@ -164,7 +165,8 @@ def _errors_as_text() -> Iterator[None]:
 
 
 def _console() -> Console:
-    return Console(file=sys.stdout)
+    """Return the screen, or a wide page where the output goes to a file."""
+    return Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH)
 
 
 @contextmanager
@@ -201,7 +203,7 @@ def _print_summary(summary: "RunSummary", files: list[Path]) -> None:
     lines("Against time integration", [_check_line(c) for c in summary.checks])
     lines("Warnings", list(summary.warnings))
     if summary.failed:
-        lines("Not converged", [f"{summary.failed} points did not converge; they are marked in the result, not filled in"])
+        lines("Not converged", [f"{summary.failed} of the points: marked in the result and in the report, not filled in"])
     lines("Files", [str(f) for f in files])
 
 

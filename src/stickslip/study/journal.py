@@ -50,12 +50,20 @@ class Journal:
         self._type = point_type
         try:
             # autocommit: each insert is a transaction of its own
-            self._db = sqlite3.connect(path, isolation_level=None)
+            self._db = sqlite3.connect(path, isolation_level=None, timeout=0.5)
+            # held until the process ends, however it ends: one run a folder
+            self._db.execute("pragma locking_mode = exclusive")
             self._db.execute("pragma journal_mode = delete")
             self._db.execute("pragma synchronous = full")
             self._db.executescript(TABLES)
             self._check(f"{FORMAT}:{fingerprint}")
+            self._db.execute("update meta set value = value")  # takes the lock
         except sqlite3.DatabaseError as error:
+            self._db.close()
+            if "locked" in str(error):
+                raise input_error(
+                    str(path.parent), "another run is at work in it", "Wait for it, or stop it."
+                ) from None
             raise input_error(
                 str(path),
                 f"the journal of finished points cannot be used ({error})",

@@ -11,9 +11,9 @@ from stickslip.errors import InputError, did_you_mean
 LONGEST_VALUE = 60  # characters of a value that a message shows
 
 
-def custom_error(problem: str, remedy: str) -> PydanticCustomError:
-    """Return the error that a validator of this package raises."""
-    context = {"problem": problem, "remedy": remedy}
+def custom_error(problem: str, remedy: str, key: str = "") -> PydanticCustomError:
+    """Return the error that a validator of this package raises; `key` is the one at fault if it judges a whole table."""
+    context = {"problem": problem, "remedy": remedy, "key": key}
     return PydanticCustomError("stickslip", "{problem}. {remedy}", context)
 
 
@@ -23,11 +23,7 @@ def library_error(section: type[BaseModel], error: InputError) -> PydanticCustom
     problem, _, remedy = rest.partition(". ")
     field = place.rpartition(".")[2]
     keys = [k for k in section.model_fields if k == field or k.startswith(field + "_")]
-    return PydanticCustomError(
-        "stickslip",
-        "{problem}. {remedy}",
-        {"problem": problem, "remedy": remedy, "key": keys[0] if len(keys) == 1 else ""},
-    )
+    return custom_error(problem, remedy, keys[0] if len(keys) == 1 else "")
 
 
 def messages(place: str, model: type[BaseModel], error: ValidationError) -> list[str]:

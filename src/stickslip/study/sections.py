@@ -16,11 +16,11 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
-def rising_pair(values: list[float], what: str) -> None:
+def rising_pair(values: list[float], key: str) -> None:
     """Refuse a pair that does not rise."""
     if len(values) == 2 and not values[0] < values[1]:
         raise custom_error(
-            f"{what} must be lower before upper, got {values}", "Give the lower frequency first"
+            f"must be the lower before the higher, got {values}", "Give the lower frequency first.", key
         )
 
 
@@ -87,7 +87,7 @@ class Loads(Section):
     @model_validator(mode="after")
     def _differ(self) -> Self:
         if len(set(self.ratios)) < len(self.ratios):
-            raise custom_error(f"ratios holds a number twice, got {self.ratios}", "Give every ratio once")
+            raise custom_error(f"holds a number twice, got {self.ratios}", "Give every ratio once.", "ratios")
         return self
 
 
@@ -122,11 +122,12 @@ class Harmonics(Section):
     @model_validator(mode="after")
     def _agree(self) -> Self:
         if self.high < self.low:
-            raise custom_error(f"high must not be below low, got low = {self.low}, high = {self.high}", "Raise high")
+            raise custom_error(f"must not be below low = {self.low}, got {self.high}", "Raise it, or lower low.", "high")
         if self.samples < 8 * self.high:
             raise custom_error(
-                f"samples must be at least 8 times high, got {self.samples} for high = {self.high}",
-                f"Give at least {8 * self.high}, better a power of two",
+                f"must be at least 8 times high = {self.high}, got {self.samples}",
+                f"Give at least {8 * self.high}, better a power of two.",
+                "samples",
             )
         return self
 
@@ -155,7 +156,7 @@ class Output(Section):
     @classmethod
     def _stays_inside(cls, name: str, info: ValidationInfo) -> str:
         """Links are followed before the check; without the context of a study file only the name is judged."""
-        relative, remedy = Path(name), "Give a plain relative name such as 'results'"
+        relative, remedy = Path(name), "Give a plain relative name such as 'results'."
         if not name.isprintable() or relative.is_absolute() or ".." in relative.parts or relative == Path():
             raise custom_error(f"must be a folder inside the study's folder, got {name!r}", remedy)
         home = (info.context or {}).get("study", Path("study.toml")).resolve().parent

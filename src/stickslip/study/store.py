@@ -5,7 +5,6 @@ strings: no compound types, no booleans, nothing that needs this package.
 """
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -135,11 +134,12 @@ def write_dataset(data: xr.Dataset, path: Path) -> None:
     """
     temporary = path.with_suffix(".nc.part")
     try:
-        data.to_netcdf(temporary, engine="h5netcdf", format="NETCDF4")
-        os.replace(temporary, path)
-    except OSError as error:
+        # whichever of netCDF4 and h5netcdf is installed: both write the same plain features
+        data.to_netcdf(temporary, format="NETCDF4")
+        temporary.replace(path)
+    except (OSError, RuntimeError) as error:  # the HDF5 libraries tell of a full disk by RuntimeError
         raise input_error(
-            str(path), f"cannot be written ({error.strerror or error})", "Make room or free the folder and run again: no point is lost."
+            str(path), f"cannot be written ({error})", "Make room and run the same command again: no finished point is lost."
         ) from error
 
 
