@@ -51,10 +51,11 @@ def test_displacement_operator_is_a_rotation_to_first_order():
     points = np.random.default_rng(1).standard_normal((5, 3))
     theta = np.array([0.3, -0.7, 0.2])
     moved = body.displacement_operator(points) @ np.concatenate([[1.0, 2.0, 3.0], theta])
-    np.testing.assert_allclose(moved, [1.0, 2.0, 3.0] + np.cross(theta, points - body.centre))
+    shift = np.array([1.0, 2.0, 3.0])
+    np.testing.assert_allclose(moved, shift + np.cross(theta, points - body.centre))
 
 
-def test_kinetic_energy_is_that_of_the_prism():
+def test_default_mass_and_inertia_are_those_of_a_steel_prism():
     """Mass and inertia of the defaults are those of a steel prism with the outline's section."""
     damper = FlatCurvedDamper()
     x, z = damper.outline().T

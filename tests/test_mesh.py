@@ -49,7 +49,8 @@ def test_other_angles_and_apex_match_too():
 
 def test_blades_are_equal(mesh):
     n, m = len(mesh.points) // 2, len(mesh.cells) // 2
-    np.testing.assert_array_equal(mesh.points[n:], mesh.points[:n] + [BladePair().pitch, 0, 0])
+    offset = np.array([BladePair().pitch, 0.0, 0.0])
+    np.testing.assert_array_equal(mesh.points[n:], mesh.points[:n] + offset)
     np.testing.assert_array_equal(mesh.cells[m:], mesh.cells[:m] + n)
 
 

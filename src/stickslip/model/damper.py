@@ -88,13 +88,13 @@ class FlatCurvedDamper:
     apex: tuple[float, float] = (0.025, 0.0715)
     flat_angle: float = math.radians(45)
     curved_angle: float = math.radians(45)
-    flat_distances: tuple[float, float] = (0.0105, 0.0120)
+    flat_distances: tuple[float, float] = (0.0140, 0.0155)
     curved_distance: float = 0.0180
     curved_radius: float = 0.025
     sections: tuple[float, ...] = (-0.016, 0.0, 0.016)
-    mass: float = 0.069
-    inertia: tuple[float, float, float] = (1.165e-5, 3.34e-6, 1.395e-5)
-    centre: tuple[float, float, float] = (0.00204, 0.0, -0.01325)
+    mass: float = 0.0685
+    inertia: tuple[float, float, float] = (1.145e-5, 3.81e-6, 1.450e-5)
+    centre: tuple[float, float, float] = (0.00143, 0.0, -0.01376)
 
     def __post_init__(self) -> None:
         for name in ("flat_angle", "curved_angle"):
@@ -173,10 +173,9 @@ class FlatCurvedDamper:
     def outline(self) -> FloatArray:
         """Return the section's polygon (k, 2) in x and z, metres, from L1 clockwise.
 
-        Flat between L1 and L2 and relieved below, an arc about R, a horizontal base. It is for
+        Flat between L1 and L2, vertical below, an arc about R, a horizontal base. It is for
         pictures and for estimating mass: contact uses the points only.
         """
-        apex = np.array(self.apex)
         corner = self.contact_points()
         count = len(self.sections)
         first, second, right = corner.position[::count][:, [0, 2]]
