@@ -1,13 +1,12 @@
 """Two equal cantilever blades with platforms, meshed with second-order tetrahedra.
 
-Coordinates: x circumferential (the blades bend this way), y axial, z radial. Blade 1 stands at
-x = 0, blade 2 at x = `pitch`. gmsh and meshio are imported only when a mesh is made or written.
+gmsh and meshio are imported only when a mesh is made or written.
 """
 
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,10 @@ import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import StickslipError, input_error
+from stickslip.model.blade_pair import BladePair
 from stickslip.model.damper import ContactPoints
+
+__all__ = ["BladePair", "SolidMesh", "mesh_blade_pair", "write_mesh"]
 
 MATCH = 1e-9  # m: a contact point and its node may differ by this much
 TET10_FROM_GMSH = np.array([0, 1, 2, 3, 4, 5, 6, 7, 9, 8])  # gmsh swaps VTK's last two nodes
@@ -28,134 +30,6 @@ GMSH_OPTIONS = {
     "Mesh.Algorithm": 6,
     "Mesh.RandomSeed": 1,
 }
-
-
-@dataclass(frozen=True, kw_only=True)
-class BladePair:
-    """Geometry of two equal blades; lengths in metres, angles in rad.
-
-    A foot block (z < 0) carries a shank, which widens into a platform whose two undersides are
-    inclined; a tapered, twisted, cambered lens section is lofted on the platform's top.
-
-    Parameters
-    ----------
-    pitch
-        Distance of the blades along x.
-    foot_width, foot_depth, foot_height
-        Extent of the foot block along x, y, z; its bottom and its x-flanks are clamped.
-    shank_thickness
-        Extent of the shank along x.
-    platform_gap
-        Clearance along x between the platforms of neighbours.
-    platform_depth
-        Extent of shank and platform along y.
-    platform_height
-        Height z of the platform's top.
-    platform_edge
-        Thickness of the platform at its edges.
-    flat_angle, curved_angle
-        Inclination from x of the underside that faces +x (blade 1: the damper's flat side) and of
-        the one that faces −x (blade 2: its curved side).
-    airfoil_length
-        From the platform's top to the tip.
-    hub_chord, tip_chord, hub_thickness, tip_thickness
-        Size of the airfoil's end sections.
-    camber
-        Height of the camber line's arc over the chord's length.
-    twist
-        Rotation of the tip section against the hub section about z.
-    airfoil_size, platform_size, foot_size
-        Element sizes.
-
-    Raises
-    ------
-    InputError
-        If a length is not positive or the parts do not fit together.
-    """
-
-    pitch: float = 0.050
-    foot_width: float = 0.034
-    foot_depth: float = 0.048
-    foot_height: float = 0.020
-    shank_thickness: float = 0.009
-    platform_gap: float = 0.001
-    platform_depth: float = 0.048
-    platform_height: float = 0.075
-    platform_edge: float = 0.004
-    flat_angle: float = math.radians(45)
-    curved_angle: float = math.radians(45)
-    airfoil_length: float = 0.165
-    hub_chord: float = 0.046
-    tip_chord: float = 0.040
-    hub_thickness: float = 0.0075
-    tip_thickness: float = 0.0050
-    camber: float = 0.04
-    twist: float = math.radians(8)
-    airfoil_size: float = 0.0060
-    platform_size: float = 0.0055
-    foot_size: float = 0.0080
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            free = field.name in {"twist", "camber"}
-            if not math.isfinite(value) or not (free or value > 0):
-                raise _bad(field.name, f"must be positive and finite, got {value}", "Give metres.")
-        for name in ("flat_angle", "curved_angle"):
-            if not getattr(self, name) < math.pi / 2:
-                raise _bad(name, f"must be below pi/2 rad, got {getattr(self, name)}", "Use rad.")
-        if self.shank_thickness >= 2 * self.half_width:
-            raise _bad(
-                "pitch",
-                f"{self.pitch} m leaves no room for platforms: they would overlap "
-                f"(shank {self.shank_thickness} m, gap {self.platform_gap} m)",
-                "Make the pitch larger than shank_thickness + platform_gap.",
-            )
-        if min(self.shank_tops) <= 0:
-            raise _bad(
-                "platform_height",
-                f"{self.platform_height} m puts the undersides' lower end at {min(self.shank_tops)} m",
-                "It must lie above the foot (z = 0): raise the platform or flatten its angles.",
-            )
-        self._check_supports()
-
-    def _check_supports(self) -> None:
-        reach = abs(self.camber) * self.hub_chord + self.hub_thickness / 2
-        if self.hub_chord >= self.platform_depth or reach >= self.half_width:
-            raise _bad(
-                "hub_chord",
-                f"the airfoil's hub section ({self.hub_chord} m × {2 * reach} m) "
-                "overhangs the platform",
-                "Make it smaller than the platform.",
-            )
-        if self.foot_width < self.shank_thickness or self.foot_depth < self.platform_depth:
-            raise _bad(
-                "foot_width",
-                f"the foot ({self.foot_width} × {self.foot_depth} m) is smaller than the shank "
-                f"({self.shank_thickness} × {self.platform_depth} m)",
-                "Make the foot at least as large as what it carries.",
-            )
-        if self.foot_width >= self.pitch:
-            raise _bad("foot_width", f"{self.foot_width} m: the feet overlap", "Lower it.")
-
-    @property
-    def half_width(self) -> float:
-        """Half the platform's extent along x, in metres."""
-        return (self.pitch - self.platform_gap) / 2
-
-    @property
-    def shank_tops(self) -> tuple[float, float]:
-        """Height z at which the shank meets the flat and the curved side's underside."""
-        reach = self.half_width - self.shank_thickness / 2
-        edge = self.platform_height - self.platform_edge
-        return edge - reach * math.tan(self.flat_angle), edge - reach * math.tan(self.curved_angle)
-
-    @property
-    def wedge_apex(self) -> tuple[float, float]:
-        """(x, z) where blade 1's underside plane meets blade 2's: the apex of a damper."""
-        flat, curved = math.tan(self.flat_angle), math.tan(self.curved_angle)
-        rise = self.platform_gap * flat * curved / (flat + curved)
-        return self.half_width + rise / flat, self.platform_height - self.platform_edge + rise
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,10 +127,6 @@ def write_mesh(mesh: SolidMesh, path: Path) -> None:
         meshio.write(path, data, file_format="gmsh22", binary=True)
     else:
         meshio.write(path, data)
-
-
-def _bad(name: str, problem: str, remedy: str) -> StickslipError:
-    return input_error(f"BladePair.{name}", problem, remedy)
 
 
 def _missing(package: str, error: Exception) -> StickslipError:
