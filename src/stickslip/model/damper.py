@@ -12,7 +12,7 @@ their undersides. Its flat side touches the left blade along the lines L1 (near 
 
 Both sides are described from the apex, the point where the two underside planes meet. Geometry of
 this family of dampers: Gola & Gastaldi, "Understanding complexities in underplatform damper
-mechanics", ASME GT2014-25240.
+mechanics", ASME Turbo Expo 2014.
 """
 
 import math
