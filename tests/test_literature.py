@@ -51,7 +51,8 @@ def test_blade_with_friction_damper_at_one_and_eleven_harmonics(row):
 def test_peak_of_the_blade_with_its_best_damper():
     amplitude, omega = case_b3_blade_with_damper.peak(0.138956, 1.1186, samples=2**14)
     assert amplitude == pytest.approx(0.5509002, rel=1e-6)
-    assert omega == pytest.approx(1.118581, abs=4e-6)  # the top is flat: the sampling error of 1e-8 moves it so far
+    # the top is flat: the sampling error of 1e-8 moves it so far
+    assert omega == pytest.approx(1.118581, abs=4e-6)
 
 
 @pytest.mark.parametrize("row", case_b6_blade_damper_blade.TABLE, ids=lambda row: f"{row[0]}Hz")
