@@ -26,7 +26,12 @@ def environment() -> dict[str, str]:
 
 def run(study: Path, *options: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        command(study, *options), capture_output=True, text=True, check=False, timeout=SECONDS, env=environment()
+        command(study, *options),
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=SECONDS,
+        env=environment(),
     )
 
 
@@ -54,12 +59,16 @@ def journalled(study: Path) -> list[tuple[int, str, bytes]]:
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess.CompletedProcess[str]]:
+def whole(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> tuple[Path, subprocess.CompletedProcess[str]]:
     study = write_small_study(tmp_path_factory.mktemp("whole"))
     return study, run(study)
 
 
-def test_whole_run_is_read_without_this_package(whole: tuple[Path, subprocess.CompletedProcess[str]]) -> None:
+def test_whole_run_is_read_without_this_package(
+    whole: tuple[Path, subprocess.CompletedProcess[str]],
+) -> None:
     study, ended = whole
     assert ended.returncode in (0, 1), ended.stderr
     assert ended.stderr == ""
@@ -77,7 +86,9 @@ def test_whole_run_is_read_without_this_package(whole: tuple[Path, subprocess.Co
         "assert float(d.amplitude[peak, 0]) == float(d.peak_amplitude[0]) == float(d.amplitude[:, 0].max())\n"
         "assert d.sizes['contact'] == 9 and d.sizes['retained'] == 33 and d.sizes['harmonic'] == 6\n"
     )
-    result = subprocess.run([sys.executable, "-c", reader], capture_output=True, text=True, check=False)
+    result = subprocess.run(
+        [sys.executable, "-c", reader], capture_output=True, text=True, check=False
+    )
     assert result.returncode == 0, result.stderr
 
 
@@ -101,10 +112,24 @@ def test_run_writes_mesh_and_log(whole: tuple[Path, subprocess.CompletedProcess[
 
 def test_table_and_alert_are_told(whole: tuple[Path, subprocess.CompletedProcess[str]]) -> None:
     said = whole[1].stdout
-    for column in ("F_CL/F_HE", "peak mm", "at Hz", "points", "H = 1", "H = 5", "Newton", "contact s", "linear s", "rest s"):
+    for column in (
+        "F_CL/F_HE",
+        "peak mm",
+        "at Hz",
+        "points",
+        "H = 1",
+        "H = 5",
+        "Newton",
+        "contact s",
+        "linear s",
+        "rest s",
+    ):
         assert column in said
     assert "Where the Jacobian Alert asked for more harmonics" in said
-    assert "points repeated with 5 harmonics, at" in said or "no frequency needs more harmonics" in said
+    assert (
+        "points repeated with 5 harmonics, at" in said
+        or "no frequency needs more harmonics" in said
+    )
     assert str(whole[0].parent / "results/result.nc") in said
 
 
@@ -117,7 +142,10 @@ def test_stopped_run_goes_on_to_the_same_numbers(
     if how is signal.SIGINT:
         assert code == 130
         folder = study.parent.resolve() / "results"
-        assert said == f"Interrupted. What is finished is kept in {folder}. The same command goes on from there.\n"
+        assert (
+            said
+            == f"Interrupted. What is finished is kept in {folder}. The same command goes on from there.\n"
+        )
     else:
         assert code == -9
     before = journalled(study)
@@ -134,10 +162,14 @@ def test_stopped_run_goes_on_to_the_same_numbers(
     ):
         for name in expected.data_vars:
             if "seconds" not in str(name):
-                np.testing.assert_array_equal(found[name].values, expected[name].values, err_msg=str(name))
+                np.testing.assert_array_equal(
+                    found[name].values, expected[name].values, err_msg=str(name)
+                )
 
 
-def test_finished_run_solves_nothing_again(whole: tuple[Path, subprocess.CompletedProcess[str]]) -> None:
+def test_finished_run_solves_nothing_again(
+    whole: tuple[Path, subprocess.CompletedProcess[str]],
+) -> None:
     before = journalled(whole[0])
     assert run(whole[0]).returncode == whole[1].returncode
     assert journalled(whole[0]) == before

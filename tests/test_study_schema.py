@@ -1,6 +1,7 @@
 """Study files: what is read, and what every kind of bad input is told."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +16,12 @@ ROOT = Path(__file__).parents[1]
 
 
 def written(folder: Path, *changes: tuple[str, str], more: str = "") -> Path:
-    """Write the example with lines changed; every change must hit one line."""
+    """Write the example with texts or, named by their key, values changed; every change must hit one place."""
     text = example_text()
     for old, new in changes:
-        assert text.count(old) == 1, f"{old!r} is not unique in the example"
-        text = text.replace(old, new)
+        pattern = rf"(?<=\n{old} = )(\[[^\]]*\]|[^\s#]+)" if old.isidentifier() else re.escape(old)
+        text, hits = re.subn(pattern, lambda _, new=new: new, text)
+        assert hits == 1, f"{old!r} is {hits} times in the example"
     path = folder / "study.toml"
     path.write_text(text + more, encoding="utf-8")
     return path
@@ -56,94 +58,114 @@ def test_example_becomes_library_objects(tmp_path: Path) -> None:
 
 def test_hash_follows_numbers_and_not_words(tmp_path: Path) -> None:
     plain = read(tmp_path).content_hash
-    assert read(tmp_path, ("schema_version = 1", "# more words\nschema_version = 1")).content_hash == plain
-    assert read(tmp_path, ("memory_gb = 4.0", "memory_gb = 3.0")).content_hash == plain
-    assert read(tmp_path, ("centrifugal_n = 442.0", "centrifugal_n = 442.5")).content_hash != plain
+    assert (
+        read(tmp_path, ("schema_version = 1", "# more words\nschema_version = 1")).content_hash
+        == plain
+    )
+    assert read(tmp_path, ("memory_gb", "3.0")).content_hash == plain
+    assert read(tmp_path, ("centrifugal_n", "442.5")).content_hash != plain
 
 
 SINGLE = {
     "negative mass": (
-        ("mass_kg = 0.080", "mass_kg = -0.1"),
+        ("mass_kg", "-0.1"),
         "damper.mass_kg: must be greater than 0, got -0.1. Give mass of the damper in kg, greater than zero.",
     ),
     "not a number": (
-        ("centrifugal_n = 442.0", "centrifugal_n = nan"),
+        ("centrifugal_n", "nan"),
         "loads.centrifugal_n: must be a finite number, got nan. Give centrifugal load on the damper in N, greater than zero.",
     ),
     "infinite": (
-        ("density_kg_per_m3 = 7850.0", "density_kg_per_m3 = inf"),
+        ("density_kg_per_m3", "inf"),
         "material.density_kg_per_m3: must be a finite number, got inf. Give density in kg/m³, greater than zero (steel: 7850).",
     ),
-    "misspelt key": (("mass_kg =", "mas_kg ="), "damper.mas_kg: unknown key 'mas_kg'. Did you mean 'mass_kg'?"),
-    "misspelt table": (("[material]", "[materiel]"), "materiel: unknown key 'materiel'. Did you mean 'material'?"),
+    "misspelt key": (
+        ("mass_kg =", "mas_kg ="),
+        "damper.mas_kg: unknown key 'mas_kg'. Did you mean 'mass_kg'?",
+    ),
+    "misspelt table": (
+        ("[material]", "[materiel]"),
+        "materiel: unknown key 'materiel'. Did you mean 'material'?",
+    ),
     "missing key": (
-        ("foot_size_m = 0.0070", ""),
+        ("foot_size_m = ", "# "),
         "blades.foot_size_m: is missing. Add it: element size in shank and foot in m.",
     ),
     "range reversed": (
-        ("frequency_hz = [150.0, 220.0]", "frequency_hz = [220.0, 150.0]"),
+        ("frequency_hz", "[220.0, 150.0]"),
         "sweep.frequency_hz: must be the lower before the higher, got [220.0, 150.0]. Give the lower frequency first.",
     ),
     "text for a number": (
-        ("platform_gap_m = 0.001 ", 'platform_gap_m = "1 mm"'),
+        ("platform_gap_m", '"1 mm"'),
         "blades.platform_gap_m: must be a number, got '1 mm'. Give clearance between neighbouring platforms along x in m.",
     ),
     "half a mode": (
-        ("fixed_interface_modes = 25", "fixed_interface_modes = 2.5"),
-        "reduction.fixed_interface_modes: must be a whole number, got 2.5. "
-        "Give number of fixed-interface modes kept beside the static ones, 1 to 500.",
+        ("fixed_interface_modes", "2.5"),
+        (
+            "reduction.fixed_interface_modes: must be a whole number, got 2.5. "
+            "Give number of fixed-interface modes kept beside the static ones, 1 to 500."
+        ),
     ),
     "truth for a number": (
-        ("peak_points = 8", "peak_points = true"),
+        ("peak_points", "true"),
         "sweep.peak_points: must be a whole number, got True. Give most points added to resolve the peak, 0 to 100.",
     ),
     "unknown selection": (
-        ('selection = "jacobian_alert"', 'selection = "always_hihg"'),
+        ("selection", '"always_hihg"'),
         "harmonics.selection: is not known, got 'always_hihg'. Did you mean 'always_high'?",
     ),
     "high below low": (
-        ("low = 1 ", "low = 7 "),
+        ("low", "7"),
         "harmonics.high: must not be below low = 7, got 5. Raise it, or lower low.",
     ),
     "too few samples": (
-        ("samples = 256", "samples = 32"),
+        ("samples", "32"),
         "harmonics.samples: must be at least 8 times high = 5, got 32. Give at least 40, better a power of two.",
     ),
     "impossible inertia": (
-        ("inertia_kg_m2 = [1.0e-5, 4.0e-6, 1.0e-5]", "inertia_kg_m2 = [1.0e-5, 1.0e-6, 1.0e-6]"),
+        ("inertia_kg_m2", "[1.0e-5, 1.0e-6, 1.0e-6]"),
         "damper.inertia_kg_m2: the largest moment exceeds the sum of the other two",
     ),
     "lines swapped": (
-        ("flat_distances_m = [0.0050, 0.0075]", "flat_distances_m = [0.0075, 0.0050]"),
+        ("flat_distances_m", "[0.0075, 0.0050]"),
         "damper.flat_distances_m: need 0 < L1 < L2 (metres from the apex), got (0.0075, 0.005)",
     ),
-    "blades overlap": (("pitch_m = 0.050 ", "pitch_m = 0.014 "), "blades.pitch_m: 0.014 m leaves no room for platforms"),
+    "blades overlap": (
+        ("pitch_m", "0.009"),
+        "blades.pitch_m: 0.009 m leaves no room for platforms",
+    ),
     "ratio twice": (
-        ("ratios = [200, 50, 20, 10, 5, 3.5, 2]", "ratios = [20, 5, 20]"),
+        ("ratios", "[20, 5, 20]"),
         "loads.ratios: holds a number twice, got [20.0, 5.0, 20.0]. Give every ratio once.",
     ),
     "no ratio": (
-        ("ratios = [200, 50, 20, 10, 5, 3.5, 2]", "ratios = []"),
+        ("ratios", "[]"),
         "loads.ratios: has the wrong number of entries, got []. Give ratios of centrifugal load to excitation amplitude",
     ),
     "zero ratio": (
-        ("ratios = [200, 50, 20, 10, 5, 3.5, 2]", "ratios = [20, 0]"),
+        ("ratios", "[20, 0]"),
         "loads.ratios.1: must be greater than 0, got 0. Give ratios of centrifugal load to excitation amplitude",
     ),
     "absolute folder": (
-        ('folder = "results"', 'folder = "/tmp/results"'),
-        "output.folder: must be a folder inside the study's folder, got '/tmp/results'. "
-        "Give a plain relative name such as 'results'.",
+        ("folder", '"/tmp/results"'),
+        (
+            "output.folder: must be a folder inside the study's folder, got '/tmp/results'. "
+            "Give a plain relative name such as 'results'."
+        ),
     ),
     "folder above": (
-        ('folder = "results"', 'folder = "a/../../b"'),
-        "output.folder: must be a folder inside the study's folder, got 'a/../../b'. "
-        "Give a plain relative name such as 'results'.",
+        ("folder", '"a/../../b"'),
+        (
+            "output.folder: must be a folder inside the study's folder, got 'a/../../b'. "
+            "Give a plain relative name such as 'results'."
+        ),
     ),
     "newer layout": (
-        ("schema_version = 1", "schema_version = 2"),
-        "schema_version: this version of stickslip reads 1, got 2. Write schema_version = 1, or install the stickslip that the "
-        "file was written for.",
+        ("schema_version", "2"),
+        (
+            "schema_version: this version of stickslip reads 1, got 2. Write schema_version = 1, or install the stickslip that the "
+            "file was written for."
+        ),
     ),
 }
 
@@ -153,7 +175,7 @@ def test_bad_input_is_named_with_value_and_remedy(tmp_path: Path, name: str) -> 
     change, message = SINGLE[name]
     said = complaint(tmp_path, change)
     assert f"{tmp_path / 'study.toml'}: {message}" in said
-    if name != "misspelt key" and name != "misspelt table":
+    if name not in {"misspelt key", "misspelt table"}:
         assert "\n" not in said, "one mistake, one line"
 
 
@@ -163,8 +185,10 @@ def test_bad_input_is_named_with_value_and_remedy(tmp_path: Path, name: str) -> 
         (
             "normal_stiffness_n_per_m = 25e6",
             "normal_stiffness_n_per_m = 0.0",
-            "contact.curved.normal_stiffness_n_per_m: must be greater than 0, got 0.0. Give normal stiffness of the whole "
-            "interface in N/m, greater than zero: nothing else holds the damper.",
+            (
+                "contact.curved.normal_stiffness_n_per_m: must be greater than 0, got 0.0. Give normal stiffness of the whole "
+                "interface in N/m, greater than zero: nothing else holds the damper."
+            ),
         ),
         (
             'law = "elastic_coulomb"\nnormal_stiffness_n_per_m = 25e6',
@@ -181,11 +205,11 @@ def test_bad_contact_is_named(tmp_path: Path, old: str, new: str, message: str) 
 def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
     said = complaint(
         tmp_path,
-        ("mass_kg = 0.080", "mass_kg = -1"),
-        ("density_kg_per_m3 = 7850.0", "density_kg_per_m3 = 0"),
-        ("frequency_hz = [150.0, 220.0]", "frequency_hz = [220, 150]"),
-        ("pitch_m = 0.050 ", "pitch_m = 0.014 "),
-        ('folder = "results"', 'folder = ".."'),
+        ("mass_kg", "-1"),
+        ("density_kg_per_m3", "0"),
+        ("frequency_hz", "[220, 150]"),
+        ("pitch_m", "0.009"),
+        ("folder", '".."'),
     ).splitlines()
     assert [line.split(": ")[1] for line in said] == [
         "blades.pitch_m",
@@ -209,19 +233,25 @@ def test_link_out_of_the_folder_is_refused(tmp_path: Path) -> None:
 
 def test_files_that_are_no_study(tmp_path: Path) -> None:
     missing = tmp_path / "none.toml"
-    with pytest.raises(InputError, match="none.toml: there is no such file. Check the name, or write an example"):
+    with pytest.raises(
+        InputError, match=r"none\.toml: there is no such file\. Check the name, or write an example"
+    ):
         read_study(missing)
-    with pytest.raises(InputError, match="is not a file. Name the study file itself"):
+    with pytest.raises(InputError, match=r"is not a file\. Name the study file itself"):
         read_study(tmp_path)
     bad = tmp_path / "bad.toml"
     bad.write_text("[blades\n")
-    with pytest.raises(InputError, match=r"bad.toml: is not valid TOML: .*line 1.*\. Correct the line named\."):
+    with pytest.raises(
+        InputError, match=r"bad.toml: is not valid TOML: .*line 1.*\. Correct the line named\."
+    ):
         read_study(bad)
     bad.write_bytes(b"title = '\xff'")
-    with pytest.raises(InputError, match=r"is not UTF-8 text \(byte 9\). Save it as UTF-8"):
+    with pytest.raises(InputError, match=r"is not UTF-8 text \(byte 9\)\. Save it as UTF-8"):
         read_study(bad)
     bad.write_bytes(b"#" * (LARGEST_FILE + 1))
-    with pytest.raises(InputError, match=f"is larger than {LARGEST_FILE} bytes. A study file is a few kilobytes"):
+    with pytest.raises(
+        InputError, match=rf"is larger than {LARGEST_FILE} bytes\. A study file is a few kilobytes"
+    ):
         read_study(bad)
     bad.write_text("x = " + "[" * 100_000)
     with pytest.raises(InputError, match="is not valid TOML"):
@@ -229,14 +259,27 @@ def test_files_that_are_no_study(tmp_path: Path) -> None:
 
 
 def test_long_values_are_cut_in_messages(tmp_path: Path) -> None:
-    said = complaint(tmp_path, ("mass_kg = 0.080", f'mass_kg = "{"9" * 10_000}"'))
+    said = complaint(tmp_path, ("mass_kg", f'"{"9" * 10_000}"'))
     assert len(said) < 400
     assert "damper.mass_kg: must be a number, got '999" in said
 
 
 def test_schema_is_json_and_knows_every_table() -> None:
     schema = json.loads(json_schema())
-    tables = "blades material reduction damping damper contact loads sweep harmonics retention limits output".split()
+    tables = [
+        "blades",
+        "material",
+        "reduction",
+        "damping",
+        "damper",
+        "contact",
+        "loads",
+        "sweep",
+        "harmonics",
+        "retention",
+        "limits",
+        "output",
+    ]
     assert set(tables) < set(schema["properties"])
     assert schema["additionalProperties"] is False
     assert schema["$defs"]["Damper"]["properties"]["mass_kg"]["exclusiveMinimum"] == 0

@@ -72,7 +72,10 @@ class ScreenSink:
 
 @app.callback(invoke_without_command=True)
 def common(
-    *, version: Annotated[bool, typer.Option("--version", help="Print the version and leave.")] = False
+    *,
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and leave.")
+    ] = False,
 ) -> None:
     """Vibration of bladed disks coupled by friction joints."""
     if version:
@@ -84,9 +87,15 @@ def common(
 def run(
     study: StudyFile,
     *,
-    verify: Annotated[bool, typer.Option("--verify", help="Integrate in time at three frequencies and compare.")] = False,
-    fresh: Annotated[bool, typer.Option("--fresh", help="Forget what the results folder holds.")] = False,
-    report: Annotated[bool, typer.Option("--report/--no-report", help="Write the HTML report.")] = True,
+    verify: Annotated[
+        bool, typer.Option("--verify", help="Integrate in time at three frequencies and compare.")
+    ] = False,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Forget what the results folder holds.")
+    ] = False,
+    report: Annotated[
+        bool, typer.Option("--report/--no-report", help="Write the HTML report.")
+    ] = True,
 ) -> None:
     """Run a study; an interrupted run goes on where it stopped."""
     with _errors_as_text():
@@ -127,15 +136,23 @@ def new(name: Annotated[Path, typer.Argument(help="A folder to make.")]) -> None
             with target.open("x", encoding="utf-8", newline="\n") as stream:
                 stream.write(example_text())
         except FileExistsError:
-            raise input_error(str(target), "exists already", "Give another name: nothing is overwritten.") from None
+            raise input_error(
+                str(target), "exists already", "Give another name: nothing is overwritten."
+            ) from None
         except OSError as error:
-            raise input_error(str(target), f"cannot be written ({error.strerror})", "Give a folder you may write to.") from None
+            raise input_error(
+                str(target),
+                f"cannot be written ({error.strerror})",
+                "Give a folder you may write to.",
+            ) from None
         typer.echo(f"{target} written. Next: stickslip run {target}")
 
 
 @app.command()
 def report(
-    result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.nc, or the folder that holds one.")],
+    result: Annotated[
+        Path, typer.Argument(metavar="RESULT", help="A result.nc, or the folder that holds one.")
+    ],
 ) -> None:
     """Write the HTML report of a result."""
     with _errors_as_text():
@@ -158,7 +175,13 @@ def _errors_as_text() -> Iterator[None]:
     except StickslipError as error:
         typer.echo(str(error), err=True)
         stopped = type(error).__name__ == "Interrupted"
-        raise typer.Exit(INTERRUPTED if stopped else BAD_INPUT if isinstance(error, InputError) else NOT_CONVERGED) from None
+        raise typer.Exit(
+            INTERRUPTED
+            if stopped
+            else BAD_INPUT
+            if isinstance(error, InputError)
+            else NOT_CONVERGED
+        ) from None
     except KeyboardInterrupt:
         typer.echo("Interrupted.", err=True)
         raise typer.Exit(INTERRUPTED) from None
@@ -176,7 +199,12 @@ def _screen() -> Iterator[ScreenSink]:
     if not console.is_terminal:
         yield ScreenSink(console, None)
         return
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[state]}"))
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[state]}"),
+    )
     with Progress(*columns, console=console, transient=True) as progress:
         yield ScreenSink(console, progress)
 
@@ -203,13 +231,27 @@ def _print_summary(summary: "RunSummary", files: list[Path]) -> None:
     lines("Against time integration", [_check_line(c) for c in summary.checks])
     lines("Warnings", list(summary.warnings))
     if summary.failed:
-        lines("Not converged", [f"{summary.failed} of the points: marked in the result and in the report, not filled in"])
+        lines(
+            "Not converged",
+            [
+                f"{summary.failed} of the points: marked in the result and in the report, not filled in"
+            ],
+        )
     lines("Files", [str(f) for f in files])
 
 
 def _table(summary: "RunSummary") -> Table:
     table = Table(title="Forced response")
-    names = ("F_CL/F_HE", "peak mm", "at Hz", "points", f"H = {summary.low}", f"H = {summary.high}", "failed", "Newton")
+    names = (
+        "F_CL/F_HE",
+        "peak mm",
+        "at Hz",
+        "points",
+        f"H = {summary.low}",
+        f"H = {summary.high}",
+        "failed",
+        "Newton",
+    )
     for name in (*names, "contact s", "linear s", "rest s"):
         table.add_column(name, justify="right")
     for r in summary.rows:

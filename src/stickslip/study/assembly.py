@@ -13,7 +13,9 @@ from stickslip.study.sections import ContactSide
 MATCH = 1e-6  # m: a contact point and its node may differ by this much
 
 
-def join_damper(tables: StudyTables, blades: Structure, damper: FlatCurvedDamper) -> tuple[Structure, Interface]:
+def join_damper(
+    tables: StudyTables, blades: Structure, damper: FlatCurvedDamper
+) -> tuple[Structure, Interface]:
     """Return blades and damper side by side, and the contacts between them.
 
     Parameters

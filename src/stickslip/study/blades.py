@@ -57,7 +57,11 @@ class Frequencies:
         return found
 
     def _pairs(self) -> tuple[tuple[str, FloatArray, FloatArray], ...]:
-        return ("free", self.free_full, self.free_reduced), ("stuck", self.stuck_full, self.stuck_reduced)
+        return ("free", self.free_full, self.free_reduced), (
+            "stuck",
+            self.stuck_full,
+            self.stuck_reduced,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,10 +90,16 @@ class ReducedBlades:
         """Return everything as named arrays."""
         s = self.structure
         found = {"mass": s.mass, "damping": s.damping, "stiffness": s.stiffness}
-        found |= {"node": s.dofs.node, "component": np.array(s.dofs.component), "position": s.dofs.position}
+        found |= {
+            "node": s.dofs.node,
+            "component": np.array(s.dofs.component),
+            "position": s.dofs.position,
+        }
         found |= {f"set.{name}": index for name, index in s.sets.items()}
         found |= {f"hz.{f.name}": getattr(self.frequencies, f.name) for f in fields(Frequencies)}
-        found |= {name: getattr(self, name) for name in ("surface_point", "surface_triangle", "n_nodes")}
+        found |= {
+            name: getattr(self, name) for name in ("surface_point", "surface_triangle", "n_nodes")
+        }
         return found
 
     @classmethod
@@ -144,11 +154,15 @@ def reduced_blades(
     return made
 
 
-def _reduce(study: Study, mesh: SolidMesh, damper: FlatCurvedDamper, say: Callable[[str], None]) -> ReducedBlades:
+def _reduce(
+    study: Study, mesh: SolidMesh, damper: FlatCurvedDamper, say: Callable[[str], None]
+) -> ReducedBlades:
     t = study.tables
     say("assembling mass and stiffness")
     full = assemble_solid(mesh, t.material.library())
-    full = rayleigh_damping(full, t.damping.ratio, (t.damping.between_hz[0], t.damping.between_hz[1]))
+    full = rayleigh_damping(
+        full, t.damping.ratio, (t.damping.between_hz[0], t.damping.between_hz[1])
+    )
     say(f"reducing {full.n} coordinates")
     keep = np.concatenate([full.dof_set(name) for name in KEPT])
     reduced = craig_bampton(full, keep, t.reduction.fixed_interface_modes)

@@ -103,7 +103,11 @@ def case_of(study: Study, journal: Journal | None, say: Callable[[str], None]) -
         blades = reduced_blades(study, damper, journal, say)
     except InputError as error:
         text = str(error)
-        raise error if str(study.path) in text else InputError(f"{study.path}: [blades] with [damper]: {text}") from None
+        raise (
+            error
+            if str(study.path) in text
+            else InputError(f"{study.path}: [blades] with [damper]: {text}")
+        ) from None
     return make_case(t, blades, damper)
 
 
@@ -147,14 +151,20 @@ def sweep_of(tables: StudyTables) -> Sweep:
     )
 
 
-def system_of(tables: StudyTables, blades: Structure, damper: FlatCurvedDamper) -> tuple[System, tuple[str, ...]]:
+def system_of(
+    tables: StudyTables, blades: Structure, damper: FlatCurvedDamper
+) -> tuple[System, tuple[str, ...]]:
     """Return the system of blades and damper, without retention, and the labels of its outputs."""
     joined, interface = join_damper(tables, blades, damper)
     outputs = joined.dof_set("blades.output")
     labels = tuple(f"{node}.{axis}" for node in OUTPUT_NODES for axis in AXES)
     # the error of the alert is taken where the motion is: along the excitation
-    along = np.array([i for i, label in enumerate(labels) if label.endswith(tables.loads.excitation_direction)])
-    return System(joined, interface, outputs, alert_outputs=along, free=joined.dof_set("damper")), labels
+    along = np.array(
+        [i for i, label in enumerate(labels) if label.endswith(tables.loads.excitation_direction)]
+    )
+    return System(
+        joined, interface, outputs, alert_outputs=along, free=joined.dof_set("damper")
+    ), labels
 
 
 def static_load(system: System, centrifugal: float) -> FloatArray:
@@ -168,5 +178,7 @@ def static_contact_force(interface: Interface, gap: FloatArray) -> FloatArray:
     """Return the (n_contacts, 3) forces t, w, n of contacts loaded once from rest to `gap`."""
     k_t, k_w, k_n, mu, n0, _ = interface.parameters().T
     normal = np.maximum(0.0, n0 - k_n * gap[:, 2])
-    tangent = np.clip(np.stack([k_t, k_w], 1) * gap[:, :2], -(mu * normal)[:, None], (mu * normal)[:, None])
+    tangent = np.clip(
+        np.stack([k_t, k_w], 1) * gap[:, :2], -(mu * normal)[:, None], (mu * normal)[:, None]
+    )
     return np.column_stack([tangent, -normal])

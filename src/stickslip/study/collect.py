@@ -94,7 +94,9 @@ class CaseResult:
         """Largest amplitude of the report output, m; NaN if nothing converged."""
         if self.peak < 0:
             return float("nan")
-        return float(self.accepted[self.peak].amplitudes(self.report_output + 1)[self.report_output])
+        return float(
+            self.accepted[self.peak].amplitudes(self.report_output + 1)[self.report_output]
+        )
 
     @property
     def peak_frequency_hz(self) -> float:
@@ -120,7 +122,12 @@ class CaseResult:
 
 
 def collect(
-    problem: ForcedProblem, points: Sequence[ForcedPoint], *, ratio: float, excitation: float, report_output: int
+    problem: ForcedProblem,
+    points: Sequence[ForcedPoint],
+    *,
+    ratio: float,
+    excitation: float,
+    report_output: int,
 ) -> CaseResult:
     """Put the points of a load case in order and recover what they look like.
 
@@ -138,7 +145,9 @@ def collect(
     accepted = tuple(_accept(problem, point, low) for point, low in _pairs(points))
     peak = _peak(accepted, report_output)
     period = None if peak < 0 else signals(problem, accepted[peak].point)
-    return CaseResult(ratio, excitation, tuple(points), accepted, peak, period, report_output, problem.sweep.low)
+    return CaseResult(
+        ratio, excitation, tuple(points), accepted, peak, period, report_output, problem.sweep.low
+    )
 
 
 def _pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, ForcedPoint | None]]:

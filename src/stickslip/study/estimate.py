@@ -47,7 +47,9 @@ def estimate(study: Study, nodes: int) -> Estimate:
     t = study.tables
     coordinates = 9 * len(t.damper.sections_m) + RETAINED
     points = len(t.loads.ratios) * (t.sweep.points + t.sweep.peak_points)
-    share_high = {"jacobian_alert": REPEATED, "always_low": 0.0, "always_high": 1.0}[t.harmonics.selection]
+    share_high = {"jacobian_alert": REPEATED, "always_low": 0.0, "always_high": 1.0}[
+        t.harmonics.selection
+    ]
     low, high = ((2 * h + 1) * coordinates for h in (t.harmonics.low, t.harmonics.high))
     alerts = points if t.harmonics.selection == "jacobian_alert" else 0
     steps_high = points * share_high * NEWTON_A_POINT + alerts

@@ -16,7 +16,9 @@ from stickslip.study.sections import Positive, Section
 Length = Annotated[float, Field(gt=0, le=100)]  # m
 Place = Annotated[float, Field(ge=-100, le=100)]  # m
 Angle = Annotated[float, Field(gt=0, lt=90)]  # degrees
-NODES_A_CUBE = 14.0  # nodes of second-order tetrahedra in a cube of one element size, measured on the example
+NODES_A_CUBE = (
+    14.0  # nodes of second-order tetrahedra in a cube of one element size, measured on the example
+)
 
 
 def _keep(value: float) -> float:
@@ -42,7 +44,9 @@ def arguments(section: Section) -> dict[str, Any]:
             continue
         suffix, convert = next(((s, c) for s, c in UNITS if key.endswith(s)), ("", _keep))
         name = key.removesuffix(suffix)
-        found[name] = tuple(convert(v) for v in value) if isinstance(value, list) else convert(value)
+        found[name] = (
+            tuple(convert(v) for v in value) if isinstance(value, list) else convert(value)
+        )
     return found
 
 
@@ -52,11 +56,17 @@ class Blades(Section):
     pitch_m: Length = Field(description="distance of the two blades along x in m")
     foot_width_m: Length = Field(description="extent of the foot along x in m")
     foot_depth_m: Length = Field(description="extent of the foot along y in m")
-    foot_height_m: Length = Field(description="extent of the foot along z in m; its bottom and flanks are clamped")
+    foot_height_m: Length = Field(
+        description="extent of the foot along z in m; its bottom and flanks are clamped"
+    )
     shank_thickness_m: Length = Field(description="extent of the shank along x in m")
-    platform_gap_m: Length = Field(description="clearance between neighbouring platforms along x in m")
+    platform_gap_m: Length = Field(
+        description="clearance between neighbouring platforms along x in m"
+    )
     platform_depth_m: Length = Field(description="extent of shank and platform along y in m")
-    platform_height_m: Length = Field(description="height of the platform's top above the foot in m")
+    platform_height_m: Length = Field(
+        description="height of the platform's top above the foot in m"
+    )
     platform_edge_m: Length = Field(description="thickness of the platform at its edges in m")
     flat_angle_deg: Angle = Field(
         description="inclination of the underside that the damper's flat side touches, in degrees from x, between 0 and 90"
@@ -64,13 +74,19 @@ class Blades(Section):
     curved_angle_deg: Angle = Field(
         description="inclination of the underside that the damper's curved side touches, in degrees from x, between 0 and 90"
     )
-    airfoil_length_m: Length = Field(description="length of the airfoil from the platform to the tip in m")
+    airfoil_length_m: Length = Field(
+        description="length of the airfoil from the platform to the tip in m"
+    )
     hub_chord_m: Length = Field(description="chord of the airfoil at the platform in m")
     tip_chord_m: Length = Field(description="chord of the airfoil at the tip in m")
     hub_thickness_m: Length = Field(description="thickness of the airfoil at the platform in m")
     tip_thickness_m: Length = Field(description="thickness of the airfoil at the tip in m")
-    camber: float = Field(0.0, ge=-0.3, le=0.3, description="height of the camber line over the chord, -0.3 to 0.3")
-    twist_deg: float = Field(0.0, ge=-90, le=90, description="rotation of the tip against the hub in degrees, -90 to 90")
+    camber: float = Field(
+        0.0, ge=-0.3, le=0.3, description="height of the camber line over the chord, -0.3 to 0.3"
+    )
+    twist_deg: float = Field(
+        0.0, ge=-90, le=90, description="rotation of the tip against the hub in degrees, -90 to 90"
+    )
     airfoil_size_m: Length = Field(description="element size in the airfoil in m")
     platform_size_m: Length = Field(description="element size in the platform in m")
     foot_size_m: Length = Field(description="element size in shank and foot in m")
@@ -103,9 +119,15 @@ class Blades(Section):
 class MaterialTable(Section):
     """Material of the blades."""
 
-    young_modulus_pa: Positive = Field(description="Young's modulus in Pa, greater than zero (steel: 2.1e11)")
-    poisson_ratio: float = Field(ge=0, lt=0.5, description="Poisson's ratio, from 0 to below 0.5 (steel: 0.3)")
-    density_kg_per_m3: Positive = Field(description="density in kg/m³, greater than zero (steel: 7850)")
+    young_modulus_pa: Positive = Field(
+        description="Young's modulus in Pa, greater than zero (steel: 2.1e11)"
+    )
+    poisson_ratio: float = Field(
+        ge=0, lt=0.5, description="Poisson's ratio, from 0 to below 0.5 (steel: 0.3)"
+    )
+    density_kg_per_m3: Positive = Field(
+        description="density in kg/m³, greater than zero (steel: 7850)"
+    )
 
     def library(self) -> Material:
         """Return the material."""
@@ -122,26 +144,36 @@ class Damper(Section):
         description="the point [x, z] in m where the damper's contact planes meet; left out: where the platforms' undersides meet",
     )
     flat_angle_deg: Angle | None = Field(
-        None, description="inclination of the flat side in degrees, between 0 and 90; left out: that of the platform"
+        None,
+        description="inclination of the flat side in degrees, between 0 and 90; left out: that of the platform",
     )
     curved_angle_deg: Angle | None = Field(
-        None, description="inclination of the plane that touches the curved side in degrees, between 0 and 90; "
-        "left out: that of the platform"
+        None,
+        description="inclination of the plane that touches the curved side in degrees, between 0 and 90; "
+        "left out: that of the platform",
     )
     flat_distances_m: list[Length] = Field(
-        min_length=2, max_length=2, description="distances of the lines [L1, L2] from the apex in m, the nearer first"
+        min_length=2,
+        max_length=2,
+        description="distances of the lines [L1, L2] from the apex in m, the nearer first",
     )
     curved_distance_m: Length = Field(description="distance of the line R from the apex in m")
     curved_radius_m: Length = Field(description="radius of the curved side in m")
     sections_m: list[Place] = Field(
-        min_length=1, max_length=20, description="axial positions y of the sections in m, growing; each holds one point a line"
+        min_length=1,
+        max_length=20,
+        description="axial positions y of the sections in m, growing; each holds one point a line",
     )
     mass_kg: Positive = Field(description="mass of the damper in kg, greater than zero")
     inertia_kg_m2: list[Positive] = Field(
-        min_length=3, max_length=3, description="moments of inertia [x, y, z] about the centre of mass in kg m², greater than zero"
+        min_length=3,
+        max_length=3,
+        description="moments of inertia [x, y, z] about the centre of mass in kg m², greater than zero",
     )
     centre_m: list[Place] = Field(
-        min_length=3, max_length=3, description="centre of mass [x, y, z] in m, measured from the apex"
+        min_length=3,
+        max_length=3,
+        description="centre of mass [x, y, z] in m, measured from the apex",
     )
 
     @model_validator(mode="after")
@@ -154,7 +186,7 @@ class Damper(Section):
 
     def library(self, blades: BladePair) -> FlatCurvedDamper:
         """Return the damper; what the table leaves out is taken from the platforms."""
-        platforms = {
+        platforms: dict[str, Any] = {
             "apex": blades.wedge_apex,
             "flat_angle": blades.flat_angle,
             "curved_angle": blades.curved_angle,

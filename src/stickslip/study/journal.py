@@ -74,7 +74,10 @@ class Journal:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self._db.close()
 
@@ -91,11 +94,16 @@ class Journal:
 
     def add(self, load_case: int, point: object) -> None:
         """Store a finished point; it is on the disk when this returns."""
-        self._db.execute("insert into point (load_case, payload) values (?, ?)", (load_case, encode(_values(point))))
+        self._db.execute(
+            "insert into point (load_case, payload) values (?, ?)",
+            (load_case, encode(_values(point))),
+        )
 
     def points(self, load_case: int) -> list[Any]:
         """Return the finished points of a load case in the order in which they came."""
-        rows = self._db.execute("select payload from point where load_case = ? order by id", (load_case,))
+        rows = self._db.execute(
+            "select payload from point where load_case = ? order by id", (load_case,)
+        )
         return [self._point(decode(payload)) for (payload,) in rows]
 
     def put(self, name: str, values: Mapping[str, Any]) -> None:
@@ -107,7 +115,7 @@ class Journal:
         row = self._db.execute("select payload from record where name = ?", (name,)).fetchone()
         return None if row is None else decode(row[0])
 
-    def _point(self, values: dict[str, Any]) -> Any:  # noqa: ANN401  the point type is the caller's
+    def _point(self, values: dict[str, Any]) -> Any:
         hints = get_type_hints(self._type)
         for name, value in values.items():
             hint = hints[name]
@@ -117,7 +125,7 @@ class Journal:
         return self._type(**values, **missing)
 
 
-def _values(point: Any) -> dict[str, Any]:  # noqa: ANN401  the point type is the caller's
+def _values(point: Any) -> dict[str, Any]:
     found = {f.name: getattr(point, f.name) for f in fields(point) if f.init}
     return {k: v.name if isinstance(v, Enum) else v for k, v in found.items()}
 

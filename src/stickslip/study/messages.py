@@ -61,7 +61,11 @@ def _problem(
     if kind in ("too_long", "too_short"):
         return f"has the wrong number of entries, got {got}", f"Give {about}."
     said = details["msg"].replace("Input should be", "must be").replace("a valid ", "a ")
-    said = said.replace("integer", "whole number").replace("string", "text").replace("list", "list of values")
+    said = (
+        said.replace("integer", "whole number")
+        .replace("string", "text")
+        .replace("list", "list of values")
+    )
     if kind.endswith("model_type") or kind == "model_attributes_type":
         said = "must be a table"
     return f"{said[0].lower()}{said[1:]}, got {got}", f"Give {about}."

@@ -2,17 +2,21 @@
 
 from dataclasses import replace
 
-from stickslip.response.forced import forced_problem, forced_response
+from stickslip.response.forced import Selection, forced_problem, forced_response
 from stickslip.study.build import Case
 from stickslip.study.collect import HZ, NO_SHIFT, CaseResult, collect
 from stickslip.study.journal import Journal
 
 WEAKER = 0.1  # the stiffness of the comparison, as a share of the study's
-WINDOW = 0.02  # half width of the frequency range of the comparison, relative to the peak's frequency
+WINDOW = (
+    0.02  # half width of the frequency range of the comparison, relative to the peak's frequency
+)
 POINTS = 12
 
 
-def peak_shift(case: Case, result: CaseResult, load_case: int, journal: Journal) -> tuple[float, float]:
+def peak_shift(
+    case: Case, result: CaseResult, load_case: int, journal: Journal
+) -> tuple[float, float]:
     """Solve the peak again with a tenth of the retention stiffness.
 
     Returns
@@ -34,7 +38,7 @@ def _shift(case: Case, result: CaseResult) -> tuple[float, float]:
     peak = result.accepted[result.peak].point
     first, last = case.sweep.omega_range
     window = max(first, (1 - WINDOW) * peak.omega), min(last, (1 + WINDOW) * peak.omega)
-    selection = "always_low" if peak.order == case.sweep.low else "always_high"
+    selection: Selection = "always_low" if peak.order == case.sweep.low else "always_high"
     sweep = replace(case.sweep, omega_range=window, points=POINTS, selection=selection)
     system = case.with_retention(WEAKER * case.retention)
     load = case.load(result.ratio)
@@ -45,4 +49,7 @@ def _shift(case: Case, result: CaseResult) -> tuple[float, float]:
         excitation=result.excitation,
         report_output=result.report_output,
     )
-    return again.peak_amplitude / result.peak_amplitude - 1, again.peak_frequency_hz - peak.omega / HZ
+    return (
+        again.peak_amplitude / result.peak_amplitude - 1,
+        again.peak_frequency_hz - peak.omega / HZ,
+    )

@@ -16,7 +16,13 @@ import numpy as np
 from stickslip import __version__
 from stickslip.errors import SingularError, StickslipError
 from stickslip.response.drift import drift
-from stickslip.response.forced import ForcedPoint, ForcedProblem, Sweep, forced_problem, forced_response
+from stickslip.response.forced import (
+    ForcedPoint,
+    ForcedProblem,
+    Sweep,
+    forced_problem,
+    forced_response,
+)
 from stickslip.study.build import Case, case_of
 from stickslip.study.collect import HZ, CaseResult, collect
 from stickslip.study.folder import JOURNAL, LOG, MESHES, RESULT, prepare_folder
@@ -50,7 +56,9 @@ class Sink(Protocol):
         ...
 
 
-def run_study(path: Path, *, verify_in_time: bool = False, fresh: bool = False, sink: Sink) -> RunSummary:
+def run_study(
+    path: Path, *, verify_in_time: bool = False, fresh: bool = False, sink: Sink
+) -> RunSummary:
     """Run a study, going on from what an interrupted run has finished.
 
     Parameters
@@ -175,7 +183,11 @@ def _load_case(run: _Run, case: Case, i: int) -> CaseResult:
     run.log.sink.begin(f"load case {i + 1} of {len(case.ratios)}: F_CL/F_HE = {ratio:g}")
     points = _points(run, case, i)
     result = collect(
-        problem, points, ratio=ratio, excitation=case.centrifugal / ratio, report_output=case.report_output
+        problem,
+        points,
+        ratio=ratio,
+        excitation=case.centrifugal / ratio,
+        report_output=case.report_output,
     )
     _warn_drift(run, problem, result)
     result = replace(result, retention_shift=peak_shift(case, result, i, run.journal))
@@ -215,7 +227,10 @@ def progress(point: ForcedPoint, sweep: Sweep) -> tuple[float, str]:
     shares = {"low": (0.0, 0.4), "high": (0.4, 0.55), "peak": (0.95, 0.05)}
     begin, width = shares[point.stage]
     state = "" if point.converged else f", {point.status.advice}"
-    return begin + width * along, f"{point.stage} {point.index + 1}: {point.omega / HZ:.2f} Hz, H = {point.order}{state}"
+    return (
+        begin + width * along,
+        f"{point.stage} {point.index + 1}: {point.omega / HZ:.2f} Hz, H = {point.order}{state}",
+    )
 
 
 def _warn_drift(run: _Run, problem: ForcedProblem, result: CaseResult) -> None:

@@ -32,8 +32,12 @@ SCHEMA_VERSION = Literal[1]
 class StudyTables(Section):
     """Everything a study file may hold."""
 
-    schema_version: SCHEMA_VERSION = Field(description="schema_version = 1, the version of the file's layout")
-    title: str = Field("Two blades and a friction damper", max_length=200, description="a title of one line")
+    schema_version: SCHEMA_VERSION = Field(
+        description="schema_version = 1, the version of the file's layout"
+    )
+    title: str = Field(
+        "Two blades and a friction damper", max_length=200, description="a title of one line"
+    )
     blades: Blades = Field(description="the table [blades], the geometry of the two equal blades")
     material: MaterialTable = Field(description="the table [material], the blades' material")
     reduction: Reduction = Field(default_factory=Reduction, description="the table [reduction]")
@@ -88,7 +92,9 @@ def read_study(path: Path) -> Study:
     try:
         raw = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise input_error(str(path), f"is not valid TOML: {error}", "Correct the line named.") from None
+        raise input_error(
+            str(path), f"is not valid TOML: {error}", "Correct the line named."
+        ) from None
     _check_version(path, raw.get("schema_version"))
     try:
         tables = StudyTables.model_validate(raw, context={"study": path})
@@ -105,20 +111,34 @@ def json_schema() -> str:
 def _text(path: Path) -> str:
     place = str(path)
     if not path.exists():
-        raise input_error(place, "there is no such file", "Check the name, or write an example with 'stickslip new NAME'.")
+        raise input_error(
+            place,
+            "there is no such file",
+            "Check the name, or write an example with 'stickslip new NAME'.",
+        )
     if not path.is_file():
-        raise input_error(place, "is not a file", "Name the study file itself, for example two_blades/study.toml.")
+        raise input_error(
+            place, "is not a file", "Name the study file itself, for example two_blades/study.toml."
+        )
     try:
         with path.open("rb") as stream:
             content = stream.read(LARGEST_FILE + 1)
         if len(content) > LARGEST_FILE:
-            raise input_error(place, f"is larger than {LARGEST_FILE} bytes", "A study file is a few kilobytes of TOML.")
+            raise input_error(
+                place,
+                f"is larger than {LARGEST_FILE} bytes",
+                "A study file is a few kilobytes of TOML.",
+            )
         # TOML allows both line ends; one form keeps hashes and provenance the same
         return content.decode("utf-8").replace("\r\n", "\n")
     except OSError as error:
-        raise input_error(place, f"cannot be read ({error.strerror})", "Check its permissions.") from None
+        raise input_error(
+            place, f"cannot be read ({error.strerror})", "Check its permissions."
+        ) from None
     except UnicodeDecodeError as error:
-        raise input_error(place, f"is not UTF-8 text (byte {error.start})", "Save it as UTF-8.") from None
+        raise input_error(
+            place, f"is not UTF-8 text (byte {error.start})", "Save it as UTF-8."
+        ) from None
 
 
 def _check_version(path: Path, found: object) -> None:

@@ -20,7 +20,9 @@ def rising_pair(values: list[float], key: str) -> None:
     """Refuse a pair that does not rise."""
     if len(values) == 2 and not values[0] < values[1]:
         raise custom_error(
-            f"must be the lower before the higher, got {values}", "Give the lower frequency first.", key
+            f"must be the lower before the higher, got {values}",
+            "Give the lower frequency first.",
+            key,
         )
 
 
@@ -28,14 +30,19 @@ class Reduction(Section):
     """Craig-Bampton reduction of the blade pair."""
 
     fixed_interface_modes: int = Field(
-        25, ge=1, le=500, description="number of fixed-interface modes kept beside the static ones, 1 to 500"
+        25,
+        ge=1,
+        le=500,
+        description="number of fixed-interface modes kept beside the static ones, 1 to 500",
     )
 
 
 class Damping(Section):
     """Structural damping of the blades, proportional to mass and stiffness."""
 
-    ratio: float = Field(ge=0, lt=1, description="damping ratio at the two frequencies of between_hz, 0 to 1")
+    ratio: float = Field(
+        ge=0, lt=1, description="damping ratio at the two frequencies of between_hz, 0 to 1"
+    )
     between_hz: list[Positive] = Field(
         min_length=2, max_length=2, description="two frequencies in Hz, the lower first"
     )
@@ -61,7 +68,9 @@ class ContactSide(Section):
     axial_stiffness_n_per_m: Positive = Field(
         description="stiffness along the damper's axis of the whole interface in N/m, greater than zero"
     )
-    friction_coefficient: float = Field(ge=0, le=5, description="friction coefficient, 0 to 5 (steel on steel: 0.6)")
+    friction_coefficient: float = Field(
+        ge=0, le=5, description="friction coefficient, 0 to 5 (steel on steel: 0.6)"
+    )
 
 
 class Contact(Section):
@@ -74,7 +83,9 @@ class Contact(Section):
 class Loads(Section):
     """Static pull on the damper and harmonic force on one blade."""
 
-    centrifugal_n: Positive = Field(description="centrifugal load on the damper in N, greater than zero")
+    centrifugal_n: Positive = Field(
+        description="centrifugal load on the damper in N, greater than zero"
+    )
     ratios: list[Annotated[float, Field(gt=0, le=1e6)]] = Field(
         min_length=1,
         max_length=100,
@@ -87,7 +98,9 @@ class Loads(Section):
     @model_validator(mode="after")
     def _differ(self) -> Self:
         if len(set(self.ratios)) < len(self.ratios):
-            raise custom_error(f"holds a number twice, got {self.ratios}", "Give every ratio once.", "ratios")
+            raise custom_error(
+                f"holds a number twice, got {self.ratios}", "Give every ratio once.", "ratios"
+            )
         return self
 
 
@@ -95,10 +108,19 @@ class SweepTable(Section):
     """Range and step of the frequency sweep."""
 
     frequency_hz: list[Positive] = Field(
-        min_length=2, max_length=2, description="the range [lowest, highest] in Hz, the lower frequency first"
+        min_length=2,
+        max_length=2,
+        description="the range [lowest, highest] in Hz, the lower frequency first",
     )
-    points: int = Field(40, ge=2, le=10_000, description="smallest number of points of the first passage, 2 to 10000")
-    peak_points: int = Field(8, ge=0, le=100, description="most points added to resolve the peak, 0 to 100")
+    points: int = Field(
+        40,
+        ge=2,
+        le=10_000,
+        description="smallest number of points of the first passage, 2 to 10000",
+    )
+    peak_points: int = Field(
+        8, ge=0, le=100, description="most points added to resolve the peak, 0 to 100"
+    )
 
     @model_validator(mode="after")
     def _rises(self) -> Self:
@@ -109,11 +131,16 @@ class SweepTable(Section):
 class Harmonics(Section):
     """Harmonics kept, and how the number is chosen at each frequency."""
 
-    low: int = Field(1, ge=1, le=30, description="number of harmonics of the first passage, 1 to 30")
-    high: int = Field(5, ge=1, le=30, description="number of harmonics of the repeated points, 1 to 30")
+    low: int = Field(
+        1, ge=1, le=30, description="number of harmonics of the first passage, 1 to 30"
+    )
+    high: int = Field(
+        5, ge=1, le=30, description="number of harmonics of the repeated points, 1 to 30"
+    )
     samples: int = Field(256, ge=16, le=8192, description="time samples of a period, 16 to 8192")
     alert_threshold_percent: Positive = Field(
-        5.0, description="predicted error in percent above which a point is repeated, greater than zero"
+        5.0,
+        description="predicted error in percent above which a point is repeated, greater than zero",
     )
     selection: Literal["jacobian_alert", "always_high", "always_low"] = Field(
         "jacobian_alert", description="jacobian_alert, always_high or always_low"
@@ -122,7 +149,11 @@ class Harmonics(Section):
     @model_validator(mode="after")
     def _agree(self) -> Self:
         if self.high < self.low:
-            raise custom_error(f"must not be below low = {self.low}, got {self.high}", "Raise it, or lower low.", "high")
+            raise custom_error(
+                f"must not be below low = {self.low}, got {self.high}",
+                "Raise it, or lower low.",
+                "high",
+            )
         if self.samples < 8 * self.high:
             raise custom_error(
                 f"must be at least 8 times high = {self.high}, got {self.samples}",
@@ -143,24 +174,37 @@ class Retention(Section):
 class Limits(Section):
     """What a run may cost; a study that is estimated above is refused before it starts."""
 
-    memory_gb: Positive = Field(4.0, description="memory in GB that a run may take, greater than zero")
-    work_s: Positive = Field(7200.0, description="estimated seconds that a run may take, greater than zero")
+    memory_gb: Positive = Field(
+        4.0, description="memory in GB that a run may take, greater than zero"
+    )
+    work_s: Positive = Field(
+        7200.0, description="estimated seconds that a run may take, greater than zero"
+    )
 
 
 class Output(Section):
     """Where the results go."""
 
-    folder: str = Field("results", min_length=1, max_length=200, description="a folder inside the study's folder")
+    folder: str = Field(
+        "results", min_length=1, max_length=200, description="a folder inside the study's folder"
+    )
 
     @field_validator("folder")
     @classmethod
     def _stays_inside(cls, name: str, info: ValidationInfo) -> str:
         """Links are followed before the check; without the context of a study file only the name is judged."""
         relative, remedy = Path(name), "Give a plain relative name such as 'results'."
-        if not name.isprintable() or relative.is_absolute() or ".." in relative.parts or relative == Path():
+        if (
+            not name.isprintable()
+            or relative.is_absolute()
+            or ".." in relative.parts
+            or relative == Path()
+        ):
             raise custom_error(f"must be a folder inside the study's folder, got {name!r}", remedy)
         home = (info.context or {}).get("study", Path("study.toml")).resolve().parent
         target = (home / relative).resolve()
         if target == home or not target.is_relative_to(home):
-            raise custom_error(f"leads out of the study's folder, got {name!r}, which is {target}", remedy)
+            raise custom_error(
+                f"leads out of the study's folder, got {name!r}, which is {target}", remedy
+            )
         return name

@@ -38,16 +38,28 @@ CASE_QUANTITIES = {
     "seconds_contact": ("s", "time in contact forces"),
     "seconds_linear": ("s", "time in linear algebra"),
     "seconds_rest": ("s", "other time of the solver"),
-    "retention_peak_shift": ("1", "relative change of the peak amplitude with a tenth of the retention stiffness"),
-    "retention_frequency_shift_hz": ("Hz", "change of the peak frequency with a tenth of the retention stiffness"),
+    "retention_peak_shift": (
+        "1",
+        "relative change of the peak amplitude with a tenth of the retention stiffness",
+    ),
+    "retention_frequency_shift_hz": (
+        "Hz",
+        "change of the peak frequency with a tenth of the retention stiffness",
+    ),
 }
 POINT_QUANTITIES = {
     "frequency_hz": ("Hz", "excitation frequency"),
     "case": ("1", "load case"),
     "order": ("1", "harmonics kept"),
     "status": ("1", "how the solver ended"),
-    "predicted_error_percent": ("percent", "error of the few harmonics predicted by the Jacobian Alert"),
-    "real_error_percent": ("percent", "difference of few and many harmonics where both were solved"),
+    "predicted_error_percent": (
+        "percent",
+        "error of the few harmonics predicted by the Jacobian Alert",
+    ),
+    "real_error_percent": (
+        "percent",
+        "difference of few and many harmonics where both were solved",
+    ),
     "newton_iterations": ("1", "Newton iterations"),
     "seconds": ("s", "time of the point"),
     "refinement": ("1", "1 if the point was added to resolve the peak"),
@@ -91,7 +103,9 @@ class Provenance:
         }
 
 
-def dataset(case: Case, results: Sequence[CaseResult], checks: Sequence[Check], provenance: Provenance) -> xr.Dataset:
+def dataset(
+    case: Case, results: Sequence[CaseResult], checks: Sequence[Check], provenance: Provenance
+) -> xr.Dataset:
     """Assemble the dataset described in the design notes.
 
     Parameters
@@ -106,7 +120,11 @@ def dataset(case: Case, results: Sequence[CaseResult], checks: Sequence[Check], 
         Attributes.
     """
     high = provenance.high_order
-    data = _case_variables(case, results) | _point_variables(case, results, high) | _peak_variables(case, results)
+    data = (
+        _case_variables(case, results)
+        | _point_variables(case, results, high)
+        | _peak_variables(case, results)
+    )
     data |= _model_variables(case)
     if checks:
         data |= _check_variables(checks)
@@ -137,14 +155,21 @@ def write_dataset(data: xr.Dataset, path: Path) -> None:
         # whichever of netCDF4 and h5netcdf is installed: both write the same plain features
         data.to_netcdf(temporary, format="NETCDF4")
         temporary.replace(path)
-    except (OSError, RuntimeError) as error:  # the HDF5 libraries tell of a full disk by RuntimeError
+    except (
+        OSError,
+        RuntimeError,
+    ) as error:  # the HDF5 libraries tell of a full disk by RuntimeError
         raise input_error(
-            str(path), f"cannot be written ({error})", "Make room and run the same command again: no finished point is lost."
+            str(path),
+            f"cannot be written ({error})",
+            "Make room and run the same command again: no finished point is lost.",
         ) from error
 
 
 def _variable(dims: str, values: object, units: str, long_name: str) -> xr.Variable:
-    return xr.Variable(tuple(dims.split()), np.asarray(values), {"units": units, "long_name": long_name})
+    return xr.Variable(
+        tuple(dims.split()), np.asarray(values), {"units": units, "long_name": long_name}
+    )
 
 
 def _parts(values: ComplexArray) -> FloatArray:
@@ -180,7 +205,9 @@ def _case_variables(case: Case, results: Sequence[CaseResult]) -> dict[str, xr.V
     }
 
 
-def _point_variables(case: Case, results: Sequence[CaseResult], high: int) -> dict[str, xr.Variable]:
+def _point_variables(
+    case: Case, results: Sequence[CaseResult], high: int
+) -> dict[str, xr.Variable]:
     pairs = [(i, a) for i, r in enumerate(results) for a in r.accepted]
     n_out = len(case.output_labels)
     rows = [_point_row(i, a) for i, a in pairs]
@@ -198,16 +225,26 @@ def _point_variables(case: Case, results: Sequence[CaseResult], high: int) -> di
     def block(shape: tuple[int, ...], name: str) -> FloatArray:
         return _parts(np.stack([_padded(_of(a.fields, name), high, shape) for a in every]))
 
-    retained = [_padded(a.point.coefficients if a.fields else None, high, (n_retained,)) for a in every]
+    retained = [
+        _padded(a.point.coefficients if a.fields else None, high, (n_retained,)) for a in every
+    ]
     energy = [np.full(n_contacts, np.nan) if a.fields is None else a.fields.energy for a in every]
     contact = "point harmonic contact direction part"
     return found | {
-        "amplitude": _variable("point output", [a.amplitudes(n_out) for a in every], "m", "first-harmonic amplitude"),
+        "amplitude": _variable(
+            "point output", [a.amplitudes(n_out) for a in every], "m", "first-harmonic amplitude"
+        ),
         "amplitude_low": _variable(
-            "point output", [a.low_amplitudes(n_out) for a in every], "m", "first-harmonic amplitude with few harmonics"
+            "point output",
+            [a.low_amplitudes(n_out) for a in every],
+            "m",
+            "first-harmonic amplitude with few harmonics",
         ),
         "output_displacement": _variable(
-            "point harmonic output part", block((n_out,), "outputs"), "m", "displacement of the outputs"
+            "point harmonic output part",
+            block((n_out,), "outputs"),
+            "m",
+            "displacement of the outputs",
         ),
         "retained_displacement": _variable(
             "point harmonic retained part",
@@ -215,9 +252,13 @@ def _point_variables(case: Case, results: Sequence[CaseResult], high: int) -> di
             "m",
             "displacement of contact and damper coordinates, rotations in rad",
         ),
-        "gap": _variable(contact, block((n_contacts, 3), "gaps"), "m", "relative displacement at the contacts"),
+        "gap": _variable(
+            contact, block((n_contacts, 3), "gaps"), "m", "relative displacement at the contacts"
+        ),
         "contact_force": _variable(contact, block((n_contacts, 3), "forces"), "N", "contact force"),
-        "dissipated_energy": _variable("point contact", energy, "J", "energy dissipated in a cycle"),
+        "dissipated_energy": _variable(
+            "point contact", energy, "J", "energy dissipated in a cycle"
+        ),
     }
 
 
@@ -258,13 +299,23 @@ def _peak_variables(case: Case, results: Sequence[CaseResult]) -> dict[str, xr.V
     state = np.full((len(results), n, 2, samples), -1)
     for i, result in enumerate(results):
         if result.signals is not None:
-            time[i], gap[i], force[i] = result.signals.time, result.signals.gap, result.signals.force
+            time[i], gap[i], force[i] = (
+                result.signals.time,
+                result.signals.gap,
+                result.signals.force,
+            )
             state[i] = result.signals.state
     found = {
         "peak_time": _variable("load_case sample", time, "s", "time within the period at the peak"),
-        "peak_gap": _variable("load_case contact direction sample", gap, "m", "contact gap at the peak"),
-        "peak_force": _variable("load_case contact direction sample", force, "N", "contact force at the peak"),
-        "peak_state": _variable("load_case contact tangent sample", state, "1", "contact state at the peak, -1 if none"),
+        "peak_gap": _variable(
+            "load_case contact direction sample", gap, "m", "contact gap at the peak"
+        ),
+        "peak_force": _variable(
+            "load_case contact direction sample", force, "N", "contact force at the peak"
+        ),
+        "peak_state": _variable(
+            "load_case contact tangent sample", state, "1", "contact state at the peak, -1 if none"
+        ),
     }
     found["peak_state"].attrs |= STATES
     return found
@@ -274,17 +325,40 @@ def _model_variables(case: Case) -> dict[str, xr.Variable]:
     checked = case.blades.frequencies
     modes = {
         "frequency_full_hz": (checked.free_full, "natural frequency, full model, no damper"),
-        "frequency_reduced_hz": (checked.free_reduced, "natural frequency, reduced model, no damper"),
-        "frequency_stuck_full_hz": (checked.stuck_full, "natural frequency, full model, contacts stuck"),
-        "frequency_stuck_reduced_hz": (checked.stuck_reduced, "natural frequency, reduced model, contacts stuck"),
+        "frequency_reduced_hz": (
+            checked.free_reduced,
+            "natural frequency, reduced model, no damper",
+        ),
+        "frequency_stuck_full_hz": (
+            checked.stuck_full,
+            "natural frequency, full model, contacts stuck",
+        ),
+        "frequency_stuck_reduced_hz": (
+            checked.stuck_reduced,
+            "natural frequency, reduced model, contacts stuck",
+        ),
     }
-    return {name: _variable("mode", values, "Hz", about) for name, (values, about) in modes.items()} | {
-        "static_gap": _variable("contact direction", case.static_gap, "m", "contact gap under the centrifugal load"),
-        "static_force": _variable("contact direction", case.static_force, "N", "contact force under the centrifugal load"),
-        "contact_position": _variable("contact xyz", case.contacts.position, "m", "position of the contact points"),
-        "contact_frame": _variable("contact xyz direction", case.contacts.frame, "1", "axes t, w, n of the contact frames"),
-        "surface_point": _variable("surface_node xyz", case.blades.surface_point, "m", "skin of the meshed blades"),
-        "surface_triangle": _variable("face corner", case.blades.surface_triangle, "1", "triangles of the skin"),
+    return {
+        name: _variable("mode", values, "Hz", about) for name, (values, about) in modes.items()
+    } | {
+        "static_gap": _variable(
+            "contact direction", case.static_gap, "m", "contact gap under the centrifugal load"
+        ),
+        "static_force": _variable(
+            "contact direction", case.static_force, "N", "contact force under the centrifugal load"
+        ),
+        "contact_position": _variable(
+            "contact xyz", case.contacts.position, "m", "position of the contact points"
+        ),
+        "contact_frame": _variable(
+            "contact xyz direction", case.contacts.frame, "1", "axes t, w, n of the contact frames"
+        ),
+        "surface_point": _variable(
+            "surface_node xyz", case.blades.surface_point, "m", "skin of the meshed blades"
+        ),
+        "surface_triangle": _variable(
+            "face corner", case.blades.surface_triangle, "1", "triangles of the skin"
+        ),
     }
 
 
@@ -292,10 +366,26 @@ def _check_variables(checks: Sequence[Check]) -> dict[str, xr.Variable]:
     columns = {
         "verify_case": ([c.load_case for c in checks], "1", "load case"),
         "verify_frequency_hz": ([c.frequency_hz for c in checks], "Hz", "frequency"),
-        "verify_transient": ([c.transient for c in checks], "m", "first-harmonic amplitude by time integration"),
-        "verify_balance": ([c.balance for c in checks], "m", "first-harmonic amplitude by harmonic balance"),
-        "verify_difference_percent": ([c.difference_percent for c in checks], "percent", "their difference"),
-        "verify_settled": ([int(c.settled) for c in checks], "1", "1 if the integration became periodic"),
+        "verify_transient": (
+            [c.transient for c in checks],
+            "m",
+            "first-harmonic amplitude by time integration",
+        ),
+        "verify_balance": (
+            [c.balance for c in checks],
+            "m",
+            "first-harmonic amplitude by harmonic balance",
+        ),
+        "verify_difference_percent": (
+            [c.difference_percent for c in checks],
+            "percent",
+            "their difference",
+        ),
+        "verify_settled": (
+            [int(c.settled) for c in checks],
+            "1",
+            "1 if the integration became periodic",
+        ),
         "verify_periods": ([c.periods for c in checks], "1", "periods integrated"),
     }
     return {name: _variable("check", *column) for name, column in columns.items()}

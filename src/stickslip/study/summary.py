@@ -91,7 +91,10 @@ def alert_sentence(result: CaseResult, threshold_percent: float, high: int) -> s
             f"below the threshold of {threshold_percent:g} %."
         )
     worst = int(np.nanargmax(np.where(asked, errors, -1.0)))
-    where = ", ".join(f"{lo:.2f}" if lo == hi else f"{lo:.2f} to {hi:.2f}" for lo, hi in _intervals(result.accepted, over))
+    where = ", ".join(
+        f"{lo:.2f}" if lo == hi else f"{lo:.2f} to {hi:.2f}"
+        for lo, hi in _intervals(result.accepted, over)
+    )
     at = result.accepted[worst].point.omega / HZ
     return (
         f"{ratio}: {int(over.sum())} of {len(over)} points repeated with {high} harmonics, at {where} Hz, because leaving "

@@ -44,7 +44,9 @@ class Check:
         return 100 * (self.balance - self.transient) / self.transient
 
 
-def verify(case: Case, results: list[CaseResult], journal: Journal, say: Callable[[str], None]) -> list[Check]:
+def verify(
+    case: Case, results: list[CaseResult], journal: Journal, say: Callable[[str], None]
+) -> list[Check]:
     """Integrate near the peak of the most nonlinear load case and on both of its flanks.
 
     Parameters
@@ -80,7 +82,11 @@ def _three(result: CaseResult) -> list[Accepted]:
     output = result.report_output
     chosen = [peak]
     for side in (-1, 1):
-        flank = [a for a in result.accepted if a.fields is not None and side * (a.point.omega - peak.point.omega) > 0]
+        flank = [
+            a
+            for a in result.accepted
+            if a.fields is not None and side * (a.point.omega - peak.point.omega) > 0
+        ]
         if flank:
             wanted = FLANK * result.peak_amplitude
             chosen.append(min(flank, key=lambda a: abs(a.amplitudes(output + 1)[output] - wanted)))

@@ -1,0 +1,169 @@
+"""The commands: exit codes, messages without tracebacks, and a light start."""
+
+import json
+import shutil
+import subprocess
+import sys
+from collections import namedtuple
+from pathlib import Path
+
+import pytest
+from small_study import write_small_study
+from typer.testing import CliRunner, Result
+
+import stickslip
+from stickslip.cli import app
+from stickslip.errors import InputError
+from stickslip.study.example import example_text
+from stickslip.study.folder import prepare_folder
+
+HEAVY = ("numpy", "scipy", "numba", "xarray", "pydantic", "plotly", "gmsh", "skfem", "meshio")
+
+
+def invoke(*words: str) -> Result:
+    return CliRunner().invoke(app, list(words))
+
+
+def refused(*words: str) -> str:
+    """Return what a command says that must end with exit code 2 and without a traceback."""
+    result = invoke(*words)
+    assert result.exit_code == 2, result.output
+    assert isinstance(result.exception, SystemExit)
+    return result.stderr.strip()
+
+
+@pytest.mark.parametrize("words", [["--help"], ["--version"], ["run", "--help"], ["new", "made"]])
+def test_light_commands_load_nothing_heavy(tmp_path: Path, words: list[str]) -> None:
+    # typer itself takes pydantic to convert arguments; --help alone is free of it
+    heavy = HEAVY if words == ["--help"] else tuple(m for m in HEAVY if m != "pydantic")
+    program = (
+        f"import sys; sys.argv = ['stickslip', *{words!r}]\n"
+        "from stickslip.cli import main\n"
+        "try:\n    main()\nexcept SystemExit as end:\n    assert not end.code, end.code\n"
+        f"print([m for m in {heavy!r} if m in sys.modules], file=sys.stderr)\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=tmp_path
+    )
+    assert ended.stderr.strip() == "[]"
+
+
+def test_version() -> None:
+    assert invoke("--version").output == f"stickslip {stickslip.__version__}\n"
+
+
+def test_unknown_command_and_option_are_bad_input() -> None:
+    assert "No such command 'runn'" in refused("runn")
+    assert "No such option" in refused("run", "x.toml", "--quick")
+
+
+def test_schema_is_printed_as_json() -> None:
+    assert json.loads(invoke("schema").output)["title"] == "StudyTables"
+
+
+def test_new_writes_the_example_and_overwrites_nothing(tmp_path: Path) -> None:
+    folder = tmp_path / "two"
+    result = invoke("new", str(folder))
+    assert result.exit_code == 0
+    assert (folder / "study.toml").read_text(encoding="utf-8") == example_text()
+    (folder / "study.toml").write_text("mine")
+    said = refused("new", str(folder))
+    assert (
+        said
+        == f"{folder / 'study.toml'}: exists already. Give another name: nothing is overwritten."
+    )
+    assert (folder / "study.toml").read_text() == "mine"
+
+
+def test_new_in_a_place_that_cannot_be(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    said = refused("new", str(tmp_path / "file" / "two"))
+    assert (
+        "study.toml: cannot be written (Not a directory). Give a folder you may write to." in said
+    )
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_missing_study(tmp_path: Path, command: str) -> None:
+    path = tmp_path / "none.toml"
+    assert refused(command, str(path)) == (
+        f"{path}: there is no such file. Check the name, or write an example with 'stickslip new NAME'."
+    )
+
+
+def test_bad_study_is_told_line_by_line(tmp_path: Path) -> None:
+    path = write_small_study(tmp_path, mass_kg="-0.1", frequency_hz="[220.0, 150.0]")
+    assert [line.split(": ")[1] for line in refused("check", str(path)).splitlines()] == [
+        "damper.mass_kg",
+        "sweep.frequency_hz",
+    ]
+
+
+def test_output_folder_that_cannot_be_made(tmp_path: Path) -> None:
+    path = write_small_study(tmp_path)
+    (tmp_path / "results").write_text("a file where the folder should be")
+    assert refused("run", str(path)) == (
+        f"output folder {tmp_path.resolve() / 'results'}: cannot be written (File exists). "
+        "Change its permissions, or name another folder under [output]."
+    )
+
+
+def test_full_disk_is_told_before_anything_is_computed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usage = namedtuple("usage", "total used free")(10**9, 10**9 - 10**6, 10**6)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage)
+    with pytest.raises(
+        InputError, match=r"its disk has 1 MB free, a run needs up to 200 MB\. Make room"
+    ):
+        prepare_folder(tmp_path / "results", fresh=False)
+
+
+def test_fresh_removes_what_a_run_writes_and_nothing_else(tmp_path: Path) -> None:
+    folder = tmp_path / "results"
+    folder.mkdir()
+    for name in ("journal.sqlite", "result.nc", "notes.txt"):
+        (folder / name).write_text("")
+    prepare_folder(folder, fresh=True)
+    assert [p.name for p in folder.iterdir()] == ["notes.txt"]
+
+
+def test_results_of_another_study_are_not_mixed(tmp_path: Path) -> None:
+    path = write_small_study(tmp_path, airfoil_size_m="1e-5")
+    assert "limits" in refused("run", str(path))  # stops after the journal is made
+    write_small_study(tmp_path, airfoil_size_m="1e-5", centrifugal_n="440.0")
+    assert "this results folder belongs to another study" in refused("run", str(path))
+    assert "limits" in refused("run", str(path), "--fresh")
+
+
+def test_run_that_costs_too_much_is_refused_before_meshing(tmp_path: Path) -> None:
+    path = write_small_study(tmp_path, airfoil_size_m="1e-5")
+    said = refused("check", str(path))
+    assert f"{path}: limits.memory_gb: the run is estimated at" in said
+    assert (
+        "the limit is 4 GB. Take a coarser mesh, fewer points, ratios or harmonics, or raise the limit."
+        in said
+    )
+    path = write_small_study(tmp_path, work_s="1e-3")
+    said = refused("check", str(path))
+    assert f"{path}: limits.work_s: the run is estimated at" in said
+    assert "the limit is 0.001 s." in said
+
+
+def test_node_sets_that_do_not_match_are_named(tmp_path: Path) -> None:
+    path = write_small_study(tmp_path)
+    text = path.read_text().replace("[damper]\n", "[damper]\nflat_angle_deg = 40.0\n")
+    path.write_text(text)
+    said = refused("check", str(path))
+    assert f"{path}: [blades] with [damper]: " in said
+    assert (
+        "non-matching node sets: these contact points of the damper are not on a platform's underside: L1.1 at"
+        in said
+    )
+    assert "L2.3 at" in said
+    assert "R.1" not in said
+
+
+def test_report_of_nothing(tmp_path: Path) -> None:
+    said = refused("report", str(tmp_path))
+    assert str(tmp_path / "result.nc") in said
