@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from stickslip.response.forced import Selection, forced_problem, forced_response
+from stickslip.response.forced import forced_problem, forced_response
 from stickslip.study.build import Case
 from stickslip.study.collect import HZ, NO_SHIFT, CaseResult, collect
 from stickslip.study.journal import Journal
@@ -38,8 +38,12 @@ def _shift(case: Case, result: CaseResult) -> tuple[float, float]:
     peak = result.accepted[result.peak].point
     first, last = case.sweep.omega_range
     window = max(first, (1 - WINDOW) * peak.omega), min(last, (1 + WINDOW) * peak.omega)
-    selection: Selection = "always_low" if peak.order == case.sweep.low else "always_high"
-    sweep = replace(case.sweep, omega_range=window, points=POINTS, selection=selection)
+    sweep = replace(
+        case.sweep,
+        omega_range=window,
+        points=POINTS,
+        selection="always_low" if peak.order == case.sweep.low else "always_high",
+    )
     system = case.with_retention(WEAKER * case.retention)
     load = case.load(result.ratio)
     again = collect(
