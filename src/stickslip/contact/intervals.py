@@ -97,7 +97,8 @@ def _march_tangent(x, normal, is_open, k, mu, start, force, state, anchor, ancho
     a = -1
     sign = 0.0
     held = 0.0
-    if not np.isnan(start):
+    # a direction without stiffness carries no force, whatever the start
+    if k > 0.0 and not np.isnan(start):
         a = n - 1
         sign = start
         held = start * mu * normal[a]

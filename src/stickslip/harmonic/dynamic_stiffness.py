@@ -118,7 +118,7 @@ class CondensedStiffness:
         """Interior D and dD/dΩ at Ω = `s`; as columns where they are diagonal."""
         if self.diagonal:
             k, c, m = (np.diagonal(a)[None, :, None] for a in self.ll)
-            return k + 1j * s * c - s**2 * m, 1j * c - 2 * s * m
+            return _dynamic((k, c, m), s)
         return _dynamic(self.ll, s)
 
     def _solve_interior(self, s: FloatArray, right: ComplexArray) -> ComplexArray:
@@ -133,7 +133,9 @@ def _dynamic(
 ) -> tuple[ComplexArray, ComplexArray]:
     """Return K + is C - s² M and its derivative by s, stacked over the frequencies `s` (H+1, 1, 1)."""
     k, c, m = blocks
-    return k + 1j * s * c - s**2 * m, 1j * c - 2.0 * s * m
+    stiffness: ComplexArray = np.asarray(k + 1j * s * c - s**2 * m)
+    slope: ComplexArray = np.asarray(1j * c - 2.0 * s * m)
+    return stiffness, slope
 
 
 def condense(structure: Structure, retained: IntArray, load: HarmonicLoad) -> CondensedStiffness:
@@ -193,16 +195,18 @@ def _interior_modes(
     """Return mass-normalised interior modes and whether they diagonalise the damping too; unit vectors if M is singular."""
     if stiffness.shape[0] == 0:
         return np.eye(0), True
-    try:
-        values, modes = scipy.linalg.eigh(stiffness, mass)
-    except np.linalg.LinAlgError:
-        return np.eye(stiffness.shape[0]), False
-    if values[0] <= 1e-12 * abs(values[-1]):
+    size = np.sqrt(np.maximum(np.abs(np.diagonal(stiffness)), np.finfo(float).tiny))
+    softest = float(np.linalg.eigvalsh(stiffness / np.outer(size, size))[0])
+    if softest <= 1e-12:
         raise input_error(
             "condense",
-            f"the coordinates that are condensed can move without stiffness (smallest eigenvalue {values[0]:.3g} rad²/s²)",
+            f"the coordinates that are condensed can move without stiffness (smallest scaled eigenvalue {softest:.3g})",
             "Retain the dofs of free bodies, or clamp them.",
         )
+    try:
+        _, modes = scipy.linalg.eigh(stiffness, mass)
+    except np.linalg.LinAlgError:
+        return np.eye(stiffness.shape[0]), False
     modal = modes.T @ damping @ modes
     off = np.max(np.abs(modal - np.diag(np.diagonal(modal))))
     return modes, bool(off <= DIAGONAL_TOLERANCE * max(np.max(np.abs(modal)), np.finfo(float).tiny))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stickslip.response.forced import ForcedPoint, ForcedProblem
+from stickslip.response.sweep import ForcedPoint, ForcedProblem
 
 SINGULAR = 1e-9  # smallest over largest singular value of the balanced Jacobian below which a coordinate counts as undetermined
 
@@ -44,7 +44,7 @@ def drift(problem: ForcedProblem, point: ForcedPoint) -> Drift:
     point
         A point of the response, converged or not.
     """
-    balance = problem.low if point.order == problem.low.order else problem.high
+    balance = problem.balance(point.order)
     jac = balance.linearise(balance.unknowns(point.coefficients), point.omega).jac
     # balance rows and columns first: translations and rotations differ by orders of magnitude
     scale = np.sqrt(np.maximum(np.max(np.abs(jac), axis=0), np.finfo(float).tiny))

@@ -10,7 +10,7 @@ from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.system import System
-from stickslip.solve.continuation import StepControl, start_point, trace
+from stickslip.solve.continuation import Following, StepControl, reversed_point, start_point, trace
 from stickslip.solve.newton import Newton, Solution, newton, solve_dense
 from stickslip.solve.status import Status
 
@@ -52,11 +52,13 @@ def preload(system: System, static_load: FloatArray, options: Newton | None = No
     SingularError
         If nothing holds a body (the message names the coordinate) or no equilibrium is found.
     """
-    if not np.any(static_load):
+    if not np.any(static_load) and all(law.preload <= 0.0 for law in system.interface.laws):
         return np.zeros(system.retained.size)
     options = options or Newton(max_iterations=60)
     linear = condense(system.structure, system.retained, HarmonicLoad(static_load))
-    balance = harmonic_balance(linear, system.interface, 0, 1)
+    # a residual traction is a force without a stiffness: it chooses a mean of the vibration, not the seat of the damper
+    laws = tuple(replace(law, residual_traction=None) for law in system.interface.laws)
+    balance = harmonic_balance(linear, replace(system.interface, laws=laws), 0, 1)
     start = bonded_start(balance, 0.0, system)
     solution = newton(lambda v: balance.linearise(v, 0.0), start, options)
     if not solution.status.converged:
@@ -76,11 +78,10 @@ def _released(balance: HarmonicBalance, options: Newton) -> Solution:
     A wedged damper that rolls onto its seat passes states from which Newton finds no way: everything slips, one line is open.
     """
     held = _Held(balance)
-    weights = np.ones(balance.size)
-    start = start_point(held, np.zeros(balance.size), 1.0, options, HOLDING, weights)
-    points = [start]
-    if start.solution.status.converged:
-        points += trace(held, start, 0.0, options=options, control=HOLDING, weights=weights)
+    following = Following(newton=options, control=HOLDING, weights=np.ones(balance.size))
+    points = [start_point(held, np.zeros(balance.size), 1.0, following)]
+    if points[0].solution.status.converged:
+        points += trace(held, reversed_point(points[0]), 0.0, following)
     last = points[-1]
     if last.p > 0.0 and last.solution.status.converged:
         return replace(last.solution, status=Status.TOO_MANY_ITERATIONS)

@@ -13,26 +13,38 @@ from stickslip.solve.status import Status
 SHARP_TURN = (
     0.5  # cosine between successive tangents below which the step is shortened, as far as that goes
 )
-BACKWARD = (
-    0.1  # share of the range by which a branch may fall back behind its start before it is left
-)
 SMOOTH_TURN = 0.9  # cosine above which a change of orientation is a bifurcation, not a corner
+LOOKS_AHEAD = (
+    1.0,
+    4.0,
+    16.0,
+    64.0,
+)  # smallest steps at which the far side of a corner is looked for
+LEAVES_BY = (4.0, 16.0, 1.0, 64.0)  # smallest steps taken along the far side
 
 
 class ParameterEvaluation(Protocol):
     """Residual, Jacobian and parameter derivative at one state."""
 
     @property
-    def residual(self) -> FloatArray: ...  # noqa: D102
+    def residual(self) -> FloatArray:
+        """(n,) residual."""
+        ...
 
     @property
-    def jac(self) -> FloatArray: ...  # noqa: D102
+    def jac(self) -> FloatArray:
+        """(n, n) derivative by x."""
+        ...
 
     @property
-    def jac_p(self) -> FloatArray: ...  # noqa: D102
+    def jac_p(self) -> FloatArray:
+        """(n,) derivative by p."""
+        ...
 
     @property
-    def seconds_contact(self) -> float: ...  # noqa: D102
+    def seconds_contact(self) -> float:
+        """Time spent in contact forces."""
+        ...
 
 
 class Problem(Protocol):
@@ -66,6 +78,25 @@ class StepControl:
     max_points: int = 500
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Following:
+    """How a branch is followed: corrector, steps, and what makes length.
+
+    Parameters
+    ----------
+    newton
+        Corrector.
+    control
+        Step control.
+    weights
+        (n,) share of each unknown in the length of a step.
+    """
+
+    newton: Newton
+    control: StepControl
+    weights: FloatArray
+
+
 @dataclass(frozen=True, eq=False)
 class Point:
     """A point of a branch with all that is needed to go on from it.
@@ -75,13 +106,13 @@ class Point:
     x, p
         The solution and its parameter.
     tangent
-        (n + 1,) direction of the branch, unit length in the measure of the step control; the last entry is that of p.
+        (n + 1,) direction of travel, unit length in the measure of the step control; the last entry is that of p.
     step
         Length of the next step.
     solution
         How Newton ended; x is a solution only if its status says so.
     orientation
-        Sign of the determinant of the Jacobian bordered by the tangent; 0: not known yet.
+        Sign of the determinant of the Jacobian bordered by the tangent; it stays the same along a path.
     """
 
     x: FloatArray
@@ -89,7 +120,7 @@ class Point:
     tangent: FloatArray
     step: float
     solution: Solution
-    orientation: float = 0.0
+    orientation: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,10 +150,14 @@ class _Measure:
         """Return the row whose product with another vector is their inner product."""
         return np.append(self.x**2 * vector[:-1], self.p**2 * vector[-1])
 
+    def cosine(self, a: FloatArray, b: FloatArray) -> float:
+        return float(self.row(a) @ b) / (self.of(a) * self.of(b))
 
-def _measure(x: FloatArray, weights: FloatArray, control: StepControl) -> _Measure:
+
+def _measure(x: FloatArray, following: Following) -> _Measure:
+    weights = following.weights
     size = float(np.linalg.norm(weights * x))
-    return _Measure(weights / size if size > 0 else weights, 1.0 / control.scale)
+    return _Measure(weights / size if size > 0 else weights, 1.0 / following.control.scale)
 
 
 def _border(problem: Problem, y: FloatArray, row: FloatArray, value: float) -> _Bordered:
@@ -135,23 +170,100 @@ def _border(problem: Problem, y: FloatArray, row: FloatArray, value: float) -> _
     return _Bordered(np.append(at.residual, row @ y - value), jac, at.seconds_contact)
 
 
-def start_point(
-    problem: Problem,
-    x: FloatArray,
-    p: float,
-    options: Newton,
-    control: StepControl,
-    weights: FloatArray,
-) -> Point:
+def start_point(problem: Problem, x: FloatArray, p: float, following: Following) -> Point:
     """Solve at fixed `p` from the guess `x` and find the direction of growing parameter."""
-    solution = newton(lambda v: problem.linearise(v, p), x, options)
+    solution = newton(lambda v: problem.linearise(v, p), x, following.newton)
     upward = np.zeros(x.size + 1)
     upward[-1] = 1.0
+    first = following.control.first
     if not solution.status.converged:
-        return Point(solution.x, p, upward, control.first, solution)
-    measure = _measure(solution.x, weights, control)
+        return Point(solution.x, p, upward, first, solution, 0.0)
+    measure = _measure(solution.x, following)
     tangent, sign = _tangent(problem, np.append(solution.x, p), upward, measure)
-    return Point(solution.x, p, tangent, control.first, solution, sign)
+    return Point(solution.x, p, tangent, first, solution, sign)
+
+
+def reversed_point(point: Point) -> Point:
+    """Return the point looking the other way along its branch."""
+    return replace(point, tangent=-point.tangent, orientation=-point.orientation)
+
+
+def trace(problem: Problem, start: Point, end: float, following: Following) -> Iterator[Point]:
+    """Follow a branch from `start`, in the direction of its tangent, until its parameter passes `end`.
+
+    Parameters
+    ----------
+    problem
+        The equation.
+    start
+        A converged point with its tangent; it is not yielded again.
+    end
+        Parameter value of the last point, which is solved exactly there.
+    following
+        Corrector, step control, weights.
+
+    Yields
+    ------
+    Point
+        Each point that was reached, until the end or `max_points`. If no step, however short, converges, a last point with
+        status `Status.STEP_TOO_SMALL` and the state it came from.
+    """
+    point = start
+    for _ in range(following.control.max_points):
+        point = advance(problem, point, end, following)
+        yield point
+        if not point.solution.status.converged or point.p == end:
+            return
+
+
+def advance(problem: Problem, point: Point, end: float, following: Following) -> Point:
+    """Take one step from `point` along its branch; see `trace`."""
+    control = following.control
+    measure = _measure(point.x, following)
+    unit = point.tangent / measure.of(point.tangent)
+    step = point.step
+    spent: list[Solution] = []
+    while step >= control.smallest:
+        new = _step(problem, point, unit, step, end, following)
+        spent.append(new.solution)
+        if new.solution.status.converged:
+            turn = measure.cosine(unit, new.tangent)
+            if abs(turn) > SHARP_TURN or step < 4 * control.smallest:
+                wanted = _next_step(step, new.solution.iterations, abs(turn), control)
+                return _with_cost(replace(new, step=wanted), spent)
+        step *= 0.5
+    new = _round_corner(problem, point, unit, end, following)
+    return _with_cost(new, [*spent, new.solution])
+
+
+def _step(
+    problem: Problem, point: Point, unit: FloatArray, step: float, end: float, following: Following
+) -> Point:
+    """Predict along `unit` and correct across it; the point says whether that worked."""
+    measure = _measure(point.x, following)
+    y = np.append(point.x, point.p)
+    guess = y + step * unit
+    row = measure.row(unit)
+    passes = (guess[-1] - end) * (point.p - end) <= 0.0
+    if passes:
+        guess = y + (end - point.p) / unit[-1] * unit
+        row = np.append(np.zeros(point.x.size), 1.0 / following.control.scale)
+    value = float(row @ guess)
+    solution = newton(lambda v: _border(problem, v, row, value), guess, following.newton)
+    x, p = solution.x[:-1], end if passes else float(solution.x[-1])
+    # a corrector that slides far away, or past the end of the range, has found another piece of the branch
+    near = measure.of(solution.x - y) <= 4.0 * step and (p - end) * (point.p - end) >= 0.0
+    found = replace(solution, x=x)
+    if not (solution.status.converged and near):
+        status = Status.STALLED if solution.status.converged else solution.status
+        return replace(point, solution=replace(found, x=point.x, status=status))
+    tangent, sign = _tangent(problem, solution.x, unit, _measure(x, following))
+    # Where contact states change the branch may turn back so sharply that the tangent nearest to the old one leads back to the
+    # corner. The sign of the bordered determinant is the same along a piecewise smooth path (Allgower & Georg 1990); a sign
+    # that changes although the tangent hardly turned is a bifurcation point, which is passed straight on.
+    if sign * point.orientation < 0.0 and measure.cosine(unit, tangent) < SMOOTH_TURN:
+        tangent, sign = -tangent, -sign
+    return Point(x, p, tangent, step, found, sign)
 
 
 def _tangent(
@@ -167,115 +279,39 @@ def _tangent(
     return tangent / measure.of(tangent), sign
 
 
-def _oriented(
-    tangent: FloatArray, sign: float, point: Point, turn: float
-) -> tuple[FloatArray, float]:
-    """Keep the direction of travel across a kink.
-
-    Where contact states change the branch may turn back sharply, so that the tangent nearest to the old one leads back to the kink. The
-    sign of the bordered determinant is the same along a piecewise smooth path (Allgower & Georg 1990); a sign that changes although the
-    tangent hardly turned is a bifurcation point, which is passed straight on.
-    """
-    reversed_ = sign * point.orientation < 0.0 and turn < SMOOTH_TURN
-    return (-tangent, -sign) if reversed_ else (tangent, sign)
-
-
-def trace(
-    problem: Problem,
-    start: Point,
-    end: float,
-    *,
-    options: Newton,
-    control: StepControl,
-    weights: FloatArray,
-) -> Iterator[Point]:
-    """Follow a branch from `start` until its parameter passes `end`.
-
-    Parameters
-    ----------
-    problem
-        The equation.
-    start
-        A converged point with its tangent; it is not yielded again.
-    end
-        Parameter value of the last point, which is solved exactly there.
-    options, control
-        Corrector and step control.
-    weights
-        (n,) share of each unknown in the length of a step.
-
-    Yields
-    ------
-    Point
-        Each point that was reached, until the end, `max_points`, or a return to before the start. If no step, however short, converges, a last point with status
-        `Status.STEP_TOO_SMALL` and the state it came from.
-    """
-    point = start
-    # the tangent is oriented towards growing p; a branch to the left starts against it
-    if (end - start.p) * start.tangent[-1] < 0:
-        point = replace(point, tangent=-start.tangent, orientation=-start.orientation)
-    if point.orientation == 0.0:
-        measure = _measure(point.x, weights, control)
-        _, sign = _tangent(problem, np.append(point.x, point.p), point.tangent, measure)
-        point = replace(point, orientation=sign)
-    for _ in range(control.max_points):
-        point = _advance(problem, point, end, options, control, weights)
-        yield point
-        left = (point.p - start.p) * (end - start.p) < -BACKWARD * (end - start.p) ** 2
-        if not point.solution.status.converged or point.p == end or left:
-            return
-
-
-def _advance(
-    problem: Problem,
-    point: Point,
-    end: float,
-    options: Newton,
-    control: StepControl,
-    weights: FloatArray,
+def _round_corner(
+    problem: Problem, point: Point, unit: FloatArray, end: float, following: Following
 ) -> Point:
-    measure = _measure(point.x, weights, control)
-    unit = point.tangent / measure.of(point.tangent)
+    """Leave a corner of more than a right angle along its far side.
+
+    No plane across the old tangent meets that side. Its tangent is that of the Jacobian just beyond the corner, oriented as the path
+    was.
+    """
+    smallest = following.control.smallest
+    measure = _measure(point.x, following)
     y = np.append(point.x, point.p)
-    step = point.step
-    contact = linear = 0.0
     iterations = 0
-    while step >= control.smallest:
-        guess = y + step * unit
-        row = measure.row(unit)
-        passes = (guess[-1] - end) * (point.p - end) <= 0.0
-        if passes:
-            guess = y + (end - point.p) / unit[-1] * unit
-            row = np.append(np.zeros(point.x.size), 1.0 / control.scale)
-        value = float(row @ guess)
-        solution = newton(lambda v, r=row, b=value: _border(problem, v, r, b), guess, options)  # type: ignore[misc]
-        contact, linear = contact + solution.seconds_contact, linear + solution.seconds_linear
-        iterations += solution.iterations
-        p = end if passes else float(solution.x[-1])
-        # a corrector that slides past the end of the range is taken back like one that slides too far
-        near = measure.of(solution.x - y) <= 4.0 * step and (p - end) * (point.p - end) >= 0.0
-        if solution.status.converged and near:
-            x = solution.x[:-1]
-            tangent, sign = _tangent(problem, solution.x, unit, _measure(x, weights, control))
-            turn = _cosine(unit, tangent, measure)
-            if turn > SHARP_TURN or step < 4 * control.smallest:
-                next_step = _next_step(step, solution.iterations, turn, control)
-                tangent, sign = _oriented(tangent, sign, point, turn)
-                spent = replace(
-                    solution,
-                    x=x,
-                    iterations=iterations,
-                    seconds_contact=contact,
-                    seconds_linear=linear,
+    for ahead in LOOKS_AHEAD:
+        far, sign = _tangent(problem, y + ahead * smallest * unit, unit, measure)
+        if sign == 0.0:
+            continue
+        if sign * point.orientation < 0.0:
+            far = -far
+        for share in LEAVES_BY:
+            new = _step(problem, point, far, share * smallest, end, following)
+            iterations += new.solution.iterations
+            if new.solution.status.converged and measure.cosine(far, new.tangent) > SHARP_TURN:
+                return replace(
+                    new, step=4.0 * smallest, solution=replace(new.solution, iterations=iterations)
                 )
-                return Point(x, p, tangent, next_step, spent, sign)
-        step *= 0.5
-    failed = Solution(point.x, Status.STEP_TOO_SMALL, iterations, np.nan, contact, linear)
-    return Point(point.x, point.p, point.tangent, control.first, failed, point.orientation)
-
-
-def _cosine(a: FloatArray, b: FloatArray, measure: _Measure) -> float:
-    return float(measure.row(a) @ b) / (measure.of(a) * measure.of(b))
+    failed = replace(
+        point.solution, status=Status.STEP_TOO_SMALL, iterations=iterations, residual_norm=np.nan
+    )
+    return replace(
+        point,
+        step=following.control.first,
+        solution=replace(failed, seconds_contact=0.0, seconds_linear=0.0),
+    )
 
 
 def _next_step(step: float, iterations: int, turn: float, control: StepControl) -> float:
@@ -286,40 +322,38 @@ def _next_step(step: float, iterations: int, turn: float, control: StepControl) 
     return float(np.clip(step * factor, control.smallest, control.largest))
 
 
-def step_to(
-    problem: Problem,
-    point: Point,
-    p: float,
-    options: Newton,
-    control: StepControl,
-    weights: FloatArray,
-) -> Point:
-    """Go from `point` to the parameter value `p`: one predicted step, or the branch between where that fails.
+def _with_cost(point: Point, spent: list[Solution]) -> Point:
+    """Charge a point with all the attempts that led to it."""
+    solution = replace(
+        point.solution,
+        iterations=sum(s.iterations for s in spent),
+        seconds_contact=sum(s.seconds_contact for s in spent),
+        seconds_linear=sum(s.seconds_linear for s in spent),
+    )
+    return replace(point, solution=solution)
+
+
+def step_to(problem: Problem, point: Point, p: float, following: Following) -> Point:
+    """Go from `point`, whose tangent shows growing p, to the value `p`: one predicted step, or the branch between.
 
     Returns
     -------
     Point
-        The point at `p`; if neither way converges, one at `p` with the status of the direct attempt and its last iterate.
+        The point at `p`, its tangent showing growing p; if neither way converges, one at `p` with the status of the direct
+        attempt and its last iterate.
     """
     if point.p == p:
         return point
     guess = point.x
-    if abs(point.tangent[-1]) > 0:
+    if point.tangent[-1] != 0.0:
         guess = point.x + (p - point.p) / point.tangent[-1] * point.tangent[:-1]
-    direct = start_point(problem, guess, p, options, control, weights)
+    direct = start_point(problem, guess, p, following)
     if direct.solution.status.converged:
         return direct
-    last, iterations = direct, direct.solution.iterations
-    contact, linear = direct.solution.seconds_contact, direct.solution.seconds_linear
-    for last in trace(problem, point, p, options=options, control=control, weights=weights):
-        iterations += last.solution.iterations
-        contact, linear = (
-            contact + last.solution.seconds_contact,
-            linear + last.solution.seconds_linear,
-        )
-    reached = last.p == p and last.solution.status.converged
-    ended = last if reached else direct
-    solution = replace(
-        ended.solution, iterations=iterations, seconds_contact=contact, seconds_linear=linear
-    )
-    return replace(ended, p=p, solution=solution)
+    onward = point if p > point.p else reversed_point(point)
+    points = list(trace(problem, onward, p, following))
+    spent = [direct.solution, *(q.solution for q in points)]
+    last = points[-1]
+    if last.p != p or not last.solution.status.converged:
+        return _with_cost(direct, spent)
+    return _with_cost(last if p > point.p else reversed_point(last), spent)

@@ -1,0 +1,179 @@
+"""The two passages of the Jacobian Alert: a branch with few harmonics, then the frequencies that need more."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.selection import jacobian_alert
+from stickslip.response.preload import bonded_start, preload
+from stickslip.response.sweep import ForcedPoint, ForcedProblem, forced_point
+from stickslip.solve.continuation import Point, advance, start_point, step_to
+from stickslip.solve.newton import Solution, newton
+
+LOAD_SHARES = (
+    0.05,
+    0.1,
+    0.2,
+    0.4,
+    0.6,
+    0.8,
+    1.0,
+)  # excitation ramp where the first point does not converge at once
+LOOP = 3  # multiples of `Sweep.points` after which a branch that gains no frequency is left
+NEIGHBOURS = 2  # points on each side from which a repeat that fails is tried
+
+
+def first_passage(
+    problem: ForcedProblem, load: HarmonicLoad, points: list[ForcedPoint]
+) -> Iterator[ForcedPoint]:
+    """Continue the first passage after `points`, which may be empty, and append to them.
+
+    Each new point depends on `points` alone, so that a run taken up again goes on as it would have.
+    """
+    sweep = problem.sweep
+    if sweep.frequencies:
+        yield from _grid(problem, load, points)
+        return
+    first, last = sweep.omega_range
+    while not points or points[-1].omega < last or not points[-1].converged:
+        began = perf_counter()
+        reach = max((p.omega for p in points), default=first)
+        if points and not points[-1].converged and reach == last:
+            return
+        point = None
+        if points and not _lost(problem, points):
+            following = problem.following(problem.low)
+            point = advance(problem.low, problem.branch_point(points[-1]), last, following)
+        if point is None or point.p < first:
+            # the branch starts here, or is lost: take it up (again) a little further on
+            gap = sweep.control.largest * sweep.control.scale if points else 0.0
+            point = _fresh_point(problem, load, min(reach + gap, last))
+        points.append(_low_point(problem, point, len(points), began))
+        yield points[-1]
+
+
+def _lost(problem: ForcedProblem, points: list[ForcedPoint]) -> bool:
+    """Whether the branch ended or runs in circles."""
+    farthest = int(np.argmax([p.omega for p in points]))
+    return not points[-1].converged or len(points) - farthest > LOOP * problem.sweep.points
+
+
+def _grid(
+    problem: ForcedProblem, load: HarmonicLoad, points: list[ForcedPoint]
+) -> Iterator[ForcedPoint]:
+    """Step through equally spaced frequencies."""
+    sweep = problem.sweep
+    following = problem.following(problem.low)
+    for omega in np.linspace(*sweep.omega_range, sweep.frequencies)[len(points) :]:
+        began = perf_counter()
+        before = [p for p in points if p.converged]
+        point = None
+        if before:
+            point = step_to(problem.low, problem.branch_point(before[-1]), float(omega), following)
+        if point is None or not point.solution.status.converged:
+            point = _fresh_point(problem, load, float(omega))
+        points.append(_low_point(problem, point, len(points), began))
+        yield points[-1]
+
+
+def _fresh_point(problem: ForcedProblem, load: HarmonicLoad, omega: float) -> Point:
+    """Solve from the static equilibrium plus the bonded vibration; ramp the excitation if that is too far away."""
+    balance = problem.low
+    following = problem.following(balance)
+    guess = balance.coefficients(bonded_start(balance, omega, problem.system))
+    guess[0] = preload(problem.system, load.static)
+    point = start_point(balance, balance.unknowns(guess), omega, following)
+    if point.solution.status.converged:
+        return point
+    x = balance.unknowns(np.concatenate([guess[:1], LOAD_SHARES[0] * guess[1:]]))
+    spent = [point.solution]
+    for share in LOAD_SHARES:
+        ramped = HarmonicLoad(load.static, {h: share * f for h, f in load.harmonics.items()})
+        eased = replace(balance, linear=balance.linear.with_load(ramped))
+        point = start_point(eased, x, omega, following)
+        spent.append(point.solution)
+        x = point.x
+    return replace(point, solution=_charged(point.solution, spent))
+
+
+def _low_point(problem: ForcedProblem, point: Point, index: int, began: float) -> ForcedPoint:
+    error, seconds = np.nan, 0.0
+    if point.solution.status.converged and problem.sweep.selection == "jacobian_alert":
+        alert = jacobian_alert(problem.low, problem.high, point.x, point.p, problem.alert_dofs)
+        error, seconds = alert.error, alert.seconds_contact
+    made = forced_point(problem.low, point.solution, "low", index, point.p, perf_counter() - began)
+    return replace(
+        made,
+        tangent=point.tangent,
+        step=point.step,
+        orientation=point.orientation,
+        predicted_error=error,
+        seconds_contact=made.seconds_contact + seconds,
+    )
+
+
+def repeat(
+    problem: ForcedProblem, point: ForcedPoint, others: Mapping[int, ForcedPoint]
+) -> ForcedPoint:
+    """Solve a frequency with more harmonics: from q + Δq, from q, or along the branch from a neighbour.
+
+    Parameters
+    ----------
+    problem
+        The forced response.
+    point
+        Point of the first passage.
+    others
+        Accepted points by index: repeats, and points of the first passage that need none.
+    """
+    began = perf_counter()
+    balance, omega = problem.high, point.omega
+    alert = jacobian_alert(
+        problem.low, balance, problem.low.unknowns(point.coefficients), omega, problem.alert_dofs
+    )
+    spent: list[Solution] = []
+    for start in (alert.start, balance.unknowns(point.coefficients)):
+        spent.append(newton(lambda v: balance.linearise(v, omega), start, problem.sweep.newton))
+        if spent[-1].status.converged:
+            break
+    for neighbour in _neighbours(point.index, others):
+        if spent[-1].status.converged:
+            break
+        spent.append(along_branch(problem, neighbour, omega).solution)
+    solution = _charged(spent[-1], spent)
+    made = forced_point(balance, solution, "high", point.index, omega, perf_counter() - began)
+    return replace(
+        made,
+        seconds_contact=made.seconds_contact + alert.seconds_contact,
+        predicted_error=point.predicted_error,
+    )
+
+
+def along_branch(problem: ForcedProblem, point: ForcedPoint, omega: float) -> Point:
+    """Go from an accepted point to another frequency on the branch with many harmonics."""
+    balance = problem.high
+    following = problem.following(balance)
+    start = start_point(balance, balance.unknowns(point.coefficients), point.omega, following)
+    if not start.solution.status.converged:
+        return start
+    return step_to(balance, start, omega, following)
+
+
+def _neighbours(index: int, others: Mapping[int, ForcedPoint]) -> list[ForcedPoint]:
+    """Return the accepted points nearest in index, from both sides."""
+    below = sorted((i for i in others if i < index), reverse=True)[:NEIGHBOURS]
+    above = sorted(i for i in others if i > index)[:NEIGHBOURS]
+    return [others[i] for i in sorted([*below, *above], key=lambda i: abs(i - index))]
+
+
+def _charged(solution: Solution, spent: list[Solution]) -> Solution:
+    """Charge a solution with all the attempts that led to it."""
+    return replace(
+        solution,
+        iterations=sum(s.iterations for s in spent),
+        seconds_contact=sum(s.seconds_contact for s in spent),
+        seconds_linear=sum(s.seconds_linear for s in spent),
+    )

@@ -1,0 +1,82 @@
+"""The resonance peak of a forced response, resolved by a few points."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+from stickslip.harmonic.selection import jacobian_alert
+from stickslip.response.passages import along_branch, repeat
+from stickslip.response.sweep import ForcedPoint, ForcedProblem, forced_point
+from stickslip.solve.continuation import start_point, step_to
+
+PEAK_RESOLUTION = 5e-4  # width of the bracket of the peak, relative to its frequency, at which it counts as resolved
+
+
+def resolve_peak(
+    problem: ForcedProblem, accepted: list[ForcedPoint], done: list[ForcedPoint]
+) -> Iterator[ForcedPoint]:
+    """Add points around the highest one until its bracket is narrow.
+
+    Parameters
+    ----------
+    problem
+        The forced response.
+    accepted
+        Points of both passages in the order of the branch.
+    done
+        Peak points of an interrupted run.
+    """
+    known = [p for p in accepted if p.converged]
+    heights = [problem.amplitude(p) for p in known]
+    for index in range(problem.sweep.peak_points):
+        omega = _vertex(known, heights)
+        if omega is None:
+            return
+        top = int(np.argmax(heights))
+        if index < len(done):
+            point = done[index]
+        else:
+            point = _peak_point(problem, known[top], omega, index)
+            yield point
+        if not point.converged:
+            return
+        place = top if omega < known[top].omega else top + 1
+        known.insert(place, point)
+        heights.insert(place, problem.amplitude(point))
+
+
+def _vertex(known: list[ForcedPoint], heights: list[float]) -> float | None:
+    """Where to look next for the peak; None when it is resolved, at the ends of the branch, or where it folds."""
+    top = int(np.argmax(heights)) if heights else 0
+    if top in (0, len(known) - 1):
+        return None
+    a, b, c = (known[i].omega for i in (top - 1, top, top + 1))
+    u, v, w = (heights[i] for i in (top - 1, top, top + 1))
+    if not a < b < c or c - a < PEAK_RESOLUTION * b:
+        return None
+    below, above = (b - a) * (v - w), (b - c) * (v - u)
+    # a kink holds the parabola on one side of the peak: halve the other side once it is three times as wide
+    if max(c - b, b - a) > 3.0 * min(c - b, b - a) or below == above:
+        return 0.5 * (b + c) if c - b > b - a else 0.5 * (a + b)
+    return float(b - 0.5 * ((b - a) * below - (b - c) * above) / (below - above))
+
+
+def _peak_point(problem: ForcedProblem, top: ForcedPoint, omega: float, index: int) -> ForcedPoint:
+    began = perf_counter()
+    balance = problem.balance(top.order)
+    if balance is not problem.low:
+        solution = along_branch(problem, top, omega).solution
+        return forced_point(balance, solution, "peak", index, omega, perf_counter() - began)
+    following = problem.following(balance)
+    start = start_point(balance, balance.unknowns(top.coefficients), top.omega, following)
+    point = step_to(balance, start, omega, following)
+    made = forced_point(balance, point.solution, "peak", index, omega, perf_counter() - began)
+    if problem.sweep.selection != "jacobian_alert" or not made.converged:
+        return made
+    alert = jacobian_alert(problem.low, problem.high, point.x, omega, problem.alert_dofs)
+    made = replace(made, predicted_error=alert.error)
+    if problem.alerted(made):
+        made = replace(repeat(problem, made, {}), stage="peak")
+    return replace(made, seconds_total=perf_counter() - began)

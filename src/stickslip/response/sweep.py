@@ -1,0 +1,210 @@
+"""What a forced response is asked for and what it consists of."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.errors import input_error
+from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
+from stickslip.harmonic.dynamic_stiffness import condense
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.system import System
+from stickslip.solve.continuation import Following, Point, StepControl
+from stickslip.solve.newton import Newton, Solution
+from stickslip.solve.status import Status
+
+Selection = Literal["jacobian_alert", "always_low", "always_high"]
+Stage = Literal["low", "high", "peak"]
+LARGEST_STEP = (
+    0.25  # arc length: a quarter of the size of the vibration, or `1 / points` of the range
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sweep:
+    """How a forced response is computed.
+
+    Parameters
+    ----------
+    omega_range
+        First and last excitation frequency, rad/s, in growing order.
+    low, high
+        Harmonics of the first passage and of the repeats; the static term is always kept.
+    samples
+        Samples per period of the contact forces.
+    threshold
+        Predicted error (fraction) above which a frequency is repeated with `high`.
+    selection
+        ``jacobian_alert``, or the same number of harmonics at every frequency.
+    points
+        Smallest number of points of the first passage; more are taken where the response turns.
+    frequencies
+        Number of equally spaced frequencies to step through instead of following the branch by arc length; 0: arc length.
+    peak_points
+        Most points added to resolve the peak.
+    newton
+        Corrector options.
+    """
+
+    omega_range: tuple[float, float]
+    low: int = 1
+    high: int = 5
+    samples: int = 256
+    threshold: float = 0.05
+    selection: Selection = "jacobian_alert"
+    points: int = 40
+    frequencies: int = 0
+    peak_points: int = 12
+    newton: Newton = Newton()  # noqa: RUF009  # frozen
+
+    def __post_init__(self) -> None:
+        first, last = self.omega_range
+        if not 0.0 < first < last:
+            raise input_error(
+                "Sweep.omega_range",
+                f"must be positive and growing, got {first:g} to {last:g} rad/s",
+                "Swap the two ends.",
+            )
+        if not 1 <= self.low <= self.high:
+            raise input_error(
+                "Sweep", f"harmonics low = {self.low}, high = {self.high}", "Give 1 <= low <= high."
+            )
+
+    @property
+    def control(self) -> StepControl:
+        """Step control of the branch: a step is at most a `points`-th of the range."""
+        first, last = self.omega_range
+        largest = 0.25
+        return StepControl(
+            scale=(last - first) / (self.points * largest), first=0.05, largest=largest
+        )
+
+    @property
+    def first_order(self) -> int:
+        """Harmonics of the first passage."""
+        return self.high if self.selection == "always_high" else self.low
+
+
+@dataclass(frozen=True, eq=False)
+class ForcedPoint:
+    """One frequency of a forced response: arrays and numbers only, so that it can be written down and given back.
+
+    Attributes
+    ----------
+    stage
+        ``low``: first passage; ``high``: repeated with more harmonics; ``peak``: added to resolve the peak.
+    index
+        Position in the stage; a ``high`` point has the index of the ``low`` point it repeats.
+    omega
+        Frequency, rad/s.
+    coefficients
+        (order+1, n_retained) complex displacement of the retained coordinates, m.
+    tangent, step, orientation
+        Where the branch goes on (scaled); empty and 0 outside the first passage.
+    status
+        How the solver ended; a point that did not converge is no solution.
+    iterations
+        Newton steps.
+    predicted_error
+        Of the Jacobian Alert, as a fraction; NaN where it was not asked.
+    seconds_contact, seconds_linear, seconds_total
+        Time in contact forces, in factorisations, and in all.
+    """
+
+    stage: Stage
+    index: int
+    omega: float
+    coefficients: ComplexArray
+    tangent: FloatArray
+    step: float
+    status: Status
+    iterations: int
+    predicted_error: float
+    seconds_contact: float
+    seconds_linear: float
+    seconds_total: float
+    orientation: float = 0.0
+
+    @property
+    def order(self) -> int:
+        """Harmonics kept at this point."""
+        return int(self.coefficients.shape[0]) - 1
+
+    @property
+    def converged(self) -> bool:
+        """Whether the point is a solution."""
+        return self.status.converged
+
+
+@dataclass(frozen=True, eq=False)
+class ForcedProblem:
+    """A system under a load, set up for both passages."""
+
+    system: System
+    sweep: Sweep
+    low: HarmonicBalance
+    high: HarmonicBalance
+
+    @property
+    def alert_dofs(self) -> IntArray:
+        """Structure dofs over which the alert takes its error."""
+        chosen = self.system.alert_outputs
+        return self.system.outputs if chosen is None else self.system.outputs[chosen]
+
+    def balance(self, order: int) -> HarmonicBalance:
+        """Return the periodic problem with `order` harmonics, one of the two."""
+        return self.low if order == self.low.order else self.high
+
+    def following(self, balance: HarmonicBalance) -> Following:
+        """Return how a branch of `balance` is followed."""
+        weights = np.ones(balance.size)
+        # the static part is left out of the arc length, or it would hide the growth of the vibration
+        weights[: balance.linear.n] = 0.0
+        return Following(newton=self.sweep.newton, control=self.sweep.control, weights=weights)
+
+    def alerted(self, point: ForcedPoint) -> bool:
+        """Whether the alert asks for more harmonics at a point of the first passage."""
+        return point.converged and bool(point.predicted_error > self.sweep.threshold)
+
+    def branch_point(self, point: ForcedPoint) -> Point:
+        """Return a point of the first passage as one that a branch goes on from."""
+        x = self.low.unknowns(point.coefficients)
+        solution = Solution(x, point.status, 0, 0.0, 0.0, 0.0)
+        return Point(x, point.omega, point.tangent, point.step, solution, point.orientation)
+
+    def amplitude(self, point: ForcedPoint, output: int = 0) -> float:
+        """First-harmonic amplitude of output number `output`, m."""
+        motion = self.low.linear.recover(point.omega, point.coefficients)
+        return float(np.abs(motion[1, self.system.outputs[output]]))
+
+
+def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedProblem:
+    """Set up the forced response of `system` under `load`."""
+    linear = condense(system.structure, system.retained, load)
+    low = harmonic_balance(linear, system.interface, sweep.first_order, sweep.samples)
+    return ForcedProblem(system, sweep, low, low.with_order(sweep.high))
+
+
+def accepted_points(points: Sequence[ForcedPoint]) -> list[ForcedPoint]:
+    """Return the points that make up the response: repeats in place of the points they repeat, then peak points."""
+    high = {p.index: p for p in points if p.stage == "high"}
+    kept = [high.get(p.index, p) for p in points if p.stage == "low"]
+    return kept + [p for p in points if p.stage == "peak"]
+
+
+def forced_point(
+    balance: HarmonicBalance,
+    solution: Solution,
+    stage: Stage,
+    index: int,
+    omega: float,
+    seconds: float,
+) -> ForcedPoint:
+    """Return a solution as a point of the response."""
+    return ForcedPoint(
+        stage, index, omega, balance.coefficients(solution.x), np.zeros(0), 0.0, solution.status, solution.iterations,
+        np.nan, solution.seconds_contact, solution.seconds_linear, seconds,
+    )  # fmt: skip
