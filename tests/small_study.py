@@ -1,4 +1,4 @@
-"""A study that runs in seconds: the example on a coarse mesh, one nearly stuck load case."""
+"""A study that runs in seconds: the example on a coarse mesh, one load case that sticks."""
 
 import re
 from pathlib import Path
@@ -9,8 +9,8 @@ CHANGES = {
     "airfoil_size_m": "0.012",
     "platform_size_m": "0.012",
     "foot_size_m": "0.016",
-    "ratios": "[200]",
-    "frequency_hz": "[235.0, 262.0]",
+    "ratios": "[2000]",
+    "frequency_hz": "[185.0, 207.0]",
     "points": "8",
     "peak_points": "2",
     "samples": "64",

@@ -107,7 +107,7 @@ def test_run_writes_mesh_and_log(whole: tuple[Path, subprocess.CompletedProcess[
     assert (folder / "blades.msh").stat().st_size > 0
     log = (folder / "run.log").read_text()
     assert "stuck mode 5: full" in log
-    assert "F_CL/F_HE = 200: peak" in log
+    assert "F_CL/F_HE = 2000: peak" in log
 
 
 def test_table_and_alert_are_told(whole: tuple[Path, subprocess.CompletedProcess[str]]) -> None:

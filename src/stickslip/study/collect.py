@@ -104,6 +104,12 @@ class CaseResult:
         return float("nan") if self.peak < 0 else self.accepted[self.peak].point.omega / HZ
 
     @property
+    def peak_at_end(self) -> bool:
+        """Whether the largest amplitude stands at an end of the frequency range."""
+        omega = [a.point.omega for a in self.accepted]
+        return self.peak >= 0 and omega[self.peak] in (min(omega), max(omega))
+
+    @property
     def failed(self) -> int:
         """Number of accepted points that did not converge."""
         return sum(not a.point.converged for a in self.accepted)

@@ -190,6 +190,11 @@ def _load_case(run: _Run, case: Case, i: int) -> CaseResult:
         report_output=case.report_output,
     )
     _warn_drift(run, problem, result)
+    if result.peak_at_end:
+        run.warn(
+            f"F_CL/F_HE = {ratio:g}: the largest amplitude stands at the end of the sweep ({result.peak_frequency_hz:.2f} Hz); "
+            "it is no resonance. Widen sweep.frequency_hz."
+        )
     result = replace(result, retention_shift=peak_shift(case, result, i, run.journal))
     run.log.say(
         f"F_CL/F_HE = {ratio:g}: peak {result.peak_amplitude:.4e} m at {result.peak_frequency_hz:.3f} Hz, "

@@ -5,7 +5,9 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from stickslip.response.transient import integrate
+from stickslip.response.fields import signals
+from stickslip.response.forced import ForcedPoint, ForcedProblem, forced_problem
+from stickslip.response.transient import TransientStart, integrate
 from stickslip.study.build import Case
 from stickslip.study.collect import HZ, Accepted, CaseResult
 from stickslip.study.journal import Journal
@@ -95,14 +97,15 @@ def _three(result: CaseResult) -> list[Accepted]:
 
 def _check(case: Case, result: CaseResult, load_case: int, accepted: Accepted) -> Check:
     point, output = accepted.point, result.report_output
-    system = case.system
+    system, load = case.system, case.load(result.ratio)
     found = integrate(
         system.structure,
         system.interface.gap_operator,
         system.interface.laws,
-        case.load(result.ratio),
+        load,
         point.omega,
         system.outputs,
+        start=_start(forced_problem(system, load, case.sweep), point),
     )
     return Check(
         load_case=load_case,
@@ -111,4 +114,15 @@ def _check(case: Case, result: CaseResult, load_case: int, accepted: Accepted) -
         transient=float(np.abs(found.harmonics[1, output])),
         settled=bool(found.settled),
         periods=int(found.periods),
+    )
+
+
+def _start(problem: ForcedProblem, point: ForcedPoint) -> TransientStart:
+    """Return the balance's state at t = 0: near what is judged, so that little has to settle."""
+    motion = problem.low.linear.recover(point.omega, point.coefficients)
+    rate = 1j * point.omega * np.arange(len(motion))[:, None]
+    return TransientStart(
+        displacement=motion.real.sum(axis=0),
+        velocity=(rate * motion).real.sum(axis=0),
+        traction=signals(problem, point).force[:, :2, 0],
     )
