@@ -7,9 +7,10 @@ from stickslip.study.schema import Study
 
 BYTES_A_NODE = 35e3  # assembly and factorisation of second-order tetrahedra, measured at 10 to 30 thousand nodes
 BASE_GB = 0.35  # interpreter and libraries
-NEWTON_A_POINT = 5  # Newton steps of a point, the slower ones near a peak included
-REPEATED = 0.4  # share of points that the alert repeats
-FLOPS = 4e9  # of a small dense factorisation on one core
+POINTS = 3.0  # points of a branch for each one asked: more are taken where the response turns
+NEWTON_A_POINT = 20  # measured over the example's load cases, repeats and failed tries included
+REPEATED = 0.6  # share of points that the alert repeats
+FLOPS = 2e9  # of a Newton step: a small dense factorisation on one core, and the contacts
 SECONDS_A_NODE = 1.2e-3  # assembly, reduction and the full model's frequencies
 RETAINED = 6  # damper coordinates beside three a contact
 
@@ -46,7 +47,7 @@ def estimate(study: Study, nodes: int) -> Estimate:
     """Estimate memory and work of `study` on a mesh of `nodes` nodes."""
     t = study.tables
     coordinates = 9 * len(t.damper.sections_m) + RETAINED
-    points = len(t.loads.ratios) * (t.sweep.points + t.sweep.peak_points)
+    points = len(t.loads.ratios) * (POINTS * t.sweep.points + t.sweep.peak_points)
     share_high = {"jacobian_alert": REPEATED, "always_low": 0.0, "always_high": 1.0}[
         t.harmonics.selection
     ]
