@@ -196,6 +196,12 @@ def at_frequency(
     return point
 
 
+def frictionless(problem: System) -> System:
+    """Return the system without its tangential contact springs."""
+    laws = tuple(replace(law, k_t=0.0, k_w=0.0) for law in problem.interface.laws)
+    return replace(problem, interface=replace(problem.interface, laws=laws))
+
+
 def integrated(
     problem: System, load: HarmonicLoad, omega: float, order: int, stepping: TimeStepping
 ) -> RefinedResult:
@@ -207,7 +213,7 @@ def integrated(
     n, n_contacts = problem.structure.n, problem.interface.n_contacts
     if order == 0:
         start = TransientStart(
-            preload(problem, load.static), np.zeros(n), np.zeros((n_contacts, 2))
+            preload(frictionless(problem), load.static), np.zeros(n), np.zeros((n_contacts, 2))
         )
     else:
         balance = balance_of(problem, load, order, 1024)
