@@ -147,9 +147,9 @@ SINGLE = {
         "loads.ratios.1: must be greater than 0, got 0. Give ratios of centrifugal load to excitation amplitude",
     ),
     "absolute folder": (
-        ("folder", '"/tmp/results"'),
+        ("folder", '"/var/results"'),
         (
-            "output.folder: must be a folder inside the study's folder, got '/tmp/results'. "
+            "output.folder: must be a folder inside the study's folder, got '/var/results'. "
             "Give a plain relative name such as 'results'."
         ),
     ),
