@@ -44,6 +44,8 @@ class BladePair:
         Height of the camber line's arc over the chord's length.
     twist
         Rotation of the tip section against the hub section about z.
+    force_span
+        Place of the force node on the airfoil's face, as a fraction of the span from hub to tip: low, as a shaker near the root.
     airfoil_size, platform_size, foot_size
         Element sizes.
 
@@ -71,6 +73,7 @@ class BladePair:
     tip_thickness: float = 0.0050
     camber: float = 0.04
     twist: float = math.radians(8)
+    force_span: float = 0.12
     airfoil_size: float = 0.0060
     platform_size: float = 0.0055
     foot_size: float = 0.0080
@@ -84,6 +87,12 @@ class BladePair:
         for name in ("flat_angle", "curved_angle"):
             if not getattr(self, name) < math.pi / 2:
                 raise _bad(name, f"must be below pi/2 rad, got {getattr(self, name)}", "Use rad.")
+        if not self.force_span < 0.5:
+            raise _bad(
+                "force_span",
+                f"must lie between 0 and 0.5, got {self.force_span}",
+                "0.12 is near the hub.",
+            )
         if self.shank_thickness >= 2 * self.half_width:
             raise _bad(
                 "pitch",

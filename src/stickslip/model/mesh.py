@@ -77,7 +77,7 @@ def mesh_blade_pair(geometry: BladePair, contacts: ContactPoints) -> SolidMesh:
     -------
     SolidMesh
         With the sets ``root``, ``contact`` (in the order of `contacts`), ``contact_L1`` and so on
-        (one a line), ``force`` (mid-span of blade 1) and ``output`` (tip of blade 1, mid-span
+        (one a line), ``force`` (on blade 1's airfoil, at `force_span`) and ``output`` (tip of blade 1, mid-span
         leading edge of blade 1, tip of blade 2).
 
     Raises
@@ -91,7 +91,10 @@ def mesh_blade_pair(geometry: BladePair, contacts: ContactPoints) -> SolidMesh:
     offset = np.array([geometry.pitch, 0.0, 0.0])
     on_second = np.array([side == "curved" for side in contacts.side])
     targets = contacts.position - on_second[:, None] * offset
-    marks = {"force": _section(geometry, 0.5)[7], "edge": _section(geometry, 0.5)[0]}
+    marks = {
+        "force": _section(geometry, geometry.force_span)[7],
+        "edge": _section(geometry, 0.5)[0],
+    }
     marks["tip"] = _section(geometry, 1.0)[2]
     points, cells = _mesh_blade(geometry, targets)
     nearest = _match(points, np.vstack([targets, *(marks[k] for k in ("force", "edge", "tip"))]))
@@ -260,7 +263,7 @@ def _build(occ: Any, geometry: BladePair) -> None:
     lines = [occ.addLine(a, b) for a, b in zip(corners, corners[1:] + corners[:1], strict=True)]
     face = occ.addPlaneSurface([occ.addCurveLoop(lines)])
     body = [e for e in occ.extrude([(2, face)], 0, g.platform_depth, 0) if e[0] == 3]
-    wires = [_wire(occ, _section(g, span)) for span in (0.0, 0.5, 1.0)]
+    wires = [_wire(occ, _section(g, span)) for span in (0.0, g.force_span, 0.5, 1.0)]
     airfoil = occ.addThruSections(wires, makeSolid=True, makeRuled=True)
     occ.fuse([(3, foot)], body + [e for e in airfoil if e[0] == 3])
 

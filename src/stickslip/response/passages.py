@@ -9,7 +9,7 @@ import numpy as np
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection import jacobian_alert
 from stickslip.response.preload import bonded_start, preload
-from stickslip.response.sweep import ForcedPoint, ForcedProblem, forced_point
+from stickslip.response.sweep import BRANCH_ITERATIONS, ForcedPoint, ForcedProblem, forced_point
 from stickslip.solve.continuation import Point, advance, start_point, step_to
 from stickslip.solve.newton import Solution, newton
 
@@ -82,7 +82,7 @@ def _grid(
 def _fresh_point(problem: ForcedProblem, load: HarmonicLoad, omega: float) -> Point:
     """Solve from the static equilibrium plus the bonded vibration; ramp the excitation if that is too far away."""
     balance = problem.low
-    following = problem.following(balance)
+    following = replace(problem.following(balance), newton=problem.sweep.newton)
     guess = balance.coefficients(bonded_start(balance, omega, problem.system))
     guess[0] = preload(problem.system, load.static)
     point = start_point(balance, balance.unknowns(guess), omega, following)
@@ -118,7 +118,7 @@ def _low_point(problem: ForcedProblem, point: Point, index: int, began: float) -
 def repeat(
     problem: ForcedProblem, point: ForcedPoint, others: Mapping[int, ForcedPoint]
 ) -> ForcedPoint:
-    """Solve a frequency with more harmonics: from q + Δq, from q, or along the branch from a neighbour.
+    """Solve a frequency with more harmonics: from q + Δq, along the branch from a neighbour, or from q.
 
     Parameters
     ----------
@@ -134,15 +134,15 @@ def repeat(
     alert = jacobian_alert(
         problem.low, balance, problem.low.unknowns(point.coefficients), omega, problem.alert_dofs
     )
-    spent: list[Solution] = []
-    for start in (alert.start, balance.unknowns(point.coefficients)):
-        spent.append(newton(lambda v: balance.linearise(v, omega), start, problem.sweep.newton))
-        if spent[-1].status.converged:
-            break
+    quick = replace(problem.sweep.newton, max_iterations=BRANCH_ITERATIONS)
+    spent = [newton(lambda v: balance.linearise(v, omega), alert.start, quick)]
     for neighbour in _neighbours(point.index, others):
         if spent[-1].status.converged:
             break
         spent.append(along_branch(problem, neighbour, omega).solution)
+    if not spent[-1].status.converged:
+        start = balance.unknowns(point.coefficients)
+        spent.append(newton(lambda v: balance.linearise(v, omega), start, problem.sweep.newton))
     solution = _charged(spent[-1], spent)
     made = forced_point(balance, solution, "high", point.index, omega, perf_counter() - began)
     return replace(

@@ -1,7 +1,7 @@
 """What a forced response is asked for and what it consists of."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,9 +18,9 @@ from stickslip.solve.status import Status
 
 Selection = Literal["jacobian_alert", "always_low", "always_high"]
 Stage = Literal["low", "high", "peak"]
-LARGEST_STEP = (
-    0.25  # arc length: a quarter of the size of the vibration, or `1 / points` of the range
-)
+# arc length: a quarter of the size of the vibration, or `1 / points` of the range
+LARGEST_STEP = 0.25
+BRANCH_ITERATIONS = 10  # of a corrector along a branch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,7 +163,12 @@ class ForcedProblem:
         weights = np.ones(balance.size)
         # the static part is left out of the arc length, or it would hide the growth of the vibration
         weights[: balance.linear.n] = 0.0
-        return Following(newton=self.sweep.newton, control=self.sweep.control, weights=weights)
+        # along a branch a shorter step is cheaper than a long correction
+        few = replace(
+            self.sweep.newton,
+            max_iterations=min(BRANCH_ITERATIONS, self.sweep.newton.max_iterations),
+        )
+        return Following(newton=few, control=self.sweep.control, weights=weights)
 
     def alerted(self, point: ForcedPoint) -> bool:
         """Whether the alert asks for more harmonics at a point of the first passage."""
