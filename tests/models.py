@@ -103,6 +103,20 @@ def griffin(limit: float) -> tuple[System, HarmonicLoad]:
     return system, HarmonicLoad(np.zeros(1), {1: np.array([0.1 + 0j])})
 
 
+def lifting() -> tuple[System, HarmonicLoad]:
+    """One mass on its spring and on a pressed contact that lifts off: its response bends to lower frequencies and folds.
+
+    m = k = 1, contact stiffness 1 and preload 1, c = 0.02, force 0.05.
+    """
+    one = np.ones((1, 1))
+    structure = Structure(one, 0.02 * one, one.copy(), table(("x",)))
+    law = ElasticCoulomb(k_t=0.0, k_w=0.0, k_n=1.0, mu=0.0, preload=1.0)
+    system = System(
+        structure, Interface(("n",), (law,), np.array([[0.0], [0.0], [1.0]])), np.array([0])
+    )
+    return system, HarmonicLoad(np.zeros(1), {1: np.array([0.05 + 0j])})
+
+
 def blades_and_damper(
     *, m: float | None = 0.0, excitation: float = 1.0, length: float = 1.0, force: float = 1.0, phase: float = 0.0,
     mirrored: bool = False,

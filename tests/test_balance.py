@@ -200,9 +200,15 @@ def test_published_amplitudes(frequency, low, high):
 
 
 def test_zero_load_is_refused():
-    system, _ = free_body_3d()
+    # neither a load nor a preload: there is nothing to measure residuals by
+    system, _ = free_body_3d(preload=0.0)
     with pytest.raises(InputError, match="HarmonicLoad: is zero"):
         balance_of(system, HarmonicLoad(np.zeros(12)))
+
+
+def test_a_preload_is_a_load():
+    system, _ = free_body_3d(preload=30.0)
+    assert balance_of(system, HarmonicLoad(np.zeros(12))).force_scale == 30.0
 
 
 @pytest.mark.parametrize(("order", "samples", "least"), [(5, 20, 40), (1, 4, 16)])

@@ -357,6 +357,17 @@ def test_order_of_contacts_does_not_matter():
     assert np.array_equal(b.state, a.state[order])
 
 
+@pytest.mark.parametrize("m", [None, -1.0, 0.0, 0.8])
+@pytest.mark.parametrize("direction", [0, 1])
+def test_a_direction_without_stiffness_carries_no_force(m, direction):
+    stiff = {"k_t": 1e6, "k_w": 1e6, ("k_t", "k_w")[direction]: 0.0}
+    law = ElasticCoulomb(**stiff, k_n=1e6, mu=0.5, preload=10.0, residual_traction=m)
+    period = evaluate(random_gap(np.random.default_rng(6), 3, 3.0, 0.3), [law], 64)
+    assert not np.any(period.force[0, direction])
+    assert not np.any(period.blocks[0, [TT + direction, TN + direction]])
+    assert np.any(period.force[0, 1 - direction])
+
+
 @pytest.mark.parametrize("m", [-1.0, -0.3, 0.0, 0.8])
 def test_residual_traction_sets_the_mean_of_a_stuck_contact(m):
     law = ElasticCoulomb(k_t=1e6, k_w=1e6, k_n=0.0, mu=0.5, preload=100.0, residual_traction=m)

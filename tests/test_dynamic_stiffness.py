@@ -213,6 +213,33 @@ def test_a_free_interior_is_refused():
         condense(replace(structure, stiffness=stiffness), RETAINED, loaded(0))
 
 
+@pytest.mark.parametrize("unit", [1e-8, 1.0, 1e8])
+def test_an_interior_without_mass_and_stiffness_is_refused(unit):
+    mass, stiffness = np.diag([1.0, 1, 0, 1]), np.diag([2.0, 2, 0, 2])
+    structure = Structure(unit * mass, 0.0 * mass, unit * stiffness, table(("q",) * 4))
+    with pytest.raises(InputError, match="can move without stiffness"):
+        condense(structure, np.array([0]), HarmonicLoad(np.ones(4)))
+
+
+@pytest.mark.parametrize("soft", [1e-10, 1e10])
+def test_an_interior_of_unequal_stiffnesses_is_held(soft):
+    # metres beside radians: entries of very different size are no sign of a free motion
+    stiffness = np.diag([2.0, soft, 1.0])
+    structure = Structure(np.eye(3), 0.1 * np.eye(3), stiffness, table(("q",) * 3))
+    linear = condense(structure, np.array([0]), HarmonicLoad(np.ones(3)))
+    moved = linear.recover(0.5, linear.condensed(0.5, 1).load)
+    assert moved[0, 1] == pytest.approx(1.0 / soft, rel=1e-12)
+
+
+def test_a_tiny_mass_is_condensed():
+    mass, stiffness = np.diag([1.0, 1, 1e-14, 1]), np.diag([2.0, 2, 3, 2])
+    stiffness[0, 2] = stiffness[2, 0] = 0.5
+    structure = Structure(mass, 0.1 * stiffness, stiffness, table(("q",) * 4))
+    got = condense(structure, np.array([0]), HarmonicLoad(np.ones(4))).condensed(1.0, 1)
+    d = dynamic(structure, 1.0)
+    assert got.stiffness[1, 0, 0] == pytest.approx(d[0, 0] - d[0, 2] ** 2 / d[2, 2], rel=1e-10)
+
+
 @pytest.mark.parametrize("name", ["mass", "damping", "stiffness"])
 def test_a_matrix_that_is_not_symmetric_is_named(name):
     structure = structure_of("general")

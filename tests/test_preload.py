@@ -1,8 +1,10 @@
 """Static equilibrium against closed forms of a block in a groove of two 45° contacts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from models import blades_and_damper, table
+from models import blades_and_damper, free_body_3d, table
 
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
@@ -75,6 +77,44 @@ def test_equilibrium_holds_the_load():
 
 def test_no_load_no_displacement():
     assert not np.any(preload(groove(1e6, 0.3), np.zeros(2)))
+
+
+def test_a_preload_of_the_contacts_is_a_load():
+    # the two contacts push the free body with their preload although no force acts on it from outside
+    system = free_body_3d(preload=30.0)[0].with_retention(1e3)
+    q = preload(system, np.zeros(12))
+    b = system.interface.gap_operator
+    gap = b @ q
+    normal = np.array([30.0, 15.0]) - 3e5 * gap[2::3]
+    assert np.all(normal > 0.0)
+    force = np.zeros(6)
+    for direction, k in ((0, 2e5), (1, 1e5)):
+        force[direction::3] = np.clip(k * gap[direction::3], -0.4 * normal, 0.4 * normal)
+    force[2::3] = -normal
+    pushed = b.T @ np.array([0, 0, -30.0, 0, 0, -15.0])
+    assert np.max(np.abs(pushed)) > 20.0
+    # Newton's tolerance, 1e-10 of the preload
+    assert np.allclose(system.structure.stiffness @ q, -(b.T @ force), rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("m", [0.0, 0.7, -1.0])
+@pytest.mark.parametrize("k_w", [0.0, 1e6])
+def test_residual_traction_does_not_move_the_seat(m, k_w):
+    # a residual traction is a force without a stiffness: it chooses a mean of the vibration, not the seat of the body
+    dofs = ("x", "z") if k_w == 0.0 else ("x", "y", "z")
+    load = np.array([0.0] * (len(dofs) - 1) + [LOAD])
+    system = groove(1e6, 0.3, dofs, k_w)
+    laws = tuple(replace(law, residual_traction=m) for law in system.interface.laws)
+    leaning = replace(system, interface=replace(system.interface, laws=laws))
+    assert np.array_equal(preload(leaning, load), preload(system, load))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_rotation_that_two_points_do_not_hold_is_named(seed):
+    # two point contacts leave the rotation about the line through them: singular up to rounding only
+    system, load = free_body_3d(seed, preload=0.0)
+    with pytest.raises(SingularError, match=r"coordinate (node\d+\.)?\w+ is held by nothing"):
+        preload(system, load.static)
 
 
 def test_unheld_coordinate_is_named():
