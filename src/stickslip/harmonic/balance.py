@@ -135,7 +135,7 @@ def harmonic_balance(
             "Retain all contact dofs.",
         )
     local = interface.restricted(linear.retained)
-    force_scale = linear.load.scale or max((law.preload for law in local.laws), default=0.0)
+    force_scale = max(linear.load.scale, *(law.preload for law in local.laws), 0.0)
     if force_scale <= 0.0:
         raise input_error("HarmonicLoad", "is zero", "Give a static or a harmonic force.")
     stiffness = local.stuck_stiffness()

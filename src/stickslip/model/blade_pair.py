@@ -55,25 +55,25 @@ class BladePair:
         If a length is not positive or the parts do not fit together.
     """
 
-    pitch: float = 0.050
+    pitch: float = 0.056
     foot_width: float = 0.034
     foot_depth: float = 0.048
     foot_height: float = 0.020
-    shank_thickness: float = 0.009
+    shank_thickness: float = 0.0132
     platform_gap: float = 0.001
     platform_depth: float = 0.048
-    platform_height: float = 0.075
+    platform_height: float = 0.110
     platform_edge: float = 0.004
     flat_angle: float = math.radians(45)
     curved_angle: float = math.radians(45)
-    airfoil_length: float = 0.165
+    airfoil_length: float = 0.160
     hub_chord: float = 0.046
     tip_chord: float = 0.040
-    hub_thickness: float = 0.0075
-    tip_thickness: float = 0.0050
+    hub_thickness: float = 0.0065
+    tip_thickness: float = 0.0055
     camber: float = 0.04
     twist: float = math.radians(8)
-    force_span: float = 0.12
+    force_span: float = 0.0
     airfoil_size: float = 0.0060
     platform_size: float = 0.0055
     foot_size: float = 0.0080
@@ -81,17 +81,15 @@ class BladePair:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            free = field.name in {"twist", "camber"}
+            free = field.name in {"twist", "camber", "force_span"}
             if not math.isfinite(value) or not (free or value > 0):
                 raise _bad(field.name, f"must be positive and finite, got {value}", "Give metres.")
         for name in ("flat_angle", "curved_angle"):
             if not getattr(self, name) < math.pi / 2:
                 raise _bad(name, f"must be below pi/2 rad, got {getattr(self, name)}", "Use rad.")
-        if not self.force_span < 0.5:
+        if not 0.0 <= self.force_span < 0.5:
             raise _bad(
-                "force_span",
-                f"must lie between 0 and 0.5, got {self.force_span}",
-                "0.12 is near the hub.",
+                "force_span", f"must lie in [0, 0.5), got {self.force_span}", "0 is the hub."
             )
         if self.shank_thickness >= 2 * self.half_width:
             raise _bad(

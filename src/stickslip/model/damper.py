@@ -85,16 +85,16 @@ class FlatCurvedDamper:
         Centre of mass in metres: offset (x, y, z) from the apex at y = 0.
     """
 
-    apex: tuple[float, float] = (0.025, 0.0715)
+    apex: tuple[float, float] = (0.028, 0.1065)
     flat_angle: float = math.radians(45)
     curved_angle: float = math.radians(45)
-    flat_distances: tuple[float, float] = (0.0140, 0.0155)
-    curved_distance: float = 0.0180
-    curved_radius: float = 0.025
+    flat_distances: tuple[float, float] = (0.002, 0.029)
+    curved_distance: float = 0.0045
+    curved_radius: float = 0.05
     sections: tuple[float, ...] = (-0.016, 0.0, 0.016)
-    mass: float = 0.0685
-    inertia: tuple[float, float, float] = (1.145e-5, 3.81e-6, 1.450e-5)
-    centre: tuple[float, float, float] = (0.00143, 0.0, -0.01376)
+    mass: float = 0.12
+    inertia: tuple[float, float, float] = (1.89e-5, 9.45e-6, 2.26e-5)
+    centre: tuple[float, float, float] = (-0.0014, 0.0, -0.0134)
 
     def __post_init__(self) -> None:
         for name in ("flat_angle", "curved_angle"):

@@ -263,7 +263,7 @@ def _build(occ: Any, geometry: BladePair) -> None:
     lines = [occ.addLine(a, b) for a, b in zip(corners, corners[1:] + corners[:1], strict=True)]
     face = occ.addPlaneSurface([occ.addCurveLoop(lines)])
     body = [e for e in occ.extrude([(2, face)], 0, g.platform_depth, 0) if e[0] == 3]
-    wires = [_wire(occ, _section(g, span)) for span in (0.0, g.force_span, 0.5, 1.0)]
+    wires = [_wire(occ, _section(g, span)) for span in sorted({0.0, g.force_span, 0.5, 1.0})]
     airfoil = occ.addThruSections(wires, makeSolid=True, makeRuled=True)
     occ.fuse([(3, foot)], body + [e for e in airfoil if e[0] == 3])
 

@@ -55,7 +55,9 @@ class Structure:
     def dof_set(self, name: str) -> IntArray:
         """Return the dof indices of the set `name`; an `InputError` names the known sets."""
         if name not in self.sets:
-            raise input_error("Structure", f"there is no set {name!r}", did_you_mean(name, list(self.sets)))
+            raise input_error(
+                "Structure", f"there is no set {name!r}", did_you_mean(name, list(self.sets))
+            )
         return self.sets[name]
 
     def expand(self, vector: FloatArray) -> FloatArray:
@@ -86,5 +88,9 @@ def join(**parts: Structure) -> Structure:
         return scipy.linalg.block_diag(*blocks)
 
     return Structure(
-        stack("mass"), stack("damping"), stack("stiffness"), join_dofs({k: s.dofs for k, s in parts.items()}), sets
+        stack("mass"),
+        stack("damping"),
+        stack("stiffness"),
+        join_dofs({k: s.dofs for k, s in parts.items()}),
+        sets,
     )

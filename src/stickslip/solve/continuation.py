@@ -351,9 +351,12 @@ def step_to(problem: Problem, point: Point, p: float, following: Following) -> P
     if direct.solution.status.converged:
         return direct
     onward = point if p > point.p else reversed_point(point)
-    points = list(trace(problem, onward, p, following))
-    spent = [direct.solution, *(q.solution for q in points)]
-    last = points[-1]
+    last, spent = onward, [direct.solution]
+    for last in trace(problem, onward, p, following):
+        spent.append(last.solution)
+        # beyond a fold the branch leads away, and what it would reach in the end is another state
+        if abs(last.p - p) > abs(point.p - p):
+            break
     if last.p != p or not last.solution.status.converged:
         return _with_cost(direct, spent)
     return _with_cost(last if p > point.p else reversed_point(last), spent)

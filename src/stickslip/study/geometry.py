@@ -87,6 +87,12 @@ class Blades(Section):
     twist_deg: float = Field(
         0.0, ge=-90, le=90, description="rotation of the tip against the hub in degrees, -90 to 90"
     )
+    force_span: float = Field(
+        0.0,
+        ge=0.0,
+        lt=0.5,
+        description="place of the force on blade 1's airfoil, as a fraction of the span from the hub, 0 to 0.5",
+    )
     airfoil_size_m: Length = Field(description="element size in the airfoil in m")
     platform_size_m: Length = Field(description="element size in the platform in m")
     foot_size_m: Length = Field(description="element size in shank and foot in m")
