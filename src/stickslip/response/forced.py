@@ -8,14 +8,17 @@ that resolve the resonance peak.
 from collections.abc import Iterator, Sequence
 
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response.passages import first_passage, repeat
+from stickslip.response.passages import first_passage, follow_run, repeat
 from stickslip.response.resonance import resolve_peak
 from stickslip.response.sweep import (
     ForcedPoint,
     ForcedProblem,
     Sweep,
+    accepted_pairs,
     accepted_points,
+    branch_points,
     forced_problem,
+    runs_of_repeats,
 )
 from stickslip.response.system import System
 
@@ -23,6 +26,7 @@ __all__ = [
     "ForcedPoint",
     "ForcedProblem",
     "Sweep",
+    "accepted_pairs",
     "accepted_points",
     "forced_problem",
     "forced_response",
@@ -66,5 +70,12 @@ def forced_response(
             solved = {i: p for i, p in high.items() if p.converged}
             high[point.index] = repeat(problem, point, quiet | solved)
             yield high[point.index]
-    accepted = [high.get(p.index, p) for p in low]
+    branches: list[ForcedPoint] = []
+    for first, last in runs_of_repeats(high):
+        if all(high[i].converged for i in range(first, last + 1)):
+            continue
+        branch = branch_points(done, first)
+        yield from follow_run(problem, first, last, low, branch, high)
+        branches += branch
+    accepted = accepted_points([*low, *high.values(), *branches])
     yield from resolve_peak(problem, accepted, [p for p in done if p.stage == "peak"])

@@ -9,7 +9,13 @@ import numpy as np
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection import jacobian_alert
 from stickslip.response.preload import bonded_start, preload
-from stickslip.response.sweep import BRANCH_ITERATIONS, ForcedPoint, ForcedProblem, forced_point
+from stickslip.response.sweep import (
+    BRANCH_ITERATIONS,
+    ForcedPoint,
+    ForcedProblem,
+    branch_end,
+    forced_point,
+)
 from stickslip.solve.continuation import Point, advance, start_point, step_to
 from stickslip.solve.newton import Solution, newton
 
@@ -23,7 +29,8 @@ LOAD_SHARES = (
     1.0,
 )  # excitation ramp where the first point does not converge at once
 LOOP = 3  # multiples of `Sweep.points` after which a branch that gains no frequency is left
-NEIGHBOURS = 2  # points on each side from which a repeat that fails is tried
+BRANCH_SEEDS = 4  # points on each side from which a branch with many harmonics is begun
+NEIGHBOURS = 1  # points on each side from which a repeat that fails is tried
 
 
 def first_passage(
@@ -150,6 +157,55 @@ def repeat(
         seconds_contact=made.seconds_contact + alert.seconds_contact,
         predicted_error=point.predicted_error,
     )
+
+
+def follow_run(
+    problem: ForcedProblem,
+    first: int,
+    last: int,
+    low: list[ForcedPoint],
+    branch: list[ForcedPoint],
+    high: Mapping[int, ForcedPoint],
+) -> Iterator[ForcedPoint]:
+    """Follow the branch with many harmonics through a run of repeats that did not all converge, and append to `branch`.
+
+    Where the two orders differ much the branch may fold: then some frequencies have no solution near the low-order one, and only the
+    branch itself leads through.
+    """
+    end = branch_end(low, last)
+    balance = problem.high
+    following = problem.following(balance)
+    while len(branch) <= LOOP * problem.sweep.points:
+        began = perf_counter()
+        if not branch:
+            point = _branch_start(problem, [*low[:first], *high.values()], first)
+            if point is None:
+                return
+        elif branch[-1].converged and branch[-1].omega != end:
+            point = advance(balance, problem.branch_point(branch[-1]), end, following)
+        else:
+            return
+        made = forced_point(
+            balance, point.solution, "branch", first, point.p, perf_counter() - began
+        )
+        branch.append(
+            replace(made, tangent=point.tangent, step=point.step, orientation=point.orientation)
+        )
+        yield branch[-1]
+
+
+def _branch_start(problem: ForcedProblem, points: list[ForcedPoint], first: int) -> Point | None:
+    """Solve with many harmonics at a point near index `first`: before it if possible, so that the whole run is passed."""
+    balance = problem.high
+    following = replace(problem.following(balance), newton=problem.sweep.newton)
+    usable = [p for p in points if p.converged and not (p.stage == "low" and problem.alerted(p))]
+    before = sorted((p for p in usable if p.index < first), key=lambda p: -p.index)[:BRANCH_SEEDS]
+    behind = sorted((p for p in usable if p.index >= first), key=lambda p: p.index)[:BRANCH_SEEDS]
+    for seed in [*before, *behind]:
+        point = start_point(balance, balance.unknowns(seed.coefficients), seed.omega, following)
+        if point.solution.status.converged:
+            return point
+    return None
 
 
 def along_branch(problem: ForcedProblem, point: ForcedPoint, omega: float) -> Point:

@@ -1,6 +1,6 @@
 """What a forced response is asked for and what it consists of."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -17,7 +17,7 @@ from stickslip.solve.newton import Newton, Solution
 from stickslip.solve.status import Status
 
 Selection = Literal["jacobian_alert", "always_low", "always_high"]
-Stage = Literal["low", "high", "peak"]
+Stage = Literal["low", "high", "branch", "peak"]
 # arc length: a quarter of the size of the vibration, or `1 / points` of the range
 LARGEST_STEP = 0.25
 BRANCH_ITERATIONS = 10  # of a corrector along a branch
@@ -95,9 +95,11 @@ class ForcedPoint:
     Attributes
     ----------
     stage
-        ``low``: first passage; ``high``: repeated with more harmonics; ``peak``: added to resolve the peak.
+        ``low``: first passage; ``high``: repeated with more harmonics; ``branch``: on the branch with more harmonics, where
+        repeats failed; ``peak``: added to resolve the peak.
     index
-        Position in the stage; a ``high`` point has the index of the ``low`` point it repeats.
+        Position in the stage; a ``high`` point has the index of the ``low`` point it repeats, a ``branch`` point that of the
+        first repeat of its run.
     omega
         Frequency, rad/s.
     coefficients
@@ -175,8 +177,8 @@ class ForcedProblem:
         return point.converged and bool(point.predicted_error > self.sweep.threshold)
 
     def branch_point(self, point: ForcedPoint) -> Point:
-        """Return a point of the first passage as one that a branch goes on from."""
-        x = self.low.unknowns(point.coefficients)
+        """Return a point of a branch as one that it goes on from."""
+        x = self.balance(point.order).unknowns(point.coefficients)
         solution = Solution(x, point.status, 0, 0.0, 0.0, 0.0)
         return Point(x, point.omega, point.tangent, point.step, solution, point.orientation)
 
@@ -193,11 +195,55 @@ def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedPr
     return ForcedProblem(system, sweep, low, low.with_order(sweep.high))
 
 
-def accepted_points(points: Sequence[ForcedPoint]) -> list[ForcedPoint]:
-    """Return the points that make up the response: repeats in place of the points they repeat, then peak points."""
+def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, ForcedPoint | None]]:
+    """Return the points that make up the response, each with the low-order point it repeats or is.
+
+    In the order of the branch: points of the first passage, their repeats in their place, and in place of a run of repeats that did not
+    all converge the branch with many harmonics, where that reached the other side. Peak points come last.
+    """
+    low = [p for p in points if p.stage == "low"]
     high = {p.index: p for p in points if p.stage == "high"}
-    kept = [high.get(p.index, p) for p in points if p.stage == "low"]
-    return kept + [p for p in points if p.stage == "peak"]
+    kept: list[tuple[ForcedPoint, ForcedPoint | None]] = []
+    passed = -1
+    for first, last in runs_of_repeats(high):
+        branch = branch_points(points, first)
+        if branch and reached(branch, branch_end(low, last)):
+            kept += [(high.get(p.index, p), p) for p in low[passed + 1 : first]]
+            kept += [(p, None) for p in branch]
+            passed = last
+    kept += [(high.get(p.index, p), p) for p in low[passed + 1 :]]
+    return kept + [(p, None) for p in points if p.stage == "peak"]
+
+
+def accepted_points(points: Sequence[ForcedPoint]) -> list[ForcedPoint]:
+    """Return the points that make up the response; see `accepted_pairs`."""
+    return [point for point, _ in accepted_pairs(points)]
+
+
+def runs_of_repeats(high: Mapping[int, ForcedPoint]) -> list[tuple[int, int]]:
+    """Return first and last index of each run of neighbouring repeats."""
+    runs: list[tuple[int, int]] = []
+    for index in sorted(high):
+        if runs and index == runs[-1][1] + 1:
+            runs[-1] = (runs[-1][0], index)
+        else:
+            runs.append((index, index))
+    return runs
+
+
+def branch_points(points: Sequence[ForcedPoint], first: int) -> list[ForcedPoint]:
+    """Return the points of the branch with many harmonics through the run of repeats that begins at `first`."""
+    return [p for p in points if p.stage == "branch" and p.index == first]
+
+
+def branch_end(low: Sequence[ForcedPoint], last: int) -> float:
+    """Return the frequency at which such a branch ends: that of the next quiet point, or of the last one."""
+    return low[min(last + 1, len(low) - 1)].omega
+
+
+def reached(branch: Sequence[ForcedPoint], end: float) -> bool:
+    """Whether a branch came to its end."""
+    return branch[-1].converged and branch[-1].omega == end
 
 
 def forced_point(

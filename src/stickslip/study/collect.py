@@ -8,7 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.selection import FLOOR
 from stickslip.response.fields import Fields, Signals, fields, signals
-from stickslip.response.forced import ForcedPoint, ForcedProblem
+from stickslip.response.forced import ForcedPoint, ForcedProblem, accepted_pairs
 
 HZ = 2 * np.pi
 NO_SHIFT = (float("nan"), float("nan"))
@@ -23,7 +23,7 @@ class Accepted:
     point
         The solution with most harmonics; not a solution where its status says so.
     low
-        The low-order point at the same frequency, or None (peak refinements).
+        The low-order point at the same frequency, or None (peak refinements, points of a branch with many harmonics).
     fields, low_fields
         What they look like everywhere; None where the point did not converge.
     real_error
@@ -148,20 +148,12 @@ def collect(
     report_output
         Position of the output whose peak counts.
     """
-    accepted = tuple(_accept(problem, point, low) for point, low in _pairs(points))
+    accepted = tuple(_accept(problem, point, low) for point, low in accepted_pairs(points))
     peak = _peak(accepted, report_output)
     period = None if peak < 0 else signals(problem, accepted[peak].point)
     return CaseResult(
         ratio, excitation, tuple(points), accepted, peak, period, report_output, problem.sweep.low
     )
-
-
-def _pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, ForcedPoint | None]]:
-    """Return the accepted point of each frequency with its low-order companion."""
-    high = {p.index: p for p in points if p.stage == "high"}
-    low = [p for p in points if p.stage == "low"]
-    pairs: list[tuple[ForcedPoint, ForcedPoint | None]] = [(high.get(p.index, p), p) for p in low]
-    return pairs + [(p, None) for p in points if p.stage == "peak"]
 
 
 def _accept(problem: ForcedProblem, point: ForcedPoint, low: ForcedPoint | None) -> Accepted:

@@ -229,7 +229,7 @@ def progress(point: ForcedPoint, sweep: Sweep) -> tuple[float, str]:
     """Return how much of a load case is done, and a line that says so."""
     first, last = sweep.omega_range
     along = min(max((point.omega - first) / (last - first), 0.0), 1.0)
-    shares = {"low": (0.0, 0.4), "high": (0.4, 0.55), "peak": (0.95, 0.05)}
+    shares = {"low": (0.0, 0.4), "high": (0.4, 0.35), "branch": (0.75, 0.2), "peak": (0.95, 0.05)}
     begin, width = shares[point.stage]
     state = "" if point.converged else f", {point.status.advice}"
     return (

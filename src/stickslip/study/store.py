@@ -273,7 +273,7 @@ def _point_row(load_case: int, accepted: Accepted) -> dict[str, float | int]:
         "real_error_percent": 100 * accepted.real_error,
         "newton_iterations": point.iterations,
         "seconds": point.seconds_total,
-        "refinement": int(accepted.low is None),
+        "refinement": int(accepted.point.stage == "peak"),
     }
 
 
