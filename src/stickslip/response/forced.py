@@ -5,6 +5,7 @@ passage: the frequencies where that error exceeds the threshold, solved again wi
 that resolve the resonance peak.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -65,11 +66,17 @@ def forced_response(
     yield from first_passage(problem, load, low)
     high = {p.index: p for p in done if p.stage == "high"}
     quiet = {p.index: p for p in low if p.converged and not problem.alerted(p)}
-    for point in low:
-        if problem.alerted(point) and point.index not in high:
-            solved = {i: p for i, p in high.items() if p.converged}
-            high[point.index] = repeat(problem, point, quiet | solved)
-            yield high[point.index]
+    tried = Counter(p.index for p in done if p.stage == "high")
+    # once forward, and what failed once more backward, when its neighbours are known
+    for attempt, order in enumerate((low, low[::-1])):
+        for point in order:
+            index = point.index
+            failed = index not in high or not high[index].converged
+            if problem.alerted(point) and failed and tried[index] <= attempt:
+                solved = {i: p for i, p in high.items() if p.converged}
+                high[index] = repeat(problem, point, quiet | solved)
+                tried[index] += 1
+                yield high[index]
     branches: list[ForcedPoint] = []
     for first, last in runs_of_repeats(high):
         if all(high[i].converged for i in range(first, last + 1)):

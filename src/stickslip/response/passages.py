@@ -29,7 +29,9 @@ LOAD_SHARES = (
     1.0,
 )  # excitation ramp where the first point does not converge at once
 LOOP = 3  # multiples of `Sweep.points` after which a branch that gains no frequency is left
-BRANCH_SEEDS = 4  # points on each side from which a branch with many harmonics is begun
+BRANCH_SEEDS = 4  # points from which a branch with many harmonics is begun
+BRANCH_LENGTH = 8  # multiples of `Sweep.points` after which such a branch is given up
+BACKWARD = 0.1  # share of the range by which it may fall back behind the start of the range
 NEIGHBOURS = 1  # points on each side from which a repeat that fails is tried
 
 
@@ -173,15 +175,17 @@ def follow_run(
     branch itself leads through.
     """
     end = branch_end(low, last)
+    begin, stop = problem.sweep.omega_range
+    leaves = begin - BACKWARD * (stop - begin)
     balance = problem.high
     following = problem.following(balance)
-    while len(branch) <= LOOP * problem.sweep.points:
+    while len(branch) <= BRANCH_LENGTH * problem.sweep.points:
         began = perf_counter()
         if not branch:
             point = _branch_start(problem, [*low[:first], *high.values()], first)
             if point is None:
                 return
-        elif branch[-1].converged and branch[-1].omega != end:
+        elif branch[-1].converged and leaves < branch[-1].omega != end:
             point = advance(balance, problem.branch_point(branch[-1]), end, following)
         else:
             return
@@ -195,13 +199,12 @@ def follow_run(
 
 
 def _branch_start(problem: ForcedProblem, points: list[ForcedPoint], first: int) -> Point | None:
-    """Solve with many harmonics at a point near index `first`: before it if possible, so that the whole run is passed."""
+    """Solve with many harmonics at an accepted point before index `first`, so that the whole run is passed."""
     balance = problem.high
     following = replace(problem.following(balance), newton=problem.sweep.newton)
-    usable = [p for p in points if p.converged and not (p.stage == "low" and problem.alerted(p))]
-    before = sorted((p for p in usable if p.index < first), key=lambda p: -p.index)[:BRANCH_SEEDS]
-    behind = sorted((p for p in usable if p.index >= first), key=lambda p: p.index)[:BRANCH_SEEDS]
-    for seed in [*before, *behind]:
+    usable = [p for p in points if p.index < first and p.converged]
+    usable = [p for p in usable if p.stage == "high" or not problem.alerted(p)]
+    for seed in sorted(usable, key=lambda p: -p.index)[:BRANCH_SEEDS]:
         point = start_point(balance, balance.unknowns(seed.coefficients), seed.omega, following)
         if point.solution.status.converged:
             return point
