@@ -1,1 +1,1 @@
-
+"""Structures: blades of finite elements, rigid dampers, lumped masses, damping and modes."""

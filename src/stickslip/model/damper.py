@@ -4,11 +4,11 @@ The damper is a prism along y that sits between two platforms and is pressed out
 their undersides. Its flat side touches the left blade along the lines L1 (near the apex) and L2
 (near the base), its curved side touches the right blade along the line R::
 
-              apex
-         L1  / \
-        L2  /   \  R
-           /     )
-          -------
+             apex
+         L1  /--\  R
+            /    \
+           /      )
+      L2  /________)
 
 Both sides are described from the apex, the point where the two underside planes meet. Geometry of
 this family of dampers: Gola & Gastaldi, "Understanding complexities in underplatform damper
@@ -25,7 +25,6 @@ from stickslip.errors import input_error
 from stickslip.model.rigid_body import RigidBody
 
 CURVED_SEGMENTS = 24
-CURVED_HALF_ANGLE = 0.25  # rad: half the arc that the picture shows
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,19 +172,19 @@ class FlatCurvedDamper:
     def outline(self) -> FloatArray:
         """Return the section's polygon (k, 2) in x and z, metres, from L1 clockwise.
 
-        Flat between L1 and L2, vertical below, an arc about R, a horizontal base. It is for
-        pictures and for estimating mass: contact uses the points only.
+        Cut off level at L1, then the arc that touches the right platform at R, the base level with
+        L2, and the flat side from L2 to L1. It is for pictures and for estimating mass: contact
+        uses the points only.
         """
         corner = self.contact_points()
-        count = len(self.sections)
-        first, second, right = corner.position[::count][:, [0, 2]]
-        up, out = corner.frame[-1][[0, 2]][:, [0, 2]].T
-        angle = np.linspace(CURVED_HALF_ANGLE, -CURVED_HALF_ANGLE, CURVED_SEGMENTS + 1)
-        arc = right + self.curved_radius * (
-            np.outer(np.cos(angle) - 1, out) + np.outer(np.sin(angle), up)
-        )
-        base = np.array([second[0], arc[-1, 1]])
-        return np.vstack([first, arc, base, second])
+        first, second, right = corner.position[:: len(self.sections)][:, [0, 2]]
+        centre = right - self.curved_radius * self.curved_normal[[0, 2]]
+        # the arc holds R even if R lies above L1 or below L2, and ends at the circle's top or bottom
+        heights = np.array([max(first[1], right[1]), min(second[1], right[1])])
+        ends = np.arcsin(np.clip((heights - centre[1]) / self.curved_radius, -1.0, 1.0))
+        angle = np.linspace(ends[0], ends[1], CURVED_SEGMENTS + 1)
+        arc = centre + self.curved_radius * np.column_stack([np.cos(angle), np.sin(angle)])
+        return np.vstack([first, arc, second])
 
     def _apex_at(self, y: float) -> FloatArray:
         return np.array([self.apex[0], y, self.apex[1]])

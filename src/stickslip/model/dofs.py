@@ -14,7 +14,7 @@ class Dofs:
     Parameters
     ----------
     node
-        (n,) node numbers; -1 for modal coordinates.
+        (n,) node numbers; -1 for coordinates of no mesh node: modal ones and those of rigid bodies.
     component
         n names: ``x y z rx ry rz`` or ``mode``.
     position
@@ -55,7 +55,7 @@ class Dofs:
         names = []
         for node, component, part in zip(self.node, self.component, self.part, strict=True):
             prefix = f"{part}." if part else ""
-            place = "" if node < 0 or component.startswith("r") else f"node{node}."
+            place = "" if node < 0 else f"node{node}."
             names.append(f"{prefix}{place}{component}")
         return tuple(names)
 

@@ -62,7 +62,7 @@ class RigidBody:
 
     def structure(self) -> Structure:
         """Return six dofs ``x y z rx ry rz`` at the centre of mass: no stiffness, no damping."""
-        dofs = Dofs(np.zeros(6, dtype=np.int64), COMPONENTS, np.tile(self.centre, (6, 1)))
+        dofs = Dofs(np.full(6, -1), COMPONENTS, np.tile(self.centre, (6, 1)))
         mass = np.diag([self.mass] * 3 + list(self.inertia)).astype(float)
         return Structure(mass, np.zeros((6, 6)), np.zeros((6, 6)), dofs)
 

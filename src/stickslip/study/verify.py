@@ -1,18 +1,31 @@
 """The check inside a run: the same reduced model integrated in time at three frequencies."""
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
+from stickslip.arrays import FloatArray
+from stickslip.contact.intervals import SLIP
 from stickslip.response.fields import signals
 from stickslip.response.forced import ForcedPoint, ForcedProblem, forced_problem
-from stickslip.response.transient import TransientStart, integrate
+from stickslip.response.transient import (
+    TimeStepping,
+    TransientResult,
+    TransientStart,
+    integrate,
+    start_from_harmonics,
+)
+from stickslip.solve.newton import newton
 from stickslip.study.build import Case
 from stickslip.study.collect import HZ, Accepted, CaseResult
 from stickslip.study.journal import Journal
 
-FLANK = 0.5  # share of the peak amplitude at which the two frequencies beside the peak are taken
+CHECKS = 3
+FLANK = 0.7  # share of the peak amplitude at which frequencies beside a peak are taken
+PATIENCE = 600  # periods; a blade damped by 0.3 % forgets its start to 1e-5, undamped ringing of the damper never ends
+LARGE = 1.0  # percent: above it the balance is repeated with more harmonics, to tell which of the two is wrong
+MORE = 3  # times the harmonics, and the samples, of that repeat
 
 
 @dataclass(frozen=True)
@@ -23,33 +36,79 @@ class Check:
     ----------
     load_case
         Position of the load case.
+    ratio
+        Its F_CL/F_HE.
     frequency_hz
         Where.
     balance, transient
-        Amplitudes in m.
+        Amplitudes in m; of the integration the average over its last third where it did not become periodic.
     settled
         Whether the integration became periodic.
     periods
         Periods integrated.
+    scatter
+        Largest distance of a period's first harmonic from that average, relative to it; over all outputs.
+    drifting
+        Names of the coordinates whose mean moves on from period to period, with commas between them.
+    order
+        Harmonics of the balance.
+    refined_order, refined
+        Harmonics and amplitude of the balance repeated with more of them; NaN where it was not needed or failed.
     """
 
     load_case: int
+    ratio: float
     frequency_hz: float
     balance: float
     transient: float
     settled: bool
     periods: int
+    scatter: float = 0.0
+    drifting: str = ""
+    order: int = 0
+    refined_order: int = 0
+    refined: float = float("nan")
 
     @property
     def difference_percent(self) -> float:
         """Of the balance against the integration."""
         return 100 * (self.balance - self.transient) / self.transient
 
+    @property
+    def sentence(self) -> str:
+        """What was compared and what happened."""
+        return (
+            f"F_CL/F_HE = {self.ratio:g}, {self.frequency_hz:.3f} Hz: balance {self.balance:.5e} m (H = {self.order}), "
+            f"time integration {self.transient:.5e} m, difference {self.difference_percent:+.2f} %; "
+            f"{self._motion}{self._verdict}"
+        )
+
+    @property
+    def _motion(self) -> str:
+        if not np.isfinite(self.transient):
+            return f"the integration overflowed after {self.periods} periods"
+        if self.settled:
+            return f"periodic after {self.periods} periods"
+        drifting = f", and these coordinates drift: {self.drifting}" if self.drifting else ""
+        return (
+            f"not periodic after {self.periods} periods: average over the last third, "
+            f"scatter {100 * self.scatter:.2g} %{drifting}"
+        )
+
+    @property
+    def _verdict(self) -> str:
+        if self.refined_order == 0:
+            return ""
+        if not np.isfinite(self.refined):
+            return f"; the balance with {self.refined_order} harmonics does not converge"
+        left = 100 * (self.refined - self.transient) / self.transient
+        return f"; the balance with {self.refined_order} harmonics gives {self.refined:.5e} m ({left:+.2f} %)"
+
 
 def verify(
     case: Case, results: list[CaseResult], journal: Journal, say: Callable[[str], None]
 ) -> list[Check]:
-    """Integrate near the peak of the most nonlinear load case and on both of its flanks.
+    """Integrate at three frequencies that span the load cases, see `chosen`.
 
     Parameters
     ----------
@@ -60,69 +119,74 @@ def verify(
     say
         Takes a line of progress.
     """
-    load_case = int(np.argmin([r.ratio for r in results]))
     checks = []
-    for accepted in _three(results[load_case]):
-        name = f"verify.{load_case}.{accepted.point.omega!r}"
+    for load_case, accepted in chosen(results):
+        name = f"check.{load_case}.{accepted.point.omega!r}"
         known = journal.get(name)
         check = Check(**known) if known else _check(case, results[load_case], load_case, accepted)
         journal.put(name, asdict(check))
-        say(
-            f"time integration at {check.frequency_hz:.2f} Hz: {check.transient:.4e} m against {check.balance:.4e} m "
-            f"by balance ({check.difference_percent:+.2f} %), {check.periods} periods"
-            + ("" if check.settled else "; it did NOT become periodic")
-        )
+        say(f"time integration: {check.sentence}")
         checks.append(check)
     return checks
 
 
-def _three(result: CaseResult) -> list[Accepted]:
-    """Return the peak and the point nearest to half of it on either side."""
-    if result.peak < 0:
+def chosen(results: list[CaseResult]) -> list[tuple[int, Accepted]]:
+    """Return three points of the sweep with the positions of their load cases.
+
+    They are the peaks of the first load case in which a contact slips, of the optimum (the smallest amplitude for a unit of
+    excitation) and of the most nonlinear case. Where these are fewer than three, as in a study of one load case, points on the
+    flanks of the peaks stand in.
+    """
+    peaked = [i for i, r in enumerate(results) if r.peak >= 0]
+    if not peaked:
         return []
-    peak = result.accepted[result.peak]
-    output = result.report_output
-    chosen = [peak]
-    for side in (-1, 1):
-        flank = [
-            a
-            for a in result.accepted
-            if a.fields is not None and side * (a.point.omega - peak.point.omega) > 0
-        ]
-        if flank:
-            wanted = FLANK * result.peak_amplitude
-            chosen.append(min(flank, key=lambda a: abs(a.amplitudes(output + 1)[output] - wanted)))
-    return sorted(chosen, key=lambda a: a.point.omega)
+    ordered = sorted(peaked, key=lambda i: -results[i].ratio)
+    slipping = [i for i in ordered if _slips(results[i])]
+    optimum = min(ordered, key=lambda i: results[i].peak_amplitude / results[i].excitation)
+    cases = list(dict.fromkeys([*slipping[:1], optimum, ordered[-1]]))
+    candidates = [(i, results[i].accepted[results[i].peak]) for i in cases]
+    candidates += [(i, flank) for i in cases for flank in _flanks(results[i])]
+    return sorted(candidates[:CHECKS], key=lambda c: (c[0], c[1].point.omega))
+
+
+def _slips(result: CaseResult) -> bool:
+    return result.period is not None and bool(np.any(result.period.state == SLIP))
+
+
+def _flanks(result: CaseResult) -> list[Accepted]:
+    """Return the points on either side of the peak that are nearest to a share of it."""
+    peak, output = result.accepted[result.peak].point.omega, result.report_output
+    wanted = FLANK * result.peak_amplitude
+    sides = [
+        [a for a in result.accepted if a.fields is not None and side * (a.point.omega - peak) > 0]
+        for side in (-1, 1)
+    ]
+    return [
+        min(points, key=lambda a: abs(a.amplitudes(output + 1)[output] - wanted))
+        for points in sides
+        if points
+    ]
 
 
 def _check(case: Case, result: CaseResult, load_case: int, accepted: Accepted) -> Check:
     point, output = accepted.point, result.report_output
-    system, load = case.system, case.load(result.ratio)
-    found = integrate(
-        system.structure,
-        system.interface.gap_operator,
-        system.interface.laws,
-        load,
-        point.omega,
-        system.outputs,
-        start=_start(forced_problem(system, load, case.sweep), point),
-    )
-    return Check(
+    problem = forced_problem(case.system, case.load(result.ratio), case.sweep)
+    found = integrated(problem, point, case.load(result.ratio))
+    known = found.harmonics[1] if found.settled else found.average
+    check = Check(
         load_case=load_case,
+        ratio=result.ratio,
         frequency_hz=point.omega / HZ,
         balance=float(accepted.amplitudes(output + 1)[output]),
-        transient=float(np.abs(found.harmonics[1, output])),
+        transient=float(np.abs(known[output])),
         settled=bool(found.settled),
         periods=int(found.periods),
+        scatter=float(found.scatter),
+        drifting=", ".join(found.drifting),
+        order=point.order,
     )
-
-
-def _start(problem: ForcedProblem, point: ForcedPoint) -> TransientStart:
-    """Return the balance's state at t = 0: near what is judged, so that little has to settle."""
-    motion = problem.low.linear.recover(point.omega, point.coefficients)
-    rate = 1j * point.omega * np.arange(len(motion))[:, None]
-    return TransientStart(
-        displacement=motion.real.sum(axis=0),
-        velocity=(rate * motion).real.sum(axis=0),
-        traction=signals(problem, point).force[:, :2, 0],
-    )
+    if abs(check.difference_percent) <= LARGE:
+        return check
+    order = MORE * case.sweep.high
+    amplitude = refined(case, result.ratio, point, order)[output]
+    return replace(check, refined_order=order, refined=float(amplitude))
