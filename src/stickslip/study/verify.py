@@ -9,10 +9,10 @@ from stickslip.arrays import FloatArray
 from stickslip.contact.intervals import SLIP
 from stickslip.response.fields import signals
 from stickslip.response.forced import ForcedPoint, ForcedProblem, forced_problem
+from stickslip.response.propagator import PeriodicLoad
 from stickslip.response.transient import (
     TimeStepping,
     TransientResult,
-    TransientStart,
     integrate,
     start_from_harmonics,
 )
@@ -145,27 +145,31 @@ def chosen(results: list[CaseResult]) -> list[tuple[int, Accepted]]:
     optimum = min(ordered, key=lambda i: results[i].peak_amplitude / results[i].excitation)
     cases = list(dict.fromkeys([*slipping[:1], optimum, ordered[-1]]))
     candidates = [(i, results[i].accepted[results[i].peak]) for i in cases]
-    candidates += [(i, flank) for i in cases for flank in _flanks(results[i])]
+    candidates += [(i, flank) for i in cases for _, flank in peak_and_flanks(results[i])[1:]]
     return sorted(candidates[:CHECKS], key=lambda c: (c[0], c[1].point.omega))
 
 
 def _slips(result: CaseResult) -> bool:
-    return result.period is not None and bool(np.any(result.period.state == SLIP))
+    return result.signals is not None and bool(np.any(result.signals.state == SLIP))
 
 
-def _flanks(result: CaseResult) -> list[Accepted]:
-    """Return the points on either side of the peak that are nearest to a share of it."""
-    peak, output = result.accepted[result.peak].point.omega, result.report_output
+def peak_and_flanks(result: CaseResult) -> list[tuple[str, Accepted]]:
+    """Return the peak and, on either side of it, the point whose amplitude is nearest to a share of the peak's."""
+    if result.peak < 0:
+        return []
+    peak, output = result.accepted[result.peak], result.report_output
     wanted = FLANK * result.peak_amplitude
-    sides = [
-        [a for a in result.accepted if a.fields is not None and side * (a.point.omega - peak) > 0]
-        for side in (-1, 1)
-    ]
-    return [
-        min(points, key=lambda a: abs(a.amplitudes(output + 1)[output] - wanted))
-        for points in sides
-        if points
-    ]
+    found = [("peak", peak)]
+    for name, side in (("below the peak", -1), ("above the peak", 1)):
+        points = [
+            a
+            for a in result.accepted
+            if a.fields is not None and side * (a.point.omega - peak.point.omega) > 0
+        ]
+        if points:
+            nearest = min(points, key=lambda a: abs(a.amplitudes(output + 1)[output] - wanted))
+            found.append((name, nearest))
+    return found
 
 
 def _check(case: Case, result: CaseResult, load_case: int, accepted: Accepted) -> Check:
@@ -187,6 +191,58 @@ def _check(case: Case, result: CaseResult, load_case: int, accepted: Accepted) -
     )
     if abs(check.difference_percent) <= LARGE:
         return check
-    order = MORE * case.sweep.high
-    amplitude = refined(case, result.ratio, point, order)[output]
-    return replace(check, refined_order=order, refined=float(amplitude))
+    order = MORE * max(case.sweep.high, point.order)
+    amplitude = float(refined(case, result.ratio, point, order)[output])
+    return replace(check, refined_order=order, refined=amplitude)
+
+
+def integrated(
+    problem: ForcedProblem, point: ForcedPoint, load: PeriodicLoad, periods: int = PATIENCE
+) -> TransientResult:
+    """Integrate in time from the balance's state at t = 0: near what is judged, so that little has to settle.
+
+    Parameters
+    ----------
+    problem, point
+        What was solved, and the solution.
+    load
+        Its loads.
+    periods
+        Give up settling after so many.
+    """
+    system = problem.system
+    motion = problem.low.linear.recover(point.omega, point.coefficients)
+    traction = signals(problem, point).force[:, :2, 0]
+    return integrate(
+        system.structure,
+        system.interface.gap_operator,
+        system.interface.laws,
+        load,
+        point.omega,
+        system.outputs,
+        start=start_from_harmonics(motion, point.omega, traction),
+        stepping=TimeStepping(max_periods=periods),
+    )
+
+
+def refined(case: Case, ratio: float, point: ForcedPoint, order: int) -> FloatArray:
+    """Return the (n_outputs,) first-harmonic amplitudes (m) of the balance with `order` harmonics; NaN if it does not converge.
+
+    Parameters
+    ----------
+    case, ratio
+        The model and F_CL/F_HE.
+    point
+        A solution with fewer harmonics, where Newton begins.
+    order
+        Harmonics; the samples grow with them.
+    """
+    sweep = replace(case.sweep, high=order, samples=(MORE + 1) * case.sweep.samples)
+    balance = forced_problem(case.system, case.load(ratio), sweep).high
+    start = balance.unknowns(point.coefficients)
+    solution = newton(lambda x: balance.linearise(x, point.omega), start, sweep.newton)
+    if not solution.status.converged:
+        return np.full(len(case.system.outputs), np.nan)
+    motion = balance.linear.recover(point.omega, balance.coefficients(solution.x))
+    amplitude: FloatArray = np.abs(motion[1, case.system.outputs])
+    return amplitude
