@@ -7,15 +7,14 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.model.damper import FlatCurvedDamper, gap_operator
+from stickslip.model.mesh import BladePair, mesh_blade_pair
 from stickslip.model.rigid_body import RigidBody
-
-# contact stiffness of the whole interface, N/m, in t, w, n; shared among the points of a side
-SIDE_STIFFNESS = {"flat": (450e6, 450e6, 520e6), "curved": (20e6, 450e6, 25e6)}
-
-
-def point_stiffness(points):
-    share = {side: points.side.count(side) for side in SIDE_STIFFNESS}
-    return np.concatenate([np.array(SIDE_STIFFNESS[s]) / share[s] for s in points.side])
+from stickslip.model.solid import assemble_solid
+from stickslip.reduction.craig_bampton import craig_bampton
+from stickslip.response.preload import preload
+from stickslip.study.build import static_contact_force, static_load, system_of
+from stickslip.study.example import example_text
+from stickslip.study.schema import read_study
 
 
 def test_nine_points_three_a_line():
@@ -56,25 +55,50 @@ def test_displacement_operator_is_a_rotation_to_first_order():
 
 
 def test_default_mass_and_inertia_are_those_of_a_steel_prism():
-    """Mass and inertia of the defaults are those of a steel prism with the outline's section."""
-    damper = FlatCurvedDamper()
+    """A prism of 40 mm with the outline's section, of steel: what the defaults say they are."""
+    damper, length, density = FlatCurvedDamper(), 0.040, 7850.0
     x, z = damper.outline().T
     x_next, z_next = np.roll(x, -1), np.roll(z, -1)
     cross = z * x_next - x * z_next
     area = cross.sum() / 2
+    assert area > 0, "clockwise"
+    assert np.ptp(damper.sections) < length
+    # the stated numbers are rounded to about 1 %
+    mass = density * area * length
+    assert mass == pytest.approx(damper.mass, rel=0.01)
     centre = np.array([((x + x_next) * cross).sum(), ((z + z_next) * cross).sum()]) / (6 * area)
-    assert area > 0
-    length = damper.mass / (7850 * area)
-    assert np.ptp(damper.sections) < length < 0.06
-    # the outline is a sketch: the stated numbers are rounded to about 1 %
     np.testing.assert_allclose(centre, damper.centre_of_mass[[0, 2]], atol=2e-4)
     second = [((a**2 + a * b + b**2) * cross).sum() / 12 for a, b in ((z, z_next), (x, x_next))]
-    about_z, about_x = (
-        damper.mass * (s / area - c**2) for s, c in zip(second, centre[::-1], strict=True)
-    )
-    axial = damper.mass * length**2 / 12
+    about_z, about_x = (mass * (s / area - c**2) for s, c in zip(second, centre[::-1], strict=True))
+    axial = mass * length**2 / 12
     expected = (about_z + axial, about_x + about_z, about_x + axial)
     np.testing.assert_allclose(damper.inertia, expected, rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {},
+        {"curved_distance": 0.02},
+        {"curved_distance": 0.001, "flat_distances": (0.01, 0.03)},  # R above L1
+        {"curved_distance": 0.02, "flat_distances": (0.002, 0.015)},  # R below L2
+        {"curved_distance": 0.012, "curved_radius": 0.008},  # the arc's circle ends above L2
+        {"flat_angle": math.radians(30), "curved_angle": math.radians(55)},
+    ],
+)
+def test_outline_touches_both_platforms_at_the_contact_lines_only(change):
+    damper = FlatCurvedDamper(**change)
+    outline = damper.outline() - damper.apex
+    lines = damper.contact_points().position[::3][:, [0, 2]] - damper.apex
+    np.testing.assert_allclose(outline[[0, -1]], lines[:2], atol=1e-16)
+    for normal in (damper.flat_normal, damper.curved_normal):
+        assert np.max(outline @ normal[[0, 2]]) < 1e-16, "a corner lies inside a platform"
+    # R lies on the arc: off the polygon by no more than the rise of one of its segments
+    a, b = outline[1:-2], outline[2:-1]
+    along = np.clip(np.sum((lines[2] - a) * (b - a), 1) / np.sum((b - a) ** 2, 1), 0.0, 1.0)
+    distance = np.linalg.norm(a + along[:, None] * (b - a) - lines[2], axis=1).min()
+    longest = np.linalg.norm(b - a, axis=1).max()
+    assert distance <= longest**2 / (8 * damper.curved_radius) * 1.01 + 1e-16
 
 
 def test_gap_operator_ignores_rigid_motion_of_everything():
@@ -100,18 +124,25 @@ def test_gap_opens_when_the_damper_moves_inward():
     np.testing.assert_allclose(gap[:, 1], 0.0, atol=1e-15)
 
 
-def test_pressed_outward_all_nine_points_are_in_compression():
-    """Rigid blades, bilateral springs: the resultant passes between L1 and L2."""
+def test_pressed_outward_all_nine_points_are_in_compression(tmp_path):
+    """The default case on a coarse mesh, its contacts free to slip and to open; no spring helps."""
+    (tmp_path / "study.toml").write_text(example_text())
+    tables = read_study(tmp_path / "study.toml").tables
     damper = FlatCurvedDamper()
-    points, body = damper.contact_points(), damper.body()
-    to_frame = points.frame.transpose(0, 2, 1)
-    closing = (to_frame @ body.displacement_operator(points.position)).reshape(27, 6)
-    k = point_stiffness(points)
-    motion = np.linalg.solve(closing.T @ (k[:, None] * closing), [0, 0, 1.0, 0, 0, 0])
-    force = (k * (closing @ motion)).reshape(9, 3)
-    assert force[:, 2].min() > 0.01  # of the load
-    total = np.einsum("pij,pj->i", points.frame, force)
-    np.testing.assert_allclose(total, [0, 0, 1], atol=1e-12)
+    pair = BladePair(airfoil_size=0.02, platform_size=0.012, foot_size=0.02)
+    blades = assemble_solid(
+        mesh_blade_pair(pair, damper.contact_points()), tables.material.library()
+    )
+    keep = np.concatenate([blades.dof_set(name) for name in ("contact", "force", "output")])
+    system, _ = system_of(tables, craig_bampton(blades, keep, 2), damper)
+    load = static_load(system, tables.loads.centrifugal_n)
+    closing = system.interface.gap_operator[:, system.retained] @ preload(system, load)
+    force = static_contact_force(system.interface, closing.reshape(9, 3))
+    assert np.max(force[:, 2]) < -0.02 * tables.loads.centrifugal_n
+    held = system.interface.gap_operator.T @ force.ravel()
+    dofs = system.structure.dof_set("damper")
+    # Newton's tolerance, 1e-10 of the load
+    np.testing.assert_allclose(held[dofs], load[dofs], atol=1e-9 * tables.loads.centrifugal_n)
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,9 @@ def test_damper_and_blades_agree_by_default():
 def test_other_angles_and_apex_match_too():
     angles = {"flat_angle": math.radians(40), "curved_angle": math.radians(50)}
     pair = BladePair(**COARSE, **angles)
-    points = FlatCurvedDamper(apex=pair.wedge_apex, **angles).contact_points()
+    # the steeper shank leaves less room under the flat side
+    damper = FlatCurvedDamper(apex=pair.wedge_apex, flat_distances=(0.002, 0.026), **angles)
+    points = damper.contact_points()
     found = mesh_blade_pair(pair, points)
     np.testing.assert_allclose(found.points[found.node_sets["contact"]], points.position, atol=1e-9)
 
@@ -74,12 +76,23 @@ def test_sets_are_where_they_should_be(mesh):
     root = mesh.points[mesh.node_sets["root"]]
     assert root[:, 2].min() == pytest.approx(-pair.foot_height)
     assert root[:, 2].max() == pytest.approx(0, abs=1e-12)
-    force, (tip1, mid1, tip2) = mesh.node_sets["force"], mesh.points[mesh.node_sets["output"]]
+    tip1, mid1, tip2 = mesh.points[mesh.node_sets["output"]]
     top = pair.platform_height + pair.airfoil_length
-    assert mesh.points[force[0], 2] == pytest.approx(top - pair.airfoil_length / 2)
     assert mid1[2] == pytest.approx(top - pair.airfoil_length / 2)
     assert tip1[2] == tip2[2] == pytest.approx(top)
     assert tip2[0] - tip1[0] == pytest.approx(pair.pitch)
+
+
+@pytest.mark.parametrize("span", [0.0, 0.3])
+def test_force_stands_on_the_first_airfoil_at_its_span(mesh, span):
+    pair = BladePair(**COARSE, force_span=span)
+    if span != BladePair().force_span:
+        mesh = mesh_blade_pair(pair, FlatCurvedDamper().contact_points())
+    (force,) = mesh.points[mesh.node_sets["force"]]
+    assert force[2] == pytest.approx(pair.platform_height + span * pair.airfoil_length)
+    # within the airfoil's chord and thickness of blade 1, which stands at x = 0
+    assert abs(force[1]) < pair.hub_chord / 2
+    assert abs(force[0]) < pair.hub_thickness + pair.camber * pair.hub_chord
 
 
 def test_meshing_in_a_thread_gives_the_same_mesh(mesh):
@@ -120,9 +133,10 @@ def test_unknown_mesh_format_is_refused(mesh, tmp_path):
         ({"flat_angle": 2.0}, "BladePair.flat_angle: must be below pi/2"),
         ({"pitch": 0.008}, "BladePair.pitch: 0.008 m leaves no room.*overlap"),
         ({"platform_height": 0.010}, "BladePair.platform_height.*above the foot"),
+        ({"force_span": 0.5}, r"BladePair.force_span: must lie in \[0, 0.5\), got 0.5"),
         ({"hub_chord": 0.060}, "overhangs the platform"),
         ({"foot_depth": 0.010}, "smaller than the shank"),
-        ({"foot_width": 0.055}, "the feet overlap"),
+        ({"foot_width": 0.057}, "the feet overlap"),
     ],
 )
 def test_bad_geometry_is_named(change, message):
@@ -134,7 +148,7 @@ def test_bad_geometry_is_named(change, message):
     ("damper", "missed"),
     [
         (FlatCurvedDamper(apex=(0.025, BladePair().wedge_apex[1] + 1e-4)), "L1.1 at"),
-        (FlatCurvedDamper(curved_distance=0.030), "R.1 at"),
+        (FlatCurvedDamper(curved_distance=0.031), "R.1 at"),
         (FlatCurvedDamper(sections=(-0.03, 0.0, 0.01)), "L2.1 at"),
         (FlatCurvedDamper(flat_angle=math.radians(44)), "L1.2 at"),
     ],

@@ -97,6 +97,19 @@ def test_a_preload_of_the_contacts_is_a_load():
     assert np.allclose(system.structure.stiffness @ q, -(b.T @ force), rtol=0, atol=1e-8)
 
 
+@pytest.mark.parametrize("share", [1e-12, 1e-9, 1e-6, 1e-4, 1e-2])
+def test_a_tiny_load_beside_a_preload_moves_the_seat_by_little(share):
+    # forces are measured by the largest of load and preloads: by the load alone no residual could ever be small enough
+    system = free_body_3d(preload=30.0)[0].with_retention(1e3)
+    seat = preload(system, np.zeros(12))
+    moved = preload(system, share * np.ones(12)) - seat
+    whole = preload(system, 1e-2 * np.ones(12)) - seat
+    # the same contacts stick and slip at all of them: the seat moves in proportion, up to Newton's tolerance of the preload
+    rounding = 1e-9 * np.max(np.abs(seat))
+    np.testing.assert_allclose(moved, whole * share / 1e-2, rtol=1e-6, atol=rounding)
+    assert np.max(np.abs(whole)) > 100 * rounding
+
+
 @pytest.mark.parametrize("m", [0.0, 0.7, -1.0])
 @pytest.mark.parametrize("k_w", [0.0, 1e6])
 def test_residual_traction_does_not_move_the_seat(m, k_w):

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     )
     from stickslip.harmonic.aft import contact_forces
     from stickslip.harmonic.excitation import HarmonicLoad
+    from stickslip.model.blade_pair import BladePair
     from stickslip.model.damper import (
         ContactPoints,
         FlatCurvedDamper,
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
         lumped,
     )
     from stickslip.model.mesh import (
-        BladePair,
         SolidMesh,
         mesh_blade_pair,
         write_mesh,
@@ -58,15 +58,15 @@ if TYPE_CHECKING:
         fields,
         signals,
     )
-    from stickslip.response.forced import (
+    from stickslip.response.forced import forced_response
+    from stickslip.response.preload import preload
+    from stickslip.response.sweep import (
         ForcedPoint,
         ForcedProblem,
         Sweep,
         accepted_points,
         forced_problem,
-        forced_response,
     )
-    from stickslip.response.preload import preload
     from stickslip.response.system import System
     from stickslip.response.transient import (
         TimeStepping,
@@ -87,11 +87,12 @@ _MODULES = {
     "stickslip.errors": ("InputError", "SingularError", "StickslipError"),
     "stickslip.harmonic.aft": ("contact_forces",),
     "stickslip.harmonic.excitation": ("HarmonicLoad",),
+    "stickslip.model.blade_pair": ("BladePair",),
     "stickslip.model.damper": ("ContactPoints", "FlatCurvedDamper", "gap_operator"),
     "stickslip.model.damping": ("rayleigh_damping",),
     "stickslip.model.dofs": ("Dofs",),
     "stickslip.model.lumped": ("chain", "lumped"),
-    "stickslip.model.mesh": ("BladePair", "SolidMesh", "mesh_blade_pair", "write_mesh"),
+    "stickslip.model.mesh": ("SolidMesh", "mesh_blade_pair", "write_mesh"),
     "stickslip.model.modes": ("natural_frequencies",),
     "stickslip.model.rigid_body": ("RigidBody",),
     "stickslip.model.solid": ("Material", "assemble_solid"),
@@ -100,15 +101,15 @@ _MODULES = {
     "stickslip.report.page": ("write_report",),
     "stickslip.response.drift": ("Drift", "drift"),
     "stickslip.response.fields": ("Fields", "Signals", "fields", "signals"),
-    "stickslip.response.forced": (
+    "stickslip.response.forced": ("forced_response",),
+    "stickslip.response.preload": ("preload",),
+    "stickslip.response.sweep": (
         "ForcedPoint",
         "ForcedProblem",
         "Sweep",
         "accepted_points",
         "forced_problem",
-        "forced_response",
     ),
-    "stickslip.response.preload": ("preload",),
     "stickslip.response.system": ("System",),
     "stickslip.response.transient": ("TimeStepping", "TransientResult", "integrate"),
     "stickslip.solve.newton": ("Newton",),

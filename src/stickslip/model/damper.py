@@ -179,12 +179,13 @@ class FlatCurvedDamper:
         corner = self.contact_points()
         first, second, right = corner.position[:: len(self.sections)][:, [0, 2]]
         centre = right - self.curved_radius * self.curved_normal[[0, 2]]
-        # the arc holds R even if R lies above L1 or below L2, and ends at the circle's top or bottom
+        # the arc holds R even if R lies above L1 or below L2; it ends at the circle's top or bottom
         heights = np.array([max(first[1], right[1]), min(second[1], right[1])])
         ends = np.arcsin(np.clip((heights - centre[1]) / self.curved_radius, -1.0, 1.0))
         angle = np.linspace(ends[0], ends[1], CURVED_SEGMENTS + 1)
         arc = centre + self.curved_radius * np.column_stack([np.cos(angle), np.sin(angle)])
-        return np.vstack([first, arc, second])
+        inside = (arc - first) @ self.flat_normal[[0, 2]] < 0.0
+        return np.vstack([first, arc[inside], second])
 
     def _apex_at(self, y: float) -> FloatArray:
         return np.array([self.apex[0], y, self.apex[1]])
