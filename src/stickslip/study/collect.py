@@ -12,6 +12,7 @@ from stickslip.response.forced import ForcedPoint, ForcedProblem, accepted_pairs
 
 HZ = 2 * np.pi
 NO_SHIFT = (float("nan"), float("nan"))
+JUMP = 2.0  # ratio of neighbouring amplitudes that no step of a branch makes
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +109,21 @@ class CaseResult:
         """Whether the largest amplitude stands at an end of the frequency range."""
         omega = [a.point.omega for a in self.accepted]
         return self.peak >= 0 and omega[self.peak] in (min(omega), max(omega))
+
+    @property
+    def jumps_hz(self) -> list[float]:
+        """Frequencies at which neighbours of the response differ more than `JUMP` times, in Hz.
+
+        Steps of the branch are far smaller: there, accepted points with few and with many harmonics stand on different solutions.
+        """
+        branch = [a for a in self.accepted if a.point.stage != "peak" and a.point.converged]
+        height = [a.amplitudes(self.report_output + 1)[self.report_output] for a in branch]
+        return [
+            float(branch[i].point.omega / HZ)
+            for i in range(1, len(branch))
+            if max(height[i - 1], height[i]) > JUMP * min(height[i - 1], height[i])
+            and branch[i - 1].point.order != branch[i].point.order
+        ]
 
     @property
     def failed(self) -> int:

@@ -189,6 +189,13 @@ def _load_case(run: _Run, case: Case, i: int) -> CaseResult:
         excitation=case.centrifugal / ratio,
         report_output=case.report_output,
     )
+    if result.jumps_hz:
+        places = ", ".join(f"{f:.2f}" for f in result.jumps_hz)
+        run.warn(
+            f"F_CL/F_HE = {result.ratio:g}: the response jumps at {places} Hz, where solutions with few and with many "
+            "harmonics meet: more than one periodic motion exists near there, and which one a machine takes depends on "
+            "its history."
+        )
     _warn_drift(run, problem, result)
     if result.peak_at_end:
         run.warn(
