@@ -2,7 +2,7 @@
 
 At the accepted peak of every ratio and at one frequency on either flank, the first harmonic of the report output, as a run gives
 it (the alert choosing between H = 1 and H = 5), is compared with the time integration of the same reduced model. So is the balance
-with three times the harmonics, which tells which of the two is wrong where they differ. The mesh is that of the example with its
+with many more harmonics, which tells which of the two is wrong where they differ. The mesh is that of the example with its
 element sizes doubled, so that the comparison takes minutes: it is a comparison on one reduced model, not of meshes.
 
 A row that does not hold is left as it is, with what is known of the reason.
@@ -19,14 +19,15 @@ from stickslip.study.build import Case, case_of
 from stickslip.study.collect import HZ, Accepted, CaseResult, collect
 from stickslip.study.example import example_text
 from stickslip.study.schema import read_study
-from stickslip.study.verify import MORE, integrated, peak_and_flanks, refined
+from stickslip.study.verify import integrated, listed, peak_and_flanks, refined
 from validation.compare import Record, record
 
 CASE = "Two blades and a damper"
 SIZES = ("airfoil_size_m", "platform_size_m", "foot_size_m")
 COARSER = 2.0  # times the element sizes of the example
 TOLERANCE = 0.01  # issue of the first release: first-harmonic amplitude at H = 5
-PERIODS = 400  # a blade damped by 0.3 % forgets its start to 5e-4 of what was off
+PERIODS = 300  # a blade damped by 0.3 % forgets its start: 2 % of what was off is left where the average begins
+ORDERS = (25, 15)  # of the balance that tells which side is wrong; the first that converges
 
 
 def coarse_example() -> str:
@@ -64,21 +65,28 @@ def compare(
     found = integrated(problem, point, case.load(ratio), PERIODS)
     first = found.harmonics[1] if found.settled else found.average
     reference = float(np.abs(first[output]))
-    order = MORE * case.sweep.high
     motion = (
         f"periodic after {found.periods} periods"
         if found.settled
         else f"not periodic after {found.periods} periods, average of the last third, scatter {100 * found.scatter:.1g} %"
     )
-    drifts = f"; drifting: {', '.join(found.drifting)}" if found.drifting else ""
+    drifts = f"; drifting: {listed(found.drifting)}" if found.drifting else ""
     source = f"time integration, 1024 steps a period, {motion}{drifts}"
     at = f"F_CL/F_HE = {ratio:g}, {where}, {point.omega / HZ:.2f} Hz: first harmonic"
     own = float(accepted.amplitudes(output + 1)[output])
-    many = float(refined(case, ratio, point, order)[output])
-    return [
-        record(CASE, f"{at}, as accepted, H = {point.order}, m", own, reference, TOLERANCE, source),
-        record(CASE, f"{at}, H = {order}, m", many, reference, TOLERANCE, source),
+    many = ((n, float(refined(case, ratio, point, n)[output])) for n in ORDERS)
+    solved = next(((n, amplitude) for n, amplitude in many if np.isfinite(amplitude)), None)
+    if solved is None:
+        source += (
+            f"; balance with {ORDERS[0]} or {ORDERS[1]} harmonics: no solution found from there"
+        )
+    made = [
+        record(CASE, f"{at}, as accepted, H = {point.order}, m", own, reference, TOLERANCE, source)
     ]
+    if solved is not None:
+        order, amplitude = solved
+        made.append(record(CASE, f"{at}, H = {order}, m", amplitude, reference, TOLERANCE, source))
+    return made
 
 
 def run() -> list[Record]:

@@ -1,6 +1,6 @@
 """The check inside a run: the same reduced model integrated in time at three frequencies."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -25,6 +25,7 @@ CHECKS = 3
 FLANK = 0.7  # share of the peak amplitude at which frequencies beside a peak are taken
 PATIENCE = 600  # periods; a blade damped by 0.3 % forgets its start to 1e-5, undamped ringing of the damper never ends
 LARGE = 1.0  # percent: above it the balance is repeated with more harmonics, to tell which of the two is wrong
+NAMED = 3  # drifting coordinates that a sentence names
 MORE = 3  # times the harmonics, and the samples, of that repeat
 
 
@@ -186,7 +187,7 @@ def _check(case: Case, result: CaseResult, load_case: int, accepted: Accepted) -
         settled=bool(found.settled),
         periods=int(found.periods),
         scatter=float(found.scatter),
-        drifting=", ".join(found.drifting),
+        drifting=listed(found.drifting),
         order=point.order,
     )
     if abs(check.difference_percent) <= LARGE:
@@ -194,6 +195,12 @@ def _check(case: Case, result: CaseResult, load_case: int, accepted: Accepted) -
     order = MORE * max(case.sweep.high, point.order)
     amplitude = float(refined(case, result.ratio, point, order)[output])
     return replace(check, refined_order=order, refined=amplitude)
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return the first few of many names as text."""
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return ", ".join(names[:NAMED]) + more
 
 
 def integrated(
