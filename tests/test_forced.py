@@ -1,7 +1,7 @@
 """Forced response: published peaks, resuming, stages, and what is refused."""
 
 from dataclasses import replace
-from itertools import islice
+from itertools import islice, pairwise
 
 import numpy as np
 import pytest
@@ -9,7 +9,13 @@ from models import blades_and_damper, griffin, lifting
 
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response.forced import Sweep, accepted_points, forced_problem, forced_response
+from stickslip.response.forced import (
+    Sweep,
+    accepted_pairs,
+    accepted_points,
+    forced_problem,
+    forced_response,
+)
 from stickslip.solve.newton import Newton
 
 HZ = 2 * np.pi
@@ -286,6 +292,98 @@ def test_points_come_one_by_one():
     system, load = blades_and_damper()
     first = list(islice(forced_response(system, load, SHORT), 2))
     assert [p.index for p in first] == [0, 1]
+
+
+# ---- the branch with many harmonics ---------------------------------------------------------------------------------------
+
+# near its peak the folded response needs more harmonics, and repeats fail where the two orders have different folds
+ALERTED = replace(FOLDED, selection="jacobian_alert")
+
+
+@pytest.fixture(scope="module")
+def branch_run():
+    system, load = lifting()
+    points = list(forced_response(system, load, ALERTED))
+    assert any(p.stage == "high" and not p.converged for p in points), "no repeat failed"
+    assert any(p.stage == "branch" for p in points), "no branch was followed: nothing was shown"
+    return system, load, points
+
+
+def repeats(points):
+    """The last try of each repeat by index."""
+    return {p.index: p for p in points if p.stage == "high"}
+
+
+def test_repeats_stay_on_the_branch_of_their_neighbours(branch_run):
+    system, load, points = branch_run
+    problem = forced_problem(system, load, ALERTED)
+    low = {p.index: p for p in points if p.stage == "low"}
+    found = {i: p for i, p in repeats(points).items() if p.converged}
+    assert len(found) > 10
+    for i, p in found.items():
+        # the other stable solution at these frequencies is a tenth as high, the unstable one two thirds
+        assert problem.amplitude(p) == pytest.approx(problem.amplitude(low[i]), rel=0.1)
+
+
+def test_a_branch_replaces_the_run_of_repeats_that_failed(branch_run):
+    system, load, points = branch_run
+    pairs = accepted_pairs(points)
+    assert accepted_points(points) == [p for p, _ in pairs]
+    assert all(p.converged for p, _ in pairs)
+    high = repeats(points)
+    inside = [k for k, (p, _) in enumerate(pairs) if p.stage == "branch"]
+    first = pairs[inside[0]][0].index
+    assert inside == list(range(inside[0], inside[-1] + 1)), "the branch stands in one piece"
+    run = [i for i in high if i >= first]
+    last = next(i for i in range(first, max(run) + 2) if i not in high) - 1
+    assert any(not high[i].converged for i in range(first, last + 1))
+    # in the run's place, between the points next to it, and each point of the first passage at most once
+    assert pairs[inside[0] - 1][1].index == first - 1
+    assert pairs[inside[-1] + 1][1].index == last + 1
+    assert all(source is None for _, source in pairs[inside[0] : inside[-1] + 1])
+    sources = [source.index for _, source in pairs if source is not None]
+    low = [p.index for p in points if p.stage == "low"]
+    assert sources == [i for i in low if not first <= i <= last]
+    problem = forced_problem(system, load, ALERTED)
+    for k in inside:
+        p = pairs[k][0]
+        assert p.order == ALERTED.high
+        at = problem.high.linearise(problem.high.unknowns(p.coefficients), p.omega)
+        assert np.max(np.abs(at.residual)) <= 1.01 * ALERTED.newton.tolerance
+
+
+def test_a_branch_that_did_not_come_through_leaves_the_run(branch_run):
+    _, _, points = branch_run
+    branch = [p for p in points if p.stage == "branch"]
+    short = [p for p in points if p is not branch[-1]]
+    accepted = accepted_points(short)
+    assert not any(p.stage == "branch" for p in accepted)
+    failed = [i for i, p in repeats(points).items() if not p.converged]
+    assert [p.index for p in accepted if not p.converged] == sorted(failed)
+
+
+def test_resuming_through_the_branch(branch_run):
+    system, load, points = branch_run
+    stages = [p.stage for p in points]
+    begin, end = stages.index("branch"), len(stages) - stages[::-1].index("branch")
+    # the repeats before it twice: the first try and the one with neighbours known
+    stops = [begin - 12, begin - 1, *range(begin, end + 1), len(points)]
+    assert_resumes(system, load, ALERTED, points, stops)
+
+
+@pytest.mark.xfail(
+    strict=True,
+    reason="the branch is begun towards higher frequencies and ends where it first meets the frequency of its end",
+)
+def test_the_response_through_a_branch_is_one_curve(branch_run):
+    system, load, points = branch_run
+    problem = forced_problem(system, load, ALERTED)
+    curve = [p for p in accepted_points(points) if p.stage != "peak"]
+    first = [p for p in points if p.stage == "low"]
+    # steps along the curve are not much longer than those of the first passage
+    longest = max(abs(problem.amplitude(b) - problem.amplitude(a)) for a, b in pairwise(first))
+    for a, b in pairwise(curve):
+        assert abs(problem.amplitude(b) - problem.amplitude(a)) <= 1.5 * longest
 
 
 # ---- messages -----------------------------------------------------------------------------------------------------------
