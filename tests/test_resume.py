@@ -13,7 +13,10 @@ import xarray as xr
 from small_study import write_small_study
 
 SECONDS = 120.0
-STOP_AT = "  low 6:"
+# a damper that slips around the peak: first passage, repeats with more harmonics, and points of the peak
+SLIPPING = {"ratios": "[20]", "frequency_hz": "[172.0, 184.0]", "points": "6"}
+# a user's interrupt in the first passage, a lost machine in the repeats
+STOPS = {signal.SIGINT: "  low 6:", signal.SIGKILL: "  high 15:"}
 
 
 def command(study: Path, *options: str) -> list[str]:
@@ -43,7 +46,7 @@ def stopped(study: Path, how: signal.Signals) -> tuple[int, str]:
         assert process.stdout is not None
         assert process.stderr is not None
         for line in process.stdout:
-            if line.startswith(STOP_AT):
+            if line.startswith(STOPS[how]):
                 process.send_signal(how)
                 break
         process.stdout.read()
@@ -62,7 +65,7 @@ def journalled(study: Path) -> list[tuple[int, str, bytes]]:
 def whole(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> tuple[Path, subprocess.CompletedProcess[str]]:
-    study = write_small_study(tmp_path_factory.mktemp("whole"))
+    study = write_small_study(tmp_path_factory.mktemp("whole"), **SLIPPING)
     return study, run(study)
 
 
@@ -107,7 +110,7 @@ def test_run_writes_mesh_and_log(whole: tuple[Path, subprocess.CompletedProcess[
     assert (folder / "blades.msh").stat().st_size > 0
     log = (folder / "run.log").read_text()
     assert "stuck mode 5: full" in log
-    assert "F_CL/F_HE = 2000: peak" in log
+    assert "F_CL/F_HE = 20: peak" in log
 
 
 def test_table_and_alert_are_told(whole: tuple[Path, subprocess.CompletedProcess[str]]) -> None:
@@ -126,18 +129,15 @@ def test_table_and_alert_are_told(whole: tuple[Path, subprocess.CompletedProcess
     ):
         assert column in said
     assert "Where the Jacobian Alert asked for more harmonics" in said
-    assert (
-        "points repeated with 5 harmonics, at" in said
-        or "no frequency needs more harmonics" in said
-    )
+    assert "points repeated with 5 harmonics, at" in said
     assert str(whole[0].parent / "results/result.nc") in said
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("how", list(STOPS))
 def test_stopped_run_goes_on_to_the_same_numbers(
     tmp_path: Path, whole: tuple[Path, subprocess.CompletedProcess[str]], how: signal.Signals
 ) -> None:
-    study = write_small_study(tmp_path / how.name)
+    study = write_small_study(tmp_path / how.name, **SLIPPING)
     code, said = stopped(study, how)
     if how is signal.SIGINT:
         assert code == 130
@@ -149,7 +149,8 @@ def test_stopped_run_goes_on_to_the_same_numbers(
     else:
         assert code == -9
     before = journalled(study)
-    assert len(before) >= 6
+    assert len(before) >= (6 if how is signal.SIGINT else 30)
+    assert len(before) < len(journalled(whole[0]))
     ended = run(study)
     assert ended.returncode == whole[1].returncode, ended.stderr
     assert "reduced blades taken from the earlier start" in ended.stdout
