@@ -14,15 +14,12 @@ from stickslip.response.forced import ForcedPoint, ForcedProblem, accepted_point
 
 REPEATS = 2
 HERTZ = (
-    155.0,
-    175.0,
-)  # around the first bending mode, as the paper's 165 to 188 Hz are around its own
-WEAK, STUCK, STRONG = (
-    1000.0,
-    200.0,
-    20.0,
-)  # F_CL/F_HE: slip at few points; the study's largest; slip at most of them
-LOADS = (WEAK, STUCK, 50.0, STRONG, 5.0)
+    165.0,
+    184.0,
+)  # from the free blades to beyond the stuck ones, as the paper's 165 to 188 Hz
+# F_CL/F_HE: fully stuck; slip near resonance; slip at most frequencies of the peak
+STUCK, WEAK, STRONG = (250.0, 100.0, 20.0)
+LOADS = (STUCK, WEAK, 50.0, STRONG, 10.0, 5.0)
 PAPER = 2.3
 
 
@@ -127,14 +124,20 @@ def run() -> list[dict[str, Any]]:
             ("strong", STRONG, None),
         )
     ]
-    gains = [
-        alert_record(ratio, everywhere[ratio], timed(ratio, "jacobian_alert")) for ratio in LOADS
-    ]
-    best = max((g for g in gains if g["holds"]), key=lambda g: g["value"], default=gains[0])
-    load = best["name"].rpartition("_")[-1]
+    alerts = {ratio: timed(ratio, "jacobian_alert") for ratio in LOADS}
+    gains = [alert_record(ratio, everywhere[ratio], alerts[ratio]) for ratio in LOADS]
+    seconds = [sum(run.seconds for run in runs.values()) for runs in (everywhere, alerts)]
+    off = max(difference(everywhere[ratio], alerts[ratio]) for ratio in LOADS)
     summary = {
-        **best,
         "name": "forced/high_everywhere_over_alert",
-        "note": f"F_CL/F_HE = {load}: {best['note']}",
+        "value": seconds[0] / seconds[1],
+        "goal": f"> {PAPER}",
+        "holds": bool(
+            seconds[0] / seconds[1] > PAPER and all(not r.failed for r in alerts.values())
+        ),
+        "note": (
+            f"all loads together, F_CL/F_HE = {', '.join(f'{r:g}' for r in LOADS)}; largest difference of amplitude "
+            f"{off:.1e} of the peak; the gain is large where the alert is silent and lost where it repeats most frequencies"
+        ),
     }
     return [summary, *records, *gains]

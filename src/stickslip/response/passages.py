@@ -127,7 +127,7 @@ def _low_point(problem: ForcedProblem, point: Point, index: int, began: float) -
 def repeat(
     problem: ForcedProblem, point: ForcedPoint, others: Mapping[int, ForcedPoint]
 ) -> ForcedPoint:
-    """Solve a frequency with more harmonics: from q + Δq, along the branch from a neighbour, or from q.
+    """Solve a frequency with more harmonics: from the best of q + Δq, q and its neighbours, or along the branch from a neighbour.
 
     Parameters
     ----------
@@ -144,8 +144,12 @@ def repeat(
         problem.low, balance, problem.low.unknowns(point.coefficients), omega, problem.alert_dofs
     )
     quick = replace(problem.sweep.newton, max_iterations=BRANCH_ITERATIONS)
-    spent = [newton(lambda v: balance.linearise(v, omega), alert.start, quick)]
-    for neighbour in _neighbours(point.index, others):
+    near = _neighbours(point.index, others)
+    guesses = [alert.start, *(balance.unknowns(p.coefficients) for p in [point, *near])]
+    # the smallest residual decides: q + Δq where states hardly change, a neighbour where they do
+    start = min(guesses, key=lambda x: float(np.linalg.norm(balance.linearise(x, omega).residual)))
+    spent = [newton(lambda v: balance.linearise(v, omega), start, quick)]
+    for neighbour in near:
         if spent[-1].status.converged:
             break
         spent.append(along_branch(problem, neighbour, omega).solution)
