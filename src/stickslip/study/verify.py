@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from stickslip.arrays import FloatArray
 from stickslip.contact.intervals import SLIP
 from stickslip.response.fields import signals
 from stickslip.response.forced import ForcedPoint, ForcedProblem, forced_problem
@@ -193,8 +192,10 @@ def _check(case: Case, result: CaseResult, load_case: int, accepted: Accepted) -
     if abs(check.difference_percent) <= LARGE:
         return check
     order = MORE * max(case.sweep.high, point.order)
-    amplitude = float(refined(case, result.ratio, point, order)[output])
-    return replace(check, refined_order=order, refined=amplitude)
+    many = refined(case, result.ratio, point, order)
+    if many is None:
+        return replace(check, refined_order=order)
+    return replace(check, refined_order=order, refined=problem.amplitude(many, output))
 
 
 def listed(names: Sequence[str]) -> str:
@@ -232,8 +233,8 @@ def integrated(
     )
 
 
-def refined(case: Case, ratio: float, point: ForcedPoint, order: int) -> FloatArray:
-    """Return the (n_outputs,) first-harmonic amplitudes (m) of the balance with `order` harmonics; NaN if it does not converge.
+def refined(case: Case, ratio: float, point: ForcedPoint, order: int) -> ForcedPoint | None:
+    """Solve the balance with `order` harmonics; None if it does not converge.
 
     Parameters
     ----------
@@ -249,7 +250,5 @@ def refined(case: Case, ratio: float, point: ForcedPoint, order: int) -> FloatAr
     start = balance.unknowns(point.coefficients)
     solution = newton(lambda x: balance.linearise(x, point.omega), start, sweep.newton)
     if not solution.status.converged:
-        return np.full(len(case.system.outputs), np.nan)
-    motion = balance.linear.recover(point.omega, balance.coefficients(solution.x))
-    amplitude: FloatArray = np.abs(motion[1, case.system.outputs])
-    return amplitude
+        return None
+    return replace(point, coefficients=balance.coefficients(solution.x))
