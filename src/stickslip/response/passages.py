@@ -16,7 +16,7 @@ from stickslip.response.sweep import (
     branch_end,
     forced_point,
 )
-from stickslip.solve.continuation import Point, advance, start_point, step_to
+from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to
 from stickslip.solve.newton import Solution, newton
 
 LOAD_SHARES = (
@@ -211,7 +211,9 @@ def _branch_start(problem: ForcedProblem, points: list[ForcedPoint], first: int)
     for seed in sorted(usable, key=lambda p: -p.index)[:BRANCH_SEEDS]:
         point = start_point(balance, balance.unknowns(seed.coefficients), seed.omega, following)
         if point.solution.status.converged:
-            return point
+            # a first passage that was coming back from a fold goes on downward
+            downward = seed.stage == "low" and seed.tangent.size > 0 and seed.tangent[-1] < 0.0
+            return reversed_point(point) if downward else point
     return None
 
 

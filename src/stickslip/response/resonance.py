@@ -11,6 +11,7 @@ from stickslip.response.passages import along_branch, repeat
 from stickslip.response.sweep import ForcedPoint, ForcedProblem, forced_point
 from stickslip.solve.continuation import start_point, step_to
 
+NEARBY = 0.002  # half the bracket about a known peak, relative to its frequency
 PEAK_RESOLUTION = 5e-4  # width of the bracket of the peak, relative to its frequency, at which it counts as resolved
 
 
@@ -45,6 +46,32 @@ def resolve_peak(
         place = top if omega < known[top].omega else top + 1
         known.insert(place, point)
         heights.insert(place, problem.amplitude(point))
+
+
+def peak_from(problem: ForcedProblem, point: ForcedPoint) -> ForcedPoint | None:
+    """Return the peak of `problem` near a peak of a slightly different one; None if no solution is found there.
+
+    Parameters
+    ----------
+    problem
+        The changed problem; the order of its first passage, or its high one, is that of `point`.
+    point
+        The known peak.
+    """
+    balance = problem.balance(point.order)
+    following = problem.following(balance)
+    middle = start_point(balance, balance.unknowns(point.coefficients), point.omega, following)
+    if not middle.solution.status.converged:
+        return None
+    sides = [
+        step_to(balance, middle, (1.0 + side) * point.omega, following)
+        for side in (-NEARBY, NEARBY)
+    ]
+    points = [
+        forced_point(balance, p.solution, "peak", 0, p.p, 0.0) for p in (sides[0], middle, sides[1])
+    ]
+    found = [p for p in [*points, *resolve_peak(problem, points, [])] if p.converged]
+    return max(found, key=problem.amplitude)
 
 
 def _vertex(known: list[ForcedPoint], heights: list[float]) -> float | None:

@@ -2,27 +2,29 @@
 
 from dataclasses import replace
 
-from stickslip.response.forced import forced_problem, forced_response
+from stickslip.response.forced import forced_problem
+from stickslip.response.resonance import peak_from
 from stickslip.study.build import Case
-from stickslip.study.collect import HZ, NO_SHIFT, CaseResult, collect
+from stickslip.study.collect import HZ, NO_SHIFT, CaseResult
 from stickslip.study.journal import Journal
 
-WEAKER = 0.1  # the stiffness of the comparison, as a share of the study's
-WINDOW = (
-    0.02  # half width of the frequency range of the comparison, relative to the peak's frequency
-)
-POINTS = 12
+WEAKER = (
+    0.5,
+    0.2,
+    0.1,
+)  # shares of the study's stiffness, each solved from the one before; the last one counts
 
 
 def peak_shift(
     case: Case, result: CaseResult, load_case: int, journal: Journal
 ) -> tuple[float, float]:
-    """Solve the peak again with a tenth of the retention stiffness.
+    """Follow the peak to a tenth of the retention stiffness.
 
     Returns
     -------
     tuple of float
-        Relative change of the peak amplitude, and change of its frequency in Hz; NaN without retention or without a peak.
+        Relative change of the peak amplitude, and change of its frequency in Hz; NaN without retention, without a peak, or where no
+        periodic motion was found with a weaker retention.
     """
     if case.retention == 0.0 or result.peak < 0:
         return NO_SHIFT
@@ -35,25 +37,17 @@ def peak_shift(
 
 
 def _shift(case: Case, result: CaseResult) -> tuple[float, float]:
-    peak = result.accepted[result.peak].point
-    first, last = case.sweep.omega_range
-    window = max(first, (1 - WINDOW) * peak.omega), min(last, (1 + WINDOW) * peak.omega)
+    point = first = result.accepted[result.peak].point
     sweep = replace(
-        case.sweep,
-        omega_range=window,
-        points=POINTS,
-        selection="always_low" if peak.order == case.sweep.low else "always_high",
+        case.sweep, selection="always_low" if point.order == case.sweep.low else "always_high"
     )
-    system = case.with_retention(WEAKER * case.retention)
-    load = case.load(result.ratio)
-    again = collect(
-        forced_problem(system, load, sweep),
-        list(forced_response(system, load, sweep)),
-        ratio=result.ratio,
-        excitation=result.excitation,
-        report_output=result.report_output,
-    )
-    return (
-        again.peak_amplitude / result.peak_amplitude - 1,
-        again.peak_frequency_hz - peak.omega / HZ,
-    )
+    for share in WEAKER:
+        problem = forced_problem(
+            case.with_retention(share * case.retention), case.load(result.ratio), sweep
+        )
+        again = peak_from(problem, point)
+        if again is None:
+            return NO_SHIFT
+        point = again
+    amplitude = problem.amplitude(point, result.report_output)
+    return amplitude / result.peak_amplitude - 1, (point.omega - first.omega) / HZ

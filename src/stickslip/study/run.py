@@ -1,6 +1,7 @@
 """A study from its file to its results, every finished point safe on the disk."""
 
 import json
+import math
 import platform
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -203,6 +204,11 @@ def _load_case(run: _Run, case: Case, i: int) -> CaseResult:
             "it is no resonance. Widen sweep.frequency_hz."
         )
     result = replace(result, retention_shift=peak_shift(case, result, i, run.journal))
+    if case.retention > 0.0 and result.peak >= 0 and math.isnan(result.retention_shift[0]):
+        run.warn(
+            f"F_CL/F_HE = {ratio:g}: no periodic motion was found at the peak with a tenth of the retention stiffness; "
+            "the peak rests on the damper being held, so do not rely on it"
+        )
     run.log.say(
         f"F_CL/F_HE = {ratio:g}: peak {result.peak_amplitude:.4e} m at {result.peak_frequency_hz:.3f} Hz, "
         f"{len(result.accepted)} points, {result.failed} not converged, {result.newton_steps} Newton steps"
