@@ -1,6 +1,7 @@
 """The two blades and their damper through the public API, without a study file."""
 
 import numpy as np
+
 import stickslip as ss
 
 damper = ss.FlatCurvedDamper()

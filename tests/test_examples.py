@@ -23,7 +23,9 @@ def test_python_example_finds_the_damped_resonance():
     rows = re.findall(r"([\d.]+) Hz, (\d) harmonics: ([\d.]+) µm(.*)", ended.stdout)
     assert len(rows) > 40
     assert all(not state for *_, state in rows)
-    hertz, _, peak = max(((float(f), int(h), float(a)) for f, h, a, _ in rows), key=lambda row: row[2])
+    hertz, _, peak = max(
+        ((float(f), int(h), float(a)) for f, h, a, _ in rows), key=lambda row: row[2]
+    )
     # between the free blades (165.5 Hz) and the blades stuck together (180.8 Hz), near the latter at this load
     assert 178.0 < hertz < 180.8
     # friction at work: the stuck peak, 44 µm/N times 22.1 N, would be 980 µm

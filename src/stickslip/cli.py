@@ -16,7 +16,6 @@ from stickslip.errors import InputError, StickslipError, input_error
 
 if TYPE_CHECKING:
     from stickslip.study.summary import RunSummary
-    from stickslip.study.verify import Check
 
 PLAIN_WIDTH = 130  # columns of a table that is not on a terminal
 DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -228,7 +227,7 @@ def _print_summary(summary: "RunSummary", files: list[Path]) -> None:
             console.print(f"  {text}", markup=False, highlight=False, soft_wrap=True)
 
     lines("Where the Jacobian Alert asked for more harmonics", list(summary.alerts))
-    lines("Against time integration", [_check_line(c) for c in summary.checks])
+    lines("Against time integration", [c.sentence for c in summary.checks])
     lines("Warnings", list(summary.warnings))
     if summary.failed:
         lines(
@@ -264,11 +263,3 @@ def _table(summary: "RunSummary") -> Table:
             *(f"{s:.2f}" for s in r.seconds),
         )
     return table
-
-
-def _check_line(check: "Check") -> str:
-    settled = "" if check.settled else ", which did NOT become periodic"
-    return (
-        f"{check.frequency_hz:.3f} Hz: balance {check.balance:.5e} m, integration {check.transient:.5e} m, "
-        f"difference {check.difference_percent:+.3f} % ({check.periods} periods{settled})"
-    )

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.errors import input_error
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +24,8 @@ class HarmonicLoad:
     ------
     ValueError
         If an order is below 1 or a length differs.
+    InputError
+        If a force is not finite.
     """
 
     static: FloatArray
@@ -33,6 +36,12 @@ class HarmonicLoad:
             if order < 1 or np.shape(amplitude) != self.static.shape:
                 raise ValueError(
                     f"HarmonicLoad: harmonic {order} with shape {np.shape(amplitude)} for {self.static.shape}"
+                )
+
+        for f in (self.static, *self.harmonics.values()):
+            if not np.all(np.isfinite(f)):
+                raise input_error(
+                    "HarmonicLoad", "contains NaN or infinite forces", "Give finite forces in N."
                 )
 
     def coefficients(self, order: int) -> ComplexArray:

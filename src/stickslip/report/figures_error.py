@@ -153,11 +153,9 @@ def error_scatter(result: Result) -> Plot:
     figure.update_yaxes(title_text="real error (%)", scaleanchor="x", constrain="domain", **axis)
     figure.update_xaxes(constrain="domain")
     larger = int((real[known] > predicted[known]).sum())
-    missed = int(((real > result.threshold) & (predicted <= result.threshold))[known].sum())
     caption = (
         f"{counted(int(known.sum()), 'point')} solved at both orders; on the dotted line the prediction is "
-        f"exact. In {larger} of them the real error is larger than predicted; {missed} "
-        f"{'lies' if missed == 1 else 'lie'} in the upper left corner, where the alert would have missed an "
-        f"error above {percent(result.threshold)} (dashed)."
+        f"exact. In {larger} of them the real error is larger than predicted. Points below the threshold of "
+        f"{percent(result.threshold)} (dashed) were not solved twice, so that errors which the alert missed cannot show here."
     )
     return Plot(key, title, caption, figure)

@@ -64,7 +64,9 @@ def _worst_card(result: Result) -> str:
     at = int(np.nanargmax(error))
     ratio = number(float(result.floats("load_ratio")[result.integers("case")[at]]), 4)
     note = f"at {number(float(result.floats('frequency_hz')[at]), 5)} Hz, {RATIO} = {ratio}"
-    return _card(percent(float(error[at])), f"worst predicted error at H = {result.low}", note)
+    largest = float(error[at])
+    said = "over 100 %" if largest > 100.0 else percent(largest)
+    return _card(said, f"worst predicted error at H = {result.low}", note)
 
 
 def headline(result: Result) -> str:

@@ -129,7 +129,15 @@ def verification(result: Result) -> str:
         RATIO, "frequency (Hz)", "by time integration", "by harmonic balance", "difference", "settled", "periods",
     ]  # fmt: skip
     text = f"<p>First-harmonic amplitude of {result.output_name}: the two independent ways differ by at most {worst}.</p>"
-    return text + html_table(head, rows)
+    return text + html_table(head, rows) + _sentences(result)
+
+
+def _sentences(result: Result) -> str:
+    """List what each check said, in words."""
+    if not result.has("verify_sentence"):
+        return ""
+    said = (f"<li>{escape(str(s))}</li>" for s in result.data["verify_sentence"].values)
+    return f"<ul>{''.join(said)}</ul>"
 
 
 def retention(result: Result) -> str:
@@ -153,6 +161,7 @@ def retention(result: Result) -> str:
         ]
         for c in known
     ]
+    rows += [[c.label, "no periodic motion found", NONE] for c in result.cases if c not in known]
     text = (
         "<p>With a retention stiffness ten times smaller the peak changes most for "
         f"{RATIO} = {worst.label}: by {percent(100 * float(shift[worst.index]))}.</p>"

@@ -32,20 +32,41 @@ def resolve_peak(
     known = [p for p in accepted if p.converged]
     heights = [problem.amplitude(p) for p in known]
     for index in range(problem.sweep.peak_points):
-        omega = _vertex(known, heights)
+        top = int(np.argmax(heights)) if heights else 0
+        seam = _on_seam(problem, known, top)
+        omega = known[top].omega if seam else _vertex(known, heights)
         if omega is None:
             return
-        top = int(np.argmax(heights))
         if index < len(done):
             point = done[index]
+        elif seam:
+            point = _repeated_top(problem, known, top, index)
+            yield point
         else:
             point = _peak_point(problem, known[top], omega, index)
             yield point
         if not point.converged:
             return
-        place = top if omega < known[top].omega else top + 1
-        known.insert(place, point)
-        heights.insert(place, problem.amplitude(point))
+        place = top if omega <= known[top].omega else top + 1
+        known[place : place + seam] = [point]
+        heights[place : place + seam] = [problem.amplitude(point)]
+
+
+def _on_seam(problem: ForcedProblem, known: list[ForcedPoint], top: int) -> bool:
+    """Whether the highest point has few harmonics and a neighbour many: then it may be highest because it has few."""
+    if not known or known[top].order == problem.high.order:
+        return False
+    return any(p.order == problem.high.order for p in known[max(top - 1, 0) : top + 2])
+
+
+def _repeated_top(
+    problem: ForcedProblem, known: list[ForcedPoint], top: int, index: int
+) -> ForcedPoint:
+    began = perf_counter()
+    here = known[top].index
+    sides = {here - 1: known[max(top - 1, 0)], here + 1: known[min(top + 1, len(known) - 1)]}
+    made = repeat(problem, known[top], sides)
+    return replace(made, stage="peak", index=index, seconds_total=perf_counter() - began)
 
 
 def peak_from(problem: ForcedProblem, point: ForcedPoint) -> ForcedPoint | None:

@@ -20,6 +20,7 @@ Selection = Literal["jacobian_alert", "always_low", "always_high"]
 Stage = Literal["low", "high", "branch", "peak"]
 # arc length: a quarter of the size of the vibration, or `1 / points` of the range
 LARGEST_STEP = 0.25
+FAINTEST = 1e-6  # excitation over static load: below, the residual tolerance swallows the vibration
 BRANCH_ITERATIONS = 10  # of a corrector along a branch
 
 
@@ -62,12 +63,22 @@ class Sweep:
 
     def __post_init__(self) -> None:
         first, last = self.omega_range
-        if not 0.0 < first < last:
+        if not 0.0 < first < last < np.inf:
             raise input_error(
                 "Sweep.omega_range",
                 f"must be positive and growing, got {first:g} to {last:g} rad/s",
                 "Swap the two ends.",
             )
+        if np.isnan(self.threshold):
+            raise input_error("Sweep.threshold", "is not a number", "0.05 is 5 %.")
+        for name in ("samples", "points", "frequencies", "peak_points"):
+            value, least = getattr(self, name), 0 if name in {"frequencies", "peak_points"} else 1
+            if not isinstance(value, (int, np.integer)) or value < least:
+                raise input_error(
+                    f"Sweep.{name}",
+                    f"must be an integer of at least {least}, got {value!r}",
+                    "Give a count.",
+                )
         if not 1 <= self.low <= self.high:
             raise input_error(
                 "Sweep", f"harmonics low = {self.low}, high = {self.high}", "Give 1 <= low <= high."
@@ -190,8 +201,25 @@ class ForcedProblem:
 
 def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedProblem:
     """Set up the forced response of `system` under `load`."""
+    top = max((h for h, f in load.harmonics.items() if np.any(f)), default=0)
+    if top > sweep.first_order:
+        raise input_error(
+            "HarmonicLoad",
+            f"excites harmonic {top}, but the first passage keeps {sweep.first_order}",
+            f"Give Sweep(low={top}, high={max(top, sweep.high)}) or more.",
+        )
     linear = condense(system.structure, system.retained, load)
     low = harmonic_balance(linear, system.interface, sweep.first_order, sweep.samples)
+    dynamic = max(
+        (float(np.max(np.abs(f), initial=0.0)) for f in load.harmonics.values()), default=0.0
+    )
+    if 0.0 < dynamic < FAINTEST * low.force_scale:
+        raise input_error(
+            "HarmonicLoad",
+            f"the excitation of {dynamic:.3g} N is less than a millionth of the static load or preload of {low.force_scale:.3g} N, "
+            "too faint for the tolerance of the solver",
+            "Solve the stuck structure, which is linear, or raise the excitation.",
+        )
     return ForcedProblem(system, sweep, low, low.with_order(sweep.high))
 
 
@@ -212,7 +240,14 @@ def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, For
             kept += [(p, None) for p in branch]
             passed = last
     kept += [(high.get(p.index, p), p) for p in low[passed + 1 :]]
-    return kept + [(p, None) for p in points if p.stage == "peak"]
+    peak = [p for p in points if p.stage == "peak"]
+    again = {p.omega: p for p in peak if p.converged}
+    # a peak that was solved again with more harmonics takes the place of what it was
+    kept = [
+        (again.pop(p.omega) if p.omega in again and p.order < again[p.omega].order else p, low)
+        for p, low in kept
+    ]
+    return kept + [(p, None) for p in peak if again.get(p.omega) is p or not p.converged]
 
 
 def accepted_points(points: Sequence[ForcedPoint]) -> list[ForcedPoint]:

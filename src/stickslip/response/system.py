@@ -63,16 +63,13 @@ class System:
         if self.free is None or stiffness == 0.0:
             return self
         added = np.zeros(self.structure.n)
-        mass = np.asarray(self.structure.mass[self.free][:, self.free])
-        translation = [
-            i
-            for i, d in enumerate(self.free)
-            if not self.structure.dofs.component[d].startswith("r")
-        ]
-        body_mass = float(np.max(np.diagonal(mass)[translation])) if translation else 1.0
-        for i, dof in enumerate(self.free):
-            rotation = self.structure.dofs.component[dof].startswith("r")
-            added[dof] = stiffness * (mass[i, i] / body_mass if rotation else 1.0)
+        dofs = self.structure.dofs
+        turns = np.array([dofs.component[d].startswith("r") for d in self.free])
+        inertia = np.array([self.structure.mass[d, d] for d in self.free])
+        for dof, turn, own in zip(self.free, turns, inertia, strict=True):
+            same_body = np.array([dofs.part[d] == dofs.part[dof] for d in self.free]) & ~turns
+            mass = np.max(inertia[same_body], initial=0.0)
+            added[dof] = stiffness * (own / mass if turn and mass > 0.0 else 1.0)
         diagonal = (
             scipy.sparse.diags_array(added)
             if scipy.sparse.issparse(self.structure.stiffness)

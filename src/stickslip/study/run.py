@@ -190,6 +190,11 @@ def _load_case(run: _Run, case: Case, i: int) -> CaseResult:
         excitation=case.centrifugal / ratio,
         report_output=case.report_output,
     )
+    if result.failed:
+        run.warn(
+            f"F_CL/F_HE = {result.ratio:g}: {result.failed} points did not converge; the peak is the largest of the others, "
+            "and a larger one may stand among them"
+        )
     if result.jumps_hz:
         places = ", ".join(f"{f:.2f}" for f in result.jumps_hz)
         run.warn(

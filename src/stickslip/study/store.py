@@ -381,11 +381,18 @@ def _check_variables(checks: Sequence[Check]) -> dict[str, xr.Variable]:
             "percent",
             "their difference",
         ),
-        "verify_settled": (
-            [int(c.settled) for c in checks],
-            "1",
-            "1 if the integration became periodic",
-        ),
+        "verify_settled": ([int(c.settled) for c in checks], "1", "1 if it became periodic"),
         "verify_periods": ([c.periods for c in checks], "1", "periods integrated"),
+        "verify_scatter": (
+            [c.scatter for c in checks],
+            "1",
+            "scatter about the average of a motion that did not become periodic",
+        ),
+        "verify_refined": (
+            [c.refined for c in checks],
+            "m",
+            "amplitude by harmonic balance with three times the harmonics",
+        ),
+        "verify_sentence": ([c.sentence for c in checks], "1", "what happened, in words"),
     }
     return {name: _variable("check", *column) for name, column in columns.items()}
