@@ -134,11 +134,14 @@ def test_every_point_solves_its_equations(run):
 def test_peak_points_raise_the_peak(run):
     system, load, points = run
     problem = forced_problem(system, load, SHORT)
+    top = max(accepted_points(points), key=problem.amplitude)
+    # against points with as many harmonics: one with fewer may stand higher, and is then solved again
     before = max(
-        problem.amplitude(p) for p in accepted_points([p for p in points if p.stage != "peak"])
+        problem.amplitude(p)
+        for p in accepted_points([p for p in points if p.stage != "peak"])
+        if p.order == top.order
     )
-    after = max(problem.amplitude(p) for p in accepted_points(points))
-    assert after >= before
+    assert problem.amplitude(top) >= before
 
 
 @pytest.mark.parametrize(("selection", "order"), [("always_low", 1), ("always_high", 5)])
