@@ -7,8 +7,8 @@ from stickslip.study.schema import Study
 
 BYTES_A_NODE = 35e3  # assembly and factorisation of second-order tetrahedra, measured at 10 to 30 thousand nodes
 BASE_GB = 0.35  # interpreter and libraries
-POINTS = 3.0  # points of a branch for each one asked: more are taken where the response turns
-NEWTON_A_POINT = 20  # measured over the example's load cases, repeats and failed tries included
+POINTS = 1.7  # points of a branch for each one asked: more are taken where the response turns
+NEWTON_A_POINT = 10  # the example took 7, repeats and failed tries included
 REPEATED = 0.6  # share of points that the alert repeats
 FLOPS = 2e9  # of a Newton step: a small dense factorisation on one core, and the contacts
 SECONDS_A_NODE = 1.2e-3  # assembly, reduction and the full model's frequencies
