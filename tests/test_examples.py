@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-EXAMPLE = ROOT / "examples" / "two_blades_in_python.py"
+EXAMPLE = ROOT / "examples" / "two_blades" / "in_python.py"
 
 
 def test_readme_shows_the_example():
