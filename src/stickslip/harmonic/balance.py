@@ -135,7 +135,8 @@ def harmonic_balance(
             "Retain all contact dofs.",
         )
     local = interface.restricted(linear.retained)
-    force_scale = max(linear.load.scale, *(law.preload for law in local.laws), 0.0)
+    # a preload is no scale for the load: beside a large one the load's own equations would be solved coarsely
+    force_scale = linear.load.scale or max((law.preload for law in local.laws), default=0.0)
     if force_scale <= 0.0:
         raise input_error("HarmonicLoad", "is zero", "Give a static or a harmonic force.")
     stiffness = local.stuck_stiffness()

@@ -59,6 +59,13 @@ def preload(system: System, static_load: FloatArray, options: Newton | None = No
     # a residual traction is a force without a stiffness: it chooses a mean of the vibration, not the seat of the damper
     laws = tuple(replace(law, residual_traction=None) for law in system.interface.laws)
     balance = harmonic_balance(linear, replace(system.interface, laws=laws), 0, 1)
+    # a faint static load beside a large preload cannot be resolved better than the preload's own rounding
+    coarser = max(1.0, *(law.preload / balance.force_scale for law in laws))
+    balance = replace(
+        balance,
+        force_scale=coarser * balance.force_scale,
+        displacement_scale=coarser * balance.displacement_scale,
+    )
     start = bonded_start(balance, 0.0, system)
     solution = newton(lambda v: balance.linearise(v, 0.0), start, options)
     if not solution.status.converged:
