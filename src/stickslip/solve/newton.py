@@ -14,7 +14,6 @@ from stickslip.solve.status import Status
 MIN_STEP = 1.0 / 64.0  # shortest share of a Newton step that the line search tries
 SINGULAR = 1e-15  # smallest pivot over largest; below, the matrix has no usable inverse
 MEMORY = 3  # residual norms a step is compared with: kinks make single increases normal
-BLOW_UP = 1e3  # growth of the residual that ends the iteration
 
 
 class Evaluation(Protocol):
