@@ -11,7 +11,7 @@ from benchmarks.two_blades import two_blades
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.response.preload import bonded_start, preload
-from stickslip.solve.newton import solve_dense
+from stickslip.solve.linear import solve_dense
 
 ROUNDS = 201
 RATIO = 5.0  # F_CL/F_HE: some contacts slip at the state that is timed

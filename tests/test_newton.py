@@ -6,7 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from stickslip.solve.newton import Newton, newton, solve_dense
+from stickslip.solve.linear import solve_dense
+from stickslip.solve.newton import Newton, newton
 from stickslip.solve.status import Status
 
 

@@ -7,7 +7,8 @@ from typing import Protocol
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.solve.newton import Newton, Solution, newton, solve_signed
+from stickslip.solve.linear import Bordered, Jacobian, LinearSolver
+from stickslip.solve.newton import Newton, Solution, newton
 from stickslip.solve.status import Status
 
 SHARP_TURN = (
@@ -32,7 +33,7 @@ class ParameterEvaluation(Protocol):
         ...
 
     @property
-    def jac(self) -> FloatArray:
+    def jac(self) -> Jacobian:
         """(n, n) derivative by x."""
         ...
 
@@ -124,15 +125,11 @@ class Point:
 
 
 @dataclass(frozen=True, eq=False)
-class _Bordered:
-    """The equation with the arc-length condition below it.
-
-    [ J   r_p ]
-    [ cᵀ  c_p ]
-    """
+class _Across:
+    """The equation with the arc-length condition below it."""
 
     residual: FloatArray
-    jac: FloatArray
+    jac: Bordered
     seconds_contact: float
 
 
@@ -160,14 +157,10 @@ def _measure(x: FloatArray, following: Following) -> _Measure:
     return _Measure(weights / size if size > 0 else weights, 1.0 / following.control.scale)
 
 
-def _border(problem: Problem, y: FloatArray, row: FloatArray, value: float) -> _Bordered:
+def _across(problem: Problem, y: FloatArray, row: FloatArray, value: float) -> _Across:
     at = problem.linearise(y[:-1], float(y[-1]))
-    n = at.residual.size
-    jac = np.empty((n + 1, n + 1), order="F")
-    jac[:n, :n] = at.jac
-    jac[:n, n] = at.jac_p
-    jac[n] = row
-    return _Bordered(np.append(at.residual, row @ y - value), jac, at.seconds_contact)
+    jac = Bordered(at.jac, at.jac_p, row[:-1], float(row[-1]))
+    return _Across(np.append(at.residual, row @ y - value), jac, at.seconds_contact)
 
 
 def start_point(problem: Problem, x: FloatArray, p: float, following: Following) -> Point:
@@ -179,7 +172,9 @@ def start_point(problem: Problem, x: FloatArray, p: float, following: Following)
     if not solution.status.converged:
         return Point(solution.x, p, upward, first, solution, 0.0)
     measure = _measure(solution.x, following)
-    tangent, sign = _tangent(problem, np.append(solution.x, p), upward, measure)
+    tangent, sign = _tangent(
+        problem, np.append(solution.x, p), upward, measure, following.newton.linear
+    )
     return Point(solution.x, p, tangent, first, solution, sign)
 
 
@@ -249,7 +244,7 @@ def _step(
         guess = y + (end - point.p) / unit[-1] * unit
         row = np.append(np.zeros(point.x.size), 1.0 / following.control.scale)
     value = float(row @ guess)
-    solution = newton(lambda v: _border(problem, v, row, value), guess, following.newton)
+    solution = newton(lambda v: _across(problem, v, row, value), guess, following.newton)
     x, p = solution.x[:-1], end if passes else float(solution.x[-1])
     # a corrector that slides far away, or past the end of the range, has found another piece of the branch
     near = measure.of(solution.x - y) <= 4.0 * step and (p - end) * (point.p - end) >= 0.0
@@ -257,7 +252,9 @@ def _step(
     if not (solution.status.converged and near):
         status = Status.STALLED if solution.status.converged else solution.status
         return replace(point, solution=replace(found, x=point.x, status=status))
-    tangent, sign = _tangent(problem, solution.x, unit, _measure(x, following))
+    tangent, sign = _tangent(
+        problem, solution.x, unit, _measure(x, following), following.newton.linear
+    )
     # Where contact states change the branch may turn back so sharply that the tangent nearest to the old one leads back to the
     # corner. The sign of the bordered determinant is the same along a piecewise smooth path (Allgower & Georg 1990); a sign
     # that changes although the tangent hardly turned is a bifurcation point, which is passed straight on.
@@ -267,13 +264,14 @@ def _step(
 
 
 def _tangent(
-    problem: Problem, y: FloatArray, previous: FloatArray, measure: _Measure
+    problem: Problem, y: FloatArray, previous: FloatArray, measure: _Measure, linear: LinearSolver
 ) -> tuple[FloatArray, float]:
     """Return the unit tangent on the side of `previous` and its orientation; `previous` itself where it is undetermined."""
-    at = _border(problem, y, measure.row(previous), 0.0)
+    at = problem.linearise(y[:-1], float(y[-1]))
+    row = measure.row(previous)
     right = np.zeros(y.size)
     right[-1] = 1.0
-    tangent, sign = solve_signed(at.jac, right)
+    tangent, sign = linear.solve_bordered(at.jac, at.jac_p, row[:-1], float(row[-1]), right)
     if tangent is None:
         return previous, 0.0
     return tangent / measure.of(tangent), sign
@@ -292,7 +290,9 @@ def _round_corner(
     y = np.append(point.x, point.p)
     iterations = 0
     for ahead in LOOKS_AHEAD:
-        far, sign = _tangent(problem, y + ahead * smallest * unit, unit, measure)
+        far, sign = _tangent(
+            problem, y + ahead * smallest * unit, unit, measure, following.newton.linear
+        )
         if sign == 0.0:
             continue
         if sign * point.orientation < 0.0:

@@ -6,13 +6,12 @@ from time import perf_counter
 from typing import Protocol
 
 import numpy as np
-import scipy.linalg
 
 from stickslip.arrays import FloatArray
+from stickslip.solve.linear import Dense, Jacobian, LinearSolver, solve_with
 from stickslip.solve.status import Status
 
 MIN_STEP = 1.0 / 64.0  # shortest share of a Newton step that the line search tries
-SINGULAR = 1e-15  # smallest pivot over largest; below, the matrix has no usable inverse
 MEMORY = 3  # residual norms a step is compared with: kinks make single increases normal
 
 
@@ -23,7 +22,7 @@ class Evaluation(Protocol):
     def residual(self) -> FloatArray: ...  # noqa: D102
 
     @property
-    def jac(self) -> FloatArray: ...  # noqa: D102
+    def jac(self) -> Jacobian: ...  # noqa: D102
 
     @property
     def seconds_contact(self) -> float: ...  # noqa: D102
@@ -39,10 +38,13 @@ class Newton:
         Largest absolute entry of the scaled residual at a solution.
     max_iterations
         Newton steps before giving up.
+    linear
+        Solver of the linear systems.
     """
 
     tolerance: float = 1e-10
     max_iterations: int = 25
+    linear: LinearSolver = Dense()  # noqa: RUF009  # frozen
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +88,7 @@ def newton(
         if iteration == options.max_iterations:
             break
         start = perf_counter()
-        step = solve_dense(at.jac, -at.residual)
+        step = solve_with(options.linear, at.jac, -at.residual)
         linear += perf_counter() - start
         if step is None:
             return Solution(x, Status.SINGULAR, iteration, norms[-1], contact, linear)
@@ -106,21 +108,3 @@ def newton(
     return Solution(
         x, Status.TOO_MANY_ITERATIONS, options.max_iterations, norms[-1], contact, linear
     )
-
-
-def solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
-    """Solve a dense system by LU; None if the matrix is singular to working precision. `matrix` is overwritten."""
-    return solve_signed(matrix, right)[0]
-
-
-def solve_signed(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray | None, float]:
-    """Solve a dense system by LU and return the sign of its determinant too (0 if singular). `matrix` is overwritten."""
-    lu, pivots, info = scipy.linalg.lapack.dgetrf(matrix, overwrite_a=True)
-    pivot = np.diagonal(lu)
-    size = np.abs(pivot)
-    if info != 0 or not np.all(np.isfinite(size)) or size.min() <= SINGULAR * size.max():
-        return None, 0.0
-    solution, _ = scipy.linalg.lapack.dgetrs(lu, pivots, right)
-    swaps = np.count_nonzero(pivots != np.arange(pivots.size))
-    flips = swaps + np.count_nonzero(pivot < 0.0)
-    return np.asarray(solution, dtype=float), 1.0 if flips % 2 == 0 else -1.0
