@@ -9,10 +9,11 @@ from typing import Any
 CALL = """
 from time import process_time
 import numpy as np
+from stickslip.contact.compiled import compile_contacts
 from stickslip.contact.intervals import contact_period
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.aft import contact_forces
-law = ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=1.0, mu=0.5, preload=1.0).parameters()[None]
+law = compile_contacts([ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=1.0, mu=0.5, preload=1.0)])
 start = process_time()
 contact_forces(np.ones((3, 3)), law, 64)
 print(process_time() - start, sum(contact_period.stats.cache_misses.values()), sum(contact_period.stats.cache_hits.values()))

@@ -47,7 +47,7 @@ def run() -> list[dict[str, Any]]:
     matrix = np.asfortranarray(at.jac)
     n = balance.size
     buffer = np.empty_like(matrix, order="F")
-    slipping = float(np.mean(balance.contacts(x).state == 1))
+    slipping = float(np.mean(balance.contacts(x, omega).state == 1))
 
     def iteration() -> None:
         now = balance.linearise(x, omega)
@@ -60,7 +60,7 @@ def run() -> list[dict[str, Any]]:
         buffer[:] = matrix
 
     def contacts() -> None:
-        balance.contacts(x)
+        balance.contacts(x, omega)
 
     def assembly() -> None:
         balance.linearise(x, omega)

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from models import OPEN, SLIP, STICK, analyse, basis, twin
 
-from stickslip.contact.intervals import NN, TN, TT, WN, WW
+from stickslip.contact.compiled import compile_contacts
+from stickslip.contact.law import NN, TN, TT, WN, WW
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.aft import contact_forces
 
@@ -15,7 +16,7 @@ SIZE = 1e-5  # gap amplitudes of the tests, m
 
 def evaluate(coefficients, laws, samples):
     """(2H+1, 3 n) coefficients of n contacts."""
-    return contact_forces(coefficients, np.array([law.parameters() for law in laws]), samples)
+    return contact_forces(coefficients, compile_contacts(laws), samples)
 
 
 def random_gap(rng, order, tangential=1.0, normal=1.0, means=(0.0, 0.0, 0.0)):

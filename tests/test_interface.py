@@ -29,8 +29,10 @@ def test_coordinates_and_restriction():
     u = np.arange(5.0)
     assert np.array_equal(small.gap_operator @ u[[1, 3]], gap @ u)
     assert interface.stuck_stiffness().tolist() == [1.0, 2.0, 3.0]
-    assert interface.parameters()[0, :5].tolist() == [1.0, 2.0, 3.0, 0.5, 4.0]
-    assert np.isnan(interface.parameters()[0, 5])
+    row = interface.compiled().elements[0]
+    assert row[:5].tolist() == [1.0, 2.0, 3.0, 0.5, 4.0]
+    assert np.isnan(row[5])
+    assert interface.resting_force().tolist() == [0.0, 0.0, -4.0]
 
 
 @pytest.mark.parametrize("empty_contact", [False, True])

@@ -4,9 +4,12 @@ The library samples the contact force, with an error that falls with the square 
 here that ten digits are met, and the order of the fall is a row of its own.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from stickslip.arrays import ComplexArray
+from stickslip.contact.compiled import compile_contacts
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.fourier import to_complex
 from validation.compare import Record, bound, digits, record
@@ -77,17 +80,16 @@ def element_force(ratio: float, samples: int, order: int = ORDER) -> ComplexArra
     """Return the force harmonics 0..order over fc of an element with k = fc = 1 under the amplitude `ratio`."""
     gap = np.zeros((2 * order + 1, 3))
     gap[1, 0] = ratio
-    law = jenkins(1.0, 1.0).parameters()[None]
-    return to_complex(contact_forces(gap, law, samples).coefficients)[:, 0]
+    contacts = compile_contacts([jenkins(1.0, 1.0)])
+    return to_complex(contact_forces(gap, contacts, samples).coefficients)[:, 0]
 
 
 def circle_force(ratio: float, samples: int) -> ComplexArray:
     """Return the harmonics of both tangential forces on a circular path; limits and springs are 1."""
     gap = np.zeros((3, 3))
     gap[1, 0], gap[2, 1] = ratio, ratio
-    law = jenkins(1.0, 1.0).parameters()[None].copy()
-    law[0, 1] = 1.0
-    return to_complex(contact_forces(gap, law, samples).coefficients)
+    contacts = compile_contacts([replace(jenkins(1.0, 1.0), k_w=1.0)])
+    return to_complex(contact_forces(gap, contacts, samples).coefficients)
 
 
 def exact_stiffness(ratio: float) -> complex:

@@ -218,7 +218,7 @@ def integrated(
     else:
         balance = balance_of(problem, load, order, 1024)
         x = solve(balance, omega, bonded(problem, balance, load, omega))
-        traction = balance.contacts(x).force[:, :2, 0]
+        traction = balance.contacts(x, omega).force[:, :2, 0]
         start = start_from_harmonics(motion(balance, omega, x), omega, traction)
     return integrate_refined(
         problem.structure,

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from stickslip.contact.compiled import compile_contacts
     from stickslip.contact.interface import Interface
+    from stickslip.contact.law import law_kernel
     from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
     from stickslip.errors import (
         InputError,
@@ -82,7 +84,9 @@ if TYPE_CHECKING:
     )
 
 _MODULES = {
+    "stickslip.contact.compiled": ("compile_contacts",),
     "stickslip.contact.interface": ("Interface",),
+    "stickslip.contact.law": ("law_kernel",),
     "stickslip.contact.laws.elastic_coulomb": ("ElasticCoulomb",),
     "stickslip.errors": ("InputError", "SingularError", "StickslipError"),
     "stickslip.harmonic.aft": ("contact_forces",),
@@ -150,6 +154,7 @@ __all__ = [
     "accepted_points",
     "assemble_solid",
     "chain",
+    "compile_contacts",
     "contact_forces",
     "craig_bampton",
     "drift",
@@ -159,6 +164,7 @@ __all__ = [
     "gap_operator",
     "integrate",
     "join",
+    "law_kernel",
     "lumped",
     "mesh_blade_pair",
     "natural_frequencies",

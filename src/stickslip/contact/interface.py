@@ -1,19 +1,21 @@
 """Where contacts are: pairs of points, their laws, and the operator from displacements to gaps."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.contact.intervals import NN, TN, TT, WN, WW
-from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.contact.compiled import CompiledContacts, Evaluator, compile_contacts
+from stickslip.contact.law import PAIRS, ContactLaw
 from stickslip.errors import input_error
+
+_PAIRS = np.array(PAIRS)
 
 
 @dataclass(frozen=True, eq=False)
 class Interface:
-    """Node-to-node contacts of a structure.
+    """Contacts of a structure: nodes against nodes, nodes against facets, or quadrature points.
 
     Parameters
     ----------
@@ -24,16 +26,19 @@ class Interface:
     gap_operator
         (3 n_contacts, n) rows t, w, n of each contact: ``gap = gap_operator @ u``; the contact forces act on the structure as
         ``gap_operator.T @ force``, on the left side of the equation of motion.
+    weights
+        (n_contacts,) factors of the forces of each law, such as the area of a point where laws are given per area; None: ones.
 
     Raises
     ------
     InputError
-        If the numbers of names, laws and rows do not agree.
+        If the numbers of names, laws, rows and weights do not agree, or a weight is not positive.
     """
 
     names: tuple[str, ...]
-    laws: tuple[ElasticCoulomb, ...]
+    laws: tuple[ContactLaw, ...]
     gap_operator: FloatArray
+    weights: FloatArray | None = None
 
     def __post_init__(self) -> None:
         n = len(self.names)
@@ -43,19 +48,46 @@ class Interface:
                 f"{n} contact names, {len(self.laws)} laws, {self.gap_operator.shape[0]} rows of the gap operator",
                 "Give one law and three rows (t, w, n) for each contact.",
             )
+        if self.weights is not None and (
+            self.weights.shape != (n,) or not np.all(np.isfinite(self.weights) & (self.weights > 0))
+        ):
+            raise input_error(
+                "Interface.weights",
+                f"must be {n} positive numbers, got shape {self.weights.shape}",
+                "Give the area of each contact point, or None.",
+            )
 
     @property
     def n_contacts(self) -> int:
         """Number of contact points."""
         return len(self.names)
 
-    def parameters(self) -> FloatArray:
-        """Return the (n_contacts, 6) law parameters for the kernels."""
-        return np.array([law.parameters() for law in self.laws]).reshape(self.n_contacts, 6)
+    @property
+    def factors(self) -> FloatArray:
+        """(n_contacts,) weights, ones where none are given."""
+        return np.ones(self.n_contacts) if self.weights is None else self.weights
+
+    def compiled(self, evaluator: Evaluator = "intervals") -> CompiledContacts:
+        """Return the laws as arrays for the evaluators."""
+        return compile_contacts(self.laws, self.weights, evaluator)
 
     def stuck_stiffness(self) -> FloatArray:
         """Return the (3 n_contacts,) spring stiffnesses of contacts that neither slip nor open, N/m."""
-        return np.array([[law.k_t, law.k_w, law.k_n] for law in self.laws]).reshape(-1)
+        own = np.array([law.stuck_stiffness() for law in self.laws]).reshape(self.n_contacts, 3)
+        return np.asarray(self.factors[:, None] * own).reshape(-1)
+
+    def resting_force(self) -> FloatArray:
+        """Return the (3 n_contacts,) contact forces at zero gap before anything has moved, N: preloads."""
+        rest = np.zeros(3)
+        out = np.empty((self.n_contacts, 3))
+        for law, force in zip(self.laws, out, strict=True):
+            state = law.initial_state()
+            jac = np.zeros((3 + state.size, 6 + state.size))
+            status = np.empty(2, dtype=np.int64)
+            law.kernel(
+                rest, rest, state, law.parameters(), force, np.empty_like(state), jac, status
+            )
+        return (self.factors[:, None] * out).reshape(-1)
 
     def coordinates(self) -> IntArray:
         """Return the structure's dofs that take part in a gap."""
@@ -63,7 +95,7 @@ class Interface:
 
     def restricted(self, dofs: IntArray) -> "Interface":
         """Return the interface on the coordinates `dofs` alone; they must hold `coordinates()`."""
-        return Interface(self.names, self.laws, self.gap_operator[:, dofs])
+        return replace(self, gap_operator=self.gap_operator[:, dofs])
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +126,7 @@ def add_contact_jacobian(blocks, columns, values, n, factor, jac):  # type: igno
     Parameters
     ----------
     blocks
-        (n_contacts, 5, m, m) from `contact_period`.
+        (n_contacts, P, m, m) derivative blocks in the order of `PAIRS`.
     columns, values
         The gap operator by contact, from `sparse_rows`.
     n
@@ -104,24 +136,26 @@ def add_contact_jacobian(blocks, columns, values, n, factor, jac):  # type: igno
     jac
         In and out: (m n, m n) matrix; Fortran order is fastest.
     """
-    n_contacts, _, m, _ = blocks.shape
+    n_contacts, n_pairs, m, _ = blocks.shape
     width = columns.shape[1]
+    local = np.empty((3, 3))
     for c in range(n_contacts):
         b = values[c]
         for q in range(m):
             for p in range(m):
-                tt, ww, nn = (
-                    factor * blocks[c, TT, p, q],
-                    factor * blocks[c, WW, p, q],
-                    factor * blocks[c, NN, p, q],
-                )
-                tn, wn = factor * blocks[c, TN, p, q], factor * blocks[c, WN, p, q]
-                if tt == 0.0 and ww == 0.0 and nn == 0.0 and tn == 0.0 and wn == 0.0:
+                local[:] = 0.0
+                empty = True
+                for k in range(n_pairs):
+                    value = blocks[c, k, p, q]
+                    if value != 0.0:
+                        local[_PAIRS[k, 0], _PAIRS[k, 1]] = factor * value
+                        empty = False
+                if empty:
                     continue
                 for j in range(width):
-                    row_t = tt * b[0, j] + tn * b[2, j]
-                    row_w = ww * b[1, j] + wn * b[2, j]
-                    row_n = nn * b[2, j]
+                    row_t = local[0, 0] * b[0, j] + local[0, 1] * b[1, j] + local[0, 2] * b[2, j]
+                    row_w = local[1, 0] * b[0, j] + local[1, 1] * b[1, j] + local[1, 2] * b[2, j]
+                    row_n = local[2, 0] * b[0, j] + local[2, 1] * b[1, j] + local[2, 2] * b[2, j]
                     col = q * n + columns[c, j]
                     for i in range(width):
                         jac[p * n + columns[c, i], col] += (

@@ -14,11 +14,8 @@ import numba
 import numpy as np
 
 from stickslip.arrays import FloatArray
-
-STICK, SLIP, OPEN = 0, 1, 2
-
-# derivative blocks of one contact, in the order of `blocks`
-TT, WW, NN, TN, WN = range(5)
+from stickslip.contact.element import K_N, RESIDUAL, normal_contact
+from stickslip.contact.law import NN, OPEN, SLIP, STICK, TN, TT
 
 
 def prefix_sums(order: int, samples: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -87,8 +84,8 @@ def _outer(cos_row, sin_row, basis_row, order, factor, out):  # type: ignore[no-
 
 
 @numba.njit(cache=True)
-def _march_tangent(x, normal, is_open, k, mu, start, force, state, anchor, anchor_sign):  # type: ignore[no-untyped-def]
-    """March one Jenkins spring with limit ``mu * normal`` over two periods; the second one is kept.
+def _march_tangent(x, limit, is_open, k, start, force, state, anchor, anchor_sign):  # type: ignore[no-untyped-def]
+    """March one Jenkins spring with the limit of each sample over two periods; the second one is kept.
 
     `anchor` is the sample whose force and position fix the spring while it sticks (-1: none, the spring starts unstretched at zero
     displacement), `anchor_sign` the sign of the slip there (0 for a sample at which the contact was open).
@@ -97,11 +94,10 @@ def _march_tangent(x, normal, is_open, k, mu, start, force, state, anchor, ancho
     a = -1
     sign = 0.0
     held = 0.0
-    # a direction without stiffness carries no force, whatever the start
-    if k > 0.0 and not np.isnan(start):
+    if not np.isnan(start):
         a = n - 1
         sign = start
-        held = start * mu * normal[a]
+        held = start * limit[a]
     for _ in range(2):
         for i in range(n):
             if is_open[i]:
@@ -110,10 +106,9 @@ def _march_tangent(x, normal, is_open, k, mu, start, force, state, anchor, ancho
                 state[i] = OPEN
             else:
                 trial = k * x[i] if a < 0 else held + k * (x[i] - x[a])
-                limit = mu * normal[i]
-                if abs(trial) > limit:
+                if abs(trial) > limit[i]:
                     sign = 1.0 if trial > 0.0 else -1.0
-                    a, held = i, sign * limit
+                    a, held = i, sign * limit[i]
                     force[i] = held
                     state[i] = SLIP
                 else:
@@ -129,8 +124,7 @@ def _tangent_blocks(  # type: ignore[no-untyped-def]
     anchor,
     anchor_sign,
     k,
-    mu,
-    k_n,
+    limit_slope,
     basis,
     cos_table,
     sin_table,
@@ -163,7 +157,7 @@ def _tangent_blocks(  # type: ignore[no-untyped-def]
                 _outer(cos_row, sin_row, basis[a], order, -k / n, block_x)
                 if anchor_sign[i] != 0.0:
                     _outer(
-                        cos_row, sin_row, basis[a], order, -anchor_sign[i] * mu * k_n / n, block_n
+                        cos_row, sin_row, basis[a], order, anchor_sign[i] * limit_slope / n, block_n
                     )
         elif state[i] == SLIP:
             while j < n and state[j] == SLIP and anchor_sign[j] == anchor_sign[i]:
@@ -172,47 +166,26 @@ def _tangent_blocks(  # type: ignore[no-untyped-def]
             sin_slip += anchor_sign[i] * (sin_table[j] - sin_table[i])
         i = j
     _product_matrix(cos_stick, sin_stick, order, k / n, block_x)
-    _product_matrix(cos_slip, sin_slip, order, -mu * k_n / n, block_n)
+    _product_matrix(cos_slip, sin_slip, order, limit_slope / n, block_n)
 
 
 @numba.njit(cache=True)
-def contact_period(gap, parameters, basis, cos_table, sin_table, force, state, blocks):  # type: ignore[no-untyped-def]
-    """Evaluate all contacts over one period.
-
-    Parameters
-    ----------
-    gap
-        (n_contacts, 3, samples) gaps t, w, n in m.
-    parameters
-        (n_contacts, 6) rows of `ElasticCoulomb.parameters`.
-    basis, cos_table, sin_table
-        From `prefix_sums`.
-    force
-        Out: (n_contacts, 3, samples) contact forces (T_t, T_w, -N) in N.
-    state
-        Out: (n_contacts, 2, samples) 0 stick, 1 slip, 2 open, for t and w.
-    blocks
-        Out: (n_contacts, 5, m, m) derivatives of Fourier coefficients of the force by those of the gap, m = 2 order + 1:
-        t by t, w by w, n by n, t by n, w by n.
-    """
-    n_contacts, _, n = gap.shape
+def _element_period(gap, row, basis, cos_table, sin_table, force, state, blocks, work):  # type: ignore[no-untyped-def]
+    """Add the force and the blocks of one elementary contact; `work` holds the arrays it needs on the way."""
+    n = gap.shape[1]
     order = (basis.shape[1] - 1) // 2
-    normal = np.empty(n)
-    is_open = np.empty(n, np.bool_)
-    anchor = np.empty(n, np.int64)
-    anchor_sign = np.empty(n)
-    size = cos_table.shape[1]
-    cos_a, sin_a, cos_b, sin_b = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
-    for c in range(n_contacts):
-        k_n, mu, preload = parameters[c, 2], parameters[c, 3], parameters[c, 4]
-        blocks[c] = 0.0
+    limit, tangent, is_open, anchor, anchor_sign, sums = work
+    cos_a, sin_a, cos_b, sin_b = sums
+    k_n = row[K_N]
+    slope = limit_slope = 0.0
+    for i in range(n):
+        normal, k, limit[i], by_gap, is_open[i] = normal_contact(gap[2, i], row)
+        force[2, i] += normal
+        if not is_open[i]:
+            slope, limit_slope = k, by_gap
+    if k_n != 0.0:
         cos_a[:] = 0.0
         sin_a[:] = 0.0
-        for i in range(n):
-            pressure = preload - k_n * gap[c, 2, i]
-            is_open[i] = pressure < 0.0
-            normal[i] = 0.0 if is_open[i] else pressure
-            force[c, 2, i] = -normal[i]
         i = 0
         while i < n:
             j = i + 1
@@ -222,22 +195,69 @@ def contact_period(gap, parameters, basis, cos_table, sin_table, force, state, b
                 cos_a += cos_table[j] - cos_table[i]
                 sin_a += sin_table[j] - sin_table[i]
             i = j
-        _product_matrix(cos_a, sin_a, order, k_n / n, blocks[c, NN])
-        for d in range(2):
-            k = parameters[c, d]
-            _march_tangent(
-                gap[c, d],
-                normal,
-                is_open,
-                k,
-                mu,
-                parameters[c, 5],
-                force[c, d],
-                state[c, d],
-                anchor,
-                anchor_sign,
+        _product_matrix(cos_a, sin_a, order, slope / n, blocks[NN])
+    for d in range(2):
+        k = row[d]
+        if k == 0.0:
+            # a direction without stiffness carries no force
+            for i in range(n):
+                state[d, i] = OPEN if is_open[i] else STICK
+            continue
+        _march_tangent(
+            gap[d], limit, is_open, k, row[RESIDUAL], tangent, state[d], anchor, anchor_sign
+        )
+        force[d] += tangent
+        _tangent_blocks(
+            state[d], anchor, anchor_sign, k, limit_slope, basis, cos_table, sin_table, order,
+            cos_a, sin_a, cos_b, sin_b, blocks[TT + d], blocks[TN + d],
+        )  # fmt: skip
+
+
+@numba.njit(cache=True)
+def _merge(state, other):  # type: ignore[no-untyped-def]
+    """Merge the state of one more element into that of the contact: what is neither all stuck nor all open slips."""
+    for d in range(2):
+        for i in range(state.shape[1]):
+            if state[d, i] != other[d, i]:
+                state[d, i] = SLIP
+
+
+@numba.njit(cache=True)
+def contact_period(gap, elements, first, basis, cos_table, sin_table, force, state, blocks):  # type: ignore[no-untyped-def]
+    """Evaluate all contacts over one period.
+
+    Parameters
+    ----------
+    gap
+        (n_contacts, 3, samples) gaps t, w, n in m.
+    elements
+        (n_elements, 7) rows of elementary contacts, see `contact.element`.
+    first
+        (n_contacts + 1,) contact c is the sum of the elements first[c] to first[c + 1].
+    basis, cos_table, sin_table
+        From `prefix_sums`.
+    force
+        Out: (n_contacts, 3, samples) contact forces (T_t, T_w, -N) in N.
+    state
+        Out: (n_contacts, 2, samples) 0 stick, 1 slip, 2 open, for t and w; a contact of several elements slips where they differ.
+    blocks
+        Out: (n_contacts, P, m, m) derivatives of Fourier coefficients of the force by those of the gap, m = 2 order + 1, of which the
+        first five differ from zero: t by t, w by w, n by n, t by n, w by n.
+    """
+    n = gap.shape[2]
+    size = cos_table.shape[1]
+    work = (
+        np.empty(n), np.empty(n), np.empty(n, np.bool_), np.empty(n, np.int64), np.empty(n),
+        (np.empty(size), np.empty(size), np.empty(size), np.empty(size)),
+    )  # fmt: skip
+    other = np.empty((2, n), np.int64)
+    for c in range(gap.shape[0]):
+        force[c] = 0.0
+        blocks[c] = 0.0
+        for e in range(first[c], first[c + 1]):
+            own = state[c] if e == first[c] else other
+            _element_period(
+                gap[c], elements[e], basis, cos_table, sin_table, force[c], own, blocks[c], work
             )
-            _tangent_blocks(
-                state[c, d], anchor, anchor_sign, k, mu, k_n, basis, cos_table, sin_table, order,
-                cos_a, sin_a, cos_b, sin_b, blocks[c, TT + d], blocks[c, TN + d],
-            )  # fmt: skip
+            if e > first[c]:
+                _merge(state[c], other)

@@ -7,6 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.contact.compiled import CompiledContacts, Evaluator
 from stickslip.contact.interface import Interface, SparseRows, add_contact_jacobian, sparse_rows
 from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces
@@ -55,7 +56,7 @@ class HarmonicBalance:
 
     linear: CondensedStiffness
     interface: Interface  # on the retained coordinates
-    parameters: FloatArray
+    compiled: CompiledContacts
     rows: SparseRows
     order: int
     samples: int
@@ -75,10 +76,10 @@ class HarmonicBalance:
         """Return the scaled unknowns of complex `coefficients`, padded or cut to `order`."""
         return to_real(padded(coefficients, self.order)).reshape(-1) / self.displacement_scale
 
-    def contacts(self, x: FloatArray) -> ContactPeriod:
-        """Return gaps, forces and states of all contacts over one period, at the scaled unknowns `x`."""
+    def contacts(self, x: FloatArray, omega: float) -> ContactPeriod:
+        """Return gaps, forces and states of all contacts over one period, at the scaled unknowns `x` and `omega` (rad/s)."""
         q = x.reshape(2 * self.order + 1, self.linear.n) * self.displacement_scale
-        return contact_forces(q @ self.interface.gap_operator.T, self.parameters, self.samples)
+        return contact_forces(q @ self.interface.gap_operator.T, self.compiled, self.samples, omega)
 
     def linearise(self, x: FloatArray, omega: float) -> Linearisation:
         """Return residual, Jacobian and ω-derivative at scaled unknowns `x` (size,) and `omega` (rad/s)."""
@@ -90,14 +91,17 @@ class HarmonicBalance:
         linear = (part.condensed.stiffness @ q)[:, :, 0] - part.condensed.load
         slope = (part.condensed.derivative @ q)[:, :, 0] - part.condensed.load_derivative
         start = perf_counter()
-        period = self.contacts(x)
+        period = self.contacts(x, omega)
         add_contact_jacobian(period.blocks, self.rows.columns, self.rows.values, n, factor, jac)
         seconds = perf_counter() - start
         residual = to_real(linear) + period.coefficients @ self.interface.gap_operator
+        by_omega = to_real(slope)
+        if period.by_omega is not None:
+            by_omega += period.by_omega @ self.interface.gap_operator
         return Linearisation(
             residual.reshape(m * n) / self.force_scale,
             jac,
-            to_real(slope).reshape(m * n) / self.force_scale,
+            by_omega.reshape(m * n) / self.force_scale,
             seconds,
         )
 
@@ -107,7 +111,11 @@ class HarmonicBalance:
 
 
 def harmonic_balance(
-    linear: CondensedStiffness, interface: Interface, order: int, samples: int
+    linear: CondensedStiffness,
+    interface: Interface,
+    order: int,
+    samples: int,
+    evaluator: Evaluator = "intervals",
 ) -> HarmonicBalance:
     """Set up the periodic problem.
 
@@ -121,6 +129,8 @@ def harmonic_balance(
         Highest harmonic; the static term is always kept.
     samples
         Samples per period of the contact forces.
+    evaluator
+        How piecewise-linear laws are evaluated: by ``intervals`` of the samples, at exact ``events``, or as all others by a ``march``.
 
     Raises
     ------
@@ -136,14 +146,14 @@ def harmonic_balance(
         )
     local = interface.restricted(linear.retained)
     # a preload is no scale for the load: beside a large one the load's own equations would be solved coarsely
-    force_scale = linear.load.scale or max((law.preload for law in local.laws), default=0.0)
+    force_scale = linear.load.scale or float(np.max(np.abs(local.resting_force()), initial=0.0))
     if force_scale <= 0.0:
         raise input_error("HarmonicLoad", "is zero", "Give a static or a harmonic force.")
     stiffness = local.stuck_stiffness()
     return HarmonicBalance(
         linear,
         local,
-        local.parameters(),
+        local.compiled(evaluator),
         sparse_rows(local.gap_operator),
         order,
         _checked_samples(samples, order),

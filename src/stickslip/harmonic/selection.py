@@ -59,7 +59,7 @@ def jacobian_alert(
     q = low.coefficients(x)
     padded = high.unknowns(q)
     start = perf_counter()
-    if _silent(low, high, padded):
+    if _silent(low, high, padded, omega):
         return Alert(0.0, 0, padded, perf_counter() - start)
     at = high.linearise(padded, omega)
     try:
@@ -75,7 +75,7 @@ def jacobian_alert(
     return Alert(float(error[worst]), worst, padded + change, at.seconds_contact)
 
 
-def _silent(low: HarmonicBalance, high: HarmonicBalance, padded: FloatArray) -> bool:
+def _silent(low: HarmonicBalance, high: HarmonicBalance, padded: FloatArray, omega: float) -> bool:
     """Whether nothing acts on the missing harmonics, so that Δq = 0 without a factorisation.
 
     The enlarged residual repeats the low-order one, which is zero, in its first rows; its other rows are loads and contact forces of
@@ -83,5 +83,5 @@ def _silent(low: HarmonicBalance, high: HarmonicBalance, padded: FloatArray) -> 
     """
     if any(h > low.order for h in high.linear.load.harmonics):
         return False
-    missing = high.contacts(padded).coefficients[2 * low.order + 1 :]
+    missing = high.contacts(padded, omega).coefficients[2 * low.order + 1 :]
     return bool(np.max(np.abs(missing), initial=0.0) <= SILENCE * high.force_scale)

@@ -59,7 +59,7 @@ def fields(problem: ForcedProblem, point: ForcedPoint) -> Fields:
     linear, interface = problem.low.linear, problem.low.interface
     outputs = linear.recover(point.omega, point.coefficients)[:, problem.system.outputs]
     gaps = point.coefficients @ interface.gap_operator.T
-    period = contact_forces(to_real(gaps), problem.low.parameters, problem.sweep.samples)
+    period = contact_forces(to_real(gaps), problem.low.compiled, problem.sweep.samples, point.omega)
     forces = to_complex(period.coefficients)
     h = np.arange(gaps.shape[0])[:, None]
     work = np.pi * np.sum(h * np.imag(np.conj(gaps) * forces), axis=0)
@@ -71,7 +71,7 @@ def fields(problem: ForcedProblem, point: ForcedPoint) -> Fields:
 def signals(problem: ForcedProblem, point: ForcedPoint) -> Signals:
     """Return one period of gaps, forces and states at the contacts, at the samples of the sweep."""
     gaps = point.coefficients @ problem.low.interface.gap_operator.T
-    period = contact_forces(to_real(gaps), problem.low.parameters, problem.sweep.samples)
+    period = contact_forces(to_real(gaps), problem.low.compiled, problem.sweep.samples, point.omega)
     samples = problem.sweep.samples
     time = np.arange(samples) / samples * 2.0 * np.pi / point.omega
     return Signals(time, period.gap, period.force, period.state)

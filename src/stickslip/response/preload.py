@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.contact.law import ContactLaw
+from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import SingularError
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import condense
@@ -53,15 +55,16 @@ def preload(system: System, static_load: FloatArray, options: Newton | None = No
     SingularError
         If nothing holds a body (the message names the coordinate) or no equilibrium is found.
     """
-    if not np.any(static_load) and all(law.preload <= 0.0 for law in system.interface.laws):
+    # a residual traction is a force without a stiffness: it chooses a mean of the vibration, not the seat of the damper
+    interface = replace(system.interface, laws=tuple(map(_unstretched, system.interface.laws)))
+    resting = float(np.max(np.abs(interface.resting_force()), initial=0.0))
+    if not np.any(static_load) and resting == 0.0:
         return np.zeros(system.retained.size)
     options = options or Newton(max_iterations=60)
     linear = condense(system.structure, system.retained, HarmonicLoad(static_load))
-    # a residual traction is a force without a stiffness: it chooses a mean of the vibration, not the seat of the damper
-    laws = tuple(replace(law, residual_traction=None) for law in system.interface.laws)
-    balance = harmonic_balance(linear, replace(system.interface, laws=laws), 0, 1)
+    balance = harmonic_balance(linear, interface, 0, 1)
     # a faint static load beside a large preload cannot be resolved better than the preload's own rounding
-    coarser = max(1.0, *(law.preload / balance.force_scale for law in laws))
+    coarser = max(1.0, resting / balance.force_scale)
     balance = replace(
         balance,
         force_scale=coarser * balance.force_scale,
@@ -78,6 +81,10 @@ def preload(system: System, static_load: FloatArray, options: Newton | None = No
             "or give it a retention stiffness."
         )
     return np.asarray(balance.coefficients(solution.x)[0].real)
+
+
+def _unstretched(law: ContactLaw) -> ContactLaw:
+    return replace(law, residual_traction=None) if isinstance(law, ElasticCoulomb) else law
 
 
 def _released(balance: HarmonicBalance, options: Newton) -> Solution:

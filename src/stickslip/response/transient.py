@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import input_error
 from stickslip.model.structure import Structure
@@ -181,9 +182,9 @@ class RefinedResult:
     fine: TransientResult
 
 
-def rest(n: int, laws: Sequence[ElasticCoulomb]) -> TransientStart:
+def rest(n: int, laws: Sequence[ContactLaw]) -> TransientStart:
     """Return zero displacement and velocity of `n` coordinates, with the residual traction of each law."""
-    held = [(law.residual_traction or 0.0) * law.mu * max(law.preload, 0.0) for law in laws]
+    held = [(law.residual_traction or 0.0) * law.mu * max(law.preload, 0.0) for law in _known(laws)]
     return TransientStart(np.zeros(n), np.zeros(n), np.tile(held, (2, 1)).T)
 
 
@@ -209,7 +210,7 @@ def start_from_harmonics(
 def integrate(
     structure: Structure,
     gap_operator: FloatArray,
-    laws: Sequence[ElasticCoulomb],
+    laws: Sequence[ContactLaw],
     load: PeriodicLoad,
     omega: float,
     outputs: IntArray,
@@ -245,9 +246,9 @@ def integrate(
     stepping = stepping or TimeStepping()
     start = start or rest(structure.n, laws)
     _check(structure.n, len(laws), outputs, start)
-    law = np.array([[c.k_t, c.k_w, c.k_n, c.mu, c.preload] for c in laws], dtype=float).reshape(
-        -1, 5
-    )
+    law = np.array(
+        [[c.k_t, c.k_w, c.k_n, c.mu, c.preload] for c in _known(laws)], dtype=float
+    ).reshape(-1, 5)
     operators, modes = step_operators(
         structure, gap_operator, law, load, omega, stepping.steps_per_period
     )
@@ -258,7 +259,7 @@ def integrate(
 def integrate_refined(
     structure: Structure,
     gap_operator: FloatArray,
-    laws: Sequence[ElasticCoulomb],
+    laws: Sequence[ContactLaw],
     load: PeriodicLoad,
     omega: float,
     outputs: IntArray,
@@ -281,6 +282,18 @@ def integrate_refined(
     error = float(np.max(np.abs(difference)) / largest) if largest != 0.0 else 0.0
     share = 1.0 / 3.0 if coarse.settled and fine.settled else 0.0  # noise must not be extrapolated
     return RefinedResult(finer + share * difference, error + scatter, coarse, fine)
+
+
+def _known(laws: Sequence[ContactLaw]) -> list[ElasticCoulomb]:
+    """Return the laws if the integration has a step of its own for each of them."""
+    for law in laws:
+        if not isinstance(law, ElasticCoulomb):
+            raise input_error(
+                "integrate: laws",
+                f"got {type(law).__name__}",
+                "The time integration judges ElasticCoulomb contacts only.",
+            )
+    return [law for law in laws if isinstance(law, ElasticCoulomb)]
 
 
 def _initial_state(

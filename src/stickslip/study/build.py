@@ -8,6 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.contact.interface import Interface
 from stickslip.errors import InputError
+from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.damper import ContactPoints, FlatCurvedDamper
 from stickslip.model.structure import Structure
@@ -176,9 +177,5 @@ def static_load(system: System, centrifugal: float) -> FloatArray:
 
 def static_contact_force(interface: Interface, gap: FloatArray) -> FloatArray:
     """Return the (n_contacts, 3) forces t, w, n of contacts loaded once from rest to `gap`."""
-    k_t, k_w, k_n, mu, n0, _ = interface.parameters().T
-    normal = np.maximum(0.0, n0 - k_n * gap[:, 2])
-    tangent = np.clip(
-        np.stack([k_t, k_w], 1) * gap[:, :2], -(mu * normal)[:, None], (mu * normal)[:, None]
-    )
-    return np.column_stack([tangent, -normal])
+    coefficients = gap.reshape(1, -1)
+    return contact_forces(coefficients, interface.compiled(), samples=1).force[:, :, 0]

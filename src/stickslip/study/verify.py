@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from stickslip.contact.intervals import SLIP
+from stickslip.contact.law import SLIP
 from stickslip.response.fields import signals
 from stickslip.response.forced import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.response.propagator import PeriodicLoad

@@ -1,10 +1,13 @@
 """Unilateral normal spring with two independent Jenkins springs whose limit follows the normal force."""
 
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.contact.element import element, element_step, slider_start
+from stickslip.contact.law import UNCOUPLED_TANGENTS
 from stickslip.errors import input_error
 
 
@@ -43,6 +46,9 @@ class ElasticCoulomb:
     preload: float = 0.0
     residual_traction: float | None = None
 
+    kernel: ClassVar[Any] = element_step
+    pairs: ClassVar[int] = UNCOUPLED_TANGENTS
+
     def __post_init__(self) -> None:
         for name in ("k_t", "k_w", "k_n", "mu"):
             value = getattr(self, name)
@@ -73,6 +79,20 @@ class ElasticCoulomb:
             )
 
     def parameters(self) -> FloatArray:
-        """Return ``(k_t, k_w, k_n, mu, preload, residual_traction or NaN)`` for the compiled kernels."""
-        m = np.nan if self.residual_traction is None else self.residual_traction
-        return np.array([self.k_t, self.k_w, self.k_n, self.mu, self.preload, m])
+        """Return the (7,) row of the elementary contact."""
+        return element(
+            k_t=self.k_t, k_w=self.k_w, k_n=self.k_n, mu=self.mu, preload=self.preload,
+            residual_traction=self.residual_traction,
+        )  # fmt: skip
+
+    def elements(self) -> FloatArray:
+        """Return the (1, 7) rows of elementary contacts that the law is the sum of."""
+        return self.parameters()[None]
+
+    def initial_state(self) -> FloatArray:
+        """Return the (2,) slider positions before t = 0, m."""
+        return slider_start(self.residual_traction)
+
+    def stuck_stiffness(self) -> FloatArray:
+        """Return the (3,) stiffnesses t, w, n of the contact that neither slips nor opens, N/m."""
+        return np.array([self.k_t, self.k_w, self.k_n])

@@ -1,0 +1,104 @@
+"""Contact laws as arrays: what the evaluators of a period take."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.contact.law import UNCOUPLED_TANGENTS, ContactLaw, PiecewiseLinear
+
+Evaluator = Literal["intervals", "march", "events"]
+
+
+@dataclass(frozen=True, eq=False)
+class MarchedLaws:
+    """Contacts of one law class, marched together."""
+
+    contacts: IntArray
+    kernel: Any
+    parameters: FloatArray  # (n, n_parameters)
+    start: FloatArray  # (n, n_state)
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledContacts:
+    """The laws of all contacts, sorted by how they are evaluated.
+
+    Attributes
+    ----------
+    evaluator
+        How piecewise-linear laws are evaluated: ``intervals`` (on samples), ``events`` (exact), or ``march`` as all others are.
+    n_contacts
+        Number of contacts.
+    pairs
+        Derivative blocks a contact: 5, 7 or 9.
+    weights
+        (n_contacts,) factors of the forces; None: ones.
+    piecewise
+        Contacts that are sums of elementary ones.
+    elements, first
+        (n_elements, 7) and (len(piecewise) + 1,): their elements, see `contact_period`.
+    marched
+        All other contacts.
+    """
+
+    evaluator: Evaluator
+    n_contacts: int
+    pairs: int
+    weights: FloatArray | None
+    piecewise: IntArray
+    elements: FloatArray
+    first: IntArray
+    marched: tuple[MarchedLaws, ...]
+
+
+def compile_contacts(
+    laws: Sequence[ContactLaw],
+    weights: FloatArray | None = None,
+    evaluator: Evaluator = "intervals",
+) -> CompiledContacts:
+    """Sort `laws` by evaluator and lay their parameters out in arrays.
+
+    Parameters
+    ----------
+    laws
+        One law a contact.
+    weights
+        (n_contacts,) factors of the forces; None: ones.
+    evaluator
+        ``intervals`` or ``events`` for piecewise-linear laws (others are marched), or ``march`` for all.
+    """
+    march_all = evaluator == "march"
+    rows: list[FloatArray] = []
+    piecewise: list[int] = []
+    others: dict[tuple[Any, int, int], list[int]] = {}
+    for index, law in enumerate(laws):
+        if isinstance(law, PiecewiseLinear) and not march_all:
+            piecewise.append(index)
+            rows.append(law.elements())
+        else:
+            kind = (law.kernel, law.parameters().size, law.initial_state().size)
+            others.setdefault(kind, []).append(index)
+    return CompiledContacts(
+        evaluator,
+        len(laws),
+        max((law.pairs for law in laws), default=UNCOUPLED_TANGENTS),
+        weights,
+        np.array(piecewise, dtype=np.int64),
+        np.concatenate(rows) if rows else np.zeros((0, 7)),
+        np.cumsum([0, *(len(r) for r in rows)], dtype=np.int64),
+        tuple(_marched(laws, np.array(indices), kind[0]) for kind, indices in others.items()),
+    )
+
+
+def _marched(laws: Sequence[ContactLaw], contacts: IntArray, kernel: Any) -> MarchedLaws:
+    return MarchedLaws(
+        contacts,
+        kernel,
+        np.array([laws[c].parameters() for c in contacts], dtype=float),
+        np.array([laws[c].initial_state() for c in contacts], dtype=float).reshape(
+            contacts.size, -1
+        ),
+    )

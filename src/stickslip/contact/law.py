@@ -1,0 +1,93 @@
+"""The seam of contact laws: parameters in a frozen dataclass, behaviour in one compiled step.
+
+The step maps displacement, velocity and state at one sample of one contact to force and new state, with the derivatives of that map. It
+owns nothing, so that the same law serves harmonic balance and the static preload. All steps share one signature: the marcher is compiled once, against that
+signature, and takes the step as a first-class function; a law of a user's script costs its own compilation and nothing else.
+"""
+
+from collections.abc import Callable
+from typing import Any, Protocol, runtime_checkable
+
+import numba
+from numba import types
+
+from stickslip.arrays import FloatArray
+
+STICK, SLIP, OPEN = 0, 1, 2  # what a step says of each tangent
+
+_vector = types.float64[::1]
+STEP_SIGNATURE = types.void(
+    _vector, _vector, _vector, _vector, _vector, _vector, types.float64[:, ::1], types.int64[::1]
+)
+
+# Derivative blocks of a contact, force by gap, in the order of `ContactPeriod.blocks`; a law fills the first 5, 7 or 9.
+TT, WW, NN, TN, WN, TW, WT, NT, NW = range(9)
+PAIRS = ((0, 0), (1, 1), (2, 2), (0, 2), (1, 2), (0, 1), (1, 0), (2, 0), (2, 1))
+UNCOUPLED_TANGENTS, COUPLED_TANGENTS, FULLY_COUPLED = 5, 7, 9
+
+
+class ContactLaw(Protocol):
+    """What an interface needs of a law; frozen dataclasses implement it.
+
+    Attributes
+    ----------
+    kernel
+        Step compiled by `law_kernel`.
+    pairs
+        Blocks that can differ from zero: 5 if neither tangent feels the other, 7 if they are coupled, 9 if the normal force depends
+        on them too.
+    """
+
+    @property
+    def kernel(self) -> Any: ...  # noqa: D102
+
+    @property
+    def pairs(self) -> int: ...  # noqa: D102
+
+    def parameters(self) -> FloatArray:
+        """Return the (n_parameters,) array handed to the step; of one length for all laws of a class with as many states."""
+        ...
+
+    def initial_state(self) -> FloatArray:
+        """Return the (n_state,) state before t = 0; where it holds NaN, one step at the last sample before t = 0 settles it."""
+        ...
+
+    def stuck_stiffness(self) -> FloatArray:
+        """Return the (3,) stiffnesses t, w, n of the contact that neither slips nor opens, N/m."""
+        ...
+
+
+@runtime_checkable
+class PiecewiseLinear(Protocol):
+    """A law that is a sum of elementary contacts, whose periods are evaluated by intervals or exact events."""
+
+    def elements(self) -> FloatArray:
+        """Return (n_elements, 7) rows k_t, k_w, k_n, mu, preload, residual traction or NaN, unilateral; see `contact.element`."""
+        ...
+
+
+def law_kernel(step: Callable[..., None]) -> Any:
+    """Compile the step of a law.
+
+    Parameters
+    ----------
+    step
+        Function ``step(displacement, velocity, state, parameters, force, new_state, jac, status)`` in the part of Python that numba
+        compiles. It reads the first four and fills the others: ``force`` (3,) = (T_t, T_w, -N) in N, ``new_state`` (n_state,),
+        ``jac`` (3 + n_state, 6 + n_state) derivatives of force and new state by displacement, velocity and state (it arrives
+        zeroed), ``status`` (2,) what each tangent does: 0 stick, 1 slip, 2 open.
+
+    Returns
+    -------
+    staticmethod
+        To be stored as the class attribute `kernel` of the law.
+
+    Notes
+    -----
+    The compiled code is kept on disk beside the file of the step. A step typed at a prompt has no file and is compiled anew.
+    """
+    try:
+        compiled = numba.njit(STEP_SIGNATURE, cache=True)(step)
+    except RuntimeError:  # numba finds no place for the cache of code without a file
+        compiled = numba.njit(STEP_SIGNATURE)(step)
+    return staticmethod(compiled)  # a compiled function on a class would be bound like a method
