@@ -8,4 +8,5 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.floating[Any]]
 ComplexArray = npt.NDArray[np.complexfloating[Any, Any]]
 IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
 Matrix = Any  # dense ndarray or scipy.sparse.csr_array: scipy ships no types

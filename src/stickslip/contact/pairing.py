@@ -1,0 +1,374 @@
+"""Kinematics of a contact: which points of two surfaces touch, and the operator from displacements to their gaps.
+
+Three ways, from the cheapest to the most exact: node to node, node to segment, and segment to segment at quadrature points ("Mortar-like",
+Krack, Salles & Thouverez 2017, section 2.2).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import scipy.sparse
+from scipy.spatial import cKDTree
+
+from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.contact.facets import (
+    DEGREE,
+    interpolation,
+    kinds_of,
+    normals,
+    positions,
+)
+from stickslip.contact.interface import Interface
+from stickslip.contact.law import ContactLaw
+from stickslip.contact.projection import facet_balls, meet, project
+from stickslip.contact.quadrature import HIGHEST_DEGREE
+from stickslip.contact.segmentation import segments
+from stickslip.contact.surface import Surface
+from stickslip.errors import InputError, input_error
+
+PARALLEL = 1e-3  # sine of the smallest angle between the direction of t and a normal
+LISTED = 5  # points that a message names
+RIM = 1e-6  # overhang that is rounding, as a share of a facet's size
+
+Outside = Literal["error", "skip"]
+
+
+@dataclass(frozen=True, eq=False)
+class Pairing:
+    """Pairs of material points of two bodies A and B.
+
+    Parameters
+    ----------
+    gap_operator
+        (3 n_points, n_dofs) sparse; rows t, w, n of each point: ``gap = gap_operator @ u = frameᵀ (u_B − u_A)``.
+    positions
+        (n_points, 3) places on side A, m.
+    frames
+        (n_points, 3, 3) columns t, w, n; n is the outward normal of body A.
+    weights
+        (n_points,) area in m² that each point stands for; ones where there are no facets. Contact force = weight × law per area.
+    initial_gap
+        (n_points,) normal distance at rest in m, negative where the bodies overlap.
+    unpaired
+        Nodes of side A (numbers; for segments: facets of side A) that were left out with ``outside="skip"``.
+    """
+
+    gap_operator: Matrix
+    positions: FloatArray
+    frames: FloatArray
+    weights: FloatArray
+    initial_gap: FloatArray
+    unpaired: IntArray
+
+    @property
+    def n_points(self) -> int:
+        """Number of pairs."""
+        return len(self.weights)
+
+
+def contact_frames(normal: FloatArray, direction: FloatArray | tuple[float, ...]) -> FloatArray:
+    """Return right-handed frames (p, 3, 3), columns t, w, n.
+
+    Parameters
+    ----------
+    normal
+        (p, 3) unit normals.
+    direction
+        (3,) its part in the tangent plane gives t.
+
+    Raises
+    ------
+    InputError
+        If the direction is parallel to a normal.
+    """
+    along = np.asarray(direction, dtype=float)
+    length = np.linalg.norm(along)
+    t = along - (normal @ along)[:, None] * normal
+    size = np.linalg.norm(t, axis=1)
+    if not size.min(initial=np.inf) > PARALLEL * length or not length > 0:
+        worst = int(np.argmin(size))
+        raise input_error(
+            "direction of t",
+            f"{tuple(float(x) for x in along)} is parallel to the normal {np.round(normal[worst], 6).tolist()} of point {worst}",
+            "Give a direction that is nowhere normal to the surface of body A.",
+        )
+    t = t / size[:, None]
+    return np.stack([t, np.cross(normal, t), normal], axis=2)
+
+
+def node_to_node(
+    a: Surface,
+    b: Surface,
+    *,
+    tolerance: float,
+    direction: tuple[float, float, float] = (1.0, 0.0, 0.0),
+    outside: Outside = "error",
+) -> Pairing:
+    """Pair each node of side A with the nearest node of side B: for matching meshes.
+
+    Parameters
+    ----------
+    a, b
+        The two sides.
+    tolerance
+        Largest distance of partners, m.
+    direction
+        Its part in the tangent plane is the tangent t.
+    outside
+        What to do about nodes of A without a partner: ``"error"`` or ``"skip"``.
+
+    Raises
+    ------
+    InputError
+        If a node has no partner, or shares it.
+    """
+    nodes, others = a.used, b.used
+    distance, nearest = cKDTree(b.points[others]).query(a.points[nodes])
+    partner = others[nearest]
+    lost = distance > tolerance
+    if lost.any() and (outside == "error" or lost.all()):
+        raise _without_partner(
+            "node_to_node", a, nodes[lost], distance[lost], f"node of side B nearer than {tolerance:g} m",
+            "Raise the tolerance, match the meshes, pair by node_to_segment, or leave the nodes out with outside='skip'.",
+        )  # fmt: skip
+    nodes, partner = nodes[~lost], partner[~lost]
+    twice, count = np.unique(partner, return_counts=True)
+    if np.any(count > 1):
+        shared = int(twice[np.argmax(count)])
+        mine = _numbers(a, nodes[partner == shared])
+        raise input_error(
+            "node_to_node",
+            f"nodes {mine} of side A have the same nearest node {_numbers(b, np.array([shared]))[0]} of side B",
+            "The meshes do not match: use node_to_segment or segment_to_segment.",
+        )
+    frames = contact_frames(a.node_normals()[nodes], direction)
+    one = np.ones((len(nodes), 1))
+    return _pairing(
+        frames,
+        a.points[nodes],
+        b.points[partner],
+        (a.weighted(nodes[:, None], one), b.weighted(partner[:, None], one)),
+        a.tributary_areas()[nodes],
+        np.array(_numbers(a, a.used[lost]), dtype=np.int64),
+    )
+
+
+def node_to_segment(
+    a: Surface,
+    b: Surface,
+    *,
+    reach: float | None = None,
+    tolerance: float | None = None,
+    direction: tuple[float, float, float] = (1.0, 0.0, 0.0),
+    outside: Outside = "error",
+) -> Pairing:
+    """Pair each node of side A with its closest point on the facets of side B: for non-matching meshes.
+
+    Simple and cheap, but a uniform pressure does not pass exactly. Let A be the side with the finer mesh.
+
+    Parameters
+    ----------
+    a, b
+        The two sides.
+    reach
+        Largest distance of partners, m; None: the radius of the largest facet.
+    tolerance
+        Distance in m by which a node may stand beyond the rim of side B; None: nothing but rounding.
+    direction
+        Its part in the tangent plane is the tangent t.
+    outside
+        What to do about nodes of A without a partner: ``"error"`` or ``"skip"``.
+
+    Raises
+    ------
+    InputError
+        If a node has no partner on side B.
+    """
+    _need_facets("node_to_segment", a, b)
+    radius_a, radius_b = facet_balls(a)[1], facet_balls(b)[1]
+    reach = float(max(radius_a.max(), radius_b.max())) if reach is None else reach
+    tolerance = RIM * float(radius_b.min()) if tolerance is None else tolerance
+    nodes = a.used
+    outward = a.node_normals()[nodes]
+    feet = project(a.points[nodes], outward, b, reach)
+    lost = feet.overhang > tolerance
+    if lost.any() and (outside == "error" or lost.all()):
+        beyond = np.where(np.isfinite(feet.overhang), feet.overhang, np.inf)
+        raise _without_partner(
+            "node_to_segment", a, nodes[lost], beyond[lost],
+            f"facet of side B that faces them within {reach:g} m and less than {tolerance:g} m beyond its rim",
+            "Check that both sides' normals point outward, raise reach or tolerance, make side B the larger one, or leave the nodes "
+            "out with outside='skip'.",
+        )  # fmt: skip
+    kept, facet, reference = nodes[~lost], feet.facet[~lost], feet.reference[~lost]
+    facets = b.facets[facet]
+    return _pairing(
+        contact_frames(outward[~lost], direction),
+        a.points[kept],
+        positions(b.points, facets, reference),
+        (a.weighted(kept[:, None], np.ones((len(kept), 1))), b.at(facet, reference)),
+        a.tributary_areas()[kept],
+        np.array(_numbers(a, nodes[lost]), dtype=np.int64),
+    )
+
+
+def segment_to_segment(
+    a: Surface,
+    b: Surface,
+    *,
+    reach: float | None = None,
+    degree: int | None = None,
+    direction: tuple[float, float, float] = (1.0, 0.0, 0.0),
+    outside: Outside = "error",
+) -> Pairing:
+    """Pair quadrature points on the common pieces of both sides' facets: "Mortar-like" contact.
+
+    On plane surfaces a uniform pressure passes exactly through any two meshes of triangles and parallelograms. Points are placed on side
+    A, and partners along its normal, so that normal forces have no moment about each other.
+
+    Parameters
+    ----------
+    a, b
+        The two sides.
+    reach
+        Largest distance of partners, m; None: the radius of the largest facet.
+    degree
+        Polynomials integrated exactly on each piece; None: products of the shape functions of both sides. The degree of the shape functions
+        of one side is enough to pass a uniform pressure, with fewer points.
+    direction
+        Its part in the tangent plane is the tangent t.
+    outside
+        What to do about facets of A no part of which has a partner: ``"error"`` or ``"skip"``. A facet that
+        reaches beyond side B takes part as far as it is opposite to it.
+
+    Raises
+    ------
+    InputError
+        If a facet has no partner on side B, or the sides are too warped to be projected.
+    """
+    _need_facets("segment_to_segment", a, b)
+    radius_a, radius_b = facet_balls(a)[1], facet_balls(b)[1]
+    reach = float(max(radius_a.max(), radius_b.max())) if reach is None else reach
+    if degree is None:
+        highest = [max(DEGREE[int(kind)] for kind in kinds_of(side.facets)) for side in (a, b)]
+        degree = min(sum(highest), HIGHEST_DEGREE)
+    found = segments(a, b, reach, degree)
+    facets_a, facets_b = a.facets[found.facet_a], b.facets[found.facet_b]
+    on_a, missed_a = meet(a.points, facets_a, found.place, found.axes)
+    places = positions(a.points, facets_a, on_a)
+    normal = np.einsum(
+        "pk,pkc->pc", interpolation(facets_a, on_a), a.corner_normals()[found.facet_a]
+    )
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    frames = contact_frames(normal, direction)
+    on_b, missed_b = meet(b.points, facets_b, places, frames[:, :, :2].transpose(0, 2, 1))
+    _refuse_warped(a, found.facet_a[np.union1d(missed_a, missed_b)])
+    partner = positions(b.points, facets_b, on_b)
+    near = np.linalg.norm(partner - places, axis=1) <= reach
+    left = np.setdiff1d(np.arange(len(a.facets)), found.facet_a[near])
+    if left.size and (outside == "error" or not near.any()):
+        raise _without_facet(a, left, reach)
+    # the plane of a cell and the curved facet above it differ in area
+    own = normals(a.points, facets_a, on_a)
+    plane = np.cross(found.axes[:, 0], found.axes[:, 1])
+    tilt = np.einsum("pc,pc->p", own, plane) / np.linalg.norm(own, axis=1)
+    return _pairing(
+        frames[near],
+        places[near],
+        partner[near],
+        (a.at(found.facet_a[near], on_a[near]), b.at(found.facet_b[near], on_b[near])),
+        (found.weight / tilt)[near],
+        left,
+    )
+
+
+def paired_interface(
+    pairing: Pairing, law: ContactLaw | Callable[[float], ContactLaw], name: str = "contact"
+) -> Interface:
+    """Put a law per area at every point of a pairing.
+
+    Parameters
+    ----------
+    pairing
+        Points, gap operator and areas.
+    law
+        One law for all points, with stiffnesses in N/m³ and pressures in Pa; it takes the bodies as touching at rest, whatever the
+        initial gaps of the pairing. Or a function from the initial gap of a point in m to its law, e.g.
+        ``lambda gap: ElasticCoulomb(..., k_n=k_n, preload=-k_n * gap)``.
+    name
+        Contacts are called ``name.1``, ``name.2`` ...
+    """
+    points = range(pairing.n_points)
+    laws = tuple(law(float(pairing.initial_gap[i])) if callable(law) else law for i in points)
+    names = tuple(f"{name}.{i + 1}" for i in points)
+    return Interface(names, laws, pairing.gap_operator.toarray(), pairing.weights)
+
+
+def _pairing(
+    frames: FloatArray,
+    places: FloatArray,
+    partners: FloatArray,
+    motions: tuple[Matrix, Matrix],
+    weights: FloatArray,
+    unpaired: IntArray,
+) -> Pairing:
+    """Put a pairing together from points of A and B and the operators to their displacements."""
+    p = len(places)
+    blocks = (frames.transpose(0, 2, 1), np.arange(p), np.arange(p + 1))
+    to_frame = scipy.sparse.bsr_array(blocks, shape=(3 * p, 3 * p))
+    operator = scipy.sparse.csr_array(to_frame @ (motions[1] - motions[0]))
+    operator.eliminate_zeros()
+    operator.sort_indices()
+    gap = np.einsum("pc,pc->p", frames[:, :, 2], partners - places)
+    return Pairing(operator, places, frames, weights, gap, unpaired)
+
+
+def _numbers(surface: Surface, nodes: IntArray) -> list[int]:
+    assert surface.numbers is not None
+    return [int(number) for number in surface.numbers[nodes]]
+
+
+def _without_partner(
+    place: str, a: Surface, nodes: IntArray, distance: FloatArray, partner: str, remedy: str
+) -> InputError:
+    """Name the nodes of side A without a partner: number, place, and how far the next one is."""
+    worst = np.argsort(-distance)[:LISTED]
+    listed = [
+        f"node {_numbers(a, nodes[[i]])[0]} at ({', '.join(f'{x:.6g}' for x in a.points[nodes[i]])}) m"
+        + (f", {distance[i]:.3g} m off" if np.isfinite(distance[i]) else ", none near")
+        for i in worst
+    ]
+    more = "" if len(nodes) <= LISTED else f" and {len(nodes) - LISTED} more"
+    return input_error(
+        place, f"{len(nodes)} nodes of side A have no {partner}: {'; '.join(listed)}{more}", remedy
+    )
+
+
+def _without_facet(a: Surface, left: IntArray, reach: float) -> InputError:
+    row = a.facets[left[0]]
+    middle = a.points[row[row >= 0]].mean(axis=0)
+    return input_error(
+        "segment_to_segment",
+        f"{len(left)} of {len(a.facets)} facets of side A have no facet of side B opposite to them within {reach:g} m, e.g. facet "
+        f"{left[0]} at ({', '.join(f'{x:.6g}' for x in middle)}) m",
+        "Check that both sides' normals point outward, raise reach, or leave the facets out with outside='skip'.",
+    )
+
+
+def _need_facets(place: str, *sides: Surface) -> None:
+    for name, side in zip("AB", sides, strict=True):
+        if len(side.facets) == 0:
+            raise input_error(
+                place, f"side {name} has no facets", "Give facets, or pair by node_to_node."
+            )
+
+
+def _refuse_warped(a: Surface, facets: IntArray) -> None:
+    if facets.size:
+        raise input_error(
+            "segment_to_segment",
+            f"points of {np.unique(facets).size} facets of side A, e.g. facet {facets[0]}, cannot be projected on both sides",
+            "Facets are folded or too warped there: refine the mesh.",
+        )

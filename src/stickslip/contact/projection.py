@@ -1,0 +1,251 @@
+"""Where a point falls on facets: the closest one, and the one in a given direction."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from stickslip.arrays import BoolArray, FloatArray, IntArray
+from stickslip.contact.facets import (
+    REFERENCE_NODES,
+    centres,
+    corner_counts,
+    normals,
+    positions,
+    tangents,
+)
+from stickslip.contact.surface import Surface
+
+ROUNDS = 40  # of Gauss-Newton: linear convergence with the ratio gap / radius of curvature
+FAR = 4.0  # reference coordinates beyond this belong to a neighbour: do not follow them further
+CONVERGED = 1e-12  # last step, in reference coordinates; the point itself is better than that
+INSIDE = 1e-12  # in reference coordinates
+
+
+@dataclass(frozen=True, eq=False)
+class Feet:
+    """Feet of perpendiculars from p points to a surface.
+
+    Parameters
+    ----------
+    facet
+        (p,) facet that holds the foot; -1 where no facet is near.
+    reference
+        (p, 2) its place in reference coordinates.
+    overhang
+        (p,) distance in metres by which the point stands beyond the rim of the surface, measured along the surface; infinite without a facet.
+    """
+
+    facet: IntArray
+    reference: FloatArray
+    overhang: FloatArray
+
+
+def near_pairs(
+    centre: FloatArray, radius: FloatArray, others: FloatArray, radii: FloatArray, reach: float
+) -> tuple[IntArray, IntArray]:
+    """Return all pairs (i, j) of balls that are nearer than `reach`, sorted by i.
+
+    Parameters
+    ----------
+    centre, radius
+        (p, 3) and (p,) balls.
+    others, radii
+        (q, 3) and (q,) the other balls.
+    reach
+        Largest distance between two of them, m.
+    """
+    around = radius + radii.max(initial=0.0) + reach
+    found = cKDTree(others).query_ball_point(centre, around)
+    first = np.repeat(np.arange(len(centre)), [len(f) for f in found])
+    second = np.array([j for f in found for j in f], dtype=np.int64)
+    apart = np.linalg.norm(centre[first] - others[second], axis=1)
+    near = apart <= radius[first] + radii[second] + reach
+    return first[near], second[near]
+
+
+def facet_balls(surface: Surface) -> tuple[FloatArray, FloatArray]:
+    """Return the (m, 3) middle of each facet and the (m,) radius about it that holds its nodes."""
+    middle = positions(surface.points, surface.facets, centres(surface.facets))
+    apart = np.linalg.norm(surface.points[surface.facets] - middle[:, None], axis=2)
+    return middle, np.where(surface.facets >= 0, apart, 0.0).max(axis=1)
+
+
+def project(points: FloatArray, outward: FloatArray, surface: Surface, reach: float) -> Feet:
+    """Project points on the closest facet of a surface that faces them.
+
+    Parameters
+    ----------
+    points
+        (p, 3) places in metres.
+    outward
+        (p, 3) normals of the body that the points belong to; only facets that look the other way are considered.
+    surface
+        The other side.
+    reach
+        Facets further away are not considered, m.
+    """
+    middle, radius = facet_balls(surface)
+    point, facet = near_pairs(points, np.zeros(len(points)), middle, radius, reach)
+    facing = normals(surface.points, surface.facets, centres(surface.facets))
+    keep = np.einsum("pc,pc->p", outward[point], facing[facet]) < 0
+    point, facet = point[keep], facet[keep]
+    # a facet whose ball begins beyond the middle of another one cannot be the closest
+    apart = np.linalg.norm(points[point] - middle[facet], axis=1)
+    bound = np.full(len(points), np.inf)
+    np.minimum.at(bound, point, apart)
+    keep = apart - radius[facet] <= bound[point]
+    point, facet = point[keep], facet[keep]
+
+    reference, edge = closest(surface.points, surface.facets[facet], points[point])
+    foot = positions(surface.points, surface.facets[facet], reference)
+    distance = np.linalg.norm(points[point] - foot, axis=1)
+    order = np.lexsort((distance, point))
+    best = order[np.unique(point[order], return_index=True)[1]]
+    best = best[distance[best] <= reach]
+    feet = Feet(np.full(len(points), -1), np.zeros((len(points), 2)), np.full(len(points), np.inf))
+    p, f, r = point[best], facet[best], reference[best]
+    feet.facet[p], feet.reference[p] = f, r
+    past = points[p] - foot[best]
+    normal = normals(surface.points, surface.facets[f], r)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    along = past - np.einsum("pc,pc->p", past, normal)[:, None] * normal
+    on_rim = _on_rim(surface.facets, f, r, edge[best])
+    feet.overhang[p] = np.where(on_rim, np.linalg.norm(along, axis=1), 0.0)
+    return feet
+
+
+def closest(
+    points: FloatArray, facets: IntArray, target: FloatArray
+) -> tuple[FloatArray, IntArray]:
+    """Return the closest point of one facet to each target: reference coordinates (p, 2) and its edge (p,), -1 inside.
+
+    Gauss-Newton on the distance; where its result lies outside the facet, the best point of the edges.
+    """
+    reference = centres(facets)
+    for _ in range(ROUNDS):
+        T = tangents(points, facets, reference)
+        miss = np.einsum("pac,pc->pa", T, target - positions(points, facets, reference))
+        step = _solve_two(np.einsum("pac,pbc->pab", T, T), miss)
+        moved = np.clip(reference + step, -FAR, FAR)
+        change = np.abs(moved - reference).max(initial=0.0)
+        reference = moved
+        if change < CONVERGED:
+            break
+    corners = corner_counts(facets)
+    edge = np.full(len(facets), -1)
+    out = np.flatnonzero(~_inside(corners, reference))
+    best = np.full(len(out), np.inf)
+    for e in range(4):
+        for count in (3, 4):
+            rows = np.flatnonzero(corners[out] == count)
+            if e >= count or len(rows) == 0:
+                continue
+            at, distance = _closest_on_edge(points, facets[out[rows]], target[out[rows]], e, count)
+            better = distance < best[rows]
+            best[rows[better]] = distance[better]
+            reference[out[rows[better]]], edge[out[rows[better]]] = at[better], e
+    return reference, edge
+
+
+def meet(
+    points: FloatArray, facets: IntArray, origin: FloatArray, axes: FloatArray
+) -> tuple[FloatArray, IntArray]:
+    """Return where the line through each origin across both axes meets a facet, or its continuation.
+
+    Parameters
+    ----------
+    points
+        (n, 3) nodes.
+    facets
+        (p, k) one facet for each line.
+    origin
+        (p, 3) a point of the line.
+    axes
+        (p, 2, 3) two unit vectors across it.
+
+    Returns
+    -------
+    reference : (p, 2) reference coordinates
+    missed : indices of lines that meet no point of their facet, because it is folded or parallel to them
+    """
+    reference = centres(facets)
+    size = np.abs(points[facets] - origin[:, None]).max(axis=(1, 2))
+    for _ in range(ROUNDS):
+        miss = np.einsum("pac,pc->pa", axes, origin - positions(points, facets, reference))
+        slope = np.einsum("pac,pbc->pab", axes, tangents(points, facets, reference))
+        moved = np.clip(reference + _solve_two(slope, miss), -FAR, FAR)
+        change = np.abs(moved - reference).max(initial=0.0)
+        reference = moved
+        if change < CONVERGED:
+            break
+    miss = np.einsum("pac,pc->pa", axes, origin - positions(points, facets, reference))
+    return reference, np.flatnonzero(np.abs(miss).max(axis=1) > 1e-10 * size)
+
+
+def _solve_two(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve many systems of two equations; a singular one gets no step."""
+    (a, b), (c, d) = matrix.transpose(1, 2, 0)
+    determinant = a * d - b * c
+    usable = determinant != 0
+    scale = np.where(usable, 1.0 / np.where(usable, determinant, 1.0), 0.0)
+    first, second = right.T
+    return np.column_stack([(d * first - b * second) * scale, (a * second - c * first) * scale])
+
+
+def _inside(corners: IntArray, reference: FloatArray) -> BoolArray:
+    xi, eta = reference.T
+    triangle = (xi >= -INSIDE) & (eta >= -INSIDE) & (xi + eta <= 1 + INSIDE)
+    square = np.abs(reference).max(axis=1, initial=0.0) <= 1 + INSIDE
+    return np.asarray(np.where(corners == 3, triangle, square))
+
+
+def _closest_on_edge(
+    points: FloatArray, facets: IntArray, target: FloatArray, edge: int, corners: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return the best reference point of one edge of each facet, and its distance."""
+    start = REFERENCE_NODES[corners][edge]
+    along = REFERENCE_NODES[corners][(edge + 1) % corners] - start
+    s = np.full(len(facets), 0.5)
+    for _ in range(ROUNDS):
+        at = start + s[:, None] * along
+        slope = np.einsum("a,pac->pc", along, tangents(points, facets, at))
+        miss = np.einsum("pc,pc->p", slope, target - positions(points, facets, at))
+        moved = np.clip(s + miss / np.einsum("pc,pc->p", slope, slope), 0.0, 1.0)
+        change = np.abs(moved - s).max(initial=0.0)
+        s = moved
+        if change < CONVERGED:
+            break
+    at = start + s[:, None] * along
+    return at, np.linalg.norm(target - positions(points, facets, at), axis=1)
+
+
+def _rim(facets: IntArray) -> tuple[BoolArray, IntArray]:
+    """Return which edges (m, 4) belong to one facet only, and the nodes on them."""
+    corners = corner_counts(facets)
+    ends, owner = [], []
+    for e in range(int(corners.max())):
+        rows = np.flatnonzero(corners > e)
+        ends.append(np.column_stack([facets[rows, e], facets[rows, (e + 1) % corners[rows]]]))
+        owner.append(np.column_stack([rows, np.full(len(rows), e)]))
+    pairs, which = np.concatenate(ends), np.concatenate(owner)
+    _, inverse, count = np.unique(
+        np.sort(pairs, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    single = count[inverse.ravel()] == 1
+    edges = np.zeros((len(facets), 4), dtype=bool)
+    edges[tuple(which[single].T)] = True
+    return edges, np.unique(pairs[single])
+
+
+def _on_rim(facets: IntArray, facet: IntArray, reference: FloatArray, edge: IntArray) -> BoolArray:
+    """Return whether feet found on an edge (-1: inside) lie on the rim of the surface, or on a node of it."""
+    rim_edge, rim_node = _rim(facets)
+    corners = corner_counts(facets[facet])
+    at_rim_node = np.zeros(len(facet), dtype=bool)
+    for count in np.unique(corners):
+        rows = np.flatnonzero(corners == count)
+        off = np.abs(reference[rows, None] - REFERENCE_NODES[int(count)]).max(axis=2)
+        node = facets[facet[rows], off.argmin(axis=1)]
+        at_rim_node[rows] = (off.min(axis=1) <= INSIDE) & np.isin(node, rim_node)
+    return np.asarray((edge >= 0) & (rim_edge[facet, edge] | at_rim_node))
