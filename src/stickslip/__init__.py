@@ -13,7 +13,12 @@ if TYPE_CHECKING:
     from stickslip.contact.compiled import compile_contacts
     from stickslip.contact.interface import Interface
     from stickslip.contact.law import law_kernel
+    from stickslip.contact.laws.bonded import Bonded
+    from stickslip.contact.laws.cubic_spring import CubicSpring
     from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+    from stickslip.contact.laws.jenkins import Jenkins
+    from stickslip.contact.laws.polynomial_spring import PolynomialSpring
+    from stickslip.contact.laws.unilateral_spring import UnilateralSpring
     from stickslip.errors import (
         InputError,
         SingularError,
@@ -87,7 +92,12 @@ _MODULES = {
     "stickslip.contact.compiled": ("compile_contacts",),
     "stickslip.contact.interface": ("Interface",),
     "stickslip.contact.law": ("law_kernel",),
+    "stickslip.contact.laws.bonded": ("Bonded",),
+    "stickslip.contact.laws.cubic_spring": ("CubicSpring",),
     "stickslip.contact.laws.elastic_coulomb": ("ElasticCoulomb",),
+    "stickslip.contact.laws.jenkins": ("Jenkins",),
+    "stickslip.contact.laws.polynomial_spring": ("PolynomialSpring",),
+    "stickslip.contact.laws.unilateral_spring": ("UnilateralSpring",),
     "stickslip.errors": ("InputError", "SingularError", "StickslipError"),
     "stickslip.harmonic.aft": ("contact_forces",),
     "stickslip.harmonic.excitation": ("HarmonicLoad",),
@@ -125,7 +135,9 @@ _HOME = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
     "BladePair",
+    "Bonded",
     "ContactPoints",
+    "CubicSpring",
     "Dofs",
     "Drift",
     "ElasticCoulomb",
@@ -136,8 +148,10 @@ __all__ = [
     "HarmonicLoad",
     "InputError",
     "Interface",
+    "Jenkins",
     "Material",
     "Newton",
+    "PolynomialSpring",
     "RigidBody",
     "Signals",
     "SingularError",
@@ -150,6 +164,7 @@ __all__ = [
     "System",
     "TimeStepping",
     "TransientResult",
+    "UnilateralSpring",
     "__version__",
     "accepted_points",
     "assemble_solid",

@@ -8,6 +8,11 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.contact.element import element, element_step, slider_start
 from stickslip.contact.law import UNCOUPLED_TANGENTS
+from stickslip.contact.laws.parameter_checks import (
+    check_any_stiffness,
+    check_finite,
+    check_not_negative,
+)
 from stickslip.errors import input_error
 
 
@@ -50,26 +55,9 @@ class ElasticCoulomb:
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:
-        for name in ("k_t", "k_w", "k_n", "mu"):
-            value = getattr(self, name)
-            if not np.isfinite(value) or value < 0:
-                raise input_error(
-                    f"ElasticCoulomb.{name}",
-                    f"must be finite and not negative, got {value}",
-                    "Give it in SI units.",
-                )
-        if not np.isfinite(self.preload):
-            raise input_error(
-                "ElasticCoulomb.preload",
-                f"must be finite, got {self.preload}",
-                "Give it in newtons.",
-            )
-        if max(self.k_t, self.k_w, self.k_n) == 0.0:
-            raise input_error(
-                "ElasticCoulomb",
-                "all contact stiffnesses are zero",
-                "Give at least one, or remove the contact.",
-            )
+        check_not_negative(self, "k_t", "k_w", "k_n", "mu")
+        check_finite(self, "preload")
+        check_any_stiffness(self, "k_t", "k_w", "k_n")
         m = self.residual_traction
         if m is not None and not -1.0 <= m <= 1.0:
             raise input_error(

@@ -1,0 +1,56 @@
+"""Springs that neither slip nor open."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.contact.element import element, element_step, slider_start
+from stickslip.contact.law import UNCOUPLED_TANGENTS
+from stickslip.contact.laws.parameter_checks import check_any_stiffness, check_not_negative
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bonded:
+    """Contact that holds whatever happens: a linear spring along each direction, pulling as well as pushing.
+
+    Parameters
+    ----------
+    k_t, k_w, k_n
+        Contact stiffnesses along t, w and n, N/m.
+
+    Raises
+    ------
+    InputError
+        If a stiffness is negative or not finite, or all are zero.
+    """
+
+    k_t: float
+    k_w: float
+    k_n: float
+
+    kernel: ClassVar[Any] = element_step
+    pairs: ClassVar[int] = UNCOUPLED_TANGENTS
+
+    def __post_init__(self) -> None:
+        check_not_negative(self, "k_t", "k_w", "k_n")
+        check_any_stiffness(self, "k_t", "k_w", "k_n")
+
+    def parameters(self) -> FloatArray:
+        """Return the (7,) row of an elementary contact whose friction limit is infinite."""
+        return element(
+            k_t=self.k_t, k_w=self.k_w, k_n=self.k_n, mu=1.0, preload=np.inf, unilateral=False
+        )
+
+    def elements(self) -> FloatArray:
+        """Return the (1, 7) rows of elementary contacts that the law is the sum of."""
+        return self.parameters()[None]
+
+    def initial_state(self) -> FloatArray:
+        """Return the (2,) slider positions before t = 0, m; they never move."""
+        return slider_start(None)
+
+    def stuck_stiffness(self) -> FloatArray:
+        """Return the (3,) stiffnesses along t, w, n, N/m."""
+        return np.array([self.k_t, self.k_w, self.k_n])

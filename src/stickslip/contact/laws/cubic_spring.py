@@ -1,0 +1,62 @@
+"""Linear and cubic spring, as of the Duffing oscillator."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.contact.law import UNCOUPLED_TANGENTS
+from stickslip.contact.laws.parameter_checks import (
+    check_any_stiffness,
+    check_finite,
+    check_not_negative,
+)
+from stickslip.contact.laws.polynomial_spring import polynomial_step
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CubicSpring:
+    """Elastic spring ``force = k g + cubic g³`` along each direction, without memory and without friction.
+
+    Parameters
+    ----------
+    cubic_t, cubic_w, cubic_n
+        Cubic coefficients along t, w and n, N/m³; negative for a spring that softens.
+    k_t, k_w, k_n
+        Linear stiffnesses along t, w and n, N/m.
+
+    Raises
+    ------
+    InputError
+        If a coefficient is not finite, a linear stiffness is negative, or all are zero.
+    """
+
+    cubic_t: float = 0.0
+    cubic_w: float = 0.0
+    cubic_n: float = 0.0
+    k_t: float = 0.0
+    k_w: float = 0.0
+    k_n: float = 0.0
+
+    kernel: ClassVar[Any] = polynomial_step
+    pairs: ClassVar[int] = UNCOUPLED_TANGENTS
+
+    def __post_init__(self) -> None:
+        check_finite(self, "cubic_t", "cubic_w", "cubic_n")
+        check_not_negative(self, "k_t", "k_w", "k_n")
+        check_any_stiffness(self, "cubic_t", "cubic_w", "cubic_n", "k_t", "k_w", "k_n")
+
+    def parameters(self) -> FloatArray:
+        """Return the (9,) coefficients of g, g² and g³ along t, w and n."""
+        linear = (self.k_t, self.k_w, self.k_n)
+        cubic = (self.cubic_t, self.cubic_w, self.cubic_n)
+        return np.array([[k, 0.0, c] for k, c in zip(linear, cubic, strict=True)]).reshape(-1)
+
+    def initial_state(self) -> FloatArray:
+        """Return the (0,) state: the spring has no memory."""
+        return np.zeros(0)
+
+    def stuck_stiffness(self) -> FloatArray:
+        """Return the (3,) linear stiffnesses along t, w, n, N/m."""
+        return np.array([self.k_t, self.k_w, self.k_n])

@@ -1,0 +1,65 @@
+"""Jenkins element: a spring in series with a slider of constant limit."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.contact.element import element, element_step, slider_start
+from stickslip.contact.law import UNCOUPLED_TANGENTS
+from stickslip.contact.laws.parameter_checks import check_any_stiffness, check_not_negative
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Jenkins:
+    """Elastic, perfectly plastic friction: ``dT = k dg`` while ``|T| <= limit`` (Griffin 1980).
+
+    Acts along t and w, each for itself and with the same limit; along n stands a linear spring that also pulls.
+
+    Parameters
+    ----------
+    k_t
+        Stiffness along t, N/m.
+    limit
+        Friction force at which the slider moves, N.
+    k_w
+        Stiffness along w, N/m.
+    k_n
+        Stiffness of the linear normal spring, N/m.
+
+    Raises
+    ------
+    InputError
+        If a parameter is negative or not finite, or all stiffnesses are zero.
+    """
+
+    k_t: float
+    limit: float
+    k_w: float = 0.0
+    k_n: float = 0.0
+
+    kernel: ClassVar[Any] = element_step
+    pairs: ClassVar[int] = UNCOUPLED_TANGENTS
+
+    def __post_init__(self) -> None:
+        check_not_negative(self, "k_t", "limit", "k_w", "k_n")
+        check_any_stiffness(self, "k_t", "k_w", "k_n")
+
+    def parameters(self) -> FloatArray:
+        """Return the (7,) row of an elementary contact of constant limit."""
+        return element(
+            k_t=self.k_t, k_w=self.k_w, k_n=self.k_n, mu=1.0, preload=self.limit, unilateral=False
+        )
+
+    def elements(self) -> FloatArray:
+        """Return the (1, 7) rows of elementary contacts that the law is the sum of."""
+        return self.parameters()[None]
+
+    def initial_state(self) -> FloatArray:
+        """Return the (2,) slider positions before t = 0, m: springs unstretched at zero displacement."""
+        return slider_start(None)
+
+    def stuck_stiffness(self) -> FloatArray:
+        """Return the (3,) stiffnesses t, w, n of the contact that does not slip, N/m."""
+        return np.array([self.k_t, self.k_w, self.k_n])

@@ -1,0 +1,65 @@
+"""Normal spring that pushes and cannot pull, without friction."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.contact.element import element, element_step, slider_start
+from stickslip.contact.law import UNCOUPLED_TANGENTS
+from stickslip.contact.laws.parameter_checks import check_not_negative, check_positive
+from stickslip.errors import input_error
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnilateralSpring:
+    """Penalty spring along the normal, ``N = max(0, preload - k_n (g_n + initial_gap))``; nothing along t and w.
+
+    Parameters
+    ----------
+    k_n
+        Normal contact stiffness, N/m.
+    preload
+        Normal force at zero normal gap, N.
+    initial_gap
+        Clearance at zero normal gap, m; not together with a preload.
+
+    Raises
+    ------
+    InputError
+        If a parameter is out of its range, or both a preload and an initial gap are given.
+    """
+
+    k_n: float
+    preload: float = 0.0
+    initial_gap: float = 0.0
+
+    kernel: ClassVar[Any] = element_step
+    pairs: ClassVar[int] = UNCOUPLED_TANGENTS
+
+    def __post_init__(self) -> None:
+        check_positive(self, "k_n")
+        check_not_negative(self, "preload", "initial_gap")
+        if self.preload > 0.0 and self.initial_gap > 0.0:
+            raise input_error(
+                "UnilateralSpring",
+                f"has a preload of {self.preload} N and an initial gap of {self.initial_gap} m",
+                "A contact at rest is either pressed or open: give one of them.",
+            )
+
+    def parameters(self) -> FloatArray:
+        """Return the (7,) row of an elementary contact without tangential springs."""
+        return element(k_n=self.k_n, preload=self.preload - self.k_n * self.initial_gap)
+
+    def elements(self) -> FloatArray:
+        """Return the (1, 7) rows of elementary contacts that the law is the sum of."""
+        return self.parameters()[None]
+
+    def initial_state(self) -> FloatArray:
+        """Return the (2,) slider positions before t = 0; the law has no use for them."""
+        return slider_start(None)
+
+    def stuck_stiffness(self) -> FloatArray:
+        """Return the (3,) stiffnesses along t, w, n of the closed contact, N/m."""
+        return np.array([0.0, 0.0, self.k_n])
