@@ -14,11 +14,11 @@ LOCK_FLAGS := --quiet --generate-hashes --strip-extras \
 # Two test workers on two cores: a threaded BLAS under each would only make them wait for each other.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help install run test lint docs bench validate lock clean
+.PHONY: help install run test lint docs bench bench-rival validate lock clean
 .DELETE_ON_ERROR:
 
 help:  ## list the targets
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
 install: $(INSTALLED)  ## make .venv and install the locked versions
 
@@ -56,6 +56,13 @@ docs: $(DOCS_INSTALLED)  ## build the documentation; any warning is an error
 bench: $(INSTALLED)  ## run every benchmark; writes benchmarks/out/results.json
 	$(ONE_THREAD) $(BIN)/python -m benchmarks
 
+bench-rival: .venv-rival/.installed  ## install pyHarm-os, which the chain benchmark is timed against, into .venv-rival
+
+.venv-rival/.installed: benchmarks/requirements.lock $(INSTALLED)
+	$(PYTHON) -m venv .venv-rival
+	.venv-rival/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r benchmarks/requirements.lock
+	@touch $@
+
 validate: $(INSTALLED)  ## compare with closed forms, other codes and the literature
 	$(ONE_THREAD) $(BIN)/python -m validation
 	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) -m validation
@@ -66,8 +73,10 @@ lock: $(INSTALLED)  ## resolve the newest versions and write both lock files
 		--build-deps-for editable -o requirements.lock pyproject.toml
 	CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra docs \
 		-c requirements.lock -o docs/requirements.lock pyproject.toml
+	CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra bench \
+		-o benchmarks/requirements.lock pyproject.toml
 
 clean:  ## remove everything that the other targets made, .venv included
-	rm -rf $(VENV) .coverage* htmlcov .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache \
+	rm -rf $(VENV) .venv-rival .coverage* htmlcov .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache \
 		docs/_build docs/auto_examples docs/generated benchmarks/out validation/out examples/*/results
 	find src tests benchmarks validation docs examples -name __pycache__ -type d -prune -exec rm -rf {} +
