@@ -1,0 +1,95 @@
+"""Coulomb friction on a rigid unilateral contact: no stiffness anywhere."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, NoReturn
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.contact.element import element_step
+from stickslip.contact.law import UNCOUPLED_TANGENTS
+from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.errors import InputError, input_error
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RigidCoulomb:
+    """Set-valued Coulomb friction and Signorini's condition (Nacivet et al. 2003): the limit of `ElasticCoulomb` as it stiffens.
+
+    Each tangent sticks without moving while its force stays below ``mu N``, and slips against ``mu N`` otherwise. The force is no
+    function of the gap, so that harmonic balance cannot evaluate it alone; `dynamic_lagrangian` solves for it.
+
+    Parameters
+    ----------
+    mu
+        Friction coefficient, the same for both tangents, which do not feel each other.
+    preload
+        None: the normal direction is rigid and unilateral, ``g + initial_gap >= 0``, ``N >= 0``, one of them zero, and N is what
+        equilibrium asks for. A preload then comes with the static load, or as interference. A number: a constant normal load N_0 presses
+        the contact whatever it does, the limit is ``mu N_0`` and the normal direction is left alone, N.
+    initial_gap
+        Normal gap at zero displacement, m; negative for an interference.
+
+    Raises
+    ------
+    InputError
+        If a parameter is not finite or out of its range, or both a constant load and a gap are given.
+    """
+
+    mu: float
+    preload: float | None = None
+    initial_gap: float = 0.0
+
+    kernel: ClassVar[Any] = element_step
+    pairs: ClassVar[int] = UNCOUPLED_TANGENTS
+
+    def __post_init__(self) -> None:
+        for name, value in (("mu", self.mu), ("preload", self.preload)):
+            if value is not None and not (np.isfinite(value) and value >= 0.0):
+                raise input_error(
+                    f"RigidCoulomb.{name}",
+                    f"must be finite and not negative, got {value}",
+                    "Give it in SI units.",
+                )
+        if not np.isfinite(self.initial_gap):
+            raise input_error(
+                "RigidCoulomb.initial_gap",
+                f"must be finite, got {self.initial_gap}",
+                "Give it in metres.",
+            )
+        if self.preload is not None and self.initial_gap != 0.0:
+            raise input_error(
+                "RigidCoulomb",
+                f"has a constant normal load of {self.preload:g} N and a gap of {self.initial_gap:g} m",
+                "Leave out one of them: a contact under a constant load never opens.",
+            )
+
+    def softened(self, stiffness: float) -> ElasticCoulomb:
+        """Return the penalty law that tends to this one as `stiffness` (N/m) grows."""
+        if self.preload is not None:
+            return ElasticCoulomb(
+                k_t=stiffness, k_w=stiffness, k_n=0.0, mu=self.mu, preload=self.preload
+            )
+        return ElasticCoulomb(
+            k_t=stiffness if self.mu > 0.0 else 0.0, k_w=stiffness if self.mu > 0.0 else 0.0,
+            k_n=stiffness, mu=self.mu, preload=-stiffness * self.initial_gap,
+        )  # fmt: skip
+
+    def parameters(self) -> NoReturn:
+        """Refuse: there is no force to compute from a gap."""
+        raise self._refusal()
+
+    def initial_state(self) -> NoReturn:
+        """Refuse: there is no force to compute from a gap."""
+        raise self._refusal()
+
+    def stuck_stiffness(self) -> FloatArray:
+        """Refuse: the stiffness is infinite."""
+        raise self._refusal()
+
+    def _refusal(self) -> InputError:
+        return input_error(
+            "RigidCoulomb",
+            "has no stiffness, its force is no function of the gap",
+            "Solve with dynamic_lagrangian, or take RigidCoulomb.softened(stiffness).",
+        )
