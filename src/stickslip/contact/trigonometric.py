@@ -19,7 +19,8 @@ _MOST_STEPS = 60
 DEEPEST = 40  # parts of a cell waiting to be searched; each cut adds one, and 2π is cut to 1e-8 in 30 cuts
 
 
-def most_sign_changes(order: int) -> int:
+@numba.njit(cache=True)
+def most_sign_changes(order):  # type: ignore[no-untyped-def]
     """Return the size of the array of sign changes: 2H exact ones, and what round-off makes of double roots."""
     return 8 * order + 16
 
@@ -225,8 +226,9 @@ def _search(  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def harmonics_at(tau, cos, sin):  # type: ignore[no-untyped-def]
-    """Fill cos(mτ) and sin(mτ), m = 0 ... size - 1."""
+def harmonics_at(tau, out):  # type: ignore[no-untyped-def]
+    """Fill both rows of `out` with cos(mτ) and sin(mτ), m = 0, 1, ..."""
+    cos, sin = out[0], out[1]
     c1, s1 = np.cos(tau), np.sin(tau)
     cos[0], sin[0] = 1.0, 0.0
     for m in range(1, cos.size):
@@ -235,18 +237,19 @@ def harmonics_at(tau, cos, sin):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def add_means(left, cos_left, sin_left, right, cos_right, sin_right, factor, cos_sum, sin_sum):  # type: ignore[no-untyped-def]
-    """Add ``factor / 2π`` times the integrals of cos(mτ) and sin(mτ) from `left` to `right`."""
+def add_means(left, at_left, right, at_right, factor, means):  # type: ignore[no-untyped-def]
+    """Add ``factor / 2π`` times the integrals of cos(mτ) and sin(mτ) from `left` to `right`, given `harmonics_at` both."""
     factor = factor / (2.0 * np.pi)
-    cos_sum[0] += factor * (right - left)
-    for m in range(1, cos_sum.size):
-        cos_sum[m] += factor / m * (sin_right[m] - sin_left[m])
-        sin_sum[m] += factor / m * (cos_left[m] - cos_right[m])
+    means[0, 0] += factor * (right - left)
+    for m in range(1, means.shape[1]):
+        means[0, m] += factor / m * (at_right[1, m] - at_left[1, m])
+        means[1, m] += factor / m * (at_left[0, m] - at_right[0, m])
 
 
 @numba.njit(cache=True)
-def product_matrix(cos_sum, sin_sum, out):  # type: ignore[no-untyped-def]
-    """Fill `out` with W times the integral of ``b b^T`` over the intervals whose means are given; W weights rows 1, 2, 2, ..."""
+def product_matrix(means, out):  # type: ignore[no-untyped-def]
+    """Fill `out` with W times the integral of ``b b^T`` over the intervals of `means`; W weights rows 1, 2, 2, ..."""
+    cos_sum, sin_sum = means[0], means[1]
     order = (out.shape[0] - 1) // 2
     out[0, 0] = cos_sum[0]
     for k in range(1, order + 1):

@@ -1,0 +1,320 @@
+"""The steady cycle of the slider that holds a tangential spring, between two walls that are trigonometric polynomials.
+
+In units of force the slider is at ``z = k x - T``, and friction keeps it between ``k x - μN`` and ``k x + μN``: it rests while the
+contact sticks, the lower wall pushes it while the contact slips forward, the upper one while it slips backward. Slip therefore ends at
+a maximum of the lower or a minimum of the upper wall, and begins where a wall passes the resting slider. Between the extrema of both
+walls and the changes of the sign of N the walls are monotone: clipping z at these nodes is exact, and each cell between two nodes
+holds at most one beginning of slip. Two periods are enough, as in `contact.intervals`: the map of z over a period is a clip.
+"""
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.contact.element import K_N, MU, RESIDUAL
+from stickslip.contact.law import OPEN, SLIP, STICK
+from stickslip.contact.trigonometric import (
+    DEEPEST,
+    bounds,
+    derivative,
+    most_sign_changes,
+    root_between,
+    sign_changes,
+    value_and_slope,
+)
+
+START, STATE, SIGN, PLACE, ANCHOR, BY_NORMAL = range(6)  # columns of segments
+NO_ANCHOR = -1.0
+PERIOD = 2.0 * np.pi
+_EXTREMUM, _OPENING, _CLOSING = 0, 1, 2  # kinds of nodes
+
+
+class Scratch(NamedTuple):
+    """Arrays that the evaluation of a contact writes on, m = 2H+1 long unless said otherwise."""
+
+    normal: FloatArray  # pressure as long as it is positive
+    limit: FloatArray  # of friction
+    low: FloatArray  # walls of the slider
+    high: FloatArray
+    slope: FloatArray
+    curvature: FloatArray
+    values: FloatArray  # (cells + 1,) on the search grid
+    slopes: FloatArray
+    cells: FloatArray  # (DEEPEST, 3)
+    roots: FloatArray  # (5, most_sign_changes): of N, extrema of the low wall, of the high wall, of both tangential gaps
+    nodes: FloatArray  # (3, most nodes) time, low and high wall
+    kinds: IntArray
+    segments: FloatArray  # (most segments, 6)
+    harmonics: (
+        FloatArray  # (3, 2, 2m-1) cos(mτ), sin(mτ) at both ends of a segment and at its anchor
+    )
+    means: FloatArray  # (3, 2, 2m-1) over a segment, over all stick, over all slip
+    row: FloatArray
+    anchor: FloatArray
+    matrix: FloatArray  # (m, m)
+    pressure: FloatArray  # (samples,)
+
+
+@numba.njit(cache=True)
+def scratch(m, width, samples):  # type: ignore[no-untyped-def]
+    """Allocate for polynomials of `m` coefficients, a search grid of `width` columns and `samples`; every array is bounded by the order."""
+    most = most_sign_changes((m - 1) // 2)
+    most_nodes = 3 * most + 2
+    return Scratch(
+        np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m),
+        np.empty(width), np.empty(width), np.empty((DEEPEST, 3)), np.empty((5, most)),
+        np.empty((3, most_nodes)), np.empty(most_nodes, np.int64), np.empty((2 * most_nodes, 6)),
+        np.empty((3, 2, 2 * m - 1)), np.empty((3, 2, 2 * m - 1)), np.empty(m), np.empty(m), np.empty((m, m)),
+        np.empty(samples),
+    )  # fmt: skip
+
+
+@numba.njit(cache=True)
+def zeros(polynomial, grid, work, roots):  # type: ignore[no-untyped-def]
+    """Return the number of sign changes, put into `roots`, and whether the polynomial begins negative."""
+    derivative(polynomial, work.slope)
+    count = sign_changes(polynomial, work.slope, grid, work.values, work.slopes, work.cells, roots)
+    return count, work.values[0] < 0.0
+
+
+@numba.njit(cache=True)
+def extrema(polynomial, grid, work, roots):  # type: ignore[no-untyped-def]
+    """Return the number of extrema, put into `roots`."""
+    derivative(polynomial, work.slope)
+    derivative(work.slope, work.curvature)
+    return sign_changes(
+        work.slope, work.curvature, grid, work.values, work.slopes, work.cells, roots
+    )
+
+
+@numba.njit(cache=True)
+def _merge(first, n_first, low, n_low, high, n_high, starts_open, tau, kinds):  # type: ignore[no-untyped-def]
+    """Sort three ascending lists (changes of the sign of N, extrema of both walls) into nodes from 0 to 2π; return their number."""
+    i = j = k = 0
+    tau[0] = 0.0
+    kinds[0] = _EXTREMUM
+    closing = starts_open
+    count = 1
+    while i < n_first or j < n_low or k < n_high:
+        a = first[i] if i < n_first else np.inf
+        b = low[j] if j < n_low else np.inf
+        c = high[k] if k < n_high else np.inf
+        tau[count] = min(a, b, c)
+        kinds[count] = _EXTREMUM
+        if a <= b and a <= c:
+            kinds[count] = _CLOSING if closing else _OPENING
+            closing = not closing
+            i += 1
+        elif b <= c:
+            j += 1
+        else:
+            k += 1
+        count += 1
+    tau[count] = PERIOD
+    kinds[count] = _EXTREMUM
+    return count + 1
+
+
+@numba.njit(cache=True)
+def _evaluate_walls(low, high, nodes, kinds, count):  # type: ignore[no-untyped-def]
+    """Evaluate both walls at the nodes; they meet where the contact opens or closes."""
+    for i in range(count - 1):
+        c1, s1 = np.cos(nodes[0, i]), np.sin(nodes[0, i])
+        c, s = 1.0, 0.0
+        f, g = low[0], high[0]
+        for h in range(1, (low.size + 1) // 2):
+            c, s = c * c1 - s * s1, s * c1 + c * s1
+            f += low[2 * h - 1] * c + low[2 * h] * s
+            g += high[2 * h - 1] * c + high[2 * h] * s
+        if kinds[i] != _EXTREMUM:
+            f = g = 0.5 * (f + g)
+        nodes[1, i], nodes[2, i] = f, g
+    nodes[1, count - 1], nodes[2, count - 1] = nodes[1, 0], nodes[2, 0]
+
+
+@numba.njit(cache=True)
+def _clipped(z, i, nodes, anchor, by_normal, slip_by_normal):  # type: ignore[no-untyped-def]
+    """Return the slider's place at node `i` of a closed contact, its anchor, and its derivative by the normal gap there."""
+    if nodes[1, i] > z:
+        return nodes[1, i], nodes[0, i], slip_by_normal
+    if nodes[2, i] < z:
+        return nodes[2, i], nodes[0, i], -slip_by_normal
+    return z, anchor, by_normal
+
+
+@numba.njit(cache=True)
+def _closing_by_normal(x, normal, k, row, tau):  # type: ignore[no-untyped-def]
+    """Return the derivative of ``k x`` at the time of closing by the normal gap there: that time moves with the gap.
+
+    A contact that sticks from then on has |k x'| <= μN', which bounds it.
+    """
+    rate = k * value_and_slope(x, tau)[1]
+    closing_rate = value_and_slope(normal, tau)[1]
+    if abs(rate) >= row[MU] * closing_rate:
+        return np.copysign(row[MU] * row[K_N], rate)
+    return rate * row[K_N] / closing_rate
+
+
+@numba.njit(cache=True)
+def _settle(z, anchor, by_normal, nodes, kinds, count, starts_open, slip_by_normal):  # type: ignore[no-untyped-def]
+    """Return the slider after one period: place, anchor, its derivative by the normal gap there (NaN: it closed there)."""
+    is_open = starts_open
+    for i in range(count):
+        if kinds[i] == _CLOSING:
+            is_open = False
+            z, anchor, by_normal = nodes[1, i], nodes[0, i], np.nan
+        elif kinds[i] == _OPENING:
+            is_open = True
+        elif not is_open:
+            z, anchor, by_normal = _clipped(z, i, nodes, anchor, by_normal, slip_by_normal)
+    return z, anchor, by_normal
+
+
+@numba.njit(cache=True)
+def _append(segments, count, start, state, sign, z, anchor, by_normal):  # type: ignore[no-untyped-def]
+    """Append a segment unless it goes on in the state of the last; one without length is replaced."""
+    if count > 0:
+        last = count - 1
+        if segments[last, STATE] == state and segments[last, SIGN] == sign:
+            return count
+        if segments[last, START] >= start:
+            count = last
+    segments[count, START] = start
+    segments[count, STATE] = state
+    segments[count, SIGN] = sign
+    segments[count, PLACE] = z
+    segments[count, ANCHOR] = anchor
+    segments[count, BY_NORMAL] = by_normal
+    return count + 1
+
+
+@numba.njit(cache=True)
+def _slip_start(wall, z, left, f_left, right, f_right):  # type: ignore[no-untyped-def]
+    """Return when the wall, monotone from `left` to `right`, passes the resting slider."""
+    size, second, _ = bounds(wall)
+    # between two extrema a wall looks like half a wave
+    share = np.arccos(1.0 - 2.0 * (z - f_left) / (f_right - f_left)) / np.pi
+    guess = left + share * (right - left)
+    return root_between(wall, z, left, f_left - z, right, f_right - z, guess, size + abs(z), second)
+
+
+@numba.njit(cache=True)
+def _cell(i, z, anchor, by_normal, slip_by_normal, work, count):  # type: ignore[no-untyped-def]
+    """Append the segments of the closed cell after node `i`; return their number and the slider at its end."""
+    nodes, segments = work.nodes, work.segments
+    left, right = nodes[0, i], nodes[0, i + 1]
+    moved, new_anchor, new_by_normal = _clipped(z, i + 1, nodes, anchor, by_normal, slip_by_normal)
+    if moved == z:
+        count = _append(segments, count, left, STICK, 0.0, z, anchor, by_normal)
+        return count, z, anchor, by_normal
+    sign = 1.0 if moved > z else -1.0
+    wall = work.low if moved > z else work.high
+    at_left = nodes[1, i] if moved > z else nodes[2, i]
+    start = left
+    if sign * at_left < sign * z:
+        start = _slip_start(wall, z, left, at_left, right, moved)
+        count = _append(segments, count, left, STICK, 0.0, z, anchor, by_normal)
+    count = _append(segments, count, start, SLIP, sign, moved, start, 0.0)
+    return count, moved, new_anchor, new_by_normal
+
+
+@numba.njit(cache=True)
+def _march(x, k, row, z, anchor, by_normal, slip_by_normal, starts_open, n_nodes, work):  # type: ignore[no-untyped-def]
+    """Fill ``work.segments`` with the states of the second period; return their number."""
+    nodes, kinds = work.nodes, work.kinds
+    z, anchor, by_normal = _settle(
+        z, anchor, by_normal, nodes, kinds, n_nodes, starts_open, slip_by_normal
+    )
+    if np.isnan(by_normal):
+        by_normal = _closing_by_normal(x, work.normal, k, row, anchor)
+    is_open = starts_open
+    count = 0
+    for i in range(n_nodes - 1):
+        tau = nodes[0, i]
+        if kinds[i] == _OPENING:
+            is_open = True
+        elif kinds[i] == _CLOSING:
+            is_open = False
+            z, anchor = nodes[1, i], tau
+            by_normal = _closing_by_normal(x, work.normal, k, row, tau)
+        if is_open:
+            count = _append(work.segments, count, tau, OPEN, 0.0, 0.0, tau, 0.0)
+        else:
+            count, z, anchor, by_normal = _cell(
+                i, z, anchor, by_normal, slip_by_normal, work, count
+            )
+    return count
+
+
+@numba.njit(cache=True)
+def _start(row, slip_by_normal, starts_open, low, high):  # type: ignore[no-untyped-def]
+    """Return the slider just before t = 0: place, anchor, its derivative by the normal gap there."""
+    share = row[RESIDUAL]
+    if np.isnan(share):
+        return 0.0, NO_ANCHOR, 0.0
+    z = low[0] + high[0]
+    difference = low[0] - high[0]
+    for p in range(1, low.size, 2):
+        z += low[p] + high[p]
+        difference += low[p] - high[p]
+    if starts_open:
+        return 0.5 * z, 0.0, 0.0
+    return 0.5 * (z + share * difference), 0.0, share * slip_by_normal
+
+
+@numba.njit(cache=True)
+def find_segments(x, d, row, limit_slope, n_roots, starts_open, n_x, grid, work):  # type: ignore[no-untyped-def]
+    """Find the states of the spring along one tangent over the steady cycle.
+
+    Parameters
+    ----------
+    x
+        (m,) tangential gap, m.
+    d
+        Tangent, 0 or 1.
+    row
+        (7,) of the element, see `contact.element`; its stiffness is not zero.
+    limit_slope
+        Derivative of the limit by the normal gap while it is closed, N/m.
+    n_roots, starts_open
+        Of the pressure, in ``work.roots[0]``.
+    n_x
+        In and out: number of extrema of both tangential gaps, in ``work.roots[3:]``; -1: not yet known.
+    grid, work
+        Search grid; scratch with pressure and limit.
+
+    Returns
+    -------
+    int
+        Number of rows of ``work.segments``: start, state, sign of the slip, place of the resting slider, time at which it was left there
+        (or `NO_ANCHOR`), derivative of its place by the normal gap at that time.
+    """
+    k = row[d]
+    for p in range(x.size):
+        work.low[p] = k * x[p] - work.limit[p]
+        work.high[p] = k * x[p] + work.limit[p]
+    z, anchor, by_normal = _start(row, -limit_slope, starts_open, work.low, work.high)
+    if n_roots == 0:
+        if starts_open:
+            return _append(work.segments, 0, 0.0, OPEN, 0.0, 0.0, 0.0, 0.0)
+        reach = z - work.low[0] + abs(work.low[0]) - bounds(work.low)[0]
+        room = work.high[0] - z + abs(work.high[0]) - bounds(work.high)[0]
+        if min(reach, room) >= 0.0:  # no wall ever comes near
+            return _append(work.segments, 0, 0.0, STICK, 0.0, z, anchor, by_normal)
+    if limit_slope == 0.0:
+        # both walls follow x, as do those of all such elements of a contact
+        if n_x[d] < 0:
+            n_x[d] = extrema(x, grid, work, work.roots[3 + d])
+        n_low, n_high = n_x[d], 0
+        low_roots = high_roots = work.roots[3 + d]
+    else:
+        low_roots, high_roots = work.roots[1], work.roots[2]
+        n_low = extrema(work.low, grid, work, low_roots)
+        n_high = extrema(work.high, grid, work, high_roots)
+    count = _merge(
+        work.roots[0], n_roots, low_roots, n_low, high_roots, n_high, starts_open, work.nodes[0], work.kinds
+    )  # fmt: skip
+    _evaluate_walls(work.low, work.high, work.nodes, work.kinds, count)
+    return _march(x, k, row, z, anchor, by_normal, -limit_slope, starts_open, count, work)
