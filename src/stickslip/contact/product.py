@@ -1,0 +1,135 @@
+"""Product of the contact stiffness ``Bᵀ K B`` with a vector, contact by contact, without forming it.
+
+The derivative of a contact's forces by its gaps is a few (m, m) blocks, m = 2H+1, in the order of `PAIRS`.
+"""
+
+import numba
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.contact.law import PAIRS
+
+_PAIRS = np.array(PAIRS)  # force and gap direction of each block
+
+
+@numba.njit(cache=True, nogil=True)
+def _gap(columns, values, vector, gap):  # type: ignore[no-untyped-def]
+    """Set `gap` (3, m) to what `vector` (m, n) makes it at one contact."""
+    gap[:] = 0.0
+    for j in range(columns.size):
+        for d in range(3):
+            value = values[d, j]
+            if value != 0.0:
+                for q in range(gap.shape[1]):
+                    gap[d, q] += value * vector[q, columns[j]]
+
+
+@numba.njit(cache=True, nogil=True)
+def _force(blocks, gap, transposed, force):  # type: ignore[no-untyped-def]
+    """Set `force` (3, m) to the product of the blocks of one contact with `gap`."""
+    m = gap.shape[1]
+    force[:] = 0.0
+    for b in range(blocks.shape[0]):
+        row, col = _PAIRS[b, 0], _PAIRS[b, 1]
+        for p in range(m):
+            if transposed:
+                for q in range(m):
+                    force[col, q] += blocks[b, p, q] * gap[row, p]
+            else:
+                total = 0.0
+                for q in range(m):
+                    total += blocks[b, p, q] * gap[col, q]
+                force[row, p] += total
+
+
+@numba.njit(cache=True, nogil=True)
+def contact_product(blocks, columns, values, vector, transposed, gap, force, out):  # type: ignore[no-untyped-def]
+    """Add ``Bᵀ K B v`` to `out`, or ``Bᵀ Kᵀ B v`` if `transposed`.
+
+    Parameters
+    ----------
+    blocks
+        (n_contacts, P, m, m) derivatives of the contact forces, N/m.
+    columns, values
+        The gap operator by contact, from `sparse_rows`.
+    vector
+        (m, n) harmonic-major coefficients of the coordinates.
+    transposed
+        Whether the transposed stiffness acts.
+    gap, force
+        Work: (3, m) each.
+    out
+        In and out: (m, n).
+    """
+    for c in range(blocks.shape[0]):
+        _gap(columns[c], values[c], vector, gap)
+        _force(blocks[c], gap, transposed, force)
+        for j in range(columns.shape[1]):
+            for d in range(3):
+                value = values[c, d, j]
+                if value != 0.0:
+                    for p in range(out.shape[0]):
+                        out[p, columns[c, j]] += value * force[d, p]
+
+
+def harmonic_means(blocks: FloatArray) -> ComplexArray:
+    """Return what is left of `blocks` when each harmonic of a force depends on the same harmonic of a gap by a complex number.
+
+    A block acts on ``(C_h, S_h)`` as a real 2 × 2 matrix ``[a b; c d]``; the nearest one that multiplies ``C_h - i S_h`` by a number has
+    ``(a + d)/2 + i (b - c)/2``.
+
+    Parameters
+    ----------
+    blocks
+        (n_contacts, P, 2H+1, 2H+1) derivatives of the contact forces, N/m.
+
+    Returns
+    -------
+    ndarray
+        (H+1, n_contacts, 3, 3) by harmonic, contact, force and gap, N/m; harmonic 0 is real.
+    """
+    n_contacts, n_pairs, m, _ = blocks.shape
+    diagonal = np.diagonal(blocks, axis1=2, axis2=3)
+    above = np.diagonal(blocks, offset=1, axis1=2, axis2=3)[:, :, 1::2]
+    below = np.diagonal(blocks, offset=-1, axis1=2, axis2=3)[:, :, 1::2]
+    real = 0.5 * (diagonal[:, :, 1::2] + diagonal[:, :, 2::2])
+    mean = np.concatenate([diagonal[:, :, :1], real + 0.5j * (above - below)], axis=2)
+    means = np.zeros(((m + 1) // 2, n_contacts, 3, 3), dtype=complex)
+    for pair, (force, gap) in enumerate(_PAIRS[:n_pairs]):
+        means[:, :, force, gap] = mean[:, pair].T
+    return means
+
+
+def less_means(blocks: FloatArray, means: ComplexArray) -> FloatArray:
+    """Return `blocks` without the part that `means` stand for; these come from `harmonic_means`, perhaps of other blocks."""
+    left = blocks.copy()
+    for pair, (force, gap) in enumerate(_PAIRS[: blocks.shape[1]]):
+        mean = means[:, :, force, gap].T
+        block = left[:, pair]
+        block[:, 0, 0] -= mean[:, 0].real
+        for h in range(1, means.shape[0]):
+            cos, sin = 2 * h - 1, 2 * h
+            block[:, cos, cos] -= mean[:, h].real
+            block[:, sin, sin] -= mean[:, h].real
+            block[:, cos, sin] -= mean[:, h].imag
+            block[:, sin, cos] += mean[:, h].imag
+    return left
+
+
+def add_stiffness(
+    stiffness: ComplexArray, columns: IntArray, values: FloatArray, out: ComplexArray
+) -> None:
+    """Add ``Bᵀ k B`` to the (n, n) matrix `out`, with one (3, 3) matrix ``k`` a contact.
+
+    Parameters
+    ----------
+    stiffness
+        (n_contacts, 3, 3) by contact, force and gap.
+    columns, values
+        The gap operator by contact, from `sparse_rows`.
+    out
+        In and out: (n, n).
+    """
+    local = values.transpose(0, 2, 1) @ stiffness @ values
+    rows = np.broadcast_to(columns[:, :, None], local.shape)
+    np.add.at(out, (rows, rows.transpose(0, 2, 1)), local)

@@ -1,0 +1,165 @@
+"""The Jacobian of the harmonic balance as what it is made of, and the preconditioner that this suggests.
+
+``J = Z + Bᵀ K̂ B`` is block-diagonal in the harmonics but for ``K̂``, which is local to each contact. Factors of ``P_h = Z_h + K̂ʰʰ``, one
+complex matrix a harmonic, therefore precondition the whole, and ``J = P + Bᵀ(K̂ - K_P)B`` needs no product with Z where P was made at the
+same frequency.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.contact.interface import SparseRows, add_contact_jacobian
+from stickslip.contact.product import add_stiffness, contact_product, harmonic_means, less_means
+from stickslip.harmonic.condensed_product import CondensedProduct
+from stickslip.harmonic.fourier import to_complex, to_real
+
+Product = Callable[[FloatArray, FloatArray], FloatArray]
+SINGULAR = 1e-15  # smallest pivot over largest below which a harmonic has no factors
+
+
+@dataclass(frozen=True, eq=False)
+class HarmonicFactors:
+    """LU factors of ``Z_h + K̂ʰʰ`` for each harmonic: the preconditioner.
+
+    Attributes
+    ----------
+    linear
+        The dynamic stiffness they were made of.
+    means
+        (H+1, n_contacts, 3, 3) the contact stiffness they were made of, N/m.
+    factors
+        LU and pivots of each harmonic, in the scale of the Jacobian.
+    """
+
+    linear: CondensedProduct
+    means: ComplexArray
+    factors: tuple[tuple[ComplexArray, FloatArray], ...]
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Solve ``P x = right``, both (n (2H+1),) harmonic-major."""
+        rows = to_complex(right.reshape(2 * self.linear.order + 1, -1))
+        for row, (lu, pivots) in zip(rows, self.factors, strict=True):
+            own = row if np.iscomplexobj(lu) else row.real
+            row[:] = _SOLVE[lu.dtype.char](lu, pivots, own.astype(lu.dtype))[0]
+        return to_real(rows).reshape(-1)
+
+
+_SOLVE = {
+    "d": scipy.linalg.lapack.dgetrs,
+    "D": scipy.linalg.lapack.zgetrs,
+    "F": scipy.linalg.lapack.cgetrs,
+    "f": scipy.linalg.lapack.sgetrs,
+}
+_FACTORISE = {
+    "d": scipy.linalg.lapack.dgetrf,
+    "D": scipy.linalg.lapack.zgetrf,
+    "F": scipy.linalg.lapack.cgetrf,
+    "f": scipy.linalg.lapack.sgetrf,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class StructuredJacobian:
+    """``scale (Z + Bᵀ K̂ B)`` by its products.
+
+    Parameters
+    ----------
+    linear
+        Dynamic stiffness at the frequency.
+    blocks
+        (n_contacts, P, 2H+1, 2H+1) derivatives of the contact forces by the gaps, N/m.
+    rows
+        Gap operator by contact.
+    scale
+        Displacement scale over force scale.
+    problem
+        What it is the Jacobian of: a preconditioner of one Jacobian of a problem serves its others.
+    """
+
+    linear: CondensedProduct
+    blocks: FloatArray
+    rows: SparseRows
+    scale: float
+    problem: object
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        size = self.linear.linear.n * (2 * self.linear.order + 1)
+        return size, size
+
+    def matvec(self, v: FloatArray) -> FloatArray:
+        """Return ``J v``."""
+        q = self._by_row(v)
+        return self.scale * self._add_contacts(self.blocks, q, False, self.linear.product(q))
+
+    def rmatvec(self, v: FloatArray) -> FloatArray:
+        """Return ``Jᵀ v``."""
+        q = self._by_row(v)
+        out = self.linear.transposed_product(q)
+        return self.scale * self._add_contacts(self.blocks, q, True, out)
+
+    def dense(self) -> FloatArray:
+        """Return the Jacobian as an array."""
+        order, n = self.linear.order, self.linear.linear.n
+        jac = self.scale * real_matrix([self.linear.block(h) for h in range(order + 1)])
+        add_contact_jacobian(self.blocks, self.rows.columns, self.rows.values, n, self.scale, jac)
+        return jac
+
+    def preconditioner(self) -> HarmonicFactors | None:
+        """Return the factors of ``Z_h + K̂ʰʰ``; None where one of them is singular."""
+        means = harmonic_means(self.blocks)
+        factors = []
+        for h in range(self.linear.order + 1):
+            block = self.linear.block(h)
+            add_stiffness(means[h], self.rows.columns, self.rows.values, block)
+            matrix = np.asfortranarray(self.scale * (block.real if h == 0 else block))
+            lu, pivots, info = _FACTORISE[matrix.dtype.char](matrix, overwrite_a=True)
+            size = np.abs(np.diagonal(lu))
+            if info != 0 or not size.min() > SINGULAR * size.max():
+                return None
+            factors.append((lu, pivots))
+        return HarmonicFactors(self.linear, means, tuple(factors))
+
+    def product_after(self, preconditioner: HarmonicFactors) -> Product:
+        """Return the product ``J v`` as a function of v and of ``P v``, which whoever solved with P knows."""
+        if preconditioner.linear is not self.linear:
+            return lambda v, _: self.matvec(v)
+        left = less_means(self.blocks, preconditioner.means)
+
+        def product(v: FloatArray, preconditioned: FloatArray) -> FloatArray:
+            q = self._by_row(v)
+            return preconditioned + self.scale * self._add_contacts(
+                left, q, False, np.zeros_like(q)
+            )
+
+        return product
+
+    def _by_row(self, v: FloatArray) -> FloatArray:
+        return np.ascontiguousarray(v.reshape(2 * self.linear.order + 1, -1))
+
+    def _add_contacts(
+        self, blocks: FloatArray, q: FloatArray, transposed: bool, out: FloatArray
+    ) -> FloatArray:
+        m = q.shape[0]
+        contact_product(
+            blocks, self.rows.columns, self.rows.values, q, transposed, np.empty((3, m)), np.empty((3, m)), out
+        )  # fmt: skip
+        return out.reshape(-1)
+
+
+def real_matrix(blocks: list[ComplexArray] | ComplexArray) -> FloatArray:
+    """Return the harmonic-major real form of complex (n, n) `blocks`, one a harmonic from 0: (n (2H+1), n (2H+1)) in Fortran order."""
+    order, n = len(blocks) - 1, blocks[0].shape[0]
+    matrix = np.zeros((n * (2 * order + 1), n * (2 * order + 1)), order="F")
+    matrix[:n, :n] = blocks[0].real
+    for h in range(1, order + 1):
+        cos, sin = slice((2 * h - 1) * n, 2 * h * n), slice(2 * h * n, (2 * h + 1) * n)
+        matrix[cos, cos] = matrix[sin, sin] = blocks[h].real
+        matrix[cos, sin] = blocks[h].imag
+        matrix[sin, cos] = -blocks[h].imag
+    return matrix
