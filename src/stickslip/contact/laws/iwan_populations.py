@@ -1,0 +1,186 @@
+"""Published populations of sliders for Iwan's parallel-series element, cut into finitely many sliders.
+
+A slider of break-free distance φ has a stiffness density ρ(φ) (Segalman 2005, eq. 5). A cell of the density becomes one slider with the
+stiffness ``∫ρ dφ`` and the limit ``∫ρ φ dφ`` of that cell, so that stiffness and limit of the whole are exact whatever the number.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.errors import input_error
+
+
+class Population(Protocol):
+    """What the Iwan element needs of its sliders."""
+
+    def sliders(self) -> FloatArray:
+        """Return (2, n) shares of the stiffness, with sum 1, and of the limit, the finite ones with sum 1."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UniformBand:
+    """Break-free distances spread evenly over a band about their mean (Iwan 1966), beside an elastic spring (Song et al. 2004).
+
+    Parameters
+    ----------
+    n_sliders
+        Sliders, without the elastic spring.
+    half_width
+        Half of the band over the mean distance, above 0 and at most 1; 1: sliders from distance zero on.
+    elastic_share
+        Share of the stiffness that never slips, 0 to below 1; the limit is that of the others.
+
+    Raises
+    ------
+    InputError
+        If a parameter is out of its range.
+    """
+
+    n_sliders: int = 20
+    half_width: float = 1.0
+    elastic_share: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_count(self, self.n_sliders)
+        if not 0.0 < self.half_width <= 1.0:
+            raise input_error(
+                "UniformBand.half_width",
+                f"must be above 0 and at most 1, got {self.half_width}",
+                "It is a share of the mean break-free distance.",
+            )
+        if not 0.0 <= self.elastic_share < 1.0:
+            raise input_error(
+                "UniformBand.elastic_share",
+                f"must be at least 0 and below 1, got {self.elastic_share}",
+                "Use Bonded for a spring that never slips.",
+            )
+
+    def sliders(self) -> FloatArray:
+        """Return (2, n) shares of stiffness and limit."""
+        middle = (2.0 * np.arange(self.n_sliders) + 1.0) / self.n_sliders - 1.0
+        shares = np.full((2, self.n_sliders), 1.0 / self.n_sliders)
+        shares[1] *= 1.0 + self.half_width * middle
+        if self.elastic_share == 0.0:
+            return shares
+        shares[0] *= 1.0 - self.elastic_share
+        return np.hstack([shares, [[self.elastic_share], [np.inf]]])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FourParameter:
+    """Segalman's population (2005): ``ρ = R φ^chi`` up to φ_max and a group of sliders that break free there together.
+
+    Two of the four parameters are stiffness and limit of the element.
+
+    Parameters
+    ----------
+    chi
+        Exponent, above -1 and at most 0: energy lost in micro-slip grows with the power 3 + chi of the amplitude.
+    beta
+        Stiffness of the sliders at φ_max over that of all others, not negative.
+    n_sliders
+        Sliders below φ_max, in cells that grow geometrically from φ_max / 1000.
+
+    Raises
+    ------
+    InputError
+        If a parameter is out of its range.
+    """
+
+    chi: float
+    beta: float
+    n_sliders: int = 20
+
+    def __post_init__(self) -> None:
+        _check_count(self, self.n_sliders)
+        if not -1.0 < self.chi <= 0.0:
+            raise input_error(
+                "FourParameter.chi",
+                f"must be above -1 and at most 0, got {self.chi}",
+                "Measured slopes of energy over amplitude lie between 2 and 3: chi is the slope less 3.",
+            )
+        if not (np.isfinite(self.beta) and self.beta >= 0.0):
+            raise input_error(
+                "FourParameter.beta",
+                f"must be finite and not negative, got {self.beta}",
+                "It is a ratio of stiffnesses.",
+            )
+
+    def sliders(self) -> FloatArray:
+        """Return (2, n) shares of stiffness and limit."""
+        edges = np.concatenate([[0.0], np.geomspace(1e-3, 1.0, self.n_sliders)])
+        stiffness = np.diff(edges ** (self.chi + 1.0))
+        limit = np.diff(edges ** (self.chi + 2.0)) * (self.chi + 1.0) / (self.chi + 2.0)
+        if self.beta > 0.0:
+            stiffness, limit = np.append(stiffness, self.beta), np.append(limit, self.beta)
+        return np.array([stiffness / np.sum(stiffness), limit / np.sum(limit)])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FirstLoading:
+    """Sliders of any first-loading curve, which slip one after the other at its corners (Segalman & Starr 2008).
+
+    The curve begins at the origin; where it ends it goes on with the slope of its last piece. Only its shape counts: the
+    element scales it to its own stiffness and limit.
+
+    Parameters
+    ----------
+    displacement, force
+        Corners of the curve after the origin, in any units; slopes fall from piece to piece.
+
+    Raises
+    ------
+    InputError
+        If the corners do not make such a curve.
+    """
+
+    displacement: tuple[float, ...]
+    force: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        x, f = self.displacement, self.force
+        if len(x) != len(f) or len(x) < 2 or not np.all(np.isfinite([*x, *f])):
+            raise input_error(
+                "FirstLoading",
+                f"got {len(x)} displacements and {len(f)} forces",
+                "Give two corners or more, with finite numbers.",
+            )
+        if np.any(np.diff([0.0, *x]) <= 0.0):
+            raise input_error(
+                "FirstLoading.displacement", f"must rise from above zero, got {x}", "Sort it."
+            )
+        slopes = self._slopes()
+        if slopes[-1] < 0.0 or np.any(np.diff(slopes) >= 0.0):
+            raise input_error(
+                "FirstLoading.force",
+                f"must rise ever more slowly, got the slopes {slopes}",
+                "Leave corners out that lie on a line with their neighbours or below it.",
+            )
+
+    def _slopes(self) -> FloatArray:
+        """Slopes of the pieces."""
+        force, displacement = np.array([0.0, *self.force]), np.array([0.0, *self.displacement])
+        return np.asarray(np.diff(force) / np.diff(displacement))
+
+    def sliders(self) -> FloatArray:
+        """Return (2, n) shares of stiffness and limit."""
+        slopes = self._slopes()
+        stiffness = -np.diff(slopes)
+        limit = stiffness * np.asarray(self.displacement[:-1])
+        if slopes[-1] > 0.0:
+            stiffness, limit = np.append(stiffness, slopes[-1]), np.append(limit, np.inf)
+        finite = np.isfinite(limit)
+        return np.array([stiffness / np.sum(stiffness), limit / np.sum(limit[finite])])
+
+
+def _check_count(population: object, n_sliders: int) -> None:
+    if n_sliders < 1:
+        raise input_error(
+            f"{type(population).__name__}.n_sliders",
+            f"must be at least 1, got {n_sliders}",
+            "Twenty make a smooth loop.",
+        )

@@ -1,0 +1,82 @@
+"""Coulomb friction smoothed over the velocity."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.contact.law import OPEN, SLIP, STICK, UNCOUPLED_TANGENTS, law_kernel
+from stickslip.contact.laws.parameter_checks import (
+    check_finite,
+    check_not_negative,
+    check_positive,
+)
+
+
+def _step(displacement, velocity, state, parameters, force, new_state, jac, status):  # type: ignore[no-untyped-def]
+    """Friction along the velocity of each tangent; there is no state."""
+    k_n, mu, preload, transition = parameters
+    pressure = preload - k_n * displacement[2]
+    if pressure < 0.0:
+        status[:] = OPEN
+        force[:] = 0.0
+        return
+    force[2] = -pressure
+    jac[2, 2] = k_n
+    for d in range(2):
+        share = np.tanh(velocity[d] / transition)
+        force[d] = mu * pressure * share
+        jac[d, 2] = -mu * k_n * share
+        jac[d, 3 + d] = mu * pressure * (1.0 - share * share) / transition
+        status[d] = SLIP if abs(velocity[d]) > transition else STICK
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegularisedCoulomb:
+    """Coulomb friction without sticking: ``T = mu N tanh(v / transition_velocity)``, ``N = max(0, preload - k_n g_n)``.
+
+    Acts along t and w, each for itself; there is no tangential stiffness, and a constant force makes the contact creep. A
+    tangent is said to stick below the transition velocity.
+
+    Parameters
+    ----------
+    mu
+        Friction coefficient.
+    transition_velocity
+        Velocity at which the friction force is 76 % of its limit, m/s; to be small against the velocities of the vibration.
+    k_n
+        Normal contact stiffness, N/m; zero for a constant normal force.
+    preload
+        Normal force at zero normal gap, N; negative for a contact with a clearance.
+
+    Raises
+    ------
+    InputError
+        If a parameter is not finite or out of its range.
+    """
+
+    mu: float
+    transition_velocity: float
+    k_n: float = 0.0
+    preload: float = 0.0
+
+    kernel: ClassVar[Any] = law_kernel(_step)
+    pairs: ClassVar[int] = UNCOUPLED_TANGENTS
+
+    def __post_init__(self) -> None:
+        check_not_negative(self, "mu", "k_n")
+        check_positive(self, "transition_velocity")
+        check_finite(self, "preload")
+
+    def parameters(self) -> FloatArray:
+        """Return the (4,) k_n, mu, preload and transition velocity."""
+        return np.array([self.k_n, self.mu, self.preload, self.transition_velocity])
+
+    def initial_state(self) -> FloatArray:
+        """Return the (0,) state: the force follows from the velocity alone."""
+        return np.zeros(0)
+
+    def stuck_stiffness(self) -> FloatArray:
+        """Return the (3,) stiffnesses t, w, n of the closed contact, N/m; the friction has none."""
+        return np.array([0.0, 0.0, self.k_n])
