@@ -1,6 +1,6 @@
 """Evaluators of a period against each other, mixed interfaces and weights."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -49,6 +49,42 @@ def test_march_and_intervals_agree(law, seed, order, samples, size):
         assert np.max(np.abs(one.blocks - other.blocks)) <= 1e-10 * stiffness
 
 
+@dataclass(frozen=True)
+class LikeElasticCoulomb:
+    """A law that hides its elements and has to be marched."""
+
+    law: ElasticCoulomb
+    kernel = staticmethod(ElasticCoulomb.kernel)
+    pairs = 7
+
+    def parameters(self):
+        return self.law.parameters()
+
+    def initial_state(self):
+        return self.law.initial_state()
+
+    def stuck_stiffness(self):
+        return self.law.stuck_stiffness()
+
+
+@pytest.mark.parametrize("evaluator", ["intervals", "events"])
+def test_groups_come_back_in_their_order(evaluator):
+    plain = [LAW, replace(LAW, mu=0.1, preload=-1.0), replace(LAW, k_w=0.0)]
+    mixed = [plain[0], LikeElasticCoulomb(plain[1]), plain[2]]
+    gap = gaps(5, 3, 3)
+    weights = np.array([1.0, 2.0, 4.0])
+    want = contact_forces(gap, compile_contacts(plain, weights, evaluator), 4096)
+    got = contact_forces(gap, compile_contacts(mixed, weights, evaluator), 4096)
+    size = np.max(np.abs(want.coefficients))
+    tolerance = (
+        1e-12 if evaluator == "intervals" else 1e-4
+    )  # the march has the error of its samples
+    assert np.max(np.abs(got.coefficients - want.coefficients)) <= tolerance * size
+    assert got.blocks.shape[1] == 7
+    assert np.max(np.abs(got.blocks[:, :5] - want.blocks)) <= max(tolerance, 1e-12) * 100
+    assert np.all(got.blocks[:, 5:] == 0.0)
+
+
 def test_contacts_of_an_interface_do_not_feel_each_other():
     mixed = [LAW, replace(LAW, mu=0.1, preload=-1.0), replace(LAW, k_w=0.0, residual_traction=0.5)]
     gap = gaps(3, 3, 3)
@@ -59,7 +95,7 @@ def test_contacts_of_an_interface_do_not_feel_each_other():
         assert np.array_equal(together.blocks[c], alone.blocks[0])
 
 
-@pytest.mark.parametrize("evaluator", ["intervals", "march"])
+@pytest.mark.parametrize("evaluator", ["intervals", "march", "events"])
 def test_weights_are_factors_of_the_forces(evaluator):
     gap = gaps(4, 2, 2)
     weights = np.array([0.5, 3.0])

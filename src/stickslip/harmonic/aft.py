@@ -1,12 +1,13 @@
 """Contact forces in the frequency domain: alternating frequency/time (Cameron & Griffin 1989)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.compiled import CompiledContacts, MarchedLaws
+from stickslip.contact.events import exact_period
 from stickslip.contact.intervals import contact_period, prefix_sums
 from stickslip.contact.march import march_period
 
@@ -73,67 +74,130 @@ def contact_forces(
     contacts
         The laws, from `compile_contacts` or `Interface.compiled`.
     samples
-        Samples per period; at least 8 H keeps aliasing below the truncation error.
+        Samples per period; at least 8 H keeps aliasing below the truncation error. Exact events need them for display only.
     omega
         Frequency in rad/s; only laws that depend on velocity ask for it.
     """
-    m, width = gap_coefficients.shape
-    n = contacts.n_contacts
-    factor = 1.0 if contacts.weights is None else contacts.weights[:, None, None]
+    m = gap_coefficients.shape[0]
     tables = _tables((m - 1) // 2, samples)
-    gap = np.ascontiguousarray((tables.basis @ gap_coefficients).T).reshape(n, 3, samples)
-    force: FloatArray = np.empty_like(gap)
-    state = np.empty((n, 2, samples), dtype=np.int64)
-    blocks = np.empty((n, contacts.pairs, m, m))
-    own = contacts.piecewise
-    if own.size == n:
-        contact_period(gap, contacts.elements, contacts.first, tables.basis, tables.cos, tables.sin, force, state, blocks)  # fmt: skip
-    elif own.size:
-        part = force[own], state[own], blocks[own]
-        contact_period(gap[own], contacts.elements, contacts.first, tables.basis, tables.cos, tables.sin, *part)  # fmt: skip
-        force[own], state[own], blocks[own] = part
-    by_omega: FloatArray | None = np.zeros_like(force) if contacts.marched else None
-    unsettled = 0
+    gap = np.ascontiguousarray((tables.basis @ gap_coefficients).T)
+    gap = gap.reshape(contacts.n_contacts, 3, samples)
+    parts = []
+    if contacts.piecewise.size:
+        own = contacts.piecewise
+        evaluate = _exact if contacts.evaluator == "events" else _on_samples
+        period = evaluate(gap_coefficients, gap, contacts, tables)
+        parts.append((own, period))
     for laws in contacts.marched:
-        c = laws.contacts
-        velocity = omega * (tables.slope @ gap_coefficients).T.reshape(n, 3, samples)[c]
-        f, s, b, slope, periods = _march(laws, gap[c], velocity, tables, omega, contacts.pairs)
-        force[c], state[c], blocks[c] = f, s, b
-        if by_omega is not None:
-            by_omega[c] = slope
-        unsettled += int(np.count_nonzero(periods < 0))
-    if contacts.weights is not None:
-        blocks *= contacts.weights[:, None, None, None]
-    force = factor * force
-    return ContactPeriod(
-        tables.analysis.T @ force.reshape(width, samples).T,
-        blocks,
-        None
-        if by_omega is None
-        else tables.analysis.T @ (factor * by_omega).reshape(width, samples).T,
-        gap,
-        force,
-        state,
-        unsettled,
-    )
+        period = _marched(gap_coefficients, gap, laws, contacts.pairs, tables, omega)
+        parts.append((laws.contacts, period))
+    # no contact at all is put together from nothing
+    whole = parts[0][1] if len(parts) == 1 else _put_together(parts, gap, contacts.pairs, m)
+    return whole if contacts.weights is None else _weighted(whole, contacts.weights)
 
 
-def _march(
-    laws: MarchedLaws,
-    gap: FloatArray,
-    velocity: FloatArray,
-    tables: _Tables,
-    omega: float,
-    pairs: int,
-) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, IntArray]:
+def _of(gap_coefficients: FloatArray, contacts: IntArray) -> FloatArray:
+    """Return the (2H+1, 3 n) coefficients of some contacts; the array itself where these are all."""
+    m, width = gap_coefficients.shape
+    if 3 * contacts.size == width:
+        return gap_coefficients
+    return gap_coefficients.reshape(m, -1, 3)[:, contacts].reshape(m, -1)
+
+
+def _on_samples(
+    _: FloatArray, gap: FloatArray, contacts: CompiledContacts, tables: _Tables
+) -> ContactPeriod:
+    """Evaluate sums of elementary contacts by intervals of the samples."""
+    gap = gap if contacts.piecewise.size == len(gap) else gap[contacts.piecewise]
     n, _, samples = gap.shape
     m = tables.basis.shape[1]
-    force, slope = np.empty_like(gap), np.empty_like(gap)
+    force = np.empty_like(gap)
+    state = np.empty((n, 2, samples), dtype=np.int64)
+    blocks = np.empty((n, contacts.pairs, m, m))
+    contact_period(
+        gap, contacts.elements, contacts.first, tables.basis, tables.cos, tables.sin, force, state, blocks,
+    )  # fmt: skip
+    coefficients = tables.analysis.T @ force.reshape(3 * n, samples).T
+    return ContactPeriod(coefficients, blocks, None, gap, force, state, 0)
+
+
+def _exact(
+    gap_coefficients: FloatArray, gap: FloatArray, contacts: CompiledContacts, _: _Tables
+) -> ContactPeriod:
+    """Evaluate sums of elementary contacts at exact events."""
+    own = contacts.piecewise
+    gap = gap if own.size == len(gap) else gap[own]
+    coefficients, blocks, force, state = exact_period(
+        _of(gap_coefficients, own), contacts.elements, contacts.first, gap, contacts.pairs
+    )
+    return ContactPeriod(coefficients, blocks, None, gap, force, state, 0)
+
+
+def _marched(
+    gap_coefficients: FloatArray,
+    gap: FloatArray,
+    laws: MarchedLaws,
+    pairs: int,
+    tables: _Tables,
+    omega: float,
+) -> ContactPeriod:
+    """Evaluate contacts of one law class sample by sample."""
+    gap = np.ascontiguousarray(gap[laws.contacts])
+    n, _, samples = gap.shape
+    m = tables.basis.shape[1]
+    rate = omega * tables.slope
+    velocity = np.ascontiguousarray((rate @ _of(gap_coefficients, laws.contacts)).T)
+    force, by_omega = np.empty_like(gap), np.empty_like(gap)
     state = np.empty((n, 2, samples), dtype=np.int64)
     blocks = np.empty((n, pairs, m, m))
     periods = np.empty(n, dtype=np.int64)
     march_period(
-        laws.kernel, laws.parameters, laws.start, gap, np.ascontiguousarray(velocity), tables.basis,
-        omega * tables.slope, omega, force, state, blocks, slope, periods,
+        laws.kernel, laws.parameters, laws.start, gap, velocity.reshape(gap.shape), tables.basis,
+        rate, omega, force, state, blocks, by_omega, periods,
     )  # fmt: skip
-    return force, state, blocks, slope, periods
+    return ContactPeriod(
+        tables.analysis.T @ force.reshape(3 * n, samples).T,
+        blocks,
+        tables.analysis.T @ by_omega.reshape(3 * n, samples).T,
+        gap,
+        force,
+        state,
+        int(np.count_nonzero(periods < 0)),
+    )
+
+
+def _put_together(
+    parts: list[tuple[IntArray, ContactPeriod]], gap: FloatArray, pairs: int, m: int
+) -> ContactPeriod:
+    """Bring contacts that were evaluated in groups back into their order."""
+    n, _, samples = gap.shape
+    coefficients, by_omega = np.zeros((m, n, 3)), np.zeros((m, n, 3))
+    blocks = np.empty((n, pairs, m, m))
+    force = np.empty_like(gap)
+    state = np.empty((n, 2, samples), dtype=np.int64)
+    for own, part in parts:
+        coefficients[:, own] = part.coefficients.reshape(m, -1, 3)
+        if part.by_omega is not None:
+            by_omega[:, own] = part.by_omega.reshape(m, -1, 3)
+        blocks[own], force[own], state[own] = part.blocks, part.force, part.state
+    return ContactPeriod(
+        coefficients.reshape(m, -1),
+        blocks,
+        by_omega.reshape(m, -1),
+        gap,
+        force,
+        state,
+        sum(part.unsettled for _, part in parts),
+    )
+
+
+def _weighted(period: ContactPeriod, weights: FloatArray) -> ContactPeriod:
+    """Multiply the forces of each contact by its weight."""
+    each = np.repeat(weights, 3)
+    return replace(
+        period,
+        coefficients=period.coefficients * each,
+        blocks=period.blocks * weights[:, None, None, None],
+        by_omega=None if period.by_omega is None else period.by_omega * each,
+        force=period.force * weights[:, None, None],
+    )
