@@ -1,0 +1,392 @@
+"""Rigid contacts in harmonic balance: the dynamic Lagrangian frequency-time method (Nacivet et al. 2003).
+
+The forces of rigid contacts are what equilibrium asks for, ``Λ = F - Z q`` along a gap. Added to a penalty ``ε`` times what the law
+forbids, sliding or penetration, they predict a force in the time domain that Coulomb's and Signorini's laws correct. At a solution the
+correction returns Λ, whatever ε is: a penalty of the method, not a stiffness of the contact.
+"""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from time import perf_counter
+
+import numpy as np
+
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from stickslip.contact.compiled import Evaluator, compile_contacts
+from stickslip.contact.interface import Interface
+from stickslip.contact.intervals import prefix_sums
+from stickslip.contact.law import TN, TT, UNCOUPLED_TANGENTS
+from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
+from stickslip.contact.rigid import RigidPeriod, project
+from stickslip.errors import InputError, input_error
+from stickslip.harmonic.aft import ContactPeriod, contact_forces
+from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_balance
+from stickslip.harmonic.dynamic_stiffness import CondensedStiffness
+
+NORMAL = 2
+SAMPLES_OF_OTHERS = 8  # per harmonic, least number at which contacts with stiffness are evaluated
+
+
+@dataclass(frozen=True, eq=False)
+class RigidContacts:
+    """The rigid contacts of an interface and their gaps among the retained coordinates.
+
+    Attributes
+    ----------
+    index
+        (n_rigid,) their positions in the interface.
+    mu, constant
+        (n_rigid,) friction coefficients; constant normal loads, scaled, NaN where the normal force is a reaction.
+    contact, direction, column, factor, penalty, offset
+        (n_gaps,) the rigid contact of a gap, 0 1 2 for t w n, its retained coordinate, the gap over that coordinate, ε scaled, and
+        the gap at zero displacement, scaled.
+    """
+
+    index: IntArray
+    mu: FloatArray
+    constant: FloatArray
+    contact: IntArray
+    direction: IntArray
+    column: IntArray
+    factor: FloatArray
+    penalty: FloatArray
+    offset: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class DynamicLagrangian:
+    """The periodic problem with rigid contacts; `HarmonicBalance` carries the linear side and the contacts that have a stiffness.
+
+    Scaled like it and solved like it. Build it with `dynamic_lagrangian`.
+    """
+
+    balance: HarmonicBalance
+    interface: Interface  # all contacts, on the retained coordinates
+    rigid: RigidContacts
+    samples: int
+
+    @property
+    def size(self) -> int:
+        """Number of real unknowns."""
+        return self.balance.size
+
+    @property
+    def order(self) -> int:
+        """Highest harmonic."""
+        return self.balance.order
+
+    @property
+    def linear(self) -> CondensedStiffness:
+        """The condensed structure and its load."""
+        return self.balance.linear
+
+    def coefficients(self, x: FloatArray) -> ComplexArray:
+        """Return the (order+1, n) complex coefficients in metres of scaled unknowns `x`."""
+        return self.balance.coefficients(x)
+
+    def unknowns(self, coefficients: ComplexArray) -> FloatArray:
+        """Return the scaled unknowns of complex `coefficients`, padded or cut to `order`."""
+        return self.balance.unknowns(coefficients)
+
+    def with_order(self, order: int) -> "DynamicLagrangian":
+        """Return the same problem with harmonics 0..`order`."""
+        samples = _checked_samples(self.samples, order)
+        inner = replace(self.balance, order=order, samples=_samples_of_others(samples, order))
+        return replace(self, balance=inner, samples=samples)
+
+    def linearise(self, x: FloatArray, omega: float) -> Linearisation:
+        """Return residual, Jacobian and ω-derivative at scaled unknowns `x` (size,) and `omega` (rad/s)."""
+        at = self.balance.linearise(x, omega)
+        start = perf_counter()
+        rigid = self.rigid
+        rows = rigid.column[:, None] + self.linear.n * np.arange(2 * self.order + 1)
+        found = self._corrected(x, at.residual)
+        # derivatives of the predictions by x and, in the last column, by ω
+        slope = -np.concatenate([at.jac[rows], at.jac_p[rows][:, :, None]], axis=2)
+        slope /= rigid.factor[:, None, None]
+        _add_penalty(slope, rows, rigid, found.stuck)
+        change = rigid.factor[:, None, None] * _chain(found.period.blocks, slope, rigid)
+        residual, jac, jac_p = at.residual.copy(), at.jac, at.jac_p.copy()
+        own = found.coefficients[:, rigid.contact, rigid.direction].T
+        residual[rows] += rigid.factor[:, None] * own
+        jac[rows] += change[:, :, :-1]
+        jac_p[rows] += change[:, :, -1]
+        return Linearisation(residual, jac, jac_p, at.seconds_contact + perf_counter() - start)
+
+    def contacts(self, x: FloatArray, omega: float) -> ContactPeriod:
+        """Return gaps, forces and states of all contacts over one period, at the scaled unknowns `x` and `omega` (rad/s).
+
+        Gaps are those of the motion, without initial gaps. For rigid contacts the blocks are derivatives by predicted forces.
+        """
+        balance, rigid = self.balance, self.rigid
+        found = self._corrected(x, balance.linearise(x, omega).residual)
+        q = x.reshape(2 * self.order + 1, -1) * balance.displacement_scale
+        n = self.interface.n_contacts
+        others = np.setdiff1d(np.arange(n), rigid.index)
+        elastic = balance.interface
+        soft = contact_forces(q @ elastic.gap_operator.T, elastic.compiled(), self.samples, omega)
+        gap = _in_time(q @ self.interface.gap_operator.T, self.samples).reshape(n, 3, self.samples)
+        coefficients = np.empty((q.shape[0], n, 3))
+        coefficients[:, others] = soft.coefficients.reshape(q.shape[0], others.size, 3)
+        coefficients[:, rigid.index] = balance.force_scale * found.coefficients
+        force, state = np.empty_like(gap), np.empty((n, 2, self.samples), dtype=np.int64)
+        force[others], state[others] = soft.force, soft.state
+        force[rigid.index] = balance.force_scale * found.period.force
+        state[rigid.index] = found.period.state
+        blocks = np.zeros((n, soft.blocks.shape[1], *soft.blocks.shape[2:]))
+        blocks[others] = soft.blocks
+        blocks[rigid.index, :UNCOUPLED_TANGENTS] = found.period.blocks
+        flat = coefficients.reshape(q.shape[0], -1)
+        return ContactPeriod(flat, blocks, None, gap, force, state, soft.unsettled)
+
+    def _corrected(self, x: FloatArray, residual: FloatArray) -> "_Corrected":
+        """Predict the forces of the rigid contacts from the `residual` without them, and correct them."""
+        rigid, m = self.rigid, 2 * self.order + 1
+        n = rigid.index.size
+        equilibrium = -residual.reshape(m, -1)[:, rigid.column] / rigid.factor
+        elastic = rigid.penalty * rigid.factor * x.reshape(m, -1)[:, rigid.column]
+        elastic[0] += rigid.penalty * rigid.offset
+        sliding = np.where(rigid.direction == NORMAL, elastic, derivative(self.order) @ elastic)
+        predicted = np.zeros((m, n, 3))
+        predicted[:, rigid.contact, rigid.direction] = equilibrium + sliding
+        in_time = _in_time(predicted.reshape(m, -1), self.samples).reshape(n, 3, self.samples)
+        period = project(in_time, rigid.mu, rigid.constant, self.order)
+        stuck = (rigid.direction != NORMAL) & period.stuck[rigid.contact, rigid.direction % 2]
+        if np.any(stuck):
+            held = predicted.copy()
+            held[:, rigid.contact[stuck], rigid.direction[stuck]] = (equilibrium + elastic)[
+                :, stuck
+            ]
+            _hold(period, held, stuck, rigid)
+        coefficients = _in_harmonics(period.force.reshape(3 * n, -1), self.order)
+        return _Corrected(period, coefficients.reshape(m, n, 3), stuck)
+
+
+@dataclass(frozen=True, eq=False)
+class _Corrected:
+    period: RigidPeriod
+    coefficients: FloatArray  # (m, n_rigid, 3)
+    stuck: BoolArray  # (n_gaps,) tangents that stick throughout
+
+
+def derivative(order: int) -> FloatArray:
+    """Return the (2 order + 1, 2 order + 1) matrix that differentiates real Fourier coefficients by τ = ωt."""
+    out = np.zeros((2 * order + 1, 2 * order + 1))
+    h = np.arange(1, order + 1)
+    out[2 * h - 1, 2 * h] = h
+    out[2 * h, 2 * h - 1] = -h
+    return out
+
+
+def _in_time(coefficients: FloatArray, samples: int) -> FloatArray:
+    """Return (n, samples) values of real Fourier coefficients (m, n)."""
+    basis = _basis((coefficients.shape[0] - 1) // 2, samples)
+    return np.ascontiguousarray((basis @ coefficients).T)
+
+
+def _in_harmonics(values: FloatArray, order: int) -> FloatArray:
+    """Return the real Fourier coefficients (m, n) of `values` (n, samples)."""
+    coefficients = (values @ _basis(order, values.shape[1])).T * (2.0 / values.shape[1])
+    coefficients[0] *= 0.5
+    return np.asarray(coefficients)
+
+
+@lru_cache(maxsize=32)
+def _basis(order: int, samples: int) -> FloatArray:
+    return prefix_sums(order, samples)[0]
+
+
+def _hold(period: RigidPeriod, held: FloatArray, stuck: BoolArray, rigid: RigidContacts) -> None:
+    """Fill in, for tangents that stick throughout, the force of a slider that starts at zero displacement.
+
+    Where nothing ever slides, sliding velocities say nothing of the place of the contact. A spring of stiffness ε on the predicted
+    displacement does: unstretched at zero, or dragged along as far as a first period had to slip.
+    """
+    m = held.shape[0]
+    which = np.unique(rigid.contact[stuck])
+    laws = tuple(_slider(rigid.mu[c], rigid.constant[c]) for c in which)
+    march = contact_forces(
+        held[:, which].reshape(m, -1), compile_contacts(laws), period.force.shape[2]
+    )
+    place = np.searchsorted(which, rigid.contact[stuck])
+    for c, d, at in zip(rigid.contact[stuck], rigid.direction[stuck], place, strict=True):
+        period.force[c, d] = march.force[at, d]
+        period.state[c, d] = march.state[at, d]
+        period.blocks[c, TT + d] = march.blocks[at, TT + d]
+        period.blocks[c, TN + d] = march.blocks[at, TN + d]
+
+
+def _slider(mu: float, constant: float) -> ElasticCoulomb:
+    """Return the contact with unit springs, for gaps that are written as forces."""
+    if np.isnan(constant):
+        return ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=1.0, mu=mu)
+    return ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=0.0, mu=mu, preload=constant)
+
+
+def _add_penalty(slope: FloatArray, rows: IntArray, rigid: RigidContacts, stuck: BoolArray) -> None:
+    """Add the derivatives of what the laws forbid: of displacements along the normal and where a tangent is held, else of velocities."""
+    m = rows.shape[1]
+    sliding = derivative((m - 1) // 2)
+    for g, by_place in enumerate((rigid.direction == NORMAL) | stuck):
+        slope[g][:, rows[g]] += (
+            rigid.penalty[g] * rigid.factor[g] * (np.eye(m) if by_place else sliding)
+        )
+
+
+def _chain(blocks: FloatArray, slope: FloatArray, rigid: RigidContacts) -> FloatArray:
+    """Return the derivatives of the corrected forces (n_gaps, m, k) from those of the predicted ones."""
+    change = blocks[rigid.contact, TT + rigid.direction] @ slope
+    for g in np.flatnonzero(rigid.direction != NORMAL):
+        normal = np.flatnonzero((rigid.contact == rigid.contact[g]) & (rigid.direction == NORMAL))
+        for k in normal:
+            change[g] += blocks[rigid.contact[g], TN + rigid.direction[g]] @ slope[k]
+    return change
+
+
+def dynamic_lagrangian(
+    linear: CondensedStiffness,
+    interface: Interface,
+    order: int,
+    samples: int,
+    penalty: float | None = None,
+    evaluator: Evaluator = "intervals",
+) -> DynamicLagrangian:
+    """Set up the periodic problem of an interface in which contacts are rigid (`RigidCoulomb`), all or some.
+
+    Parameters
+    ----------
+    linear
+        Condensed structure and load.
+    interface
+        Contacts on the dofs of the whole structure; each gap of a rigid one must be a retained coordinate, times a factor.
+    order
+        Highest harmonic.
+    samples
+        Samples per period. With ``2 order + 1``, as many as there are coefficients, the laws hold exactly at the samples, and nothing
+        depends on the penalty; with more, eight a harmonic and up, the answer is more accurate and depends on it by less than the
+        error that the missing harmonics make.
+    penalty
+        Penalty ε of the method (N/m); None: for each gap the stiffness of the structure at that coordinate.
+    evaluator
+        Of the contacts that have a stiffness; see `harmonic_balance`.
+
+    Raises
+    ------
+    InputError
+        If no contact is rigid, or a gap of one is no coordinate, or there are fewer samples than coefficients.
+    """
+    rigid = [i for i, law in enumerate(interface.laws) if isinstance(law, RigidCoulomb)]
+    if not rigid:
+        raise input_error("dynamic_lagrangian", "no contact is rigid", "Use harmonic_balance.")
+    if penalty is not None and not (np.isfinite(penalty) and penalty > 0.0):
+        raise input_error(
+            "dynamic_lagrangian: penalty",
+            f"must be positive and finite, got {penalty}",
+            "Give it in N/m, or None.",
+        )
+    missing = np.setdiff1d(interface.coordinates(), linear.retained)
+    if missing.size:
+        raise input_error(
+            "dynamic_lagrangian",
+            f"contact dofs {missing[:5].tolist()} are not retained",
+            "Retain all contact dofs.",
+        )
+    _checked_samples(samples, order)
+    balance = harmonic_balance(
+        linear, _without(interface, rigid), order, _samples_of_others(samples, order), evaluator
+    )
+    local = interface.restricted(linear.retained)
+    return DynamicLagrangian(
+        balance, local, _rigid_contacts(local, rigid, balance, penalty), samples
+    )
+
+
+def _without(interface: Interface, rigid: list[int]) -> Interface:
+    """Return the contacts that have a stiffness."""
+    keep = np.setdiff1d(np.arange(interface.n_contacts), rigid)
+    rows = (3 * keep[:, None] + np.arange(3)).ravel()
+    return Interface(
+        tuple(interface.names[i] for i in keep),
+        tuple(interface.laws[i] for i in keep),
+        interface.gap_operator[rows],
+        None if interface.weights is None else interface.weights[keep],
+    )
+
+
+def _rigid_contacts(
+    interface: Interface, rigid: list[int], balance: HarmonicBalance, penalty: float | None
+) -> RigidContacts:
+    """Find the coordinates of the gaps, and write all parameters in scaled units."""
+    length, force = balance.displacement_scale, balance.force_scale
+    stiffness = np.abs(np.diagonal(balance.linear.nn[0]))
+    typical = force / length
+    entries: list[tuple[int, int, int, float]] = []
+    for c, i in enumerate(rigid):
+        entries += [(c, *entry) for entry in _gap_coordinates(interface, i)]
+    contact, direction, column = (
+        np.array([e[k] for e in entries], dtype=np.int64) for k in range(3)
+    )
+    factor = np.array([e[3] for e in entries])
+    if np.unique(column).size < column.size:
+        twice = column[np.argmax(np.bincount(column)[column] > 1)]
+        names = [interface.names[rigid[c]] for c in contact[column == twice]]
+        raise _no_coordinate(" and ".join(names), "share one coordinate")
+    own = np.where(stiffness[column] > 0.0, stiffness[column], typical) / factor**2
+    laws = [law for law in interface.laws if isinstance(law, RigidCoulomb)]
+    gaps = np.array([law.initial_gap for law in laws]) / length
+    constant = np.array([np.nan if law.preload is None else law.preload for law in laws])
+    return RigidContacts(
+        np.array(rigid), np.array([law.mu for law in laws]), constant * interface.factors[rigid] / force,
+        contact, direction, column, factor,
+        (own if penalty is None else np.full(column.size, penalty)) * length / force,
+        np.where(direction == NORMAL, gaps[contact], 0.0),
+    )  # fmt: skip
+
+
+def _gap_coordinates(interface: Interface, contact: int) -> list[tuple[int, int, float]]:
+    """Return (direction, coordinate, factor) of the gaps of a contact."""
+    law, name = interface.laws[contact], interface.names[contact]
+    found = []
+    for d in range(3):
+        row = interface.gap_operator[3 * contact + d]
+        columns = np.flatnonzero(row)
+        constant = isinstance(law, RigidCoulomb) and law.preload is not None
+        if columns.size == 0 or (d == NORMAL and constant):
+            continue
+        if columns.size > 1:
+            raise _no_coordinate(name, "has a gap between several coordinates")
+        found.append((d, int(columns[0]), float(row[columns[0]])))
+    if (
+        isinstance(law, RigidCoulomb)
+        and law.preload is None
+        and NORMAL not in [d for d, _, _ in found]
+    ):
+        raise input_error(
+            f"contact {name}",
+            "is unilateral and has no normal gap",
+            "Give it a normal direction, or a constant normal load (preload).",
+        )
+    return found
+
+
+def _no_coordinate(name: str, problem: str) -> InputError:
+    return input_error(
+        f"rigid contact {name}",
+        problem,
+        "Write the structure in_relative_coordinates, where every gap is a coordinate.",
+    )
+
+
+def _checked_samples(samples: int, order: int) -> int:
+    if samples < 2 * order + 1:
+        raise input_error(
+            "samples",
+            f"{samples} samples a period for {order} harmonics",
+            f"Give at least {2 * order + 1}, as many as there are coefficients.",
+        )
+    return samples
+
+
+def _samples_of_others(samples: int, order: int) -> int:
+    return max(samples, SAMPLES_OF_OTHERS * order, 16)
