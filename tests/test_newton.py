@@ -142,11 +142,11 @@ def test_the_number_of_evaluations_is_bounded():
     wrapped, calls = counted(nonsense)
     solution = newton(wrapped, np.zeros(4), Newton(max_iterations=10))
     assert solution.status in (Status.TOO_MANY_ITERATIONS, Status.STALLED)
-    assert len(calls) <= 1 + 10 * 7
+    assert len(calls) <= 1 + 10 * (7 + 31), "seven shares of a step, then thirty-one towards a kink"
 
 
 def test_each_status_has_advice():
-    assert [s.converged for s in Status] == [True, False, False, False, False, False]
+    assert [s.converged for s in Status] == [s is Status.CONVERGED for s in Status]
     assert len({s.advice for s in Status}) == len(Status)
 
 

@@ -1,31 +1,26 @@
-"""Newton's method with a line search, for equations that are smooth between kinks."""
+"""Newton's method for equations that are smooth between kinks, with a choice of what keeps it from going astray."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from time import perf_counter
-from typing import Protocol
+from typing import Literal, get_args
 
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.solve.linear import Dense, Jacobian, LinearSolver, solve_with
-from stickslip.solve.status import Status
+from stickslip.errors import input_error
+from stickslip.solve.dogleg import Dogleg
+from stickslip.solve.iterate import Evaluation, Globalisation, Iterate, Work
+from stickslip.solve.levenberg_marquardt import LevenbergMarquardt
+from stickslip.solve.line_search import LineSearch
+from stickslip.solve.linear import Dense, LinearSolver
+from stickslip.solve.status import Rung, Status
 
-MIN_STEP = 1.0 / 64.0  # shortest share of a Newton step that the line search tries
-MEMORY = 3  # residual norms a step is compared with: kinks make single increases normal
-
-
-class Evaluation(Protocol):
-    """What Newton needs of one evaluation."""
-
-    @property
-    def residual(self) -> FloatArray: ...  # noqa: D102
-
-    @property
-    def jac(self) -> Jacobian: ...  # noqa: D102
-
-    @property
-    def seconds_contact(self) -> float: ...  # noqa: D102
+GlobalisationName = Literal["line_search", "dogleg", "levenberg_marquardt"]
+GLOBALISATIONS: dict[GlobalisationName, Callable[[], Globalisation]] = {
+    "line_search": LineSearch,
+    "dogleg": Dogleg,
+    "levenberg_marquardt": LevenbergMarquardt,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,18 +33,30 @@ class Newton:
         Largest absolute entry of the scaled residual at a solution.
     max_iterations
         Newton steps before giving up.
+    globalisation
+        What is done where the full Newton step does not help: ``line_search`` shortens it, ``dogleg`` bends it towards the gradient
+        (Powell), ``levenberg_marquardt`` damps what the Jacobian knows little about.
     linear
         Solver of the linear systems.
     """
 
     tolerance: float = 1e-10
     max_iterations: int = 25
+    globalisation: GlobalisationName = "line_search"
     linear: LinearSolver = Dense()  # noqa: RUF009  # frozen
+
+    def __post_init__(self) -> None:
+        if self.globalisation not in GLOBALISATIONS:
+            raise input_error(
+                "Newton.globalisation",
+                f"is {self.globalisation!r}",
+                f"Give one of {', '.join(get_args(GlobalisationName))}.",
+            )
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Where Newton ended, why, and what it cost."""
+    """Where a corrector ended, why, what it cost, and what it took."""
 
     x: FloatArray
     status: Status
@@ -57,15 +64,13 @@ class Solution:
     residual_norm: float
     seconds_contact: float
     seconds_linear: float
+    rung: Rung = Rung.FULL_STEPS
 
 
 def newton(
     evaluate: Callable[[FloatArray], Evaluation], x: FloatArray, options: Newton
 ) -> Solution:
     """Solve ``residual(x) = 0``.
-
-    A step is shortened until the residual norm falls below the largest of the last few (non-monotone line search after Grippo et al.
-    1986), because contact states that switch make the norm rise for one step on the way to the solution.
 
     Parameters
     ----------
@@ -74,37 +79,39 @@ def newton(
     x
         (n,) start.
     options
-        Tolerance and limits.
+        Tolerance, limits, globalisation and linear solver.
+
+    Returns
+    -------
+    Solution
+        The solution, or the iterate with the smallest residual, and why the iteration ended. Its rung is `Rung.DAMPED_STEP` if
+        a step was ever refused.
     """
-    contact = linear = 0.0
-    at = evaluate(x)
-    contact += at.seconds_contact
-    norms = [float(np.max(np.abs(at.residual)))]
-    for iteration in range(options.max_iterations + 1):
-        if not np.isfinite(norms[-1]):
-            return Solution(x, Status.NOT_FINITE, iteration, norms[-1], contact, linear)
-        if norms[-1] <= options.tolerance:
-            return Solution(x, Status.CONVERGED, iteration, norms[-1], contact, linear)
-        if iteration == options.max_iterations:
+    work = Work(evaluate, options.linear)
+    globalisation = GLOBALISATIONS[options.globalisation]()
+    now = work.at(x)
+    best = (now.x, now.norm)
+    iterations = 0
+    status = _ended(now, iterations, options)
+    while status is None:
+        after = globalisation.advance(work, now)
+        if isinstance(after, Status):
+            iterations += after is Status.STALLED
+            status = after
             break
-        start = perf_counter()
-        step = solve_with(options.linear, at.jac, -at.residual)
-        linear += perf_counter() - start
-        if step is None:
-            return Solution(x, Status.SINGULAR, iteration, norms[-1], contact, linear)
-        share = 1.0
-        while True:
-            trial = evaluate(x + share * step)
-            contact += trial.seconds_contact
-            norm = float(np.max(np.abs(trial.residual)))
-            if norm <= (1.0 - 1e-4 * share) * max(norms[-MEMORY:]):
-                break
-            share *= 0.5
-            if share < MIN_STEP:
-                return Solution(x, Status.STALLED, iteration + 1, norms[-1], contact, linear)
-        x = x + share * step
-        at = trial
-        norms.append(norm)
-    return Solution(
-        x, Status.TOO_MANY_ITERATIONS, options.max_iterations, norms[-1], contact, linear
-    )
+        now = after
+        iterations += 1
+        if now.norm < best[1]:
+            best = (now.x, now.norm)
+        status = _ended(now, iterations, options)
+    rung = Rung.DAMPED_STEP if work.rejected else Rung.FULL_STEPS
+    x, norm = best
+    return Solution(x, status, iterations, norm, work.seconds_contact, work.seconds_linear, rung)
+
+
+def _ended(now: Iterate, iterations: int, options: Newton) -> Status | None:
+    if not np.isfinite(now.norm):
+        return Status.NOT_FINITE
+    if now.norm <= options.tolerance:
+        return Status.CONVERGED
+    return Status.TOO_MANY_ITERATIONS if iterations == options.max_iterations else None

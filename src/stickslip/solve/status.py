@@ -1,4 +1,4 @@
-"""Why a solver stopped, as a value with advice."""
+"""Why a solver stopped, as a value with advice, and what it took."""
 
 from enum import IntEnum
 
@@ -12,6 +12,7 @@ class Status(IntEnum):
     SINGULAR = 3
     NOT_FINITE = 4
     STEP_TOO_SMALL = 5
+    LOCAL_MINIMUM = 6
 
     @property
     def converged(self) -> bool:
@@ -31,4 +32,15 @@ _ADVICE = {
     Status.SINGULAR: "the Jacobian is singular: a rigid body is held by no contact, give it a retention stiffness",
     Status.NOT_FINITE: "the iteration left the finite numbers; check loads and stiffnesses",
     Status.STEP_TOO_SMALL: "the continuation step shrank below its smallest value",
+    Status.LOCAL_MINIMUM: "the residual has a minimum that is not zero; start nearer to the solution",
 }
+
+
+class Rung(IntEnum):
+    """What it took to find a solution, in the order in which it is tried; the numbers may be written to result files."""
+
+    FULL_STEPS = 0
+    DAMPED_STEP = 1
+    SHORTER_STEP = 2
+    OTHER_GLOBALISATION = 3
+    HOMOTOPY = 4

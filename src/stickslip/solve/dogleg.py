@@ -1,0 +1,127 @@
+"""Powell's dogleg: Newton steps within a region in which the linear model is trusted."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.solve.iterate import Iterate, Work, column_scale, squared_ratio
+from stickslip.solve.kink import Kinks, slow
+from stickslip.solve.linear import times, transposed_times
+from stickslip.solve.status import Status
+
+ACCEPT = 1e-4  # share of the predicted decrease below which a step is refused
+POOR, GOOD = 0.25, 0.75  # shares at which the region shrinks and grows
+TRIALS = 12  # in one region after the other, each a tenth to a half of the last
+FLAT = 1e-13  # cosine between residual and columns below which the residual has a minimum
+
+
+@dataclass(frozen=True, eq=False)
+class _Path:
+    """From the state down the gradient to the Cauchy point, and on to the Newton point; in scaled steps.
+
+    The Newton point is where the model has no residual; it is the Cauchy point itself where the Jacobian is singular.
+    """
+
+    residual: FloatArray
+    cauchy: FloatArray
+    newton: FloatArray
+    left: FloatArray  # residual of the model at the Cauchy point
+    singular: bool
+
+    def within(self, radius: float) -> tuple[FloatArray, FloatArray]:
+        """Return the last point of the path within `radius`, and the residual of the model there."""
+        short = float(np.linalg.norm(self.cauchy))
+        if radius <= short or self.singular:
+            share = min(radius / short, 1.0)
+            return share * self.cauchy, self.residual + share * (self.left - self.residual)
+        if radius >= np.linalg.norm(self.newton):
+            return self.newton, np.zeros_like(self.residual)
+        leg = self.newton - self.cauchy
+        a, b, c = leg @ leg, self.cauchy @ leg, short**2 - radius**2
+        # the positive root of a s² + 2 b s + c, written without cancellation
+        root = float(np.sqrt(b * b - a * c))
+        share = float(-c / (b + root) if b >= 0.0 else (root - b) / a)
+        return self.cauchy + share * leg, (1.0 - share) * self.left
+
+
+class Dogleg:
+    """Trust region with the dogleg path (Powell 1970), lengths measured in columns of the Jacobian (Moré 1978).
+
+    A singular Jacobian is passed along the gradient. The first region holds the whole Newton step, so that easy problems cost what
+    Newton's method costs.
+    """
+
+    def __init__(self) -> None:
+        self._kinks = Kinks()
+        self._scale: FloatArray | None = None
+        self._radius = 0.0
+
+    def advance(self, work: Work, now: Iterate) -> Iterate | Status:
+        """Return the next iterate, or why there is none."""
+        scale = self._scale = column_scale(now.at.jac, self._scale)
+        path = _path(work, now, scale)
+        if path is None:
+            return Status.LOCAL_MINIMUM
+        if self._radius == 0.0:
+            self._radius = float(np.linalg.norm(path.newton))
+        trial = self._within_region(work, now, path, scale)
+        if path.singular or (trial is not None and not slow(trial, now)):
+            return trial or Status.STALLED
+        beyond = self._kinks.cross(work, now, path.newton / scale)
+        if isinstance(beyond, Status):
+            return trial or beyond
+        self._radius = float(np.linalg.norm(path.newton))
+        return beyond
+
+    def _within_region(
+        self, work: Work, now: Iterate, path: _Path, scale: FloatArray
+    ) -> Iterate | None:
+        """Return the first iterate that decreases the residual as predicted, in smaller and smaller regions."""
+        radius, size = self._radius, float(np.linalg.norm(path.residual))
+        for _ in range(TRIALS):
+            step, model = path.within(radius)
+            expected = squared_ratio(model, size) - 1.0
+            if expected >= 0.0:  # to rounding: a smaller region cannot help
+                return None
+            trial = work.at(now.x + step / scale)
+            length = float(np.linalg.norm(step))
+            change = squared_ratio(trial.at.residual, size) - 1.0
+            share = change / expected if np.isfinite(change) else -np.inf
+            if share < POOR:
+                slope = 2.0 * (float(path.residual / size @ model) / size - 1.0)
+                radius = length * _shorter(change, slope)
+            elif share > GOOD and length >= 0.99 * radius:
+                radius = 2.0 * length
+            self._radius = radius
+            if share > ACCEPT:
+                return trial
+            work.rejected += 1
+        return None
+
+
+def _path(work: Work, now: Iterate, scale: FloatArray) -> _Path | None:
+    """Return the path at an iterate; None where there is no way down."""
+    residual = now.at.residual
+    gradient = transposed_times(now.at.jac, residual) / scale
+    slope = times(now.at.jac, gradient / scale)  # before the factorisation overwrites the Jacobian
+    newton = work.newton_step(now)
+    steep = float(np.linalg.norm(gradient))
+    if steep <= FLAT * float(np.linalg.norm(residual)) or not np.any(slope):
+        if newton is None:
+            return None
+        # nearly singular: the gradient is rounding, the Newton step is not
+        return _Path(residual, scale * newton, scale * newton, np.zeros_like(residual), False)
+    down = -((steep / float(np.linalg.norm(slope))) ** 2)
+    cauchy, left = down * gradient, residual + down * slope
+    if newton is None:
+        return _Path(residual, cauchy, cauchy, left, True)
+    return _Path(residual, cauchy, scale * newton, left, False)
+
+
+def _shorter(change: float, slope: float) -> float:
+    """Return by how much to shorten a step: to the minimum of the parabola through what was found, within bounds."""
+    curved = 2.0 * (change - slope)
+    if not np.isfinite(curved):
+        return 0.1
+    return float(np.clip(-slope / curved, 0.1, 0.5)) if curved > 0.0 else 0.5
