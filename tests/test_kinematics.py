@@ -149,8 +149,8 @@ def test_clipping_against_half_planes(seed):
 @pytest.mark.parametrize("kind", KINDS)
 def test_closest_point_against_minimisation(kind):
     rng = np.random.default_rng(kind)
-    flat = REFERENCE_NODES[kind]
     triangle = kind in {3, 6}
+    flat = 2 * REFERENCE_NODES[kind] - 0.5 if triangle else REFERENCE_NODES[kind]
     for _ in range(12):
         nodes = np.column_stack([flat, np.zeros(kind)]) + 0.1 * rng.standard_normal((kind, 3))
         # above the facet and beside it, nearer than its radius of curvature
@@ -168,8 +168,11 @@ def test_closest_point_against_minimisation(kind):
             for a in starts for b in starts if not triangle or a + b <= 1
         )  # fmt: skip
         assert math.sqrt(distance(reference[0])) <= math.sqrt(best) + 1e-7
-        lies_inside = bool(np.all(np.abs(reference[0] - flat[: 3 if triangle else 4].mean(0)) < 0.3))
-        assert edge[0] == -1 or not lies_inside
+        corners = REFERENCE_NODES[3 if triangle else 4]
+        start, end = corners, np.roll(corners, -1, axis=0)
+        along, past = end - start, reference[0] - start
+        off = along[:, 0] * past[:, 1] - along[:, 1] * past[:, 0]
+        assert off.min() > 0 if edge[0] == -1 else abs(off[edge[0]]) < 1e-12
 
 
 @pytest.mark.parametrize("kind", ["tri", "quad", "tri6", "quad8"])
@@ -392,9 +395,9 @@ def test_kinds_can_be_mixed():
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("swap", [False, True])
-@pytest.mark.parametrize(("kind", "order"), [("tri", 2), ("quad", 2), ("tri6", 3), ("quad8", 3)])
+@pytest.mark.parametrize(("kind", "order"), [("tri", 2), ("quad", 2), ("tri6", 4), ("quad8", 4)])
 def test_cylinder_in_cylinder(kind, order, swap, way):
-    """Gaps of faceted cylinders are right to the square of the facets' size, of curved facets to the third power at least."""
+    """Gaps and areas converge with the square of the size of straight facets, with the fourth power of that of curved ones."""
     errors, tilts, areas = [], [], []
     gap = 0.02
     for fine in (1, 2):
@@ -408,11 +411,13 @@ def test_cylinder_in_cylinder(kind, order, swap, way):
         tilts.append(np.abs(pairing.frames[inner, :, 2] - radial[inner]).max())
         areas.append(pairing.weights.sum() / (1.2 * (1 + gap * swap)) - 1)
         assert np.abs(pairing.frames[:, :, 0] - [0, 1, 0]).max() < 1e-12
-    assert errors[1] < errors[0] / 2 ** (order - 0.5)
-    assert errors[1] < {2: 1.2e-3, 3: 1e-4}[order]
+    assert errors[1] < errors[0] / 2 ** (order - 0.2)
+    assert errors[1] < {2: 2e-3, 4: 5e-7}[order]  # the sagitta of a facet of 5.7 degrees is 1.2e-3
     # away from the rim, where a node has facets on one side only
-    assert tilts[1] < {2: 1e-3, 3: 1e-3}[order]
-    assert abs(areas[1]) < {2: 2e-3, 3: 1e-4}[order]
+    assert tilts[1] < {2: 1e-3, 4: 2e-5}[order]
+    if not (way == "segment" and swap):  # planes of a concave side lean inward: at the rim they miss gap times slope
+        assert abs(areas[1]) < abs(areas[0]) / 2 ** (order - 0.2)
+        assert abs(areas[1]) < {2: 1e-3, 4: 5e-7}[order]
 
 
 def test_interpolated_normals_are_continuous_but_keep_edges():
@@ -520,7 +525,7 @@ def test_nodes_beyond_the_rim_are_named():
 def test_surfaces_out_of_reach_or_turned_round():
     a, b = two_planes((EVEN, EVEN), (EVEN, EVEN), gap=0.5)
     for way in WAYS.values():
-        with pytest.raises(InputError, match=r"within 0.177 m.*reach"):
+        with pytest.raises(InputError, match=r"within 0.17.* m.*reach"):
             way(a, b)
         assert np.allclose(way(a, b, reach=0.6).initial_gap, 0.5)
     a, b = two_planes((EVEN, EVEN), (EVEN, EVEN))
@@ -561,15 +566,67 @@ def test_surfaces_are_checked():
 
 
 def test_five_thousand_nodes_take_seconds():
-    """No count of operations stands for the cost of array code, so this one looks at the clock, with a margin of five."""
+    """No count of operations stands for the cost of array code, so this one looks at the clock, with a wide margin."""
     a, b = two_planes((even(70), even(70)), (even(71), even(71)))
     start = time.process_time()
     by_nodes = node_to_segment(a, b)
-    by_segments = segment_to_segment(a, b)
+    by_segments = segment_to_segment(a, b, degree=2)
     assert time.process_time() - start < 25.0
     assert by_nodes.n_points == 5041
-    assert by_segments.n_points == 12 * 140**2
+    assert by_segments.n_points == 6 * 140**2
     assert by_segments.weights.sum() == pytest.approx(1.0, rel=1e-10)
 
 
 # ---- end to end --------------------------------------------------------------------------------------------------------
+
+
+def friction_joint(pairing, structure, held):
+    """Two columns end to end, clamped at their far ends, pressed together by 10 MPa and excited sideways in the lower one."""
+    free = np.setdiff1d(np.arange(structure.n), held)
+    structure = replace(
+        structure,
+        mass=structure.mass[free][:, free], stiffness=structure.stiffness[free][:, free],
+        damping=structure.damping[free][:, free], dofs=structure.dofs.take(free),
+    )  # fmt: skip
+    pairing = replace(pairing, gap_operator=pairing.gap_operator[:, free])
+    law = ElasticCoulomb(k_t=5e11, k_w=5e11, k_n=1e12, mu=0.3, preload=1e7)
+    interface = paired_interface(pairing, law)
+    middle = np.linalg.norm(structure.dofs.position - [0.0, 0.0, -0.05], axis=1)
+    sideways = np.array([c == "x" for c in structure.dofs.component])
+    driven = np.flatnonzero(sideways & (middle < middle.min() + 1e-9))[:1]
+    structure = rayleigh_damping(structure, ratio=0.002, between_hz=(1000.0, 5000.0))
+    return System(structure, interface, driven)
+
+
+@pytest.fixture(scope="module")
+def columns():
+    size = 0.02
+    lower = block(even(2, 0, size), even(2, 0, size), even(4, -0.1, 0.0))
+    upper = block(even(3, 0, size), even(3, 0, size), even(3, 0.0, 0.08))
+    a, b, structure = stacked(lower, upper)
+    z = structure.dofs.position[:, 2]
+    return a, b, structure, np.flatnonzero((z < z.min() + 1e-9) | (z > z.max() - 1e-9))
+
+
+def test_friction_joint_of_two_flexible_blocks(columns):
+    a, b, structure, held = columns
+    peaks = {}
+    for amplitude in (1.0, 400.0):
+        for name, pairing in (
+            ("node", node_to_segment(b, a)),
+            ("segment", segment_to_segment(a, b, degree=2)),
+        ):
+            system = friction_joint(pairing, structure, held)
+            force = np.zeros(system.structure.n, dtype=complex)
+            force[system.outputs] = amplitude
+            load = HarmonicLoad(np.zeros(system.structure.n), {1: force})
+            sweep = Sweep(
+                omega_range=(2 * np.pi * 2400, 2 * np.pi * 3600), selection="always_low", samples=64, points=15, peak_points=6
+            )  # fmt: skip
+            problem = forced_problem(system, load, sweep)
+            points = accepted_points(list(forced_response(system, load, sweep)))
+            assert all(p.converged for p in points)
+            height = [problem.amplitude(p) / amplitude for p in points]
+            peaks[name, amplitude] = max(height), points[int(np.argmax(height))].omega / 2 / np.pi
+            print(name, amplitude, len(points), peaks[name, amplitude])
+    assert 0

@@ -117,11 +117,22 @@ def normals(points: FloatArray, facets: IntArray, at: FloatArray) -> FloatArray:
 
 
 def node_normals(points: FloatArray, facets: IntArray) -> FloatArray:
-    """Return the (n, k, 3) normals of each facet at each of its own nodes, weighted by area as in `normals`."""
+    """Return the (n, k, 3) normals of each facet at each of its own nodes, as long as the facet's angle there in rad.
+
+    Their sum over the facets around a node does not depend on how a surface is cut into triangles (Thürmer & Wüthrich 1998).
+    """
     found = np.zeros((*facets.shape, 3))
     for kind, rows in _by_kind(facets):
+        count = CORNERS[kind]
+        corners = points[facets[rows, :count]]
+        ahead, back = (np.roll(corners, shift, axis=1) - corners for shift in (-1, 1))
+        sine = np.linalg.norm(np.cross(ahead, back), axis=2)
+        angle = np.full((len(rows), kind), np.pi)  # at mid nodes
+        angle[:, :count] = np.arctan2(sine, np.sum(ahead * back, axis=2))
         for j, node in enumerate(REFERENCE_NODES[kind]):
-            found[rows, j] = normals(points, facets[rows], np.tile(node, (len(rows), 1)))
+            normal = normals(points, facets[rows], np.tile(node, (len(rows), 1)))
+            normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+            found[rows, j] = angle[:, j, None] * normal
     return found
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
-from stickslip.contact.facets import CORNERS, kinds_of
+from stickslip.contact.facets import CORNERS, REFERENCE_NODES, kinds_of, shape_functions
 from stickslip.contact.projection import near_pairs
 from stickslip.contact.quadrature import triangle_rule
 from stickslip.contact.surface import Surface
@@ -17,10 +17,13 @@ from stickslip.contact.surface import Surface
 STRAIGHT = 1e-9  # mid nodes nearer to the edge than this share of its length do not bend it
 ON_EDGE = 1e-12  # corners nearer to a clipping edge than this share of it lie on it
 SLIVER = 1e-10  # pieces smaller than this share of the smaller cell are rounding
-# cells of a facet with curved edges, as positions in its row; triangles repeat their last corner
-_CURVED = {
-    6: np.array([[0, 3, 5, 5], [3, 1, 4, 4], [5, 4, 2, 2], [3, 4, 5, 5]]),
-    8: np.array([[0, 4, 7, 7], [4, 1, 5, 5], [5, 2, 6, 6], [6, 3, 7, 7], [4, 5, 6, 7]]),
+# a facet with curved edges: cells (corners; triangles repeat their last) between points at these reference places
+_PARTS = {
+    6: (REFERENCE_NODES[6], np.array([[0, 3, 5, 5], [3, 1, 4, 4], [5, 4, 2, 2], [3, 4, 5, 5]])),
+    8: (
+        np.vstack([REFERENCE_NODES[8], [[0.0, 0.0]]]),
+        np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]]),
+    ),
 }
 
 
@@ -63,8 +66,9 @@ def cells_of(surface: Surface) -> tuple[FloatArray, IntArray]:
         corners.append(nodes[~curved][:, simple])
         owner.append(rows[~curved])
         if curved.any():
-            parts = _CURVED[int(kind)]
-            corners.append(nodes[curved][:, parts].reshape(-1, 4, 3))
+            places, parts = _PARTS[int(kind)]
+            spread = np.einsum("gk,mkc->mgc", shape_functions(int(kind), places), nodes[curved])
+            corners.append(spread[:, parts].reshape(-1, 4, 3))
             owner.append(np.repeat(rows[curved], len(parts)))
     return np.concatenate(corners), np.concatenate(owner)
 

@@ -40,7 +40,7 @@ class Surface:
         anticlockwise seen from outside the body, then mid nodes. Shorter rows are filled up with -1, so that kinds can be mixed. May be
         empty for contacts node to node that know their normals.
     normals
-        (n, 3) outward unit normals at the nodes; None: means of the facets around each node, by area.
+        (n, 3) outward unit normals at the nodes; None: means of the facets around each node, by angle.
     numbers
         (n,) numbers of the nodes for messages; None: 0 ... n - 1.
 
