@@ -194,9 +194,9 @@ def _element(polynomials, row, gap, grid, n_x, work, coefficients, blocks, force
 
 
 @numba.njit(cache=True)
-def _contact(
+def _contact(  # type: ignore[no-untyped-def]
     polynomials, elements, gap, grid, work, n_x, other, coefficients, blocks, force, state
-):  # type: ignore[no-untyped-def]
+):  # fmt: skip
     """Evaluate one contact, the sum of `elements`; it slips where their states differ."""
     coefficients[:] = 0.0
     blocks[:] = 0.0
