@@ -19,39 +19,13 @@ from stickslip.contact.law import TN, TT, UNCOUPLED_TANGENTS
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.contact.rigid import RigidPeriod, project
-from stickslip.errors import InputError, input_error
+from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import CondensedStiffness
+from stickslip.harmonic.rigid_contacts import NORMAL, RigidContacts, rigid_contacts
 
-NORMAL = 2
 SAMPLES_OF_OTHERS = 8  # per harmonic, least number at which contacts with stiffness are evaluated
-
-
-@dataclass(frozen=True, eq=False)
-class RigidContacts:
-    """The rigid contacts of an interface and their gaps among the retained coordinates.
-
-    Attributes
-    ----------
-    index
-        (n_rigid,) their positions in the interface.
-    mu, constant
-        (n_rigid,) friction coefficients; constant normal loads, scaled, NaN where the normal force is a reaction.
-    contact, direction, column, factor, penalty, offset
-        (n_gaps,) the rigid contact of a gap, 0 1 2 for t w n, its retained coordinate, the gap over that coordinate, ε scaled, and
-        the gap at zero displacement, scaled.
-    """
-
-    index: IntArray
-    mu: FloatArray
-    constant: FloatArray
-    contact: IntArray
-    direction: IntArray
-    column: IntArray
-    factor: FloatArray
-    penalty: FloatArray
-    offset: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +39,7 @@ class DynamicLagrangian:
     interface: Interface  # all contacts, on the retained coordinates
     rigid: RigidContacts
     samples: int
+    penalty: float | None
 
     @property
     def size(self) -> int:
@@ -93,7 +68,8 @@ class DynamicLagrangian:
         """Return the same problem with harmonics 0..`order`."""
         samples = _checked_samples(self.samples, order)
         inner = replace(self.balance, order=order, samples=_samples_of_others(samples, order))
-        return replace(self, balance=inner, samples=samples)
+        own = rigid_contacts(self.interface, self.rigid.index, inner, self.penalty)
+        return replace(self, balance=inner, rigid=own, samples=samples)
 
     def linearise(self, x: FloatArray, omega: float) -> Linearisation:
         """Return residual, Jacobian and ω-derivative at scaled unknowns `x` (size,) and `omega` (rad/s)."""
@@ -103,11 +79,12 @@ class DynamicLagrangian:
         rows = rigid.column[:, None] + self.linear.n * np.arange(2 * self.order + 1)
         found = self._corrected(x, at.residual)
         # derivatives of the predictions by x and, in the last column, by ω
-        slope = -np.concatenate([at.jac[rows], at.jac_p[rows][:, :, None]], axis=2)
+        jac = at.dense_jac()
+        slope = -np.concatenate([jac[rows], at.jac_p[rows][:, :, None]], axis=2)
         slope /= rigid.factor[:, None, None]
         _add_penalty(slope, rows, rigid, found.stuck)
         change = rigid.factor[:, None, None] * _chain(found.period.blocks, slope, rigid)
-        residual, jac, jac_p = at.residual.copy(), at.jac, at.jac_p.copy()
+        residual, jac_p = at.residual.copy(), at.jac_p.copy()
         own = found.coefficients[:, rigid.contact, rigid.direction].T
         residual[rows] += rigid.factor[:, None] * own
         jac[rows] += change[:, :, :-1]
@@ -267,7 +244,8 @@ def dynamic_lagrangian(
         depends on the penalty; with more, eight a harmonic and up, the answer is more accurate and depends on it by less than the
         error that the missing harmonics make.
     penalty
-        Penalty ε of the method (N/m); None: for each gap the stiffness of the structure at that coordinate.
+        Penalty ε of the method (N/m); None: for each gap a quarter of the structure's stiffness at that coordinate times the order, so
+        that the error falls in proportion to 1/H, and extrapolates.
     evaluator
         Of the contacts that have a stiffness; see `harmonic_balance`.
 
@@ -276,8 +254,10 @@ def dynamic_lagrangian(
     InputError
         If no contact is rigid, or a gap of one is no coordinate, or there are fewer samples than coefficients.
     """
-    rigid = [i for i, law in enumerate(interface.laws) if isinstance(law, RigidCoulomb)]
-    if not rigid:
+    rigid = np.array(
+        [i for i, law in enumerate(interface.laws) if isinstance(law, RigidCoulomb)], dtype=np.int64
+    )
+    if not rigid.size:
         raise input_error("dynamic_lagrangian", "no contact is rigid", "Use harmonic_balance.")
     if penalty is not None and not (np.isfinite(penalty) and penalty > 0.0):
         raise input_error(
@@ -297,12 +277,11 @@ def dynamic_lagrangian(
         linear, _without(interface, rigid), order, _samples_of_others(samples, order), evaluator
     )
     local = interface.restricted(linear.retained)
-    return DynamicLagrangian(
-        balance, local, _rigid_contacts(local, rigid, balance, penalty), samples
-    )
+    own = rigid_contacts(local, rigid, balance, penalty)
+    return DynamicLagrangian(balance, local, own, samples, penalty)
 
 
-def _without(interface: Interface, rigid: list[int]) -> Interface:
+def _without(interface: Interface, rigid: IntArray) -> Interface:
     """Return the contacts that have a stiffness."""
     keep = np.setdiff1d(np.arange(interface.n_contacts), rigid)
     rows = (3 * keep[:, None] + np.arange(3)).ravel()
@@ -311,70 +290,6 @@ def _without(interface: Interface, rigid: list[int]) -> Interface:
         tuple(interface.laws[i] for i in keep),
         interface.gap_operator[rows],
         None if interface.weights is None else interface.weights[keep],
-    )
-
-
-def _rigid_contacts(
-    interface: Interface, rigid: list[int], balance: HarmonicBalance, penalty: float | None
-) -> RigidContacts:
-    """Find the coordinates of the gaps, and write all parameters in scaled units."""
-    length, force = balance.displacement_scale, balance.force_scale
-    stiffness = np.abs(np.diagonal(balance.linear.nn[0]))
-    typical = force / length
-    entries: list[tuple[int, int, int, float]] = []
-    for c, i in enumerate(rigid):
-        entries += [(c, *entry) for entry in _gap_coordinates(interface, i)]
-    contact, direction, column = (
-        np.array([e[k] for e in entries], dtype=np.int64) for k in range(3)
-    )
-    factor = np.array([e[3] for e in entries])
-    if np.unique(column).size < column.size:
-        twice = column[np.argmax(np.bincount(column)[column] > 1)]
-        names = [interface.names[rigid[c]] for c in contact[column == twice]]
-        raise _no_coordinate(" and ".join(names), "share one coordinate")
-    own = np.where(stiffness[column] > 0.0, stiffness[column], typical) / factor**2
-    laws = [law for law in interface.laws if isinstance(law, RigidCoulomb)]
-    gaps = np.array([law.initial_gap for law in laws]) / length
-    constant = np.array([np.nan if law.preload is None else law.preload for law in laws])
-    return RigidContacts(
-        np.array(rigid), np.array([law.mu for law in laws]), constant * interface.factors[rigid] / force,
-        contact, direction, column, factor,
-        (own if penalty is None else np.full(column.size, penalty)) * length / force,
-        np.where(direction == NORMAL, gaps[contact], 0.0),
-    )  # fmt: skip
-
-
-def _gap_coordinates(interface: Interface, contact: int) -> list[tuple[int, int, float]]:
-    """Return (direction, coordinate, factor) of the gaps of a contact."""
-    law, name = interface.laws[contact], interface.names[contact]
-    found = []
-    for d in range(3):
-        row = interface.gap_operator[3 * contact + d]
-        columns = np.flatnonzero(row)
-        constant = isinstance(law, RigidCoulomb) and law.preload is not None
-        if columns.size == 0 or (d == NORMAL and constant):
-            continue
-        if columns.size > 1:
-            raise _no_coordinate(name, "has a gap between several coordinates")
-        found.append((d, int(columns[0]), float(row[columns[0]])))
-    if (
-        isinstance(law, RigidCoulomb)
-        and law.preload is None
-        and NORMAL not in [d for d, _, _ in found]
-    ):
-        raise input_error(
-            f"contact {name}",
-            "is unilateral and has no normal gap",
-            "Give it a normal direction, or a constant normal load (preload).",
-        )
-    return found
-
-
-def _no_coordinate(name: str, problem: str) -> InputError:
-    return input_error(
-        f"rigid contact {name}",
-        problem,
-        "Write the structure in_relative_coordinates, where every gap is a coordinate.",
     )
 
 

@@ -1,0 +1,122 @@
+"""Gaps of rigid contacts among the coordinates of a periodic problem."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.contact.interface import Interface
+from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
+from stickslip.errors import InputError, input_error
+from stickslip.harmonic.balance import HarmonicBalance
+
+NORMAL = 2
+PENALTY_SHARE = 0.25  # of the structure's stiffness, per harmonic
+
+
+@dataclass(frozen=True, eq=False)
+class RigidContacts:
+    """The rigid contacts of an interface and their gaps among the retained coordinates.
+
+    Attributes
+    ----------
+    index
+        (n_rigid,) their positions in the interface.
+    mu, constant
+        (n_rigid,) friction coefficients; constant normal loads, scaled, NaN where the normal force is a reaction.
+    contact, direction, column, factor, penalty, offset
+        (n_gaps,) the rigid contact of a gap, 0 1 2 for t w n, its retained coordinate, the gap over that coordinate, ε scaled, and
+        the gap at zero displacement, scaled.
+    """
+
+    index: IntArray
+    mu: FloatArray
+    constant: FloatArray
+    contact: IntArray
+    direction: IntArray
+    column: IntArray
+    factor: FloatArray
+    penalty: FloatArray
+    offset: FloatArray
+
+
+def rigid_contacts(
+    interface: Interface, rigid: IntArray, balance: HarmonicBalance, penalty: float | None
+) -> RigidContacts:
+    """Find the coordinates of the gaps, and write all parameters in the scaled units of a problem.
+
+    Parameters
+    ----------
+    interface
+        All contacts, on the retained coordinates.
+    rigid
+        (n_rigid,) which of them are rigid.
+    balance
+        The periodic problem without them.
+    penalty
+        ε in N/m, or None for the default.
+
+    Raises
+    ------
+    InputError
+        If a gap is no coordinate, or two gaps are the same one.
+    """
+    length, force = balance.displacement_scale, balance.force_scale
+    stiffness = np.abs(np.diagonal(balance.linear.nn[0]))
+    typical = force / length
+    entries: list[tuple[int, int, int, float]] = []
+    for c, i in enumerate(rigid):
+        entries += [(c, *entry) for entry in _gap_coordinates(interface, i)]
+    contact, direction, column = (
+        np.array([e[k] for e in entries], dtype=np.int64) for k in range(3)
+    )
+    factor = np.array([e[3] for e in entries])
+    if np.unique(column).size < column.size:
+        twice = column[np.argmax(np.bincount(column)[column] > 1)]
+        names = [interface.names[rigid[c]] for c in contact[column == twice]]
+        raise _no_coordinate(" and ".join(names), "share one coordinate")
+    own = np.where(stiffness[column] > 0.0, stiffness[column], typical) / factor**2
+    own *= PENALTY_SHARE * max(balance.order, 1)
+    laws = [law for law in interface.laws if isinstance(law, RigidCoulomb)]
+    gaps = np.array([law.initial_gap for law in laws]) / length
+    constant = np.array([np.nan if law.preload is None else law.preload for law in laws])
+    return RigidContacts(
+        rigid, np.array([law.mu for law in laws]), constant * interface.factors[rigid] / force,
+        contact, direction, column, factor,
+        (own if penalty is None else np.full(column.size, penalty)) * length / force,
+        np.where(direction == NORMAL, gaps[contact], 0.0),
+    )  # fmt: skip
+
+
+def _gap_coordinates(interface: Interface, contact: int) -> list[tuple[int, int, float]]:
+    """Return (direction, coordinate, factor) of the gaps of a contact."""
+    law, name = interface.laws[contact], interface.names[contact]
+    found = []
+    for d in range(3):
+        row = interface.gap_operator[3 * contact + d]
+        columns = np.flatnonzero(row)
+        constant = isinstance(law, RigidCoulomb) and law.preload is not None
+        if columns.size == 0 or (d == NORMAL and constant):
+            continue
+        if columns.size > 1:
+            raise _no_coordinate(name, "has a gap between several coordinates")
+        found.append((d, int(columns[0]), float(row[columns[0]])))
+    if (
+        isinstance(law, RigidCoulomb)
+        and law.preload is None
+        and NORMAL not in [d for d, _, _ in found]
+    ):
+        raise input_error(
+            f"contact {name}",
+            "is unilateral and has no normal gap",
+            "Give it a normal direction, or a constant normal load (preload).",
+        )
+    return found
+
+
+def _no_coordinate(name: str, problem: str) -> InputError:
+    return input_error(
+        f"rigid contact {name}",
+        problem,
+        "Write the structure in_relative_coordinates, where every gap is a coordinate.",
+    )
