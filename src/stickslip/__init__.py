@@ -14,10 +14,20 @@ if TYPE_CHECKING:
     from stickslip.contact.interface import Interface
     from stickslip.contact.law import law_kernel
     from stickslip.contact.laws.bonded import Bonded
+    from stickslip.contact.laws.bouc_wen import BoucWen
+    from stickslip.contact.laws.coupled_coulomb import CoupledCoulomb
     from stickslip.contact.laws.cubic_spring import CubicSpring
+    from stickslip.contact.laws.dahl import Dahl
     from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+    from stickslip.contact.laws.iwan import Iwan
+    from stickslip.contact.laws.iwan_populations import (
+        FirstLoading,
+        FourParameter,
+        UniformBand,
+    )
     from stickslip.contact.laws.jenkins import Jenkins
     from stickslip.contact.laws.polynomial_spring import PolynomialSpring
+    from stickslip.contact.laws.regularised_coulomb import RegularisedCoulomb
     from stickslip.contact.laws.unilateral_spring import UnilateralSpring
     from stickslip.errors import (
         InputError,
@@ -93,10 +103,16 @@ _MODULES = {
     "stickslip.contact.interface": ("Interface",),
     "stickslip.contact.law": ("law_kernel",),
     "stickslip.contact.laws.bonded": ("Bonded",),
+    "stickslip.contact.laws.bouc_wen": ("BoucWen",),
+    "stickslip.contact.laws.coupled_coulomb": ("CoupledCoulomb",),
     "stickslip.contact.laws.cubic_spring": ("CubicSpring",),
+    "stickslip.contact.laws.dahl": ("Dahl",),
     "stickslip.contact.laws.elastic_coulomb": ("ElasticCoulomb",),
+    "stickslip.contact.laws.iwan": ("Iwan",),
+    "stickslip.contact.laws.iwan_populations": ("FirstLoading", "FourParameter", "UniformBand"),
     "stickslip.contact.laws.jenkins": ("Jenkins",),
     "stickslip.contact.laws.polynomial_spring": ("PolynomialSpring",),
+    "stickslip.contact.laws.regularised_coulomb": ("RegularisedCoulomb",),
     "stickslip.contact.laws.unilateral_spring": ("UnilateralSpring",),
     "stickslip.errors": ("InputError", "SingularError", "StickslipError"),
     "stickslip.harmonic.aft": ("contact_forces",),
@@ -136,22 +152,29 @@ _HOME = {name: module for module, names in _MODULES.items() for name in names}
 __all__ = [
     "BladePair",
     "Bonded",
+    "BoucWen",
     "ContactPoints",
+    "CoupledCoulomb",
     "CubicSpring",
+    "Dahl",
     "Dofs",
     "Drift",
     "ElasticCoulomb",
     "Fields",
+    "FirstLoading",
     "FlatCurvedDamper",
     "ForcedPoint",
     "ForcedProblem",
+    "FourParameter",
     "HarmonicLoad",
     "InputError",
     "Interface",
+    "Iwan",
     "Jenkins",
     "Material",
     "Newton",
     "PolynomialSpring",
+    "RegularisedCoulomb",
     "RigidBody",
     "Signals",
     "SingularError",
@@ -164,6 +187,7 @@ __all__ = [
     "System",
     "TimeStepping",
     "TransientResult",
+    "UniformBand",
     "UnilateralSpring",
     "__version__",
     "accepted_points",

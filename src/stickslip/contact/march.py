@@ -1,7 +1,11 @@
 """Forces and derivatives of any contact law over one period, sample by sample.
 
-The state is marched from its start until it repeats from one period to the next; derivatives by the Fourier coefficients of the gaps
-travel with it. Two periods are enough for independent tangents; with coupled ones the start is forgotten only gradually.
+The state is marched from its start until it is periodic; derivatives by the Fourier coefficients of the gaps travel with it. Two periods
+are enough for independent tangents. Other laws forget their start only gradually: a planar Coulomb contact near incipient slip or a
+Dahl contact in micro-slip would take hundreds of periods. From the third period on, the derivative of the state after a period by the state
+before it is marched, too, and one Newton step a period is made towards the state that repeats. It also says how far the state is from
+that one, which the change over a period alone does not where the start is forgotten slowly. A direction that keeps the memory of its
+start for ever, as a spring that only sticks, is left where marching brought it.
 """
 
 import numba
@@ -11,9 +15,11 @@ from numba import types
 from stickslip.contact.law import PAIRS, STEP_SIGNATURE
 
 MAX_PERIODS = 400
-REPEATS = (
-    1e-12  # change of a state from period to period, as a share of its range, that counts as none
-)
+ROUNDING = 1e-14  # change over a period that counts as none, as a share of the state's range
+SETTLED = 1e-12  # largest distance from the periodic state, in the same measure
+NOISE = 10.0  # times ROUNDING: what a Newton step may leave where the start is forgotten so slowly that rounding hides it
+ROWS = 1e3  # the same two numbers are larger by this factor for derivatives
+KEPT = 1e-11  # singular value below which a direction is said to keep its memory for ever
 
 _PAIRS = np.array(PAIRS)
 _cube = types.float64[:, :, ::1]
@@ -56,23 +62,6 @@ def _carry(jac, basis_row, rate_row, v_by_omega, rows, by_omega, out, out_omega,
 
 
 @numba.njit(cache=True)
-def _repeats(now, before, low, high, rows, rows_before):  # type: ignore[no-untyped-def]
-    """Whether the state and its derivatives are those of a period ago."""
-    for s in range(now.size):
-        if abs(now[s] - before[s]) > REPEATS * max(high[s] - low[s], abs(high[s]), abs(low[s])):
-            return False
-        size = 0.0
-        change = 0.0
-        for b in range(3):
-            for p in range(rows.shape[2]):
-                size = max(size, abs(rows[s, b, p]))
-                change = max(change, abs(rows[s, b, p] - rows_before[s, b, p]))
-        if change > 1e3 * REPEATS * max(size, 1.0):
-            return False
-    return True
-
-
-@numba.njit(cache=True)
 def _collect(c, jac, force_rows, basis_row, blocks):  # type: ignore[no-untyped-def]
     """Add the derivative of the force at one sample to the blocks of contact `c`."""
     m = basis_row.size
@@ -96,15 +85,163 @@ def _load(c, i, gap, velocity, omega, u, v, v_by_omega):  # type: ignore[no-unty
 
 
 @numba.njit(cache=True)
+def _carry_map(jac, period_map, new_map):  # type: ignore[no-untyped-def]
+    """Chain the derivative of the state by the state at the beginning of the period."""
+    n_state = period_map.shape[0]
+    new_map[:] = 0.0
+    for a in range(n_state):
+        for s in range(n_state):
+            share = jac[3 + a, 6 + s]
+            if share != 0.0:
+                for b in range(n_state):
+                    new_map[a, b] += share * period_map[s, b]
+    period_map[:] = new_map
+
+
+@numba.njit(cache=True)
 def _workspace(n_state, m):  # type: ignore[no-untyped-def]
-    """Arrays that a march writes on."""
+    """Arrays that a march writes on: of a sample, of derivatives, and the ranges of the state."""
     of_state = (n_state, 3, m)
     return (
-        np.empty(3), np.empty(3), np.empty(3), np.empty(3),
-        np.empty(n_state), np.empty(n_state), np.empty(n_state), np.empty(n_state), np.empty(n_state),
-        np.empty((3 + n_state, 6 + n_state)), np.empty(of_state), np.empty(of_state), np.empty(of_state),
-        np.empty((3, 3, m)), np.empty(n_state), np.empty(n_state), np.empty(3),
+        (np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(n_state),
+         np.empty((3 + n_state, 6 + n_state)), np.empty(2, np.int64)),
+        (np.empty(of_state), np.empty(n_state), np.empty((3, 3, m)), np.empty(3), np.empty((n_state, n_state))),
+        (np.empty(n_state), np.empty(n_state)),
     )  # fmt: skip
+
+
+@numba.njit(cache=True)
+def _one_period(  # type: ignore[no-untyped-def]
+    step, parameters, c, first, gap, velocity, basis, basis_rate, omega, s, rows, s_omega, period_map, work,
+    record, track, force, state, blocks, by_omega,
+):  # fmt: skip
+    """March one contact over a period from the state `s`; its derivatives, and with `track` the `period_map`, go along."""
+    u, v, v_by_omega, f, new, jac, status = work[0]
+    new_rows, new_omega, force_rows, f_omega, new_map = work[1]
+    low, high = work[2]
+    n_state = s.size
+    low[:] = np.inf
+    high[:] = -np.inf
+    if record:
+        blocks[c] = 0.0
+    if track:
+        period_map[:] = 0.0
+        for a in range(n_state):
+            period_map[a, a] = 1.0
+    for i in range(first, basis.shape[0]):
+        _load(c, i, gap, velocity, omega, u, v, v_by_omega)
+        jac[:] = 0.0
+        step(u, v, s, parameters[c], f, new, jac, status)
+        _carry(jac, basis[i], basis_rate[i], v_by_omega, rows, s_omega, new_rows, new_omega, 3, n_state)  # fmt: skip
+        if record:
+            _carry(jac, basis[i], basis_rate[i], v_by_omega, rows, s_omega, force_rows, f_omega, 0, 3)  # fmt: skip
+            _collect(c, jac, force_rows, basis[i], blocks)
+            force[c, :, i] = f
+            by_omega[c, :, i] = f_omega
+            state[c, :, i] = status
+        if track:
+            _carry_map(jac, period_map, new_map)
+        s[:] = new
+        s_omega[:] = new_omega
+        rows[:] = new_rows
+        np.minimum(low, s, low)
+        np.maximum(high, s, high)
+
+
+@numba.njit(cache=True)
+def _scales(ranges, largest_gap, scale, row_scale, rows):  # type: ignore[no-untyped-def]
+    """Set the size of each state and of its derivatives, below which rounding hides a change."""
+    low, high = ranges
+    for a in range(scale.size):
+        size = max(high[a] - low[a], abs(high[a]), abs(low[a]))
+        scale[a] = size if size > 0.0 else 1.0
+        row_scale[a] = max(np.max(np.abs(rows[a])), size / largest_gap)
+        if row_scale[a] == 0.0:
+            row_scale[a] = 1.0
+
+
+@numba.njit(cache=True)
+def _largest(change, scale):  # type: ignore[no-untyped-def]
+    """Return the largest entry of (n_state, ...) `change` in units of each state's `scale`."""
+    out = 0.0
+    for a in range(scale.size):
+        size = np.max(np.abs(change[a])) / scale[a]
+        if not size <= out:
+            out = size  # not a number counts as large, too
+    return out
+
+
+@numba.njit(cache=True)
+def _to_fixed_point(period_map, scale, change, row_change, omega_change):  # type: ignore[no-untyped-def]
+    """Turn the changes over a period into the steps that bring state and derivatives to those that repeat, in place.
+
+    They solve ``(1 - M) step = change`` with the period map M; by least squares, without the directions that M keeps.
+    """
+    n_state = scale.size
+    matrix = np.empty((n_state, n_state))
+    for a in range(n_state):
+        for b in range(n_state):
+            matrix[a, b] = (1.0 if a == b else 0.0) - period_map[a, b] * scale[b] / scale[a]
+    left, sizes, right = np.linalg.svd(matrix)
+    inverse = np.zeros((n_state, n_state))
+    for k in range(n_state):
+        if sizes[k] > KEPT:
+            for a in range(n_state):
+                for b in range(n_state):
+                    inverse[a, b] += right[k, a] * left[b, k] / sizes[k]
+    for a in range(n_state):
+        for b in range(n_state):
+            inverse[a, b] *= scale[a] / scale[b]
+    change[:] = inverse @ change
+    omega_change[:] = inverse @ omega_change
+    flat = np.ascontiguousarray(row_change).reshape(n_state, -1)
+    row_change[:] = (inverse @ flat).reshape(row_change.shape)
+
+
+@numba.njit(cache=True)
+def _settle(  # type: ignore[no-untyped-def]
+    step, parameters, c, first, gap, velocity, basis, basis_rate, omega, s, rows, s_omega, work,
+    force, state, blocks, by_omega,
+):  # fmt: skip
+    """March contact `c` from the state `s` until it is periodic; return the periods this took, or -1."""
+    n_state = s.size
+    scale, row_scale = np.empty(n_state), np.empty(n_state)
+    period_map = np.empty((n_state, n_state))
+    largest_gap = max(np.max(np.abs(gap[c])), 1e-300)
+    safe, safe_rows, safe_omega = s.copy(), rows.copy(), s_omega.copy()
+    last, plain, patience = np.inf, 0, 1
+    _one_period(step, parameters, c, first, gap, velocity, basis, basis_rate, omega, s, rows, s_omega, period_map,
+                work, False, False, force, state, blocks, by_omega)  # fmt: skip
+    for period in range(1, MAX_PERIODS):
+        before, rows_before, omega_before = s.copy(), rows.copy(), s_omega.copy()
+        track = period > 1
+        _one_period(step, parameters, c, 0, gap, velocity, basis, basis_rate, omega, s, rows, s_omega, period_map,
+                    work, True, track, force, state, blocks, by_omega)  # fmt: skip
+        _scales(work[2], largest_gap, scale, row_scale, rows)
+        change, row_change, omega_change = s - before, rows - rows_before, s_omega - omega_before
+        moved, turned = _largest(change, scale), _largest(row_change, row_scale)
+        if moved <= ROUNDING and turned <= ROWS * ROUNDING:
+            return period + 1
+        if not track:
+            continue
+        _to_fixed_point(period_map, scale, change, row_change, omega_change)
+        distance, row_distance = _largest(change, scale), _largest(row_change, row_scale)
+        noise = NOISE * ROUNDING if last < np.inf else ROUNDING
+        if (moved <= noise or distance <= SETTLED) and (
+            turned <= ROWS * noise or row_distance <= ROWS * SETTLED
+        ):
+            return period + 1
+        if plain > 0:
+            plain -= 1
+        elif moved > 0.5 * last or not np.isfinite(distance + row_distance):
+            # the last step led nowhere: march on from where it was made
+            s[:], rows[:], s_omega[:] = safe, safe_rows, safe_omega
+            last, plain, patience = np.inf, patience, 2 * patience
+        else:
+            last = moved
+            safe[:], safe_rows[:], safe_omega[:] = s, rows, s_omega
+            s[:], rows[:], s_omega[:] = before + change, rows_before + row_change, omega_before + omega_change  # fmt: skip
+    return -1
 
 
 @numba.njit(_SIGNATURE, cache=True)
@@ -138,59 +275,13 @@ def march_period(  # type: ignore[no-untyped-def]
     """
     n_samples, m = basis.shape
     n_state = start.shape[1]
-    u, v, f, v_by_omega, s, new, before, low, high, jac, rows, new_rows, rows_before, force_rows, s_omega, new_omega, f_omega = _workspace(n_state, m)  # fmt: skip
-    status = np.empty(2, np.int64)
+    work = _workspace(n_state, m)
+    s, s_omega, rows = np.empty(n_state), np.empty(n_state), np.empty((n_state, 3, m))
     for c in range(gap.shape[0]):
         s[:] = start[c]
-        rows[:] = 0.0
         s_omega[:] = 0.0
+        rows[:] = 0.0
         first = -1 if np.any(np.isnan(s)) else 0
-        periods[c] = -1
-        for period in range(MAX_PERIODS):
-            before[:] = s
-            rows_before[:] = rows
-            low[:] = np.inf
-            high[:] = -np.inf
-            blocks[c] = 0.0
-            for i in range(first if period == 0 else 0, n_samples):
-                _load(c, i, gap, velocity, omega, u, v, v_by_omega)
-                jac[:] = 0.0
-                step(u, v, s, parameters[c], f, new, jac, status)
-                _carry(
-                    jac,
-                    basis[i],
-                    basis_rate[i],
-                    v_by_omega,
-                    rows,
-                    s_omega,
-                    new_rows,
-                    new_omega,
-                    3,
-                    n_state,
-                )
-                if period > 0:
-                    _carry(
-                        jac,
-                        basis[i],
-                        basis_rate[i],
-                        v_by_omega,
-                        rows,
-                        s_omega,
-                        force_rows,
-                        f_omega,
-                        0,
-                        3,
-                    )
-                    _collect(c, jac, force_rows, basis[i], blocks)
-                    force[c, :, i] = f
-                    by_omega[c, :, i] = f_omega
-                    state[c, :, i] = status
-                s[:] = new
-                s_omega[:] = new_omega
-                rows[:] = new_rows
-                np.minimum(low, s, low)
-                np.maximum(high, s, high)
-            if period > 0 and _repeats(s, before, low, high, rows, rows_before):
-                periods[c] = period + 1
-                break
+        periods[c] = _settle(step, parameters, c, first, gap, velocity, basis, basis_rate, omega, s, rows, s_omega,
+                             work, force, state, blocks, by_omega)  # fmt: skip
         blocks[c] /= n_samples

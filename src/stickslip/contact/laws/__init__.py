@@ -1,1 +1,39 @@
-"""Contact laws, one a file."""
+"""Contact laws, one a file, and their registry."""
+
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+
+
+class _Registry(Mapping[str, type]):
+    """Law classes by name; a file is loaded, and its step compiled, when its law is first asked for."""
+
+    def __init__(self, classes: dict[str, str]) -> None:
+        self._classes = classes
+
+    def __getitem__(self, name: str) -> type:
+        law: type = getattr(import_module(f"{__name__}.{name}"), self._classes[name])
+        return law
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._classes)
+
+    def __len__(self) -> int:
+        return len(self._classes)
+
+
+# file → class: the laws that give a force for a gap; `rigid_coulomb` does not, see `harmonic.dlft`
+LAWS: Mapping[str, type] = _Registry(
+    {
+        "bonded": "Bonded",
+        "unilateral_spring": "UnilateralSpring",
+        "cubic_spring": "CubicSpring",
+        "polynomial_spring": "PolynomialSpring",
+        "jenkins": "Jenkins",
+        "elastic_coulomb": "ElasticCoulomb",
+        "coupled_coulomb": "CoupledCoulomb",
+        "regularised_coulomb": "RegularisedCoulomb",
+        "dahl": "Dahl",
+        "bouc_wen": "BoucWen",
+        "iwan": "Iwan",
+    }
+)

@@ -22,7 +22,7 @@ def _step(displacement, velocity, state, parameters, force, new_state, jac, stat
         move = x - before
         toward = limit * np.sign(move)
         left = np.exp(-k * abs(move) / limit)  # of the distance to the limit
-        force[d] = toward + (held - toward) * left if move != 0.0 else held
+        force[d] = held - (toward - held) * np.expm1(-k * abs(move) / limit)
         slope = k * left * (1.0 - held * np.sign(move) / limit)
         new_state[2 * d] = x
         new_state[2 * d + 1] = force[d]
