@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from time import perf_counter
+from typing import Literal
 
 import numpy as np
 
@@ -11,8 +12,13 @@ from stickslip.contact.compiled import CompiledContacts, Evaluator
 from stickslip.contact.interface import Interface, SparseRows, add_contact_jacobian, sparse_rows
 from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces
+from stickslip.harmonic.condensed_product import CondensedProduct, at_frequency
 from stickslip.harmonic.dynamic_stiffness import Condensed, CondensedStiffness
 from stickslip.harmonic.fourier import padded, to_complex, to_real
+from stickslip.harmonic.structured import StructuredJacobian, real_matrix
+
+JacobianForm = Literal["auto", "dense", "structured"]
+CROSSOVER = 1200  # unknowns above which products and a Krylov method cost less than an array and its LU factors
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,9 +26,13 @@ class Linearisation:
     """Residual and derivatives at one state, all scaled, and the time the contacts took."""
 
     residual: FloatArray  # (size,)
-    jac: FloatArray  # (size, size)
+    jac: FloatArray | StructuredJacobian  # (size, size)
     jac_p: FloatArray  # (size,), by the parameter ω
     seconds_contact: float
+
+    def dense_jac(self) -> FloatArray:
+        """Return the Jacobian as an array."""
+        return self.jac if isinstance(self.jac, np.ndarray) else self.jac.dense()
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,15 +45,12 @@ class _LinearPart:
 def _linear_part(linear: CondensedStiffness, order: int, omega: float) -> _LinearPart:
     """Assemble the linear side at one frequency; kept, because a Newton iteration at fixed frequency asks for it at every step."""
     condensed = linear.condensed(omega, order)
-    n = linear.n
-    matrix = np.zeros((n * (2 * order + 1), n * (2 * order + 1)), order="F")
-    matrix[:n, :n] = condensed.stiffness[0].real
-    for h in range(1, order + 1):
-        cos, sin = slice((2 * h - 1) * n, 2 * h * n), slice(2 * h * n, (2 * h + 1) * n)
-        matrix[cos, cos] = matrix[sin, sin] = condensed.stiffness[h].real
-        matrix[cos, sin] = condensed.stiffness[h].imag
-        matrix[sin, cos] = -condensed.stiffness[h].imag
-    return _LinearPart(condensed, matrix)
+    return _LinearPart(condensed, real_matrix(condensed.stiffness))
+
+
+@lru_cache(maxsize=2)
+def _product(linear: CondensedStiffness, order: int, omega: float) -> CondensedProduct:
+    return at_frequency(linear, omega, order)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +69,18 @@ class HarmonicBalance:
     samples: int
     displacement_scale: float
     force_scale: float
+    jacobian: JacobianForm = "auto"
 
     @property
     def size(self) -> int:
         """Number of real unknowns."""
         return self.linear.n * (2 * self.order + 1)
+
+    @property
+    def structured(self) -> bool:
+        """Whether the Jacobian is given by its products; without harmonics an array is as good."""
+        large = self.size > CROSSOVER if self.jacobian == "auto" else self.jacobian == "structured"
+        return large and self.order > 0
 
     def coefficients(self, x: FloatArray) -> ComplexArray:
         """Return the (order+1, n) complex coefficients in metres of scaled unknowns `x`."""
@@ -83,31 +97,55 @@ class HarmonicBalance:
 
     def linearise(self, x: FloatArray, omega: float) -> Linearisation:
         """Return residual, Jacobian and ω-derivative at scaled unknowns `x` (size,) and `omega` (rad/s)."""
-        n, m = self.linear.n, 2 * self.order + 1
-        factor = self.displacement_scale / self.force_scale
-        part = _linear_part(self.linear, self.order, omega)
-        jac = factor * part.matrix
-        q = self.coefficients(x)[:, :, None]
-        linear = (part.condensed.stiffness @ q)[:, :, 0] - part.condensed.load
-        slope = (part.condensed.derivative @ q)[:, :, 0] - part.condensed.load_derivative
         start = perf_counter()
         period = self.contacts(x, omega)
-        add_contact_jacobian(period.blocks, self.rows.columns, self.rows.values, n, factor, jac)
         seconds = perf_counter() - start
-        residual = to_real(linear) + period.coefficients @ self.interface.gap_operator
-        by_omega = to_real(slope)
+        jac: FloatArray | StructuredJacobian
+        if self.size > CROSSOVER or self.structured:
+            linear, slope, jac = self._by_products(x, omega, period)
+        else:
+            linear, slope, jac = self._by_matrices(x, omega, period)
+        linear += period.coefficients @ self.interface.gap_operator
         if period.by_omega is not None:
-            by_omega += period.by_omega @ self.interface.gap_operator
+            slope += period.by_omega @ self.interface.gap_operator
         return Linearisation(
-            residual.reshape(m * n) / self.force_scale,
+            linear.reshape(-1) / self.force_scale,
             jac,
-            by_omega.reshape(m * n) / self.force_scale,
+            slope.reshape(-1) / self.force_scale,
             seconds,
         )
 
+    def _by_matrices(
+        self, x: FloatArray, omega: float, period: ContactPeriod
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return linear forces and their slope by ω (2H+1, n), and the Jacobian as an array."""
+        factor = self.displacement_scale / self.force_scale
+        part = _linear_part(self.linear, self.order, omega)
+        jac = factor * part.matrix
+        add_contact_jacobian(
+            period.blocks, self.rows.columns, self.rows.values, self.linear.n, factor, jac
+        )
+        q = self.coefficients(x)[:, :, None]
+        linear = (part.condensed.stiffness @ q)[:, :, 0] - part.condensed.load
+        slope = (part.condensed.derivative @ q)[:, :, 0] - part.condensed.load_derivative
+        return to_real(linear), to_real(slope), jac
+
+    def _by_products(
+        self, x: FloatArray, omega: float, period: ContactPeriod
+    ) -> tuple[FloatArray, FloatArray, FloatArray | StructuredJacobian]:
+        """Return the same without condensed matrices; the Jacobian by its products too if that was chosen."""
+        part = _product(self.linear, self.order, omega)
+        q = x.reshape(2 * self.order + 1, self.linear.n) * self.displacement_scale
+        linear, slope = part.product_and_slope(q)
+        factor = self.displacement_scale / self.force_scale
+        jac = StructuredJacobian(part, period.blocks, self.rows, factor)
+        return linear - part.load, slope - part.load_slope, jac if self.structured else jac.dense()
+
     def with_order(self, order: int) -> "HarmonicBalance":
         """Return the same problem with harmonics 0..`order`."""
-        return replace(self, order=order, samples=_checked_samples(self.samples, order))
+        samples = _checked_samples(self.samples, order)
+        # rows of its own: they tell a solver which Jacobians can share a preconditioner
+        return replace(self, order=order, samples=samples, rows=replace(self.rows))
 
 
 def harmonic_balance(
@@ -116,6 +154,7 @@ def harmonic_balance(
     order: int,
     samples: int,
     evaluator: Evaluator = "intervals",
+    jacobian: JacobianForm = "auto",
 ) -> HarmonicBalance:
     """Set up the periodic problem.
 
@@ -131,6 +170,8 @@ def harmonic_balance(
         Samples per period of the contact forces.
     evaluator
         How piecewise-linear laws are evaluated: by ``intervals`` of the samples, at exact ``events``, or as all others by a ``march``.
+    jacobian
+        Its form: an array (``dense``), products (``structured``, for a Krylov method), or what costs less at this size (``auto``).
 
     Raises
     ------
@@ -159,6 +200,7 @@ def harmonic_balance(
         _checked_samples(samples, order),
         force_scale / _typical_stiffness(stiffness, linear),
         force_scale,
+        jacobian,
     )
 
 

@@ -33,6 +33,14 @@ class CondensedProduct:
     load: FloatArray  # (2 order + 1, n), N
     load_slope: FloatArray  # (2 order + 1, n), by ω
 
+    def same(self, other: "CondensedProduct") -> bool:
+        """Whether `other` has the same dynamic stiffness; loads may differ."""
+        return (
+            self.omega == other.omega
+            and self.order == other.order
+            and (self.linear.nn is other.linear.nn)
+        )
+
     def product(self, rows: FloatArray) -> FloatArray:
         """Return the rows of ``Z q`` for the `rows` of q."""
         s = self.frequencies

@@ -1,5 +1,6 @@
 """Which harmonics a frequency needs: the Jacobian Alert (Gastaldi & Berruti 2017, section 4)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -7,6 +8,9 @@ import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.structured import StructuredJacobian
+
+Solve = Callable[[FloatArray | StructuredJacobian, FloatArray], FloatArray | None]
 
 SILENCE = (
     1e-12  # contact forces of the missing harmonics, as a share of the load, that count as none
@@ -37,7 +41,12 @@ class Alert:
 
 
 def jacobian_alert(
-    low: HarmonicBalance, high: HarmonicBalance, x: FloatArray, omega: float, dofs: IntArray
+    low: HarmonicBalance,
+    high: HarmonicBalance,
+    x: FloatArray,
+    omega: float,
+    dofs: IntArray,
+    solve: Solve | None = None,
 ) -> Alert:
     """Predict how the missing harmonics would change a low-order solution.
 
@@ -55,6 +64,9 @@ def jacobian_alert(
     dofs
         Structure dofs over which the largest relative change of harmonic 1 is taken; those that move less than a thousandth of the
         largest are left out.
+    solve
+        Solution of the enlarged system from its Jacobian and right side, None where there is none; by default by LU. The published method
+        partitions the system by harmonics; a Krylov method with factors of each harmonic does, too.
     """
     q = low.coefficients(x)
     padded = high.unknowns(q)
@@ -62,9 +74,8 @@ def jacobian_alert(
     if _silent(low, high, padded, omega):
         return Alert(0.0, 0, padded, perf_counter() - start)
     at = high.linearise(padded, omega)
-    try:
-        change = np.linalg.solve(at.jac, -at.residual)
-    except np.linalg.LinAlgError:
+    change = (solve or _solve_array)(at.jac, -at.residual)
+    if change is None:
         return Alert(np.inf, 0, padded, at.seconds_contact)
     dq = high.coefficients(change)
     before = np.abs(low.linear.recover(omega, q)[1, dofs])
@@ -73,6 +84,15 @@ def jacobian_alert(
     error = np.where(relevant, moved / np.where(relevant, before, 1.0), 0.0)
     worst = int(np.argmax(error))
     return Alert(float(error[worst]), worst, padded + change, at.seconds_contact)
+
+
+def _solve_array(jac: FloatArray | StructuredJacobian, right: FloatArray) -> FloatArray | None:
+    try:
+        return np.asarray(
+            np.linalg.solve(jac if isinstance(jac, np.ndarray) else jac.dense(), right)
+        )
+    except np.linalg.LinAlgError:
+        return None
 
 
 def _silent(low: HarmonicBalance, high: HarmonicBalance, padded: FloatArray, omega: float) -> bool:

@@ -76,15 +76,17 @@ class StructuredJacobian:
         Gap operator by contact.
     scale
         Displacement scale over force scale.
-    problem
-        What it is the Jacobian of: a preconditioner of one Jacobian of a problem serves its others.
     """
 
     linear: CondensedProduct
     blocks: FloatArray
     rows: SparseRows
     scale: float
-    problem: object
+
+    @property
+    def problem(self) -> object:
+        """What Jacobians have in common that can share a preconditioner: contacts at the same places, and the same harmonics."""
+        return self.rows
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -127,7 +129,7 @@ class StructuredJacobian:
 
     def product_after(self, preconditioner: HarmonicFactors) -> Product:
         """Return the product ``J v`` as a function of v and of ``P v``, which whoever solved with P knows."""
-        if preconditioner.linear is not self.linear:
+        if not self.linear.same(preconditioner.linear):
             return lambda v, _: self.matvec(v)
         left = less_means(self.blocks, preconditioner.means)
 

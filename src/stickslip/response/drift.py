@@ -45,7 +45,7 @@ def drift(problem: ForcedProblem, point: ForcedPoint) -> Drift:
         A point of the response, converged or not.
     """
     balance = problem.balance(point.order)
-    jac = balance.linearise(balance.unknowns(point.coefficients), point.omega).jac
+    jac = balance.linearise(balance.unknowns(point.coefficients), point.omega).dense_jac()
     # balance rows and columns first: translations and rotations differ by orders of magnitude
     scale = np.sqrt(np.maximum(np.max(np.abs(jac), axis=0), np.finfo(float).tiny))
     _, values, right = np.linalg.svd(jac / scale[:, None] / scale[None, :])

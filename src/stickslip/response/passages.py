@@ -111,7 +111,9 @@ def _fresh_point(problem: ForcedProblem, load: HarmonicLoad, omega: float) -> Po
 def _low_point(problem: ForcedProblem, point: Point, index: int, began: float) -> ForcedPoint:
     error, seconds = np.nan, 0.0
     if point.solution.status.converged and problem.sweep.selection == "jacobian_alert":
-        alert = jacobian_alert(problem.low, problem.high, point.x, point.p, problem.alert_dofs)
+        alert = jacobian_alert(
+            problem.low, problem.high, point.x, point.p, problem.alert_dofs, problem.alert_solve
+        )
         error, seconds = alert.error, alert.seconds_contact
     made = forced_point(problem.low, point.solution, "low", index, point.p, perf_counter() - began)
     return replace(
@@ -141,7 +143,12 @@ def repeat(
     began = perf_counter()
     balance, omega = problem.high, point.omega
     alert = jacobian_alert(
-        problem.low, balance, problem.low.unknowns(point.coefficients), omega, problem.alert_dofs
+        problem.low,
+        balance,
+        problem.low.unknowns(point.coefficients),
+        omega,
+        problem.alert_dofs,
+        problem.alert_solve,
     )
     quick = replace(problem.sweep.newton, max_iterations=BRANCH_ITERATIONS)
     near = _neighbours(point.index, others)

@@ -29,7 +29,7 @@ class _Held:
     def linearise(self, x: FloatArray, p: float) -> Linearisation:
         at = self.balance.linearise(x, 0.0)
         return Linearisation(
-            at.residual + p * x, at.jac + p * np.eye(x.size), x, at.seconds_contact
+            at.residual + p * x, at.dense_jac() + p * np.eye(x.size), x, at.seconds_contact
         )
 
 

@@ -123,7 +123,9 @@ def _peak_point(problem: ForcedProblem, top: ForcedPoint, omega: float, index: i
     made = forced_point(balance, point.solution, "peak", index, omega, perf_counter() - began)
     if problem.sweep.selection != "jacobian_alert" or not made.converged:
         return made
-    alert = jacobian_alert(problem.low, problem.high, point.x, omega, problem.alert_dofs)
+    alert = jacobian_alert(
+        problem.low, problem.high, point.x, omega, problem.alert_dofs, problem.alert_solve
+    )
     made = replace(made, predicted_error=alert.error)
     if problem.alerted(made):
         made = replace(repeat(problem, made, {}), stage="peak")

@@ -11,8 +11,10 @@ from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.selection import Solve
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, Point, StepControl
+from stickslip.solve.krylov import to_tolerance
 from stickslip.solve.newton import Newton, Solution
 from stickslip.solve.status import Status
 
@@ -21,6 +23,7 @@ Stage = Literal["low", "high", "branch", "peak"]
 # arc length: a quarter of the size of the vibration, or `1 / points` of the range
 LARGEST_STEP = 0.25
 FAINTEST = 1e-6  # excitation over static load: below, the residual tolerance swallows the vibration
+ALERT_TOLERANCE = 1e-6  # relative residual of the alert's step where it is found by iteration
 BRANCH_ITERATIONS = 10  # of a corrector along a branch
 
 
@@ -166,6 +169,11 @@ class ForcedProblem:
         """Structure dofs over which the alert takes its error."""
         chosen = self.system.alert_outputs
         return self.system.outputs if chosen is None else self.system.outputs[chosen]
+
+    @property
+    def alert_solve(self) -> Solve:
+        """Solver of the alert's enlarged system: that of Newton, but exact enough for an error of a thousandth."""
+        return to_tolerance(self.sweep.newton.linear, ALERT_TOLERANCE).solve
 
     def balance(self, order: int) -> HarmonicBalance:
         """Return the periodic problem with `order` harmonics, one of the two."""

@@ -5,7 +5,7 @@ one that Newton sees.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol, runtime_checkable
 from weakref import WeakKeyDictionary
 
@@ -90,6 +90,8 @@ class Krylov:
         of the tolerance.
     counts
         What was done so far.
+    memory
+        The preconditioner of each problem.
     """
 
     method: Literal["gmres", "bicgstab"] = "gmres"
@@ -97,8 +99,8 @@ class Krylov:
     tangent_tolerance: float = 1e-6
     max_products: int = 100
     counts: KrylovCounts = field(default_factory=KrylovCounts)
-    _memory: "WeakKeyDictionary[object, _Kept]" = field(
-        default_factory=WeakKeyDictionary, init=False, repr=False
+    memory: "WeakKeyDictionary[object, _Kept]" = field(
+        default_factory=WeakKeyDictionary, repr=False
     )
 
     def __post_init__(self) -> None:
@@ -126,18 +128,18 @@ class Krylov:
         self.counts.systems += 1
         if not np.any(right):
             return np.zeros_like(right)
-        kept = self._memory.get(jac.problem)
+        kept = self.memory.get(jac.problem)
         if kept is not None and not kept.worn:
             solution, left = self._iterate(jac, kept, border, right, tolerance)
             if left <= tolerance:
                 return solution
         # the old factors go before the new ones come: they are most of what a large problem holds
-        self._memory.pop(jac.problem, None)
+        self.memory.pop(jac.problem, None)
         kept = None
         made = jac.preconditioner()
         if made is not None:
             self.counts.preconditioners += 1
-            kept = self._memory[jac.problem] = _Kept(made)
+            kept = self.memory[jac.problem] = _Kept(made)
             solution, left = self._iterate(jac, kept, border, right, tolerance)
             kept.first = kept.last
             if left <= max(tolerance, np.sqrt(tolerance)):
@@ -256,3 +258,12 @@ class Automatic:
 
     def _solver(self, jac: Jacobian) -> LinearSolver:
         return self.dense if isinstance(jac, np.ndarray) else self.krylov
+
+
+def to_tolerance(linear: LinearSolver, tolerance: float) -> LinearSolver:
+    """Return `linear` with another relative residual of its solutions; LU leaves none. Preconditioners and counts are shared."""
+    if isinstance(linear, Krylov):
+        return replace(linear, tolerance=tolerance)
+    if isinstance(linear, Automatic):
+        return replace(linear, krylov=to_tolerance(linear.krylov, tolerance))
+    return linear

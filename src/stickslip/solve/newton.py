@@ -12,7 +12,8 @@ from stickslip.solve.dogleg import Dogleg
 from stickslip.solve.iterate import Evaluation, Globalisation, Iterate, Work
 from stickslip.solve.levenberg_marquardt import LevenbergMarquardt
 from stickslip.solve.line_search import LineSearch
-from stickslip.solve.linear import Dense, LinearSolver
+from stickslip.solve.krylov import Automatic
+from stickslip.solve.linear import LinearSolver
 from stickslip.solve.status import Rung, Status
 
 GlobalisationName = Literal["line_search", "dogleg", "levenberg_marquardt"]
@@ -37,13 +38,13 @@ class Newton:
         What is done where the full Newton step does not help: ``line_search`` shortens it, ``dogleg`` bends it towards the gradient
         (Powell), ``levenberg_marquardt`` damps what the Jacobian knows little about.
     linear
-        Solver of the linear systems.
+        Solver of the linear systems; by default LU for a Jacobian that is an array and a Krylov method for one known by its products.
     """
 
     tolerance: float = 1e-10
     max_iterations: int = 25
     globalisation: GlobalisationName = "line_search"
-    linear: LinearSolver = Dense()  # noqa: RUF009  # frozen
+    linear: LinearSolver = Automatic()  # noqa: RUF009  # frozen
 
     def __post_init__(self) -> None:
         if self.globalisation not in GLOBALISATIONS:
