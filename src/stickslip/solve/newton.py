@@ -10,9 +10,9 @@ from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.solve.dogleg import Dogleg
 from stickslip.solve.iterate import Evaluation, Globalisation, Iterate, Work
+from stickslip.solve.krylov import Automatic
 from stickslip.solve.levenberg_marquardt import LevenbergMarquardt
 from stickslip.solve.line_search import LineSearch
-from stickslip.solve.krylov import Automatic
 from stickslip.solve.linear import LinearSolver
 from stickslip.solve.status import Rung, Status
 
