@@ -11,6 +11,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from time import process_time
@@ -20,7 +21,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.contact.interface import Interface
-from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.lumped import chain
@@ -69,7 +70,7 @@ class Chain:
     def system(self) -> System:
         """Return the chain; its output is the free end."""
         structure = chain(self.masses, self.mass, self.stiffness, self.damping_factor)
-        element = ElasticCoulomb(k_t=self.k_t, k_w=0.0, k_n=0.0, mu=1.0, preload=self.limit)
+        element = Jenkins(k_t=self.k_t, limit=self.limit)
         gap = np.zeros((3 * self.elements, self.masses))
         gap[3 * np.arange(self.elements), np.arange(self.elements)] = 1.0
         names = tuple(f"element{i}" for i in range(self.elements))
@@ -127,13 +128,19 @@ def rival_python() -> str | None:
 def rival(python: str, case: Chain, method: dict[str, Any]) -> Rival:
     """Solve the chain with pyHarm in a process of its own."""
     options = {"step": STEP, "corrector": "arc_length", "reductor": "noreductor", **method}
-    run = subprocess.run(
-        [python, str(HERE / "rival_pyharm.py"), json.dumps(asdict(case) | {"options": options})],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
-    )
+    with tempfile.TemporaryDirectory() as folder:  # pyHarm leaves a folder where it runs
+        run = subprocess.run(
+            [
+                python,
+                str(HERE / "rival_pyharm.py"),
+                json.dumps(asdict(case) | {"options": options}),
+            ],
+            capture_output=True,
+            text=True,
+            check=True,
+            cwd=folder,
+            env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+        )
     found = json.loads(run.stdout.splitlines()[-1])
     per_point = found["seconds"] / len(found["omega"])
     note = (

@@ -1,0 +1,191 @@
+"""The periodic problem as a function of any parameter: a level of the load, a field of the contact laws, or what a user's function changes.
+
+A family gives the harmonic balance for each value of the parameter. All its members have the scales of the first one, so that an unknown
+means the same displacement for every value. Residual and Jacobian are those of the member; the derivative of the residual by the
+parameter is a central difference, which is exact for loads and enters the direction of a branch only, never a solution.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property, lru_cache
+from typing import Literal
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.contact.law import ContactLaw
+from stickslip.errors import input_error
+from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.structured import StructuredJacobian
+
+Family = Callable[[float], HarmonicBalance]
+LoadPart = Literal["excitation", "static_load"]
+
+DIFFERENCE = 1e-5  # of the parameter: about the cube root of rounding
+KEPT = 8  # members of a family that are not built again
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterLinearisation:
+    """Residual and derivatives at one state and one value of the parameter; `jac_p` is computed when it is asked for."""
+
+    residual: FloatArray
+    jac: FloatArray | StructuredJacobian
+    seconds_contact: float
+    by_parameter: Callable[[], FloatArray]
+
+    @cached_property
+    def jac_p(self) -> FloatArray:
+        """(size,) derivative of the residual by the parameter."""
+        return self.by_parameter()
+
+
+@dataclass(frozen=True, eq=False)
+class AtFrequency:
+    """The periodic problem at one frequency with another parameter; an equation that can be continued.
+
+    Parameters
+    ----------
+    family
+        Harmonic balance of each value of the parameter.
+    omega
+        Frequency, rad/s.
+    """
+
+    family: Family
+    omega: float
+
+    def linearise(self, x: FloatArray, p: float) -> ParameterLinearisation:
+        """Evaluate at scaled unknowns `x` and the value `p` of the parameter."""
+        at = self.family(p).linearise(x, self.omega)
+        return ParameterLinearisation(
+            at.residual,
+            at.jac,
+            at.seconds_contact,
+            lambda: by_parameter(self.family, x, self.omega, p),
+        )
+
+
+def by_parameter(family: Family, x: FloatArray, omega: float, p: float) -> FloatArray:
+    """Return the (size,) derivative of the residual by the parameter at fixed `x` and `omega`."""
+    return difference(lambda v: family(v).linearise(x, omega).residual, p)
+
+
+def difference(function: Callable[[float], FloatArray], p: float) -> FloatArray:
+    """Return the derivative of `function` at `p`; from above where p = 0, because most parameters are not negative."""
+    step = DIFFERENCE * abs(p)
+    if step == 0.0:
+        return (function(DIFFERENCE) - function(0.0)) / DIFFERENCE
+    return (function(p + step) - function(p - step)) / (2.0 * step)
+
+
+def load_level(balance: HarmonicBalance, part: LoadPart) -> Family:
+    """Return the family whose parameter is a factor on the harmonic or on the static load.
+
+    Parameters
+    ----------
+    balance
+        The problem at factor one.
+    part
+        ``excitation``: all harmonics; ``static_load``: the static forces.
+    """
+    load = balance.linear.load
+
+    @lru_cache(maxsize=KEPT)
+    def member(factor: float) -> HarmonicBalance:
+        if part == "excitation":
+            scaled = HarmonicLoad(load.static, {h: factor * f for h, f in load.harmonics.items()})
+        else:
+            scaled = HarmonicLoad(factor * load.static, load.harmonics)
+        return replace(balance, linear=balance.linear.with_load(scaled))
+
+    return member
+
+
+def law_field(balance: HarmonicBalance, name: str, contacts: Sequence[int] | None = None) -> Family:
+    """Return the family whose parameter is a field of the contact laws, such as ``mu``, ``preload``, ``limit``, ``k_n``, ``initial_gap``.
+
+    Parameters
+    ----------
+    balance
+        The problem; what is not varied stays as it is here.
+    name
+        Field of the laws. A law without a field ``initial_gap`` that has a normal stiffness and a preload takes it as the preload
+        ``-k_n initial_gap``.
+    contacts
+        Contacts whose laws are varied; None: all that have the field.
+
+    Raises
+    ------
+    InputError
+        If no law has the field, or one of the contacts named has not.
+    """
+    laws = balance.interface.laws
+    chosen = [i for i, law in enumerate(laws) if _has(law, name)] if contacts is None else contacts
+    lacking = [i for i in chosen if not _has(laws[i], name)]
+    if not chosen or lacking:
+        known = sorted({f for law in laws for f in _fields(law)})
+        raise input_error(
+            "parameter",
+            f"{name!r} is no field of the contact laws{f' of contacts {lacking}' if lacking else ''}",
+            f"Give 'excitation', 'static_load', or one of {', '.join(known)}.",
+        )
+    varied = set(chosen)
+
+    @lru_cache(maxsize=KEPT)
+    def member(value: float) -> HarmonicBalance:
+        interface = replace(
+            balance.interface,
+            laws=tuple(
+                _with(law, name, value) if i in varied else law for i, law in enumerate(laws)
+            ),
+        )
+        compiled = interface.compiled(balance.compiled.evaluator)
+        return replace(balance, interface=interface, compiled=compiled)
+
+    return member
+
+
+def rebuilt(build: Family, first: float) -> Family:
+    """Return a family of balances that `build` makes anew for every value, all with the scales of the `first` one.
+
+    Raises
+    ------
+    InputError
+        If a member has other unknowns than the first one.
+    """
+    reference = build(first)
+
+    @lru_cache(maxsize=KEPT)
+    def member(value: float) -> HarmonicBalance:
+        made = build(value)
+        if not np.array_equal(made.linear.retained, reference.linear.retained):
+            raise input_error(
+                "parameter",
+                f"the retained dofs at {value:g} differ from those at {first:g}",
+                "Keep contacts and dofs the same for all values.",
+            )
+        return replace(
+            made,
+            displacement_scale=reference.displacement_scale,
+            force_scale=reference.force_scale,
+        )
+
+    return member
+
+
+def _fields(law: ContactLaw) -> set[str]:
+    return {f.name for f in fields(law)}  # type: ignore[arg-type]  # laws are dataclasses
+
+
+def _has(law: ContactLaw, name: str) -> bool:
+    own = _fields(law)
+    return name in own or (name == "initial_gap" and {"preload", "k_n"} <= own)
+
+
+def _with(law: ContactLaw, name: str, value: float) -> ContactLaw:
+    if name in _fields(law):
+        return replace(law, **{name: value})  # type: ignore[type-var]  # a dataclass: it has fields
+    # a clearance is a preload that has to be overcome first
+    return replace(law, preload=-law.stuck_stiffness()[2] * value)  # type: ignore[type-var]

@@ -1,0 +1,222 @@
+"""Periodic motion as any parameter varies: solution branches at one frequency, and what analyses along a parameter share."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.contact.compiled import Evaluator
+from stickslip.errors import input_error
+from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
+from stickslip.harmonic.dynamic_stiffness import condense
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.parameters import AtFrequency, Family, law_field, load_level, rebuilt
+from stickslip.response.preload import bonded_start, preload
+from stickslip.response.system import System
+from stickslip.solve.continuation import (
+    Following,
+    Point,
+    StepControl,
+    reversed_point,
+    start_point,
+    trace,
+)
+from stickslip.solve.newton import Newton, newton
+from stickslip.solve.status import Status
+
+Build = Callable[[float], tuple[System, HarmonicLoad]]
+Parameter = str | Build
+LoadName = Literal["excitation", "static_load"]
+RAMP = (0.1, 0.3, 0.6, 1.0)  # shares of the load where the first point does not converge at once
+LARGEST = 0.25  # arc length of the largest step: a quarter of the size of the vibration, or `1 / points` of the range
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Discretisation:
+    """How a periodic motion is represented and solved for.
+
+    Parameters
+    ----------
+    order
+        Highest harmonic; the static term is always kept.
+    samples
+        Samples per period of the contact forces.
+    evaluator
+        How piecewise-linear laws are evaluated; ``events`` has no sampling error, so that amplitudes are smooth in every parameter.
+    newton
+        Corrector.
+    """
+
+    order: int = 5
+    samples: int = 256
+    evaluator: Evaluator = "events"
+    newton: Newton = Newton()  # noqa: RUF009  # frozen
+
+    def balance(self, system: System, load: HarmonicLoad, more: IntArray) -> HarmonicBalance:
+        """Set up the periodic problem, the dofs `more` retained beside those of the contacts."""
+        linear = condense(system.structure, np.union1d(system.retained, more), load)
+        return harmonic_balance(
+            linear, system.interface, self.order, self.samples, self.evaluator, "dense"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterPoint:
+    """A point of a branch along a parameter.
+
+    Attributes
+    ----------
+    value
+        Of the parameter.
+    omega
+        Frequency, rad/s.
+    coefficients
+        (order+1, n) complex displacement of all dofs of the structure, m.
+    status
+        How the solver ended; a point that did not converge is no solution.
+    iterations
+        Newton steps.
+    forward
+        Whether the parameter grows along the branch here; it changes at a fold.
+    """
+
+    value: float
+    omega: float
+    coefficients: ComplexArray
+    status: Status
+    iterations: int
+    forward: bool
+
+    @property
+    def converged(self) -> bool:
+        """Whether the point is a solution."""
+        return self.status.converged
+
+
+def parameter_family(
+    system: System,
+    load: HarmonicLoad,
+    parameter: Parameter,
+    first: float,
+    made: Callable[[System, HarmonicLoad], HarmonicBalance],
+) -> Family:
+    """Return the balances of `made` as a function of a parameter; see `branch_in_parameter` for what that may be."""
+    if callable(parameter):
+        build = parameter
+        return rebuilt(lambda value: made(*build(value)), first)
+    balance = made(system, load)
+    if parameter in get_args(LoadName):
+        return load_level(balance, parameter)  # type: ignore[arg-type]  # one of the two, by the test above
+    return law_field(balance, parameter)
+
+
+def branch_in_parameter(
+    system: System,
+    load: HarmonicLoad,
+    parameter: Parameter,
+    span: tuple[float, float],
+    omega: float,
+    points: int = 40,
+    discretisation: Discretisation | None = None,
+) -> Iterator[ParameterPoint]:
+    """Follow the periodic motion at one frequency while a parameter varies, around folds where there are any.
+
+    Parameters
+    ----------
+    system
+        Structure, contacts and outputs.
+    load
+        Static and harmonic forces on all dofs, N.
+    parameter
+        ``excitation`` or ``static_load``: a factor on the harmonic or static forces. A field of the contact laws (``mu``, ``preload``,
+        ``limit``, ``k_t``, ``k_n``, ``initial_gap`` and so on): its value for all contacts that have it. A function ``value -> (system,
+        load)`` varies anything else. For the frequency itself see `forced_response`.
+    span
+        First and last value of the parameter; the last may be the smaller one.
+    omega
+        Frequency, rad/s.
+    points
+        Smallest number of points; more are taken where the motion changes fast.
+    discretisation
+        Harmonics, samples, solver.
+
+    Yields
+    ------
+    ParameterPoint
+        Points in the order of the branch; the last one is at the end of the span, or says why the branch could not be followed.
+
+    Raises
+    ------
+    InputError
+        If the parameter is unknown, or the span is empty.
+    """
+    first, last = span
+    if not (np.isfinite(first) and np.isfinite(last) and first != last):
+        raise input_error("span", f"goes from {first} to {last}", "Give two different values.")
+    how = discretisation or Discretisation()
+    family = parameter_family(
+        system, load, parameter, first, lambda s, f: how.balance(s, f, np.zeros(0, dtype=np.int64))
+    )
+    problem = AtFrequency(family, omega)
+    balance = family(first)
+    weights = np.ones(balance.size)
+    weights[: balance.linear.n] = 0.0  # the static part would hide the growth of the vibration
+    following = Following(
+        newton=how.newton,
+        control=StepControl(
+            scale=abs(last - first) / (points * LARGEST), first=0.05, largest=LARGEST
+        ),
+        weights=weights,
+    )
+    changed = parameter(first) if callable(parameter) else (system, load)
+    start = start_point(
+        problem, first_guess(changed[0], balance, omega, how.newton), first, following
+    )
+    forward = last > first
+    yield _parameter_point(family, omega, start, growing=forward)
+    if not start.solution.status.converged:
+        return
+    onward = start if forward else reversed_point(start)
+    for point in trace(problem, onward, last, following):
+        yield _parameter_point(family, omega, point, growing=point.tangent[-1] > 0.0)
+
+
+def first_guess(
+    system: System, balance: HarmonicBalance, omega: float, options: Newton
+) -> FloatArray:
+    """Return unknowns near the solution at `omega`: bonded contacts, or, if they do not lead there, what a ramp of the load does.
+
+    Parameters
+    ----------
+    system
+        What `balance` was made of.
+    balance
+        The periodic problem; its load is the one that is meant.
+    omega
+        Frequency, rad/s.
+    options
+        Corrector.
+    """
+    guess = balance.coefficients(bonded_start(balance, omega, system))
+    retained = np.searchsorted(balance.linear.retained, system.retained)
+    guess[0, retained] = preload(system, balance.linear.load.static)
+    x = balance.unknowns(guess)
+    if newton(lambda v: balance.linearise(v, omega), x, options).status.converged:
+        return x
+    x = balance.unknowns(np.concatenate([guess[:1], RAMP[0] * guess[1:]]))
+    for share in RAMP:
+        eased = load_level(balance, "excitation")(share)
+        x = newton(lambda v, b=eased: b.linearise(v, omega), x, options).x  # type: ignore[misc]
+    return x
+
+
+def _parameter_point(
+    family: Family, omega: float, point: Point, *, growing: bool
+) -> ParameterPoint:
+    balance = family(point.p)
+    motion = balance.linear.recover(omega, balance.coefficients(point.x))
+    return ParameterPoint(
+        point.p, omega, motion, point.solution.status, point.solution.iterations, growing
+    )

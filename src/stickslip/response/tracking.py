@@ -1,0 +1,373 @@
+"""The resonance peak followed directly while a design parameter varies, without a sweep for each value.
+
+Each peak is the solution of one equation (see `harmonic.peak`), started from the peak before. A damper optimisation curve costs a few
+Newton steps a point, and its lowest point is the root of the exact slope of the peak amplitude.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import get_args
+
+import numpy as np
+import scipy.optimize
+
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.errors import input_error
+from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.peak import EVALUATIONS, Condition, PeakProblem
+from stickslip.response.parameter import (
+    Discretisation,
+    Parameter,
+    first_guess,
+    parameter_family,
+)
+from stickslip.response.system import System
+from stickslip.solve.continuation import Following, StepControl, start_point, trace
+from stickslip.solve.newton import Newton, Solution, newton
+from stickslip.solve.status import Status
+
+SWEEP_POINTS = 40  # at least, of the one sweep that finds the first peak
+HALVINGS = 6  # of a step of the parameter that does not converge
+STEPS = 12  # of Newton from peak to peak
+FARTHEST = 0.1  # change of ln ω in one step beyond which another peak was found
+BRACKET = 1e-12  # width in ln ω at which a peak on a kink counts as found
+SEARCH = 60  # solutions that may be spent on a bracket
+
+
+@dataclass(frozen=True, eq=False)
+class PeakPoint:
+    """A resonance peak at one value of the design parameter.
+
+    Attributes
+    ----------
+    value
+        Of the parameter.
+    omega
+        Frequency of the peak, rad/s.
+    amplitude
+        First-harmonic amplitude of the output, m.
+    phase
+        Phase of the output against the force, rad; -π/2 in quadrature.
+    slope
+        Derivative of the amplitude by the parameter along the curve of peaks, m over the parameter's unit.
+    curvature
+        ``d² ln(amplitude) / d(ln ω)²`` of the response: negative at a maximum.
+    coefficients
+        (order+1, n) complex displacement of all dofs of the structure, m.
+    status
+        How the solver ended; a point that did not converge is no peak.
+    iterations
+        Newton steps.
+    evaluations
+        Evaluations of the periodic problem that were needed, those of the slope included.
+    """
+
+    value: float
+    omega: float
+    amplitude: float
+    phase: float
+    slope: float
+    curvature: float
+    coefficients: ComplexArray
+    status: Status
+    iterations: int
+    evaluations: int
+
+    @property
+    def converged(self) -> bool:
+        """Whether the point fulfils the condition of a peak."""
+        return self.status.converged
+
+    @property
+    def is_maximum(self) -> bool:
+        """Whether the amplitude falls on both sides: a horizontal tangent may also be a minimum or a saddle."""
+        return self.curvature < 0.0
+
+
+def track_peak(
+    system: System,
+    load: HarmonicLoad,
+    parameter: Parameter,
+    values: Sequence[float] | FloatArray,
+    omega_range: tuple[float, float],
+    by: Condition = "horizontal_tangent",
+    output: int = 0,
+    discretisation: Discretisation | None = None,
+) -> Iterator[PeakPoint]:
+    """Follow a resonance peak through the values of a design parameter.
+
+    Parameters
+    ----------
+    system
+        Structure, contacts and outputs.
+    load
+        Static and harmonic forces on all dofs, N.
+    parameter
+        As in `branch_in_parameter`: a factor on a load, a field of the contact laws, or a function of the value.
+    values
+        Values of the parameter, in the order in which they are to be visited.
+    omega_range
+        Frequencies between which the first peak is searched for by a sweep, rad/s.
+    by
+        ``horizontal_tangent``: the largest amplitude; ``phase_quadrature``: the output lags the force by 90°, which is close to it for
+        a lightly damped resonance, and cheaper.
+    output
+        Position among the outputs of the dof whose amplitude peaks.
+    discretisation
+        Harmonics, samples, solver.
+
+    Yields
+    ------
+    PeakPoint
+        One a value. After one that is not found the next is tried from the last that was.
+
+    Raises
+    ------
+    InputError
+        If there are no values, the parameter or the condition is unknown, or the range holds no peak at the first value.
+    """
+    tracker = _tracker(system, load, parameter, float(values[0]) if len(values) else np.nan, omega_range, by, output, discretisation)  # fmt: skip
+    for value in values:
+        yield tracker.point(float(value))
+
+
+def smallest_peak(
+    system: System,
+    load: HarmonicLoad,
+    parameter: Parameter,
+    span: tuple[float, float],
+    omega_range: tuple[float, float],
+    output: int = 0,
+    discretisation: Discretisation | None = None,
+) -> PeakPoint:
+    """Return the design with the smallest resonance peak: the value of the parameter at which the peak amplitude is stationary.
+
+    Parameters
+    ----------
+    system, load, parameter, omega_range, output, discretisation
+        As in `track_peak`.
+    span
+        Two values between which the peak falls first and then rises.
+
+    Raises
+    ------
+    InputError
+        If the slope of the peak amplitude has the same sign at both ends.
+    """
+    tracker = _tracker(system, load, parameter, span[0], omega_range, "horizontal_tangent", output, discretisation)  # fmt: skip
+    ends = [tracker.point(value) for value in span]
+    if not ends[0].slope * ends[1].slope < 0.0:
+        raise input_error(
+            "span",
+            f"the peak amplitude changes by {ends[0].slope:.3g} and {ends[1].slope:.3g} per unit at its ends",
+            "Give two values with the smallest peak between them.",
+        )
+    value = scipy.optimize.brentq(
+        lambda v: tracker.point(float(v)).slope, *span, xtol=1e-12 * max(map(abs, span)), rtol=1e-12
+    )
+    return tracker.point(float(value))
+
+
+@dataclass(slots=True)
+class _Tracker:
+    """The peaks found so far, from which the next ones start."""
+
+    problem: PeakProblem
+    newton: Newton
+    known: list[tuple[float, FloatArray]] = field(default_factory=list)
+    evaluations: int = 0
+
+    def point(self, value: float) -> PeakPoint:
+        """Find the peak at a value of the parameter, from those known."""
+        self.evaluations = 0
+        solution = self._reach(value, HALVINGS)
+        y, problem = solution.x, self.problem
+        balance = problem.family(value)
+        slope, curvature = np.nan, np.nan
+        if solution.status.converged:
+            slope, curvature = problem.amplitude_slope(y, value), problem.curvature(y, value)
+            self.evaluations += 2 + 2 * EVALUATIONS["horizontal_tangent"]
+        a, omega = problem.amplitude(y, value), problem.omega(y)
+        lag = np.angle(a * np.exp(-1j * problem.phase))
+        motion = balance.linear.recover(omega, balance.coefficients(y[:-1]))
+        return PeakPoint(
+            value, omega, abs(a), float(lag), abs(a) * slope, curvature, motion, solution.status, solution.iterations, self.evaluations
+        )  # fmt: skip
+
+    def _reach(self, value: float, halvings: int) -> Solution:
+        """Solve from the predicted peak; through the values between, or in a bracket, if that fails."""
+        guess = self._predicted(value)
+        solution = self._solved(guess, value)
+        if not self._is_found(solution, guess, value) and halvings > 0 and self._last != value:
+            between = self._reach(0.5 * (self._last + value), halvings - 1)
+            if between.status.converged:
+                guess = self._predicted(value)
+                solution = self._solved(guess, value)
+        if (
+            not self._is_found(solution, guess, value)
+            and self.problem.condition == "horizontal_tangent"
+        ):
+            solution = self._bracketed(guess, value)
+        if solution.status.converged:
+            self.known = [*self.known[-1:], (value, solution.x)]
+        return solution
+
+    @property
+    def _last(self) -> float:
+        return self.known[-1][0]
+
+    def _predicted(self, value: float) -> FloatArray:
+        """Extrapolate the last two peaks; the last one, where that would go far."""
+        p, y = self.known[-1]
+        if len(self.known) < 2 or self.known[0][0] == p:
+            return y
+        before, earlier = self.known[0]
+        share = (value - p) / (p - before)
+        return y + share * (y - earlier) if abs(share) <= 2.0 else y
+
+    def _is_found(self, solution: Solution, guess: FloatArray, value: float) -> bool:
+        """Whether a solution is the peak that was followed: near, and no minimum between two peaks."""
+        if not solution.status.converged or abs(solution.x[-1] - guess[-1]) > FARTHEST:
+            return False
+        if self.problem.condition == "phase_quadrature":
+            return True
+        self.evaluations += EVALUATIONS["horizontal_tangent"]
+        return not self.problem.curvature(solution.x, value) > 0.0
+
+    def _solved(self, y: FloatArray, value: float) -> Solution:
+        def evaluate(v: FloatArray):  # type: ignore[no-untyped-def]
+            self.evaluations += EVALUATIONS[self.problem.condition]
+            return self.problem.linearise(v, value)
+
+        return newton(evaluate, y, self.newton)
+
+    def _bracketed(self, y: FloatArray, value: float) -> Solution:
+        """Find the top of a response whose slope jumps there: a kink, or the steps that samples make."""
+        climb = _Climb(self, value, y)
+        try:
+            top = climb.top()
+        except (ArithmeticError, ValueError):
+            return replace(climb.last, x=y, status=Status.STALLED)
+        return replace(climb.last, x=climb.state(top))
+
+
+@dataclass(slots=True)
+class _Climb:
+    """Solutions at fixed frequencies, each from the one before, and the slope of the amplitude there."""
+
+    tracker: _Tracker
+    value: float
+    y: FloatArray
+    last: Solution = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.last = Solution(self.y, Status.STALLED, 0, np.nan, 0.0, 0.0)
+
+    def state(self, at: float) -> FloatArray:
+        """Return the unknowns at ``ln(ω / omega_scale) = at``."""
+        problem, tracker = self.tracker.problem, self.tracker
+        balance = problem.family(self.value)
+        omega = problem.omega(np.array([at]))
+        solution = newton(lambda v: balance.linearise(v, omega), self.y[:-1], tracker.newton)
+        tracker.evaluations += solution.iterations + 1
+        if not solution.status.converged:
+            raise ArithmeticError(solution.status.advice)
+        self.y = np.append(solution.x, at)
+        self.last = replace(solution, iterations=self.last.iterations + solution.iterations)
+        return self.y
+
+    def rate(self, at: float) -> float:
+        """Return the slope of the amplitude there."""
+        problem = self.tracker.problem
+        here = problem.sensitivity(problem.family(self.value), self.state(at))
+        self.tracker.evaluations += 1
+        if here is None:
+            raise ArithmeticError("fold")
+        return here.rate
+
+    def top(self) -> float:
+        """Climb until the slope changes its sign, then close the bracket."""
+        at = float(self.y[-1])
+        slope = self.rate(at)
+        step = 0.1 / self.tracker.problem.sharpness * (1.0 if slope > 0.0 else -1.0)
+        for _ in range(SEARCH):
+            ahead = self.rate(at + step)
+            if ahead * slope <= 0.0:
+                found: float = scipy.optimize.brentq(self.rate, at, at + step, xtol=BRACKET)
+                return found
+            at, step = at + step, 1.3 * step
+        raise ArithmeticError("no maximum")
+
+
+def _tracker(
+    system: System,
+    load: HarmonicLoad,
+    parameter: Parameter,
+    first: float,
+    omega_range: tuple[float, float],
+    by: Condition,
+    output: int,
+    discretisation: Discretisation | None,
+) -> _Tracker:
+    """Find the first peak by a sweep."""
+    if not np.isfinite(first):
+        raise input_error("values", "are empty or not finite", "Give at least one number.")
+    if by not in get_args(Condition):
+        raise input_error("by", f"is {by!r}", f"Give one of {', '.join(get_args(Condition))}.")
+    how = discretisation or Discretisation()
+    dof = int(system.outputs[output])
+    family = parameter_family(
+        system, load, parameter, first, lambda s, f: how.balance(s, f, np.array([dof]))
+    )
+    balance = family(first)
+    position = int(np.searchsorted(balance.linear.retained, dof))
+    changed = parameter(first)[0] if callable(parameter) else system
+    changed = replace(changed, interface=replace(changed.interface, laws=balance.interface.laws))
+    x, omega = _highest(changed, balance, position, omega_range, how.newton)
+    force = balance.linear.load.coefficients(1)[1]
+    phase = float(np.angle(force[np.argmax(np.abs(force))]))
+    problem = PeakProblem(family, by, position, phase, omega)
+    y = np.append(x, 0.0)
+    here = problem.sensitivity(balance, y)
+    if here is not None:
+        n = balance.linear.n
+        places = [n + position, 2 * n + position]
+        sharp = np.linalg.norm(here.state[places]) / np.linalg.norm(x[places])
+        problem = replace(problem, sharpness=max(float(sharp), 1.0))
+    few = replace(how.newton, max_iterations=min(STEPS, how.newton.max_iterations))
+    return _Tracker(problem, few, [(first, y)])
+
+
+def _highest(
+    system: System,
+    balance: HarmonicBalance,
+    position: int,
+    omega_range: tuple[float, float],
+    options: Newton,
+) -> tuple[FloatArray, float]:
+    """Return state and frequency of the highest point of a response between two frequencies."""
+    begin, end = omega_range
+    if not 0.0 < begin < end < np.inf:
+        raise input_error(
+            "omega_range", f"must be positive and growing, got {begin} to {end} rad/s", "Swap them."
+        )
+    n = balance.linear.n
+    weights = np.ones(balance.size)
+    weights[:n] = 0.0
+    control = StepControl(scale=(end - begin) / (SWEEP_POINTS * 0.25), first=0.05)
+    following = Following(newton=options, control=control, weights=weights)
+    start = start_point(balance, first_guess(system, balance, begin, options), begin, following)
+    points = [start]
+    if start.solution.status.converged:
+        points += trace(balance, start, end, following)
+    points = [p for p in points if p.solution.status.converged]
+    heights = [np.hypot(p.x[n + position], p.x[2 * n + position]) for p in points]
+    top = int(np.argmax(heights)) if heights else 0
+    if top in (0, len(points) - 1):
+        raise input_error(
+            "omega_range",
+            f"holds no peak at the first value: of {len(points)} solutions from {begin:.6g} to {end:.6g} rad/s the first or the last is the highest",
+            "Widen it, or choose another output.",
+        )
+    return points[top].x, points[top].p
