@@ -1,0 +1,555 @@
+"""Many contacts: the Jacobian by its products, its preconditioner, and Krylov methods, against arrays and LU."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.linalg
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stickslip.contact.interface import Interface, sparse_rows
+from stickslip.contact.law import PAIRS
+from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.contact.product import add_stiffness, contact_product, harmonic_means, less_means
+from stickslip.errors import InputError
+from stickslip.harmonic import balance as balance_module
+from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
+from stickslip.harmonic.condensed_product import at_frequency
+from stickslip.harmonic.dynamic_stiffness import condense
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.harmonic.selection import jacobian_alert
+from stickslip.harmonic.structured import StructuredJacobian, real_matrix
+from stickslip.model.dofs import Dofs
+from stickslip.model.structure import Structure
+from stickslip.response.forced import forced_problem, forced_response
+from stickslip.response.preload import bonded_start
+from stickslip.response.sweep import Sweep
+from stickslip.response.system import System
+from stickslip.solve.continuation import Following, StepControl, start_point, trace
+from stickslip.solve.krylov import YOUNG, Automatic, Krylov, to_tolerance
+from stickslip.solve.linear import Bordered, Dense
+from stickslip.solve.newton import Newton, newton
+from stickslip.solve.status import Status
+
+N_CONTACTS, INNER = 6, 5
+STATES = {"stick": 0.05, "micro-slip": 1.2, "gross slip": 6.0, "lift-off": 40.0}
+OMEGA = 0.8
+
+
+def body(proportional: bool = True, seed: int = 0) -> Structure:
+    """A random elastic body with its contacts' relative displacements first and a few inner coordinates."""
+    rng = np.random.default_rng(seed)
+    n = 3 * N_CONTACTS + INNER
+    shapes = np.linalg.qr(rng.standard_normal((n, n)))[0]
+    stiffness = shapes @ np.diag(np.linspace(0.6, 12.0, n)) @ shapes.T
+    mass = np.eye(n) + 0.02 * np.ones((n, n))
+    damping = 0.02 * mass + 0.01 * stiffness
+    if not proportional:
+        damping = damping + np.diag(rng.uniform(0.0, 0.02, n))
+    stiffness, damping = (stiffness + stiffness.T) / 2, (damping + damping.T) / 2
+    table = Dofs(np.arange(n), ("x",) * n, np.zeros((n, 3)))
+    return Structure(mass, damping, stiffness, table)
+
+
+def system(seed: int = 0, relative: bool = True) -> System:
+    """The body with contacts of different laws at its first coordinates, or at mixtures of them."""
+    structure = body(seed=seed)
+    rng = np.random.default_rng(seed + 1)
+    laws = tuple(
+        ElasticCoulomb(k_t=1.0, k_w=0.8, k_n=1.5, mu=0.4, preload=float(p))
+        for p in rng.uniform(0.5, 1.5, N_CONTACTS)
+    )
+    operator = np.zeros((3 * N_CONTACTS, structure.n))
+    operator[:, : 3 * N_CONTACTS] = np.eye(3 * N_CONTACTS)
+    if not relative:
+        for c in range(N_CONTACTS):
+            other = 3 * ((c + 1) % N_CONTACTS)
+            operator[3 * c : 3 * c + 3, other : other + 3] = 0.2 * rng.standard_normal((3, 3))
+    names = tuple(f"c{i}" for i in range(N_CONTACTS))
+    interface = Interface(names, laws, operator, rng.uniform(0.5, 1.5, N_CONTACTS))
+    return System(structure, interface, np.array([structure.n - 1]))
+
+
+def load(share: float) -> HarmonicLoad:
+    """Static and alternating forces on all coordinates, contacts and inner ones."""
+    rng = np.random.default_rng(5)
+    n = 3 * N_CONTACTS + INNER
+    force = rng.standard_normal(n) + 1j * rng.standard_normal(n)
+    return HarmonicLoad(0.1 * rng.standard_normal(n), {1: share * force})
+
+
+def problem(share: float, order: int = 3, relative: bool = True) -> HarmonicBalance:
+    made = system(relative=relative)
+    linear = condense(made.structure, made.retained, load(share))
+    return harmonic_balance(linear, made.interface, order, 64, jacobian="structured")
+
+
+def state(name: str, order: int = 3, relative: bool = True) -> tuple[HarmonicBalance, np.ndarray]:
+    """A balance and unknowns at which its contacts are as the name says."""
+    balance = problem(STATES[name], order, relative)
+    x = bonded_start(balance, OMEGA, system(relative=relative))
+    found = balance.contacts(x, OMEGA).state
+    shares = [float(np.mean(found == which)) for which in range(3)]
+    sticks, slips, opens = shares
+    assert {
+        "stick": sticks == 1.0,
+        "micro-slip": 0.0 < slips < 0.5 and sticks > 0.5,
+        "gross slip": slips > 0.3,
+        "lift-off": opens > 0.2,
+    }[name], (name, shares)
+    return balance, x
+
+
+def assert_same(found: np.ndarray, expected: np.ndarray, digits: float = 1e-13) -> None:
+    """Agreement to rounding: sums of some hundred products, relative to the largest entry."""
+    np.testing.assert_allclose(found, expected, rtol=0, atol=digits * np.max(np.abs(expected)))
+
+
+# ---- products ------------------------------------------------------------------------------------------------------------
+
+
+@given(
+    st.integers(0, 2**31), st.integers(1, 4), st.integers(0, 4), st.sampled_from([5, 7, 9]), st.integers(3, 8)
+)  # fmt: skip
+@settings(max_examples=30, deadline=None)
+def test_contact_product_is_that_of_the_assembled_matrix(seed, n_contacts, order, pairs, n):
+    rng = np.random.default_rng(seed)
+    m = 2 * order + 1
+    blocks = rng.standard_normal((n_contacts, pairs, m, m))
+    operator = rng.standard_normal((3 * n_contacts, n)) * (rng.random((3 * n_contacts, n)) < 0.5)
+    rows = sparse_rows(operator)
+    full = np.zeros((3 * n_contacts, m, 3 * n_contacts, m))
+    for c in range(n_contacts):
+        for k, (force, gap) in enumerate(PAIRS[:pairs]):
+            full[3 * c + force, :, 3 * c + gap, :] = blocks[c, k]
+    v = rng.standard_normal((m, n))
+    gaps = operator @ v.T
+    for transposed, force in (
+        (False, np.einsum("apbq,bq->ap", full, gaps)),
+        (True, np.einsum("apbq,ap->bq", full, gaps)),
+    ):
+        out = np.ones((m, n))
+        contact_product(
+            blocks, rows.columns, rows.values, v, transposed, np.empty((3, m)), np.empty((3, m)), out
+        )  # fmt: skip
+        # sums of a few hundred numbers of size one
+        np.testing.assert_allclose(out - 1.0, (operator.T @ force).T, rtol=0, atol=1e-12)
+
+
+@given(st.integers(0, 2**31), st.integers(1, 3), st.integers(0, 4), st.sampled_from([5, 7, 9]))
+@settings(max_examples=30, deadline=None)
+def test_means_and_what_they_leave_make_up_the_blocks(seed, n_contacts, order, pairs):
+    rng = np.random.default_rng(seed)
+    m = 2 * order + 1
+    blocks = rng.standard_normal((n_contacts, pairs, m, m))
+    means = harmonic_means(blocks)
+    left = less_means(blocks, means)
+    # what is left has no mean, and with the real form of the means it is the whole
+    assert np.max(np.abs(harmonic_means(left))) < 1e-14
+    for c in range(n_contacts):
+        whole = real_matrix(means[:, c]).reshape(m, 3, m, 3)
+        for k, (force, gap) in enumerate(PAIRS[:pairs]):
+            np.testing.assert_allclose(
+                left[c, k] + whole[:, force, :, gap], blocks[c, k], rtol=0, atol=1e-14
+            )
+
+
+def test_means_are_the_nearest_complex_numbers():
+    rng = np.random.default_rng(3)
+    block = rng.standard_normal((1, 5, 3, 3))
+    left = less_means(block, harmonic_means(block))[0, 0, 1:, 1:]
+    for number in (0.1, 0.1j, -0.1j, -0.1):
+        turned = real_matrix(np.array([[[0.0]], [[number]]], dtype=complex))[1:, 1:]
+        assert np.linalg.norm(left + turned) > np.linalg.norm(left)
+
+
+def test_stiffness_of_contacts_that_share_coordinates_adds_up():
+    rng = np.random.default_rng(2)
+    operator = rng.standard_normal((6, 4))
+    rows = sparse_rows(operator)
+    stiffness = rng.standard_normal((2, 3, 3)) + 1j * rng.standard_normal((2, 3, 3))
+    out = np.zeros((4, 4), dtype=complex)
+    add_stiffness(stiffness, rows.columns, rows.values, out)
+    expected = operator.T @ scipy.linalg.block_diag(*stiffness) @ operator
+    np.testing.assert_allclose(out, expected, rtol=1e-13)
+
+
+@pytest.mark.parametrize("proportional", [True, False])
+def test_products_are_those_of_the_condensed_matrices(proportional):
+    structure = body(proportional)
+    rng = np.random.default_rng(4)
+    forces = load(1.0)
+    linear = condense(structure, np.arange(3 * N_CONTACTS), forces)
+    assert linear.diagonal is proportional
+    order, n = 3, linear.n
+    condensed, products = linear.condensed(OMEGA, order), at_frequency(linear, OMEGA, order)
+    rows = rng.standard_normal((2 * order + 1, n))
+    q = to_complex(rows)[:, :, None]
+    product, slope = products.product_and_slope(rows)
+    assert_same(product, to_real((condensed.stiffness @ q)[:, :, 0]))
+    assert_same(slope, to_real((condensed.derivative @ q)[:, :, 0]))
+    assert_same(products.product(rows), product)
+    assert_same(products.load, to_real(condensed.load))
+    assert_same(products.load_slope, to_real(condensed.load_derivative))
+    matrix = real_matrix(condensed.stiffness)
+    assert_same(products.transposed_product(rows).ravel(), matrix.T @ rows.ravel())
+    for h in range(order + 1):
+        assert_same(products.block(h), condensed.stiffness[h])
+
+
+@pytest.mark.parametrize("name", STATES)
+@pytest.mark.parametrize("relative", [True, False])
+def test_structured_linearisation_is_the_dense_one(name, relative):
+    balance, x = state(name, relative=relative)
+    at = balance.linearise(x, OMEGA)
+    dense = replace(balance, jacobian="dense").linearise(x, OMEGA)
+    assert isinstance(at.jac, StructuredJacobian)
+    assert_same(at.residual, dense.residual)
+    assert_same(at.jac_p, dense.jac_p)
+    assert_same(at.jac.dense(), dense.jac)
+    assert at.jac.shape == dense.jac.shape
+    v = np.random.default_rng(1).standard_normal(x.size)
+    assert_same(at.jac.matvec(v), dense.jac @ v)
+    assert_same(at.jac.rmatvec(v), dense.jac.T @ v)
+
+
+# ---- solves --------------------------------------------------------------------------------------------------------------
+
+
+def dense_solution(jac: StructuredJacobian, right: np.ndarray) -> np.ndarray:
+    return np.linalg.solve(jac.dense(), right)
+
+
+@pytest.mark.parametrize("name", STATES)
+@pytest.mark.parametrize("method", ["gmres", "bicgstab"])
+def test_solution_is_that_of_lu(name, method):
+    balance, x = state(name, relative=False)
+    at = balance.linearise(x, OMEGA)
+    exact = dense_solution(at.jac, -at.residual)
+    for tolerance in (1e-2, 1e-6, 1e-11):
+        krylov = Krylov(method=method, tolerance=tolerance)
+        found = krylov.solve(at.jac, -at.residual)
+        left = np.linalg.norm(at.jac.matvec(found) + at.residual) / np.linalg.norm(at.residual)
+        assert left <= 1.01 * tolerance  # rounding of the product that judges
+        assert krylov.counts.failures == 0
+    # the residual of 1e-11 times the condition of these matrices, about 1e2
+    assert np.linalg.norm(found - exact) <= 1e-8 * np.linalg.norm(exact)
+
+
+def test_preconditioner_is_exact_where_all_sticks():
+    balance, x = state("stick")
+    at = balance.linearise(x, OMEGA)
+    assert_same(at.jac.preconditioner().solve(at.jac.matvec(x)), x, 1e-11)
+    krylov = Krylov(tolerance=1e-10)
+    krylov.solve(at.jac, at.residual)
+    assert krylov.counts.products <= 2  # one, and the one that checks
+
+
+@pytest.mark.parametrize("name", STATES)
+@pytest.mark.parametrize("at_other", [OMEGA, 1.001 * OMEGA])
+def test_product_after_a_kept_preconditioner_is_the_product(name, at_other):
+    # at the same frequency without the dynamic stiffness, at another with it
+    kept = problem(STATES["stick"]).linearise(np.zeros(problem(1.0).size), OMEGA)
+    balance, x = state(name)
+    jac = replace(balance, linear=problem(1.0).linear).linearise(x, at_other).jac
+    kept = replace(balance, linear=jac.linear.linear).linearise(0.01 * x, OMEGA).jac
+    preconditioner = kept.preconditioner()
+    v = np.random.default_rng(0).standard_normal(x.size)
+    solved = preconditioner.solve(v)
+    assert jac.linear.same(kept.linear) is (at_other == OMEGA)
+    assert_same(jac.product_after(preconditioner)(solved, v), jac.matvec(solved), 1e-11)
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_bordered_solution_is_that_of_lu(name):
+    balance, x = state(name)
+    at = balance.linearise(x, OMEGA)
+    rng = np.random.default_rng(0)
+    row, right = rng.standard_normal(x.size), rng.standard_normal(x.size + 1)
+    krylov = Krylov(tolerance=1e-11, tangent_tolerance=1e-11)
+    tangent = np.append(np.zeros(x.size), 1.0)
+    for right_side in (right, tangent):
+        found, sign = krylov.solve_bordered(at.jac, at.jac_p, row, 0.3, right_side)
+        exact, known = Dense().solve_bordered(at.jac.dense(), at.jac_p, row, 0.3, right_side)
+        assert np.linalg.norm(found - exact) <= 1e-7 * np.linalg.norm(exact)
+        assert np.isnan(sign)
+        assert known in {-1.0, 1.0}
+
+
+class Nearly:
+    """A Jacobian with a preconditioner of which it is a small change."""
+
+    def __init__(self, matrix: np.ndarray, preconditioner: np.ndarray) -> None:
+        self.matrix, self.nearby = matrix, preconditioner
+        self.shape = matrix.shape
+        self.made = 0
+
+    @property
+    def problem(self):
+        return self
+
+    def matvec(self, v):
+        return self.matrix @ v
+
+    def rmatvec(self, v):
+        return self.matrix.T @ v
+
+    def preconditioner(self):
+        self.made += 1
+        inverse = np.linalg.inv(self.nearby)
+
+        class Inverse:
+            def solve(self, right):
+                return inverse @ right
+
+        return Inverse()
+
+    def product_after(self, _):
+        return lambda v, _: self.matrix @ v
+
+
+def fold(n: int = 30) -> tuple[Nearly, np.ndarray, np.ndarray]:
+    """A singular Jacobian whose border makes it regular, and a preconditioner that is almost singular."""
+    rng = np.random.default_rng(8)
+    left, _, right = np.linalg.svd(rng.standard_normal((n, n)))
+    sizes = np.linspace(1.0, 2.0, n)
+    singular, nearby = sizes.copy(), sizes.copy()
+    singular[-1], nearby[-1] = 0.0, 1e-6
+    made = Nearly(left @ np.diag(singular) @ right, left @ np.diag(nearby) @ right)
+    return made, left[:, -1] + 0.1, right[-1] + 0.1
+
+
+def test_bordered_system_at_a_fold():
+    jac, column, row = fold()
+    right = np.append(np.zeros(30), 1.0)
+    found, _ = Krylov().solve_bordered(jac, column, row, 0.0, right)
+    left = Bordered(jac, column, row, 0.0).matvec(found) - right
+    assert np.linalg.norm(left) <= 1e-6
+    assert Dense().solve(jac.matrix.copy(), right[:-1] + 1.0) is None
+
+
+def test_preconditioner_is_kept_while_it_serves():
+    balance, x = state("micro-slip")
+    krylov = Krylov(tolerance=1e-6)
+    for scale in (1.0, 1.001, 1.002):
+        at = balance.linearise(scale * x, OMEGA)
+        krylov.solve(at.jac, -at.residual)
+    assert krylov.counts.systems == 3
+    assert krylov.counts.preconditioners == 1
+
+
+def test_worn_preconditioner_is_made_anew():
+    rng = np.random.default_rng(1)
+    jac = Nearly(np.eye(80), np.eye(80))
+    krylov = Krylov(tolerance=1e-8)
+    krylov.solve(jac, np.ones(80))
+    jac.matrix = jac.nearby = np.eye(80) + 0.06 * rng.standard_normal((80, 80))
+    before = krylov.counts.products
+    krylov.solve(jac, np.ones(80))
+    assert jac.made == 1  # it still served, though badly
+    assert krylov.counts.products - before > YOUNG
+    assert_same(jac.matrix @ krylov.solve(jac, np.ones(80)), np.ones(80), 1e-8)
+    assert jac.made == 2
+    # one that fails is made anew at once
+    jac.matrix = jac.nearby = np.roll(np.eye(80), 1, axis=0)
+    assert replace(krylov, max_products=40).solve(jac, np.eye(80)[0]) is not None
+    assert jac.made == 3
+
+
+def test_problems_that_are_gone_leave_no_factors():
+    krylov = Krylov()
+    jac = Nearly(np.eye(4), np.eye(4))
+    krylov.solve(jac, np.ones(4))
+    assert len(krylov.memory) == 1
+    del jac
+    assert len(krylov.memory) == 0
+
+
+def test_orders_of_a_problem_keep_factors_apart():
+    low, x = state("micro-slip", order=1)
+    high = low.with_order(3)
+    krylov = Krylov()
+    for balance in (low, high, low, high):
+        at = balance.linearise(balance.unknowns(low.coefficients(x)), OMEGA)
+        krylov.solve(at.jac, -at.residual)
+    assert krylov.counts.preconditioners == 2
+
+
+def test_right_side_zero_needs_no_work():
+    balance, x = state("stick")
+    krylov = Krylov()
+    jac = balance.linearise(x, OMEGA).jac
+    assert np.array_equal(krylov.solve(jac, np.zeros(x.size)), np.zeros(x.size))
+    assert krylov.counts.products == krylov.counts.preconditioners == 0
+
+
+# ---- failure -------------------------------------------------------------------------------------------------------------
+
+
+def hopeless(n: int = 60) -> Nearly:
+    """A shift, of which every product but the last says nothing about the solution."""
+    return Nearly(np.roll(np.eye(n), 1, axis=0), np.eye(n))
+
+
+def test_no_solution_is_none_and_counted():
+    krylov = Krylov(max_products=10)
+    jac = hopeless()
+    assert krylov.solve(jac, np.eye(60)[0]) is None
+    solution, sign = krylov.solve_bordered(jac, np.zeros(60), np.zeros(60), 1.0, np.eye(61)[0])
+    assert solution is None
+    assert np.isnan(sign)
+    assert krylov.counts.failures == 2
+
+
+def test_newton_without_a_step_says_so():
+    jac = hopeless()
+
+    class At:
+        residual, seconds_contact = np.eye(60)[0], 0.0
+
+    At.jac = jac
+    solution = newton(lambda _: At(), np.zeros(60), Newton(linear=Krylov(max_products=10)))
+    assert solution.status is Status.SINGULAR
+    assert "Krylov" in solution.status.advice
+
+
+def test_harmonic_without_stiffness_has_no_preconditioner():
+    balance, x = state("stick")
+    at = balance.linearise(x, OMEGA)
+    loose = replace(at.jac, blocks=np.zeros_like(at.jac.blocks))
+    nothing = (np.zeros((balance.linear.n,) * 2),) * 3
+    linear = replace(
+        loose.linear,
+        linear=replace(balance.linear, nn=nothing, nl=tuple(0 * a for a in balance.linear.nl)),
+    )
+    krylov = Krylov()
+    assert krylov.solve(replace(loose, linear=linear), at.residual) is None
+    assert krylov.counts.failures == 1
+
+
+def test_array_and_unknown_method_are_refused():
+    with pytest.raises(
+        InputError, match="Krylov needs a Jacobian that makes its preconditioner, and got ndarray"
+    ):
+        Krylov().solve(np.eye(2), np.ones(2))
+    with pytest.raises(InputError, match=r"Krylov\.method.*'qmr'"):
+        Krylov(method="qmr")
+    balance, x = state("stick")
+    with pytest.raises(InputError, match="Dense needs the Jacobian as an array"):
+        Dense().solve(balance.linearise(x, OMEGA).jac, x)
+
+
+# ---- problems ------------------------------------------------------------------------------------------------------------
+
+
+def test_size_chooses_the_form(monkeypatch):
+    made = replace(problem(1.0), jacobian="auto")
+    assert not made.structured
+    assert isinstance(made.linearise(np.zeros(made.size), OMEGA).jac, np.ndarray)
+    monkeypatch.setattr(balance_module, "CROSSOVER", made.size - 1)
+    assert made.structured
+    assert isinstance(made.linearise(np.zeros(made.size), OMEGA).jac, StructuredJacobian)
+    # without harmonics nothing is saved, and the static problem is small
+    static = problem(1.0, order=0)
+    x = np.random.default_rng(0).standard_normal(static.size)
+    assert isinstance(static.linearise(x, OMEGA).jac, np.ndarray)
+    monkeypatch.setattr(balance_module, "CROSSOVER", 1)
+    by_products = static.linearise(x, OMEGA)
+    assert isinstance(by_products.jac, np.ndarray)
+    monkeypatch.setattr(balance_module, "CROSSOVER", 1000)
+    assert_same(by_products.jac, static.linearise(x, OMEGA).jac)
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_newton_finds_the_same_solution(name):
+    balance, x = state(name)
+    options = Newton(tolerance=1e-12, max_iterations=60)
+    found = newton(lambda v: balance.linearise(v, OMEGA), x, options)
+    dense = replace(balance, jacobian="dense")
+    expected = newton(lambda v: dense.linearise(v, OMEGA), x, options)
+    assert found.status is expected.status is Status.CONVERGED
+    assert np.max(np.abs(found.x - expected.x)) <= 1e-9 * np.max(np.abs(expected.x))
+
+
+def test_branch_is_the_same():
+    balance = problem(STATES["gross slip"])
+    weights = np.ones(balance.size)
+    control = StepControl(scale=0.2, max_points=200)
+    ends = []
+    for form in ("structured", "dense"):
+        made = replace(balance, jacobian=form)
+        following = Following(
+            newton=Newton(tolerance=1e-12, max_iterations=25), control=control, weights=weights
+        )
+        start = start_point(made, bonded_start(made, 0.3, system()), 0.3, following)
+        points = [start, *trace(made, start, 0.5, following)]
+        assert all(point.solution.status.converged for point in points)
+        ends.append(points[-1])
+    assert ends[0].p == ends[1].p == 0.5
+    size = np.max(np.abs(ends[1].x))
+    assert np.max(np.abs(ends[0].x - ends[1].x)) <= 1e-9 * size
+
+
+def test_alert_is_the_same():
+    low, x = state("gross slip", order=1)
+    solution = newton(lambda v: low.linearise(v, OMEGA), x, Newton(tolerance=1e-12))
+    assert solution.status.converged
+    high = low.with_order(3)
+    dofs = np.arange(3 * N_CONTACTS + INNER)
+    krylov = Krylov()
+    solve = to_tolerance(krylov, 1e-11).solve
+    iterated = jacobian_alert(low, high, solution.x, OMEGA, dofs, solve)
+    assert krylov.counts.products > 0
+    direct = jacobian_alert(low, replace(high, jacobian="dense"), solution.x, OMEGA, dofs)
+    assert iterated.error == pytest.approx(direct.error, rel=1e-9)
+    assert iterated.worst == direct.worst
+    assert direct.error > 1e-3  # there is something to compare
+    assert jacobian_alert(low, high, solution.x, OMEGA, dofs).error == pytest.approx(
+        direct.error, rel=1e-9
+    )
+
+
+def test_alert_without_a_solution_is_infinite():
+    low, x = state("gross slip", order=1)
+    high = low.with_order(3)
+    alert = jacobian_alert(low, high, x, OMEGA, np.arange(3), lambda *_: None)
+    assert alert.error == np.inf
+
+
+def test_tolerance_is_set_through_the_choice_of_solver():
+    automatic = Automatic()
+    finer = to_tolerance(automatic, 1e-9)
+    assert finer.krylov.tolerance == 1e-9
+    assert finer.krylov.memory is automatic.krylov.memory
+    assert to_tolerance(Dense(), 1e-9) == Dense()
+
+
+def test_forced_response_is_the_same(monkeypatch):
+    sweep = Sweep(
+        omega_range=(0.3, 0.5),
+        low=1,
+        high=3,
+        samples=64,
+        points=6,
+        peak_points=2,
+        newton=Newton(tolerance=1e-12),
+    )
+    made, forces = system(), load(STATES["gross slip"])
+    dense = list(forced_response(made, forces, sweep))
+    monkeypatch.setattr(balance_module, "CROSSOVER", 1)
+    assert forced_problem(made, forces, sweep).low.structured
+    iterated = list(forced_response(made, forces, sweep))
+    assert all(p.converged for p in [*dense, *iterated])
+    assert {p.stage for p in iterated} >= {"low", "high"}
+    for found, expected in zip(
+        [p for p in iterated if p.stage == "low"][::100],
+        [p for p in dense if p.stage == "low"][::100],
+        strict=True,
+    ):
+        assert_same(found.coefficients, expected.coefficients, 1e-9)
+    last = [[p for p in points if p.stage == "low"][-1] for points in (iterated, dense)]
+    assert last[0].omega == last[1].omega == 0.5
+    assert_same(last[0].coefficients, last[1].coefficients, 1e-9)
+    assert last[0].predicted_error == pytest.approx(last[1].predicted_error, rel=1e-4)
