@@ -117,7 +117,10 @@ def less_means(blocks: FloatArray, means: ComplexArray) -> FloatArray:
 
 
 def add_stiffness(
-    stiffness: ComplexArray, columns: IntArray, values: FloatArray, out: ComplexArray
+    stiffness: FloatArray | ComplexArray,
+    columns: IntArray,
+    values: FloatArray,
+    out: ComplexArray,
 ) -> None:
     """Add ``Bᵀ k B`` to the (n, n) matrix `out`, with one (3, 3) matrix ``k`` a contact.
 

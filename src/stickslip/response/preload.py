@@ -5,12 +5,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.contact.interface import sparse_rows
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.contact.product import add_stiffness
 from stickslip.errors import SingularError
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_balance
+from stickslip.harmonic.condensed_product import at_frequency
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.fourier import to_complex
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, StepControl, reversed_point, start_point, trace
 from stickslip.solve.linear import solve_dense
@@ -111,19 +115,23 @@ def bonded_start(balance: HarmonicBalance, omega: float, system: System) -> Floa
     SingularError
         If a body is held by nothing even then; the message names the coordinate.
     """
-    condensed = balance.linear.condensed(omega, balance.order)
-    b = balance.interface.gap_operator
-    springs = b.T @ (balance.interface.stuck_stiffness()[:, None] * b)
+    linear = at_frequency(balance.linear, omega, balance.order)
+    load = to_complex(linear.load)
+    rows = sparse_rows(balance.interface.gap_operator)
+    springs = balance.interface.stuck_stiffness().reshape(-1, 3, 1) * np.eye(3)
     q = np.zeros((balance.order + 1, balance.linear.n), dtype=complex)
     for h in range(balance.order + 1):
-        matrix = condensed.stiffness[h] + springs
+        if h > 0 and not np.any(load[h]):
+            continue
+        matrix = linear.block(h)
+        add_stiffness(springs, rows.columns, rows.values, matrix)
         if h == 0:
-            static = solve_dense(np.asfortranarray(matrix.real), condensed.load[0].real)
+            static = solve_dense(np.array(matrix.real, order="F"), load[0].real)
             if static is None:
                 raise SingularError(_unheld(matrix.real, system))
             q[0] = static
-        elif np.any(condensed.load[h]):
-            q[h] = np.linalg.solve(matrix, condensed.load[h])
+        else:
+            q[h] = np.linalg.solve(matrix, load[h])
     return balance.unknowns(q)
 
 
