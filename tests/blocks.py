@@ -91,7 +91,9 @@ def stacked(lower, upper):
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    displacement: np.ndarray  # largest difference from uniform compression over the largest displacement
+    displacement: (
+        np.ndarray
+    )  # largest difference from uniform compression over the largest displacement
     pressure: np.ndarray  # at the points of the pairing, over the applied one
 
 

@@ -17,7 +17,6 @@ from stickslip.contact.facets import (
     DEGREE,
     KINDS,
     REFERENCE_NODES,
-    interpolation,
     positions,
     shape_functions,
     shape_gradients,
@@ -205,7 +204,10 @@ def test_frames_are_right_handed_and_t_follows_the_direction():
 
 def test_direction_parallel_to_the_normal():
     a, b = two_planes((EVEN, EVEN), (EVEN, EVEN))
-    with pytest.raises(InputError, match=r"direction of t: \(0.0, 0.0, 2.0\) is parallel to the normal \[0.0, 0.0, 1.0\] of"):
+    with pytest.raises(
+        InputError,
+        match=r"direction of t: \(0.0, 0.0, 2.0\) is parallel to the normal \[0.0, 0.0, 1.0\] of",
+    ):
         node_to_node(a, b, tolerance=1e-6, direction=(0.0, 0.0, 2.0))  # fmt: skip
 
 
@@ -229,7 +231,9 @@ def test_rigid_motions(kinds, gap):
         assert np.allclose(gaps, np.cross(turn, [0, 0, gap]), rtol=0, atol=1e-14)
         only = np.concatenate([np.zeros(a.points.size), motion(b.points, shift, turn)])
         gaps = (pairing.gap_operator @ only).reshape(-1, 3)
-        assert np.allclose(gaps, shift + np.cross(turn, pairing.positions + [0, 0, gap]), atol=1e-13)
+        assert np.allclose(
+            gaps, shift + np.cross(turn, pairing.positions + np.array([0, 0, gap])), atol=1e-13
+        )
 
 
 def cylinders(kind, fine, gap=0.0, n_a=(6, 3), n_b=(5, 4), swap=False):
@@ -290,7 +294,10 @@ def test_segments_pass_a_uniform_pressure_to_both_sides(grid_a, grid_b, kind_a, 
     force = pressure_loads(pairing).reshape(-1, 3)
     assert pairing.weights.sum() == pytest.approx(1.0, rel=1e-9)  # slivers of 1e-10 are dropped
     assert pairing.weights.min() > 0
-    for surface, rows, sign in ((a, slice(0, len(a.points)), 1), (b, slice(len(a.points), None), -1)):
+    for surface, rows, sign in (
+        (a, slice(0, len(a.points)), 1),
+        (b, slice(len(a.points), None), -1),
+    ):
         assert np.abs(force[rows, 2] * -sign - consistent_loads(surface)).max() < 1e-9
 
 
@@ -306,7 +313,9 @@ def consistent_loads(surface):
             here, share = np.column_stack([u, v * (1 - u)]), weight * (1 - u) / 4
         else:
             here, share = at, weight
-        first, second = np.einsum("gak,kc->agc", shape_gradients(len(row), here), surface.points[row])
+        first, second = np.einsum(
+            "gak,kc->agc", shape_gradients(len(row), here), surface.points[row]
+        )
         area = np.linalg.norm(np.cross(first, second), axis=1) * share
         loads[row] += area @ shape_functions(len(row), here)
     return loads
@@ -407,7 +416,10 @@ def test_cylinder_in_cylinder(kind, order, swap, way):
         errors.append(np.abs(pairing.initial_gap - gap).max())
         radial = pairing.positions * [1, 0, 1]
         radial /= np.linalg.norm(radial, axis=1, keepdims=True) * (-1 if swap else 1)
-        inner = np.abs(np.arctan2(pairing.positions[:, 0], pairing.positions[:, 2])) < 0.6 - 1.2 / 5 / fine
+        inner = (
+            np.abs(np.arctan2(pairing.positions[:, 0], pairing.positions[:, 2]))
+            < 0.6 - 1.2 / 5 / fine
+        )
         tilts.append(np.abs(pairing.frames[inner, :, 2] - radial[inner]).max())
         areas.append(pairing.weights.sum() / (1.2 * (1 + gap * swap)) - 1)
         assert np.abs(pairing.frames[:, :, 0] - [0, 1, 0]).max() < 1e-12
@@ -415,7 +427,9 @@ def test_cylinder_in_cylinder(kind, order, swap, way):
     assert errors[1] < {2: 2e-3, 4: 5e-7}[order]  # the sagitta of a facet of 5.7 degrees is 1.2e-3
     # away from the rim, where a node has facets on one side only
     assert tilts[1] < {2: 1e-3, 4: 2e-5}[order]
-    if not (way == "segment" and swap):  # planes of a concave side lean inward: at the rim they miss gap times slope
+    if not (
+        way == "segment" and swap
+    ):  # planes of a concave side lean inward: at the rim they miss gap times slope
         assert abs(areas[1]) < abs(areas[0]) / 2 ** (order - 0.2)
         assert abs(areas[1]) < {2: 1e-3, 4: 5e-7}[order]
 
@@ -426,7 +440,18 @@ def test_interpolated_normals_are_continuous_but_keep_edges():
     spread = [np.ptp(normals[a.facets == node], axis=0).max() for node in range(len(a.points))]
     assert max(spread) < 1e-15
     # a box: three faces around a corner keep their own normals
-    corner = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, -1], [1, 0, -1], [0, 1, -1], [1, 1, -1.0]])
+    corner = np.array(
+        [
+            [0, 0, 0],
+            [1, 0, 0],
+            [1, 1, 0],
+            [0, 1, 0],
+            [0, 0, -1],
+            [1, 0, -1],
+            [0, 1, -1],
+            [1, 1, -1.0],
+        ]
+    )
     box = Surface(corner, scipy.sparse.eye_array(24, format="csr"),
                   np.array([[0, 1, 2, 3], [0, 4, 5, 1], [1, 5, 7, 2]]))  # fmt: skip
     own = box.corner_normals()
@@ -442,7 +467,9 @@ def test_given_normals_are_used():
     radial = pairing.positions * [1, 0, 1]
     radial /= np.linalg.norm(radial, axis=1, keepdims=True)
     assert np.abs(pairing.frames[:, :, 2] - radial).max() < 1e-3  # linear between exact normals
-    with pytest.raises(InputError, match=r"Surface.normals: need one unit vector for each of 28 nodes"):
+    with pytest.raises(
+        InputError, match=r"Surface.normals: need one unit vector for each of 28 nodes"
+    ):
         replace(a, normals=2 * exact.normals)
 
 
@@ -478,7 +505,10 @@ def test_surface_of_a_structure_finds_its_dofs():
     assert abs(other.displacement - b.displacement).max() == 0
     one, two = segment_to_segment(found, other), segment_to_segment(a, b)
     assert abs(one.gap_operator - two.gap_operator).max() == 0
-    with pytest.raises(InputError, match=r"structure_surface: 1 nodes have no dofs x, y, z in the structure, e.g. \[999\]"):
+    with pytest.raises(
+        InputError,
+        match=r"structure_surface: 1 nodes have no dofs x, y, z in the structure, e.g. \[999\]",
+    ):
         structure_surface(structure, np.array([[0, 1, 999]]))  # fmt: skip
 
 
@@ -513,7 +543,10 @@ def test_nodes_without_a_partner_are_named():
 
 def test_nodes_beyond_the_rim_are_named():
     a, b = two_planes((even(4) * 1.2, even(2)), (even(3), even(2)))
-    with pytest.raises(InputError, match=r"node_to_segment: 3 nodes of side A .*node 1[234] at \(1.2, 0(\.5)?, 0\) m, 0.2 m off"):
+    with pytest.raises(
+        InputError,
+        match=r"node_to_segment: 3 nodes of side A .*node 1[234] at \(1.2, 0(\.5)?, 0\) m, 0.2 m off",
+    ):
         node_to_segment(a, b)  # fmt: skip
     assert node_to_segment(a, b, tolerance=0.21).n_points == 15
     some = node_to_segment(a, b, outside="skip")
@@ -534,7 +567,9 @@ def test_surfaces_out_of_reach_or_turned_round():
         with pytest.raises(InputError, match="normals point outward"):
             way(a, inward)
     far = plane(EVEN + 0.5, EVEN, up=False, n=a.displacement.shape[1])
-    with pytest.raises(InputError, match=r"8 of 16 facets of side A have no facet of side B opposite"):
+    with pytest.raises(
+        InputError, match=r"8 of 16 facets of side A have no facet of side B opposite"
+    ):
         segment_to_segment(a, far)
     some = segment_to_segment(a, far, outside="skip")
     assert some.weights.sum() == pytest.approx(0.5, rel=1e-12)
@@ -598,35 +633,39 @@ def friction_joint(pairing, structure, held):
     return System(structure, interface, driven)
 
 
-@pytest.fixture(scope="module")
-def columns():
+def peak_of(system, force, sweep):
+    """Return the height of the peak per newton, and its frequency in Hz."""
+    shake = np.zeros(system.structure.n, dtype=complex)
+    shake[system.outputs] = force
+    load = HarmonicLoad(np.zeros(system.structure.n), {1: shake})
+    problem = forced_problem(system, load, sweep)
+    points = accepted_points(list(forced_response(system, load, sweep)))
+    assert all(p.converged for p in points)
+    height = [problem.amplitude(p) / force for p in points]
+    return max(height), points[int(np.argmax(height))].omega / (2 * np.pi)
+
+
+def test_friction_joint_of_two_flexible_blocks():
+    """Two ways over non-matching meshes give nearly the same peak, stuck and with most of its height taken by friction.
+
+    Tributary areas of 5 nodes a side have a second moment of area 1 + 2/16 times that of the true face: a stiffer joint in bending, 1 % in
+    frequency here. With 6 and 7 nodes a side the difference is 0.4 % and 0.3 %.
+    """
     size = 0.02
     lower = block(even(2, 0, size), even(2, 0, size), even(4, -0.1, 0.0))
-    upper = block(even(3, 0, size), even(3, 0, size), even(3, 0.0, 0.08))
+    upper = block(even(4, 0, size), even(4, 0, size), even(3, 0.0, 0.08))
     a, b, structure = stacked(lower, upper)
     z = structure.dofs.position[:, 2]
-    return a, b, structure, np.flatnonzero((z < z.min() + 1e-9) | (z > z.max() - 1e-9))
-
-
-def test_friction_joint_of_two_flexible_blocks(columns):
-    a, b, structure, held = columns
-    peaks = {}
-    for amplitude in (1.0, 400.0):
-        for name, pairing in (
-            ("node", node_to_segment(b, a)),
-            ("segment", segment_to_segment(a, b, degree=2)),
-        ):
-            system = friction_joint(pairing, structure, held)
-            force = np.zeros(system.structure.n, dtype=complex)
-            force[system.outputs] = amplitude
-            load = HarmonicLoad(np.zeros(system.structure.n), {1: force})
-            sweep = Sweep(
-                omega_range=(2 * np.pi * 2400, 2 * np.pi * 3600), selection="always_low", samples=64, points=15, peak_points=6
-            )  # fmt: skip
-            problem = forced_problem(system, load, sweep)
-            points = accepted_points(list(forced_response(system, load, sweep)))
-            assert all(p.converged for p in points)
-            height = [problem.amplitude(p) / amplitude for p in points]
-            peaks[name, amplitude] = max(height), points[int(np.argmax(height))].omega / 2 / np.pi
-            print(name, amplitude, len(points), peaks[name, amplitude])
-    assert 0
+    held = np.flatnonzero((z < z.min() + 1e-9) | (z > z.max() - 1e-9))
+    sweep = Sweep(
+        omega_range=(2 * np.pi * 2780, 2 * np.pi * 3100), selection="always_low", samples=64, points=4, peak_points=4
+    )  # fmt: skip
+    ways = (node_to_segment(b, a), segment_to_segment(a, b, degree=2))
+    peaks = {
+        force: [peak_of(friction_joint(way, structure, held), force, sweep) for way in ways]
+        for force in (1.0, 400.0)
+    }
+    for (by_nodes, where), (by_segments, there) in peaks.values():
+        assert by_nodes == pytest.approx(by_segments, rel=0.02)
+        assert where == pytest.approx(there, rel=0.012)
+    assert peaks[400.0][1][0] < 0.2 * peaks[1.0][1][0]  # friction matters
