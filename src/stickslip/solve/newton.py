@@ -1,7 +1,7 @@
 """Newton's method for equations that are smooth between kinks, with a choice of what keeps it from going astray."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -66,6 +66,16 @@ class Solution:
     seconds_contact: float
     seconds_linear: float
     rung: Rung = Rung.FULL_STEPS
+
+
+def charged(solution: Solution, spent: Sequence[Solution]) -> Solution:
+    """Return a solution charged with the cost of all the attempts that led to it."""
+    return replace(
+        solution,
+        iterations=sum(s.iterations for s in spent),
+        seconds_contact=sum(s.seconds_contact for s in spent),
+        seconds_linear=sum(s.seconds_linear for s in spent),
+    )
 
 
 def newton(

@@ -9,7 +9,7 @@ from stickslip.arrays import FloatArray
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
 from stickslip.solve.iterate import Evaluation
 from stickslip.solve.linear import Jacobian
-from stickslip.solve.newton import GLOBALISATIONS, Newton, Solution, newton
+from stickslip.solve.newton import GLOBALISATIONS, Newton, Solution, charged, newton
 from stickslip.solve.status import Rung, Status
 
 Evaluate = Callable[[FloatArray], Evaluation]
@@ -68,8 +68,8 @@ def solve_robustly(
     for attempt in _attempts(evaluate, x, options, families, weights):
         spent.append(attempt)
         if attempt.status.converged:
-            return _charged(attempt, spent)
-    return _charged(min(spent, key=lambda s: _finite(s.residual_norm)), spent)
+            return charged(attempt, spent)
+    return charged(min(spent, key=lambda s: _finite(s.residual_norm)), spent)
 
 
 def _attempts(
@@ -142,18 +142,8 @@ def _followed(
         # what a failed step left is no measure of how near s = 1 is
         norm = float(np.max(np.abs(evaluate(point.x).residual)))
         solution = replace(solution, x=point.x, residual_norm=norm)
-    return replace(_charged(solution, [p.solution for p in points]), rung=Rung.HOMOTOPY)
+    return replace(charged(solution, [p.solution for p in points]), rung=Rung.HOMOTOPY)
 
 
 def _finite(norm: float) -> float:
     return norm if np.isfinite(norm) else np.inf
-
-
-def _charged(solution: Solution, spent: list[Solution]) -> Solution:
-    """Charge a solution with all the attempts that led to it."""
-    return replace(
-        solution,
-        iterations=sum(s.iterations for s in spent),
-        seconds_contact=sum(s.seconds_contact for s in spent),
-        seconds_linear=sum(s.seconds_linear for s in spent),
-    )

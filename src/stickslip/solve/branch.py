@@ -1,0 +1,201 @@
+"""What a branch of ``F(x, p) = 0`` is made of: the equation, its points, their distances, and how it is to be followed."""
+
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol, get_args
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.errors import input_error
+from stickslip.solve.linear import Jacobian
+from stickslip.solve.newton import Newton, Solution
+
+Parametrisation = Literal["arc_length", "natural", "local"]
+Predictor = Literal["tangent", "secant"]
+
+
+class ParameterEvaluation(Protocol):
+    """Residual, Jacobian and parameter derivative at one state."""
+
+    @property
+    def residual(self) -> FloatArray:
+        """(n,) residual."""
+        ...
+
+    @property
+    def jac(self) -> Jacobian:
+        """(n, n) derivative by x."""
+        ...
+
+    @property
+    def jac_p(self) -> FloatArray:
+        """(n,) derivative by p."""
+        ...
+
+    @property
+    def seconds_contact(self) -> float:
+        """Time spent in contact forces."""
+        ...
+
+
+class Problem(Protocol):
+    """An equation with one parameter."""
+
+    def linearise(self, x: FloatArray, p: float) -> ParameterEvaluation:
+        """Evaluate everything at (x, p)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StepControl:
+    """How far a branch is followed in one step.
+
+    Length is measured in changes of x relative to its own size and in changes of p relative to `scale`.
+
+    Parameters
+    ----------
+    scale
+        Change of the parameter that counts as length one.
+    first, smallest, largest
+        Step lengths.
+    max_points
+        Where to stop a branch that does not reach its end.
+    """
+
+    scale: float
+    first: float = 0.1
+    smallest: float = 1e-3
+    largest: float = 0.25
+    max_points: int = 500
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Following:
+    """How a branch is followed: corrector, steps, and what makes length.
+
+    Parameters
+    ----------
+    newton
+        Corrector.
+    control
+        Step control.
+    weights
+        (n,) share of each unknown in the length of a step.
+    parametrisation
+        What a step prescribes: ``arc_length``: the way along the direction of travel (Keller 1977); ``local``: the unknown, or p, that
+        changes most (Rheinboldt & Burkardt 1983); ``natural``: p, which stops at folds with `Status.STEP_TOO_SMALL`.
+    predictor
+        Direction of travel: ``tangent``, which costs a linear system a point and sees corners and folds at once; or ``secant`` through
+        the last two points, which costs nothing.
+    """
+
+    newton: Newton
+    control: StepControl
+    weights: FloatArray
+    parametrisation: Parametrisation = "arc_length"
+    predictor: Predictor = "tangent"
+
+    def __post_init__(self) -> None:
+        for name, choices in (("parametrisation", Parametrisation), ("predictor", Predictor)):
+            if getattr(self, name) not in get_args(choices):
+                raise input_error(
+                    f"Following.{name}",
+                    f"is {getattr(self, name)!r}",
+                    f"Give one of {', '.join(get_args(choices))}.",
+                )
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A point of a branch with all that is needed to go on from it.
+
+    Attributes
+    ----------
+    x, p
+        The solution and its parameter.
+    tangent
+        (n + 1,) direction of travel, unit length in the measure of the step control; the last entry is that of p. With the predictor
+        ``secant`` it points from the point before to this one.
+    step
+        Length of the next step.
+    solution
+        How Newton ended; x is a solution only if its status says so.
+    orientation
+        Sign of the determinant of the Jacobian bordered by the tangent; it stays the same along a path. 0 where it was not asked for
+        (secants), NaN where the linear solver cannot tell.
+    event
+        Name of the event that was located here; empty for the points of the steps themselves.
+    """
+
+    x: FloatArray
+    p: float
+    tangent: FloatArray
+    step: float
+    solution: Solution
+    orientation: float
+    event: str = ""
+
+    @property
+    def y(self) -> FloatArray:
+        """(n + 1,) unknowns and parameter."""
+        return np.append(self.x, self.p)
+
+
+@dataclass(frozen=True, eq=False)
+class Measure:
+    """Weights that make lengths: of x (per entry) and of p."""
+
+    x: FloatArray
+    p: float
+
+    def of(self, vector: FloatArray) -> float:
+        """Return the length of a vector (n + 1,)."""
+        return float(np.sqrt(self.row(vector) @ vector))
+
+    def row(self, vector: FloatArray) -> FloatArray:
+        """Return the row whose product with another vector is their inner product."""
+        return np.append(self.x**2 * vector[:-1], self.p**2 * vector[-1])
+
+    def cosine(self, a: FloatArray, b: FloatArray) -> float:
+        """Return the cosine of the angle between two vectors (n + 1,)."""
+        return float(self.row(a) @ b) / (self.of(a) * self.of(b))
+
+
+def measure_at(x: FloatArray, following: Following) -> Measure:
+    """Return how lengths are measured near `x`: changes of x by its own size, changes of p by the scale of the step control."""
+    weights = following.weights
+    size = float(np.linalg.norm(weights * x))
+    return Measure(weights / size if size > 0 else weights, 1.0 / following.control.scale)
+
+
+def tangent_at(
+    problem: Problem, y: FloatArray, previous: FloatArray, following: Following
+) -> tuple[FloatArray, float]:
+    """Return the unit tangent on the side of `previous` and its orientation; `previous` itself where it is undetermined.
+
+    Parameters
+    ----------
+    problem
+        The equation.
+    y
+        (n + 1,) unknowns and parameter of a point of the branch.
+    previous
+        (n + 1,) direction of travel so far.
+    following
+        What makes length, and the linear solver.
+    """
+    measure = measure_at(y[:-1], following)
+    at = problem.linearise(y[:-1], float(y[-1]))
+    row = measure.row(previous)
+    right = np.zeros(y.size)
+    right[-1] = 1.0
+    linear = following.newton.linear
+    tangent, sign = linear.solve_bordered(at.jac, at.jac_p, row[:-1], float(row[-1]), right)
+    if tangent is None:
+        return previous, 0.0
+    return tangent / measure.of(tangent), sign
+
+
+def reversed_point(point: Point) -> Point:
+    """Return the point looking the other way along its branch."""
+    return replace(point, tangent=-point.tangent, orientation=-point.orientation)

@@ -1,0 +1,191 @@
+"""One step along a branch: predict, correct, and find the way round corners."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.solve.branch import (
+    Following,
+    Measure,
+    Point,
+    Problem,
+    StepControl,
+    measure_at,
+    tangent_at,
+)
+from stickslip.solve.linear import Bordered
+from stickslip.solve.newton import newton
+from stickslip.solve.status import Status
+
+SHARP_TURN = (
+    0.5  # cosine between successive tangents below which the step is shortened, as far as that goes
+)
+SMOOTH_TURN = 0.9  # cosine above which a change of orientation is a bifurcation, not a corner
+LOOKS_AHEAD = (
+    1.0,
+    4.0,
+    16.0,
+    64.0,
+)  # smallest steps at which the far side of a corner is looked for
+LEAVES_BY = (4.0, 16.0, 1.0, 64.0)  # smallest steps taken along the far side
+
+
+@dataclass(frozen=True, eq=False)
+class _Across:
+    """The equation with one more condition below it: ``row @ (x, p) = value``."""
+
+    residual: FloatArray
+    jac: Bordered
+    seconds_contact: float
+
+
+def across(problem: Problem, y: FloatArray, row: FloatArray, value: float) -> _Across:
+    """Evaluate the equation and the condition ``row @ y = value`` at `y` (n + 1,)."""
+    at = problem.linearise(y[:-1], float(y[-1]))
+    jac = Bordered(at.jac, at.jac_p, row[:-1], float(row[-1]))
+    return _Across(np.append(at.residual, row @ y - value), jac, at.seconds_contact)
+
+
+def take_step(
+    problem: Problem, point: Point, unit: FloatArray, step: float, end: float, following: Following
+) -> Point:
+    """Predict along `unit` and correct; the point says whether that worked.
+
+    Parameters
+    ----------
+    problem
+        The equation.
+    point
+        Where to start.
+    unit
+        (n + 1,) direction of unit length.
+    step
+        Length of the step; change of p over its scale with natural parametrisation.
+    end
+        Parameter value not to pass: a step that would ends there.
+    following
+        Corrector, parametrisation, predictor, measure of length.
+    """
+    measure = measure_at(point.x, following)
+    y = point.y
+    predicted = _prediction(unit, step, measure, following)
+    if predicted is None:
+        return replace(point, solution=replace(point.solution, status=Status.STALLED, iterations=0))
+    ahead, row = predicted
+    guess = y + ahead
+    reach = max(step, measure.of(ahead)) if following.parametrisation == "natural" else step
+    passes = (guess[-1] - end) * (point.p - end) <= 0.0
+    if passes:
+        guess = y + (end - point.p) / unit[-1] * unit
+        row = _natural_row(measure, y.size)
+    value = float(row @ guess)
+    solution = newton(lambda v: across(problem, v, row, value), guess, following.newton)
+    x, p = solution.x[:-1], end if passes else float(solution.x[-1])
+    # a corrector that slides far away, or past the end of the range, has found another piece of the branch
+    near = measure.of(solution.x - y) <= 4.0 * reach and (p - end) * (point.p - end) >= 0.0
+    found = replace(solution, x=x)
+    if not (solution.status.converged and near):
+        status = Status.STALLED if solution.status.converged else solution.status
+        return replace(point, solution=replace(found, x=point.x, status=status))
+    tangent, sign = _direction(problem, point, solution.x, unit, following)
+    return Point(x, p, tangent, step, found, sign)
+
+
+def _natural_row(measure: Measure, size: int) -> FloatArray:
+    return np.append(np.zeros(size - 1), measure.p)
+
+
+def _prediction(
+    unit: FloatArray, step: float, measure: Measure, following: Following
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return the predicted change of (x, p) and the row of the condition that holds the corrector; None if it is too long."""
+    if following.parametrisation == "natural":
+        share = measure.p * abs(float(unit[-1]))
+        # beside a fold a small change of p asks for a long way, whose end has nothing to do with this branch
+        if step > following.control.largest * share:
+            return None
+        return step / share * unit, _natural_row(measure, unit.size)
+    if following.parametrisation == "local":
+        weights = np.append(measure.x, measure.p)
+        largest = int(np.argmax(np.abs(weights * unit)))
+        row = np.zeros(unit.size)
+        row[largest] = weights[largest]
+        return step * unit, row
+    return step * unit, measure.row(unit)
+
+
+def _direction(
+    problem: Problem, before: Point, y: FloatArray, unit: FloatArray, following: Following
+) -> tuple[FloatArray, float]:
+    """Return the direction in which to go on from `y`, and its orientation."""
+    measure = measure_at(y[:-1], following)
+    if following.predictor == "secant":
+        chord = y - before.y
+        return chord / measure.of(chord), 0.0
+    tangent, sign = tangent_at(problem, y, unit, following)
+    # Where contact states change the branch may turn back so sharply that the tangent nearest to the old one leads back to the
+    # corner. The sign of the bordered determinant is the same along a piecewise smooth path (Allgower & Georg 1990); a sign
+    # that changes although the tangent hardly turned is a bifurcation point, which is passed straight on.
+    old = measure_at(before.x, following)
+    if sign * before.orientation < 0.0 and old.cosine(unit, tangent) < SMOOTH_TURN:
+        return -tangent, -sign
+    return tangent, sign
+
+
+def round_corner(
+    problem: Problem, point: Point, unit: FloatArray, end: float, following: Following
+) -> Point:
+    """Leave a corner of more than a right angle along its far side.
+
+    No plane across the old tangent meets that side. Its tangent is that of the Jacobian just beyond the corner, oriented as the path
+    was; where the linear solver gives no determinant both ways are tried.
+    """
+    smallest = following.control.smallest
+    measure = measure_at(point.x, following)
+    orientation = point.orientation
+    if following.predictor == "secant":
+        orientation = tangent_at(problem, point.y, unit, following)[1]
+    iterations = 0
+    for ahead in LOOKS_AHEAD:
+        far, sign = tangent_at(problem, point.y + ahead * smallest * unit, unit, following)
+        if sign == 0.0:
+            continue
+        known = not np.isnan(sign * orientation)
+        if known and sign * orientation < 0.0:
+            far = -far
+        for side in (far,) if known else (far, -far):
+            for share in LEAVES_BY:
+                new = take_step(problem, point, side, share * smallest, end, following)
+                iterations += new.solution.iterations
+                if new.solution.status.converged and _left(new, side, unit, known, measure):
+                    solution = replace(new.solution, iterations=iterations)
+                    return replace(new, step=4.0 * smallest, solution=solution)
+    return no_step(point, following.control, iterations)
+
+
+def _left(new: Point, side: FloatArray, unit: FloatArray, known: bool, measure: Measure) -> bool:
+    """Whether a step along the far side of a corner ended there, and not on the near side again."""
+    turn = measure.cosine(side, new.tangent)
+    return turn > SHARP_TURN and (known or turn > abs(measure.cosine(unit, new.tangent)))
+
+
+def no_step(point: Point, control: StepControl, iterations: int) -> Point:
+    """Return the point from which no step, however short, converged."""
+    failed = replace(
+        point.solution,
+        status=Status.STEP_TOO_SMALL,
+        iterations=iterations,
+        residual_norm=np.nan,
+        seconds_contact=0.0,
+        seconds_linear=0.0,
+    )
+    return replace(point, step=control.first, solution=failed)
+
+
+def next_step(step: float, iterations: int, turn: float, control: StepControl) -> float:
+    """Grow after easy corrections, shrink where Newton works hard or the branch turns."""
+    factor = 1.5 if iterations <= 4 else 1.0 if iterations <= 8 else 0.6
+    if turn < 0.97:
+        factor = min(factor, 0.7)
+    return float(np.clip(step * factor, control.smallest, control.largest))
