@@ -37,6 +37,7 @@ from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.damper import FlatCurvedDamper, gap_operator
 from stickslip.model.damping import rayleigh_damping
+from stickslip.model.modes import natural_frequencies
 from stickslip.response.forced import accepted_points, forced_problem, forced_response
 from stickslip.response.sweep import Sweep
 from stickslip.response.system import System
@@ -646,7 +647,7 @@ def peak_of(system, force, sweep):
 
 
 def test_friction_joint_of_two_flexible_blocks():
-    """Two ways over non-matching meshes give nearly the same peak, stuck and with most of its height taken by friction.
+    """Two ways over non-matching meshes give nearly the same peak, most of its height taken by friction.
 
     Tributary areas of 5 nodes a side have a second moment of area 1 + 2/16 times that of the true face: a stiffer joint in bending, 1 % in
     frequency here. With 6 and 7 nodes a side the difference is 0.4 % and 0.3 %.
@@ -661,11 +662,13 @@ def test_friction_joint_of_two_flexible_blocks():
         omega_range=(2 * np.pi * 2780, 2 * np.pi * 3100), selection="always_low", samples=64, points=4, peak_points=4
     )  # fmt: skip
     ways = (node_to_segment(b, a), segment_to_segment(a, b, degree=2))
-    peaks = {
-        force: [peak_of(friction_joint(way, structure, held), force, sweep) for way in ways]
-        for force in (1.0, 400.0)
-    }
-    for (by_nodes, where), (by_segments, there) in peaks.values():
-        assert by_nodes == pytest.approx(by_segments, rel=0.02)
-        assert where == pytest.approx(there, rel=0.012)
-    assert peaks[400.0][1][0] < 0.2 * peaks[1.0][1][0]  # friction matters
+    systems = [friction_joint(way, structure, held) for way in ways]
+    by_nodes, by_segments = (peak_of(system, 400.0, sweep) for system in systems)
+    assert by_nodes[0] == pytest.approx(by_segments[0], rel=0.02)
+    assert by_nodes[1] == pytest.approx(by_segments[1], rel=0.012)
+    stuck = systems[1].stuck_structure()
+    omega = 2 * np.pi * natural_frequencies(stuck, 1)[0]
+    Z = stuck.stiffness + 1j * omega * stuck.damping - omega**2 * stuck.mass
+    shake = np.eye(stuck.n)[systems[1].outputs[0]]
+    linear = abs(np.linalg.solve(np.asarray(Z), shake)[systems[1].outputs[0]])
+    assert by_segments[0] < 0.2 * linear  # friction matters
