@@ -29,6 +29,19 @@ if TYPE_CHECKING:
     from stickslip.contact.laws.polynomial_spring import PolynomialSpring
     from stickslip.contact.laws.regularised_coulomb import RegularisedCoulomb
     from stickslip.contact.laws.unilateral_spring import UnilateralSpring
+    from stickslip.contact.pairing import (
+        Pairing,
+        node_to_node,
+        node_to_segment,
+        paired_interface,
+        segment_to_segment,
+    )
+    from stickslip.contact.surface import (
+        Surface,
+        nodal_surface,
+        rigid_surface,
+        structure_surface,
+    )
     from stickslip.errors import (
         InputError,
         SingularError,
@@ -114,6 +127,19 @@ _MODULES = {
     "stickslip.contact.laws.polynomial_spring": ("PolynomialSpring",),
     "stickslip.contact.laws.regularised_coulomb": ("RegularisedCoulomb",),
     "stickslip.contact.laws.unilateral_spring": ("UnilateralSpring",),
+    "stickslip.contact.pairing": (
+        "Pairing",
+        "node_to_node",
+        "node_to_segment",
+        "paired_interface",
+        "segment_to_segment",
+    ),
+    "stickslip.contact.surface": (
+        "Surface",
+        "nodal_surface",
+        "rigid_surface",
+        "structure_surface",
+    ),
     "stickslip.errors": ("InputError", "SingularError", "StickslipError"),
     "stickslip.harmonic.aft": ("contact_forces",),
     "stickslip.harmonic.excitation": ("HarmonicLoad",),
@@ -173,6 +199,7 @@ __all__ = [
     "Jenkins",
     "Material",
     "Newton",
+    "Pairing",
     "PolynomialSpring",
     "RegularisedCoulomb",
     "RigidBody",
@@ -183,6 +210,7 @@ __all__ = [
     "StickslipError",
     "Structure",
     "Study",
+    "Surface",
     "Sweep",
     "System",
     "TimeStepping",
@@ -207,11 +235,18 @@ __all__ = [
     "lumped",
     "mesh_blade_pair",
     "natural_frequencies",
+    "nodal_surface",
+    "node_to_node",
+    "node_to_segment",
+    "paired_interface",
     "preload",
     "rayleigh_damping",
     "read_study",
+    "rigid_surface",
     "run_study",
+    "segment_to_segment",
     "signals",
+    "structure_surface",
     "write_mesh",
     "write_report",
 ]
