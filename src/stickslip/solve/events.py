@@ -32,6 +32,8 @@ class Event:
 
 
 FOLD = Event(name="fold", value=lambda point: float(point.tangent[-1]))
+CLOSE = 10.0  # tolerances that the neighbours of an event may be apart
+HALVINGS = 60  # of the way between them
 
 
 class _LostError(Exception):
@@ -67,43 +69,82 @@ def located(
         The point where the value is zero or jumps, named after the event. If the corrector fails in between, a point with its status and
         the state it came from.
     """
-    measure = measure_at(before.x, following)
-    chord = after.y - before.y
-    length = measure.of(chord)
-    row = measure.row(chord) / length**2
-    known = {0.0: before, 1.0: after}
     spent: list[Solution] = []
-
-    def point_at(share: float) -> Point:
-        if share not in known:
-            guess = _between(known, share)
-            value = float(row @ before.y) + share
-            solution = newton(lambda v: across(problem, v, row, value), guess, following.newton)
-            spent.append(solution)
-            if not solution.status.converged:
-                raise _LostError(solution)
-            tangent, sign = tangent_at(problem, solution.x, chord / length, following)
-            x, p = solution.x[:-1], float(solution.x[-1])
-            found = replace(solution, x=x)
-            known[share] = Point(x, p, tangent, before.step, found, sign)
-        return known[share]
-
     try:
-        share = scipy.optimize.brentq(
-            lambda s: event.value(point_at(float(s))), 0.0, 1.0, xtol=event.tolerance / length
-        )
-        point = point_at(float(share))
+        point, low, high = _narrowed(problem, before, after, event, following, spent)
+        side = np.sign(event.value(before))
+        for _ in range(HALVINGS):
+            measure = measure_at(low.x, following)
+            if measure.of(high.y - low.y) <= CLOSE * event.tolerance:
+                break
+            # at a sharp corner planes meet both of its sides, and the neighbours found are far apart: each chord between the last
+            # neighbours cuts off a part that has the corner in it
+            point = _on_chord(problem, low, high, 0.5, following, spent)
+            if np.sign(event.value(point)) == side:
+                low = point
+            else:
+                high = point
     except _LostError as lost:
         point = replace(before, solution=replace(lost.solution, x=before.x))
     return replace(point, event=event.name, solution=charged(point.solution, spent))
 
 
-def _between(known: dict[float, Point], share: float) -> FloatArray:
-    """Return a guess on the plane at `share`, from its neighbours."""
-    low = max(s for s in known if s < share)
-    high = min(s for s in known if s > share)
-    part = (share - low) / (high - low)
-    return (1.0 - part) * known[low].y + part * known[high].y
+def _narrowed(
+    problem: Problem,
+    before: Point,
+    after: Point,
+    event: Event,
+    following: Following,
+    spent: list[Solution],
+) -> tuple[Point, Point, Point]:
+    """Look for the event on planes across one chord (Brent 1973); return it and its neighbours on both sides."""
+    known = {0.0: before, 1.0: after}
+
+    def value_at(share: float) -> float:
+        if share not in known:
+            low = max(s for s in known if s < share)
+            high = min(s for s in known if s > share)
+            part = (share - low) / (high - low)
+            guess = known[low].y + part * (known[high].y - known[low].y)
+            known[share] = _on_chord(problem, before, after, share, following, spent, guess)
+        return event.value(known[share])
+
+    length = measure_at(before.x, following).of(after.y - before.y)
+    xtol = event.tolerance / length
+    root = float(scipy.optimize.brentq(lambda s: value_at(float(s)), 0.0, 1.0, xtol=xtol))
+    value_at(root)
+    side = np.sign(value_at(0.0))
+    low = max(s for s in known if s <= root and np.sign(value_at(s)) == side)
+    high = min(s for s in known if s >= root and np.sign(value_at(s)) != side)
+    return known[root], known[low], known[high]
+
+
+def _on_chord(
+    problem: Problem,
+    before: Point,
+    after: Point,
+    share: float,
+    following: Following,
+    spent: list[Solution],
+    guess: FloatArray | None = None,
+) -> Point:
+    """Solve on the plane across the chord at a share of its length."""
+    measure = measure_at(before.x, following)
+    chord = after.y - before.y
+    length = measure.of(chord)
+    row = measure.row(chord) / length**2
+    guess = before.y + share * chord if guess is None else guess
+    value = float(row @ before.y) + share
+    solution = newton(lambda v: across(problem, v, row, value), guess, following.newton)
+    spent.append(solution)
+    if not solution.status.converged:
+        raise _LostError(solution)
+    tangent, sign = tangent_at(problem, solution.x, chord / length, following)
+    # beside a sharp corner the chord may point against the direction of travel; the determinant knows
+    if sign * before.orientation < 0.0 < before.orientation * after.orientation:
+        tangent, sign = -tangent, -sign
+    found = replace(solution, x=solution.x[:-1])
+    return Point(found.x, float(solution.x[-1]), tangent, before.step, found, sign)
 
 
 def with_tangent(problem: Problem, point: Point, following: Following) -> Point:

@@ -28,6 +28,7 @@ LOOKS_AHEAD = (
     16.0,
     64.0,
 )  # smallest steps at which the far side of a corner is looked for
+LONGEST = 2.0  # largest steps that a step of p may be long: more is asked for beside a fold only
 LEAVES_BY = (4.0, 16.0, 1.0, 64.0)  # smallest steps taken along the far side
 
 
@@ -103,7 +104,7 @@ def _prediction(
     if following.parametrisation == "natural":
         share = measure.p * abs(float(unit[-1]))
         # beside a fold a small change of p asks for a long way, whose end has nothing to do with this branch
-        if step > following.control.largest * share:
+        if step > LONGEST * following.control.largest * share:
             return None
         return step / share * unit, _natural_row(measure, unit.size)
     if following.parametrisation == "local":
