@@ -21,7 +21,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from multiprocessing import Pool
 from time import process_time
 
@@ -83,8 +83,7 @@ def solve(drawn: Drawn) -> tuple[list[ForcedPoint], str]:
     points: list[ForcedPoint] = []
     try:
         with at_most(CPU_SECONDS):
-            for point in forced_response(drawn.system, drawn.load, drawn.sweep):
-                points.append(point)
+            points.extend(forced_response(drawn.system, drawn.load, drawn.sweep))
     except OutOfTimeError:
         return points, "out of CPU time"
     except StickslipError as error:
@@ -92,8 +91,16 @@ def solve(drawn: Drawn) -> tuple[list[ForcedPoint], str]:
     return points, ""
 
 
+@cache
+def warmed() -> None:
+    """Compile or load the kernels, once a process and outside the clock."""
+    drawn = draw(0, 0)
+    next(iter(forced_response(drawn.system, drawn.load, drawn.sweep)))
+
+
 def outcome(seed: int, number: int) -> Outcome:
-    """Solve and count one system; numbers beyond the asked ones are the larger wedges."""
+    """Solve and count one system; negative numbers are the larger wedges."""
+    warmed()
     drawn = drawn_system(seed, number)
     began = process_time()
     points, early = solve(drawn)

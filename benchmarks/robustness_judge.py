@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_real
-from stickslip.harmonic.aft import contact_forces
 from stickslip.response.forced import ForcedPoint, ForcedProblem
 from stickslip.response.transient import (
     TimeStepping,
@@ -142,4 +142,4 @@ def tractions(problem: ForcedProblem, coefficients: np.ndarray) -> np.ndarray:
     """Return the (n_contacts, 2) tangential forces at t = 0, N."""
     balance = problem.high
     gaps = coefficients @ balance.interface.gap_operator.T
-    return contact_forces(to_real(gaps), balance.parameters, SAMPLES).force[:, :2, 0]
+    return contact_forces(to_real(gaps), balance.compiled, SAMPLES).force[:, :2, 0]

@@ -17,6 +17,7 @@ from stickslip.contact.law import PAIRS, PiecewiseLinear
 from stickslip.contact.laws import LAWS
 from stickslip.errors import InputError
 from stickslip.harmonic.aft import contact_forces
+from validation import case_b1_iwan, case_b1_planar
 
 stiff = st.floats(-1, 1).map(lambda e: 10**e)
 some = st.floats(-1, 1)
@@ -557,3 +558,56 @@ def test_a_second_process_compiles_no_law():
     misses, hits, kernels = (int(word) for word in done.stdout.split())
     assert misses == 0
     assert hits == kernels
+
+
+# ---- numbers of the literature (B1), quickly; `make validate` compares them in full -------------------------------------------
+
+
+@pytest.mark.parametrize("row", case_b1_planar.TABLE, ids=lambda row: f"A/xc={row[0]}")
+def test_planar_friction_on_a_circle(row):
+    ratio = float(row[0])
+    force = case_b1_planar.extrapolated(ratio, 1024)
+    exact = complex(float(row[1]), float(row[2]))
+    # what extrapolation leaves is of second order: (2 pi / 1024)² = 4e-5 of the limit over the amplitude, a fraction of it
+    assert force[1, 0] / ratio == pytest.approx(exact, abs=1e-5)
+    assert 1j * force[1, 1] / ratio == pytest.approx(exact, abs=1e-5)
+
+
+@pytest.mark.parametrize("row", case_b1_iwan.ENERGY, ids=lambda row: f"A={row[0]}")
+def test_energy_lost_in_an_iwan_element(row):
+    amplitude, sliders = float(row[0]), 100
+    law = ss.Iwan(k_t=1.0, limit=1.0, population=ss.UniformBand(n_sliders=sliders))
+    # midpoint rule over the sliders in cells of 2 / n, and 30 / samples² from sampling
+    tolerance = (2.0 / sliders / amplitude) ** 2 + 30.0 / 1024**2
+    assert case_b1_iwan.energy(law, amplitude, 1024) == pytest.approx(float(row[1]), rel=tolerance)
+
+
+def test_first_loading_of_an_iwan_element():
+    x = np.array([0.1, 0.5, 1.0, 2.0, 3.0])
+    law = ss.Iwan(k_t=1.0, limit=1.0, population=ss.UniformBand(n_sliders=20))
+    want = np.where(x < 2.0, x - x**2 / 4.0, 1.0)
+    assert case_b1_iwan.first_loading(law, x) == pytest.approx(want, abs=1e-13)
+
+
+@pytest.mark.parametrize("chi", [0.0, -0.4, -0.8])
+def test_micro_slip_grows_with_the_power_of_its_population(chi):
+    law = ss.Iwan(k_t=1.0, limit=1.0, population=ss.FourParameter(chi=chi, beta=0.5, n_sliders=200))
+    assert case_b1_iwan.slope(law, np.array([0.1, 0.2, 0.4])) == pytest.approx(3 + chi, abs=5e-3)
+
+
+@settings(max_examples=40)
+@given(population=populations)
+def test_sliders_add_up_to_the_element(population):
+    law = ss.Iwan(k_t=3.0, limit=0.7, k_w=2.0, k_n=5.0, population=population)
+    rows = law.elements()
+    assert np.sum(rows[:, :3], axis=0) == pytest.approx([3.0, 2.0, 5.0], rel=1e-12)
+    limits = rows[:, 3] * rows[:, 4]
+    assert np.sum(limits[np.isfinite(limits)]) == pytest.approx(0.7, rel=1e-12)
+
+
+def test_first_loading_follows_the_curve_it_was_made_of():
+    x, f = (1.0, 2.0, 4.0), (2.0, 3.0, 3.5)
+    law = ss.Iwan(k_t=2.0, limit=3.0, population=ss.FirstLoading(displacement=x, force=f))
+    # the last piece goes on: 0.25 of elastic spring, under which the sliders hold 3.5 - 4 / 4 = 2.5
+    got = case_b1_iwan.first_loading(law, np.array(x) * 3.0 / 2.5)
+    assert got == pytest.approx(np.array(f) * 3.0 / 2.5, rel=1e-13)

@@ -4,16 +4,14 @@ The library samples the contact force, with an error that falls with the square 
 here that ten digits are met, and the order of the fall is a row of its own.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
 from stickslip.arrays import ComplexArray
 from stickslip.contact.compiled import compile_contacts
+from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.fourier import to_complex
 from validation.compare import Record, bound, digits, record
-from validation.models import jenkins
 
 SOURCE = "literature benchmark B1 (closed form)"
 ORDER = 5
@@ -80,7 +78,7 @@ def element_force(ratio: float, samples: int, order: int = ORDER) -> ComplexArra
     """Return the force harmonics 0..order over fc of an element with k = fc = 1 under the amplitude `ratio`."""
     gap = np.zeros((2 * order + 1, 3))
     gap[1, 0] = ratio
-    contacts = compile_contacts([jenkins(1.0, 1.0)])
+    contacts = compile_contacts([Jenkins(k_t=1.0, limit=1.0)])
     return to_complex(contact_forces(gap, contacts, samples).coefficients)[:, 0]
 
 
@@ -88,7 +86,7 @@ def circle_force(ratio: float, samples: int) -> ComplexArray:
     """Return the harmonics of both tangential forces on a circular path; limits and springs are 1."""
     gap = np.zeros((3, 3))
     gap[1, 0], gap[2, 1] = ratio, ratio
-    contacts = compile_contacts([replace(jenkins(1.0, 1.0), k_w=1.0)])
+    contacts = compile_contacts([Jenkins(k_t=1.0, k_w=1.0, limit=1.0)])
     return to_complex(contact_forces(gap, contacts, samples).coefficients)
 
 
