@@ -1,4 +1,8 @@
-"""A contact law of one's own: a Jenkins element whose friction limit grows with the sliding velocity.
+"""
+A contact law of one's own
+==========================
+
+A Jenkins element whose friction limit grows with the sliding velocity.
 
 Run it as it is; nothing of the package is touched. The first run compiles the step of the law, later ones load it.
 """

@@ -379,10 +379,6 @@ def test_resuming_through_the_branch(branch_run):
     assert_resumes(system, load, ALERTED, points, stops)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="the branch is begun towards higher frequencies and ends where it first meets the frequency of its end",
-)
 def test_the_response_through_a_branch_is_one_curve(branch_run):
     system, load, points = branch_run
     problem = forced_problem(system, load, ALERTED)
