@@ -56,6 +56,16 @@ class DynamicLagrangian:
         """The condensed structure and its load."""
         return self.balance.linear
 
+    @property
+    def displacement_scale(self) -> float:
+        """Displacement that a scaled unknown of one stands for, m."""
+        return self.balance.displacement_scale
+
+    @property
+    def force_scale(self) -> float:
+        """Force that a scaled residual of one stands for, N."""
+        return self.balance.force_scale
+
     def coefficients(self, x: FloatArray) -> ComplexArray:
         """Return the (order+1, n) complex coefficients in metres of scaled unknowns `x`."""
         return self.balance.coefficients(x)
