@@ -9,12 +9,15 @@ from hypothesis import strategies as st
 from models import OPEN, SLIP, STICK, analyse, basis, twin
 from scipy.optimize import brentq
 
+from stickslip.contact import threads
+from stickslip.contact.compiled import compile_contacts
 from stickslip.contact.element import element
 from stickslip.contact.events import exact_period
 from stickslip.contact.intervals import contact_period, prefix_sums
 from stickslip.contact.law import NN, TN, TT, WN, WW
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.trigonometric import most_sign_changes, search_grid, sign_changes
+from stickslip.harmonic.aft import contact_forces
 
 SIZE = 1e-5  # gap amplitudes of the tests, m
 BLOCKS = {TT: (0, 0), WW: (1, 1), NN: (2, 2), TN: (0, 2), WN: (1, 2)}
@@ -550,3 +553,28 @@ def test_zero_counts_as_positive():
     sine = found(np.array([0.0, 0.0, 1.0]))  # positive at 0, negative from π
     assert sine.size == 2
     assert sine == pytest.approx([np.pi, 2 * np.pi])
+
+
+# ---- threads ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("evaluator", ["intervals", "events"])
+def test_threads_change_nothing(evaluator, monkeypatch):
+    rng = np.random.default_rng(2)
+    laws = [
+        ElasticCoulomb(k_t=1e6, k_w=2e6, k_n=3e6, mu=0.5, preload=60.0 * p)
+        for p in rng.uniform(-0.5, 3.0, 37)
+    ]
+    contacts = compile_contacts(laws, evaluator=evaluator)
+    q = random_gaps(rng, 3, 37, 2.0)
+    alone = contact_forces(q, contacts, 64)
+    monkeypatch.setattr(threads, "CONTACTS_WORTH_THREADS", 2)
+    monkeypatch.setattr(threads.numba, "get_num_threads", lambda: 2)
+    assert threads.thread_shares(37) > 1
+    shared = contact_forces(q, contacts, 64)
+    assert np.array_equal(alone.coefficients, shared.coefficients)
+    assert np.array_equal(alone.blocks, shared.blocks)
+    assert np.array_equal(alone.force, shared.force)
+    assert np.array_equal(alone.state, shared.state)
+    monkeypatch.setattr(threads.numba, "get_num_threads", lambda: 1)
+    assert threads.thread_shares(10**6) == 1

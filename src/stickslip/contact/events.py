@@ -30,6 +30,7 @@ from stickslip.contact.slider import (
     scratch,
     zeros,
 )
+from stickslip.contact.threads import thread_shares
 from stickslip.contact.trigonometric import add_means, harmonics_at, product_matrix, search_grid
 
 
@@ -213,6 +214,22 @@ def _contact(  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
+def _contacts(  # type: ignore[no-untyped-def]
+    start, end, polynomials, elements, first, grid, gap, coefficients, blocks, force, state
+):  # fmt: skip
+    """Evaluate the contacts from `start` to before `end`."""
+    samples = gap.shape[2]
+    work = scratch(polynomials.shape[2], grid.shape[1], samples)
+    n_x = np.empty(2, np.int64)
+    other = np.empty((2, samples), np.int64)
+    for c in range(start, end):
+        _contact(
+            polynomials[c], elements[first[c] : first[c + 1]], gap[c], grid, work, n_x, other,
+            coefficients[c], blocks[c], force[c], state[c],
+        )  # fmt: skip
+
+
+@numba.njit(cache=True)
 def contact_events(polynomials, elements, first, grid, gap, coefficients, blocks, force, state):  # type: ignore[no-untyped-def]
     """Evaluate all contacts over one period, exactly.
 
@@ -238,15 +255,21 @@ def contact_events(polynomials, elements, first, grid, gap, coefficients, blocks
     state
         Out: (n_contacts, 2, samples) 0 stick, 1 slip, 2 open, for t and w; a contact of several elements slips where they differ.
     """
-    n_contacts, _, m = polynomials.shape
-    samples = gap.shape[2]
-    work = scratch(m, grid.shape[1], samples)
-    n_x = np.empty(2, np.int64)
-    other = np.empty((2, samples), np.int64)
-    for c in range(n_contacts):
-        _contact(
-            polynomials[c], elements[first[c] : first[c + 1]], gap[c], grid, work, n_x, other,
-            coefficients[c], blocks[c], force[c], state[c],
+    _contacts(
+        0, gap.shape[0], polynomials, elements, first, grid, gap, coefficients, blocks, force, state
+    )
+
+
+@numba.njit(cache=True, parallel=True)
+def contact_events_threads(  # type: ignore[no-untyped-def]
+    shares, polynomials, elements, first, grid, gap, coefficients, blocks, force, state
+):  # fmt: skip
+    """Do the same as `contact_events` in `shares` that threads take in turn."""
+    n = gap.shape[0]
+    for share in numba.prange(shares):
+        _contacts(
+            share * n // shares, (share + 1) * n // shares,
+            polynomials, elements, first, grid, gap, coefficients, blocks, force, state,
         )  # fmt: skip
 
 
@@ -288,7 +311,10 @@ def exact_period(
     blocks = np.empty((n, pairs, m, m))
     force = np.empty_like(gap)
     state = np.empty((n, 2, gap.shape[2]), dtype=np.int64)
-    contact_events(
-        polynomials, elements, first, _grid((m - 1) // 2), gap, coefficients, blocks, force, state
-    )
+    arrays = (polynomials, elements, first, _grid((m - 1) // 2), gap, coefficients, blocks, force, state)  # fmt: skip
+    shares = thread_shares(n)
+    if shares > 1:
+        contact_events_threads(shares, *arrays)
+    else:
+        contact_events(*arrays)
     return coefficients.reshape(width, m).T, blocks, force, state

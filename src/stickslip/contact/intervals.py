@@ -223,6 +223,30 @@ def _merge(state, other):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
+def _contacts(  # type: ignore[no-untyped-def]
+    start, end, gap, elements, first, basis, cos_table, sin_table, force, state, blocks
+):  # fmt: skip
+    """Evaluate the contacts from `start` to before `end`."""
+    n = gap.shape[2]
+    size = cos_table.shape[1]
+    work = (
+        np.empty(n), np.empty(n), np.empty(n, np.bool_), np.empty(n, np.int64), np.empty(n),
+        (np.empty(size), np.empty(size), np.empty(size), np.empty(size)),
+    )  # fmt: skip
+    other = np.empty((2, n), np.int64)
+    for c in range(start, end):
+        force[c] = 0.0
+        blocks[c] = 0.0
+        for e in range(first[c], first[c + 1]):
+            own = state[c] if e == first[c] else other
+            _element_period(
+                gap[c], elements[e], basis, cos_table, sin_table, force[c], own, blocks[c], work
+            )
+            if e > first[c]:
+                _merge(state[c], other)
+
+
+@numba.njit(cache=True)
 def contact_period(gap, elements, first, basis, cos_table, sin_table, force, state, blocks):  # type: ignore[no-untyped-def]
     """Evaluate all contacts over one period.
 
@@ -244,20 +268,19 @@ def contact_period(gap, elements, first, basis, cos_table, sin_table, force, sta
         Out: (n_contacts, P, m, m) derivatives of Fourier coefficients of the force by those of the gap, m = 2 order + 1, of which the
         first five differ from zero: t by t, w by w, n by n, t by n, w by n.
     """
-    n = gap.shape[2]
-    size = cos_table.shape[1]
-    work = (
-        np.empty(n), np.empty(n), np.empty(n, np.bool_), np.empty(n, np.int64), np.empty(n),
-        (np.empty(size), np.empty(size), np.empty(size), np.empty(size)),
-    )  # fmt: skip
-    other = np.empty((2, n), np.int64)
-    for c in range(gap.shape[0]):
-        force[c] = 0.0
-        blocks[c] = 0.0
-        for e in range(first[c], first[c + 1]):
-            own = state[c] if e == first[c] else other
-            _element_period(
-                gap[c], elements[e], basis, cos_table, sin_table, force[c], own, blocks[c], work
-            )
-            if e > first[c]:
-                _merge(state[c], other)
+    _contacts(
+        0, gap.shape[0], gap, elements, first, basis, cos_table, sin_table, force, state, blocks
+    )
+
+
+@numba.njit(cache=True, parallel=True)
+def contact_period_threads(  # type: ignore[no-untyped-def]
+    shares, gap, elements, first, basis, cos_table, sin_table, force, state, blocks
+):  # fmt: skip
+    """Do the same as `contact_period` in `shares` that threads take in turn."""
+    n = gap.shape[0]
+    for share in numba.prange(shares):
+        _contacts(
+            share * n // shares, (share + 1) * n // shares,
+            gap, elements, first, basis, cos_table, sin_table, force, state, blocks,
+        )  # fmt: skip

@@ -8,8 +8,9 @@ import numpy as np
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.compiled import CompiledContacts, MarchedLaws
 from stickslip.contact.events import exact_period
-from stickslip.contact.intervals import contact_period, prefix_sums
+from stickslip.contact.intervals import contact_period, contact_period_threads, prefix_sums
 from stickslip.contact.march import march_period
+from stickslip.contact.threads import thread_shares
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,9 +115,12 @@ def _on_samples(
     force = np.empty_like(gap)
     state = np.empty((n, 2, samples), dtype=np.int64)
     blocks = np.empty((n, contacts.pairs, m, m))
-    contact_period(
-        gap, contacts.elements, contacts.first, tables.basis, tables.cos, tables.sin, force, state, blocks,
-    )  # fmt: skip
+    arrays = (gap, contacts.elements, contacts.first, tables.basis, tables.cos, tables.sin, force, state, blocks)  # fmt: skip
+    shares = thread_shares(n)
+    if shares > 1:
+        contact_period_threads(shares, *arrays)
+    else:
+        contact_period(*arrays)
     coefficients = tables.analysis.T @ force.reshape(3 * n, samples).T
     return ContactPeriod(coefficients, blocks, None, gap, force, state, 0)
 

@@ -1,0 +1,14 @@
+"""When the contacts of a period are shared among threads."""
+
+import numba
+
+CONTACTS_WORTH_THREADS = 300
+_SHARES_PER_THREAD = 4  # contacts that slip and open take longer than those that stick
+
+
+def thread_shares(n_contacts: int) -> int:
+    """Return into how many shares the contacts are split: one for few contacts or one thread (``NUMBA_NUM_THREADS=1``)."""
+    threads = numba.get_num_threads()
+    if threads == 1 or n_contacts < CONTACTS_WORTH_THREADS:
+        return 1
+    return _SHARES_PER_THREAD * threads
