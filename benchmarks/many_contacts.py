@@ -46,10 +46,10 @@ class Plates:
     lift: float  # N, total preload
 
     def load(self, share: float) -> HarmonicLoad:
-        """Return an excitation of `share` times the total preload in harmonic 1."""
-        return HarmonicLoad(
-            np.zeros(self.pull.size), {1: share * self.lift * self.pull.astype(complex)}
-        )
+        """Return the clamping that balances the preloads, and an excitation of `share` times their sum in harmonic 1."""
+        interface = self.system.interface
+        clamping = interface.gap_operator.T @ interface.resting_force()
+        return HarmonicLoad(clamping, {1: share * self.lift * self.pull.astype(complex)})
 
 
 def two_plates(points: int, seed: int = 0) -> Plates:
@@ -85,7 +85,7 @@ def two_plates(points: int, seed: int = 0) -> Plates:
     corner = np.flatnonzero(top & (places[:, 0] < 1e-9) & (places[:, 1] < 1e-9))[0]
     tip = new[3 * n + 3 * corner + np.arange(3)]
     reduced = craig_bampton(full, np.concatenate([gaps, tip]), MODES)
-    reduced = rayleigh_damping(reduced, 0.002, (200.0, 4000.0))
+    reduced = rayleigh_damping(reduced, 0.01, (200.0, 4000.0))
     return _with_contacts(reduced, points, seed)
 
 

@@ -71,21 +71,27 @@ class CondensedProduct:
         return _dynamic(near, s) - _dynamic(back, s), _by_omega(slope)
 
     def block(self, harmonic: int) -> ComplexArray:
-        """Return ``Z_h``, (n, n) complex."""
+        """Return ``Z_h``, (n, n) complex in Fortran order."""
         s = harmonic * self.omega
         (k, c, m), (k_nl, c_nl, m_nl) = self.linear.nn, self.linear.nl
-        out = np.empty(k.shape, dtype=complex)
-        out.real = k - s**2 * m
-        out.imag = s * c
+        # symmetric: their transposes are in Fortran order
+        out = np.empty(k.shape, dtype=complex, order="F")
+        np.multiply(m.T, -(s**2), out=out.real)
+        out.real += k.T
+        np.multiply(c.T, s, out=out.imag)
         far = k_nl + 1j * s * c_nl - s**2 * m_nl
+        if far.shape[1] == 0:
+            return out
         inner = self.inner[harmonic]
         moved = (
             far.T / inner[:, None]
             if isinstance(inner, np.ndarray)
             else scipy.linalg.lu_solve(inner, far.T)
         )
-        out -= far @ moved
-        return out
+        # in place: for thousands of coordinates this is the largest array there is
+        return np.asarray(
+            scipy.linalg.blas.zgemm(-1.0, far, moved, beta=1.0, c=out, overwrite_c=True)
+        )
 
 
 def at_frequency(linear: CondensedStiffness, omega: float, order: int) -> CondensedProduct:

@@ -119,7 +119,8 @@ class StructuredJacobian:
         for h in range(self.linear.order + 1):
             block = self.linear.block(h)
             add_stiffness(means[h], self.rows.columns, self.rows.values, block)
-            matrix = np.asfortranarray(self.scale * (block.real if h == 0 else block))
+            block *= self.scale
+            matrix = np.array(block.real, order="F") if h == 0 else block
             lu, pivots, info = _FACTORISE[matrix.dtype.char](matrix, overwrite_a=True)
             size = np.abs(np.diagonal(lu))
             if info != 0 or not size.min() > SINGULAR * size.max():
