@@ -9,6 +9,7 @@ from models import blades_and_damper, griffin, lifting
 
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response import passages
 from stickslip.response.forced import (
     Sweep,
     accepted_pairs,
@@ -16,7 +17,8 @@ from stickslip.response.forced import (
     forced_problem,
     forced_response,
 )
-from stickslip.solve.newton import Newton
+from stickslip.solve.newton import Newton, Solution
+from stickslip.solve.status import Status
 
 HZ = 2 * np.pi
 SHORT = Sweep(omega_range=(155 * HZ, 166 * HZ), samples=64, points=12, peak_points=3)
@@ -267,7 +269,18 @@ def test_a_branch_that_falls_out_of_the_range_is_taken_up_further_on():
 HASTY = replace(BETWEEN, newton=Newton(max_iterations=2), points=40)
 
 
-def test_resuming_after_points_that_failed():
+@pytest.fixture
+def no_rescue(monkeypatch):
+    """Nothing but Newton and shorter steps: points fail that are found otherwise."""
+
+    def fails(_problem, balance, _omega, start):
+        return Solution(np.zeros(balance.size), Status.STALLED, 0, np.nan, 0.0, 0.0)
+
+    monkeypatch.setattr(passages, "otherwise", fails)
+    monkeypatch.setattr(passages, "by_homotopy", fails)
+
+
+def test_resuming_after_points_that_failed(no_rescue):
     system, load = lifting()
     points = list(forced_response(system, load, HASTY))
     failed = [k for k, p in enumerate(points) if not p.converged]
@@ -284,7 +297,7 @@ def test_resuming_frequencies():
     assert_resumes(system, load, sweep, points, range(1, len(points)))
 
 
-def test_frequencies_stay_on_their_grid_after_one_that_failed():
+def test_frequencies_stay_on_their_grid_after_one_that_failed(no_rescue):
     system, load = lifting()
     sweep = replace(HASTY, newton=Newton(max_iterations=1), frequencies=24, peak_points=0)
     points = list(forced_response(system, load, sweep))
@@ -327,7 +340,7 @@ def test_repeats_stay_on_the_branch_of_their_neighbours(branch_run):
     problem = forced_problem(system, load, ALERTED)
     low = {p.index: p for p in points if p.stage == "low"}
     found = {i: p for i, p in repeats(points).items() if p.converged}
-    assert len(found) > 10
+    assert len(found) > 5, "hardly a repeat converged: nothing was shown"
     for i, p in found.items():
         # the other stable solution at these frequencies is a tenth as high, the unstable one two thirds
         assert problem.amplitude(p) == pytest.approx(problem.amplitude(low[i]), rel=0.1)

@@ -49,6 +49,7 @@ def both_passages(
         threshold=-1.0,
         frequencies=5,
         peak_points=0,
+        evaluator="intervals",  # on samples, as the published numbers
     )
     points = list(forced_response(problem, load, sweep))
     last = max(p.index for p in points)
@@ -79,7 +80,10 @@ def two_forms(hertz: float) -> float:
 def crossing() -> list[ForcedPoint]:
     """Follow the branch of H = 1 from 221 to 229 Hz by arc length."""
     sweep = Sweep(
-        omega_range=(2 * np.pi * 221, 2 * np.pi * 229), selection="always_low", peak_points=0
+        omega_range=(2 * np.pi * 221, 2 * np.pi * 229),
+        selection="always_low",
+        peak_points=0,
+        evaluator="intervals",
     )
     return accepted_points(list(forced_response(blade_damper_blade(), b6_load(), sweep)))
 

@@ -18,7 +18,14 @@ PEAKS = (
 def curve(force: float) -> tuple[float, float, float]:
     """Return frequency and height of the peak of the free end, and the share of converged points."""
     problem, load = small_chain(), force_at(20, 19, force)
-    sweep = Sweep(omega_range=(6.0, 12.0), low=5, high=5, selection="always_low", points=60)
+    sweep = Sweep(
+        omega_range=(6.0, 12.0),
+        low=5,
+        high=5,
+        selection="always_low",
+        points=60,
+        evaluator="intervals",  # on samples, as the other solver
+    )
     points = accepted_points(list(forced_response(problem, load, sweep)))
     solved = [p for p in points if p.converged]
     made = forced_problem(problem, load, sweep)

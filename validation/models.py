@@ -189,6 +189,7 @@ def at_frequency(
         selection="always_low",
         frequencies=5,
         peak_points=0,
+        evaluator="intervals",  # on samples, as the published numbers
     )
     point = list(forced_response(problem, load, sweep))[-1]
     if not point.converged:

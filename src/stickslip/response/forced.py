@@ -6,10 +6,11 @@ that resolve the resonance peak.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.passages import first_passage, follow_run, repeat
+from stickslip.response.preload import preload
 from stickslip.response.resonance import resolve_peak
 from stickslip.response.sweep import (
     ForcedPoint,
@@ -19,6 +20,7 @@ from stickslip.response.sweep import (
     accepted_points,
     branch_points,
     forced_problem,
+    reached,
     runs_of_repeats,
 )
 from stickslip.response.system import System
@@ -32,6 +34,9 @@ __all__ = [
     "forced_problem",
     "forced_response",
 ]
+
+
+LAST_TRY = 2  # repeats of a frequency before the last one, by homotopy
 
 
 def forced_response(
@@ -79,10 +84,32 @@ def forced_response(
                 yield high[index]
     branches: list[ForcedPoint] = []
     for first, last in runs_of_repeats(high):
+        if any(tried[i] > LAST_TRY for i in range(first, last + 1)):
+            continue
         if all(high[i].converged for i in range(first, last + 1)):
             continue
         branch = branch_points(done, first)
         yield from follow_run(problem, first, last, low, branch, high)
         branches += branch
+    # last, a homotopy for what neither neighbours nor the branch led to
+    lost = [low[i] for i in _unsolved(low, high, branches) if tried[i] <= LAST_TRY]
+    static = preload(system, load.static) if lost else None
+    for point in lost:
+        solved = {i: p for i, p in high.items() if p.converged}
+        high[point.index] = repeat(problem, point, quiet | solved, static)
+        yield high[point.index]
     accepted = accepted_points([*low, *high.values(), *branches])
     yield from resolve_peak(problem, accepted, [p for p in done if p.stage == "peak"])
+
+
+def _unsolved(
+    low: Sequence[ForcedPoint], high: Mapping[int, ForcedPoint], branches: Sequence[ForcedPoint]
+) -> list[int]:
+    """Return the indices of repeats that failed and that no branch replaces."""
+    return [
+        i
+        for first, last in runs_of_repeats(high)
+        if not reached(branch_points(branches, first), low, last)
+        for i in range(first, last + 1)
+        if not high[i].converged
+    ]

@@ -180,7 +180,7 @@ def branch_in_parameter(
         return
     onward = start if forward else reversed_point(start)
     for point in trace(problem, onward, last, following):
-        yield _parameter_point(family, omega, point, growing=point.tangent[-1] > 0.0)
+        yield _parameter_point(family, omega, point, growing=bool(point.tangent[-1] > 0.0))
 
 
 def first_guess(

@@ -6,32 +6,28 @@ from time import perf_counter
 
 import numpy as np
 
+from stickslip.arrays import FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection import jacobian_alert
 from stickslip.response.preload import bonded_start, preload
+from stickslip.response.rescue import by_homotopy, charged, otherwise
 from stickslip.response.sweep import (
     BRANCH_ITERATIONS,
     ForcedPoint,
     ForcedProblem,
     branch_end,
     forced_point,
+    reached,
 )
 from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to
 from stickslip.solve.newton import Solution, newton
+from stickslip.solve.status import Rung
 
-LOAD_SHARES = (
-    0.05,
-    0.1,
-    0.2,
-    0.4,
-    0.6,
-    0.8,
-    1.0,
-)  # excitation ramp where the first point does not converge at once
 LOOP = 3  # multiples of `Sweep.points` after which a branch that gains no frequency is left
 BRANCH_SEEDS = 4  # points from which a branch with many harmonics is begun
 BRANCH_LENGTH = 8  # multiples of `Sweep.points` after which such a branch is given up
 BACKWARD = 0.1  # share of the range by which it may fall back behind the start of the range
+DETOUR = 30  # most points on the way from a neighbour to a repeat that fails
 NEIGHBOURS = 1  # points on each side from which a repeat that fails is tried
 
 
@@ -56,10 +52,10 @@ def first_passage(
         if points and not _lost(problem, points):
             following = problem.following(problem.low)
             point = advance(problem.low, problem.branch_point(points[-1]), last, following)
-        if point is None or point.p < first:
+        if point is None or not point.solution.status.converged or point.p < first:
             # the branch starts here, or is lost: take it up (again) a little further on
             gap = sweep.control.largest * sweep.control.scale if points else 0.0
-            point = _fresh_point(problem, load, min(reach + gap, last))
+            point = _fresh_point(problem, load, points, min(reach + gap, last))
         points.append(_low_point(problem, point, len(points), began))
         yield points[-1]
 
@@ -83,29 +79,53 @@ def _grid(
         if before:
             point = step_to(problem.low, problem.branch_point(before[-1]), float(omega), following)
         if point is None or not point.solution.status.converged:
-            point = _fresh_point(problem, load, float(omega))
+            point = _fresh_point(problem, load, before, float(omega))
         points.append(_low_point(problem, point, len(points), began))
         yield points[-1]
 
 
-def _fresh_point(problem: ForcedProblem, load: HarmonicLoad, omega: float) -> Point:
-    """Solve from the static equilibrium plus the bonded vibration; ramp the excitation if that is too far away."""
+def _fresh_point(
+    problem: ForcedProblem, load: HarmonicLoad, points: list[ForcedPoint], omega: float
+) -> Point:
+    """Solve without a branch that leads here.
+
+    From the last solution; from the static equilibrium plus the bonded vibration; from a solution with few harmonics. Then the other
+    globalisations, and last the homotopy in the excitation.
+    """
     balance = problem.low
     following = replace(problem.following(balance), newton=problem.sweep.newton)
+    spent: list[Solution] = []
+    for start in _starts(problem, load, points, omega):
+        point = start_point(balance, start, omega, following)
+        spent.append(point.solution)
+        if point.solution.status.converged:
+            return replace(point, solution=charged(spent))
+    spent.append(otherwise(problem, balance, omega, start))
+    if not spent[-1].status.converged:
+        static = preload(problem.system, load.static)[None].astype(complex)
+        spent.append(by_homotopy(problem, balance, omega, balance.unknowns(static)))
+    if spent[-1].status.converged:
+        point = start_point(balance, spent[-1].x, omega, following)
+    return replace(point, solution=charged(spent))
+
+
+def _starts(
+    problem: ForcedProblem, load: HarmonicLoad, points: list[ForcedPoint], omega: float
+) -> Iterator[FloatArray]:
+    """Yield scaled unknowns of the first passage to start Newton from."""
+    balance = problem.low
+    if points and points[-1].converged:
+        yield balance.unknowns(points[-1].coefficients)
     guess = balance.coefficients(bonded_start(balance, omega, problem.system))
     guess[0] = preload(problem.system, load.static)
-    point = start_point(balance, balance.unknowns(guess), omega, following)
-    if point.solution.status.converged:
-        return point
-    x = balance.unknowns(np.concatenate([guess[:1], LOAD_SHARES[0] * guess[1:]]))
-    spent = [point.solution]
-    for share in LOAD_SHARES:
-        ramped = HarmonicLoad(load.static, {h: share * f for h, f in load.harmonics.items()})
-        eased = replace(balance, linear=balance.linear.with_load(ramped))
-        point = start_point(eased, x, omega, following)
-        spent.append(point.solution)
-        x = point.x
-    return replace(point, solution=_charged(point.solution, spent))
+    yield balance.unknowns(guess)
+    few = balance.with_order(max(load.harmonics, default=balance.order))
+    if few.order < balance.order:
+        solution = newton(
+            lambda x: few.linearise(x, omega), few.unknowns(guess), problem.sweep.newton
+        )
+        if solution.status.converged:
+            yield balance.unknowns(few.coefficients(solution.x))
 
 
 def _low_point(problem: ForcedProblem, point: Point, index: int, began: float) -> ForcedPoint:
@@ -127,7 +147,10 @@ def _low_point(problem: ForcedProblem, point: Point, index: int, began: float) -
 
 
 def repeat(
-    problem: ForcedProblem, point: ForcedPoint, others: Mapping[int, ForcedPoint]
+    problem: ForcedProblem,
+    point: ForcedPoint,
+    others: Mapping[int, ForcedPoint],
+    static: FloatArray | None = None,
 ) -> ForcedPoint:
     """Solve a frequency with more harmonics: from the best of q + Δq, q and its neighbours, or along the branch from a neighbour.
 
@@ -139,6 +162,8 @@ def repeat(
         Point of the first passage.
     others
         Accepted points by index: repeats, and points of the first passage that need none.
+    static
+        (n_retained,) static equilibrium, m, from which a homotopy begins if all else fails; None: no homotopy.
     """
     began = perf_counter()
     balance, omega = problem.high, point.omega
@@ -159,11 +184,14 @@ def repeat(
     for neighbour in near:
         if spent[-1].status.converged:
             break
-        spent.append(along_branch(problem, neighbour, omega).solution)
+        detour = along_branch(problem, neighbour, omega).solution
+        spent.append(replace(detour, rung=max(detour.rung, Rung.SHORTER_STEP)))
     if not spent[-1].status.converged:
-        start = balance.unknowns(point.coefficients)
-        spent.append(newton(lambda v: balance.linearise(v, omega), start, problem.sweep.newton))
-    solution = _charged(spent[-1], spent)
+        spent.append(otherwise(problem, balance, omega, start))
+    if not spent[-1].status.converged and static is not None:
+        at_rest = balance.unknowns(static[None].astype(complex))
+        spent.append(by_homotopy(problem, balance, omega, at_rest))
+    solution = charged(spent)
     made = forced_point(balance, solution, "high", point.index, omega, perf_counter() - began)
     return replace(
         made,
@@ -187,19 +215,27 @@ def follow_run(
     """
     end = branch_end(low, last)
     begin, stop = problem.sweep.omega_range
-    leaves = begin - BACKWARD * (stop - begin)
+    margin = BACKWARD * (stop - begin)
     balance = problem.high
     following = problem.following(balance)
     while len(branch) <= BRANCH_LENGTH * problem.sweep.points:
         began = perf_counter()
         if not branch:
-            point = _branch_start(problem, [*low[:first], *high.values()], first)
+            point = _branch_start(problem, low, high, first)
             if point is None:
                 return
-        elif branch[-1].converged and leaves < branch[-1].omega != end:
-            point = advance(balance, problem.branch_point(branch[-1]), end, following)
-        else:
+        elif (
+            reached(branch, low, last)
+            or not branch[-1].converged
+            or not begin - margin < branch[-1].omega < stop + margin
+        ):
             return
+        else:
+            # another sheet at the frequency of the end: on, until the branch comes back to it
+            upward = branch[-1].tangent[-1] > 0.0
+            beyond = stop + 2 * margin if upward else begin - 2 * margin
+            goal = beyond if branch[-1].omega == end else end
+            point = advance(balance, problem.branch_point(branch[-1]), goal, following)
         made = forced_point(
             balance, point.solution, "branch", first, point.p, perf_counter() - began
         )
@@ -209,18 +245,23 @@ def follow_run(
         yield branch[-1]
 
 
-def _branch_start(problem: ForcedProblem, points: list[ForcedPoint], first: int) -> Point | None:
+def _branch_start(
+    problem: ForcedProblem,
+    low: list[ForcedPoint],
+    high: Mapping[int, ForcedPoint],
+    first: int,
+) -> Point | None:
     """Solve with many harmonics at an accepted point before index `first`, so that the whole run is passed."""
     balance = problem.high
     following = replace(problem.following(balance), newton=problem.sweep.newton)
-    usable = [p for p in points if p.index < first and p.converged]
-    usable = [p for p in usable if p.stage == "high" or not problem.alerted(p)]
+    usable = [high.get(p.index, p) for p in low[:first] if p.converged]
+    usable = [p for p in usable if p.converged and (p.stage == "high" or not problem.alerted(p))]
     for seed in sorted(usable, key=lambda p: -p.index)[:BRANCH_SEEDS]:
         point = start_point(balance, balance.unknowns(seed.coefficients), seed.omega, following)
         if point.solution.status.converged:
             # a first passage that was coming back from a fold goes on downward
-            downward = seed.stage == "low" and seed.tangent.size > 0 and seed.tangent[-1] < 0.0
-            return reversed_point(point) if downward else point
+            tangent = low[seed.index].tangent
+            return reversed_point(point) if tangent.size > 0 and tangent[-1] < 0.0 else point
     return None
 
 
@@ -228,6 +269,7 @@ def along_branch(problem: ForcedProblem, point: ForcedPoint, omega: float) -> Po
     """Go from an accepted point to another frequency on the branch with many harmonics."""
     balance = problem.high
     following = problem.following(balance)
+    following = replace(following, control=replace(following.control, max_points=DETOUR))
     start = start_point(balance, balance.unknowns(point.coefficients), point.omega, following)
     if not start.solution.status.converged:
         return start
@@ -239,13 +281,3 @@ def _neighbours(index: int, others: Mapping[int, ForcedPoint]) -> list[ForcedPoi
     below = sorted((i for i in others if i < index), reverse=True)[:NEIGHBOURS]
     above = sorted(i for i in others if i > index)[:NEIGHBOURS]
     return [others[i] for i in sorted([*below, *above], key=lambda i: abs(i - index))]
-
-
-def _charged(solution: Solution, spent: list[Solution]) -> Solution:
-    """Charge a solution with all the attempts that led to it."""
-    return replace(
-        solution,
-        iterations=sum(s.iterations for s in spent),
-        seconds_contact=sum(s.seconds_contact for s in spent),
-        seconds_linear=sum(s.seconds_linear for s in spent),
-    )

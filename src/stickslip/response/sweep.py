@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.contact.compiled import Evaluator
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import condense
@@ -16,7 +17,7 @@ from stickslip.response.system import System
 from stickslip.solve.continuation import Following, Point, StepControl
 from stickslip.solve.krylov import to_tolerance
 from stickslip.solve.newton import Newton, Solution
-from stickslip.solve.status import Status
+from stickslip.solve.status import Rung, Status
 
 Selection = Literal["jacobian_alert", "always_low", "always_high"]
 Stage = Literal["low", "high", "branch", "peak"]
@@ -25,6 +26,9 @@ LARGEST_STEP = 0.25
 FAINTEST = 1e-6  # excitation over static load: below, the residual tolerance swallows the vibration
 ALERT_TOLERANCE = 1e-6  # relative residual of the alert's step where it is found by iteration
 BRANCH_ITERATIONS = 10  # of a corrector along a branch
+ALIKE = (
+    0.25  # relative difference of two vibrations below which a branch has come back to the other
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +43,8 @@ class Sweep:
         Harmonics of the first passage and of the repeats; the static term is always kept.
     samples
         Samples per period of the contact forces.
+    evaluator
+        How piecewise-linear laws are evaluated; ``events`` has no sampling error, which would put small corners and folds into branches.
     threshold
         Predicted error (fraction) above which a frequency is repeated with `high`.
     selection
@@ -57,6 +63,7 @@ class Sweep:
     low: int = 1
     high: int = 5
     samples: int = 256
+    evaluator: Evaluator = "events"
     threshold: float = 0.05
     selection: Selection = "jacobian_alert"
     points: int = 40
@@ -128,6 +135,8 @@ class ForcedPoint:
         Of the Jacobian Alert, as a fraction; NaN where it was not asked.
     seconds_contact, seconds_linear, seconds_total
         Time in contact forces, in factorisations, and in all.
+    rescue
+        What it took to find the solution.
     """
 
     stage: Stage
@@ -143,6 +152,7 @@ class ForcedPoint:
     seconds_linear: float
     seconds_total: float
     orientation: float = 0.0
+    rescue: Rung = Rung.FULL_STEPS
 
     @property
     def order(self) -> int:
@@ -217,7 +227,9 @@ def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedPr
             f"Give Sweep(low={top}, high={max(top, sweep.high)}) or more.",
         )
     linear = condense(system.structure, system.retained, load)
-    low = harmonic_balance(linear, system.interface, sweep.first_order, sweep.samples)
+    low = harmonic_balance(
+        linear, system.interface, sweep.first_order, sweep.samples, sweep.evaluator
+    )
     dynamic = max(
         (float(np.max(np.abs(f), initial=0.0)) for f in load.harmonics.values()), default=0.0
     )
@@ -243,7 +255,7 @@ def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, For
     passed = -1
     for first, last in runs_of_repeats(high):
         branch = branch_points(points, first)
-        if branch and reached(branch, branch_end(low, last)):
+        if reached(branch, low, last):
             kept += [(high.get(p.index, p), p) for p in low[passed + 1 : first]]
             kept += [(p, None) for p in branch]
             passed = last
@@ -284,9 +296,18 @@ def branch_end(low: Sequence[ForcedPoint], last: int) -> float:
     return low[min(last + 1, len(low) - 1)].omega
 
 
-def reached(branch: Sequence[ForcedPoint], end: float) -> bool:
-    """Whether a branch came to its end."""
-    return branch[-1].converged and branch[-1].omega == end
+def reached(branch: Sequence[ForcedPoint], low: Sequence[ForcedPoint], last: int) -> bool:
+    """Whether a branch came to its end: to the frequency of the next quiet point, and to its motion.
+
+    Where the branch folds it may pass that frequency several times, on its way to the other sheets.
+    """
+    if not branch or not branch[-1].converged or branch[-1].omega != branch_end(low, last):
+        return False
+    if last + 1 >= len(low) or not low[last + 1].converged:
+        return True
+    quiet = low[last + 1].coefficients[1:]
+    here = branch[-1].coefficients[1 : len(quiet) + 1]
+    return bool(np.linalg.norm(here - quiet) <= ALIKE * np.linalg.norm(quiet))
 
 
 def forced_point(
@@ -300,5 +321,5 @@ def forced_point(
     """Return a solution as a point of the response."""
     return ForcedPoint(
         stage, index, omega, balance.coefficients(solution.x), np.zeros(0), 0.0, solution.status, solution.iterations,
-        np.nan, solution.seconds_contact, solution.seconds_linear, seconds,
+        np.nan, solution.seconds_contact, solution.seconds_linear, seconds, rescue=solution.rung,
     )  # fmt: skip

@@ -23,7 +23,7 @@ from stickslip.response.parameter import (
     parameter_family,
 )
 from stickslip.response.system import System
-from stickslip.solve.continuation import Following, StepControl, start_point, trace
+from stickslip.solve.continuation import Following, Point, StepControl, start_point, trace
 from stickslip.solve.newton import Newton, Solution, newton
 from stickslip.solve.status import Status
 
@@ -31,6 +31,7 @@ SWEEP_POINTS = 40  # at least, of the one sweep that finds the first peak
 HALVINGS = 6  # of a step of the parameter that does not converge
 STEPS = 12  # of Newton from peak to peak
 FARTHEST = 0.1  # change of ln ω in one step beyond which another peak was found
+EVALUATIONS_BESIDE = 2  # of a point of a sweep, beside one a Newton step: the start and the tangent
 BRACKET = 1e-12  # width in ln ω at which a peak on a kink counts as found
 SEARCH = 60  # solutions that may be spent on a bracket
 
@@ -60,7 +61,8 @@ class PeakPoint:
     iterations
         Newton steps.
     evaluations
-        Evaluations of the periodic problem that were needed, those of the slope included.
+        Evaluations of the periodic problem that were needed; those of slope and curvature are included, and in the first point
+        those of the sweep.
     """
 
     value: float
@@ -180,7 +182,6 @@ class _Tracker:
 
     def point(self, value: float) -> PeakPoint:
         """Find the peak at a value of the parameter, from those known."""
-        self.evaluations = 0
         solution = self._reach(value, HALVINGS)
         y, problem = solution.x, self.problem
         balance = problem.family(value)
@@ -191,8 +192,9 @@ class _Tracker:
         a, omega = problem.amplitude(y, value), problem.omega(y)
         lag = np.angle(a * np.exp(-1j * problem.phase))
         motion = balance.linear.recover(omega, balance.coefficients(y[:-1]))
+        spent, self.evaluations = self.evaluations, 0
         return PeakPoint(
-            value, omega, abs(a), float(lag), abs(a) * slope, curvature, motion, solution.status, solution.iterations, self.evaluations
+            value, omega, abs(a), float(lag), abs(a) * slope, curvature, motion, solution.status, solution.iterations, spent
         )  # fmt: skip
 
     def _reach(self, value: float, halvings: int) -> Solution:
@@ -324,10 +326,12 @@ def _tracker(
     position = int(np.searchsorted(balance.linear.retained, dof))
     changed = parameter(first)[0] if callable(parameter) else system
     changed = replace(changed, interface=replace(changed.interface, laws=balance.interface.laws))
-    x, omega = _highest(changed, balance, position, omega_range, how.newton)
     force = balance.linear.load.coefficients(1)[1]
     phase = float(np.angle(force[np.argmax(np.abs(force))]))
-    problem = PeakProblem(family, by, position, phase, omega)
+    problem = PeakProblem(family, by, position, phase, omega_range[1])
+    points = _sweep(changed, balance, omega_range, how.newton)
+    x, omega = _first_peak(problem, first, points)
+    problem = replace(problem, omega_scale=omega)
     y = np.append(x, 0.0)
     here = problem.sensitivity(balance, y)
     if here is not None:
@@ -336,38 +340,52 @@ def _tracker(
         sharp = np.linalg.norm(here.state[places]) / np.linalg.norm(x[places])
         problem = replace(problem, sharpness=max(float(sharp), 1.0))
     few = replace(how.newton, max_iterations=min(STEPS, how.newton.max_iterations))
-    return _Tracker(problem, few, [(first, y)])
+    spent = sum(p.solution.iterations + EVALUATIONS_BESIDE for p in points)
+    return _Tracker(problem, few, [(first, y)], spent)
 
 
-def _highest(
-    system: System,
-    balance: HarmonicBalance,
-    position: int,
-    omega_range: tuple[float, float],
-    options: Newton,
-) -> tuple[FloatArray, float]:
-    """Return state and frequency of the highest point of a response between two frequencies."""
+def _sweep(
+    system: System, balance: HarmonicBalance, omega_range: tuple[float, float], options: Newton
+) -> list[Point]:
+    """Return the solutions of the response between two frequencies."""
     begin, end = omega_range
     if not 0.0 < begin < end < np.inf:
         raise input_error(
             "omega_range", f"must be positive and growing, got {begin} to {end} rad/s", "Swap them."
         )
-    n = balance.linear.n
     weights = np.ones(balance.size)
-    weights[:n] = 0.0
+    weights[: balance.linear.n] = 0.0
     control = StepControl(scale=(end - begin) / (SWEEP_POINTS * 0.25), first=0.05)
     following = Following(newton=options, control=control, weights=weights)
-    start = start_point(balance, first_guess(system, balance, begin, options), begin, following)
-    points = [start]
-    if start.solution.status.converged:
-        points += trace(balance, start, end, following)
-    points = [p for p in points if p.solution.status.converged]
-    heights = [np.hypot(p.x[n + position], p.x[2 * n + position]) for p in points]
-    top = int(np.argmax(heights)) if heights else 0
+    points = [start_point(balance, first_guess(system, balance, begin, options), begin, following)]
+    if points[0].solution.status.converged:
+        points += trace(balance, points[0], end, following)
+    return [p for p in points if p.solution.status.converged]
+
+
+def _first_peak(
+    problem: PeakProblem, value: float, points: list[Point]
+) -> tuple[FloatArray, float]:
+    """Return state and frequency near the highest peak of a sweep, or near the quadrature next to it."""
+    first = [problem.amplitude(p.x, value) for p in points]
+    top = int(np.argmax(np.abs(first))) if first else 0
     if top in (0, len(points) - 1):
         raise input_error(
             "omega_range",
-            f"holds no peak at the first value: of {len(points)} solutions from {begin:.6g} to {end:.6g} rad/s the first or the last is the highest",
+            f"holds no peak at the first value: of {len(points)} solutions the first or the last is the highest",
             "Widen it, or choose another output.",
         )
-    return points[top].x, points[top].p
+    if problem.condition == "horizontal_tangent":
+        return points[top].x, points[top].p
+    in_phase = np.real(np.array(first) * np.exp(-1j * problem.phase))
+    crossings = np.flatnonzero(in_phase[:-1] * in_phase[1:] <= 0.0)
+    if crossings.size == 0:
+        raise input_error(
+            "omega_range",
+            "holds no frequency at which the output is in quadrature with the force",
+            "Track the horizontal tangent.",
+        )
+    i = int(crossings[np.argmin(np.abs(crossings + 0.5 - top))])
+    share = in_phase[i] / (in_phase[i] - in_phase[i + 1])
+    a, b = points[i], points[i + 1]
+    return a.x + share * (b.x - a.x), a.p + share * (b.p - a.p)
