@@ -89,6 +89,11 @@ if TYPE_CHECKING:
         signals,
     )
     from stickslip.response.forced import forced_response
+    from stickslip.response.parameter import (
+        Discretisation,
+        ParameterPoint,
+        branch_in_parameter,
+    )
     from stickslip.response.preload import preload
     from stickslip.response.sweep import (
         ForcedPoint,
@@ -98,6 +103,11 @@ if TYPE_CHECKING:
         forced_problem,
     )
     from stickslip.response.system import System
+    from stickslip.response.tracking import (
+        PeakPoint,
+        smallest_peak,
+        track_peak,
+    )
     from stickslip.response.transient import (
         TimeStepping,
         TransientResult,
@@ -158,6 +168,7 @@ _MODULES = {
     "stickslip.response.drift": ("Drift", "drift"),
     "stickslip.response.fields": ("Fields", "Signals", "fields", "signals"),
     "stickslip.response.forced": ("forced_response",),
+    "stickslip.response.parameter": ("Discretisation", "ParameterPoint", "branch_in_parameter"),
     "stickslip.response.preload": ("preload",),
     "stickslip.response.sweep": (
         "ForcedPoint",
@@ -167,6 +178,7 @@ _MODULES = {
         "forced_problem",
     ),
     "stickslip.response.system": ("System",),
+    "stickslip.response.tracking": ("PeakPoint", "smallest_peak", "track_peak"),
     "stickslip.response.transient": ("TimeStepping", "TransientResult", "integrate"),
     "stickslip.solve.newton": ("Newton",),
     "stickslip.solve.status": ("Status",),
@@ -183,6 +195,7 @@ __all__ = [
     "CoupledCoulomb",
     "CubicSpring",
     "Dahl",
+    "Discretisation",
     "Dofs",
     "Drift",
     "ElasticCoulomb",
@@ -200,6 +213,8 @@ __all__ = [
     "Material",
     "Newton",
     "Pairing",
+    "ParameterPoint",
+    "PeakPoint",
     "PolynomialSpring",
     "RegularisedCoulomb",
     "RigidBody",
@@ -220,6 +235,7 @@ __all__ = [
     "__version__",
     "accepted_points",
     "assemble_solid",
+    "branch_in_parameter",
     "chain",
     "compile_contacts",
     "contact_forces",
@@ -246,7 +262,9 @@ __all__ = [
     "run_study",
     "segment_to_segment",
     "signals",
+    "smallest_peak",
     "structure_surface",
+    "track_peak",
     "write_mesh",
     "write_report",
 ]
