@@ -7,6 +7,7 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.contact.interface import Interface
+from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import condense
@@ -35,7 +36,7 @@ def lumped(mass: FloatArray, damping: FloatArray, stiffness: FloatArray) -> Stru
     return Structure(np.asarray(mass), np.asarray(damping), np.asarray(stiffness), dofs)
 
 
-def system(structure: Structure, laws: Sequence[ElasticCoulomb], gap: FloatArray) -> System:
+def system(structure: Structure, laws: Sequence[ContactLaw], gap: FloatArray) -> System:
     """Return a system whose every dof is an output."""
     names = tuple(f"contact{i + 1}" for i in range(len(laws)))
     return System(structure, Interface(names, tuple(laws), gap), np.arange(structure.n))

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.contact.law import ContactLaw
+from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -43,8 +45,8 @@ def nlvib(name: str, *, complete: bool) -> NlvibCase:
     """Read a case and build its model.
 
     A unilateral spring pushes with ``k (x - gap)`` beyond its gap: our normal gap is then ``-x``. A Jenkins element is a tangential spring
-    with a constant limit. (The source starts its slider at the second sample and we start it at the first; no element of these rows
-    slips only while it settles, so that the start does not matter.)
+    with a constant limit; a cubic spring, too, acts along the tangent. (The source starts its slider at the second sample and we start
+    it at the first; no element of these rows slips only while it settles, so that the start does not matter.)
     """
     place = folder("nlvib", complete=complete)
     case = json.loads((place / f"{name}.json").read_text())
@@ -52,7 +54,7 @@ def nlvib(name: str, *, complete: bool) -> NlvibCase:
     table = np.loadtxt(place / run["file"], delimiter=",", skiprows=1, ndmin=2)
     n = case["n"]
     gap = np.zeros((3 * len(case["elements"]), n))
-    laws: list[ElasticCoulomb] = []
+    laws: list[ContactLaw] = []
     for i, element in enumerate(case["elements"]):
         if element["law"] == "jenkins":
             laws.append(jenkins(element["k"], element["limit"]))
@@ -60,10 +62,11 @@ def nlvib(name: str, *, complete: bool) -> NlvibCase:
         elif element["law"] == "unilateral_spring":
             laws.append(unilateral(element["k"], element["gap"]))
             gap[3 * i + 2] = -np.array(element["direction"], dtype=float)
+        elif element["law"] == "cubic_spring":
+            laws.append(CubicSpring(cubic_t=element["k"]))
+            gap[3 * i] = element["direction"]
         else:
-            raise ValueError(
-                f"{name}: {element['law']} cannot be expressed by the contact laws of this version"
-            )
+            raise ValueError(f"{name}: no contact law stands for {element['law']!r}")
     force = np.array(run["excitation"]["cos"]) - 1j * np.array(run["excitation"]["sin"])
     matrices = [np.array(case[key], dtype=float) for key in ("M", "D", "K")]
     load = HarmonicLoad(np.zeros(n), {1: force})
