@@ -18,6 +18,7 @@ from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.condensed_product import at_frequency
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.factors import factorise
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.selection import jacobian_alert
 from stickslip.harmonic.structured import StructuredJacobian, real_matrix
@@ -213,6 +214,28 @@ def test_structured_linearisation_is_the_dense_one(name, relative):
     v = np.random.default_rng(1).standard_normal(x.size)
     assert_same(at.jac.matvec(v), dense.jac @ v)
     assert_same(at.jac.rmatvec(v), dense.jac.T @ v)
+
+
+@pytest.mark.parametrize("n", [1, 63, 64, 65, 150])
+@pytest.mark.parametrize("dtype", [float, complex])
+def test_factors_solve_as_lapack_does(n, dtype):
+    rng = np.random.default_rng(n)
+    matrix, right = rng.standard_normal((n, n)).astype(dtype), rng.standard_normal(n).astype(dtype)
+    if dtype is complex:
+        matrix, right = matrix + 1j * rng.standard_normal((n, n)), right * np.exp(0.3j)
+    matrix[:, -1] *= 1e-6  # rows must change places, and columns differ in size
+    expected = np.linalg.solve(matrix, right)
+    found = factorise(np.array(matrix, order="F")).solve(right)
+    assert found.dtype == matrix.dtype
+    # both are exact for a matrix that differs by rounding, times a growth of at most n
+    left = np.linalg.norm(matrix @ found - right)
+    assert left <= n * 1e-14 * np.linalg.norm(matrix) * np.linalg.norm(expected)
+    np.testing.assert_allclose(found, expected, rtol=1e-7 * n)
+
+
+def test_singular_matrix_has_no_factors():
+    assert factorise(np.ones((3, 3), order="F")) is None
+    assert factorise(np.zeros((2, 2), dtype=complex, order="F")) is None
 
 
 # ---- solves --------------------------------------------------------------------------------------------------------------

@@ -9,16 +9,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.contact.interface import SparseRows, add_contact_jacobian
 from stickslip.contact.product import add_stiffness, contact_product, harmonic_means, less_means
 from stickslip.harmonic.condensed_product import CondensedProduct
+from stickslip.harmonic.factors import Factors, factorise
 from stickslip.harmonic.fourier import to_complex, to_real
 
 Product = Callable[[FloatArray, FloatArray], FloatArray]
-SINGULAR = 1e-15  # smallest pivot over largest below which a harmonic has no factors
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,34 +31,19 @@ class HarmonicFactors:
     means
         (H+1, n_contacts, 3, 3) the contact stiffness they were made of, N/m.
     factors
-        LU and pivots of each harmonic, in the scale of the Jacobian.
+        Of each harmonic, in the scale of the Jacobian; harmonic 0 is real.
     """
 
     linear: CondensedProduct
     means: ComplexArray
-    factors: tuple[tuple[ComplexArray, FloatArray], ...]
+    factors: tuple[Factors, ...]
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Solve ``P x = right``, both (n (2H+1),) harmonic-major."""
         rows = to_complex(right.reshape(2 * self.linear.order + 1, -1))
-        for row, (lu, pivots) in zip(rows, self.factors, strict=True):
-            own = row if np.iscomplexobj(lu) else row.real
-            row[:] = _SOLVE[lu.dtype.char](lu, pivots, own.astype(lu.dtype))[0]
+        for row, own in zip(rows, self.factors, strict=True):
+            row[:] = own.solve(row if np.iscomplexobj(own.lu) else row.real)
         return to_real(rows).reshape(-1)
-
-
-_SOLVE = {
-    "d": scipy.linalg.lapack.dgetrs,
-    "D": scipy.linalg.lapack.zgetrs,
-    "F": scipy.linalg.lapack.cgetrs,
-    "f": scipy.linalg.lapack.sgetrs,
-}
-_FACTORISE = {
-    "d": scipy.linalg.lapack.dgetrf,
-    "D": scipy.linalg.lapack.zgetrf,
-    "F": scipy.linalg.lapack.cgetrf,
-    "f": scipy.linalg.lapack.sgetrf,
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,11 +105,10 @@ class StructuredJacobian:
             add_stiffness(means[h], self.rows.columns, self.rows.values, block)
             block *= self.scale
             matrix = np.array(block.real, order="F") if h == 0 else block
-            lu, pivots, info = _FACTORISE[matrix.dtype.char](matrix, overwrite_a=True)
-            size = np.abs(np.diagonal(lu))
-            if info != 0 or not size.min() > SINGULAR * size.max():
+            own = factorise(matrix)
+            if own is None:
                 return None
-            factors.append((lu, pivots))
+            factors.append(own)
         return HarmonicFactors(self.linear, means, tuple(factors))
 
     def product_after(self, preconditioner: HarmonicFactors) -> Product:
