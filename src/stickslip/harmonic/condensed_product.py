@@ -12,10 +12,12 @@ import scipy.linalg
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.dynamic_stiffness import CondensedStiffness
 from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.harmonic.spectral import StateSpace
 
 Parts = tuple[FloatArray, FloatArray, FloatArray]  # K, C, M, or their products with the same rows
-# interior dynamic stiffness of each harmonic: its diagonal, or its LU factors where it is not diagonal
-Inner = tuple[ComplexArray, ...] | tuple[tuple[ComplexArray, IntArray], ...]
+# interior dynamic stiffness of each harmonic: its diagonal, or its state-space eigenvectors and ihω, or its LU factors
+InnerOne = ComplexArray | tuple[StateSpace, complex] | tuple[ComplexArray, IntArray]
+Inner = tuple[InnerOne, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,12 +84,7 @@ class CondensedProduct:
         far = k_nl + 1j * s * c_nl - s**2 * m_nl
         if far.shape[1] == 0:
             return out
-        inner = self.inner[harmonic]
-        moved = (
-            far.T / inner[:, None]
-            if isinstance(inner, np.ndarray)
-            else scipy.linalg.lu_solve(inner, far.T)
-        )
+        moved = _solve_one(self.inner[harmonic], far.T)
         # in place: for thousands of coordinates this is the largest array there is
         return np.asarray(
             scipy.linalg.blas.zgemm(-1.0, far, moved, beta=1.0, c=out, overwrite_c=True)
@@ -136,15 +133,25 @@ def _inner(linear: CondensedStiffness, omega: float, order: int) -> Inner:
     if linear.diagonal:
         k, c, m = np.diagonal(k), np.diagonal(c), np.diagonal(m)
         return tuple(k + 1j * w * c - w**2 * m for w in s)
+    states = linear.spectral.states if np.any(s) else None
+    if states is not None:
+        return tuple((states, 1j * w) for w in s)
     return tuple(scipy.linalg.lu_factor(k + 1j * w * c - w**2 * m) for w in s)
 
 
 def _solve_inner(inner: Inner, rows: FloatArray) -> FloatArray:
-    solved = [
-        right / own if isinstance(own, np.ndarray) else scipy.linalg.lu_solve(own, right)
-        for own, right in zip(inner, to_complex(rows), strict=True)
-    ]
-    return to_real(np.array(solved))
+    each = zip(inner, to_complex(rows), strict=True)
+    return to_real(np.array([_solve_one(own, right) for own, right in each]))
+
+
+def _solve_one(inner: InnerOne, right: ComplexArray) -> ComplexArray:
+    """Solve the interior of one harmonic for `right` (l,) or (l, k)."""
+    if isinstance(inner, np.ndarray):
+        return np.asarray(right / (inner if right.ndim == 1 else inner[:, None]))
+    first, second = inner
+    if isinstance(first, StateSpace):
+        return first.solve(complex(second), right)
+    return np.asarray(scipy.linalg.lu_solve((first, second), right))
 
 
 def _inner_parts(linear: CondensedStiffness, rows: FloatArray) -> Parts:

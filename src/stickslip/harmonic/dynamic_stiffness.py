@@ -1,11 +1,13 @@
 """Dynamic stiffness condensed exactly to the retained coordinates (Gastaldi & Berruti 2017, eq. 2-5).
 
-``D(Ω) = K + iΩ C - Ω² M``. The interior is written once in its own undamped modes, in which its dynamic stiffness is diagonal when the
-damping is proportional; a frequency then costs a few products and no factorisation. With any other damping matrix the interior,
-already small after reduction, is solved at each frequency.
+``D(Ω) = K + iΩ C - Ω² M``. The interior is written once in its own undamped modes, and where these do not diagonalise the damping in
+its state-space eigenvectors; a frequency then costs a few products and no factorisation (`harmonic.spectral`). Only where those
+eigenvectors are ill-conditioned, or the interior is very large, is it factorised at each frequency.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg
@@ -14,6 +16,8 @@ import scipy.sparse
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.fourier import padded
+from stickslip.harmonic.spectral import Blocks, Interior, Terms, summed
 from stickslip.model.structure import Structure
 
 DIAGONAL_TOLERANCE = (
@@ -33,20 +37,31 @@ class Condensed:
 
 
 @dataclass(frozen=True, eq=False)
+class _Sums:
+    """The spectral decomposition and what a load is to it, as many harmonics as the load has; see `summed`."""
+
+    terms: Terms
+    load: ComplexArray  # statically condensed
+    source: ComplexArray
+    direct: ComplexArray
+
+
+@dataclass(frozen=True, eq=False)
 class CondensedStiffness:
     """A structure and its load, seen from the retained coordinates.
 
-    Build it with `condense`. Retained blocks carry ``n``, interior ones ``l`` (modal where that is possible).
+    Build it with `condense`. Retained blocks carry ``n``, interior ones ``l``, in undamped modes of unit stiffness.
     """
 
     retained: IntArray
     interior: IntArray
-    nn: tuple[FloatArray, FloatArray, FloatArray]  # K, C, M on the retained coordinates
-    nl: tuple[FloatArray, FloatArray, FloatArray]
-    ll: tuple[FloatArray, FloatArray, FloatArray]
+    nn: Blocks  # K, C, M on the retained coordinates
+    nl: Blocks
+    ll: Blocks
     modes: FloatArray  # interior displacement = modes @ interior coordinates
     diagonal: bool
     load: HarmonicLoad
+    spectral: Interior  # the same blocks, and what is derived from them when first needed
 
     @property
     def n(self) -> int:
@@ -55,12 +70,28 @@ class CondensedStiffness:
 
     def with_load(self, load: HarmonicLoad) -> "CondensedStiffness":
         """Return the same structure under another load."""
-        return CondensedStiffness(
-            self.retained, self.interior, self.nn, self.nl, self.ll, self.modes, self.diagonal, load
-        )
+        return replace(self, load=load)
 
     def condensed(self, omega: float, order: int) -> Condensed:
         """Return stiffness, load and their ω-derivatives for harmonics 0..`order` at `omega` (rad/s)."""
+        # the static problem alone is no reason to decompose the interior
+        sums = self._sums if order > 0 and omega != 0.0 else None
+        return self._factorised(omega, order) if sums is None else self._summed(sums, omega, order)
+
+    def _summed(self, sums: "_Sums", omega: float, order: int) -> Condensed:
+        """Condense by the spectral decomposition of the interior."""
+        h = np.arange(1, order + 1)[:, None]
+        load, source, direct = (padded(a, order) for a in (sums.load, sums.source, sums.direct))
+        found = summed(sums.terms, 1j * omega * h, source[1:], direct[1:])
+        load[1:] += found.load
+        stiffness = np.concatenate([sums.terms.polynomial[:1].astype(complex), found.stiffness])
+        derivative, load_derivative = np.zeros_like(stiffness), np.zeros_like(load)
+        derivative[1:] = 1j * h[:, :, None] * found.slope
+        load_derivative[1:] = 1j * h * found.load_slope
+        return Condensed(stiffness, derivative, load, load_derivative)
+
+    def _factorised(self, omega: float, order: int) -> Condensed:
+        """Condense by solving the interior at each harmonic."""
         h = np.arange(order + 1)
         s = (h * omega)[:, None, None]
         f_n, f_l = self._loads(order)
@@ -105,14 +136,35 @@ class CondensedStiffness:
         s = (np.arange(q.shape[0]) * omega)[:, None, None]
         d_nl, _ = _dynamic(self.nl, s)
         right = f_l[:, :, None] - d_nl.transpose(0, 2, 1) @ q[:, :, None]
+        states = self.spectral.states if np.any(s) else None
+        if states is None:
+            moved = self._solve_interior(s, right)[:, :, 0]
+        else:
+            each = zip(1j * s[:, 0, 0], right[:, :, 0], strict=True)
+            moved = np.array([states.solve(p, own) for p, own in each])
         out = np.empty((q.shape[0], self.retained.size + self.interior.size), dtype=complex)
         out[:, self.retained] = q
-        out[:, self.interior] = self._solve_interior(s, right)[:, :, 0] @ self.modes.T
+        out[:, self.interior] = moved @ self.modes.T
         return out
 
     def _loads(self, order: int) -> tuple[ComplexArray, ComplexArray]:
-        f = self.load.coefficients(order)
-        return f[:, self.retained], f[:, self.interior] @ self.modes
+        f_n, f_l = self._modal_load
+        return padded(f_n, order), padded(f_l, order)
+
+    @cached_property
+    def _modal_load(self) -> tuple[ComplexArray, ComplexArray]:
+        """Load on the retained coordinates and on the interior's modes, as many harmonics as it has."""
+        f = self.load.coefficients(max(self.load.harmonics, default=0))
+        inner = f[:, self.interior]
+        return f[:, self.retained], inner.real @ self.modes + 1j * (inner.imag @ self.modes)
+
+    @cached_property
+    def _sums(self) -> "_Sums | None":
+        terms = self.spectral.terms
+        if terms is None:
+            return None
+        f_n, f_l = self._modal_load
+        return _Sums(terms, f_n - f_l @ self.nl[0].T, terms.source(f_l), f_l @ terms.direct.T)
 
     def _interior_dynamic(self, s: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Interior D and dD/dΩ at Ω = `s`; as columns where they are diagonal."""
@@ -125,12 +177,12 @@ class CondensedStiffness:
         d_ll, _ = self._interior_dynamic(s)
         if self.diagonal:
             return right / d_ll
+        if not np.any(s):
+            return right  # modes of unit stiffness
         return np.linalg.solve(d_ll, right)
 
 
-def _dynamic(
-    blocks: tuple[FloatArray, FloatArray, FloatArray], s: FloatArray
-) -> tuple[ComplexArray, ComplexArray]:
+def _dynamic(blocks: Blocks, s: FloatArray) -> tuple[ComplexArray, ComplexArray]:
     """Return K + is C - s² M and its derivative by s, stacked over the frequencies `s` (H+1, 1, 1)."""
     k, c, m = blocks
     stiffness: ComplexArray = np.asarray(k + 1j * s * c - s**2 * m)
@@ -167,34 +219,35 @@ def condense(structure: Structure, retained: IntArray, load: HarmonicLoad) -> Co
             "Reduce the structure first (craig_bampton).",
         )
     full = tuple(_dense_symmetric(structure, name) for name in ("stiffness", "damping", "mass"))
-    nn = tuple(a[np.ix_(retained, retained)] for a in full)
+    nn = _three(a[np.ix_(retained, retained)] for a in full)
     nl = tuple(a[np.ix_(retained, interior)] for a in full)
     ll = tuple(a[np.ix_(interior, interior)] for a in full)
-    modes, diagonal = _interior_modes(*ll)
-    ll = tuple(modes.T @ a @ modes for a in ll)
+    modes = _interior_modes(ll[0], ll[2])
+    to_modes = _three(a @ modes for a in nl)
+    damping = modes.T @ ll[1] @ modes
+    diagonal = _is_diagonal(damping)
+    own = _modal(modes, ll[2], np.diag(np.diagonal(damping)) if diagonal else damping)
     return CondensedStiffness(
-        np.asarray(retained),
-        interior,
-        _three(nn),
-        _three(tuple(a @ modes for a in nl)),
-        _three(ll),
-        modes,
-        diagonal,
-        load,
-    )
+        np.asarray(retained), interior, nn, to_modes, own, modes, diagonal, load,
+        Interior(nn, to_modes, own, diagonal),
+    )  # fmt: skip
 
 
-def _three(blocks: tuple[FloatArray, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _three(blocks: Iterable[FloatArray]) -> Blocks:
     k, c, m = blocks
     return k, c, m
 
 
-def _interior_modes(
-    stiffness: FloatArray, damping: FloatArray, mass: FloatArray
-) -> tuple[FloatArray, bool]:
-    """Return mass-normalised interior modes and whether they diagonalise the damping too; unit vectors if M is singular."""
+def _modal(modes: FloatArray, mass: FloatArray, damping: FloatArray) -> Blocks:
+    """Return K = 1, C and the diagonal M in the interior's modes."""
+    own = np.einsum("ij,ij->j", modes, mass @ modes)
+    return np.eye(modes.shape[1]), damping, np.diag(np.maximum(own, 0.0))
+
+
+def _interior_modes(stiffness: FloatArray, mass: FloatArray) -> FloatArray:
+    """Return the undamped modes, of unit stiffness: those without mass are modes as well, and the slow ones come out sharpest."""
     if stiffness.shape[0] == 0:
-        return np.eye(0), True
+        return np.eye(0)
     size = np.sqrt(np.maximum(np.abs(np.diagonal(stiffness)), np.finfo(float).tiny))
     softest = float(np.linalg.eigvalsh(stiffness / np.outer(size, size))[0])
     if softest <= 1e-12:
@@ -203,13 +256,14 @@ def _interior_modes(
             f"the coordinates that are condensed can move without stiffness (smallest scaled eigenvalue {softest:.3g})",
             "Retain the dofs of free bodies, or clamp them.",
         )
-    try:
-        _, modes = scipy.linalg.eigh(stiffness, mass)
-    except np.linalg.LinAlgError:
-        return np.eye(stiffness.shape[0]), False
-    modal = modes.T @ damping @ modes
-    off = np.max(np.abs(modal - np.diag(np.diagonal(modal))))
-    return modes, bool(off <= DIAGONAL_TOLERANCE * max(np.max(np.abs(modal)), np.finfo(float).tiny))
+    return np.asarray(scipy.linalg.eigh(mass, stiffness)[1])
+
+
+def _is_diagonal(damping: FloatArray) -> bool:
+    """Whether the modes diagonalise the damping."""
+    size = np.max(np.abs(damping), initial=0.0)
+    off = np.max(np.abs(damping - np.diag(np.diagonal(damping))), initial=0.0)
+    return bool(off <= DIAGONAL_TOLERANCE * size)
 
 
 def _dense_symmetric(structure: Structure, name: str) -> FloatArray:
