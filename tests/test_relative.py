@@ -99,7 +99,9 @@ def test_local_blocks_are_the_pseudo_inverse_of_the_whole():
     structure, _ = in_relative_coordinates(system.structure, system.interface.gap_operator)
     gaps = structure.sets["gaps"]
     np.testing.assert_allclose(
-        structure.basis[:, gaps], np.linalg.pinv(system.interface.gap_operator), atol=1e-13
+        structure.basis[:, gaps],
+        np.linalg.pinv(system.interface.gap_operator.toarray()),
+        atol=1e-13,
     )
 
 
@@ -122,7 +124,7 @@ def test_directions_without_a_gap_get_no_coordinate():
     system, load = blades_and_damper()  # planar: no w direction
     other, other_load = relative(system, load)
     assert other.structure.sets["gaps"].size == 4
-    np.testing.assert_array_equal(other.interface.gap_operator[1::3], 0.0)
+    assert other.interface.gap_operator[1::3].nnz == 0
     omega = 2 * np.pi * 160
     a, at_a = solved(system, load, omega)
     free = replace(other, free=None)
@@ -135,7 +137,7 @@ def test_directions_without_a_gap_get_no_coordinate():
 
 def test_dependent_gaps_are_refused_by_name():
     system, _ = two_flexible_bodies()
-    gap = system.interface.gap_operator.copy()
+    gap = system.interface.gap_operator.toarray()
     gap[6:9] = gap[3:6]  # the third contact lies on the second
     with pytest.raises(
         InputError, match=r"gaps of contacts c1, c2 depend on each other.*6 gaps of which 3"

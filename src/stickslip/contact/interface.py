@@ -1,11 +1,13 @@
 """Where contacts are: pairs of points, their laws, and the operator from displacements to gaps."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numba
 import numpy as np
+import scipy.sparse
 
-from stickslip.arrays import FloatArray, IntArray
+from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.contact.compiled import CompiledContacts, Evaluator, compile_contacts
 from stickslip.contact.law import PAIRS, ContactLaw
 from stickslip.errors import input_error
@@ -25,7 +27,8 @@ class Interface:
         One law a contact.
     gap_operator
         (3 n_contacts, n) rows t, w, n of each contact: ``gap = gap_operator @ u``; the contact forces act on the structure as
-        ``gap_operator.T @ force``, on the left side of the equation of motion.
+        ``gap_operator.T @ force``, on the left side of the equation of motion. Dense or sparse; kept as `scipy.sparse.csr_array`
+        without stored zeros, because a contact touches a few coordinates of thousands.
     weights
         (n_contacts,) factors of the forces of each law, such as the area of a point where laws are given per area; None: ones.
 
@@ -37,10 +40,11 @@ class Interface:
 
     names: tuple[str, ...]
     laws: tuple[ContactLaw, ...]
-    gap_operator: FloatArray
+    gap_operator: Matrix
     weights: FloatArray | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "gap_operator", _without_zeros(self.gap_operator))
         n = len(self.names)
         if len(self.laws) != n or self.gap_operator.shape[0] != 3 * n:
             raise input_error(
@@ -91,11 +95,19 @@ class Interface:
 
     def coordinates(self) -> IntArray:
         """Return the structure's dofs that take part in a gap."""
-        return np.flatnonzero(np.any(self.gap_operator != 0.0, axis=0))
+        return np.unique(self.gap_operator.indices).astype(np.int64)
 
     def restricted(self, dofs: IntArray) -> "Interface":
         """Return the interface on the coordinates `dofs` alone; they must hold `coordinates()`."""
         return replace(self, gap_operator=self.gap_operator[:, dofs])
+
+
+def _without_zeros(gap_operator: Matrix) -> Matrix:
+    """Return a matrix as a new csr_array of doubles with sorted entries, none of them zero."""
+    operator = scipy.sparse.csr_array(gap_operator, dtype=float, copy=True)
+    operator.sum_duplicates()
+    operator.eliminate_zeros()
+    return operator
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,18 +117,54 @@ class SparseRows:
     columns: IntArray  # (n_contacts, width); unused entries repeat column 0 with value 0
     values: FloatArray  # (n_contacts, 3, width)
 
+    def gaps(self, vector: FloatArray) -> FloatArray:
+        """Return the (m, 3 n_contacts) gaps of coordinates `vector` (m, n), in C order both."""
+        gap = np.zeros((vector.shape[0], 3 * len(self.columns)))
+        add_gaps(self.columns, self.values, vector, gap)
+        return gap
 
-def sparse_rows(gap_operator: FloatArray) -> SparseRows:
-    """Return the (3 n_contacts, n) `gap_operator` by contact, for `add_contact_jacobian`."""
-    by_contact = gap_operator.reshape(-1, 3, gap_operator.shape[1])
-    used = [np.flatnonzero(np.any(rows != 0.0, axis=0)) for rows in by_contact]
+    def add_forces(self, force: FloatArray, out: FloatArray) -> None:
+        """Add what the contact forces (m, 3 n_contacts) do at the coordinates to `out` (m, n)."""
+        add_forces(self.columns, self.values, force, out)
+
+
+def sparse_rows(gap_operator: Matrix) -> SparseRows:
+    """Return the (3 n_contacts, n) `gap_operator`, dense or sparse, by contact."""
+    operator = _without_zeros(gap_operator)
+    starts = operator.indptr[::3]
+    used = [np.unique(operator.indices[a:b]) for a, b in pairwise(starts)]
     width = max((u.size for u in used), default=0)
     columns = np.zeros((len(used), width), dtype=np.int64)
     values = np.zeros((len(used), 3, width))
-    for c, u in enumerate(used):
+    direction = np.repeat(np.arange(operator.shape[0]) % 3, np.diff(operator.indptr))
+    for c, (u, (a, b)) in enumerate(zip(used, pairwise(starts), strict=True)):
         columns[c, : u.size] = u
-        values[c, :, : u.size] = by_contact[c][:, u]
+        values[c, direction[a:b], np.searchsorted(u, operator.indices[a:b])] = operator.data[a:b]
     return SparseRows(columns, values)
+
+
+@numba.njit(cache=True)
+def add_gaps(columns, values, vector, gap):  # type: ignore[no-untyped-def]
+    """Add the gaps of coordinates `vector` (m, n) to `gap` (m, 3 n_contacts); `columns` and `values` from `sparse_rows`."""
+    for q in range(vector.shape[0]):
+        for c in range(columns.shape[0]):
+            for d in range(3):
+                total = 0.0
+                for j in range(columns.shape[1]):
+                    total += values[c, d, j] * vector[q, columns[c, j]]
+                gap[q, 3 * c + d] += total
+
+
+@numba.njit(cache=True)
+def add_forces(columns, values, force, out):  # type: ignore[no-untyped-def]
+    """Add what contact forces `force` (m, 3 n_contacts) do at the coordinates to `out` (m, n); the rest from `sparse_rows`."""
+    for q in range(out.shape[0]):
+        for c in range(columns.shape[0]):
+            for j in range(columns.shape[1]):
+                total = 0.0
+                for d in range(3):
+                    total += values[c, d, j] * force[q, 3 * c + d]
+                out[q, columns[c, j]] += total
 
 
 @numba.njit(cache=True)

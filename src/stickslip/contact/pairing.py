@@ -303,7 +303,7 @@ def paired_interface(
     points = range(pairing.n_points)
     laws = tuple(law(float(pairing.initial_gap[i])) if callable(law) else law for i in points)
     names = tuple(f"{name}.{i + 1}" for i in points)
-    return Interface(names, laws, pairing.gap_operator.toarray(), pairing.weights)
+    return Interface(names, laws, pairing.gap_operator, pairing.weights)
 
 
 def _pairing(

@@ -93,7 +93,7 @@ class HarmonicBalance:
     def contacts(self, x: FloatArray, omega: float) -> ContactPeriod:
         """Return gaps, forces and states of all contacts over one period, at the scaled unknowns `x` and `omega` (rad/s)."""
         q = x.reshape(2 * self.order + 1, self.linear.n) * self.displacement_scale
-        return contact_forces(q @ self.interface.gap_operator.T, self.compiled, self.samples, omega)
+        return contact_forces(self.rows.gaps(q), self.compiled, self.samples, omega)
 
     def linearise(self, x: FloatArray, omega: float) -> Linearisation:
         """Return residual, Jacobian and ω-derivative at scaled unknowns `x` (size,) and `omega` (rad/s)."""
@@ -105,9 +105,9 @@ class HarmonicBalance:
             linear, slope, jac = self._by_products(x, omega, period)
         else:
             linear, slope, jac = self._by_matrices(x, omega, period)
-        linear += period.coefficients @ self.interface.gap_operator
+        self.rows.add_forces(period.coefficients, linear)
         if period.by_omega is not None:
-            slope += period.by_omega @ self.interface.gap_operator
+            self.rows.add_forces(period.by_omega, slope)
         return Linearisation(
             linear.reshape(-1) / self.force_scale,
             jac,

@@ -112,7 +112,7 @@ class DynamicLagrangian:
         n = self.interface.n_contacts
         others = np.setdiff1d(np.arange(n), rigid.index)
         elastic = balance.interface
-        soft = contact_forces(q @ elastic.gap_operator.T, elastic.compiled(), self.samples, omega)
+        soft = contact_forces(balance.rows.gaps(q), elastic.compiled(), self.samples, omega)
         gap = _in_time(q @ self.interface.gap_operator.T, self.samples).reshape(n, 3, self.samples)
         coefficients = np.empty((q.shape[0], n, 3))
         coefficients[:, others] = soft.coefficients.reshape(q.shape[0], others.size, 3)

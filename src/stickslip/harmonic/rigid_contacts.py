@@ -93,14 +93,14 @@ def _gap_coordinates(interface: Interface, contact: int) -> list[tuple[int, int,
     law, name = interface.laws[contact], interface.names[contact]
     found = []
     for d in range(3):
-        row = interface.gap_operator[3 * contact + d]
-        columns = np.flatnonzero(row)
+        row = interface.gap_operator[[3 * contact + d]]
+        columns = row.indices
         constant = isinstance(law, RigidCoulomb) and law.preload is not None
         if columns.size == 0 or (d == NORMAL and constant):
             continue
         if columns.size > 1:
             raise _no_coordinate(name, "has a gap between several coordinates")
-        found.append((d, int(columns[0]), float(row[columns[0]])))
+        found.append((d, int(columns[0]), float(row.data[0])))
     if (
         isinstance(law, RigidCoulomb)
         and law.preload is None

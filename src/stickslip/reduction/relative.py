@@ -16,7 +16,7 @@ DIRECTIONS = ("t", "w", "n")
 
 
 def in_relative_coordinates(
-    structure: Structure, gap_operator: FloatArray, names: Sequence[str] = ()
+    structure: Structure, gap_operator: Matrix, names: Sequence[str] = ()
 ) -> tuple[Structure, FloatArray]:
     """Write a structure in the gaps of its contacts and the coordinates that leave the gaps alone.
 
@@ -46,7 +46,7 @@ def in_relative_coordinates(
     InputError
         If gaps depend on each other; the message names the contacts.
     """
-    B = np.asarray(gap_operator, dtype=float)
+    B = _dense(gap_operator)
     if B.ndim != 2 or B.shape[1] != structure.n or B.shape[0] % 3:
         raise input_error(
             "in_relative_coordinates: gap_operator",
@@ -76,6 +76,10 @@ def in_relative_coordinates(
         ),
         operator,
     )
+
+
+def _dense(matrix: Matrix) -> FloatArray:
+    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix, dtype=float)
 
 
 def _local_inverses(

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.contact.interface import sparse_rows
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.product import add_stiffness
@@ -117,7 +116,7 @@ def bonded_start(balance: HarmonicBalance, omega: float, system: System) -> Floa
     """
     linear = at_frequency(balance.linear, omega, balance.order)
     load = to_complex(linear.load)
-    rows = sparse_rows(balance.interface.gap_operator)
+    rows = balance.rows
     springs = balance.interface.stuck_stiffness().reshape(-1, 3, 1) * np.eye(3)
     q = np.zeros((balance.order + 1, balance.linear.n), dtype=complex)
     for h in range(balance.order + 1):

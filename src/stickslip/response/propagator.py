@@ -77,7 +77,7 @@ def _coordinates(structure: Structure, stiffness: FloatArray, omega: float) -> M
 
 def step_operators(
     structure: Structure,
-    gap_operator: FloatArray,
+    gap_operator: Matrix,
     law: FloatArray,
     load: PeriodicLoad,
     omega: float,
@@ -90,6 +90,7 @@ def step_operators(
     law
         (n_contacts, 5): k_t, k_w, k_n (N/m), mu, preload (N) of each contact; the rest as in `integrate`.
     """
+    gap_operator = _dense(gap_operator)
     _check(structure.n, gap_operator, law, load, omega)
     springs = law[:, :3].reshape(-1, 1)
     stuck = _dense(structure.stiffness) + gap_operator.T @ (springs * gap_operator)

@@ -8,6 +8,7 @@ import scipy.sparse
 from stickslip.arrays import IntArray
 from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
+from stickslip.model.modes import with_springs
 from stickslip.model.structure import Structure
 
 
@@ -82,5 +83,4 @@ class System:
     def stuck_structure(self) -> Structure:
         """Return the linear structure with every contact bonded through its springs."""
         b = self.interface.gap_operator
-        springs = b.T @ (self.interface.stuck_stiffness()[:, None] * b)
-        return replace(self.structure, stiffness=self.structure.stiffness + springs)
+        return with_springs(self.structure, b, self.interface.stuck_stiffness())

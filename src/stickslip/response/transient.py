@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import input_error
@@ -209,7 +209,7 @@ def start_from_harmonics(
 
 def integrate(
     structure: Structure,
-    gap_operator: FloatArray,
+    gap_operator: Matrix,
     laws: Sequence[ContactLaw],
     load: PeriodicLoad,
     omega: float,
@@ -224,7 +224,7 @@ def integrate(
     structure
         Any linear structure with a regular mass matrix; free rigid bodies are welcome.
     gap_operator
-        (3 n_contacts, n): rows t, w, n of each contact; normal gap positive when open.
+        (3 n_contacts, n), dense or sparse: rows t, w, n of each contact; normal gap positive when open.
     laws
         One law a contact.
     load
@@ -258,7 +258,7 @@ def integrate(
 
 def integrate_refined(
     structure: Structure,
-    gap_operator: FloatArray,
+    gap_operator: Matrix,
     laws: Sequence[ContactLaw],
     load: PeriodicLoad,
     omega: float,
@@ -297,7 +297,7 @@ def _known(laws: Sequence[ContactLaw]) -> list[ElasticCoulomb]:
 
 
 def _initial_state(
-    modes: ModalCoordinates, gap_operator: FloatArray, law: FloatArray, start: TransientStart
+    modes: ModalCoordinates, gap_operator: Matrix, law: FloatArray, start: TransientStart
 ) -> StepState:
     gap = gap_operator @ start.displacement
     normal = np.maximum(0.0, law[:, 4] - law[:, 2] * gap[2::3])
