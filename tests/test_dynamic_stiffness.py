@@ -4,13 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.linalg
 import scipy.sparse
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from models import table
 
 from stickslip.errors import InputError
+from stickslip.harmonic import spectral
+from stickslip.harmonic.condensed_product import at_frequency
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded, to_complex, to_real
+from stickslip.harmonic.spectral import Modes, Poles, StateSpace
 from stickslip.model.structure import Structure
 
 RETAINED = np.array([1, 4, 5])
@@ -197,6 +203,135 @@ def test_retained_in_any_order():
     b = condense(structure, RETAINED[order], load).condensed(OMEGA, 2)
     assert np.allclose(b.stiffness, a.stiffness[:, order][:, :, order], atol=1e-12)
     assert np.allclose(b.load, a.load[:, order], atol=1e-12)
+
+
+# ---- spectral decomposition of the interior -----------------------------------------------------------------------------
+
+
+def decomposed(structure, load=None):
+    linear = condense(structure, RETAINED, load or loaded(0, structure.n))
+    return linear, linear.spectral.terms
+
+
+def assert_schur(structure, omegas, order=ORDER, tolerance=1e-9):
+    load = loaded(0, structure.n)
+    linear = condense(structure, RETAINED, load)
+    for omega in omegas:
+        got = linear.condensed(omega, order)
+        stiffness, force = schur(structure, load, omega, order)
+        assert np.max(np.abs(got.stiffness - stiffness)) <= tolerance * np.max(np.abs(stiffness))
+        assert np.max(np.abs(got.load - force)) <= tolerance * np.max(np.abs(force))
+    return linear
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    damping=st.sampled_from([1e-3, 0.3, 10.0]),
+    dashpots=st.integers(0, 2),
+    spread=st.sampled_from([0.0, 3.0]),
+    frequency=st.floats(-2.0, 2.0),
+)
+def test_sum_over_poles_is_the_schur_complement(seed, damping, dashpots, spread, frequency):
+    # from light damping to overdamped, interior frequencies over decades, far below and far above them
+    rng = np.random.default_rng(seed)
+    n = 12
+    scale = 10.0 ** (spread * rng.random(n) / 2)
+    mass = positive(rng, n)
+    stiffness = 20 * scale[:, None] * positive(rng, n) * scale
+    c = damping * positive(rng, n)
+    c[np.arange(dashpots), np.arange(dashpots)] += 100.0
+    linear = assert_schur(Structure(mass, c, stiffness, table(("q",) * n)), [10.0**frequency])
+    assert isinstance(linear.spectral.terms, Poles)
+
+
+@pytest.mark.parametrize("kind", ["proportional", "none"])
+def test_proportional_damping_sums_over_modes(kind):
+    structure = structure_of(kind)
+    _, terms = decomposed(structure)
+    assert isinstance(terms, Modes)
+    assert_schur(structure, [1e-3, 0.5, OMEGA, 40.0, 1e3])
+
+
+def test_modal_damping_of_the_interior_beside_other_damping_outside_is_exact():
+    # diagonal in the interior's modes, but no multiple of the mass across: neither sum, and still no factorisation
+    structure = structure_of("proportional")
+    damping = np.array(structure.damping)
+    inner = np.setdiff1d(np.arange(9), RETAINED)
+    damping[1, inner[0]] = damping[inner[0], 1] = 0.05
+    linear = assert_schur(replace(structure, damping=damping), [0.5, OMEGA])
+    assert linear.diagonal
+    assert linear.spectral.terms is None
+
+
+def test_coordinates_without_mass_have_no_pole_at_infinity():
+    structure = structure_of("massless")
+    linear = assert_schur(structure, [0.01, OMEGA, 100.0])
+    assert np.all(np.isfinite(linear.spectral.states.nu))
+    assert isinstance(linear.spectral.terms, Poles)
+
+
+def test_equal_bodies_have_equal_poles():
+    # eigenvectors of a repeated pole are arbitrary within their space
+    rng = np.random.default_rng(4)
+    one = {name: s * positive(rng, 4) for name, s in (("m", 1.0), ("c", 0.3), ("k", 20.0))}
+    m, c, k = (scipy.linalg.block_diag(np.eye(6), *(3 * [one[name]])) for name in "mck")
+    k[1, 6:] = k[6:, 1] = 0.5
+    k[1, 1] = 30.0
+    structure = Structure(m, c, k, table(("q",) * 18))
+    linear = assert_schur(structure, [0.5, OMEGA, 20.0])
+    assert isinstance(linear.spectral.terms, Poles)
+
+
+def oscillators(critical):
+    """Interior of two coupled oscillators and one alone with `critical` times its critical damping."""
+    m, k = np.eye(6), np.diag([9.0, 4, 3, 9, 9, 9])
+    k[2, 3] = k[3, 2] = -1.0
+    k[1, :] = k[:, 1] = [1.0, 5.0, 0.5, 0.5, 1.0, 1.0]
+    c = np.diag([0.1, 0.1, 0.4, 0.1, 0.1, 0.1])
+    c[0, 0] = 2.0 * 3.0 * critical
+    return Structure(m, c, k, table(("q",) * 6))
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-3])
+def test_critical_damping_is_factorised_where_its_eigenvectors_are_parallel(off):
+    for side in (1.0 + off, 1.0 - off):
+        linear = assert_schur(oscillators(side), [0.3, 3.0, 9.0])
+        assert not linear.diagonal
+        assert (linear.spectral.terms is None) == (off < 1e-8)
+
+
+def test_large_interiors_are_factorised(monkeypatch):
+    monkeypatch.setattr(spectral, "LARGEST_STATE_SPACE", 5)
+    linear = assert_schur(structure_of("general"), [OMEGA])
+    assert linear.spectral.terms is None
+
+
+def test_no_decomposition_for_the_static_problem():
+    linear = condense(structure_of("general"), RETAINED, loaded(0))
+    linear.condensed(OMEGA, 0)
+    linear.recover(OMEGA, np.ones((1, 3), dtype=complex))
+    assert not {"states", "terms"} & set(vars(linear.spectral))
+
+
+def test_another_load_keeps_the_decomposition():
+    linear, terms = decomposed(structure_of("general"))
+    assert linear.with_load(loaded(5)).spectral.terms is terms
+
+
+def test_slope_at_zero_frequency_is_the_damping():
+    structure = structure_of("general")
+    linear = condense(structure, np.arange(9), loaded(0))
+    np.testing.assert_allclose(linear.condensed(0.0, 2).derivative[2], 2j * structure.damping)
+
+
+def test_products_at_one_frequency_use_the_poles():
+    linear, _ = decomposed(structure_of("general"))
+    got = linear.condensed(OMEGA, ORDER)
+    products = at_frequency(linear, OMEGA, ORDER)
+    for h in range(ORDER + 1):
+        np.testing.assert_allclose(products.block(h), got.stiffness[h], rtol=1e-11)
+    assert all(isinstance(inner[0], StateSpace) for inner in products.inner)
 
 
 # ---- messages -----------------------------------------------------------------------------------------------------------
