@@ -7,7 +7,9 @@ import sys
 from collections import namedtuple
 from pathlib import Path
 
+import numpy as np
 import pytest
+import xarray as xr
 from small_study import write_small_study
 from typer.testing import CliRunner, Result
 
@@ -134,6 +136,66 @@ def test_results_of_another_study_are_not_mixed(tmp_path: Path) -> None:
     write_small_study(tmp_path, airfoil_size_m="1e-5", centrifugal_n="440.0")
     assert "this results folder belongs to another study" in refused("run", str(path))
     assert "limits" in refused("run", str(path), "--fresh")
+
+
+def planar_friction(path: Path, *sides: str) -> Path:
+    """Give sides of a study's damper coupled_coulomb."""
+    text = path.read_text(encoding="utf-8")
+    for side in sides:
+        begin = text.index(f"[contact.{side}]")
+        end = text.index("\n\n", begin)
+        changed = text[begin:end].replace("elastic_coulomb", "coupled_coulomb")
+        changed = changed.replace("axial_stiffness_n_per_m = 450e6\n", "")
+        text = text[:begin] + changed + text[end:]
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_other_law_and_evaluator_from_a_file_to_the_result(tmp_path: Path) -> None:
+    path = planar_friction(write_small_study(tmp_path, evaluator='"intervals"'), "flat")
+    ended = invoke("run", str(path), "--no-report")
+    assert ended.exit_code == 0, ended.output
+    with xr.open_dataset(tmp_path / "results" / "result.nc") as data:
+        assert data.attrs["evaluator"] == "intervals"
+        assert list(data.contact_law.values) == ["coupled_coulomb"] * 6 + ["elastic_coulomb"] * 3
+        assert int(data.points_failed.sum()) == 0
+        # the static force stands on the limit, along the radius of the disc
+        force = data.static_force.sel(contact=[f"L{i}.{j}" for i in (1, 2) for j in (1, 2, 3)])
+        friction = np.hypot(force.sel(direction="t"), force.sel(direction="w"))
+        np.testing.assert_allclose(friction, -0.6 * force.sel(direction="n"), rtol=1e-3)
+        # under so faint a harmonic force the contacts are springs: the peak is the mode with the springs of both laws
+        modes = data.frequency_stuck_reduced_hz.values
+        assert np.min(np.abs(modes / data.peak_frequency_hz.values[0] - 1.0)) < 1e-3
+
+
+@pytest.mark.parametrize("fresh", [(), ("--fresh",)])
+def test_time_integration_of_other_laws_is_refused_before_anything_is_done(
+    tmp_path: Path, fresh: tuple[str, ...]
+) -> None:
+    path = planar_friction(write_small_study(tmp_path), "flat", "curved")
+    kept = tmp_path / "results" / "result.nc"
+    kept.parent.mkdir()
+    kept.write_text("of an earlier run")
+    said = refused("run", str(path), "--verify", *fresh).splitlines()
+    assert said == [
+        (
+            f"{path}: contact.{side}.law: --verify integrates in time, which knows elastic_coulomb alone, got 'coupled_coulomb'. "
+            "Run without --verify, or give the law elastic_coulomb."
+        )
+        for side in ("flat", "curved")
+    ]
+    assert [p.name for p in kept.parent.iterdir()] == ["result.nc"]
+    assert kept.read_text() == "of an earlier run"
+
+
+def test_results_of_another_law_or_evaluator_are_not_mixed(tmp_path: Path) -> None:
+    path = write_small_study(tmp_path, airfoil_size_m="1e-5")
+    assert "limits" in refused("run", str(path))  # stops after the journal is made
+    for changed in (
+        write_small_study(tmp_path, airfoil_size_m="1e-5", evaluator='"march"'),
+        planar_friction(write_small_study(tmp_path, airfoil_size_m="1e-5"), "curved"),
+    ):
+        assert "this results folder belongs to another study" in refused("run", str(changed))
 
 
 def test_run_that_costs_too_much_is_refused_before_meshing(tmp_path: Path) -> None:

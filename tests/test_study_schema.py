@@ -7,8 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from stickslip.contact.laws.bonded import Bonded
+from stickslip.contact.laws.coupled_coulomb import CoupledCoulomb
+from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.contact.laws.iwan import Iwan
+from stickslip.contact.laws.jenkins import Jenkins
+from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError
+from stickslip.study.assembly import contact_laws
 from stickslip.study.build import sweep_of
+from stickslip.study.contacts import NEEDS
 from stickslip.study.example import example_text
 from stickslip.study.schema import LARGEST_FILE, Study, json_schema, read_study
 
@@ -114,6 +122,10 @@ SINGLE = {
         ("selection", '"always_hihg"'),
         "harmonics.selection: is not known, got 'always_hihg'. Did you mean 'always_high'?",
     ),
+    "unknown evaluator": (
+        ("evaluator", '"event"'),
+        "solver.evaluator: is not known, got 'event'. Did you mean 'events'?",
+    ),
     "high below low": (
         ("low", "7"),
         "harmonics.high: must not be below low = 7, got 5. Raise it, or lower low.",
@@ -202,6 +214,94 @@ def test_bad_contact_is_named(tmp_path: Path, old: str, new: str, message: str) 
     assert complaint(tmp_path, (old, new)) == f"{tmp_path / 'study.toml'}: {message}"
 
 
+# the example's curved side under another law, and what it then says
+CURVED = """[contact.curved]
+law = "elastic_coulomb"
+normal_stiffness_n_per_m = 25e6
+tangential_stiffness_n_per_m = 20e6
+axial_stiffness_n_per_m = 450e6
+friction_coefficient = 0.6
+"""
+
+
+def curved(law: str, **values: float) -> tuple[str, str]:
+    """Return the change that gives the curved side a law with some keys."""
+    keys = "".join(f"{key} = {value}\n" for key, value in values.items())
+    return CURVED, f'[contact.curved]\nlaw = "{law}"\n{keys}'
+
+
+NORMAL = {"normal_stiffness_n_per_m": 24e6}
+PLANE = NORMAL | {"tangential_stiffness_n_per_m": 18e6}
+BOTH = PLANE | {"axial_stiffness_n_per_m": 450e6}
+OF_LAWS = {
+    "elastic_coulomb": (
+        BOTH | {"friction_coefficient": 0.3},
+        ElasticCoulomb(k_t=6e6, k_w=150e6, k_n=8e6, mu=0.3),
+    ),
+    "coupled_coulomb": (
+        PLANE | {"friction_coefficient": 0.3},
+        CoupledCoulomb(k_t=6e6, k_n=8e6, mu=0.3),
+    ),
+    "jenkins": (BOTH | {"slip_limit_n": 90.0}, Jenkins(k_t=6e6, k_w=150e6, k_n=8e6, limit=30.0)),
+    "iwan": (BOTH | {"slip_limit_n": 90.0}, Iwan(k_t=6e6, k_w=150e6, k_n=8e6, limit=30.0)),
+    "unilateral_spring": (NORMAL, UnilateralSpring(k_n=8e6)),
+    "bonded": (BOTH, Bonded(k_t=6e6, k_w=150e6, k_n=8e6)),
+}
+
+
+def test_every_law_of_the_file_is_tested() -> None:
+    assert set(OF_LAWS) == set(NEEDS)
+
+
+@pytest.mark.parametrize("name", OF_LAWS)
+def test_laws_share_the_stiffness_of_a_side_among_its_points(tmp_path: Path, name: str) -> None:
+    values, expected = OF_LAWS[name]
+    tables = read(tmp_path, curved(name, **values)).tables
+    points = tables.damper.library(tables.blades.library()).contact_points()
+    laws = contact_laws(tables, points)
+    assert points.side == ("flat",) * 6 + ("curved",) * 3
+    assert {type(law) for law in laws[:6]} == {ElasticCoulomb}
+    for law in laws[6:]:
+        assert type(law) is type(expected)
+        np.testing.assert_allclose(law.parameters(), expected.parameters(), rtol=1e-15)
+
+
+def test_law_with_the_keys_of_another_is_told_key_by_key(tmp_path: Path) -> None:
+    said = complaint(tmp_path, ('"elastic_coulomb"\nnormal_stiffness_n_per_m = 25e6', '"jenkins"\nnormal_stiffness_n_per_m = 25e6'))  # fmt: skip
+    at = f"{tmp_path / 'study.toml'}: contact.curved"
+    assert said.splitlines() == [
+        (
+            f"{at}.friction_coefficient: is no parameter of the law jenkins, got 0.6. Remove it, or choose a law that has it: "
+            "elastic_coulomb, coupled_coulomb."
+        ),
+        (
+            f"{at}.slip_limit_n: is missing, the law jenkins needs it. Add it: friction force in N at which the whole interface "
+            "has slipped, along either tangent, greater than zero."
+        ),
+    ]
+
+
+@pytest.mark.parametrize("key", ["tangential_stiffness_n_per_m", "axial_stiffness_n_per_m"])
+def test_stiffness_that_a_law_needs_is_missed(tmp_path: Path, key: str) -> None:
+    values = BOTH | {"friction_coefficient": 0.3}
+    del values[key]
+    said = complaint(tmp_path, curved("elastic_coulomb", **values))
+    assert f"contact.curved.{key}: is missing, the law elastic_coulomb needs it. Add it: " in said
+
+
+def test_slip_limit_must_be_positive(tmp_path: Path) -> None:
+    said = complaint(tmp_path, curved("iwan", **(BOTH | {"slip_limit_n": -1.0})))
+    assert "contact.curved.slip_limit_n: must be greater than 0, got -1.0. Give friction force" in said  # fmt: skip
+    assert "\n" not in said
+
+
+def test_law_and_evaluator_belong_to_what_numbers_depend_on(tmp_path: Path) -> None:
+    plain = read(tmp_path).content_hash
+    assert read(tmp_path, ("evaluator", '"intervals"')).content_hash != plain
+    assert read(tmp_path, curved("bonded", **BOTH)).content_hash != plain
+    assert sweep_of(read(tmp_path, ("evaluator", '"march"')).tables).evaluator == "march"
+
+
 def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
     said = complaint(
         tmp_path,
@@ -276,6 +376,7 @@ def test_schema_is_json_and_knows_every_table() -> None:
         "loads",
         "sweep",
         "harmonics",
+        "solver",
         "retention",
         "limits",
         "output",

@@ -3,12 +3,11 @@
 import numpy as np
 
 from stickslip.contact.interface import Interface
-from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.contact.law import ContactLaw
 from stickslip.errors import input_error
 from stickslip.model.damper import ContactPoints, FlatCurvedDamper, gap_operator
 from stickslip.model.structure import Structure, join
 from stickslip.study.schema import StudyTables
-from stickslip.study.sections import ContactSide
 
 MATCH = 1e-6  # m: a contact point and its node may differ by this much
 
@@ -40,18 +39,12 @@ def join_damper(
     return joined, Interface(points.names, contact_laws(tables, points), operator)
 
 
-def contact_laws(tables: StudyTables, points: ContactPoints) -> tuple[ElasticCoulomb, ...]:
-    """Return the law of each contact: stiffnesses of a side are shared equally among its points."""
-    sides: dict[str, ContactSide] = {"flat": tables.contact.flat, "curved": tables.contact.curved}
-    laws = {}
-    for name, side in sides.items():
-        share = 1.0 / points.side.count(name)
-        laws[name] = ElasticCoulomb(
-            k_t=share * side.tangential_stiffness_n_per_m,
-            k_w=share * side.axial_stiffness_n_per_m,
-            k_n=share * side.normal_stiffness_n_per_m,
-            mu=side.friction_coefficient,
-        )
+def contact_laws(tables: StudyTables, points: ContactPoints) -> tuple[ContactLaw, ...]:
+    """Return the law of each contact: stiffnesses and slip limit of a side are shared equally among its points."""
+    laws = {
+        side: tables.contact.of_side(side).library(points.side.count(side))
+        for side in set(points.side)
+    }
     return tuple(laws[side] for side in points.side)
 
 

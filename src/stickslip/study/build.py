@@ -48,6 +48,8 @@ class Case:
         Where the harmonic force acts.
     output_labels
         Names of the outputs.
+    law_names
+        Name of the law of each contact.
     static_gap, static_force
         (n_contacts, 3) gaps (m) and forces (N) under the centrifugal load alone.
     """
@@ -62,6 +64,7 @@ class Case:
     retention: float
     force_dof: int
     output_labels: tuple[str, ...]
+    law_names: tuple[str, ...]
     static_gap: FloatArray
     static_force: FloatArray
     report_output: int = 0  # the first output is the one whose peak the solver resolves
@@ -131,6 +134,7 @@ def make_case(tables: StudyTables, blades: ReducedBlades, damper: FlatCurvedDamp
         retention=tables.retention.stiffness_n_per_m,
         force_dof=int(system.structure.dof_set("blades.force")[axis]),
         output_labels=labels,
+        law_names=tuple(tables.contact.of_side(side).law for side in contacts.side),
         static_gap=gap,
         static_force=static_contact_force(system.interface, gap),
     )
@@ -145,6 +149,7 @@ def sweep_of(tables: StudyTables) -> Sweep:
         low=h.low,
         high=h.high,
         samples=h.samples,
+        evaluator=tables.solver.evaluator,
         threshold=h.alert_threshold_percent / 100,
         selection=h.selection,
         points=tables.sweep.points,

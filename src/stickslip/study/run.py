@@ -32,7 +32,7 @@ from stickslip.study.retention import peak_shift
 from stickslip.study.schema import Study, read_study
 from stickslip.study.store import Provenance, dataset, write_dataset
 from stickslip.study.summary import RunSummary, alert_sentence, row
-from stickslip.study.verify import Check, verify
+from stickslip.study.verify import Check, require_integrable, verify
 
 LIBRARIES = ("numpy", "scipy", "numba", "gmsh", "scikit-fem", "pydantic", "xarray", "h5netcdf")
 
@@ -81,6 +81,8 @@ def run_study(
         If the user stops it; the message says how to go on.
     """
     study = read_study(path)
+    if verify_in_time:
+        require_integrable(study)
     prepare_folder(study.folder, fresh=fresh)
     versions = library_versions()
     with Journal(study.folder / JOURNAL, fingerprint(study, versions), ForcedPoint) as journal:
@@ -292,6 +294,7 @@ def _write(
         low_order=case.sweep.low,
         high_order=case.sweep.high,
         samples=case.sweep.samples,
+        evaluator=case.sweep.evaluator,
         alert_explanation=" ".join(_alerts(case, results)),
         warnings=run.warnings,
         complete=complete,

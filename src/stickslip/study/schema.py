@@ -10,10 +10,10 @@ from typing import Literal, get_args
 from pydantic import Field, ValidationError
 
 from stickslip.errors import InputError, input_error
+from stickslip.study.contacts import Contact
 from stickslip.study.geometry import Blades, Damper, MaterialTable
 from stickslip.study.messages import messages
 from stickslip.study.sections import (
-    Contact,
     Damping,
     Harmonics,
     Limits,
@@ -22,6 +22,7 @@ from stickslip.study.sections import (
     Reduction,
     Retention,
     Section,
+    Solver,
     SweepTable,
 )
 
@@ -47,6 +48,7 @@ class StudyTables(Section):
     loads: Loads = Field(description="the table [loads]")
     sweep: SweepTable = Field(description="the table [sweep]")
     harmonics: Harmonics = Field(default_factory=Harmonics, description="the table [harmonics]")
+    solver: Solver = Field(default_factory=Solver, description="the table [solver]")
     retention: Retention = Field(default_factory=Retention, description="the table [retention]")
     limits: Limits = Field(default_factory=Limits, description="the table [limits]")
     output: Output = Field(default_factory=Output, description="the table [output]")

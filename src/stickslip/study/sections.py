@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
+from stickslip.contact.compiled import Evaluator
 from stickslip.study.messages import custom_error
 
 Positive = Annotated[float, Field(gt=0)]
@@ -51,33 +52,6 @@ class Damping(Section):
     def _rises(self) -> Self:
         rising_pair(self.between_hz, "between_hz")
         return self
-
-
-class ContactSide(Section):
-    """One side of the damper; stiffnesses of the whole interface, shared among its contact points."""
-
-    law: Literal["elastic_coulomb"] = Field(
-        description="the contact law: elastic_coulomb (two Jenkins springs under a unilateral normal spring)"
-    )
-    normal_stiffness_n_per_m: Positive = Field(
-        description="normal stiffness of the whole interface in N/m, greater than zero: nothing else holds the damper"
-    )
-    tangential_stiffness_n_per_m: Positive = Field(
-        description="stiffness in the section's plane of the whole interface in N/m, greater than zero"
-    )
-    axial_stiffness_n_per_m: Positive = Field(
-        description="stiffness along the damper's axis of the whole interface in N/m, greater than zero"
-    )
-    friction_coefficient: float = Field(
-        ge=0, le=5, description="friction coefficient, 0 to 5 (steel on steel: 0.6)"
-    )
-
-
-class Contact(Section):
-    """The two sides of the damper."""
-
-    flat: ContactSide = Field(description="the table [contact.flat]")
-    curved: ContactSide = Field(description="the table [contact.curved]")
 
 
 class Loads(Section):
@@ -161,6 +135,16 @@ class Harmonics(Section):
                 "samples",
             )
         return self
+
+
+class Solver(Section):
+    """How contact forces are computed."""
+
+    evaluator: Evaluator = Field(
+        "events",
+        description="how piecewise-linear laws are evaluated over a period: events (exact transition times, no sampling error), "
+        "intervals (transitions on the time samples) or march (sample by sample, as coupled_coulomb always is)",
+    )
 
 
 class Retention(Section):

@@ -80,6 +80,7 @@ class Provenance:
     low_order: int
     high_order: int
     samples: int
+    evaluator: str
     alert_explanation: str
     warnings: Sequence[str]
     complete: bool
@@ -97,6 +98,7 @@ class Provenance:
             "low_order": self.low_order,
             "high_order": self.high_order,
             "samples": self.samples,
+            "evaluator": self.evaluator,
             "alert_explanation": self.alert_explanation,
             "warnings": json.dumps(list(self.warnings)),
             "complete": int(self.complete),
@@ -155,10 +157,8 @@ def write_dataset(data: xr.Dataset, path: Path) -> None:
         # whichever of netCDF4 and h5netcdf is installed: both write the same plain features
         data.to_netcdf(temporary, format="NETCDF4")
         temporary.replace(path)
-    except (
-        OSError,
-        RuntimeError,
-    ) as error:  # the HDF5 libraries tell of a full disk by RuntimeError
+    # the HDF5 libraries tell of a full disk by RuntimeError
+    except (OSError, RuntimeError) as error:
         raise input_error(
             str(path),
             f"cannot be written ({error})",
@@ -347,6 +347,7 @@ def _model_variables(case: Case) -> dict[str, xr.Variable]:
         "static_force": _variable(
             "contact direction", case.static_force, "N", "contact force under the centrifugal load"
         ),
+        "contact_law": _variable("contact", list(case.law_names), "1", "law of the contact"),
         "contact_position": _variable(
             "contact xyz", case.contacts.position, "m", "position of the contact points"
         ),

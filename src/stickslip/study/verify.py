@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from stickslip.contact.law import SLIP
+from stickslip.errors import InputError
 from stickslip.response.fields import signals
 from stickslip.response.forced import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.response.propagator import PeriodicLoad
@@ -19,12 +20,14 @@ from stickslip.solve.newton import newton
 from stickslip.study.build import Case
 from stickslip.study.collect import HZ, Accepted, CaseResult
 from stickslip.study.journal import Journal
+from stickslip.study.schema import Study
 
 CHECKS = 3
 FLANK = 0.7  # share of the peak amplitude at which frequencies beside a peak are taken
 PATIENCE = 600  # periods; a blade damped by 0.3 % forgets its start to 1e-5, undamped ringing of the damper never ends
 LARGE = 1.0  # percent: above it the balance is repeated with more harmonics, to tell which of the two is wrong
 NAMED = 3  # drifting coordinates that a sentence names
+INTEGRABLE = "elastic_coulomb"  # the law that the time integration knows
 MORE = 3  # times the harmonics, and the samples, of that repeat
 
 
@@ -103,6 +106,25 @@ class Check:
             return f"; the balance with {self.refined_order} harmonics does not converge"
         left = 100 * (self.refined - self.transient) / self.transient
         return f"; the balance with {self.refined_order} harmonics gives {self.refined:.5e} m ({left:+.2f} %)"
+
+
+def require_integrable(study: Study) -> None:
+    """Refuse a check by time integration of laws that it does not know, before anything is computed.
+
+    Raises
+    ------
+    InputError
+        Naming every side of the damper that has such a law.
+    """
+    sides = {"flat": study.tables.contact.flat, "curved": study.tables.contact.curved}
+    lines = [
+        f"{study.path}: contact.{name}.law: --verify integrates in time, which knows {INTEGRABLE} alone, got {side.law!r}. "
+        f"Run without --verify, or give the law {INTEGRABLE}."
+        for name, side in sides.items()
+        if side.law != INTEGRABLE
+    ]
+    if lines:
+        raise InputError("\n".join(lines))
 
 
 def verify(
