@@ -26,7 +26,6 @@ from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.lumped import chain
 from stickslip.response.forced import ForcedPoint, Sweep, forced_problem, forced_response
-from stickslip.response.passages import LOAD_SHARES
 from stickslip.response.system import System
 from stickslip.solve.newton import Newton, newton
 
@@ -37,6 +36,7 @@ ABSENT = "not measured: install stickslip[bench], or run `make bench-rival`"
 REPEATS = 5
 EQUAL = 1e-6  # of the largest coefficient of the point
 STEP = 0.2  # rad/s between points
+LOAD_SHARES = (0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)  # of a load that is ramped up
 HYBRID = {
     "solver": "scipyroot",
     "solver_options": {
@@ -90,6 +90,7 @@ class Chain:
             low=self.order,
             high=self.order,
             samples=self.samples,
+            evaluator="intervals",  # on the samples, as pyHarm does
             selection="always_high",
             frequencies=self.points,
             peak_points=0,

@@ -14,7 +14,7 @@ import numba
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.contact.element import K_N, RESIDUAL, normal_contact
+from stickslip.contact.element import K_N, MU, PRELOAD, RESIDUAL, UNILATERAL
 from stickslip.contact.law import NN, OPEN, SLIP, STICK, TN, TT
 
 
@@ -84,89 +84,133 @@ def _outer(cos_row, sin_row, basis_row, order, factor, out):  # type: ignore[no-
 
 
 @numba.njit(cache=True)
-def _march_tangent(x, limit, is_open, k, start, force, state, anchor, anchor_sign):  # type: ignore[no-untyped-def]
-    """March one Jenkins spring with the limit of each sample over two periods; the second one is kept.
+def _first_period(x, limit, is_open, k, start):  # type: ignore[no-untyped-def]
+    """March one Jenkins spring over the first period; return its anchor, the sign of the slip there, and the force there.
 
-    `anchor` is the sample whose force and position fix the spring while it sticks (-1: none, the spring starts unstretched at zero
-    displacement), `anchor_sign` the sign of the slip there (0 for a sample at which the contact was open).
+    The anchor is the sample whose force and position fix the spring while it sticks (-1: none, the spring starts unstretched at zero
+    displacement). The sign is 0 for a sample at which the contact was open.
     """
     n = x.size
-    a = -1
-    sign = 0.0
-    held = 0.0
+    a, sign, held, place = -1, 0.0, 0.0, 0.0
     if not np.isnan(start):
-        a = n - 1
-        sign = start
-        held = start * limit[a]
-    for _ in range(2):
-        for i in range(n):
-            if is_open[i]:
-                a, sign, held = i, 0.0, 0.0
-                force[i] = 0.0
-                state[i] = OPEN
-            else:
-                trial = k * x[i] if a < 0 else held + k * (x[i] - x[a])
-                if abs(trial) > limit[i]:
-                    sign = 1.0 if trial > 0.0 else -1.0
-                    a, held = i, sign * limit[i]
-                    force[i] = held
-                    state[i] = SLIP
-                else:
-                    force[i] = trial
-                    state[i] = STICK
-            anchor[i] = a
-            anchor_sign[i] = sign
+        a, sign = n - 1, start
+        held, place = start * limit[a], x[a]
+    for i in range(n):
+        if is_open[i]:
+            a, sign, held, place = i, 0.0, 0.0, x[i]
+            continue
+        trial = held + k * (x[i] - place)
+        if abs(trial) > limit[i]:
+            sign = 1.0 if trial > 0.0 else -1.0
+            a, held, place = i, sign * limit[i], x[i]
+    return a, sign, held
+
+
+@numba.njit(cache=True)
+def _march_tangent(x, limit, is_open, k, start, force, state, spans, signs):  # type: ignore[no-untyped-def]
+    """March one Jenkins spring with the limit of each sample over two periods; add the force of the second one to `force`.
+
+    Returns
+    -------
+    int
+        Number of rows of `spans`: first sample, state, and anchor of each interval of constant state, with the `signs` of the slip, or
+        of that at the anchor.
+    """
+    a, sign, held = _first_period(x, limit, is_open, k, start)
+    place = x[a] if a >= 0 else 0.0
+    count, last, last_sign = 0, -1, 0.0
+    for i in range(x.size):
+        now = STICK
+        if is_open[i]:
+            now = OPEN
+            a, sign, held, place = i, 0.0, 0.0, x[i]
+        else:
+            trial = held + k * (x[i] - place)
+            if abs(trial) > limit[i]:
+                now = SLIP
+                sign = 1.0 if trial > 0.0 else -1.0
+                a, held, place = i, sign * limit[i], x[i]
+                trial = held
+            force[i] += trial
+        state[i] = now
+        if now != last or sign != last_sign:
+            spans[count, 0], spans[count, 1], spans[count, 2] = i, now, a
+            signs[count] = sign
+            count += 1
+            last, last_sign = now, sign
+    return count
 
 
 @numba.njit(cache=True)
 def _tangent_blocks(  # type: ignore[no-untyped-def]
-    state,
-    anchor,
-    anchor_sign,
-    k,
-    limit_slope,
-    basis,
-    cos_table,
-    sin_table,
-    order,
-    cos_stick,
-    sin_stick,
-    cos_slip,
-    sin_slip,
-    block_x,
-    block_n,
-):
+    spans, signs, count, k, limit_slope, basis, cos_table, sin_table, sums, block_x, block_n
+):  # fmt: skip
     """Add the derivatives of one tangential force by its own displacement and by the normal gap, from its intervals."""
-    n = state.size
+    n = basis.shape[0]
+    order = (basis.shape[1] - 1) // 2
+    cos_stick, sin_stick, cos_slip, sin_slip, cos_row, sin_row = sums
     cos_stick[:] = 0.0
     sin_stick[:] = 0.0
     cos_slip[:] = 0.0
     sin_slip[:] = 0.0
+    for r in range(count):
+        i = spans[r, 0]
+        j = n if r + 1 == count else spans[r + 1, 0]
+        if spans[r, 1] == STICK:
+            for p in range(cos_row.size):
+                cos_row[p] = cos_table[j, p] - cos_table[i, p]
+                sin_row[p] = sin_table[j, p] - sin_table[i, p]
+                cos_stick[p] += cos_row[p]
+                sin_stick[p] += sin_row[p]
+            a = spans[r, 2]
+            if a >= 0:
+                _outer(cos_row, sin_row, basis[a], order, -k / n, block_x)
+                slope = signs[r] * limit_slope
+                if slope != 0.0:
+                    _outer(cos_row, sin_row, basis[a], order, slope / n, block_n)
+        elif spans[r, 1] == SLIP:
+            for p in range(cos_row.size):
+                cos_slip[p] += signs[r] * (cos_table[j, p] - cos_table[i, p])
+                sin_slip[p] += signs[r] * (sin_table[j, p] - sin_table[i, p])
+    _product_matrix(cos_stick, sin_stick, order, k / n, block_x)
+    if limit_slope != 0.0:
+        _product_matrix(cos_slip, sin_slip, order, limit_slope / n, block_n)
+
+
+@numba.njit(cache=True)
+def _normal(gap, row, force, limit, is_open):  # type: ignore[no-untyped-def]
+    """Add the normal force; fill the limit of friction and where the contact is open. Return the slope of the limit by the gap."""
+    k_n, mu, preload = row[K_N], row[MU], row[PRELOAD]
+    if row[UNILATERAL] == 0.0:
+        for i in range(gap.size):
+            force[i] += k_n * gap[i]
+            limit[i] = mu * preload
+            is_open[i] = False
+        return 0.0
+    for i in range(gap.size):
+        pressure = preload - k_n * gap[i]
+        is_open[i] = pressure < 0.0
+        pressure = 0.0 if is_open[i] else pressure
+        force[i] -= pressure
+        limit[i] = mu * pressure
+    return -mu * k_n
+
+
+@numba.njit(cache=True)
+def _closed_sums(is_open, cos_table, sin_table, cos_sum, sin_sum):  # type: ignore[no-untyped-def]
+    """Sum cosines and sines over the samples at which the contact is closed."""
+    n = is_open.size
+    cos_sum[:] = 0.0
+    sin_sum[:] = 0.0
     i = 0
     while i < n:
         j = i + 1
-        if state[i] == STICK:
-            while j < n and state[j] == STICK:
-                j += 1
-            cos_row = cos_table[j] - cos_table[i]
-            sin_row = sin_table[j] - sin_table[i]
-            cos_stick += cos_row
-            sin_stick += sin_row
-            a = anchor[i]
-            if a >= 0:
-                _outer(cos_row, sin_row, basis[a], order, -k / n, block_x)
-                if anchor_sign[i] != 0.0:
-                    _outer(
-                        cos_row, sin_row, basis[a], order, anchor_sign[i] * limit_slope / n, block_n
-                    )
-        elif state[i] == SLIP:
-            while j < n and state[j] == SLIP and anchor_sign[j] == anchor_sign[i]:
-                j += 1
-            cos_slip += anchor_sign[i] * (cos_table[j] - cos_table[i])
-            sin_slip += anchor_sign[i] * (sin_table[j] - sin_table[i])
+        while j < n and is_open[j] == is_open[i]:
+            j += 1
+        if not is_open[i]:
+            cos_sum += cos_table[j] - cos_table[i]
+            sin_sum += sin_table[j] - sin_table[i]
         i = j
-    _product_matrix(cos_stick, sin_stick, order, k / n, block_x)
-    _product_matrix(cos_slip, sin_slip, order, limit_slope / n, block_n)
 
 
 @numba.njit(cache=True)
@@ -174,28 +218,11 @@ def _element_period(gap, row, basis, cos_table, sin_table, force, state, blocks,
     """Add the force and the blocks of one elementary contact; `work` holds the arrays it needs on the way."""
     n = gap.shape[1]
     order = (basis.shape[1] - 1) // 2
-    limit, tangent, is_open, anchor, anchor_sign, sums = work
-    cos_a, sin_a, cos_b, sin_b = sums
-    k_n = row[K_N]
-    slope = limit_slope = 0.0
-    for i in range(n):
-        normal, k, limit[i], by_gap, is_open[i] = normal_contact(gap[2, i], row)
-        force[2, i] += normal
-        if not is_open[i]:
-            slope, limit_slope = k, by_gap
-    if k_n != 0.0:
-        cos_a[:] = 0.0
-        sin_a[:] = 0.0
-        i = 0
-        while i < n:
-            j = i + 1
-            while j < n and is_open[j] == is_open[i]:
-                j += 1
-            if not is_open[i]:
-                cos_a += cos_table[j] - cos_table[i]
-                sin_a += sin_table[j] - sin_table[i]
-            i = j
-        _product_matrix(cos_a, sin_a, order, slope / n, blocks[NN])
+    limit, is_open, spans, signs, sums = work
+    limit_slope = _normal(gap[2], row, force[2], limit, is_open)
+    if row[K_N] != 0.0:
+        _closed_sums(is_open, cos_table, sin_table, sums[0], sums[1])
+        _product_matrix(sums[0], sums[1], order, row[K_N] / n, blocks[NN])
     for d in range(2):
         k = row[d]
         if k == 0.0:
@@ -203,13 +230,11 @@ def _element_period(gap, row, basis, cos_table, sin_table, force, state, blocks,
             for i in range(n):
                 state[d, i] = OPEN if is_open[i] else STICK
             continue
-        _march_tangent(
-            gap[d], limit, is_open, k, row[RESIDUAL], tangent, state[d], anchor, anchor_sign
+        count = _march_tangent(
+            gap[d], limit, is_open, k, row[RESIDUAL], force[d], state[d], spans, signs
         )
-        force[d] += tangent
         _tangent_blocks(
-            state[d], anchor, anchor_sign, k, limit_slope, basis, cos_table, sin_table, order,
-            cos_a, sin_a, cos_b, sin_b, blocks[TT + d], blocks[TN + d],
+            spans, signs, count, k, limit_slope, basis, cos_table, sin_table, sums, blocks[TT + d], blocks[TN + d]
         )  # fmt: skip
 
 
@@ -230,8 +255,8 @@ def _contacts(  # type: ignore[no-untyped-def]
     n = gap.shape[2]
     size = cos_table.shape[1]
     work = (
-        np.empty(n), np.empty(n), np.empty(n, np.bool_), np.empty(n, np.int64), np.empty(n),
-        (np.empty(size), np.empty(size), np.empty(size), np.empty(size)),
+        np.empty(n), np.empty(n, np.bool_), np.empty((n, 3), np.int64), np.empty(n),
+        (np.empty(size), np.empty(size), np.empty(size), np.empty(size), np.empty(size), np.empty(size)),
     )  # fmt: skip
     other = np.empty((2, n), np.int64)
     for c in range(start, end):
