@@ -54,7 +54,7 @@ class _Tables:
 @lru_cache(maxsize=32)
 def _tables(order: int, samples: int) -> _Tables:
     basis, cos_table, sin_table = prefix_sums(order, samples)
-    analysis = basis * (2.0 / samples)
+    analysis = basis * (2.0 / max(samples, 1))
     analysis[:, 0] *= 0.5
     h = np.arange(1, order + 1)
     slope = np.zeros_like(basis)
@@ -64,7 +64,12 @@ def _tables(order: int, samples: int) -> _Tables:
 
 
 def contact_forces(
-    gap_coefficients: FloatArray, contacts: CompiledContacts, samples: int, omega: float = 1.0
+    gap_coefficients: FloatArray,
+    contacts: CompiledContacts,
+    samples: int,
+    omega: float = 1.0,
+    *,
+    history: bool = True,
 ) -> ContactPeriod:
     """Evaluate contacts whose gaps have the given Fourier coefficients.
 
@@ -78,11 +83,16 @@ def contact_forces(
         Samples per period; at least 8 H keeps aliasing below the truncation error. Exact events need them for display only.
     omega
         Frequency in rad/s; only laws that depend on velocity ask for it.
+    history
+        Whether gaps, forces and states over the period are asked for, too: exact events do without them, and are then returned
+        with no samples.
     """
     m = gap_coefficients.shape[0]
+    if not history and contacts.evaluator == "events" and not contacts.marched:
+        samples = 0
     tables = _tables((m - 1) // 2, samples)
-    gap = np.ascontiguousarray((tables.basis @ gap_coefficients).T)
-    gap = gap.reshape(contacts.n_contacts, 3, samples)
+    # one row a gap, so that an evaluator runs along it
+    gap = (gap_coefficients.T @ tables.basis.T).reshape(contacts.n_contacts, 3, samples)
     parts = []
     if contacts.piecewise.size:
         own = contacts.piecewise
@@ -150,7 +160,7 @@ def _marched(
     n, _, samples = gap.shape
     m = tables.basis.shape[1]
     rate = omega * tables.slope
-    velocity = np.ascontiguousarray((rate @ _of(gap_coefficients, laws.contacts)).T)
+    velocity = _of(gap_coefficients, laws.contacts).T @ rate.T
     force, by_omega = np.empty_like(gap), np.empty_like(gap)
     state = np.empty((n, 2, samples), dtype=np.int64)
     blocks = np.empty((n, pairs, m, m))

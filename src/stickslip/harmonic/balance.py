@@ -95,10 +95,16 @@ class HarmonicBalance:
         q = x.reshape(2 * self.order + 1, self.linear.n) * self.displacement_scale
         return contact_forces(self.rows.gaps(q), self.compiled, self.samples, omega)
 
+    def _forces(self, x: FloatArray, omega: float) -> ContactPeriod:
+        """Return what the equations ask of the contacts: coefficients and derivatives."""
+        q = x.reshape(2 * self.order + 1, self.linear.n) * self.displacement_scale
+        gaps = self.rows.gaps(q)
+        return contact_forces(gaps, self.compiled, self.samples, omega, history=False)
+
     def linearise(self, x: FloatArray, omega: float) -> Linearisation:
         """Return residual, Jacobian and ω-derivative at scaled unknowns `x` (size,) and `omega` (rad/s)."""
         start = perf_counter()
-        period = self.contacts(x, omega)
+        period = self._forces(x, omega)
         seconds = perf_counter() - start
         jac: FloatArray | StructuredJacobian
         if self.size > CROSSOVER or self.structured:
