@@ -215,6 +215,37 @@ def test_phase_quadrature_is_in_quadrature_and_near_the_top():
         assert point.amplitude == pytest.approx(top.amplitude, rel=5e-3)
 
 
+@pytest.mark.parametrize(
+    ("case", "parameter", "value"), [(damped, "limit", 0.12), (block, "mu", 0.3)]
+)
+def test_phase_quadrature_is_where_a_dense_sweep_crosses_it(case, parameter, value):
+    system, load = case()
+    how = Discretisation(order=3)
+    start = {"limit": 0.2, "mu": 0.5}[parameter]
+    point = list(
+        track_peak(
+            system, load, parameter, (start, value), (0.8, 1.6), "phase_quadrature", discretisation=how
+        )
+    )[-1]  # fmt: skip
+    balance = member(system, load, parameter, value, how)
+    n, place = balance.linear.n, int(np.searchsorted(balance.linear.retained, system.outputs[0]))
+    omegas = point.omega * (1 + np.linspace(-5e-3, 5e-3, 42))  # 42: none is the tracked one
+    x = first_guess(system, balance, omegas[0], FINE)
+    found = []
+    for omega in omegas:
+        x = newton(lambda v, w=omega: balance.linearise(v, w), x, FINE).x
+        found.append(complex(x[n + place], -x[2 * n + place]) * balance.displacement_scale)
+    # the largest force is in phase with the cosine: in quadrature the real part vanishes
+    real = np.real(found)
+    assert real[0] > 0.0 > real[-1]
+    i = int(np.flatnonzero(real > 0.0)[-1])
+    share = real[i] / (real[i] - real[i + 1])
+    # between neighbours 2.4e-4 apart the curves are straight to the square of that, over the half-width of the peak
+    assert point.omega == pytest.approx(omegas[i] + share * (omegas[i + 1] - omegas[i]), rel=1e-6)
+    height = abs(found[i] + share * (found[i + 1] - found[i]))
+    assert point.amplitude == pytest.approx(height, rel=1e-5)
+
+
 @pytest.mark.parametrize("by", ["horizontal_tangent", "phase_quadrature"])
 @pytest.mark.parametrize(
     ("case", "parameter", "value"),
