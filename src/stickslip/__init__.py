@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from stickslip.contact.laws.jenkins import Jenkins
     from stickslip.contact.laws.polynomial_spring import PolynomialSpring
     from stickslip.contact.laws.regularised_coulomb import RegularisedCoulomb
+    from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
     from stickslip.contact.laws.unilateral_spring import UnilateralSpring
     from stickslip.contact.pairing import (
         Pairing,
@@ -48,6 +49,10 @@ if TYPE_CHECKING:
         StickslipError,
     )
     from stickslip.harmonic.aft import contact_forces
+    from stickslip.harmonic.balance import harmonic_balance
+    from stickslip.harmonic.compliance import ComplianceForm
+    from stickslip.harmonic.dlft import dynamic_lagrangian
+    from stickslip.harmonic.dynamic_stiffness import condense
     from stickslip.harmonic.excitation import HarmonicLoad
     from stickslip.model.blade_pair import BladePair
     from stickslip.model.damper import (
@@ -77,6 +82,7 @@ if TYPE_CHECKING:
         join,
     )
     from stickslip.reduction.craig_bampton import craig_bampton
+    from stickslip.reduction.relative import in_relative_coordinates
     from stickslip.report.page import write_report
     from stickslip.response.drift import (
         Drift,
@@ -113,7 +119,10 @@ if TYPE_CHECKING:
         TransientResult,
         integrate,
     )
-    from stickslip.solve.newton import Newton
+    from stickslip.solve.newton import (
+        Newton,
+        newton,
+    )
     from stickslip.solve.status import Status
     from stickslip.study.run import run_study
     from stickslip.study.schema import (
@@ -136,6 +145,7 @@ _MODULES = {
     "stickslip.contact.laws.jenkins": ("Jenkins",),
     "stickslip.contact.laws.polynomial_spring": ("PolynomialSpring",),
     "stickslip.contact.laws.regularised_coulomb": ("RegularisedCoulomb",),
+    "stickslip.contact.laws.rigid_coulomb": ("RigidCoulomb",),
     "stickslip.contact.laws.unilateral_spring": ("UnilateralSpring",),
     "stickslip.contact.pairing": (
         "Pairing",
@@ -152,6 +162,10 @@ _MODULES = {
     ),
     "stickslip.errors": ("InputError", "SingularError", "StickslipError"),
     "stickslip.harmonic.aft": ("contact_forces",),
+    "stickslip.harmonic.balance": ("harmonic_balance",),
+    "stickslip.harmonic.compliance": ("ComplianceForm",),
+    "stickslip.harmonic.dlft": ("dynamic_lagrangian",),
+    "stickslip.harmonic.dynamic_stiffness": ("condense",),
     "stickslip.harmonic.excitation": ("HarmonicLoad",),
     "stickslip.model.blade_pair": ("BladePair",),
     "stickslip.model.damper": ("ContactPoints", "FlatCurvedDamper", "gap_operator"),
@@ -164,6 +178,7 @@ _MODULES = {
     "stickslip.model.solid": ("Material", "assemble_solid"),
     "stickslip.model.structure": ("Structure", "join"),
     "stickslip.reduction.craig_bampton": ("craig_bampton",),
+    "stickslip.reduction.relative": ("in_relative_coordinates",),
     "stickslip.report.page": ("write_report",),
     "stickslip.response.drift": ("Drift", "drift"),
     "stickslip.response.fields": ("Fields", "Signals", "fields", "signals"),
@@ -180,7 +195,7 @@ _MODULES = {
     "stickslip.response.system": ("System",),
     "stickslip.response.tracking": ("PeakPoint", "smallest_peak", "track_peak"),
     "stickslip.response.transient": ("TimeStepping", "TransientResult", "integrate"),
-    "stickslip.solve.newton": ("Newton",),
+    "stickslip.solve.newton": ("Newton", "newton"),
     "stickslip.solve.status": ("Status",),
     "stickslip.study.run": ("run_study",),
     "stickslip.study.schema": ("Study", "read_study"),
@@ -191,6 +206,7 @@ __all__ = [
     "BladePair",
     "Bonded",
     "BoucWen",
+    "ComplianceForm",
     "ContactPoints",
     "CoupledCoulomb",
     "CubicSpring",
@@ -218,6 +234,7 @@ __all__ = [
     "PolynomialSpring",
     "RegularisedCoulomb",
     "RigidBody",
+    "RigidCoulomb",
     "Signals",
     "SingularError",
     "SolidMesh",
@@ -238,19 +255,24 @@ __all__ = [
     "branch_in_parameter",
     "chain",
     "compile_contacts",
+    "condense",
     "contact_forces",
     "craig_bampton",
     "drift",
+    "dynamic_lagrangian",
     "fields",
     "forced_problem",
     "forced_response",
     "gap_operator",
+    "harmonic_balance",
+    "in_relative_coordinates",
     "integrate",
     "join",
     "law_kernel",
     "lumped",
     "mesh_blade_pair",
     "natural_frequencies",
+    "newton",
     "nodal_surface",
     "node_to_node",
     "node_to_segment",
