@@ -27,7 +27,11 @@ PRESSURE = 1e6  # Pa
 NORMAL, TANGENTIAL = 1e12, 0.7e12  # N/m per m²
 FRICTION = 0.3
 GRIDS = {
+    8: (4, 2),
+    12: (4, 3),
+    16: (4, 4),
     24: (6, 4),
+    36: (6, 6),
     50: (10, 5),
     100: (10, 10),
     150: (15, 10),
@@ -35,21 +39,24 @@ GRIDS = {
     300: (20, 15),
     1000: (40, 25),
 }
+# unit forces at the free corner of the upper plate: the first opens contacts, the second makes them slip
+PULLS = {"lift": (0.3, 0.2, 0.9), "slide": (0.95, 0.3, 0.0)}
 
 
 @dataclass(frozen=True, eq=False)
 class Plates:
-    """The system, the shape of a unit force at the free corner of the upper plate, and the contact area of a point."""
+    """The system, whose outputs are the free corner of the upper plate in x, y, z, and the sum of its preloads."""
 
     system: System
-    pull: np.ndarray  # (n,) unit force, mostly normal with a tangential part
-    lift: float  # N, total preload
+    preload: float  # N
 
-    def load(self, share: float) -> HarmonicLoad:
+    def load(self, share: float, pull: str = "lift") -> HarmonicLoad:
         """Return the clamping that balances the preloads, and an excitation of `share` times their sum in harmonic 1."""
         interface = self.system.interface
         clamping = interface.gap_operator.T @ interface.resting_force()
-        return HarmonicLoad(clamping, {1: share * self.lift * self.pull.astype(complex)})
+        force = np.zeros(self.system.structure.n, dtype=complex)
+        force[self.system.outputs] = share * self.preload * np.array(PULLS[pull])
+        return HarmonicLoad(clamping, {1: force})
 
 
 def two_plates(points: int, seed: int = 0) -> Plates:
@@ -99,17 +106,10 @@ def _with_contacts(structure: Structure, points: int, seed: int) -> Plates:
         )
         for r in rough
     )  # fmt: skip
-    operator = np.zeros((3 * points, structure.n))
-    operator[np.arange(3 * points), np.arange(3 * points)] = 1.0
+    operator = scipy.sparse.eye_array(3 * points, structure.n, format="csr")
     names = tuple(str(i) for i in range(points))
-    pull = np.zeros(structure.n)
-    tip = 3 * points + np.arange(3)
-    pull[tip] = 0.3, 0.2, 0.9
-    return Plates(
-        System(structure, Interface(names, laws, operator), tip),
-        pull,
-        float(PRESSURE * area * rough.sum()),
-    )
+    system = System(structure, Interface(names, laws, operator), 3 * points + np.arange(3))
+    return Plates(system, float(PRESSURE * area * rough.sum()))
 
 
 def _plate(

@@ -72,6 +72,38 @@ def contact_product(blocks, columns, values, vector, transposed, gap, force, out
                         out[p, columns[c, j]] += value * force[d, p]
 
 
+@numba.njit(cache=True, nogil=True)
+def subtract_lower(blocks, columns, values, vector, before, first, last, factor, gap, out):  # type: ignore[no-untyped-def]
+    """Subtract from the rows `first` to `last` of `out` what the coefficients before them contribute to ``factor Bᵀ K B v``.
+
+    Parameters
+    ----------
+    blocks, columns, values
+        As in `contact_product`.
+    vector
+        (m, n) coefficients of the coordinates; only those before `first` are read.
+    before, first, last
+        Rows before `before` have their gaps in `gap` already; those up to `first` are added to it.
+    factor
+        Scale of the result.
+    gap
+        In and out: (n_contacts, 3, m).
+    out
+        In and out: (m, n).
+    """
+    for c in range(blocks.shape[0]):
+        _gap(columns[c], values[c], vector[before:first], gap[c, :, before:first])
+        for b in range(blocks.shape[1]):
+            row, col = _PAIRS[b, 0], _PAIRS[b, 1]
+            for p in range(first, last):
+                total = 0.0
+                for q in range(first):
+                    total += blocks[c, b, p, q] * gap[c, col, q]
+                if total != 0.0:
+                    for j in range(columns.shape[1]):
+                        out[p, columns[c, j]] -= factor * values[c, row, j] * total
+
+
 def harmonic_means(blocks: FloatArray) -> ComplexArray:
     """Return what is left of `blocks` when each harmonic of a force depends on the same harmonic of a gap by a complex number.
 
