@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from collections import namedtuple
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,12 @@ from typer.testing import CliRunner, Result
 import stickslip
 from stickslip.cli import app
 from stickslip.errors import InputError
+from stickslip.response.forced import ForcedPoint
+from stickslip.solve.status import Status
+from stickslip.study.collect import Accepted, CaseResult
 from stickslip.study.example import example_text
 from stickslip.study.folder import prepare_folder
+from stickslip.study.summary import alert_sentence
 
 HEAVY = ("numpy", "scipy", "numba", "xarray", "pydantic", "plotly", "gmsh", "skfem", "meshio")
 
@@ -229,3 +234,32 @@ def test_node_sets_that_do_not_match_are_named(tmp_path: Path) -> None:
 def test_report_of_nothing(tmp_path: Path) -> None:
     said = refused("report", str(tmp_path))
     assert str(tmp_path / "result.nc") in said
+
+
+def first_passage(index: int, hertz: float, error: float) -> ForcedPoint:
+    """Return a point with a predicted error (a fraction)."""
+    return ForcedPoint(
+        "low", index, 2 * np.pi * hertz, np.zeros((2, 1), dtype=complex), np.zeros(2), 0.1, Status.CONVERGED,
+        3, error, 0.0, 0.0, 0.0,
+    )  # fmt: skip
+
+
+def told(errors: list[float]) -> str:
+    """Return what is said of a load case whose points over the threshold a branch with many harmonics replaced."""
+    passage = [first_passage(i, 100.0 + i, e) for i, e in enumerate(errors)]
+    branch = [replace(p, stage="branch", predicted_error=np.nan) for p in passage]
+    kept = tuple(Accepted(p, None, None, None, np.nan) for p in branch)
+    solved = (*passage, *branch)
+    result = CaseResult(4.0, 1.0, solved, kept, -1, None, 0, 1)
+    return alert_sentence(result, 5.0, 5)
+
+
+def test_alert_is_told_where_a_branch_took_the_place_of_the_points_it_was_asked_at() -> None:
+    assert told([0.01, 0.06, 0.31, 0.02]) == (
+        "F_CL/F_HE = 4: 2 of 4 points repeated with 5 harmonics, at 101.00 to 102.00 Hz, because leaving the higher harmonics out "
+        "was predicted to change the first harmonic by more than 5 % (up to 31 % at 102.00 Hz)."
+    )
+    assert "no frequency needs more harmonics; the largest predicted error is 2 %" in told(
+        [0.01, np.nan, 0.02]
+    )
+    assert told([np.nan]) == "F_CL/F_HE = 4: the alert was not asked."

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from stickslip.study.collect import HZ, Accepted, CaseResult
+from stickslip.response.forced import ForcedPoint
+from stickslip.study.collect import HZ, CaseResult
 from stickslip.study.verify import Check
 
 
@@ -78,11 +79,14 @@ def row(result: CaseResult) -> Row:
 
 
 def alert_sentence(result: CaseResult, threshold_percent: float, high: int) -> str:
-    """Say at which frequencies of a load case the alert asked for more harmonics, and why."""
+    """Say at which frequencies of a load case the alert asked for more harmonics, and why.
+
+    It was asked at the points of the first passage, whatever took their places afterwards: a repeat, or a branch with many harmonics.
+    """
     ratio = f"F_CL/F_HE = {result.ratio:g}"
-    errors = np.array([100 * a.predicted_error for a in result.accepted])
-    asked = np.isfinite(errors)
-    if not np.any(asked):
+    passage = [p for p in result.solved if p.stage == "low"]
+    errors = np.array([100 * p.predicted_error for p in passage])
+    if not np.any(np.isfinite(errors)):
         return f"{ratio}: the alert was not asked."
     over = np.array([bool(e > threshold_percent) for e in errors])
     if not np.any(over):
@@ -90,12 +94,11 @@ def alert_sentence(result: CaseResult, threshold_percent: float, high: int) -> s
             f"{ratio}: no frequency needs more harmonics; the largest predicted error is {np.nanmax(errors):.2g} %, "
             f"below the threshold of {threshold_percent:g} %."
         )
-    worst = int(np.nanargmax(np.where(asked, errors, -1.0)))
+    worst = int(np.nanargmax(errors))
     where = ", ".join(
-        f"{lo:.2f}" if lo == hi else f"{lo:.2f} to {hi:.2f}"
-        for lo, hi in _intervals(result.accepted, over)
+        f"{lo:.2f}" if lo == hi else f"{lo:.2f} to {hi:.2f}" for lo, hi in _intervals(passage, over)
     )
-    at = result.accepted[worst].point.omega / HZ
+    at = passage[worst].omega / HZ
     return (
         f"{ratio}: {int(over.sum())} of {len(over)} points repeated with {high} harmonics, at {where} Hz, because leaving "
         f"the higher harmonics out was predicted to change the first harmonic by more than {threshold_percent:g} % "
@@ -103,13 +106,13 @@ def alert_sentence(result: CaseResult, threshold_percent: float, high: int) -> s
     )
 
 
-def _intervals(accepted: Sequence[Accepted], over: np.ndarray) -> list[tuple[float, float]]:
+def _intervals(points: Sequence[ForcedPoint], over: np.ndarray) -> list[tuple[float, float]]:
     """Return the ranges (Hz) of neighbouring frequencies above the threshold."""
-    order = np.argsort([a.point.omega for a in accepted])
+    order = np.argsort([p.omega for p in points])
     found: list[tuple[float, float]] = []
     inside = False
     for i in order:
-        hz = accepted[i].point.omega / HZ
+        hz = points[i].omega / HZ
         if over[i]:
             found = [*found[:-1], (found[-1][0], hz)] if inside else [*found, (hz, hz)]
         inside = bool(over[i])
