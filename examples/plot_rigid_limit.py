@@ -1,6 +1,6 @@
 r"""
-Rigid Coulomb friction: limit of the penalty law, independent of the method's own penalty
-========================================================================================
+Rigid Coulomb friction: limit of the penalty law
+=================================================
 
 Two masses, the second of which rubs on the ground. A *penalty law* puts a spring in front of the slider; a *rigid* contact has none: it
 sticks without moving, and the friction force jumps when the velocity changes its sign. The dynamic Lagrangian frequency-time method solves
