@@ -126,7 +126,7 @@ def test_derivatives_of_the_peak_problem(case, condition):
 # ---- peaks against dense sweeps -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("limit", [0.03, 0.1, 0.2, 0.6])
+@pytest.mark.parametrize("limit", [0.03, 0.1, 0.6])
 def test_tracked_peak_of_a_damper_is_that_of_a_dense_sweep(limit):
     system, load = damped()
     how = Discretisation(order=3)
@@ -134,7 +134,7 @@ def test_tracked_peak_of_a_damper_is_that_of_a_dense_sweep(limit):
     found = points[-1]
     assert found.converged
     assert found.is_maximum
-    omegas = found.omega * (1 + np.linspace(-0.005, 0.005, 101))
+    omegas = found.omega * (1 + np.linspace(-0.003, 0.003, 61))
     height, at = dense_peak(system, load, "limit", limit, how, omegas)
     assert found.amplitude == pytest.approx(height, rel=1e-6)
     assert found.omega == pytest.approx(at, rel=1e-4)
@@ -155,7 +155,7 @@ def test_tracked_peak_of_a_contact_in_three_directions(parameter, values):
     for point in track_peak(system, load, parameter, values, (0.8, 1.6), discretisation=how):
         assert point.converged
         assert point.is_maximum
-        omegas = point.omega * (1 + np.linspace(-4e-3, 4e-3, 81))
+        omegas = point.omega * (1 + np.linspace(-2e-3, 2e-3, 41))
         height, _ = dense_peak(system, load, parameter, point.value, how, omegas)
         assert point.amplitude == pytest.approx(height, rel=1e-6)
         balance = member(system, load, parameter, point.value, how)
@@ -178,7 +178,7 @@ def test_tracked_peak_of_a_condensed_output_beside_a_fold():
     assert np.all(np.diff([p.omega for p in points]) > 0.0)
     # from below, where there is one solution, up the branch that overhangs, to just beyond its top
     near = points[0].omega * (1 + np.linspace(-1e-4, 1e-4, 21))
-    omegas = np.append(np.linspace(0.55, 0.999 * near[0], 100), near)
+    omegas = np.append(np.linspace(0.55, 0.999 * near[0], 60), near)
     height, _ = dense_peak(system, load, "excitation", 1.0, how, omegas)
     assert points[0].amplitude == pytest.approx(height, rel=1e-6)
 
@@ -186,7 +186,7 @@ def test_tracked_peak_of_a_condensed_output_beside_a_fold():
 def test_samples_leave_a_peak_with_kinks_that_is_found_all_the_same():
     system, load = damped()
     exact = Discretisation(order=1)
-    sampled = replace(exact, evaluator="intervals", samples=512)
+    sampled = replace(exact, evaluator="intervals", samples=128)
     values = (0.2, 0.14)
     one, other = (
         [
@@ -195,8 +195,8 @@ def test_samples_leave_a_peak_with_kinks_that_is_found_all_the_same():
         ]
         for d in (exact, sampled)
     )
-    # second order in 1/samples: (2π/512)² / 12 is 1.3e-5
-    assert other == pytest.approx(one, rel=5e-5)
+    # second order in 1/samples: (2π/128)² / 12 is 2.0e-4
+    assert other == pytest.approx(one, rel=8e-4)
     assert other != one
 
 
