@@ -13,12 +13,12 @@ from stickslip.contact.interface import Interface, SparseRows, add_contact_jacob
 from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces
 from stickslip.harmonic.condensed_product import CondensedProduct, at_frequency
-from stickslip.harmonic.dynamic_stiffness import Condensed, CondensedStiffness
+from stickslip.harmonic.dynamic_stiffness import CondensedStiffness
 from stickslip.harmonic.fourier import padded, to_complex, to_real
 from stickslip.harmonic.structured import StructuredJacobian, real_matrix
 
 JacobianForm = Literal["auto", "dense", "structured"]
-CROSSOVER = 1200  # unknowns above which products and a Krylov method cost less than an array and its LU factors
+CROSSOVER = 700  # unknowns above which products and a Krylov method cost less than an array and its LU factors
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,15 +37,20 @@ class Linearisation:
 
 @dataclass(frozen=True, eq=False)
 class _LinearPart:
-    condensed: Condensed
+    operators: ComplexArray  # (2, H+1, n, n) dynamic stiffness and its ω-derivative
+    loads: ComplexArray  # (2, H+1, n, 1) load and its ω-derivative
     matrix: FloatArray  # (n (2H+1), n (2H+1)) real form of the block-diagonal dynamic stiffness
 
 
 @lru_cache(maxsize=4)
 def _linear_part(linear: CondensedStiffness, order: int, omega: float) -> _LinearPart:
     """Assemble the linear side at one frequency; kept, because a Newton iteration at fixed frequency asks for it at every step."""
-    condensed = linear.condensed(omega, order)
-    return _LinearPart(condensed, real_matrix(condensed.stiffness))
+    part = linear.condensed(omega, order)
+    return _LinearPart(
+        np.stack([part.stiffness, part.derivative]),
+        np.stack([part.load, part.load_derivative])[..., None],
+        real_matrix(part.stiffness),
+    )
 
 
 @lru_cache(maxsize=2)
@@ -131,10 +136,8 @@ class HarmonicBalance:
         add_contact_jacobian(
             period.blocks, self.rows.columns, self.rows.values, self.linear.n, factor, jac
         )
-        q = self.coefficients(x)[:, :, None]
-        linear = (part.condensed.stiffness @ q)[:, :, 0] - part.condensed.load
-        slope = (part.condensed.derivative @ q)[:, :, 0] - part.condensed.load_derivative
-        return to_real(linear), to_real(slope), jac
+        force, slope = part.operators @ self.coefficients(x)[:, :, None] - part.loads
+        return to_real(force[..., 0]), to_real(slope[..., 0]), jac
 
     def _by_products(
         self, x: FloatArray, omega: float, period: ContactPeriod

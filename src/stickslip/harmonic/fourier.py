@@ -14,7 +14,7 @@ def to_real(coefficients: ComplexArray) -> FloatArray:
     real = np.empty((2 * order + 1, *coefficients.shape[1:]))
     real[0] = coefficients[0].real
     real[1::2] = coefficients[1:].real
-    real[2::2] = -coefficients[1:].imag
+    np.negative(coefficients.imag[1:], out=real[2::2])
     return real
 
 
@@ -22,7 +22,8 @@ def to_complex(real: FloatArray) -> ComplexArray:
     """Return the complex coefficients (H+1, ...) of real rows (2H+1, ...)."""
     coefficients = np.empty(((real.shape[0] + 1) // 2, *real.shape[1:]), dtype=complex)
     coefficients[0] = real[0]
-    coefficients[1:] = real[1::2] - 1j * real[2::2]
+    coefficients.real[1:] = real[1::2]
+    np.negative(real[2::2], out=coefficients.imag[1:])
     return coefficients
 
 
