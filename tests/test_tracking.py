@@ -400,6 +400,7 @@ def test_initial_gap_of_an_elastic_contact_is_a_negative_preload():
     [
         ({"values": []}, "values: are empty"),
         ({"by": "energy"}, "by: is 'energy'"),
+        ({"output": 1}, "output: is 1, of 1 outputs. Give 0 to 0"),
         ({"parameter": "colour"}, "'colour' is no field of the contact laws"),
         ({"omega_range": (1.2, 1.5)}, "holds no peak"),
         ({"omega_range": (1.5, 1.2)}, "must be positive and growing"),
@@ -410,6 +411,26 @@ def test_input_of_tracking_is_checked(change, message):
     given = {"parameter": "limit", "values": [0.2], "omega_range": (0.8, 1.4), **change}
     with pytest.raises(InputError, match=message.replace("(", r"\(")):
         list(track_peak(system, load, **given))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"order": 0}, "Discretisation.order: must be at least 1, got 0"),
+        ({"samples": 0}, "Discretisation.samples: must be at least 1, got 0"),
+        ({"evaluator": "event"}, "Discretisation.evaluator: is 'event'. Give one of intervals"),
+    ],
+)
+def test_discretisation_is_checked(given, message):
+    with pytest.raises(InputError, match=message):
+        Discretisation(**given)
+
+
+@pytest.mark.parametrize(("omega", "points"), [(-1.0, 40), (np.nan, 40), (1.0, 0)])
+def test_frequency_and_points_of_a_branch_are_checked(omega, points):
+    system, load = damped()
+    with pytest.raises(InputError, match=r"omega, points: must be positive, got"):
+        list(branch_in_parameter(system, load, "limit", (0.2, 0.3), omega, points=points))
 
 
 def test_output_that_never_is_in_quadrature_is_told():

@@ -47,12 +47,32 @@ class Discretisation:
         How piecewise-linear laws are evaluated; ``events`` has no sampling error, so that amplitudes are smooth in every parameter.
     newton
         Corrector.
+
+    Raises
+    ------
+    InputError
+        If the evaluator is unknown, or there is no harmonic or no sample.
     """
 
     order: int = 5
     samples: int = 256
     evaluator: Evaluator = "events"
     newton: Newton = Newton()  # noqa: RUF009  # frozen
+
+    def __post_init__(self) -> None:
+        if self.evaluator not in get_args(Evaluator):
+            raise input_error(
+                "Discretisation.evaluator",
+                f"is {self.evaluator!r}",
+                f"Give one of {', '.join(get_args(Evaluator))}.",
+            )
+        for name in ("order", "samples"):
+            if getattr(self, name) < 1:
+                raise input_error(
+                    f"Discretisation.{name}",
+                    f"must be at least 1, got {getattr(self, name)}",
+                    "Give a count.",
+                )
 
     def balance(self, system: System, load: HarmonicLoad, more: IntArray) -> HarmonicBalance:
         """Set up the periodic problem, the dofs `more` retained beside those of the contacts."""
@@ -150,11 +170,17 @@ def branch_in_parameter(
     Raises
     ------
     InputError
-        If the parameter is unknown, or the span is empty.
+        If the parameter is unknown, the span is empty, or the frequency or the number of points is not positive.
     """
     first, last = span
     if not (np.isfinite(first) and np.isfinite(last) and first != last):
         raise input_error("span", f"goes from {first} to {last}", "Give two different values.")
+    if not (0.0 < omega < np.inf and points >= 1):
+        raise input_error(
+            "omega, points",
+            f"must be positive, got {omega} rad/s and {points} points",
+            "For the static problem see `preload`.",
+        )
     how = discretisation or Discretisation()
     family = parameter_family(
         system, load, parameter, first, lambda s, f: how.balance(s, f, np.zeros(0, dtype=np.int64))

@@ -127,7 +127,7 @@ def track_peak(
     Raises
     ------
     InputError
-        If there are no values, the parameter or the condition is unknown, or the range holds no peak at the first value.
+        If there are no values, the parameter, the condition or the output is unknown, or the range holds no peak at the first value.
     """
     tracker = _tracker(system, load, parameter, float(values[0]) if len(values) else np.nan, omega_range, by, output, discretisation)  # fmt: skip
     for value in values:
@@ -314,9 +314,12 @@ def _tracker(
 ) -> _Tracker:
     """Find the first peak by a sweep."""
     if not np.isfinite(first):
-        raise input_error("values", "are empty or not finite", "Give at least one number.")
+        raise input_error("values", "are empty or not finite", "Give numbers.")
     if by not in get_args(Condition):
         raise input_error("by", f"is {by!r}", f"Give one of {', '.join(get_args(Condition))}.")
+    if not 0 <= output < system.outputs.size:
+        have = system.outputs.size
+        raise input_error("output", f"is {output}, of {have} outputs", f"Give 0 to {have - 1}.")
     how = discretisation or Discretisation()
     dof = int(system.outputs[output])
     family = parameter_family(
