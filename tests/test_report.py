@@ -21,7 +21,7 @@ from stickslip.report.figures_response import frequency_response
 from stickslip.report.page import write_report
 from stickslip.report.quantities import number, percent, quantity, scale_for
 from stickslip.report.result import NEEDED, load_result
-from stickslip.report.summary import flagged_ranges
+from stickslip.report.summary import alert, flagged_ranges
 
 CHROMIUM = (
     shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -378,6 +378,19 @@ def test_flagged_ranges_are_runs_of_neighbouring_points(tmp_path: Path) -> None:
     data["frequency_hz"][:], data["predicted_error_percent"][:] = hz, error
     result = load_result(write_result(data, tmp_path / "r.nc"))
     assert flagged_ranges(result, result.cases[0]) == [(101, 101, 6, 101), (104, 106, 9, 105)]
+
+
+def test_points_of_a_branch_belong_to_the_range_that_the_alert_asked_for(tmp_path: Path) -> None:
+    data = synthetic_result(ratios=(5,), n=10)
+    data["frequency_hz"][:10] = np.arange(100.0, 110.0)
+    data["predicted_error_percent"][:10] = [0, 0, np.nan, np.nan, 8, 0, 0, np.nan, 0, 0]
+    data["order"][:10] = [1, 1, 5, 5, 5, 1, 1, 5, 1, 1]
+    result = load_result(write_result(data, tmp_path / "r.nc"))
+    first, second = flagged_ranges(result, result.cases[0])
+    assert first == (102, 104, 8, 104)
+    assert second[:2] == (107, 107)
+    assert np.isnan(second[2])
+    assert "102 to 104 Hz<br>107 Hz" in alert(result)
 
 
 def test_curves_follow_frequency_but_a_folded_branch_its_own_order(tmp_path: Path) -> None:

@@ -153,21 +153,27 @@ def warnings_box(result: Result) -> str:
 def flagged_ranges(result: Result, case: Case) -> list[tuple[float, float, float, float]]:
     """Ranges of frequency in which the alert asked for more harmonics.
 
+    Points of a branch with many harmonics, which took the place of points that the alert spoke of, have no predicted error of their own;
+    they belong to the range.
+
     Returns
     -------
     ranges
-        (first Hz, last Hz, largest predicted error in percent, Hz of it) of each run of neighbouring points.
+        (first Hz, last Hz, largest predicted error in percent, Hz of it) of each run of neighbouring points; NaN for the last two where
+        no point of the run has one.
     """
     error = result.floats("predicted_error_percent")
+    refined = np.nan_to_num(result.floats("refinement")) > 0
+    branch = ~np.isfinite(error) & (result.integers("order") > result.low) & ~refined
     at = result.points(case)
-    at = at[np.isfinite(error[at])]
-    above = np.concatenate([[False], error[at] > result.threshold, [False]])
+    at = at[np.isfinite(error[at]) | branch[at]]
+    above = np.concatenate([[False], (error[at] > result.threshold) | branch[at], [False]])
     starts = np.flatnonzero(~above[:-1] & above[1:])
     ends = np.flatnonzero(above[:-1] & ~above[1:])
     hz = result.floats("frequency_hz")[at]
     ranges = []
     for a, b in zip(starts, ends, strict=True):
-        worst = a + int(np.argmax(error[at][a:b]))
+        worst = a + int(np.argmax(np.nan_to_num(error[at][a:b])))
         ranges.append(
             (float(hz[a:b].min()), float(hz[a:b].max()), float(error[at][worst]), float(hz[worst]))
         )
@@ -221,7 +227,8 @@ def alert(result: Result) -> str:
             f"{number(a, 5)} Hz" if a == b else f"{number(a, 5)} to {number(b, 5)} Hz"
             for a, b, _, _ in ranges
         )
-        worst = max(ranges, key=lambda r: r[2]) if ranges else None
+        known = [r for r in ranges if np.isfinite(r[2])]
+        worst = max(known, key=lambda r: r[2]) if known else None
         peak = f"{percent(worst[2])} at {number(worst[3], 5)} Hz" if worst else "–"
         rows.append([case.label, where or "nowhere", peak, _why(result, case)])
     text = (
