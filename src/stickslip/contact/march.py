@@ -49,6 +49,10 @@ def _carry(jac, basis_row, rate_row, v_by_omega, rows, by_omega, out, out_omega,
         out_omega[a] = 0.0
         for b in range(3):
             u, v = line[b], line[3 + b]
+            if v == 0.0:
+                for p in range(m):
+                    out[a, b, p] = u * basis_row[p]
+                continue
             out_omega[a] += v * v_by_omega[b]
             for p in range(m):
                 out[a, b, p] = u * basis_row[p] + v * rate_row[p]
@@ -62,17 +66,15 @@ def _carry(jac, basis_row, rate_row, v_by_omega, rows, by_omega, out, out_omega,
 
 
 @numba.njit(cache=True)
-def _collect(c, jac, force_rows, basis_row, blocks):  # type: ignore[no-untyped-def]
-    """Add the derivative of the force at one sample to the blocks of contact `c`."""
-    m = basis_row.size
-    for k in range(blocks.shape[1]):
-        a, b = _PAIRS[k]
-        if jac[a, b] == 0.0 and not np.any(force_rows[a, b] != 0.0):
-            continue
+def _blocks_of(rows, basis, blocks):  # type: ignore[no-untyped-def]
+    """Fill the (P, m, m) blocks of a contact from the (P, samples, m) derivatives of its force on samples."""
+    n_samples, m = basis.shape
+    for k in range(rows.shape[0]):
+        np.dot(basis.T, rows[k], blocks[k])
         for p in range(m):
-            share = basis_row[p] * (1.0 if p == 0 else 2.0)
+            share = (1.0 if p == 0 else 2.0) / n_samples
             for q in range(m):
-                blocks[c, k, p, q] += share * force_rows[a, b, q]
+                blocks[k, p, q] *= share
 
 
 @numba.njit(cache=True)
@@ -99,31 +101,31 @@ def _carry_map(jac, period_map, new_map):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _workspace(n_state, m):  # type: ignore[no-untyped-def]
-    """Arrays that a march writes on: of a sample, of derivatives, and the ranges of the state."""
+def _workspace(n_state, n_pairs, n_samples, m):  # type: ignore[no-untyped-def]
+    """Arrays that a march writes on: of a sample, of derivatives, the ranges of the state, and derivatives of the force on samples."""
     of_state = (n_state, 3, m)
     return (
         (np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(n_state),
          np.empty((3 + n_state, 6 + n_state)), np.empty(2, np.int64)),
         (np.empty(of_state), np.empty(n_state), np.empty((3, 3, m)), np.empty(3), np.empty((n_state, n_state))),
         (np.empty(n_state), np.empty(n_state)),
+        np.empty((n_pairs, n_samples, m)),
     )  # fmt: skip
 
 
 @numba.njit(cache=True)
 def _one_period(  # type: ignore[no-untyped-def]
     step, parameters, c, first, gap, velocity, basis, basis_rate, omega, s, rows, s_omega, period_map, work,
-    record, track, force, state, blocks, by_omega,
+    record, track, force, state, by_omega,
 ):  # fmt: skip
     """March one contact over a period from the state `s`; its derivatives, and with `track` the `period_map`, go along."""
     u, v, v_by_omega, f, new, jac, status = work[0]
     new_rows, new_omega, force_rows, f_omega, new_map = work[1]
     low, high = work[2]
+    force_history = work[3]
     n_state = s.size
     low[:] = np.inf
     high[:] = -np.inf
-    if record:
-        blocks[c] = 0.0
     if track:
         period_map[:] = 0.0
         for a in range(n_state):
@@ -135,17 +137,18 @@ def _one_period(  # type: ignore[no-untyped-def]
         _carry(jac, basis[i], basis_rate[i], v_by_omega, rows, s_omega, new_rows, new_omega, 3, n_state)  # fmt: skip
         if record:
             _carry(jac, basis[i], basis_rate[i], v_by_omega, rows, s_omega, force_rows, f_omega, 0, 3)  # fmt: skip
-            _collect(c, jac, force_rows, basis[i], blocks)
-            force[c, :, i] = f
-            by_omega[c, :, i] = f_omega
-            state[c, :, i] = status
+            for k in range(force_history.shape[0]):
+                force_history[k, i] = force_rows[_PAIRS[k, 0], _PAIRS[k, 1]]
+            for a in range(3):
+                force[c, a, i] = f[a]
+                by_omega[c, a, i] = f_omega[a]
+            state[c, 0, i], state[c, 1, i] = status[0], status[1]
         if track:
             _carry_map(jac, period_map, new_map)
-        s[:] = new
-        s_omega[:] = new_omega
         rows[:] = new_rows
-        np.minimum(low, s, low)
-        np.maximum(high, s, high)
+        for a in range(n_state):
+            s[a], s_omega[a] = new[a], new_omega[a]
+            low[a], high[a] = np.minimum(low[a], s[a]), np.maximum(high[a], s[a])
 
 
 @numba.njit(cache=True)
@@ -201,7 +204,7 @@ def _to_fixed_point(period_map, scale, change, row_change, omega_change):  # typ
 @numba.njit(cache=True)
 def _settle(  # type: ignore[no-untyped-def]
     step, parameters, c, first, gap, velocity, basis, basis_rate, omega, s, rows, s_omega, work,
-    force, state, blocks, by_omega,
+    force, state, by_omega,
 ):  # fmt: skip
     """March contact `c` from the state `s` until it is periodic; return the periods this took, or -1."""
     n_state = s.size
@@ -211,12 +214,12 @@ def _settle(  # type: ignore[no-untyped-def]
     safe, safe_rows, safe_omega = s.copy(), rows.copy(), s_omega.copy()
     last, plain, patience = np.inf, 0, 1
     _one_period(step, parameters, c, first, gap, velocity, basis, basis_rate, omega, s, rows, s_omega, period_map,
-                work, False, False, force, state, blocks, by_omega)  # fmt: skip
+                work, False, False, force, state, by_omega)  # fmt: skip
     for period in range(1, MAX_PERIODS):
         before, rows_before, omega_before = s.copy(), rows.copy(), s_omega.copy()
         track = period > 1
         _one_period(step, parameters, c, 0, gap, velocity, basis, basis_rate, omega, s, rows, s_omega, period_map,
-                    work, True, track, force, state, blocks, by_omega)  # fmt: skip
+                    work, True, track, force, state, by_omega)  # fmt: skip
         _scales(work[2], largest_gap, scale, row_scale, rows)
         change, row_change, omega_change = s - before, rows - rows_before, s_omega - omega_before
         moved, turned = _largest(change, scale), _largest(row_change, row_scale)
@@ -275,7 +278,7 @@ def march_period(  # type: ignore[no-untyped-def]
     """
     n_samples, m = basis.shape
     n_state = start.shape[1]
-    work = _workspace(n_state, m)
+    work = _workspace(n_state, blocks.shape[1], n_samples, m)
     s, s_omega, rows = np.empty(n_state), np.empty(n_state), np.empty((n_state, 3, m))
     for c in range(gap.shape[0]):
         s[:] = start[c]
@@ -283,5 +286,5 @@ def march_period(  # type: ignore[no-untyped-def]
         rows[:] = 0.0
         first = -1 if np.any(np.isnan(s)) else 0
         periods[c] = _settle(step, parameters, c, first, gap, velocity, basis, basis_rate, omega, s, rows, s_omega,
-                             work, force, state, blocks, by_omega)  # fmt: skip
-        blocks[c] /= n_samples
+                             work, force, state, by_omega)  # fmt: skip
+        _blocks_of(work[3], basis, blocks[c])
