@@ -301,6 +301,20 @@ def test_critical_damping_is_factorised_where_its_eigenvectors_are_parallel(off)
         assert (linear.spectral.terms is None) == (off < 1e-8)
 
 
+@pytest.mark.parametrize("kind", ["proportional", "general", "massless"])
+def test_tables_of_residues_and_their_products_are_the_same(kind, monkeypatch):
+    structure = structure_of(kind)
+    linear, terms = decomposed(structure)
+    few = linear.condensed(OMEGA, ORDER)
+    assert "residues" not in vars(terms)
+    monkeypatch.setattr(spectral, "FEWEST", 1)
+    many = linear.condensed(OMEGA, ORDER)
+    assert "residues" in vars(terms)
+    for name in ("stiffness", "derivative"):
+        theirs = getattr(few, name)
+        np.testing.assert_allclose(getattr(many, name), theirs, atol=1e-12 * np.abs(theirs).max())
+
+
 def test_large_interiors_are_factorised(monkeypatch):
     monkeypatch.setattr(spectral, "LARGEST_STATE_SPACE", 5)
     linear = assert_schur(structure_of("general"), [OMEGA])

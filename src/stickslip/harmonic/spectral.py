@@ -9,17 +9,19 @@ the interior ``D_NL(p) = p (c + p m)``. Two exact sums follow, in which frequenc
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
 
 Blocks = tuple[FloatArray, FloatArray, FloatArray]  # K, C, M
 LARGEST_STATE_SPACE = 2000  # interior coordinates; beyond, the eigenproblem takes many minutes
 # condition number of an eigenvalue above which rounding could reach 1e-10 of a receptance
 ILL_CONDITIONED = 1e4
 PARALLEL = 1e-10  # share of c by which its columns may differ from multiples of those of m
+LARGEST_TABLE = 8e6  # entries of all residues together, 64 MB; beyond, they are multiplied out at each frequency
+FEWEST = 200  # terms below which such a table gains nothing
 FAST = (
     10.0  # lowest interior frequencies: poles below are divided out of p = 1/ν, others out of p = 0
 )
@@ -58,6 +60,16 @@ class Modes:
     def source(self, load: ComplexArray) -> ComplexArray:
         """Return the (H, J) amplitudes of the terms under interior modal loads (H, l)."""
         return load
+
+    @cached_property
+    def residues(self) -> FloatArray:
+        """(J, n (n + 1) / 2) upper triangles of the products of columns of `left` and rows of `right`."""
+        rows, columns = np.triu_indices(self.left.shape[0])
+        return np.ascontiguousarray((self.left[rows] * self.left[columns]).T)
+
+    def on_residues(self, weights: ComplexArray) -> ComplexArray:
+        """Return what the `weights` (k, J) are for the rows of `residues`."""
+        return weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +111,29 @@ class Poles:
     def source(self, load: ComplexArray) -> ComplexArray:
         """Return the (H, J) amplitudes of the terms under interior modal loads (H, l)."""
         return np.asarray(load @ self.states.backward.T)
+
+    @cached_property
+    def residues(self) -> FloatArray:
+        """(J, n (n + 1) / 2) upper triangles: real parts for real poles and one of each pair, then imaginary parts for the pairs."""
+        rows, columns = np.triu_indices(self.left.shape[0])
+        single, pair = self._single_and_pairs
+        kept = np.concatenate([single, pair])
+        left, right = self.left[:, kept], self.right[kept].T
+        # only the sum of residues is symmetric where poles repeat; their symmetric parts have the same sum
+        each = 0.5 * (left[rows] * right[columns] + left[columns] * right[rows]).T
+        return np.concatenate([each.real, each[single.size :].imag])
+
+    def on_residues(self, weights: ComplexArray) -> ComplexArray:
+        """Return what the `weights` (k, J) are for the rows of `residues`: ``w R + w' R* = (w + w') Re R + i (w - w') Im R``."""
+        single, pair = self._single_and_pairs
+        first, second = weights[:, pair], weights[:, pair + 1]
+        return np.concatenate([weights[:, single], first + second, 1j * (first - second)], axis=1)
+
+    @cached_property
+    def _single_and_pairs(self) -> tuple[IntArray, IntArray]:
+        """Return the places of real poles and of the first one of each conjugate pair, which LAPACK puts beside each other."""
+        imaginary = self.states.nu.imag
+        return np.flatnonzero(imaginary == 0.0), np.flatnonzero(imaginary > 0.0)
 
 
 Terms = Modes | Poles
@@ -246,13 +281,19 @@ def summed(terms: Terms, p: ComplexArray, source: ComplexArray, direct: ComplexA
 
 
 def _products(terms: Terms, weights: ComplexArray) -> ComplexArray:
-    """Return ``left diag(weights) right`` for each row of `weights` (k, J)."""
-    left, right = terms.left, terms.right
-    k, n = weights.shape[0], left.shape[0]
-    if isinstance(terms, Poles):
-        scaled = (left * weights[:, None, :]).reshape(k * n, -1)
-        return np.asarray(scaled @ right).reshape(k, n, n)
-    # real matrices: half the work of complex ones
-    parts = np.concatenate([weights.real, weights.imag])
-    out = ((left * parts[:, None, :]).reshape(2 * k * n, -1) @ right).reshape(2, k, n, n)
-    return np.asarray(out[0] + 1j * out[1])
+    """Return ``left diag(weights) right``, symmetric, for each row of `weights` (k, J)."""
+    k, (n, size) = weights.shape[0], terms.left.shape
+    if size < FEWEST or size * n * (n + 1) / 2 > LARGEST_TABLE:
+        scaled = (terms.left * weights[:, None, :]).reshape(k * n, size)
+        return np.asarray(scaled @ terms.right).reshape(k, n, n)
+    on_rows = terms.on_residues(weights)
+    triangles = np.concatenate([on_rows.real, on_rows.imag]) @ terms.residues
+    return np.asarray((triangles[:k] + 1j * triangles[k:])[:, _places(n)])
+
+
+@lru_cache(maxsize=8)
+def _places(n: int) -> IntArray:
+    """Return the (n, n) places of the entries of a symmetric matrix in its upper triangle."""
+    places = np.zeros((n, n), dtype=np.int64)
+    places[np.triu_indices(n)] = np.arange(n * (n + 1) // 2)
+    return np.maximum(places, places.T)
