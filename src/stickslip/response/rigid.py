@@ -1,0 +1,148 @@
+"""Forced response with rigid contacts, by the dynamic Lagrangian method; contacts with a stiffness may stand beside them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.errors import input_error
+from stickslip.harmonic.dlft import DynamicLagrangian, dynamic_lagrangian
+from stickslip.harmonic.dynamic_stiffness import condense
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.parameter import LARGEST, Discretisation
+from stickslip.response.system import System
+from stickslip.solve.continuation import Following, Point, StepControl, start_point, trace
+from stickslip.solve.newton import newton
+from stickslip.solve.status import Status
+
+
+@dataclass(frozen=True, eq=False)
+class RigidPoint:
+    """A frequency of a response with rigid contacts.
+
+    Attributes
+    ----------
+    omega
+        Frequency, rad/s.
+    coefficients
+        (order+1, n) complex displacement of all dofs of the structure, m.
+    contact_force
+        (n_contacts, 3, samples) forces over one period along t, w, n, N.
+    state
+        (n_contacts, 2, samples): 0 stick, 1 slip, 2 open, for t and w.
+    status
+        How the solver ended; a point that did not converge is no solution.
+    iterations
+        Newton steps.
+    """
+
+    omega: float
+    coefficients: ComplexArray
+    contact_force: FloatArray
+    state: IntArray
+    status: Status
+    iterations: int
+
+    @property
+    def converged(self) -> bool:
+        """Whether the point is a solution."""
+        return self.status.converged
+
+
+def rigid_response(
+    system: System,
+    load: HarmonicLoad,
+    omega_range: tuple[float, float],
+    points: int = 40,
+    discretisation: Discretisation | None = None,
+    penalty: float | None = None,
+) -> Iterator[RigidPoint]:
+    """Compute the forced response of a system with `RigidCoulomb` contacts over a frequency range, by arc length.
+
+    All harmonics are kept everywhere: there is no Jacobian Alert, because the force of a rigid contact is no function of its gap.
+
+    Parameters
+    ----------
+    system
+        Structure, contacts and outputs. Each gap of a rigid contact must be a coordinate: see `in_relative_coordinates`.
+    load
+        Static and harmonic forces on all dofs, N.
+    omega_range
+        First and last frequency, rad/s, in growing order; the same twice for one frequency.
+    points
+        Smallest number of points; more are taken where the response turns.
+    discretisation
+        Harmonics, samples, solver. As many samples as coefficients, ``2 order + 1``, let the laws hold exactly at the samples; eight
+        a harmonic and more are more accurate.
+    penalty
+        Of the method, N/m; see `dynamic_lagrangian`. It is no stiffness of the contacts.
+
+    Yields
+    ------
+    RigidPoint
+        Points in the order of the branch, the last one at the end of the range. Where the branch cannot be followed, a point that did not
+        converge, and a new beginning a little further on.
+
+    Raises
+    ------
+    InputError
+        If the range is empty, no contact is rigid, or a gap of a rigid contact is no coordinate.
+    """
+    first, last = omega_range
+    if not 0.0 < first <= last < np.inf:
+        raise input_error(
+            "omega_range", f"goes from {first:g} to {last:g} rad/s", "Give 0 < first <= last."
+        )
+    how = discretisation or Discretisation()
+    # where contacts stick throughout, their coordinates are zero and no measure of a step
+    retained = np.union1d(system.retained, system.outputs)
+    linear = condense(system.structure, retained, load)
+    problem = dynamic_lagrangian(
+        linear, system.interface, how.order, how.samples, penalty, how.evaluator
+    )
+    weights = np.ones(problem.size)
+    weights[: linear.n] = 0.0  # the static part would hide the growth of the vibration
+    gap = (last - first) / points
+    following = Following(
+        newton=how.newton,
+        control=StepControl(scale=gap / LARGEST or first, first=0.05, largest=LARGEST),
+        weights=weights,
+    )
+    omega, guess = first, np.zeros((1, linear.n), dtype=complex)
+    while True:
+        point = start = _begin(problem, guess, omega, following)
+        yield _rigid_point(problem, start)
+        if start.solution.status.converged and start.p < last:
+            for point in trace(problem, start, last, following):
+                yield _rigid_point(problem, point)
+                if point.solution.status.converged:
+                    guess = problem.coefficients(point.x)
+        if point.p >= last:
+            return
+        omega = min(max(point.p, omega) + gap, last)
+
+
+def _begin(
+    problem: DynamicLagrangian, guess: ComplexArray, omega: float, following: Following
+) -> Point:
+    """Solve at `omega` from a guess; if that fails with twice as many harmonics each time, from one upward."""
+    point = start_point(problem, problem.unknowns(guess), omega, following)
+    if point.solution.status.converged:
+        return point
+    order, q = 1, np.zeros((1, problem.linear.n), dtype=complex)
+    while order < problem.order:
+        few = problem.with_order(order)
+        q = few.coefficients(
+            newton(lambda v, p=few: p.linearise(v, omega), few.unknowns(q), following.newton).x  # type: ignore[misc]
+        )
+        order *= 2
+    return start_point(problem, problem.unknowns(q), omega, following)
+
+
+def _rigid_point(problem: DynamicLagrangian, point: Point) -> RigidPoint:
+    at = problem.contacts(point.x, point.p)
+    return RigidPoint(
+        point.p, problem.linear.recover(point.p, problem.coefficients(point.x)), at.force, at.state,
+        point.solution.status, point.solution.iterations,
+    )  # fmt: skip
