@@ -7,7 +7,6 @@ import pytest
 from test_relative import relative, two_flexible_bodies
 
 import stickslip as ss
-from stickslip.response.rigid import rigid_response
 
 TWO_MASSES = ss.lumped(
     np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]]), np.array([[0.04, -0.02], [-0.02, 0.02]])
@@ -25,7 +24,7 @@ def rubbing(law=None):
 
 def at(omega, order, samples=None):
     how = ss.Discretisation(order=order, samples=samples or 32 * order)
-    (point,) = rigid_response(rubbing(), LOAD, (omega, omega), discretisation=how)
+    (point,) = ss.rigid_response(rubbing(), LOAD, (omega, omega), discretisation=how)
     assert point.converged
     return point
 
@@ -55,7 +54,7 @@ def test_sticking_motions_of_benchmark_b5(omega, first, stick):
 
 def test_response_through_resonance_until_the_contact_sticks():
     how = ss.Discretisation(order=5, samples=160)
-    points = list(rigid_response(rubbing(), LOAD, (0.45, 2.2), 25, how))
+    points = list(ss.rigid_response(rubbing(), LOAD, (0.45, 2.2), 25, how))
     assert all(p.converged for p in points)
     assert (points[0].omega, points[-1].omega) == (0.45, 2.2)
     heights = [abs(p.coefficients[1, 1]) for p in points]
@@ -79,10 +78,10 @@ def test_contact_between_two_flexible_bodies_in_relative_coordinates():
     laws = tuple(ss.RigidCoulomb(mu=0.3, preload=20.0) for _ in system.interface.laws)
     system = replace(system, interface=replace(system.interface, laws=laws))
     with pytest.raises(ss.InputError, match="in_relative_coordinates"):
-        next(rigid_response(system, load, (330.0, 330.0)))
+        next(ss.rigid_response(system, load, (330.0, 330.0)))
     other, load = relative(system, load)
     how = ss.Discretisation(order=3, samples=96)
-    (point,) = rigid_response(other, load, (330.0, 330.0), discretisation=how)
+    (point,) = ss.rigid_response(other, load, (330.0, 330.0), discretisation=how)
     assert point.converged
     assert set(np.unique(point.state)) == {0, 1}
     limit = np.max(np.abs(point.contact_force[:, :2]))
@@ -91,7 +90,7 @@ def test_contact_between_two_flexible_bodies_in_relative_coordinates():
 
 def test_messages():
     with pytest.raises(ss.InputError, match="omega_range: goes from 2 to 1 rad/s"):
-        next(rigid_response(rubbing(), LOAD, (2.0, 1.0)))
+        next(ss.rigid_response(rubbing(), LOAD, (2.0, 1.0)))
     soft = rubbing(ss.RigidCoulomb(mu=0.9, preload=9.0).softened(10.0))
     with pytest.raises(ss.InputError, match="no contact is rigid"):
-        next(rigid_response(soft, LOAD, (1.0, 2.0)))
+        next(ss.rigid_response(soft, LOAD, (1.0, 2.0)))

@@ -101,6 +101,10 @@ if TYPE_CHECKING:
         branch_in_parameter,
     )
     from stickslip.response.preload import preload
+    from stickslip.response.rigid import (
+        RigidPoint,
+        rigid_response,
+    )
     from stickslip.response.sweep import (
         ForcedPoint,
         ForcedProblem,
@@ -185,6 +189,7 @@ _MODULES = {
     "stickslip.response.forced": ("forced_response",),
     "stickslip.response.parameter": ("Discretisation", "ParameterPoint", "branch_in_parameter"),
     "stickslip.response.preload": ("preload",),
+    "stickslip.response.rigid": ("RigidPoint", "rigid_response"),
     "stickslip.response.sweep": (
         "ForcedPoint",
         "ForcedProblem",
@@ -235,6 +240,7 @@ __all__ = [
     "RegularisedCoulomb",
     "RigidBody",
     "RigidCoulomb",
+    "RigidPoint",
     "Signals",
     "SingularError",
     "SolidMesh",
@@ -280,6 +286,7 @@ __all__ = [
     "preload",
     "rayleigh_damping",
     "read_study",
+    "rigid_response",
     "rigid_surface",
     "run_study",
     "segment_to_segment",
