@@ -249,17 +249,20 @@ def evaluated(case: Contacts, samples: int, evaluator: str) -> Callable[[], Bloc
     return evaluate
 
 
-def fastest(actions: dict[str, Callable[[], object]], rounds: int) -> dict[str, float]:
-    """CPU seconds of each action, the fastest of some rounds in which they take turns; the first call compiles and is not timed."""
+def medians(actions: dict[str, Callable[[], object]], rounds: int) -> dict[str, float]:
+    """CPU seconds of each action, the median of rounds in which they take turns; the first call compiles and is not timed.
+
+    The fastest round would favour short actions on a busy machine: they fit between two disturbances.
+    """
     for action in actions.values():
         action()
-    seconds = dict.fromkeys(actions, np.inf)
+    seconds: dict[str, list[float]] = {name: [] for name in actions}
     for _ in range(rounds):
         for name, action in actions.items():
             began = process_time()
             action()
-            seconds[name] = min(seconds[name], process_time() - began)
-    return seconds
+            seconds[name].append(process_time() - began)
+    return {name: float(np.median(times)) for name, times in seconds.items()}
 
 
 def ratios(order: int, samples: int, goals: dict[str, float]) -> list[dict[str, Any]]:
@@ -278,8 +281,8 @@ def ratios(order: int, samples: int, goals: dict[str, float]) -> list[dict[str, 
         for found in (actions["march"](), actions["loop"](), actions["blas"](), twin())
         for part, want, s in zip(found, reference, size, strict=True)
     )
-    seconds = fastest(actions, ROUNDS)
-    slow = fastest({"numpy": twin, "march": actions["march"]}, NUMPY_ROUNDS)
+    seconds = medians(actions, ROUNDS)
+    slow = medians({"numpy": twin, "march": actions["march"]}, NUMPY_ROUNDS)
     state = contact_forces(case.gap, case.compiled("intervals"), samples).state
     shares = ", ".join(
         f"{np.mean(state == s):.0%} {word}" for s, word in enumerate(("stuck", "slipping", "open"))

@@ -89,12 +89,13 @@ def solve(case: dict, options: dict) -> dict:
 
 
 def main() -> None:
-    """Solve the case once for compilation, with two points, and once for the numbers."""
+    """Solve the case once for compilation, with two points, and some times for the numbers."""
     logging.disable(logging.CRITICAL)
     case = json.loads(sys.argv[1])
-    options = case.pop("options")
+    options, runs = case.pop("options"), case.pop("rival_runs")
     solve(case | {"points": 2}, options)
-    print(json.dumps(solve(case, options) | {"version": version("pyHarm-os")}))
+    fastest = min((solve(case, options) for _ in range(runs)), key=lambda found: found["seconds"])
+    print(json.dumps(fastest | {"version": version("pyHarm-os")}))
 
 
 if __name__ == "__main__":
