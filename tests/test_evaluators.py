@@ -117,3 +117,20 @@ def test_weights_reach_the_stuck_contact():
 def test_weights_must_be_positive(bad):
     with pytest.raises(InputError, match=r"Interface\.weights: must be 2 positive numbers"):
         Interface(("a", "b"), (LAW, LAW), np.eye(6), np.array(bad))
+
+
+@pytest.mark.parametrize("hidden", [False, True], ids=["elements alone", "with a marched law"])
+@pytest.mark.parametrize("evaluator", ["intervals", "march", "events"])
+def test_without_history_the_forces_are_the_same(evaluator, hidden):
+    laws = [LAW, LikeElasticCoulomb(LAW) if hidden else replace(LAW, mu=0.1, preload=-1.0)]
+    compiled = compile_contacts(laws, np.array([1.0, 2.0]), evaluator)
+    gap = gaps(6, 3, 2)
+    whole = contact_forces(gap, compiled, 64)
+    part = contact_forces(gap, compiled, 64, history=False)
+    assert np.array_equal(part.coefficients, whole.coefficients)
+    assert np.array_equal(part.blocks, whole.blocks)
+    # only exact events do without samples, and only if no law beside them needs any
+    samples = 0 if evaluator == "events" and not hidden else 64
+    assert part.gap.shape == part.force.shape == (2, 3, samples)
+    assert part.state.shape == (2, 2, samples)
+    assert whole.force.shape == (2, 3, 64)
