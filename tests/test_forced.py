@@ -17,8 +17,7 @@ from stickslip.response.forced import (
     forced_problem,
     forced_response,
 )
-from stickslip.solve.newton import Newton, Solution
-from stickslip.solve.status import Status
+from stickslip.solve.newton import Newton, newton
 
 HZ = 2 * np.pi
 SHORT = Sweep(omega_range=(155 * HZ, 166 * HZ), samples=64, points=12, peak_points=3)
@@ -273,11 +272,14 @@ HASTY = replace(BETWEEN, newton=Newton(max_iterations=2), points=40)
 def no_rescue(monkeypatch):
     """Nothing but Newton and shorter steps: points fail that are found otherwise."""
 
-    def fails(_problem, balance, _omega, start):
-        return Solution(np.zeros(balance.size), Status.STALLED, 0, np.nan, 0.0, 0.0)
+    def newton_only(evaluate, starts, options, *_):
+        for start in starts:
+            solution = newton(evaluate, start, options)
+            if solution.status.converged:
+                break
+        return solution
 
-    monkeypatch.setattr(passages, "otherwise", fails)
-    monkeypatch.setattr(passages, "by_homotopy", fails)
+    monkeypatch.setattr(passages, "solve_robustly", newton_only)
 
 
 def test_resuming_after_points_that_failed(no_rescue):

@@ -12,7 +12,7 @@ from stickslip.solve.kink import Kinks
 from stickslip.solve.levenberg_marquardt import damped_step
 from stickslip.solve.linear import Bordered, Dense, bordered_array, times, transposed_times
 from stickslip.solve.newton import GLOBALISATIONS, Newton, newton
-from stickslip.solve.rescue import solve_robustly
+from stickslip.solve.rescue import ByDifference, Homotopy, solve_robustly
 from stickslip.solve.status import Rung, Status
 
 CORRECTORS = sorted(GLOBALISATIONS)
@@ -84,7 +84,7 @@ def test_all_find_the_same_root_of_springs(seed, n, contacts):
     roots = []
     for name in CORRECTORS:
         options = Newton(tolerance=1e-11, max_iterations=200, globalisation=name)
-        solution = solve_robustly(problem, np.zeros(n), options)
+        solution = solve_robustly(problem, [np.zeros(n)], options)
         assert solution.status is Status.CONVERGED, name
         roots.append(solution.x)
     # the structure is softest with 0.1: an error of the residual of 1e-11 in each of n equations moves x by less than 1e-9
@@ -414,7 +414,7 @@ def test_an_easy_problem_stays_on_the_first_rung():
         calls.append(x)
         return At(2.0 * x - 4.0, 2.0 * np.eye(3, order="F"))
 
-    solution = solve_robustly(easy, np.zeros(3), Newton())
+    solution = solve_robustly(easy, [np.zeros(3)], Newton())
     assert solution.rung is Rung.FULL_STEPS
     assert len(calls) == 2
 
@@ -449,16 +449,46 @@ def stuck(start):
     )
 
 
-@pytest.mark.parametrize("families", [(), (loads,)], ids=["residual", "load"])
-def test_a_homotopy_passes_folds_to_the_root(families):
+def homotopies(kind, start):
+    if kind == "load":
+        return [Homotopy((ByDifference(loads),), start)]
+    if kind == "two legs":
+        half = ByDifference(lambda s: loads(0.5 * s))
+        return [Homotopy((half, ByDifference(lambda s: loads(0.5 + 0.5 * s))), start)]
+    return []
+
+
+@pytest.mark.parametrize("kind", ["residual", "load", "two legs"])
+def test_a_homotopy_passes_folds_to_the_root(kind):
     starts = [np.array([x, 1.0]) for x in BEHIND]
     starts = [start for start in starts if stuck(start)]
     assert len(starts) >= 3
     for start in starts:
-        solution = solve_robustly(well, start, Newton(max_iterations=FEW), families)
+        solution = solve_robustly(
+            well, [start], Newton(max_iterations=FEW), homotopies(kind, start), patience=FEW
+        )
         assert solution.status is Status.CONVERGED
         assert solution.rung is Rung.HOMOTOPY
         assert solution.x[0] == pytest.approx(-2.1038034, abs=1e-6)
+
+
+def test_starts_and_homotopies_are_asked_for_one_by_one():
+    asked = []
+
+    def starts():
+        for x in (1.4, -2.0, 5.0):
+            asked.append(x)
+            yield np.array([x, 1.0])
+
+    def never():
+        raise AssertionError("a homotopy was asked for although a start converged")
+        yield
+
+    solution = solve_robustly(well, starts(), Newton(max_iterations=FEW), never())
+    assert solution.status is Status.CONVERGED
+    assert asked == [1.4, -2.0]
+    single = newton(well, np.array([-2.0, 1.0]), Newton(max_iterations=FEW))
+    assert solution.iterations > single.iterations, "the start that failed is charged"
 
 
 def test_where_nothing_helps_the_nearest_attempt_is_returned():
@@ -466,7 +496,7 @@ def test_where_nothing_helps_the_nearest_attempt_is_returned():
         return At(np.array([x[0] ** 2 + 1.0]), np.array([[2.0 * x[0]]], order="F"))
 
     single = newton(rootless, np.array([1.7]), Newton())
-    solution = solve_robustly(rootless, np.array([1.7]), Newton())
+    solution = solve_robustly(rootless, [np.array([1.7])], Newton())
     assert not solution.status.converged
     assert 1.0 <= solution.residual_norm <= single.residual_norm
     assert solution.iterations > single.iterations, "all attempts are charged"

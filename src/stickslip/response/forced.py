@@ -84,12 +84,10 @@ def forced_response(
                 yield high[index]
     branches: list[ForcedPoint] = []
     for first, last in runs_of_repeats(high):
-        if any(tried[i] > LAST_TRY for i in range(first, last + 1)):
-            continue
-        if all(high[i].converged for i in range(first, last + 1)):
-            continue
-        branch = branch_points(done, first)
-        yield from follow_run(problem, first, last, low, branch, high)
+        branch = branch_points(done, first, last)
+        begin = _branch_begin(low, high, first, last)
+        if begin is not None and all(tried[i] <= LAST_TRY for i in range(first, last + 1)):
+            yield from follow_run(problem, begin, last, low, branch, high)
         branches += branch
     # last, a homotopy for what neither neighbours nor the branch led to
     lost = [low[i] for i in _unsolved(low, high, branches) if tried[i] <= LAST_TRY]
@@ -102,6 +100,21 @@ def forced_response(
     yield from resolve_peak(problem, accepted, [p for p in done if p.stage == "peak"])
 
 
+def _branch_begin(
+    low: Sequence[ForcedPoint], high: Mapping[int, ForcedPoint], first: int, last: int
+) -> int | None:
+    """Return the first repeat of a run that its branch replaces: all of them, if a solution before the run is known.
+
+    None if all of them converged, or where nothing is known from which a branch could begin.
+    """
+    failed = [i for i in range(first, last + 1) if not high[i].converged]
+    if not failed:
+        return None
+    if any(p.converged for p in low[:first]):
+        return first
+    return failed[0] if failed[0] > first else None
+
+
 def _unsolved(
     low: Sequence[ForcedPoint], high: Mapping[int, ForcedPoint], branches: Sequence[ForcedPoint]
 ) -> list[int]:
@@ -109,7 +122,7 @@ def _unsolved(
     return [
         i
         for first, last in runs_of_repeats(high)
-        if not reached(branch_points(branches, first), low, last)
+        if not reached(branch_points(branches, first, last), low, last)
         for i in range(first, last + 1)
         if not high[i].converged
     ]

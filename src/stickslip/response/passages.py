@@ -10,7 +10,7 @@ from stickslip.arrays import FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection import jacobian_alert
 from stickslip.response.preload import bonded_start, preload
-from stickslip.response.rescue import by_homotopy, charged, otherwise
+from stickslip.response.rescue import homotopies
 from stickslip.response.sweep import (
     BRANCH_ITERATIONS,
     ForcedPoint,
@@ -20,14 +20,16 @@ from stickslip.response.sweep import (
     reached,
 )
 from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to
-from stickslip.solve.newton import Solution, newton
+from stickslip.solve.newton import charged, newton
+from stickslip.solve.rescue import Homotopy, solve_robustly
 from stickslip.solve.status import Rung
 
 LOOP = 3  # multiples of `Sweep.points` after which a branch that gains no frequency is left
 BRANCH_SEEDS = 4  # points from which a branch with many harmonics is begun
-BRANCH_LENGTH = 8  # multiples of `Sweep.points` after which such a branch is given up
+BRANCH_LENGTH = 5  # multiples of `Sweep.points` after which such a branch is given up
 BACKWARD = 0.1  # share of the range by which it may fall back behind the start of the range
 DETOUR = 30  # most points on the way from a neighbour to a repeat that fails
+ISOLATED = 5  # iterations of a repeat beside none that is accepted: it converges soon or not at all
 NEIGHBOURS = 1  # points on each side from which a repeat that fails is tried
 
 
@@ -89,24 +91,26 @@ def _fresh_point(
 ) -> Point:
     """Solve without a branch that leads here.
 
-    From the last solution; from the static equilibrium plus the bonded vibration; from a solution with few harmonics. Then the other
-    globalisations, and last the homotopy in the excitation.
+    From the last solution; from the static equilibrium plus the bonded vibration; from a solution with few harmonics. Then by all that
+    `solve_robustly` knows.
     """
     balance = problem.low
-    following = replace(problem.following(balance), newton=problem.sweep.newton)
-    spent: list[Solution] = []
-    for start in _starts(problem, load, points, omega):
-        point = start_point(balance, start, omega, following)
-        spent.append(point.solution)
-        if point.solution.status.converged:
-            return replace(point, solution=charged(spent))
-    spent.append(otherwise(problem, balance, omega, start))
-    if not spent[-1].status.converged:
-        static = preload(problem.system, load.static)[None].astype(complex)
-        spent.append(by_homotopy(problem, balance, omega, balance.unknowns(static)))
-    if spent[-1].status.converged:
-        point = start_point(balance, spent[-1].x, omega, following)
-    return replace(point, solution=charged(spent))
+    following = problem.following(balance)
+    solution = solve_robustly(
+        lambda x: balance.linearise(x, omega),
+        _starts(problem, load, points, omega),
+        problem.sweep.newton,
+        _ways(problem, load, omega),
+        following.weights,
+    )
+    if not solution.status.converged:
+        upward = np.append(np.zeros(balance.size), 1.0)
+        return Point(solution.x, omega, upward, following.control.first, solution, 0.0)
+    return replace(start_point(balance, solution.x, omega, following), solution=solution)
+
+
+def _ways(problem: ForcedProblem, load: HarmonicLoad, omega: float) -> Iterator[Homotopy]:
+    yield from homotopies(problem.low, omega, preload(problem.system, load.static))
 
 
 def _starts(
@@ -154,6 +158,8 @@ def repeat(
 ) -> ForcedPoint:
     """Solve a frequency with more harmonics: from the best of q + Δq, q and its neighbours, or along the branch from a neighbour.
 
+    A neighbour whose own neighbours failed is as far as the branch led: no detour begins farther away than the next point.
+
     Parameters
     ----------
     problem
@@ -163,7 +169,7 @@ def repeat(
     others
         Accepted points by index: repeats, and points of the first passage that need none.
     static
-        (n_retained,) static equilibrium, m, from which a homotopy begins if all else fails; None: no homotopy.
+        (n_retained,) static equilibrium, m, for what `solve_robustly` tries if all else fails; None: that is not tried.
     """
     began = perf_counter()
     balance, omega = problem.high, point.omega
@@ -175,23 +181,29 @@ def repeat(
         problem.alert_dofs,
         problem.alert_solve,
     )
-    quick = replace(problem.sweep.newton, max_iterations=BRANCH_ITERATIONS)
     near = _neighbours(point.index, others)
+    beside = [p for p in near if abs(p.index - point.index) <= 1]
+    most = BRANCH_ITERATIONS if beside or static is not None else ISOLATED
+    quick = replace(problem.sweep.newton, max_iterations=most)
     guesses = [alert.start, *(balance.unknowns(p.coefficients) for p in [point, *near])]
     # the smallest residual decides: q + Δq where states hardly change, a neighbour where they do
     start = min(guesses, key=lambda x: float(np.linalg.norm(balance.linearise(x, omega).residual)))
     spent = [newton(lambda v: balance.linearise(v, omega), start, quick)]
-    for neighbour in near:
+    for neighbour in beside:
         if spent[-1].status.converged:
             break
         detour = along_branch(problem, neighbour, omega).solution
         spent.append(replace(detour, rung=max(detour.rung, Rung.SHORTER_STEP)))
-    if not spent[-1].status.converged:
-        spent.append(otherwise(problem, balance, omega, start))
     if not spent[-1].status.converged and static is not None:
-        at_rest = balance.unknowns(static[None].astype(complex))
-        spent.append(by_homotopy(problem, balance, omega, at_rest))
-    solution = charged(spent)
+        solution = solve_robustly(
+            lambda v: balance.linearise(v, omega),
+            [start],
+            problem.sweep.newton,
+            homotopies(balance, omega, static),
+            problem.following(balance).weights,
+        )
+        spent.append(solution)
+    solution = charged(spent[-1], spent)
     made = forced_point(balance, solution, "high", point.index, omega, perf_counter() - began)
     return replace(
         made,

@@ -1,22 +1,19 @@
-"""What is tried where a frequency does not converge: another globalisation, and last a homotopy in the excitation."""
+"""The physics of what is tried where a frequency does not converge: homotopies in the excitation and in the friction."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 from stickslip.arrays import FloatArray
+from stickslip.contact.law import ContactLaw
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation
 from stickslip.harmonic.condensed_product import at_frequency
-from stickslip.response.sweep import ForcedProblem
-from stickslip.solve.continuation import Following, Point, StepControl, start_point, trace
-from stickslip.solve.newton import Solution, newton
-from stickslip.solve.status import Rung, Status
+from stickslip.solve.rescue import ByDifference, Evaluate, Homotopy
 
-FAINT = (
-    1e-3,
-    1e-5,
-)  # shares of the excitation at which contacts hardly change: the problem is linear there
-GROWING = StepControl(scale=1.0, first=0.1, largest=0.5, smallest=1e-4, max_points=120)
-PATIENCE = 60  # iterations of a corrector that has no neighbour to start from
-OTHERS = ("dogleg", "levenberg_marquardt")  # in this order
+# shares of the excitation at which contacts hardly change: the problem is linear there
+FAINT = (1e-3, 1e-5)
+BACK = 1e-3  # share of the faintest load at which a path has come back to rest
+STICKY = 30.0  # factor of the friction coefficients at which little slips
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,88 +38,48 @@ def growing_load(balance: HarmonicBalance, omega: float) -> GrowingLoad:
     return GrowingLoad(balance, omega, load.reshape(-1) / balance.force_scale)
 
 
-def otherwise(
-    problem: ForcedProblem, balance: HarmonicBalance, omega: float, guess: FloatArray
-) -> Solution:
-    """Solve by the other globalisations, one after the other.
+def with_friction(balance: HarmonicBalance, factor: float) -> HarmonicBalance:
+    """Return the same problem with all friction coefficients times `factor`; laws without one stay as they are."""
+    interface = balance.interface
+    laws = tuple(_with_friction(law, factor) for law in interface.laws)
+    changed = replace(interface, laws=laws)
+    compiled = changed.compiled(balance.compiled.evaluator)
+    return replace(balance, interface=changed, compiled=compiled)
+
+
+def _with_friction(law: ContactLaw, factor: float) -> ContactLaw:
+    if not hasattr(law, "mu"):
+        return law
+    with_mu: Any = law  # the protocol of laws knows no friction coefficient
+    changed: ContactLaw = replace(with_mu, mu=factor * with_mu.mu)
+    return changed
+
+
+def homotopies(balance: HarmonicBalance, omega: float, static: FloatArray) -> Iterator[Homotopy]:
+    """Yield ways from an easy problem to the balance at one frequency.
+
+    First the excitation grows from next to nothing: there nothing changes its state and the problem is linear. As damping bounds the
+    motion under every share of the excitation, the path that begins there comes to the whole of it, through folds if need be (degree
+    theory; Allgower & Georg 1990). Where several motions stand beside each other it may find another one than the neighbours in
+    frequency. Then the same with much friction, which is let down afterwards.
 
     Parameters
     ----------
-    problem
-        The forced response.
     balance
-        Its problem with few or with many harmonics.
-    omega
-        Frequency, rad/s.
-    guess
-        (size,) scaled unknowns to start from.
-
-    Returns
-    -------
-    Solution
-        Of the first one that converged, or of the last.
-    """
-    spent: list[Solution] = []
-    for name in OTHERS:
-        options = replace(problem.sweep.newton, globalisation=name, max_iterations=PATIENCE)  # type: ignore[arg-type]
-        spent.append(newton(lambda x: balance.linearise(x, omega), guess, options))
-        if spent[-1].status.converged:
-            break
-    return replace(charged(spent), rung=Rung.OTHER_GLOBALISATION)
-
-
-def by_homotopy(
-    problem: ForcedProblem, balance: HarmonicBalance, omega: float, static: FloatArray
-) -> Solution:
-    """Let the excitation grow from next to nothing, by arc length, at a fixed frequency.
-
-    Under a faint excitation nothing changes its state and the problem is linear; damping bounds the motion, so that the branch from there
-    comes to the whole excitation. Where several motions stand beside each other it may find another one than its neighbours.
-
-    Parameters
-    ----------
-    problem
-        The forced response.
-    balance
-        Its problem with few or with many harmonics.
+        The periodic problem.
     omega
         Frequency, rad/s.
     static
-        (size,) scaled unknowns of the static equilibrium, no vibration.
+        (n_retained,) static equilibrium, m.
     """
-    growing = growing_load(balance, omega)
-    following = replace(problem.following(balance), control=GROWING)
-    spent: list[Solution] = []
-    for share in FAINT:
-        last = _grown(growing, start_point(growing, static, share, following), following, spent)
-        if last.p == 1.0 and last.solution.status.converged:
-            break
-        failed = last.solution.status
-        status = Status.TOO_MANY_ITERATIONS if failed.converged else failed
-        spent[-1] = replace(spent[-1], status=status)
-    return replace(charged(spent), rung=Rung.HOMOTOPY)
+    at_rest = balance.unknowns(static[None].astype(complex))
+    yield Homotopy((growing_load(balance, omega),), at_rest, FAINT, BACK * FAINT[-1])
+    if not any(hasattr(law, "mu") for law in balance.interface.laws):
+        return
 
+    def sliding(s: float) -> Evaluate:
+        now = with_friction(balance, STICKY ** (1.0 - s))
+        return lambda x: now.linearise(x, omega)
 
-def _grown(
-    growing: GrowingLoad, start: Point, following: Following, spent: list[Solution]
-) -> Point:
-    """Follow the branch from `start` until the load is whole, no step converges, or it comes back to where it began."""
-    point = start
-    spent.append(start.solution)
-    if not start.solution.status.converged:
-        return start
-    for point in trace(growing, start, 1.0, following):
-        spent.append(point.solution)
-        if point.p < 0.5 * start.p:
-            break
-    return point
-
-
-def charged(spent: list[Solution]) -> Solution:
-    """Return the last of several solutions, charged with what all of them cost."""
-    return replace(
-        spent[-1],
-        iterations=sum(s.iterations for s in spent),
-        seconds_contact=sum(s.seconds_contact for s in spent),
-        seconds_linear=sum(s.seconds_linear for s in spent),
-    )
+    sticky = growing_load(with_friction(balance, STICKY), omega)
+    yield Homotopy((sticky, ByDifference(sliding)), at_rest, FAINT, BACK * FAINT[-1])

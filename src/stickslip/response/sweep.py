@@ -120,7 +120,7 @@ class ForcedPoint:
         repeats failed; ``peak``: added to resolve the peak.
     index
         Position in the stage; a ``high`` point has the index of the ``low`` point it repeats, a ``branch`` point that of the
-        first repeat of its run.
+        first repeat that it replaces.
     omega
         Frequency, rad/s.
     coefficients
@@ -254,9 +254,9 @@ def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, For
     kept: list[tuple[ForcedPoint, ForcedPoint | None]] = []
     passed = -1
     for first, last in runs_of_repeats(high):
-        branch = branch_points(points, first)
+        branch = branch_points(points, first, last)
         if reached(branch, low, last):
-            kept += [(high.get(p.index, p), p) for p in low[passed + 1 : first]]
+            kept += [(high.get(p.index, p), p) for p in low[passed + 1 : branch[0].index]]
             kept += [(p, None) for p in branch]
             passed = last
     kept += [(high.get(p.index, p), p) for p in low[passed + 1 :]]
@@ -286,9 +286,9 @@ def runs_of_repeats(high: Mapping[int, ForcedPoint]) -> list[tuple[int, int]]:
     return runs
 
 
-def branch_points(points: Sequence[ForcedPoint], first: int) -> list[ForcedPoint]:
-    """Return the points of the branch with many harmonics through the run of repeats that begins at `first`."""
-    return [p for p in points if p.stage == "branch" and p.index == first]
+def branch_points(points: Sequence[ForcedPoint], first: int, last: int) -> list[ForcedPoint]:
+    """Return the points of the branch with many harmonics through the run of repeats from `first` to `last`."""
+    return [p for p in points if p.stage == "branch" and first <= p.index <= last]
 
 
 def branch_end(low: Sequence[ForcedPoint], last: int) -> float:

@@ -113,7 +113,9 @@ def advance(problem: Problem, point: Point, end: float, following: Following) ->
         spent.append(new.solution)
         if new.solution.status.converged:
             turn = measure.cosine(unit, new.tangent)
-            if abs(turn) > SHARP_TURN or step < 4 * control.smallest:
+            # a path keeps its orientation: one that changed lies on another sheet, unless the shortest step finds it changed too
+            flipped = new.orientation * point.orientation < 0.0
+            if (turn > SHARP_TURN and not flipped) or step < 4 * control.smallest:
                 wanted = next_step(step, new.solution.iterations, abs(turn), control)
                 return _with_cost(replace(new, step=wanted), spent, rung)
         else:

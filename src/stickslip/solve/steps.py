@@ -28,6 +28,7 @@ LOOKS_AHEAD = (
     16.0,
     64.0,
 )  # smallest steps at which the far side of a corner is looked for
+NEAR = 2.0  # lengths of a step by which its end may be away: farther, it lies on another piece of the branch
 LONGEST = 2.0  # largest steps that a step of p may be long: more is asked for beside a fold only
 LEAVES_BY = (4.0, 16.0, 1.0, 64.0)  # smallest steps taken along the far side
 
@@ -84,7 +85,7 @@ def take_step(
     solution = newton(lambda v: across(problem, v, row, value), guess, following.newton)
     x, p = solution.x[:-1], end if passes else float(solution.x[-1])
     # a corrector that slides far away, or past the end of the range, has found another piece of the branch
-    near = measure.of(solution.x - y) <= 4.0 * reach and (p - end) * (point.p - end) >= 0.0
+    near = measure.of(solution.x - y) <= NEAR * reach and (p - end) * (point.p - end) >= 0.0
     found = replace(solution, x=x)
     if not (solution.status.converged and near):
         status = Status.STALLED if solution.status.converged else solution.status

@@ -1,0 +1,95 @@
+"""The cascade on systems drawn at random: everything converges, and what it took is counted."""
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.robustness_systems import draw
+from stickslip.response.forced import accepted_points, forced_problem, forced_response
+from stickslip.response.preload import preload
+from stickslip.response.rescue import growing_load, homotopies, with_friction
+from stickslip.solve.newton import Newton, newton
+from stickslip.solve.rescue import solve_robustly
+from stickslip.solve.status import Rung, Status
+
+SEED = 1
+
+
+def prepared(number, share=0.4):
+    """A drawn system with many harmonics, a frequency inside its range, and its static equilibrium."""
+    drawn = draw(SEED, number)
+    problem = forced_problem(drawn.system, drawn.load, drawn.sweep)
+    first, last = drawn.sweep.omega_range
+    static = preload(drawn.system, drawn.load.static)
+    return problem, first + share * (last - first), static
+
+
+def residual_norm(balance, x, omega):
+    return np.max(np.abs(balance.linearise(x, omega).residual))
+
+
+@pytest.mark.parametrize("number", [3, 12, 33])
+def test_a_drawn_system_converges(number):
+    drawn = draw(SEED, number)
+    points = accepted_points(list(forced_response(drawn.system, drawn.load, drawn.sweep)))
+    assert all(p.converged for p in points)
+    problem = forced_problem(drawn.system, drawn.load, drawn.sweep)
+    for p in points:
+        balance = problem.balance(p.order)
+        norm = residual_norm(balance, balance.unknowns(p.coefficients), p.omega)
+        # once more through metres and back: rounding
+        assert norm <= 1.1 * drawn.sweep.newton.tolerance
+    counted = Counter(p.rescue for p in points)
+    assert set(counted) <= set(Rung)
+    assert counted[Rung.FULL_STEPS] > len(points) / 2
+
+
+@pytest.mark.parametrize("number", [33, 12, 20])
+def test_the_load_grows_to_the_whole_through_folds(number):
+    problem, omega, static = prepared(number)
+    balance = problem.high
+
+    def evaluate(x):
+        # not finite at the start: only a homotopy can help
+        at = balance.linearise(x, omega)
+        return at if np.any(x) else replace(at, residual=np.full(x.size, np.nan))
+
+    ways = list(homotopies(balance, omega, static))
+    weights = problem.following(balance).weights
+    solution = solve_robustly(
+        evaluate, [np.zeros(balance.size)], problem.sweep.newton, ways[:1], weights
+    )
+    assert solution.status is Status.CONVERGED
+    assert solution.rung is Rung.HOMOTOPY
+    assert residual_norm(balance, solution.x, omega) <= problem.sweep.newton.tolerance
+
+
+def test_friction_comes_down_to_what_it_is():
+    problem, omega, static = prepared(33)
+    balance = problem.high
+    ways = list(homotopies(balance, omega, static))
+    assert len(ways) == 2
+    assert len(ways[1].legs) == 2
+    x = balance.unknowns(static[None].astype(complex))
+    sticky = with_friction(balance, 30.0)
+    assert np.allclose(
+        ways[1].legs[1].linearise(x, 0.0).residual, sticky.linearise(x, omega).residual
+    )
+    assert np.allclose(
+        ways[1].legs[1].linearise(x, 1.0).residual, balance.linearise(x, omega).residual
+    )
+
+
+def test_the_whole_load_is_the_balance_and_none_is_rest():
+    problem, omega, static = prepared(33)
+    balance = problem.high
+    growing = growing_load(balance, omega)
+    x = balance.unknowns(static[None].astype(complex))
+    whole, none = growing.linearise(x, 1.0), growing.linearise(x, 0.0)
+    assert np.array_equal(whole.residual, balance.linearise(x, omega).residual)
+    assert np.allclose(none.residual - whole.residual, -whole.jac_p, rtol=0, atol=1e-12)
+    at_rest = newton(lambda v: growing.linearise(v, 0.0), x, Newton())
+    assert at_rest.status is Status.CONVERGED
+    assert np.allclose(balance.coefficients(at_rest.x)[1:], 0.0)
