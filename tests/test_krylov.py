@@ -264,7 +264,8 @@ def test_solution_is_that_of_lu(name, method):
 def test_preconditioner_is_exact_where_all_sticks():
     balance, x = state("stick")
     at = balance.linearise(x, OMEGA)
-    assert_same(at.jac.preconditioner().solve(at.jac.matvec(x)), x, 1e-11)
+    solve, _ = at.jac.preconditioned_by(at.jac.preconditioner())
+    assert_same(solve(at.jac.matvec(x)), x, 1e-11)
     krylov = Krylov(tolerance=1e-10)
     krylov.solve(at.jac, at.residual)
     assert krylov.counts.products <= 2  # one, and the one that checks
@@ -278,11 +279,28 @@ def test_product_after_a_kept_preconditioner_is_the_product(name, at_other):
     balance, x = state(name)
     jac = replace(balance, linear=problem(1.0).linear).linearise(x, at_other).jac
     kept = replace(balance, linear=jac.linear.linear).linearise(0.01 * x, OMEGA).jac
-    preconditioner = kept.preconditioner()
+    solve, product = jac.preconditioned_by(kept.preconditioner())
     v = np.random.default_rng(0).standard_normal(x.size)
-    solved = preconditioner.solve(v)
+    solved = solve(v)
     assert jac.linear.same(kept.linear) is (at_other == OMEGA)
-    assert_same(jac.product_after(preconditioner)(solved, v), jac.matvec(solved), 1e-11)
+    assert_same(product(solved, v), jac.matvec(solved), 1e-11)
+
+
+@pytest.mark.parametrize("relative", [True, False])
+def test_preconditioner_holds_all_below_the_harmonics(relative):
+    # P is J without what higher harmonics do to lower ones, and with a complex number for each harmonic's own stiffness
+    balance, x = state("lift-off", relative=relative)
+    jac = balance.linearise(x, OMEGA).jac
+    means = harmonic_means(jac.blocks)
+    own = replace(jac, blocks=jac.blocks - less_means(jac.blocks, means)).dense()
+    size, m = balance.linear.n, 2 * balance.order + 1
+    harmonic = np.repeat((np.arange(m) + 1) // 2, size)
+    lower = harmonic[:, None] > harmonic[None, :]
+    expected = np.where(lower, jac.dense(), own)
+    solve, _ = jac.preconditioned_by(jac.preconditioner())
+    v = np.random.default_rng(2).standard_normal(x.size)
+    assert np.linalg.norm(np.where(lower, jac.dense(), 0.0)) > 0.01 * np.linalg.norm(own)
+    assert_same(solve(expected @ v), v, 1e-11)
 
 
 @pytest.mark.parametrize("name", STATES)
@@ -321,16 +339,10 @@ class Nearly:
 
     def preconditioner(self):
         self.made += 1
-        inverse = np.linalg.inv(self.nearby)
+        return np.linalg.inv(self.nearby)
 
-        class Inverse:
-            def solve(self, right):
-                return inverse @ right
-
-        return Inverse()
-
-    def product_after(self, _):
-        return lambda v, _: self.matrix @ v
+    def preconditioned_by(self, kept):
+        return lambda right: kept @ right, lambda v, _: self.matrix @ v
 
 
 def fold(n: int = 30) -> tuple[Nearly, np.ndarray, np.ndarray]:

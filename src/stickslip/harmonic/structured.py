@@ -1,8 +1,9 @@
 """The Jacobian of the harmonic balance as what it is made of, and the preconditioner that this suggests.
 
-``J = Z + Bᵀ K̂ B`` is block-diagonal in the harmonics but for ``K̂``, which is local to each contact. Factors of ``P_h = Z_h + K̂ʰʰ``, one
-complex matrix a harmonic, therefore precondition the whole, and ``J = P + Bᵀ(K̂ - K_P)B`` needs no product with Z where P was made at the
-same frequency.
+``J = Z + Bᵀ K̂ B`` is block-diagonal in the harmonics but for ``K̂``, which is local to each contact. Factors of ``D_h = Z_h + K̂ʰʰ``, one
+complex matrix a harmonic, therefore precondition the whole. From the lowest harmonic to the highest, each is solved with what those below
+it do at the contacts: block Gauss-Seidel, ``P = D + Bᵀ K̂_lower B``, which halves the iterations of D alone and costs no factors. With
+``J = P + Bᵀ(K̂ - K_P)B`` no product with Z is needed where D was made at the same frequency.
 """
 
 from collections.abc import Callable
@@ -12,17 +13,23 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.contact.interface import SparseRows, add_contact_jacobian
-from stickslip.contact.product import add_stiffness, contact_product, harmonic_means, less_means
+from stickslip.contact.product import (
+    add_stiffness,
+    contact_product,
+    harmonic_means,
+    less_means,
+    subtract_lower,
+)
 from stickslip.harmonic.condensed_product import CondensedProduct
 from stickslip.harmonic.factors import Factors, factorise
-from stickslip.harmonic.fourier import to_complex, to_real
 
+Solve = Callable[[FloatArray], FloatArray]
 Product = Callable[[FloatArray, FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
 class HarmonicFactors:
-    """LU factors of ``Z_h + K̂ʰʰ`` for each harmonic: the preconditioner.
+    """LU factors of ``Z_h + K̂ʰʰ`` for each harmonic: what of the preconditioner is worth keeping.
 
     Attributes
     ----------
@@ -37,13 +44,6 @@ class HarmonicFactors:
     linear: CondensedProduct
     means: ComplexArray
     factors: tuple[Factors, ...]
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Solve ``P x = right``, both (n (2H+1),) harmonic-major."""
-        rows = to_complex(right.reshape(2 * self.linear.order + 1, -1))
-        for row, own in zip(rows, self.factors, strict=True):
-            row[:] = own.solve(row if np.iscomplexobj(own.lu) else row.real)
-        return to_real(rows).reshape(-1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ class StructuredJacobian:
         return jac
 
     def preconditioner(self) -> HarmonicFactors | None:
-        """Return the factors of ``Z_h + K̂ʰʰ``; None where one of them is singular."""
+        """Return the factors of ``Z_h + K̂ʰʰ``; None where one of the matrices is singular."""
         means = harmonic_means(self.blocks)
         factors = []
         for h in range(self.linear.order + 1):
@@ -111,11 +111,17 @@ class StructuredJacobian:
             factors.append(own)
         return HarmonicFactors(self.linear, means, tuple(factors))
 
-    def product_after(self, preconditioner: HarmonicFactors) -> Product:
-        """Return the product ``J v`` as a function of v and of ``P v``, which whoever solved with P knows."""
-        if not self.linear.same(preconditioner.linear):
-            return lambda v, _: self.matvec(v)
-        left = less_means(self.blocks, preconditioner.means)
+    def preconditioned_by(self, kept: HarmonicFactors) -> tuple[Solve, Product]:
+        """Return how to solve ``P x = y`` with kept factors and the coupling of this Jacobian, and ``J v`` as a function of v and ``P v``."""
+
+        def solve(right: FloatArray) -> FloatArray:
+            return self._sweep(kept, right)
+
+        if not self.linear.same(kept.linear):
+            return solve, lambda v, _: self.matvec(v)
+        left = less_means(self.blocks, kept.means)
+        for h in range(1, self.linear.order + 1):
+            left[:, :, 2 * h - 1 : 2 * h + 1, : 2 * h - 1] = 0.0
 
         def product(v: FloatArray, preconditioned: FloatArray) -> FloatArray:
             q = self._by_row(v)
@@ -123,7 +129,25 @@ class StructuredJacobian:
                 left, q, False, np.zeros_like(q)
             )
 
-        return product
+        return solve, product
+
+    def _sweep(self, kept: HarmonicFactors, right: FloatArray) -> FloatArray:
+        """Solve harmonic by harmonic, from the static one up."""
+        rows = self._by_row(right).copy()
+        gap = np.zeros((len(self.blocks), 3, len(rows)))
+        before = first = 0
+        for h, factors in enumerate(kept.factors):
+            last = 2 * h + 1
+            subtract_lower(
+                self.blocks, self.rows.columns, self.rows.values, rows, before, first, last, self.scale, gap, rows
+            )  # fmt: skip
+            if h == 0:
+                rows[0] = factors.solve(rows[0])
+            else:
+                solved = factors.solve(rows[first] - 1j * rows[first + 1])
+                rows[first], rows[first + 1] = solved.real, -solved.imag
+            before, first = first, last
+        return rows.reshape(-1)
 
     def _by_row(self, v: FloatArray) -> FloatArray:
         return np.ascontiguousarray(v.reshape(2 * self.linear.order + 1, -1))

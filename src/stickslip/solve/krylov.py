@@ -16,17 +16,10 @@ from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.solve.linear import Dense, Jacobian, JacobianOperator, LinearSolver
 
+Solve = Callable[[FloatArray], FloatArray]
 Product = Callable[[FloatArray, FloatArray], FloatArray]
 WORN = 2.0  # growth of the iterations at which a preconditioner is made anew ...
 YOUNG = 12  # ... though not below that many iterations, which cost less than new factors
-
-
-class Preconditioner(Protocol):
-    """An approximation P of the matrix that is easily solved with."""
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Solve ``P x = right``."""
-        ...
 
 
 @runtime_checkable
@@ -35,15 +28,15 @@ class Preconditioned(JacobianOperator, Protocol):
 
     @property
     def problem(self) -> object:
-        """What it is the Jacobian of; a preconditioner of one of its Jacobians serves the others."""
+        """What it is the Jacobian of; what is kept from one of its Jacobians serves the others."""
         ...
 
-    def preconditioner(self) -> Preconditioner | None:
-        """Return a new preconditioner; None if there is none."""
+    def preconditioner(self) -> object | None:
+        """Return what of a new preconditioner is costly, such as factors; None if there is none."""
         ...
 
-    def product_after(self, preconditioner: Preconditioner) -> Product:
-        """Return the product ``J v`` as a function of v and ``P v``."""
+    def preconditioned_by(self, kept: object) -> tuple[Solve, Product]:
+        """Return how to solve ``P x = y``, with P from what was kept and from this Jacobian, and ``J v`` as a function of v and ``P v``."""
         ...
 
 
@@ -61,7 +54,7 @@ class KrylovCounts:
 class _Kept:
     """A preconditioner and the products that its first system took."""
 
-    preconditioner: Preconditioner
+    preconditioner: object
     first: int = 0
     last: int = 0
 
@@ -157,11 +150,7 @@ class Krylov:
     ) -> tuple[FloatArray, float]:
         """Return the solution and its relative residual, which is `tolerance` where that was reached."""
         before = self.counts.products
-        system = (
-            _system(jac, kept.preconditioner)
-            if border is None
-            else _bordered_system(jac, kept.preconditioner, border)
-        )
+        system = _system(*jac.preconditioned_by(kept.preconditioner), border)
 
         def product(y: FloatArray) -> FloatArray:
             self.counts.products += 1
@@ -200,23 +189,17 @@ class _System:
     product: Callable[[FloatArray], FloatArray]
 
 
-def _system(jac: Preconditioned, preconditioner: Preconditioner) -> _System:
-    after = jac.product_after(preconditioner)
-    return _System(preconditioner.solve, lambda y: after(preconditioner.solve(y), y))
-
-
-def _bordered_system(
-    jac: Preconditioned, preconditioner: Preconditioner, border: _Border
-) -> _System:
-    """Put the same border around both; that of the preconditioner is eliminated."""
-    after = jac.product_after(preconditioner)
-    solved = preconditioner.solve(border.column)
+def _system(solve: Solve, after: Product, border: _Border | None) -> _System:
+    """Put the same border around matrix and preconditioner; that of the latter is eliminated."""
+    if border is None:
+        return _System(solve, lambda y: after(solve(y), y))
+    solved = solve(border.column)
     pivot = border.corner - float(border.row @ solved)
     # where P is singular in the direction of the border, any number will do: P is an approximation
     pivot = pivot if pivot != 0.0 else 1.0
 
     def precondition(y: FloatArray) -> FloatArray:
-        x = preconditioner.solve(y[:-1])
+        x = solve(y[:-1])
         z = float(y[-1] - border.row @ x) / pivot
         return np.append(x - z * solved, z)
 
