@@ -33,6 +33,8 @@ from stickslip.contact.slider import (
 from stickslip.contact.threads import thread_shares
 from stickslip.contact.trigonometric import add_means, harmonics_at, product_matrix, search_grid
 
+LARGEST = 1e152  # of a gap's Fourier coefficients; its square is still finite
+
 
 @numba.njit(cache=True)
 def _basis_row(at, weight, out):  # type: ignore[no-untyped-def]
@@ -302,7 +304,7 @@ def exact_period(
     -------
     tuple
         (2H+1, 3 n_contacts) coefficients of the forces, N; (n_contacts, pairs, 2H+1, 2H+1) derivatives, N/m;
-        (n_contacts, 3, samples) forces, N; (n_contacts, 2, samples) states.
+        (n_contacts, 3, samples) forces, N; (n_contacts, 2, samples) states. All NaN, and open, where a gap is not finite or beyond 1e152 m.
     """
     m, width = gap_coefficients.shape
     n = width // 3
@@ -311,6 +313,12 @@ def exact_period(
     blocks = np.empty((n, pairs, m, m))
     force = np.empty_like(gap)
     state = np.empty((n, 2, gap.shape[2]), dtype=np.int64)
+    if not np.all(np.abs(polynomials) < LARGEST):
+        # a lost iterate: what is not a number, or overflows in a product, has no sign changes to look for
+        for out in (coefficients, blocks, force):
+            out[:] = np.nan
+        state[:] = OPEN
+        return coefficients.reshape(width, m).T, blocks, force, state
     arrays = (polynomials, elements, first, _grid((m - 1) // 2), gap, coefficients, blocks, force, state)  # fmt: skip
     shares = thread_shares(n)
     if shares > 1:
