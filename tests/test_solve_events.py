@@ -173,22 +173,31 @@ def test_all_ways_lead_to_the_same_end(parametrisation, predictor):
     assert ends[1].x[0] == pytest.approx(ends[0].x[0], abs=1e-12)
 
 
-def test_secants_cost_no_system_for_a_direction():
+def test_secants_cost_no_system_for_a_direction_and_tangents_no_evaluation():
     systems = {}
     for predictor in ("tangent", "secant"):
-        evaluations = []
+        evaluations, solves = [], []
 
         class Counted:
             def linearise(self, x, p, log=evaluations):
                 log.append(p)
                 return CUBIC.linearise(x, p)
 
-        following = along(predictor=predictor, largest=0.05)
+        class Solver:
+            solve = Dense().solve
+
+            def solve_bordered(self, *system, log=solves):
+                log.append(1)
+                return Dense().solve_bordered(*system)
+
+        following = along(predictor=predictor, largest=0.05, linear=Solver())
         start = begin(CUBIC, 1.0, 0.0, following)
         evaluations.clear()
+        solves.clear()
         points = list(trace(Counted(), start, 3.0, following))
-        trials = sum(1 + point.solution.iterations for point in points)
-        systems[predictor] = (len(evaluations) - trials) / len(points)
+        steps = sum(point.solution.iterations for point in points)
+        assert len(evaluations) == steps + len(points)
+        systems[predictor] = (len(solves) - steps) / len(points)
     assert systems == {"tangent": 1.0, "secant": 0.0}
 
 

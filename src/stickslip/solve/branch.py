@@ -169,7 +169,11 @@ def measure_at(x: FloatArray, following: Following) -> Measure:
 
 
 def tangent_at(
-    problem: Problem, y: FloatArray, previous: FloatArray, following: Following
+    problem: Problem,
+    y: FloatArray,
+    previous: FloatArray,
+    following: Following,
+    at: ParameterEvaluation | None = None,
 ) -> tuple[FloatArray, float]:
     """Return the unit tangent on the side of `previous` and its orientation; `previous` itself where it is undetermined.
 
@@ -183,9 +187,12 @@ def tangent_at(
         (n + 1,) direction of travel so far.
     following
         What makes length, and the linear solver.
+    at
+        The equation at `y` where that is known; it is evaluated otherwise.
     """
     measure = measure_at(y[:-1], following)
-    at = problem.linearise(y[:-1], float(y[-1]))
+    if at is None:
+        at = problem.linearise(y[:-1], float(y[-1]))
     row = measure.row(previous)
     right = np.zeros(y.size)
     right[-1] = 1.0
@@ -194,6 +201,29 @@ def tangent_at(
     if tangent is None:
         return previous, 0.0
     return tangent / measure.of(tangent), sign
+
+
+@dataclass(eq=False)
+class Latest:
+    """A problem that remembers its latest evaluation: where a corrector ends, the tangent asks for the same Jacobian again.
+
+    A corrector leaves the Jacobian of the iterate at which it has converged as it is.
+    """
+
+    problem: Problem
+    x: FloatArray | None = None
+    p: float = np.nan
+    at: ParameterEvaluation | None = None
+
+    def linearise(self, x: FloatArray, p: float) -> ParameterEvaluation:
+        """Evaluate everything at (x, p)."""
+        self.x, self.p, self.at = x, p, self.problem.linearise(x, p)
+        return self.at
+
+    def known(self, x: FloatArray, p: float) -> ParameterEvaluation | None:
+        """Return the latest evaluation if it was made at (x, p)."""
+        same = self.x is not None and self.p == p and np.array_equal(self.x, x)
+        return self.at if same else None
 
 
 def reversed_point(point: Point) -> Point:

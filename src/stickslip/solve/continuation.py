@@ -8,6 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.solve.branch import (
     Following,
+    Latest,
     Measure,
     ParameterEvaluation,
     Parametrisation,
@@ -46,13 +47,15 @@ __all__ = [
 
 def start_point(problem: Problem, x: FloatArray, p: float, following: Following) -> Point:
     """Solve at fixed `p` from the guess `x` and find the direction of growing parameter."""
-    solution = newton(lambda v: problem.linearise(v, p), x, following.newton)
+    latest = Latest(problem)
+    solution = newton(lambda v: latest.linearise(v, p), x, following.newton)
     upward = np.zeros(x.size + 1)
     upward[-1] = 1.0
     first = following.control.first
     if not solution.status.converged:
         return Point(solution.x, p, upward, first, solution, 0.0)
-    tangent, sign = tangent_at(problem, np.append(solution.x, p), upward, following)
+    at = latest.known(solution.x, p)
+    tangent, sign = tangent_at(problem, np.append(solution.x, p), upward, following, at)
     return Point(solution.x, p, tangent, first, solution, sign)
 
 

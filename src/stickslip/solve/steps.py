@@ -7,6 +7,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.solve.branch import (
     Following,
+    Latest,
     Measure,
     Point,
     Problem,
@@ -82,7 +83,8 @@ def take_step(
         guess = y + (end - point.p) / unit[-1] * unit
         row = _natural_row(measure, y.size)
     value = float(row @ guess)
-    solution = newton(lambda v: across(problem, v, row, value), guess, following.newton)
+    latest = Latest(problem)
+    solution = newton(lambda v: across(latest, v, row, value), guess, following.newton)
     x, p = solution.x[:-1], end if passes else float(solution.x[-1])
     # a corrector that slides far away, or past the end of the range, has found another piece of the branch
     near = measure.of(solution.x - y) <= NEAR * reach and (p - end) * (point.p - end) >= 0.0
@@ -90,7 +92,7 @@ def take_step(
     if not (solution.status.converged and near):
         status = Status.STALLED if solution.status.converged else solution.status
         return replace(point, solution=replace(found, x=point.x, status=status))
-    tangent, sign = _direction(problem, point, solution.x, unit, following)
+    tangent, sign = _direction(latest, point, solution.x, unit, following)
     return Point(x, p, tangent, step, found, sign)
 
 
@@ -118,14 +120,15 @@ def _prediction(
 
 
 def _direction(
-    problem: Problem, before: Point, y: FloatArray, unit: FloatArray, following: Following
+    latest: Latest, before: Point, y: FloatArray, unit: FloatArray, following: Following
 ) -> tuple[FloatArray, float]:
-    """Return the direction in which to go on from `y`, and its orientation."""
+    """Return the direction in which to go on from `y`, where the corrector ended, and its orientation."""
     measure = measure_at(y[:-1], following)
     if following.predictor == "secant":
         chord = y - before.y
         return chord / measure.of(chord), 0.0
-    tangent, sign = tangent_at(problem, y, unit, following)
+    at = latest.known(y[:-1], float(y[-1]))
+    tangent, sign = tangent_at(latest.problem, y, unit, following, at)
     # Where contact states change the branch may turn back so sharply that the tangent nearest to the old one leads back to the
     # corner. The sign of the bordered determinant is the same along a piecewise smooth path (Allgower & Georg 1990); a sign
     # that changes although the tangent hardly turned is a bifurcation point, which is passed straight on.
