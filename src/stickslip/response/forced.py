@@ -7,9 +7,17 @@ that resolve the resonance peak.
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response.passages import first_passage, follow_run, repeat
+from stickslip.response.passages import (
+    first_passage,
+    follow_run,
+    passing,
+    postponed,
+    repeat,
+    worth_a_try,
+)
 from stickslip.response.preload import preload
 from stickslip.response.resonance import resolve_peak
 from stickslip.response.sweep import (
@@ -72,32 +80,61 @@ def forced_response(
     high = {p.index: p for p in done if p.stage == "high"}
     quiet = {p.index: p for p in low if p.converged and not problem.alerted(p)}
     tried = Counter(p.index for p in done if p.stage == "high")
-    # once forward, and what failed once more backward, when its neighbours are known
-    for attempt, order in enumerate((low, low[::-1])):
-        for point in order:
-            index = point.index
-            failed = index not in high or not high[index].converged
-            if problem.alerted(point) and failed and tried[index] <= attempt:
-                solved = {i: p for i, p in high.items() if p.converged}
-                high[index] = repeat(problem, point, quiet | solved)
-                tried[index] += 1
-                yield high[index]
+    yield from _repeats(problem, low, quiet, high, tried)
+    static = cache(lambda: preload(system, load.static))
     branches: list[ForcedPoint] = []
     for first, last in runs_of_repeats(high):
         branch = branch_points(done, first, last)
+        if _nothing_known(low, high, first, last) and tried[first] == LAST_TRY:
+            high[first] = repeat(problem, low[first], {}, static)
+            tried[first] += 1
+            yield high[first]
         begin = _branch_begin(low, high, first, last)
-        if begin is not None and all(tried[i] <= LAST_TRY for i in range(first, last + 1)):
+        # once the last tries of a run have begun, its branch is over
+        if begin is not None and all(tried[i] <= LAST_TRY for i in range(first + 1, last + 1)):
             yield from follow_run(problem, begin, last, low, branch, high)
         branches += branch
-    # last, a homotopy for what neither neighbours nor the branch led to
-    lost = [low[i] for i in _unsolved(low, high, branches) if tried[i] <= LAST_TRY]
-    static = preload(system, load.static) if lost else None
-    for point in lost:
-        solved = {i: p for i, p in high.items() if p.converged}
-        high[point.index] = repeat(problem, point, quiet | solved, static)
-        yield high[point.index]
+    # last, from where the branch passed a frequency or from new neighbours; for what is left then, a homotopy
+    for most, last_way in ((LAST_TRY, None), (LAST_TRY + 1, static)):
+        for index in [i for i in _unsolved(low, high, branches) if tried[i] <= most]:
+            known = quiet | {i: p for i, p in high.items() if p.converged}
+            led = index - 1 in known or index + 1 in known or passing(branches, low[index])
+            if led or last_way is not None:
+                high[index] = repeat(problem, low[index], known, last_way, branches)
+            else:
+                high[index] = postponed(problem, low[index])
+            tried[index] += 1
+            yield high[index]
     accepted = accepted_points([*low, *high.values(), *branches])
-    yield from resolve_peak(problem, accepted, [p for p in done if p.stage == "peak"])
+    yield from resolve_peak(problem, accepted, [p for p in done if p.stage == "peak"], static)
+
+
+def _repeats(
+    problem: ForcedProblem,
+    low: Sequence[ForcedPoint],
+    quiet: dict[int, ForcedPoint],
+    high: dict[int, ForcedPoint],
+    tried: Counter[int],
+) -> Iterator[ForcedPoint]:
+    """Repeat what the alert asks for, once forward, and what failed once more backward, when its neighbours are known."""
+
+    def failed(index: int) -> bool:
+        return index in high and not high[index].converged
+
+    for attempt, order in enumerate((low, low[::-1])):
+        for point in order:
+            index = point.index
+            done = index in high and high[index].converged
+            if not problem.asks_again(point) or done or tried[index] > attempt:
+                continue
+            known = quiet | {i: p for i, p in high.items() if p.converged}
+            beside = index - 1 in known or index + 1 in known
+            if worth_a_try(index, attempt == 0, failed, beside):
+                high[index] = repeat(problem, point, known)
+            else:
+                high[index] = postponed(problem, point)
+            tried[index] += 1
+            yield high[index]
 
 
 def _branch_begin(
@@ -113,6 +150,13 @@ def _branch_begin(
     if any(p.converged for p in low[:first]):
         return first
     return failed[0] if failed[0] > first else None
+
+
+def _nothing_known(
+    low: Sequence[ForcedPoint], high: Mapping[int, ForcedPoint], first: int, last: int
+) -> bool:
+    """Whether a run of repeats failed from its first one on, and no point before it is known from which a branch could begin."""
+    return not high[first].converged and not any(p.converged for p in low[:first])
 
 
 def _unsolved(

@@ -1,12 +1,14 @@
 """The two passages of the Jacobian Alert: a branch with few harmonics, then the frequencies that need more."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from time import perf_counter
 
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection import jacobian_alert
 from stickslip.response.preload import bonded_start, preload
@@ -20,17 +22,22 @@ from stickslip.response.sweep import (
     reached,
 )
 from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to
-from stickslip.solve.newton import charged, newton
+from stickslip.solve.newton import Solution, charged, newton
 from stickslip.solve.rescue import Homotopy, solve_robustly
-from stickslip.solve.status import Rung
+from stickslip.solve.status import Rung, Status
 
 LOOP = 3  # multiples of `Sweep.points` after which a branch that gains no frequency is left
 BRANCH_SEEDS = 4  # points from which a branch with many harmonics is begun
 BRANCH_LENGTH = 5  # multiples of `Sweep.points` after which such a branch is given up
+STALLS = 1.5  # multiples of `Sweep.points` after which it is given up if it gains no frequency
 BACKWARD = 0.1  # share of the range by which it may fall back behind the start of the range
 DETOUR = 30  # most points on the way from a neighbour to a repeat that fails
 ISOLATED = 5  # iterations of a repeat beside none that is accepted: it converges soon or not at all
 NEIGHBOURS = 1  # points on each side from which a repeat that fails is tried
+PATIENCE = (
+    4  # repeats that fail one after the other before most of the following are left to the branch
+)
+GLANCE = 8  # each such repeat in a row of failures is tried all the same
 
 
 def first_passage(
@@ -57,7 +64,9 @@ def first_passage(
         if point is None or not point.solution.status.converged or point.p < first:
             # the branch starts here, or is lost: take it up (again) a little further on
             gap = sweep.control.largest * sweep.control.scale if points else 0.0
-            point = _fresh_point(problem, load, points, min(reach + gap, last))
+            # a single frequency is left to the repeats, which know both sides; a second one in a row to the homotopies
+            left = bool(points) and points[-1].converged and sweep.selection != "always_low"
+            point = _fresh_point(problem, load, points, min(reach + gap, last), left)
         points.append(_low_point(problem, point, len(points), began))
         yield points[-1]
 
@@ -87,26 +96,45 @@ def _grid(
 
 
 def _fresh_point(
-    problem: ForcedProblem, load: HarmonicLoad, points: list[ForcedPoint], omega: float
+    problem: ForcedProblem,
+    load: HarmonicLoad,
+    points: list[ForcedPoint],
+    omega: float,
+    quickly: bool = False,
 ) -> Point:
     """Solve without a branch that leads here.
 
-    From the last solution; from the static equilibrium plus the bonded vibration; from a solution with few harmonics. Then by all that
-    `solve_robustly` knows.
+    From the last solution; from the static equilibrium plus the bonded vibration; from a solution with few harmonics. Then, unless it is
+    to go quickly, by all that `solve_robustly` knows.
     """
     balance = problem.low
     following = problem.following(balance)
-    solution = solve_robustly(
-        lambda x: balance.linearise(x, omega),
-        _starts(problem, load, points, omega),
-        problem.sweep.newton,
-        _ways(problem, load, omega),
-        following.weights,
-    )
+    if quickly:
+        solution = _from_starts(problem, load, points, omega)
+    else:
+        solution = solve_robustly(
+            lambda x: balance.linearise(x, omega),
+            _starts(problem, load, points, omega),
+            problem.sweep.newton,
+            _ways(problem, load, omega),
+            following.weights,
+        )
     if not solution.status.converged:
         upward = np.append(np.zeros(balance.size), 1.0)
         return Point(solution.x, omega, upward, following.control.first, solution, 0.0)
     return replace(start_point(balance, solution.x, omega, following), solution=solution)
+
+
+def _from_starts(
+    problem: ForcedProblem, load: HarmonicLoad, points: list[ForcedPoint], omega: float
+) -> Solution:
+    """Return where Newton's method ends from the first start that converges, or from the last one."""
+    spent: list[Solution] = []
+    for start in _starts(problem, load, points, omega):
+        spent.append(newton(lambda x: problem.low.linearise(x, omega), start, problem.sweep.newton))
+        if spent[-1].status.converged:
+            break
+    return charged(spent[-1], spent)
 
 
 def _ways(problem: ForcedProblem, load: HarmonicLoad, omega: float) -> Iterator[Homotopy]:
@@ -154,7 +182,8 @@ def repeat(
     problem: ForcedProblem,
     point: ForcedPoint,
     others: Mapping[int, ForcedPoint],
-    static: FloatArray | None = None,
+    static: Callable[[], FloatArray] | None = None,
+    branch: Sequence[ForcedPoint] = (),
 ) -> ForcedPoint:
     """Solve a frequency with more harmonics: from the best of q + Δq, q and its neighbours, or along the branch from a neighbour.
 
@@ -169,23 +198,18 @@ def repeat(
     others
         Accepted points by index: repeats, and points of the first passage that need none.
     static
-        (n_retained,) static equilibrium, m, for what `solve_robustly` tries if all else fails; None: that is not tried.
+        Gives the (n_retained,) static equilibrium, m, for what `solve_robustly` tries if all else fails; None: that is not tried.
+    branch
+        Points of a branch with many harmonics: where it passed the frequency, it leads to a solution.
     """
     began = perf_counter()
     balance, omega = problem.high, point.omega
-    alert = jacobian_alert(
-        problem.low,
-        balance,
-        problem.low.unknowns(point.coefficients),
-        omega,
-        problem.alert_dofs,
-        problem.alert_solve,
-    )
+    guesses, seconds_alert = _predicted(problem, point)
     near = _neighbours(point.index, others)
-    beside = [p for p in near if abs(p.index - point.index) <= 1]
+    beside = passing(branch, point) + [p for p in near if abs(p.index - point.index) <= 1]
     most = BRANCH_ITERATIONS if beside or static is not None else ISOLATED
     quick = replace(problem.sweep.newton, max_iterations=most)
-    guesses = [alert.start, *(balance.unknowns(p.coefficients) for p in [point, *near])]
+    guesses += [balance.unknowns(p.coefficients) for p in [point, *near]]
     # the smallest residual decides: q + Δq where states hardly change, a neighbour where they do
     start = min(guesses, key=lambda x: float(np.linalg.norm(balance.linearise(x, omega).residual)))
     spent = [newton(lambda v: balance.linearise(v, omega), start, quick)]
@@ -199,7 +223,7 @@ def repeat(
             lambda v: balance.linearise(v, omega),
             [start],
             problem.sweep.newton,
-            homotopies(balance, omega, static),
+            homotopies(balance, omega, static()),
             problem.following(balance).weights,
         )
         spent.append(solution)
@@ -207,9 +231,66 @@ def repeat(
     made = forced_point(balance, solution, "high", point.index, omega, perf_counter() - began)
     return replace(
         made,
-        seconds_contact=made.seconds_contact + alert.seconds_contact,
+        seconds_contact=made.seconds_contact + seconds_alert,
         predicted_error=point.predicted_error,
     )
+
+
+def _predicted(problem: ForcedProblem, point: ForcedPoint) -> tuple[list[FloatArray], float]:
+    """Return q + Δq in a list, empty if q is no solution, and the seconds in contacts that it took."""
+    if not point.converged:
+        return [], 0.0
+    x = problem.low.unknowns(point.coefficients)
+    alert = jacobian_alert(
+        problem.low, problem.high, x, point.omega, problem.alert_dofs, problem.alert_solve
+    )
+    return [alert.start], alert.seconds_contact
+
+
+def worth_a_try(index: int, forward: bool, failed: Callable[[int], bool], known: bool) -> bool:
+    """Whether a repeat is tried now, or left to the branch with many harmonics and to the homotopy.
+
+    A few repeats that fail in a row show that the solution with few harmonics says little about that with many. Then only some are
+    tried on the way forward, and on the way back those beside an accepted one.
+
+    Parameters
+    ----------
+    index
+        Of the point of the first passage.
+    forward
+        Whether this is the first attempt.
+    failed
+        Whether the repeat of an index failed.
+    known
+        Whether a neighbour is accepted.
+    """
+    if known:
+        return True
+    row = all(failed(i) for i in range(index - PATIENCE, index))
+    return forward and (not row or index % GLANCE == 0)
+
+
+def postponed(problem: ForcedProblem, point: ForcedPoint) -> ForcedPoint:
+    """Return a repeat that was given no iterations: for `follow_run` or a homotopy to find."""
+    x = problem.high.unknowns(point.coefficients)
+    none = Solution(x, Status.TOO_MANY_ITERATIONS, 0, np.nan, 0.0, 0.0)
+    made = forced_point(problem.high, none, "high", point.index, point.omega, 0.0)
+    return replace(made, predicted_error=point.predicted_error)
+
+
+def passing(branch: Sequence[ForcedPoint], point: ForcedPoint) -> list[ForcedPoint]:
+    """Return the two points of a branch between which it went across the frequency of `point`, on the sheet nearest to its motion."""
+    ends = [
+        sorted((a, b), key=lambda p: abs(p.omega - point.omega))
+        for a, b in pairwise(p for p in branch if p.converged)
+        if a.index == b.index and (a.omega - point.omega) * (b.omega - point.omega) <= 0.0
+    ]
+    low = point.coefficients[1:]
+
+    def away(pair: list[ForcedPoint]) -> float:
+        return float(np.linalg.norm(pair[0].coefficients[1 : len(low) + 1] - low))
+
+    return min(ends, key=away, default=[])
 
 
 def follow_run(
@@ -239,6 +320,8 @@ def follow_run(
         elif (
             reached(branch, low, last)
             or not branch[-1].converged
+            or len(branch) - int(np.argmax([p.omega for p in branch]))
+            > problem.sweep.points * STALLS
             or not begin - margin < branch[-1].omega < stop + margin
         ):
             return
@@ -277,9 +360,11 @@ def _branch_start(
     return None
 
 
-def along_branch(problem: ForcedProblem, point: ForcedPoint, omega: float) -> Point:
-    """Go from an accepted point to another frequency on the branch with many harmonics."""
-    balance = problem.high
+def along_branch(
+    problem: ForcedProblem, point: ForcedPoint, omega: float, balance: HarmonicBalance | None = None
+) -> Point:
+    """Go from an accepted point to another frequency on the branch with many harmonics, or on that of `balance`."""
+    balance = problem.high if balance is None else balance
     following = problem.following(balance)
     following = replace(following, control=replace(following.control, max_points=DETOUR))
     start = start_point(balance, balance.unknowns(point.coefficients), point.omega, following)

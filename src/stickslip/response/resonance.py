@@ -1,22 +1,30 @@
 """The resonance peak of a forced response, resolved by a few points."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
 
+from stickslip.arrays import FloatArray
 from stickslip.harmonic.selection import jacobian_alert
 from stickslip.response.passages import along_branch, repeat
+from stickslip.response.rescue import homotopies
 from stickslip.response.sweep import ForcedPoint, ForcedProblem, forced_point
 from stickslip.solve.continuation import start_point, step_to
+from stickslip.solve.newton import Solution, charged
+from stickslip.solve.rescue import solve_robustly
+from stickslip.solve.status import Rung
 
 NEARBY = 0.002  # half the bracket about a known peak, relative to its frequency
 PEAK_RESOLUTION = 5e-4  # width of the bracket of the peak, relative to its frequency, at which it counts as resolved
 
 
 def resolve_peak(
-    problem: ForcedProblem, accepted: list[ForcedPoint], done: list[ForcedPoint]
+    problem: ForcedProblem,
+    accepted: list[ForcedPoint],
+    done: list[ForcedPoint],
+    static: Callable[[], FloatArray] | None = None,
 ) -> Iterator[ForcedPoint]:
     """Add points around the highest one until its bracket is narrow.
 
@@ -28,6 +36,8 @@ def resolve_peak(
         Points of both passages in the order of the branch.
     done
         Peak points of an interrupted run.
+    static
+        Gives the (n_retained,) static equilibrium, m, for the homotopies of what does not converge otherwise; None: they are not tried.
     """
     known = [p for p in accepted if p.converged]
     heights = [problem.amplitude(p) for p in known]
@@ -40,10 +50,11 @@ def resolve_peak(
         if index < len(done):
             point = done[index]
         elif seam:
-            point = _repeated_top(problem, known, top, index)
+            point = _repeated_top(problem, known, top, index, static)
             yield point
         else:
-            point = _peak_point(problem, known[top], omega, index)
+            aside = known[top - 1 if omega <= known[top].omega else top + 1]
+            point = _peak_point(problem, (known[top], aside), omega, index, static)
             yield point
         if not point.converged:
             return
@@ -60,12 +71,16 @@ def _on_seam(problem: ForcedProblem, known: list[ForcedPoint], top: int) -> bool
 
 
 def _repeated_top(
-    problem: ForcedProblem, known: list[ForcedPoint], top: int, index: int
+    problem: ForcedProblem,
+    known: list[ForcedPoint],
+    top: int,
+    index: int,
+    static: Callable[[], FloatArray] | None,
 ) -> ForcedPoint:
     began = perf_counter()
     here = known[top].index
     sides = {here - 1: known[max(top - 1, 0)], here + 1: known[min(top + 1, len(known) - 1)]}
-    made = repeat(problem, known[top], sides)
+    made = repeat(problem, known[top], sides, static)
     return replace(made, stage="peak", index=index, seconds_total=perf_counter() - began)
 
 
@@ -111,22 +126,52 @@ def _vertex(known: list[ForcedPoint], heights: list[float]) -> float | None:
     return float(b - 0.5 * ((b - a) * below - (b - c) * above) / (below - above))
 
 
-def _peak_point(problem: ForcedProblem, top: ForcedPoint, omega: float, index: int) -> ForcedPoint:
+def _peak_point(
+    problem: ForcedProblem,
+    ends: tuple[ForcedPoint, ForcedPoint],
+    omega: float,
+    index: int,
+    static: Callable[[], FloatArray] | None,
+) -> ForcedPoint:
+    """Solve at a frequency between two points: along the branch from either of them, then by all that `solve_robustly` knows."""
     began = perf_counter()
+    top = ends[0]
     balance = problem.balance(top.order)
-    if balance is not problem.low:
-        solution = along_branch(problem, top, omega).solution
-        return forced_point(balance, solution, "peak", index, omega, perf_counter() - began)
-    following = problem.following(balance)
-    start = start_point(balance, balance.unknowns(top.coefficients), top.omega, following)
-    point = step_to(balance, start, omega, following)
-    made = forced_point(balance, point.solution, "peak", index, omega, perf_counter() - began)
-    if problem.sweep.selection != "jacobian_alert" or not made.converged:
+    solution = _between(problem, ends, omega, static)
+    made = forced_point(balance, solution, "peak", index, omega, perf_counter() - began)
+    asked = problem.sweep.selection == "jacobian_alert" and balance is problem.low
+    if not asked or not made.converged:
         return made
     alert = jacobian_alert(
-        problem.low, problem.high, point.x, omega, problem.alert_dofs, problem.alert_solve
+        problem.low, problem.high, solution.x, omega, problem.alert_dofs, problem.alert_solve
     )
     made = replace(made, predicted_error=alert.error)
     if problem.alerted(made):
-        made = replace(repeat(problem, made, {}), stage="peak")
+        made = replace(repeat(problem, made, {}, static), stage="peak")
     return replace(made, seconds_total=perf_counter() - began)
+
+
+def _between(
+    problem: ForcedProblem,
+    ends: tuple[ForcedPoint, ForcedPoint],
+    omega: float,
+    static: Callable[[], FloatArray] | None,
+) -> Solution:
+    balance = problem.balance(ends[0].order)
+    spent: list[Solution] = []
+    for end in ends:
+        found = along_branch(problem, end, omega, balance).solution
+        rung = max(found.rung, Rung.SHORTER_STEP) if spent else found.rung
+        spent.append(replace(found, rung=rung))
+        if found.status.converged:
+            return charged(spent[-1], spent)
+    if static is None:
+        return charged(spent[0], spent)
+    solution = solve_robustly(
+        lambda v: balance.linearise(v, omega),
+        [balance.unknowns(end.coefficients) for end in ends],
+        problem.sweep.newton,
+        homotopies(balance, omega, static()),
+        problem.following(balance).weights,
+    )
+    return charged(solution, [*spent, solution])

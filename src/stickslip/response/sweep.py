@@ -205,6 +205,11 @@ class ForcedProblem:
         """Whether the alert asks for more harmonics at a point of the first passage."""
         return point.converged and bool(point.predicted_error > self.sweep.threshold)
 
+    def asks_again(self, point: ForcedPoint) -> bool:
+        """Whether a point of the first passage is repeated: alerted, or not found although its neighbours may lead to it."""
+        lost = not point.converged and self.sweep.selection != "always_low"
+        return lost or self.alerted(point)
+
     def branch_point(self, point: ForcedPoint) -> Point:
         """Return a point of a branch as one that it goes on from."""
         x = self.balance(point.order).unknowns(point.coefficients)

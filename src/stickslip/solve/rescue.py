@@ -16,7 +16,7 @@ from stickslip.solve.status import Rung, Status
 Evaluate = Callable[[FloatArray], Evaluation]
 Family = Callable[[float], Evaluate]
 
-PATIENCE = 60  # iterations of a corrector that has no neighbour to start from
+PATIENCE = 30  # iterations of a corrector that has no neighbour to start from
 STEPS = StepControl(scale=1.0, first=0.1, largest=0.5, smallest=1e-5)
 ITERATIONS = (
     10  # of a corrector along a homotopy: there a shorter step is cheaper than a long correction
