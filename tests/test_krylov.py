@@ -487,7 +487,7 @@ def test_size_chooses_the_form(monkeypatch):
     assert made.structured
     assert isinstance(made.linearise(np.zeros(made.size), OMEGA).jac, StructuredJacobian)
     # without harmonics nothing is saved, and the static problem is small
-    static = problem(1.0, order=0)
+    static = problem(1.0).with_order(0)
     x = np.random.default_rng(0).standard_normal(static.size)
     assert isinstance(static.linearise(x, OMEGA).jac, np.ndarray)
     monkeypatch.setattr(balance_module, "CROSSOVER", 1)
