@@ -211,6 +211,22 @@ def test_a_preload_is_a_load():
     assert balance_of(system, HarmonicLoad(np.zeros(12))).force_scale == 30.0
 
 
+def test_what_the_balance_cannot_keep_or_does_not_know_is_refused():
+    system, load = free_body_3d()
+    high = HarmonicLoad(load.static, {**load.harmonics, 3: load.harmonics[1]})
+    with pytest.raises(
+        InputError, match=r"excites harmonic 3, but only 2 are kept\. Keep 3 or more"
+    ):
+        balance_of(system, high, 2)
+    with pytest.raises(InputError, match="order: must be an integer from 0 on, got -1"):
+        balance_of(system, load, -1)
+    linear = condense(system.structure, system.retained, load)
+    with pytest.raises(InputError, match="'exact' is none of intervals, march, events"):
+        harmonic_balance(linear, system.interface, 1, 16, "exact")
+    with pytest.raises(InputError, match="'sparse' is none of auto, dense, structured"):
+        harmonic_balance(linear, system.interface, 1, 16, jacobian="sparse")
+
+
 @pytest.mark.parametrize(("order", "samples", "least"), [(5, 20, 40), (1, 4, 16)])
 def test_too_few_samples_are_refused(order, samples, least):
     system, load = free_body_3d()
@@ -220,7 +236,7 @@ def test_too_few_samples_are_refused(order, samples, least):
     ):
         balance_of(system, load, order, samples)
     with pytest.raises(InputError, match="samples a period"):
-        balance_of(system, load, 0, samples).with_order(order)
+        balance_of(system, load, 1, samples).with_order(order)
 
 
 def test_contact_dofs_must_be_retained():

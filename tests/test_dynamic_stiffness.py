@@ -17,6 +17,7 @@ from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded, to_complex, to_real
 from stickslip.harmonic.spectral import Modes, Poles, StateSpace
+from stickslip.model.lumped import lumped
 from stickslip.model.structure import Structure
 
 RETAINED = np.array([1, 4, 5])
@@ -54,13 +55,28 @@ def test_padding_adds_zeros_or_drops():
 
 
 def test_load_refuses_what_is_no_harmonic():
-    with pytest.raises(ValueError, match="harmonic 0"):
+    with pytest.raises(InputError, match="an integer from 1 on, got 0"):
         HarmonicLoad(np.zeros(3), {0: np.zeros(3, complex)})
-    with pytest.raises(ValueError, match=r"harmonic 1 with shape \(2,\) for \(3,\)"):
+    with pytest.raises(InputError, match=r"harmonic 1 has shape \(2,\), the static load \(3,\)"):
         HarmonicLoad(np.zeros(3), {1: np.zeros(2, complex)})
+    with pytest.raises(InputError, match=r"static: must be one row of real forces"):
+        HarmonicLoad(np.array([1.0 + 3j, 0.0]))
+    assert np.array_equal(HarmonicLoad([1, 2]).static, [1.0, 2.0])
     load = HarmonicLoad(np.array([1.0, -7.0, 0]), {2: np.array([0, 3 + 4j, 0])})
     assert load.scale == 7.0
     assert np.array_equal(load.coefficients(1)[1], np.zeros(3))
+
+
+@pytest.mark.parametrize("retained", [[-2], [True, False], [0, 0], [0, 2], [0.0]])
+def test_only_different_dofs_are_retained(retained):
+    structure = lumped(np.ones(2), np.array([[2.0, -1.0], [-1.0, 2.0]]))
+    with pytest.raises(InputError, match=r"retained: must be different integers from 0 to 1"):
+        condense(structure, np.array(retained), HarmonicLoad(np.ones(2)))
+
+
+def test_structural_damping_is_refused():
+    with pytest.raises(InputError, match="is complex"):
+        lumped(np.ones(2), np.array([[2.0 + 0.1j, -1.0], [-1.0, 2.0]]))
 
 
 # ---- condensation -------------------------------------------------------------------------------------------------------

@@ -115,7 +115,7 @@ def test_weights_reach_the_stuck_contact():
 
 @pytest.mark.parametrize("bad", [[1.0], [1.0, 0.0], [1.0, -2.0], [1.0, np.nan]])
 def test_weights_must_be_positive(bad):
-    with pytest.raises(InputError, match=r"Interface\.weights: must be 2 positive numbers"):
+    with pytest.raises(InputError, match="weights: must be 2 positive numbers"):
         Interface(("a", "b"), (LAW, LAW), np.eye(6), np.array(bad))
 
 

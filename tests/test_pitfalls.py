@@ -15,6 +15,7 @@ from stickslip.contact.compiled import compile_contacts
 from stickslip.contact.interface import Interface
 from stickslip.contact.law import TT
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.errors import InputError
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -87,6 +88,46 @@ def test_event_buffers_are_bounded(evaluator, size):
         period = contact_forces(gap, compile_contacts([law] * 20, evaluator=evaluator), 512)
     assert period.coefficients.shape == (51, 60)
     assert np.all(np.isfinite(period.coefficients)) == bool(size <= 1e150)
+
+
+@pytest.mark.parametrize("order", [3, 5, 10, 20])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_gap_that_is_flat_where_it_touches(order, sign):
+    # ((1 - cos τ) / 2)^H stays within rounding of zero for a good part of the period
+    flat = np.array([1.0])
+    for _ in range(order):
+        flat = np.polynomial.chebyshev.chebmul(flat, [0.5, -0.5])
+    gap = np.zeros((2 * order + 1, 3))
+    gap[0, 2], gap[1::2, 2], gap[1, 0] = sign * flat[0], sign * flat[1:], 1.0
+    law = ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=1.0, mu=0.3)
+    exact, sampled = (
+        contact_forces(gap, compile_contacts([law], evaluator=evaluator), 4096).coefficients
+        for evaluator in ("events", "intervals")
+    )
+    assert np.max(np.abs(exact - sampled)) < 1e-6
+
+
+def test_integers_are_numbers():
+    law = ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=1.0, mu=0.3, preload=1.0)
+    gap = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    contacts = compile_contacts([law], evaluator="events")
+    whole, real = (contact_forces(np.array(gap, dtype=t), contacts, 16) for t in (int, float))
+    assert np.array_equal(whole.coefficients, real.coefficients)
+    assert np.array_equal(contact_forces(gap, contacts, 16).coefficients, real.coefficients)
+    with pytest.raises(InputError, match=r"shape \(2, 3\) for 1 contacts"):
+        contact_forces(np.zeros((2, 3)), contacts, 16)
+
+
+@pytest.mark.parametrize("evaluator", ["march", "intervals", "events"])
+def test_slider_at_rest_on_its_limit_sticks(evaluator):
+    # x - s of a slider at its limit is off by rounding: the march took that for slip and lost the derivative
+    law = Jenkins(k_t=1.84, k_w=1.84, limit=0.3)
+    gap = np.zeros((3, 3))
+    gap[0, :2] = 0.5
+    period = contact_forces(gap, compile_contacts([law], evaluator=evaluator), 64)
+    assert period.coefficients[0, :2] == pytest.approx(0.3)
+    # a steady displacement moves the slider along
+    assert np.diag(period.blocks[0][TT]) == pytest.approx([0.0, 1.84, 1.84])
 
 
 def test_too_few_samples():

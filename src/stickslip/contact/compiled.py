@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.law import UNCOUPLED_TANGENTS, ContactLaw, PiecewiseLinear
+from stickslip.errors import input_error
 
 Evaluator = Literal["intervals", "march", "events"]
 
@@ -54,6 +55,28 @@ class CompiledContacts:
     marched: tuple[MarchedLaws, ...]
 
 
+def check_evaluator(evaluator: str) -> None:
+    """Raise `InputError` unless there is such an evaluator."""
+    if evaluator not in get_args(Evaluator):
+        raise input_error(
+            "evaluator",
+            f"{evaluator!r} is none of {', '.join(get_args(Evaluator))}",
+            "'events' has no sampling error.",
+        )
+
+
+def checked_weights(weights: FloatArray, n: int) -> FloatArray:
+    """Return the factors of `n` contacts as an array, or raise `InputError`."""
+    factors = np.asarray(weights, dtype=float)
+    if factors.shape != (n,) or not np.all(np.isfinite(factors) & (factors > 0)):
+        raise input_error(
+            "weights",
+            f"must be {n} positive numbers, got {factors.size} from {factors.min(initial=np.inf):g} on",
+            "Give the area of each contact point, or None.",
+        )
+    return factors
+
+
 def compile_contacts(
     laws: Sequence[ContactLaw],
     weights: FloatArray | None = None,
@@ -69,7 +92,15 @@ def compile_contacts(
         (n_contacts,) factors of the forces; None: ones.
     evaluator
         ``intervals`` or ``events`` for piecewise-linear laws (others are marched), or ``march`` for all.
+
+    Raises
+    ------
+    InputError
+        If there is no such evaluator, or the weights are not one positive number a contact.
     """
+    check_evaluator(evaluator)
+    if weights is not None:
+        weights = checked_weights(weights, len(laws))
     march_all = evaluator == "march"
     rows: list[FloatArray] = []
     piecewise: list[int] = []

@@ -12,6 +12,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import OPEN, SLIP, STICK, law_kernel
 
+ROUND_OFF = 4e-16
 K_T, K_W, K_N, MU, PRELOAD, RESIDUAL, UNILATERAL = range(7)
 
 
@@ -56,7 +57,8 @@ def _step(displacement, velocity, state, parameters, force, new_state, jac, stat
             continue
         started = not np.isnan(s)
         trial = k * (x - s) if started else parameters[RESIDUAL] * limit
-        if started and abs(trial) <= limit:
+        # x - s of a slider that rests at its limit is off by rounding
+        if started and abs(trial) <= limit + ROUND_OFF * k * (abs(x) + abs(s)):
             status[d] = STICK
             force[d] = trial
             new_state[d] = s

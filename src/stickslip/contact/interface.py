@@ -8,7 +8,12 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
-from stickslip.contact.compiled import CompiledContacts, Evaluator, compile_contacts
+from stickslip.contact.compiled import (
+    CompiledContacts,
+    Evaluator,
+    checked_weights,
+    compile_contacts,
+)
 from stickslip.contact.law import PAIRS, ContactLaw
 from stickslip.errors import input_error
 
@@ -35,7 +40,7 @@ class Interface:
     Raises
     ------
     InputError
-        If the numbers of names, laws, rows and weights do not agree, or a weight is not positive.
+        If the numbers of names, laws, rows and weights do not agree, a weight is not positive, or a gap is not finite.
     """
 
     names: tuple[str, ...]
@@ -52,14 +57,14 @@ class Interface:
                 f"{n} contact names, {len(self.laws)} laws, {self.gap_operator.shape[0]} rows of the gap operator",
                 "Give one law and three rows (t, w, n) for each contact.",
             )
-        if self.weights is not None and (
-            self.weights.shape != (n,) or not np.all(np.isfinite(self.weights) & (self.weights > 0))
-        ):
+        if not np.all(np.isfinite(self.gap_operator.data)):
             raise input_error(
-                "Interface.weights",
-                f"must be {n} positive numbers, got shape {self.weights.shape}",
-                "Give the area of each contact point, or None.",
+                "Interface.gap_operator",
+                "contains NaN or infinite numbers",
+                "Check the frames and places of the contacts.",
             )
+        if self.weights is not None:
+            object.__setattr__(self, "weights", checked_weights(self.weights, n))
 
     @property
     def n_contacts(self) -> int:

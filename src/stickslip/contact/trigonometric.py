@@ -15,6 +15,8 @@ CELLS_PER_ORDER = (
 )
 _NARROWEST = 1e-8  # width at which a cell is no longer cut: what it hides there is below round-off in the polynomial
 _ROUND_OFF = 4e-16
+_NOISE = 4e-16  # of the polynomial's bound, for each term of its sum: smaller values have no sign of their own and count as zero
+_MOST_CUTS = 2000  # of a cell: where a polynomial stays near zero for long, ever smaller parts would differ by rounding only
 _MOST_STEPS = 60
 DEEPEST = 40  # parts of a cell waiting to be searched; each cut adds one, and 2π is cut to 1e-8 in 30 cuts
 
@@ -154,6 +156,10 @@ def sign_changes(polynomial, slope, grid, values, slopes, cells, roots):  # type
     size, second, third = bounds(polynomial)
     if second == 0.0:
         return 0
+    noise = _NOISE * size * polynomial.size
+    for i in range(n):
+        if abs(values[i]) <= noise:
+            values[i] = 0.0
     on_grid(slope, grid, slopes)
     width = 2.0 * np.pi / (n - 1)
     flat, straight = 0.125 * width * width * second, 0.125 * width * width * third
@@ -172,7 +178,9 @@ def sign_changes(polynomial, slope, grid, values, slopes, cells, roots):  # type
             count = _search(
                 polynomial, left, f_left, d_left, right, f_right, d_right, size, second, third, cells, roots, count
             )  # fmt: skip
-        elif count < roots.size:
+        elif count == roots.size:
+            count -= 1
+        else:
             guess = _guess(left, f_left, d_left, right, f_right, d_right)
             roots[count] = root_between(
                 polynomial, 0.0, left, f_left, right, f_right, guess, size, second
@@ -197,7 +205,8 @@ def _search(  # type: ignore[no-untyped-def]
     polynomial, left, f_left, d_left, right, f_right, d_right, size, second, third, cells, roots, count
 ):  # fmt: skip
     """Append the sign changes of one cell, cutting it in two until each part holds at most one for certain."""
-    waiting = 0
+    waiting, cuts = 0, 0
+    noise = _NOISE * size * polynomial.size
     while True:
         width = right - left
         eighth = 0.125 * width * width
@@ -206,14 +215,22 @@ def _search(  # type: ignore[no-untyped-def]
             d_left * d_right > 0.0 and min(abs(d_left), abs(d_right)) > eighth * third
         ) or width < _NARROWEST
         excluded = not changes and (monotone or min(abs(f_left), abs(f_right)) > eighth * second)
-        if not excluded and not monotone and waiting < cells.shape[0]:
+        if not excluded and not monotone and waiting < cells.shape[0] and cuts < _MOST_CUTS:
+            cuts += 1
             middle = 0.5 * (left + right)
             f, d = value_and_slope(polynomial, middle)
-            cells[waiting, 0], cells[waiting, 1], cells[waiting, 2] = right, f_right, d_right
-            waiting += 1
-            right, f_right, d_right = middle, f, d
-            continue
-        if changes and count < roots.size:
+            if abs(f) <= noise:
+                f = 0.0
+            # where it stays within rounding of zero there is nothing to be found
+            if not (f_left == 0.0 and f == 0.0 and f_right == 0.0):
+                cells[waiting, 0], cells[waiting, 1], cells[waiting, 2] = right, f_right, d_right
+                waiting += 1
+                right, f_right, d_right = middle, f, d
+                continue
+        if changes and count == roots.size:
+            # more than the polynomial has: the last two stand where it is as flat as rounding, and cancel
+            count -= 1
+        elif changes:
             roots[count] = root_between(
                 polynomial, 0.0, left, f_left, right, f_right, 0.5 * (left + right), size, second
             )

@@ -11,6 +11,7 @@ from stickslip.contact.events import exact_period
 from stickslip.contact.intervals import contact_period, contact_period_threads, prefix_sums
 from stickslip.contact.march import march_period
 from stickslip.contact.threads import thread_shares
+from stickslip.errors import input_error
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +88,14 @@ def contact_forces(
         Whether gaps, forces and states over the period are asked for, too: exact events do without them, and are then returned
         with no samples.
     """
-    m = gap_coefficients.shape[0]
+    gap_coefficients = np.asarray(gap_coefficients, dtype=float)
+    m = gap_coefficients.shape[0] if gap_coefficients.ndim else 0
+    if m % 2 == 0 or gap_coefficients.shape != (m, 3 * contacts.n_contacts):
+        raise input_error(
+            "contact_forces",
+            f"gap coefficients of shape {gap_coefficients.shape} for {contacts.n_contacts} contacts",
+            "Give 2 H + 1 rows, and columns t, w, n of each contact.",
+        )
     if not history and contacts.evaluator == "events" and not contacts.marched:
         samples = 0
     tables = _tables((m - 1) // 2, samples)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from time import perf_counter
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces
 from stickslip.harmonic.condensed_product import CondensedProduct, at_frequency
 from stickslip.harmonic.dynamic_stiffness import CondensedStiffness
+from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded, to_complex, to_real
 from stickslip.harmonic.structured import StructuredJacobian, real_matrix
 
@@ -185,8 +186,16 @@ def harmonic_balance(
     Raises
     ------
     InputError
-        If the contacts touch dofs that are not retained, or there are fewer than four samples a harmonic.
+        If the contacts touch dofs that are not retained, the load excites a harmonic above `order`, there are fewer than four samples a
+        harmonic, or no such evaluator or form.
     """
+    _check_order(linear.load, order)
+    if jacobian not in get_args(JacobianForm):
+        raise input_error(
+            "harmonic_balance: jacobian",
+            f"{jacobian!r} is none of {', '.join(get_args(JacobianForm))}",
+            "'auto' takes what costs less.",
+        )
     missing = np.setdiff1d(interface.coordinates(), linear.retained)
     if missing.size:
         raise input_error(
@@ -218,6 +227,18 @@ def _typical_stiffness(contact: FloatArray, linear: CondensedStiffness) -> float
     values = contact[contact > 0] if np.any(contact > 0) else np.abs(np.diagonal(linear.nn[0]))
     values = values[values > 0]
     return float(np.exp(np.mean(np.log(values)))) if values.size else 1.0
+
+
+def _check_order(load: HarmonicLoad, order: int) -> None:
+    if order != int(order) or order < 0:
+        raise input_error("order", f"must be an integer from 0 on, got {order!r}", "Give a count.")
+    top = max((h for h, f in load.harmonics.items() if np.any(f)), default=0)
+    if top > order:
+        raise input_error(
+            "HarmonicLoad",
+            f"excites harmonic {top}, but only {order} are kept",
+            f"Keep {top} or more.",
+        )
 
 
 def _checked_samples(samples: int, order: int) -> int:

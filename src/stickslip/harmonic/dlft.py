@@ -111,14 +111,14 @@ class DynamicLagrangian:
         q = x.reshape(2 * self.order + 1, -1) * balance.displacement_scale
         n = self.interface.n_contacts
         others = np.setdiff1d(np.arange(n), rigid.index)
-        elastic = balance.interface
-        soft = contact_forces(balance.rows.gaps(q), elastic.compiled(), self.samples, omega)
+        soft = balance.contacts(x, omega)
+        shown = contact_forces(balance.rows.gaps(q), balance.compiled, self.samples, omega)
         gap = _in_time(q @ self.interface.gap_operator.T, self.samples).reshape(n, 3, self.samples)
         coefficients = np.empty((q.shape[0], n, 3))
         coefficients[:, others] = soft.coefficients.reshape(q.shape[0], others.size, 3)
         coefficients[:, rigid.index] = balance.force_scale * found.coefficients
         force, state = np.empty_like(gap), np.empty((n, 2, self.samples), dtype=np.int64)
-        force[others], state[others] = soft.force, soft.state
+        force[others], state[others] = shown.force, shown.state
         force[rigid.index] = balance.force_scale * found.period.force
         state[rigid.index] = found.period.state
         blocks = np.zeros((n, soft.blocks.shape[1], *soft.blocks.shape[2:]))

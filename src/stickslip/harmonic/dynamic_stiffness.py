@@ -205,12 +205,13 @@ def condense(structure: Structure, retained: IntArray, load: HarmonicLoad) -> Co
     Raises
     ------
     InputError
-        If a matrix is not symmetric, the interior is too large, or it can move freely.
+        If a matrix is not real and symmetric, `retained` are not different dofs, the interior is too large, or it can move freely.
     """
     if load.static.size != structure.n:
         raise input_error(
             "HarmonicLoad", f"{load.static.size} entries for {structure.n} dofs", "Give one a dof."
         )
+    retained = _checked_dofs(retained, structure.n)
     interior = np.setdiff1d(np.arange(structure.n), retained)
     if interior.size > LARGEST_INTERIOR:
         raise input_error(
@@ -228,9 +229,22 @@ def condense(structure: Structure, retained: IntArray, load: HarmonicLoad) -> Co
     diagonal = _is_diagonal(damping)
     own = _modal(modes, ll[2], np.diag(np.diagonal(damping)) if diagonal else damping)
     return CondensedStiffness(
-        np.asarray(retained), interior, nn, to_modes, own, modes, diagonal, load,
+        retained, interior, nn, to_modes, own, modes, diagonal, load,
         Interior(nn, to_modes, own, diagonal),
     )  # fmt: skip
+
+
+def _checked_dofs(retained: IntArray, n: int) -> IntArray:
+    """Return dof indices after checking that each is there, once."""
+    dofs = np.asarray(retained)
+    whole = dofs.size == 0 or np.issubdtype(dofs.dtype, np.integer)
+    if not whole or dofs.ndim != 1 or np.any((dofs < 0) | (dofs >= n)) or np.unique(dofs).size != dofs.size:  # fmt: skip
+        raise input_error(
+            "condense: retained",
+            f"must be different integers from 0 to {n - 1}, got {dofs[:8].tolist() if dofs.ndim else dofs}",
+            "Of a mask, take np.flatnonzero(mask).",
+        )
+    return dofs.astype(np.int64)
 
 
 def _three(blocks: Iterable[FloatArray]) -> Blocks:
@@ -268,6 +282,12 @@ def _is_diagonal(damping: FloatArray) -> bool:
 
 def _dense_symmetric(structure: Structure, name: str) -> FloatArray:
     matrix = getattr(structure, name)
+    if np.iscomplexobj(matrix):
+        raise input_error(
+            f"Structure.{name}",
+            "is complex",
+            "Structural damping is not supported yet: give viscous damping as a real matrix.",
+        )
     dense = np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix, dtype=float)
     if not np.all(np.isfinite(dense)):
         raise input_error(

@@ -22,22 +22,37 @@ class HarmonicLoad:
 
     Raises
     ------
-    ValueError
-        If an order is below 1 or a length differs.
     InputError
-        If a force is not finite.
+        If an order is no integer above 0, a length differs, the static load is complex or a force is not finite.
     """
 
     static: FloatArray
     harmonics: Mapping[int, ComplexArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for order, amplitude in self.harmonics.items():
-            if order < 1 or np.shape(amplitude) != self.static.shape:
-                raise ValueError(
-                    f"HarmonicLoad: harmonic {order} with shape {np.shape(amplitude)} for {self.static.shape}"
+        static = np.asarray(self.static)
+        if static.ndim != 1 or np.any(np.imag(static) != 0.0):
+            raise input_error(
+                "HarmonicLoad.static",
+                f"must be one row of real forces, got shape {static.shape} of {static.dtype}",
+                "A phase belongs to a harmonic: give it in `harmonics`.",
+            )
+        object.__setattr__(self, "static", np.real(static).astype(float))
+        harmonics = {h: np.asarray(f, dtype=complex) for h, f in self.harmonics.items()}
+        object.__setattr__(self, "harmonics", harmonics)
+        for order, amplitude in harmonics.items():
+            if order != int(order) or order < 1:
+                raise input_error(
+                    "HarmonicLoad.harmonics",
+                    f"the order of a harmonic must be an integer from 1 on, got {order!r}",
+                    "Give what does not vibrate as `static`.",
                 )
-
+            if amplitude.shape != static.shape:
+                raise input_error(
+                    "HarmonicLoad.harmonics",
+                    f"harmonic {order} has shape {amplitude.shape}, the static load {static.shape}",
+                    "Give one force a dof.",
+                )
         for f in (self.static, *self.harmonics.values()):
             if not np.all(np.isfinite(f)):
                 raise input_error(

@@ -86,6 +86,12 @@ def chain(n: int, mass: float, stiffness: float, damping_factor: float = 0.0) ->
 
 def _symmetric(name: str, matrix: FloatArray, n: int | None = None) -> FloatArray:
     """Return the matrix as floats after checking shape, finiteness and symmetry."""
+    if np.iscomplexobj(matrix):
+        raise input_error(
+            f"lumped: {name}",
+            "is complex",
+            "Structural damping is not supported yet: give viscous damping as a real matrix.",
+        )
     matrix = np.asarray(matrix, dtype=float)
     expected = len(matrix) if n is None and matrix.ndim else n
     if matrix.shape != (expected, expected):

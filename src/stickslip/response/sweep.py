@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
-from stickslip.contact.compiled import Evaluator
+from stickslip.contact.compiled import Evaluator, check_evaluator
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import condense
@@ -78,6 +78,13 @@ class Sweep:
                 "Sweep.omega_range",
                 f"must be positive and growing, got {first:g} to {last:g} rad/s",
                 "Swap the two ends.",
+            )
+        check_evaluator(self.evaluator)
+        if self.selection not in get_args(Selection):
+            raise input_error(
+                "Sweep.selection",
+                f"{self.selection!r} is none of {', '.join(get_args(Selection))}",
+                "'jacobian_alert' repeats where it matters.",
             )
         if np.isnan(self.threshold):
             raise input_error("Sweep.threshold", "is not a number", "0.05 is 5 %.")

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.contact.element import element
+from stickslip.contact.element import ROUND_OFF, element
 from stickslip.contact.law import SLIP, STICK, UNCOUPLED_TANGENTS, law_kernel
 from stickslip.contact.laws.iwan_populations import Population, UniformBand
 from stickslip.contact.laws.parameter_checks import check_any_stiffness, check_not_negative
@@ -25,7 +25,8 @@ def _step(displacement, velocity, state, parameters, force, new_state, jac, stat
                 jac[3 + row, d] = 1.0
                 continue
             trial = k * (x - state[row])
-            if abs(trial) <= limit:
+            # x - s of a slider that rests at its limit is off by rounding
+            if abs(trial) <= limit + ROUND_OFF * k * (abs(x) + abs(state[row])):
                 new_state[row] = state[row]
                 force[d] += trial
                 jac[d, d] += k

@@ -9,6 +9,7 @@ from stickslip.arrays import FloatArray
 from stickslip.contact.element import element_step
 from stickslip.contact.law import UNCOUPLED_TANGENTS
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.errors import InputError, input_error
 
 
@@ -64,12 +65,10 @@ class RigidCoulomb:
                 "Leave out one of them: a contact under a constant load never opens.",
             )
 
-    def softened(self, stiffness: float) -> ElasticCoulomb:
+    def softened(self, stiffness: float) -> ElasticCoulomb | Jenkins:
         """Return the penalty law that tends to this one as `stiffness` (N/m) grows."""
         if self.preload is not None:
-            return ElasticCoulomb(
-                k_t=stiffness, k_w=stiffness, k_n=0.0, mu=self.mu, preload=self.preload
-            )
+            return Jenkins(k_t=stiffness, k_w=stiffness, limit=self.mu * self.preload)
         return ElasticCoulomb(
             k_t=stiffness if self.mu > 0.0 else 0.0, k_w=stiffness if self.mu > 0.0 else 0.0,
             k_n=stiffness, mu=self.mu, preload=-stiffness * self.initial_gap,
