@@ -17,11 +17,12 @@ from synthetic_result import synthetic_result, write_result
 from stickslip.errors import InputError
 from stickslip.report.figure_mesh import edges
 from stickslip.report.figures_damper import damper_motion
+from stickslip.report.figures_error import errors
 from stickslip.report.figures_response import frequency_response
 from stickslip.report.page import write_report
 from stickslip.report.quantities import number, percent, quantity, scale_for
 from stickslip.report.result import NEEDED, load_result
-from stickslip.report.summary import alert, flagged_ranges
+from stickslip.report.summary import alert, flagged_ranges, headline
 
 CHROMIUM = (
     shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -380,17 +381,18 @@ def test_flagged_ranges_are_runs_of_neighbouring_points(tmp_path: Path) -> None:
     assert flagged_ranges(result, result.cases[0]) == [(101, 101, 6, 101), (104, 106, 9, 105)]
 
 
-def test_points_of_a_branch_belong_to_the_range_that_the_alert_asked_for(tmp_path: Path) -> None:
+def test_the_report_knows_of_alerts_whose_points_a_branch_replaced(tmp_path: Path) -> None:
     data = synthetic_result(ratios=(5,), n=10)
-    data["frequency_hz"][:10] = np.arange(100.0, 110.0)
-    data["predicted_error_percent"][:10] = [0, 0, np.nan, np.nan, 8, 0, 0, np.nan, 0, 0]
-    data["order"][:10] = [1, 1, 5, 5, 5, 1, 1, 5, 1, 1]
+    data["predicted_error_percent"][:] = np.nan
+    data["alert_case"] = "alert_point", np.zeros(6, dtype=int)
+    data["alert_frequency_hz"] = "alert_point", np.array([100.0, 102, 103, 104, 105, 107])
+    data["alert_error_percent"] = "alert_point", np.array([1.0, 6, 250, 8, 2, 9])
     result = load_result(write_result(data, tmp_path / "r.nc"))
-    first, second = flagged_ranges(result, result.cases[0])
-    assert first == (102, 104, 8, 104)
-    assert second[:2] == (107, 107)
-    assert np.isnan(second[2])
+    assert flagged_ranges(result, result.cases[0]) == [(102, 104, 250, 103), (107, 107, 9, 107)]
     assert "102 to 104 Hz<br>107 Hz" in alert(result)
+    assert "4 of 6 checked points above 5 %" in headline(result)
+    assert "over 100 %" in headline(result)
+    assert "4 of 6 checked points lie above it" in errors(result).caption
 
 
 def test_curves_follow_frequency_but_a_folded_branch_its_own_order(tmp_path: Path) -> None:

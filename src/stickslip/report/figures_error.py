@@ -5,7 +5,7 @@ import numpy.typing as npt
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from stickslip.arrays import FloatArray, IntArray
+from stickslip.arrays import FloatArray
 from stickslip.report.figures_response import COMPARED
 from stickslip.report.plot import ALARM, INK, Plot, absent, log_ticks, styled
 from stickslip.report.quantities import counted, number, percent
@@ -16,24 +16,25 @@ _SMALLEST_ERROR = 1e-3  # percent; below it the axis would only show rounding
 
 def _error_traces(figure: go.Figure, result: Result) -> list[Case]:
     """Add predicted errors of all cases (left) and both errors of some (right); return those."""
-    hz = result.floats("frequency_hz")
-    predicted, real = result.floats("predicted_error_percent"), result.floats("real_error_percent")
+    hz, asked = result.floats("frequency_hz"), result.alert
+    real = result.floats("real_error_percent")
     both = [c for c in result.cases if np.isfinite(real[result.points(c)]).any()][-COMPARED:]
 
-    def add(case: Case, at: IntArray, y: FloatArray, column: int, **style: object) -> None:
-        keep = at[np.isfinite(y[at])]
+    def add(case: Case, x: FloatArray, y: FloatArray, column: int, **style: object) -> None:
         hover = f"{RATIO} = {case.label}<br>%{{x:.2f}} Hz: %{{y:.3g}} %<extra></extra>"
         options = {"legendgroup": "cases", "hovertemplate": hover, **style}
-        figure.add_scatter(x=hz[keep], y=y[keep], row=1, col=column, **options)
+        figure.add_scatter(x=x, y=y, row=1, col=column, **options)
 
     heading = {"text": f"load ratio {RATIO}"}
     for case in result.cases:
+        own = np.flatnonzero(asked.case == case.index)
         at = result.points(case)
+        at = at[np.isfinite(real[at])]
         line = {"color": case.colour, "width": 1.6}
         add(
             case,
-            at,
-            predicted,
+            asked.hz[own],
+            asked.error[own],
             1,
             mode="lines",
             name=case.label,
@@ -47,23 +48,42 @@ def _error_traces(figure: go.Figure, result: Result) -> list[Case]:
                 "symbol": "circle-open",
                 "line": {"width": 1.4},
             }
-            add(case, at, predicted, 2, mode="lines", name=case.label, line=line, showlegend=False)
-            add(case, at, real, 2, mode="markers", name="real", marker=mark, showlegend=False)
+            add(
+                case,
+                asked.hz[own],
+                asked.error[own],
+                2,
+                mode="lines",
+                name=case.label,
+                line=line,
+                showlegend=False,
+            )
+            add(
+                case,
+                hz[at],
+                real[at],
+                2,
+                mode="markers",
+                name="real",
+                marker=mark,
+                showlegend=False,
+            )
     return both
 
 
 def _error_caption(result: Result) -> str:
-    error = result.floats("predicted_error_percent")
-    known, above = np.isfinite(error), result.flagged
+    asked = result.alert
+    error = asked.error
+    above = error > result.threshold
     text = (
         f"The alert's predicted error of the H = {result.low} solution on the output dofs; the dashed line "
         f"is the threshold of {percent(result.threshold)}. {int(above.sum())} of "
-        f"{counted(int(known.sum()), 'checked point')} lie above it and were asked to repeat at "
+        f"{counted(error.size, 'checked point')} lie above it and were asked to repeat at "
         f"H = {result.high}. "
     )
-    worst = int(np.nanargmax(error))
-    ratio = number(float(result.floats("load_ratio")[result.integers("case")[worst]]))
-    hz = number(float(result.floats("frequency_hz")[worst]), 5)
+    worst = int(np.argmax(error))
+    ratio = number(float(result.floats("load_ratio")[asked.case[worst]]))
+    hz = number(float(asked.hz[worst]), 5)
     text += f"The largest, {percent(float(error[worst]))}, is at {hz} Hz for {RATIO} = {ratio}. "
     real = np.isfinite(result.floats("real_error_percent"))
     if real.any():
@@ -80,8 +100,8 @@ def _error_caption(result: Result) -> str:
 def errors(result: Result) -> Plot:
     """Predicted and real error against frequency (Gastaldi and Berruti 2017, fig. 6)."""
     key, title = "errors", "The alert: predicted and real error against frequency"
-    error = result.floats("predicted_error_percent")
-    if not np.isfinite(error).any():
+    error = result.alert.error
+    if not error.size:
         return absent(key, title, "no predicted error was computed")
     some_real = np.isfinite(result.floats("real_error_percent")).any()
     titles = ("predicted, all load cases", "predicted (line) and real (circles)")
@@ -92,11 +112,7 @@ def errors(result: Result) -> Plot:
     _error_traces(figure, result)
     styled(figure, 430)
     real = result.floats("real_error_percent")
-    top = float(
-        np.concatenate(
-            [error[np.isfinite(error)], real[np.isfinite(real)], [result.threshold]]
-        ).max()
-    )
+    top = float(np.concatenate([error, real[np.isfinite(real)], [result.threshold]]).max())
     figure.add_hline(y=result.threshold, line={"dash": "dash", "color": ALARM, "width": 1.4})
     hz = result.floats("frequency_hz")
     figure.update_xaxes(title_text="frequency (Hz)", range=[float(hz.min()), float(hz.max())])

@@ -55,6 +55,15 @@ class Case:
 
 
 @dataclass(frozen=True, eq=False)
+class Alert:
+    """The points at which the alert was asked, in the order of solution."""
+
+    case: IntArray  # index of the load case
+    hz: FloatArray
+    error: FloatArray  # percent, as predicted
+
+
+@dataclass(frozen=True, eq=False)
 class Result:
     """A result in memory.
 
@@ -128,9 +137,17 @@ class Result:
         return np.isin(self.integers("status"), good or [0])
 
     @property
-    def flagged(self) -> npt.NDArray[np.bool_]:
-        """(point,) True where the predicted error is above the threshold."""
-        return np.nan_to_num(self.floats("predicted_error_percent")) > self.threshold
+    def alert(self) -> Alert:
+        """Where the alert was asked; the accepted points that have a predicted error in files which do not say."""
+        if "alert_error_percent" in self.data:
+            return Alert(
+                self.integers("alert_case"),
+                self.floats("alert_frequency_hz"),
+                self.floats("alert_error_percent"),
+            )
+        error = self.floats("predicted_error_percent")
+        at = np.flatnonzero(np.isfinite(error))
+        return Alert(self.integers("case")[at], self.floats("frequency_hz")[at], error[at])
 
     @property
     def threshold(self) -> float:

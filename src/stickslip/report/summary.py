@@ -49,22 +49,24 @@ def _shift_card(result: Result) -> str:
 
 
 def _alert_card(result: Result) -> str:
-    known = int(np.isfinite(result.floats("predicted_error_percent")).sum())
-    if not known:
+    error = result.alert.error
+    if not error.size:
         return _card("–", "asked for more harmonics", "no predicted error was computed")
-    asked = int(result.flagged.sum())
-    note = f"{asked} of {counted(known, 'checked point')} above {percent(result.threshold)}"
-    return _card(f"{number(100 * asked / known, 2)} %", "of points asked for more harmonics", note)
+    asked = int(np.sum(error > result.threshold))
+    note = f"{asked} of {counted(error.size, 'checked point')} above {percent(result.threshold)}"
+    return _card(
+        f"{number(100 * asked / error.size, 2)} %", "of points asked for more harmonics", note
+    )
 
 
 def _worst_card(result: Result) -> str:
-    error = result.floats("predicted_error_percent")
-    if not np.isfinite(error).any():
+    asked = result.alert
+    if not asked.error.size:
         return _card("–", "worst predicted error", "no predicted error was computed")
-    at = int(np.nanargmax(error))
-    ratio = number(float(result.floats("load_ratio")[result.integers("case")[at]]), 4)
-    note = f"at {number(float(result.floats('frequency_hz')[at]), 5)} Hz, {RATIO} = {ratio}"
-    largest = float(error[at])
+    at = int(np.argmax(asked.error))
+    ratio = number(float(result.floats("load_ratio")[asked.case[at]]), 4)
+    note = f"at {number(float(asked.hz[at]), 5)} Hz, {RATIO} = {ratio}"
+    largest = float(asked.error[at])
     said = "over 100 %" if largest > 100.0 else percent(largest)
     return _card(said, f"worst predicted error at H = {result.low}", note)
 
@@ -153,29 +155,21 @@ def warnings_box(result: Result) -> str:
 def flagged_ranges(result: Result, case: Case) -> list[tuple[float, float, float, float]]:
     """Ranges of frequency in which the alert asked for more harmonics.
 
-    Points of a branch with many harmonics, which took the place of points that the alert spoke of, have no predicted error of their own;
-    they belong to the range.
-
     Returns
     -------
     ranges
-        (first Hz, last Hz, largest predicted error in percent, Hz of it) of each run of neighbouring points; NaN for the last two where
-        no point of the run has one.
+        (first Hz, last Hz, largest predicted error in percent, Hz of it) of each run of neighbouring points.
     """
-    error = result.floats("predicted_error_percent")
-    refined = np.nan_to_num(result.floats("refinement")) > 0
-    branch = ~np.isfinite(error) & (result.integers("order") > result.low) & ~refined
-    at = result.points(case)
-    at = at[np.isfinite(error[at]) | branch[at]]
-    above = np.concatenate([[False], (error[at] > result.threshold) | branch[at], [False]])
+    at = np.flatnonzero(result.alert.case == case.index)
+    hz, error = result.alert.hz[at], result.alert.error[at]
+    above = np.concatenate([[False], error > result.threshold, [False]])
     starts = np.flatnonzero(~above[:-1] & above[1:])
     ends = np.flatnonzero(above[:-1] & ~above[1:])
-    hz = result.floats("frequency_hz")[at]
     ranges = []
     for a, b in zip(starts, ends, strict=True):
-        worst = a + int(np.argmax(np.nan_to_num(error[at][a:b])))
+        worst = a + int(np.argmax(error[a:b]))
         ranges.append(
-            (float(hz[a:b].min()), float(hz[a:b].max()), float(error[at][worst]), float(hz[worst]))
+            (float(hz[a:b].min()), float(hz[a:b].max()), float(error[worst]), float(hz[worst]))
         )
     return ranges
 
@@ -218,7 +212,7 @@ def _why(result: Result, case: Case) -> str:
 
 def alert(result: Result) -> str:
     """Where the alert asked for more harmonics, and why, in plain words."""
-    if not np.isfinite(result.floats("predicted_error_percent")).any():
+    if not result.alert.error.size:
         return "<p>No predicted error was computed: the alert did not run.</p>"
     rows = []
     for case in result.cases:
@@ -227,8 +221,7 @@ def alert(result: Result) -> str:
             f"{number(a, 5)} Hz" if a == b else f"{number(a, 5)} to {number(b, 5)} Hz"
             for a, b, _, _ in ranges
         )
-        known = [r for r in ranges if np.isfinite(r[2])]
-        worst = max(known, key=lambda r: r[2]) if known else None
+        worst = max(ranges, key=lambda r: r[2]) if ranges else None
         peak = f"{percent(worst[2])} at {number(worst[3], 5)} Hz" if worst else "–"
         rows.append([case.label, where or "nowhere", peak, _why(result, case)])
     text = (

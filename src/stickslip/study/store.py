@@ -17,6 +17,7 @@ from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import input_error
 from stickslip.response.fields import Fields
 from stickslip.solve.status import Status
+from stickslip.study.alert_points import alert_variables
 from stickslip.study.build import Case
 from stickslip.study.collect import HZ, Accepted, CaseResult
 from stickslip.study.verify import Check
@@ -52,10 +53,7 @@ POINT_QUANTITIES = {
     "case": ("1", "load case"),
     "order": ("1", "harmonics kept"),
     "status": ("1", "how the solver ended"),
-    "predicted_error_percent": (
-        "percent",
-        "error of the few harmonics predicted by the Jacobian Alert",
-    ),
+    "predicted_error_percent": ("percent", "error of the few harmonics that the alert predicted"),
     "real_error_percent": (
         "percent",
         "difference of few and many harmonics where both were solved",
@@ -126,8 +124,9 @@ def dataset(
         _case_variables(case, results)
         | _point_variables(case, results, high)
         | _peak_variables(case, results)
+        | alert_variables(results)
+        | _model_variables(case)
     )
-    data |= _model_variables(case)
     if checks:
         data |= _check_variables(checks)
     coordinates = {
