@@ -155,10 +155,16 @@ def smallest_peak(
     Raises
     ------
     InputError
-        If the slope of the peak amplitude has the same sign at both ends.
+        If the peak is not found at an end, or its amplitude has a slope of the same sign at both.
     """
     tracker = _tracker(system, load, parameter, span[0], omega_range, "horizontal_tangent", output, discretisation)  # fmt: skip
     ends = [tracker.point(value) for value in span]
+    for end in (e for e in ends if not e.status.converged):
+        raise input_error(
+            "span",
+            f"the peak at {end.value:g} was not found ({end.status.advice})",
+            "Take another end.",
+        )
     if not ends[0].slope * ends[1].slope < 0.0:
         raise input_error(
             "span",

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -124,6 +125,13 @@ class CaseResult:
             if max(height[i - 1], height[i]) > JUMP * min(height[i - 1], height[i])
             and branch[i - 1].point.order != branch[i].point.order
         ]
+
+    @property
+    def folded_hz(self) -> tuple[float, float] | None:
+        """Lowest and highest frequency (Hz) between which the response runs backwards somewhere; None: it does not."""
+        hz = [a.point.omega / HZ for a in self.accepted if a.point.stage != "peak"]
+        back = [(b, a) for a, b in pairwise(hz) if b < a]
+        return (min(b for b, _ in back), max(a for _, a in back)) if back else None
 
     @property
     def failed(self) -> int:

@@ -204,6 +204,11 @@ def _load_case(run: _Run, case: Case, i: int) -> CaseResult:
             "harmonics meet: more than one periodic motion exists near there, and which one a machine takes depends on "
             "its history."
         )
+    if result.folded_hz is not None:
+        run.warn(
+            f"F_CL/F_HE = {result.ratio:g}: the response folds between {result.folded_hz[0]:.2f} and {result.folded_hz[1]:.2f} Hz: "
+            "more than one periodic motion was found there, as a rule one of them unstable. Points outside the asked range belong to the fold."
+        )
     _warn_drift(run, problem, result)
     if result.peak_at_end:
         run.warn(
