@@ -63,6 +63,10 @@ class RateJenkins:
         return np.array([self.k_t, 0.0, 0.0])
 
 
+# Are the derivatives right? An error names the first entry that is not.
+
+ss.check_law(RateJenkins(k_t=2e4, limit=5.0, per_velocity=2.0), size=1e-3, rate=0.1)
+
 # Two masses, the second held by the friction element, shaken through their first resonance.
 
 structure = ss.lumped(

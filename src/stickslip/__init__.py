@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from stickslip.contact.check_law import check_law
     from stickslip.contact.compiled import compile_contacts
     from stickslip.contact.interface import Interface
     from stickslip.contact.law import law_kernel
@@ -137,6 +138,7 @@ if TYPE_CHECKING:
 _MODULES = {
     "stickslip.contact.compiled": ("compile_contacts",),
     "stickslip.contact.interface": ("Interface",),
+    "stickslip.contact.check_law": ("check_law",),
     "stickslip.contact.law": ("law_kernel",),
     "stickslip.contact.laws.bonded": ("Bonded",),
     "stickslip.contact.laws.bouc_wen": ("BoucWen",),
@@ -260,6 +262,7 @@ __all__ = [
     "assemble_solid",
     "branch_in_parameter",
     "chain",
+    "check_law",
     "compile_contacts",
     "condense",
     "contact_forces",

@@ -1,0 +1,132 @@
+"""A law of one's own against its differences, before a long computation relies on it."""
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.contact.law import FULLY_COUPLED, PAIRS, ContactLaw
+from stickslip.errors import InputError, input_error
+
+ALLOWED = (5, 7, 9)
+RELATIVE_STEP = 1e-6
+KINK = 1e-3  # difference of both sides, relative to the largest outcome, at which a kink is near: nothing is said there
+WRONG = 1e-4  # relative to the largest outcome; curvature between the two sides is a hundred times smaller
+
+
+def check_law(
+    law: ContactLaw, size: float = 1.0, rate: float = 1.0, steps: int = 200, seed: int = 0
+) -> None:
+    """Walk a law along a random path and compare its derivatives with differences.
+
+    Parameters
+    ----------
+    law
+        A contact law.
+    size, rate
+        Typical displacement, m, and velocity, m/s: large enough that the law shows all its states.
+    steps
+        Length of the path.
+    seed
+        Of the path.
+
+    Raises
+    ------
+    InputError
+        If `pairs` is none of 5, 7, 9 or leaves out a block that differs from zero, an output is not filled, a derivative is wrong, or
+        each point was next to a kink; it names the entry and both numbers.
+    """
+    if law.pairs not in ALLOWED:
+        raise _refused(law, f"pairs is {law.pairs}", "Give 5, 7 or 9 (see ContactLaw).")
+    rng = np.random.default_rng(seed)
+    state = np.asarray(law.initial_state(), dtype=float)
+    path = []
+    for _ in range(steps):
+        point = np.concatenate(
+            [size * rng.standard_normal(3), rate * rng.standard_normal(3), state]
+        )
+        out, jac = _step(law, point)
+        if not np.any(np.isnan(state)):
+            path.append((point, out, jac))
+        state = out[3:]
+    out_scale = np.concatenate(
+        [
+            np.full(3, np.max([np.abs(o[:3]) for _, o, _ in path])),
+            np.max([np.abs(o[3:]) for _, o, _ in path], axis=0),
+        ]
+    )
+    out_scale[out_scale == 0.0] = 1.0
+    in_scale = np.concatenate([np.full(3, size), np.full(3, rate), out_scale[3:]])
+    compared = sum(_compare(law, *stop, out_scale, in_scale) for stop in path)
+    if compared == 0:
+        raise _refused(
+            law, "each point of the path is next to a kink", "Give another `size` or `rate`."
+        )
+
+
+def _step(law: ContactLaw, point: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return force and new state, and their derivatives, at one sample."""
+    n = point.size - 6
+    force, new_state = np.full(3, np.nan), np.full(n, np.nan)
+    jac, status = np.zeros((3 + n, 6 + n)), np.full(2, -1, dtype=np.int64)
+    law.kernel(point[:3], point[3:6], point[6:], law.parameters(), force, new_state, jac, status)
+    out = np.concatenate([force, new_state])
+    if np.any(status < 0) or np.any(np.isnan(out)):
+        names = ["status"] if np.any(status < 0) else []
+        names += [_output(int(i)) for i in np.flatnonzero(np.isnan(out))]
+        raise _refused(
+            law, f"the step does not fill {', '.join(names)}", "Fill every output in every branch."
+        )
+    return out, jac
+
+
+def _compare(
+    law: ContactLaw,
+    point: FloatArray,
+    out: FloatArray,
+    jac: FloatArray,
+    out_scale: FloatArray,
+    in_scale: FloatArray,
+) -> int:
+    """Compare all derivatives at one point and return how many columns were not at a kink."""
+    for pair in PAIRS[law.pairs : FULLY_COUPLED]:
+        if jac[pair] != 0.0:
+            raise _refused(
+                law,
+                f"pairs = {law.pairs} leaves out jac{list(pair)}, which is {jac[pair]:.6g}",
+                "Give 7 if the tangents feel each other, 9 if the normal force feels them, too.",
+            )
+    compared = 0
+    for column in range(point.size):
+        h = RELATIVE_STEP * in_scale[column]
+        ahead, behind = point.copy(), point.copy()
+        ahead[column] += h
+        behind[column] -= h
+        right = (_step(law, ahead)[0] - out) / h
+        left = (out - _step(law, behind)[0]) / h
+        unit = in_scale[column] / out_scale
+        if np.max(np.abs(right - left) * unit) > KINK:
+            continue
+        compared += 1
+        middle = 0.5 * (right + left)
+        row = int(np.argmax(np.abs(middle - jac[:, column]) * unit))
+        if abs(middle[row] - jac[row, column]) * unit[row] > WRONG:
+            raise _refused(
+                law,
+                f"jac[{row}, {column}], {_output(row)} by {_input(column)}, is {jac[row, column]:.6g}, differences give "
+                f"{middle[row]:.6g}, at displacement {point[:3]}, velocity {point[3:6]} and state {point[6:]}",
+                "Mend the derivative: Newton's method and the Jacobian Alert live on it.",
+            )
+    return compared
+
+
+def _output(row: int) -> str:
+    return f"force[{row}]" if row < 3 else f"new_state[{row - 3}]"
+
+
+def _input(column: int) -> str:
+    names = (("displacement", 0), ("velocity", 3), ("state", 6))
+    name, first = names[min(column // 3, 2)]
+    return f"{name}[{column - first}]"
+
+
+def _refused(law: ContactLaw, problem: str, remedy: str) -> InputError:
+    return input_error(type(law).__name__, problem, remedy)
