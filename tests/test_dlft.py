@@ -8,6 +8,7 @@ from models import table
 
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.contact.rigid import weighted_products
 from stickslip.errors import InputError
@@ -15,6 +16,7 @@ from stickslip.harmonic.balance import harmonic_balance
 from stickslip.harmonic.dlft import dynamic_lagrangian
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.fourier import to_complex
 from stickslip.model.lumped import lumped
 from stickslip.model.structure import Structure
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
@@ -279,3 +281,27 @@ def test_messages():
         RigidCoulomb(mu=0.5, preload=1.0, initial_gap=0.1)
     with pytest.raises(InputError, match="mu: must be finite and not negative"):
         RigidCoulomb(mu=-0.5)
+
+
+@pytest.mark.parametrize("samples", [11, 64])
+def test_reported_forces_keep_the_balance_beside_elastic_contacts(samples):
+    # they were evaluated on the samples of the rigid contacts, which may be far fewer
+    structure = lumped(
+        np.ones(2), np.array([[2.0, -1.0], [-1.0, 2.0]]), np.array([[0.02, 0.0], [0.0, 0.02]])
+    )
+    gaps = np.zeros((6, 2))
+    gaps[0, 0] = gaps[3, 1] = 1.0
+    laws = (RigidCoulomb(mu=0.1, preload=1.0), Jenkins(k_t=1.0, limit=0.3))
+    load, omega, order = HarmonicLoad(np.zeros(2), {1: np.array([1.0, 0.0])}), 0.5, 5
+    linear = condense(structure, np.array([0, 1]), load)
+    problem = dynamic_lagrangian(linear, Interface(("r", "s"), laws, gaps), order, samples)
+    start = np.zeros(problem.size)
+    found = newton(lambda v: problem.linearise(v, omega), start, Newton(max_iterations=100))
+    assert found.status.converged
+    motion = problem.coefficients(found.x)
+    force = to_complex(problem.contacts(found.x, omega).coefficients)
+    for h in range(order + 1):
+        s = h * omega
+        stiffness = structure.stiffness + 1j * s * structure.damping - s**2 * structure.mass
+        left = stiffness @ motion[h] + gaps.T @ force[h] - load.coefficients(order)[h]
+        assert np.max(np.abs(left)) < 1e-8
