@@ -342,7 +342,7 @@ def test_repeats_stay_on_the_branch_of_their_neighbours(branch_run):
     problem = forced_problem(system, load, ALERTED)
     low = {p.index: p for p in points if p.stage == "low"}
     found = {i: p for i, p in repeats(points).items() if p.converged}
-    assert len(found) > 5, "hardly a repeat converged: nothing was shown"
+    assert len(found) > 8, "hardly a repeat converged: nothing was shown"
     for i, p in found.items():
         # the other stable solution at these frequencies is a tenth as high, the unstable one two thirds
         assert problem.amplitude(p) == pytest.approx(problem.amplitude(low[i]), rel=0.1)

@@ -418,7 +418,7 @@ def test_input_of_tracking_is_checked(change, message):
     [
         ({"order": 0}, "Discretisation.order: must be at least 1, got 0"),
         ({"samples": 0}, "Discretisation.samples: must be at least 1, got 0"),
-        ({"evaluator": "event"}, "Discretisation.evaluator: is 'event'. Give one of intervals"),
+        ({"evaluator": "event"}, "evaluator: 'event' is none of intervals, march, events"),
     ],
 )
 def test_discretisation_is_checked(given, message):

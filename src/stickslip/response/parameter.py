@@ -7,7 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
-from stickslip.contact.compiled import Evaluator
+from stickslip.contact.compiled import Evaluator, check_evaluator
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import condense
@@ -60,12 +60,7 @@ class Discretisation:
     newton: Newton = Newton()  # noqa: RUF009  # frozen
 
     def __post_init__(self) -> None:
-        if self.evaluator not in get_args(Evaluator):
-            raise input_error(
-                "Discretisation.evaluator",
-                f"is {self.evaluator!r}",
-                f"Give one of {', '.join(get_args(Evaluator))}.",
-            )
+        check_evaluator(self.evaluator)
         for name in ("order", "samples"):
             if getattr(self, name) < 1:
                 raise input_error(
