@@ -7,9 +7,10 @@ import pytest
 import scipy.sparse
 
 from stickslip.errors import InputError, SingularError
+from stickslip.model.blade_mesh import mesh_blade_pair
+from stickslip.model.blade_pair import BladePair
 from stickslip.model.damper import FlatCurvedDamper, gap_operator
 from stickslip.model.lumped import chain, lumped
-from stickslip.model.mesh import BladePair, mesh_blade_pair
 from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.solid import Material, assemble_solid
 from stickslip.model.structure import Structure, join

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
+from stickslip.model.blade_mesh import mesh_blade_pair
+from stickslip.model.blade_pair import BladePair
 from stickslip.model.damper import FlatCurvedDamper, gap_operator
-from stickslip.model.mesh import BladePair, mesh_blade_pair
 from stickslip.model.rigid_body import RigidBody
 from stickslip.model.solid import assemble_solid
 from stickslip.reduction.craig_bampton import craig_bampton

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError, StickslipError
+from stickslip.model.blade_mesh import mesh_blade_pair
+from stickslip.model.blade_pair import BladePair
 from stickslip.model.damper import FlatCurvedDamper
-from stickslip.model.mesh import BladePair, mesh_blade_pair, write_mesh
+from stickslip.model.mesh import write_mesh
 
 COARSE = {"airfoil_size": 0.02, "platform_size": 0.012, "foot_size": 0.02}
 

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
+from stickslip.model.blade_mesh import mesh_blade_pair
+from stickslip.model.blade_pair import BladePair
 from stickslip.model.damper import FlatCurvedDamper
 from stickslip.model.damping import rayleigh_damping
 from stickslip.model.lumped import lumped
-from stickslip.model.mesh import BladePair, SolidMesh, mesh_blade_pair
+from stickslip.model.mesh import SolidMesh
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.solid import Material, assemble_solid
 

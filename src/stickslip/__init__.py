@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from stickslip.harmonic.dlft import dynamic_lagrangian
     from stickslip.harmonic.dynamic_stiffness import condense
     from stickslip.harmonic.excitation import HarmonicLoad
+    from stickslip.model.blade_mesh import mesh_blade_pair
     from stickslip.model.blade_pair import BladePair
     from stickslip.model.damper import (
         ContactPoints,
@@ -67,11 +68,7 @@ if TYPE_CHECKING:
         chain,
         lumped,
     )
-    from stickslip.model.mesh import (
-        SolidMesh,
-        mesh_blade_pair,
-        write_mesh,
-    )
+    from stickslip.model.mesh import SolidMesh, write_mesh
     from stickslip.model.modes import natural_frequencies
     from stickslip.model.rigid_body import RigidBody
     from stickslip.model.solid import (
@@ -173,12 +170,13 @@ _MODULES = {
     "stickslip.harmonic.dlft": ("dynamic_lagrangian",),
     "stickslip.harmonic.dynamic_stiffness": ("condense",),
     "stickslip.harmonic.excitation": ("HarmonicLoad",),
+    "stickslip.model.blade_mesh": ("mesh_blade_pair",),
     "stickslip.model.blade_pair": ("BladePair",),
     "stickslip.model.damper": ("ContactPoints", "FlatCurvedDamper", "gap_operator"),
     "stickslip.model.damping": ("rayleigh_damping",),
     "stickslip.model.dofs": ("Dofs",),
     "stickslip.model.lumped": ("chain", "lumped"),
-    "stickslip.model.mesh": ("SolidMesh", "mesh_blade_pair", "write_mesh"),
+    "stickslip.model.mesh": ("SolidMesh", "write_mesh"),
     "stickslip.model.modes": ("natural_frequencies",),
     "stickslip.model.rigid_body": ("RigidBody",),
     "stickslip.model.solid": ("Material", "assemble_solid"),

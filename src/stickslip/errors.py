@@ -36,3 +36,23 @@ def did_you_mean(word: str, known: list[str]) -> str:
     if near:
         return f"Did you mean {near[0]!r}?"
     return "Known: " + ", ".join(sorted(known)) + "."
+
+
+def missing_package(package: str, error: Exception, extra: str) -> StickslipError:
+    """Build the error for an optional package that cannot be imported.
+
+    Parameters
+    ----------
+    package
+        Its name.
+    error
+        What the import raised; an `OSError` means that a library of the system is missing.
+    extra
+        The extra of this package that installs it.
+    """
+    if isinstance(error, OSError):
+        return StickslipError(
+            f"{package}: a system library is missing ({error}). On Debian or Ubuntu: apt-get install "
+            "libglu1-mesa libxft2 libxcursor1 libxinerama1 libxrender1"
+        )
+    return StickslipError(f"{package}: not installed. Use: pip install 'stickslip[{extra}]'")

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
-from stickslip.errors import StickslipError, input_error
+from stickslip.errors import input_error, missing_package
 from stickslip.model.dofs import nodal_dofs
 from stickslip.model.mesh import SolidMesh
 from stickslip.model.structure import Structure
@@ -117,8 +117,7 @@ def _integrate(mesh: SolidMesh, material: Material) -> tuple[Matrix, Matrix]:
     try:
         import skfem
     except ModuleNotFoundError as error:
-        message = f"{error.name}: not installed. Use: pip install 'stickslip[fe]'"
-        raise StickslipError(message) from error
+        raise missing_package("scikit-fem", error, "fe") from error
 
     grid = skfem.MeshTet2(np.ascontiguousarray(mesh.points.T), np.ascontiguousarray(mesh.cells.T))
     basis = skfem.Basis(grid, skfem.ElementTetP2(), intorder=4)

@@ -7,7 +7,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 
-from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import did_you_mean, input_error
 from stickslip.model.dofs import Dofs, join_dofs
 
@@ -19,13 +19,15 @@ class Structure:
     Parameters
     ----------
     mass, damping, stiffness
-        (n, n) matrices in kg, N s/m, N/m; dense or SciPy CSR.
+        (n, n) matrices in kg, N s/m, N/m; dense or SciPy CSR. Symmetric, or Hermitian where they are those of a
+        travelling wave (`reduction.cyclic`); damping may hold the skew Coriolis matrix of a rotating structure.
     dofs
         Table of the n coordinates.
     sets
         Name -> dof indices, in an order that has a meaning.
     basis
-        (n_full, n) matrix with ``full = basis @ reduced``; None where nothing was reduced.
+        (n_full, n) matrix with ``full = basis @ reduced``, dense or SciPy CSR, complex for a travelling wave;
+        None where nothing was reduced.
 
     Raises
     ------
@@ -38,7 +40,7 @@ class Structure:
     stiffness: Matrix
     dofs: Dofs
     sets: Mapping[str, IntArray] = field(default_factory=dict)
-    basis: FloatArray | None = None
+    basis: Matrix | None = None
 
     def __post_init__(self) -> None:
         n = len(self.dofs)
@@ -60,7 +62,7 @@ class Structure:
             )
         return self.sets[name]
 
-    def expand(self, vector: FloatArray) -> FloatArray:
+    def expand(self, vector: Matrix) -> Matrix:
         """Return the full-model vector(s) of reduced coordinates `vector` (n,) or (n, k)."""
         return vector if self.basis is None else self.basis @ vector
 

@@ -7,10 +7,11 @@ from typing import Any, Self
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.model.blade_mesh import mesh_blade_pair
 from stickslip.model.damper import FlatCurvedDamper
 from stickslip.model.damping import rayleigh_damping
 from stickslip.model.dofs import Dofs
-from stickslip.model.mesh import SolidMesh, mesh_blade_pair, write_mesh
+from stickslip.model.mesh import SolidMesh, write_mesh
 from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.solid import assemble_solid
 from stickslip.model.structure import Structure

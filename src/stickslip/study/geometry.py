@@ -7,8 +7,8 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from stickslip.errors import InputError
+from stickslip.model.blade_pair import BladePair
 from stickslip.model.damper import FlatCurvedDamper
-from stickslip.model.mesh import BladePair
 from stickslip.model.solid import Material
 from stickslip.study.messages import library_error
 from stickslip.study.sections import Positive, Section
