@@ -79,6 +79,10 @@ if TYPE_CHECKING:
         Structure,
         join,
     )
+    from stickslip.model.structure_file import (
+        load_structure,
+        save_structure,
+    )
     from stickslip.reduction.craig_bampton import craig_bampton
     from stickslip.reduction.relative import in_relative_coordinates
     from stickslip.report.page import write_report
@@ -181,6 +185,7 @@ _MODULES = {
     "stickslip.model.rigid_body": ("RigidBody",),
     "stickslip.model.solid": ("Material", "assemble_solid"),
     "stickslip.model.structure": ("Structure", "join"),
+    "stickslip.model.structure_file": ("load_structure", "save_structure"),
     "stickslip.reduction.craig_bampton": ("craig_bampton",),
     "stickslip.reduction.relative": ("in_relative_coordinates",),
     "stickslip.report.page": ("write_report",),
@@ -276,6 +281,7 @@ __all__ = [
     "integrate",
     "join",
     "law_kernel",
+    "load_structure",
     "lumped",
     "mesh_blade_pair",
     "natural_frequencies",
@@ -290,6 +296,7 @@ __all__ = [
     "rigid_response",
     "rigid_surface",
     "run_study",
+    "save_structure",
     "segment_to_segment",
     "signals",
     "smallest_peak",
