@@ -1,0 +1,449 @@
+"""Geometry of one sector of a bladed disk.
+
+Rotation axis z, sector centred on +x, right-hand rule; the cyclic faces lie in the planes at plus and minus half the
+pitch. The mesher is in `model.sector_mesh`.
+"""
+
+import math
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+
+from stickslip.arrays import BoolArray, FloatArray
+from stickslip.errors import InputError, input_error
+
+SECTION_POINTS = 7  # on either face of the airfoil
+STEEPEST = math.radians(75)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiskProfile:
+    """Cross-section of the disk: a hub that narrows to a web, which carries a rim; lengths in metres.
+
+    Parameters
+    ----------
+    bore_radius
+        Inner radius; the bore is clamped.
+    hub_radius
+        Where the hub has narrowed to the web.
+    rim_radius
+        Outer radius.
+    rim_height
+        Extent of the rim along the radius.
+    bore_width, web_width, rim_width
+        Extents along the axis.
+
+    Raises
+    ------
+    InputError
+        If a length is not positive, or the radii do not follow each other.
+    """
+
+    bore_radius: float = 0.060
+    hub_radius: float = 0.095
+    rim_radius: float = 0.170
+    rim_height: float = 0.014
+    bore_width: float = 0.050
+    web_width: float = 0.014
+    rim_width: float = 0.034
+
+    def __post_init__(self) -> None:
+        _check_lengths(self)
+        if not self.bore_radius < self.hub_radius < self.rim_radius - self.rim_height:
+            raise input_error(
+                "DiskProfile",
+                f"bore_radius {self.bore_radius} m, hub_radius {self.hub_radius} m and the rim's inner radius "
+                f"{self.rim_radius - self.rim_height:.6g} m do not grow in this order",
+                "Make the rim lower or its radius larger.",
+            )
+
+    @property
+    def outline(self) -> FloatArray:
+        """(p, 2) corners (r, z) of the cross-section, without repeated ones."""
+        inner = self.rim_radius - self.rim_height
+        radius = [self.bore_radius, self.hub_radius, inner, inner, self.rim_radius]
+        width = [self.bore_width, self.web_width, self.web_width, self.rim_width, self.rim_width]
+        upper = np.column_stack([radius, np.array(width) / 2])
+        upper = upper[np.r_[True, np.any(np.diff(upper, axis=0) != 0, axis=1)]]
+        return np.vstack([upper, upper[::-1] * [1, -1]])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Platform:
+    """A neck on the rim that widens into a platform with plane, inclined undersides; metres and rad.
+
+    Parameters
+    ----------
+    top_radius
+        Distance of the plane top from the axis.
+    thickness
+        Of the platform at its sides.
+    neck_width
+        Extent of the neck around the wheel.
+    depth
+        Extent of neck and platform along the axis.
+    underside_angle
+        Inclination of the undersides: they fall towards the neck.
+    gap
+        Clearance to the neighbour's platform at the top; 0 lets them touch.
+
+    Raises
+    ------
+    InputError
+        If a length is not positive, or the angle is too steep.
+    """
+
+    top_radius: float = 0.187
+    thickness: float = 0.004
+    neck_width: float = 0.018
+    depth: float = 0.034
+    underside_angle: float = math.radians(20)
+    gap: float = 0.0008
+
+    def __post_init__(self) -> None:
+        _check_lengths(self, zero=("underside_angle", "gap"))
+        _check_steep("Platform.underside_angle", self.underside_angle)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Airfoil:
+    """A tapered, twisted, cambered lens section, lofted along the radius; metres and rad.
+
+    Parameters
+    ----------
+    airfoil_length
+        From the platform's top (without platform: from the rim) to the tip.
+    hub_chord, tip_chord, hub_thickness, tip_thickness
+        Size of the end sections.
+    camber
+        Height of the camber line's arc over the chord's length.
+    stagger
+        Angle of the hub's chord from the axis.
+    twist
+        Rotation of the tip section against the hub section.
+
+    Raises
+    ------
+    InputError
+        If a length is not positive, or a thickness exceeds its chord.
+    """
+
+    airfoil_length: float = 0.105
+    hub_chord: float = 0.030
+    tip_chord: float = 0.026
+    hub_thickness: float = 0.0050
+    tip_thickness: float = 0.0028
+    camber: float = 0.08
+    stagger: float = math.radians(15)
+    twist: float = math.radians(25)
+
+    def __post_init__(self) -> None:
+        _check_lengths(self, free=("camber", "stagger", "twist"))
+        for end in ("hub", "tip"):
+            chord, thickness = getattr(self, f"{end}_chord"), getattr(self, f"{end}_thickness")
+            if thickness >= chord:
+                raise input_error(
+                    f"Airfoil.{end}_thickness",
+                    f"{thickness} m is not below the chord {chord} m",
+                    "Make the section thinner.",
+                )
+
+    def section(self, span: float) -> FloatArray:
+        """Return the outline (2 `SECTION_POINTS`, 2) in (y, z) at the fraction `span` of the length.
+
+        The first half runs along one face from the leading to the trailing edge, the second half back along the other; the
+        edges are blunt.
+        """
+        chord = (1 - span) * self.hub_chord + span * self.tip_chord
+        thickness = (1 - span) * self.hub_thickness + span * self.tip_thickness
+        s = np.linspace(-1.0, 1.0, SECTION_POINTS)
+        half = thickness / 2 * (0.3 + 0.7 * (1 - s**2))
+        line = self.camber * chord * (1 - s**2)
+        along = np.concatenate([s, s[::-1]]) * chord / 2
+        across = np.concatenate([line + half, (line - half)[::-1]])
+        angle = self.stagger + self.twist * span
+        y = across * math.cos(angle) + along * math.sin(angle)
+        z = along * math.cos(angle) - across * math.sin(angle)
+        return np.column_stack([y, z])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shroud:
+    """A ring segment on the blade whose faces meet, or almost meet, the neighbours'; metres and rad.
+
+    Parameters
+    ----------
+    span
+        Where its middle lies, as a fraction of the airfoil's length; 1 is the tip.
+    thickness
+        Extent along the radius.
+    depth
+        Extent along the axis.
+    gap
+        Clearance to the neighbour's face along the circumference; 0 lets them touch.
+    face_angle
+        Inclination of the contact faces from the axial plane, as in an interlocked (Z) shroud.
+
+    Raises
+    ------
+    InputError
+        If a length is not positive, the span is outside (0, 1], or the angle is too steep.
+    """
+
+    span: float = 1.0
+    thickness: float = 0.004
+    depth: float = 0.026
+    gap: float = 0.0
+    face_angle: float = math.radians(20)
+
+    def __post_init__(self) -> None:
+        _check_lengths(self, zero=("gap",), free=("face_angle",))
+        _check_steep("Shroud.face_angle", self.face_angle)
+        if self.span > 1:
+            raise input_error(
+                "Shroud.span", f"must lie in (0, 1], got {self.span}", "1 is the tip."
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class BladedSector:
+    """One of `sectors` equal sectors of a bladed disk; the defaults are a steel wheel with 24 blades.
+
+    Parameters
+    ----------
+    sectors
+        How many make the wheel, at least 3.
+    disk
+        Cross-section of the disk.
+    platform
+        What carries the airfoil; None sets the airfoil on the rim.
+    airfoil
+        The blade.
+    shroud
+        None for blades that do not touch each other.
+    disk_size, platform_size, airfoil_size
+        Element sizes in metres, outward; a shroud has that of the platform.
+
+    Raises
+    ------
+    InputError
+        If the parts do not fit together, or reach into the neighbours.
+    """
+
+    sectors: int = 24
+    disk: DiskProfile = field(default_factory=DiskProfile)
+    platform: Platform | None = field(default_factory=Platform)
+    airfoil: Airfoil = field(default_factory=Airfoil)
+    shroud: Shroud | None = None
+    disk_size: float = 0.012
+    platform_size: float = 0.008
+    airfoil_size: float = 0.010
+
+    def __post_init__(self) -> None:
+        if self.sectors < 3 or self.sectors % 1:
+            raise _bad(
+                "sectors", f"must be a whole number from 3 on, got {self.sectors}", "Try 24."
+            )
+        for name in ("disk_size", "platform_size", "airfoil_size"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise _bad(name, f"must be positive and finite, got {value}", "Give metres.")
+        self._check_platform()
+        self._check_base()
+        self._check_neighbours()
+        self._check_shroud()
+
+    @property
+    def pitch(self) -> float:
+        """Angle of a sector in rad."""
+        return 2 * math.pi / self.sectors
+
+    @property
+    def base_radius(self) -> float:
+        """Radius at which the airfoil starts, in metres."""
+        return self.disk.rim_radius if self.platform is None else self.platform.top_radius
+
+    @property
+    def tip_radius(self) -> float:
+        """Radius of the plane in which the airfoil ends, in metres."""
+        return self.base_radius + self.airfoil.airfoil_length
+
+    @property
+    def platform_angle(self) -> float:
+        """Angle from one side face of the platform to the other, in rad; needs a platform."""
+        assert self.platform is not None
+        return self.pitch - self.platform.gap / self.platform.top_radius
+
+    @property
+    def shroud_radius(self) -> float:
+        """Radius of the shroud's middle, in metres; needs a shroud."""
+        assert self.shroud is not None
+        return self.base_radius + self.shroud.span * self.airfoil.airfoil_length
+
+    @property
+    def shroud_angle(self) -> float:
+        """Angle from one contact face of the shroud to the other, in rad; needs a shroud."""
+        assert self.shroud is not None
+        return self.pitch - self.shroud.gap / self.shroud_radius
+
+    def platform_outline(self) -> FloatArray:
+        """Return the (8, 2) corners (x, y) of neck and platform, +y side from the bottom up, then the other side down."""
+        assert self.platform is not None
+        p, slope = self.platform, math.tan(self.platform_angle / 2)
+        lower = p.top_radius - p.thickness
+        neck = p.neck_width / 2
+        meets = lower - (lower * slope - neck) * math.tan(p.underside_angle)
+        side = np.array(
+            [
+                [self._sunk(neck), neck],
+                [meets, neck],
+                [lower, lower * slope],
+                [p.top_radius, p.top_radius * slope],
+            ]
+        )
+        return np.vstack([side, side[::-1] * [1, -1]])
+
+    def airfoil_sections(self) -> list[FloatArray]:
+        """Return the sections (2 `SECTION_POINTS`, 3) through which the airfoil is lofted, from the base outward."""
+        sections = []
+        for span in (0.0, 0.5, 1.0):
+            outline = self.airfoil.section(span)
+            x = self.base_radius + span * self.airfoil.airfoil_length
+            if span == 0.0 and self.platform is None:
+                x = self._sunk(np.abs(outline[:, 0]).max())
+            sections.append(np.column_stack([np.full(len(outline), x), outline]))
+        return sections
+
+    def _sunk(self, half_width: float) -> float:
+        """Return the x at which something `half_width` wide to either side is inside the rim."""
+        rim = self.disk.rim_radius
+        return math.sqrt(max(rim**2 - half_width**2, 0.0)) - 0.1 * self.disk.rim_height
+
+    def _check_platform(self) -> None:
+        p, rim = self.platform, self.disk.rim_radius
+        if p is None:
+            return
+        if p.depth > self.disk.rim_width:
+            raise _bad(
+                "platform.depth",
+                f"{p.depth} m exceeds the rim's width {self.disk.rim_width} m",
+                "Make the rim wider or the platform less deep.",
+            )
+        room = 2 * (p.top_radius - p.thickness) * math.tan(self.platform_angle / 2)
+        if p.neck_width >= min(room, 2 * rim * math.sin(self.pitch / 2)):
+            raise _bad(
+                "platform.neck_width",
+                f"{p.neck_width} m reaches into the neighbours (the platform is {room:.6g} m wide)",
+                "Make the neck narrower or take fewer sectors.",
+            )
+        meets = self.platform_outline()[1]
+        if np.hypot(*meets) <= rim:
+            raise _bad(
+                "platform.top_radius",
+                f"{p.top_radius} m: the underside meets the neck at {meets[0]:.6g} m, inside the rim "
+                f"of radius {rim} m",
+                "Raise the platform, make it thinner, or its underside flatter.",
+            )
+
+    def _check_base(self) -> None:
+        y, z = np.abs(self.airfoil.section(0.0)).max(axis=0)
+        if self.platform is None:
+            name, half = "rim", self.disk.rim_radius * math.sin(self.pitch / 2)
+            depth, sunk = self.disk.rim_width, self._sunk(y)
+        else:
+            name, half = "platform", self.platform.top_radius * math.tan(self.platform_angle / 2)
+            depth, sunk = self.platform.depth, self._sunk(self.platform.neck_width / 2)
+        if y >= half or z >= depth / 2:
+            raise _bad(
+                "airfoil.hub_chord",
+                f"the hub section ({2 * y:.6g} m around, {2 * z:.6g} m along the axis) overhangs the {name} "
+                f"({2 * half:.6g} m, {depth:.6g} m)",
+                "Make the section smaller, or turn it by the stagger.",
+            )
+        if sunk <= self.disk.rim_radius - self.disk.rim_height:
+            raise _bad(
+                "disk.rim_height",
+                f"{self.disk.rim_height} m is too low for what the curved rim carries",
+                "Make the rim higher or what it carries narrower.",
+            )
+
+    def _check_neighbours(self) -> None:
+        for span in np.linspace(0.0, 1.0, 9):
+            outline = self.airfoil.section(float(span))
+            radius = self.base_radius + float(span) * self.airfoil.airfoil_length
+            arc = np.column_stack([radius * np.arctan2(outline[:, 0], radius), outline[:, 1]])
+            if np.any(_inside(arc + np.array([radius * self.pitch, 0.0]), arc)):
+                raise _bad(
+                    "airfoil",
+                    f"at {span:.3g} of its length the airfoil reaches into the neighbour's",
+                    "Take fewer sectors, or less stagger, chord, camber or thickness.",
+                )
+
+    def _check_shroud(self) -> None:
+        s = self.shroud
+        if s is None:
+            return
+        inner = self.shroud_radius - s.thickness / 2
+        if inner <= self.base_radius:
+            raise _bad(
+                "shroud.span", f"{s.span} puts the shroud into the blade's foot", "Move it outward."
+            )
+        if s.gap >= self.shroud_radius * self.pitch:
+            raise _bad("shroud.gap", f"{s.gap} m leaves no shroud", "Make the gap smaller.")
+        outline = self.airfoil.section(s.span)
+        y, z = outline.T
+        ahead = _turned_y(self.shroud_radius, y, -self.shroud_angle / 2) - z * math.tan(
+            s.face_angle
+        )
+        behind = _turned_y(self.shroud_radius, y, self.shroud_angle / 2) - z * math.tan(
+            s.face_angle
+        )
+        if np.any(ahead >= 0) or np.any(behind <= 0):
+            raise _bad(
+                "shroud.face_angle",
+                f"at {math.degrees(s.face_angle):.6g} degrees the contact faces cut through the airfoil",
+                "Incline them towards the chord, or take fewer sectors.",
+            )
+        if s.span == 1.0 and np.hypot(self.tip_radius, np.abs(y).max()) >= inner + s.thickness:
+            raise _bad(
+                "shroud.thickness",
+                f"{s.thickness} m: the corners of the plane tip stick out of the round shroud",
+                "Make the shroud thicker or the tip's chord smaller.",
+            )
+
+
+def _turned_y(radius: float, y: FloatArray, angle: float) -> FloatArray:
+    """Return y of the points (radius, y) after a turn by `angle`."""
+    return radius * math.sin(angle) + y * math.cos(angle)
+
+
+def _inside(points: FloatArray, polygon: FloatArray) -> BoolArray:
+    """Tell which `points` (n, 2) lie inside the `polygon` (p, 2), by counting crossings."""
+    x, y = points[:, :1], points[:, 1:]
+    (x0, y0), (x1, y1) = polygon.T, np.roll(polygon, -1, axis=0).T
+    spans = (y0 > y) != (y1 > y)
+    rise = np.where(y1 == y0, 1.0, y1 - y0)
+    crossed = spans & (x < x0 + (y - y0) / rise * (x1 - x0))
+    return np.asarray(crossed.sum(axis=1) % 2 == 1)
+
+
+def _check_lengths(part: object, zero: tuple[str, ...] = (), free: tuple[str, ...] = ()) -> None:
+    """Refuse numbers that are not finite or positive; those in `zero` may vanish, those in `free` may have any sign."""
+    for entry in fields(part):  # type: ignore[arg-type]
+        name, value = entry.name, getattr(part, entry.name)
+        low = value >= 0 if name in zero else value > 0
+        if not math.isfinite(value) or not (low or name in free):
+            raise input_error(
+                f"{type(part).__name__}.{name}",
+                f"must be positive and finite, got {value}",
+                "Give metres, and angles in rad.",
+            )
+
+
+def _check_steep(place: str, angle: float) -> None:
+    if abs(angle) > STEEPEST:
+        raise input_error(place, f"must be within ±{STEEPEST:.3g} rad, got {angle}", "Use rad.")
+
+
+def _bad(name: str, problem: str, remedy: str) -> InputError:
+    return input_error(f"BladedSector.{name}", problem, remedy)
