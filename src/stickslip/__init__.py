@@ -64,12 +64,23 @@ if TYPE_CHECKING:
     )
     from stickslip.model.damping import rayleigh_damping
     from stickslip.model.dofs import Dofs
+    from stickslip.model.gyroscopic import (
+        GyroscopicModes,
+        gyroscopic_modes,
+    )
     from stickslip.model.lumped import (
         chain,
         lumped,
     )
-    from stickslip.model.mesh import SolidMesh, write_mesh
-    from stickslip.model.modes import natural_frequencies
+    from stickslip.model.mesh import (
+        SolidMesh,
+        write_mesh,
+    )
+    from stickslip.model.modes import (
+        Modes,
+        natural_frequencies,
+        normal_modes,
+    )
     from stickslip.model.rigid_body import RigidBody
     from stickslip.model.solid import (
         Material,
@@ -86,6 +97,11 @@ if TYPE_CHECKING:
     from stickslip.reduction.craig_bampton import craig_bampton
     from stickslip.reduction.relative import in_relative_coordinates
     from stickslip.report.page import write_report
+    from stickslip.response.campbell import (
+        Campbell,
+        Crossing,
+        campbell,
+    )
     from stickslip.response.drift import (
         Drift,
         drift,
@@ -97,6 +113,7 @@ if TYPE_CHECKING:
         signals,
     )
     from stickslip.response.forced import forced_response
+    from stickslip.response.nodal_diameters import NodalDiameterMap
     from stickslip.response.parameter import (
         Discretisation,
         ParameterPoint,
@@ -106,6 +123,11 @@ if TYPE_CHECKING:
     from stickslip.response.rigid import (
         RigidPoint,
         rigid_response,
+    )
+    from stickslip.response.safe import (
+        Interference,
+        Safe,
+        safe,
     )
     from stickslip.response.sweep import (
         ForcedPoint,
@@ -137,9 +159,9 @@ if TYPE_CHECKING:
     )
 
 _MODULES = {
+    "stickslip.contact.check_law": ("check_law",),
     "stickslip.contact.compiled": ("compile_contacts",),
     "stickslip.contact.interface": ("Interface",),
-    "stickslip.contact.check_law": ("check_law",),
     "stickslip.contact.law": ("law_kernel",),
     "stickslip.contact.laws.bonded": ("Bonded",),
     "stickslip.contact.laws.bouc_wen": ("BoucWen",),
@@ -161,12 +183,7 @@ _MODULES = {
         "paired_interface",
         "segment_to_segment",
     ),
-    "stickslip.contact.surface": (
-        "Surface",
-        "nodal_surface",
-        "rigid_surface",
-        "structure_surface",
-    ),
+    "stickslip.contact.surface": ("Surface", "nodal_surface", "rigid_surface", "structure_surface"),
     "stickslip.errors": ("InputError", "SingularError", "StickslipError"),
     "stickslip.harmonic.aft": ("contact_forces",),
     "stickslip.harmonic.balance": ("harmonic_balance",),
@@ -179,9 +196,10 @@ _MODULES = {
     "stickslip.model.damper": ("ContactPoints", "FlatCurvedDamper", "gap_operator"),
     "stickslip.model.damping": ("rayleigh_damping",),
     "stickslip.model.dofs": ("Dofs",),
+    "stickslip.model.gyroscopic": ("GyroscopicModes", "gyroscopic_modes"),
     "stickslip.model.lumped": ("chain", "lumped"),
     "stickslip.model.mesh": ("SolidMesh", "write_mesh"),
-    "stickslip.model.modes": ("natural_frequencies",),
+    "stickslip.model.modes": ("Modes", "natural_frequencies", "normal_modes"),
     "stickslip.model.rigid_body": ("RigidBody",),
     "stickslip.model.solid": ("Material", "assemble_solid"),
     "stickslip.model.structure": ("Structure", "join"),
@@ -189,12 +207,15 @@ _MODULES = {
     "stickslip.reduction.craig_bampton": ("craig_bampton",),
     "stickslip.reduction.relative": ("in_relative_coordinates",),
     "stickslip.report.page": ("write_report",),
+    "stickslip.response.campbell": ("Campbell", "Crossing", "campbell"),
     "stickslip.response.drift": ("Drift", "drift"),
     "stickslip.response.fields": ("Fields", "Signals", "fields", "signals"),
     "stickslip.response.forced": ("forced_response",),
+    "stickslip.response.nodal_diameters": ("NodalDiameterMap",),
     "stickslip.response.parameter": ("Discretisation", "ParameterPoint", "branch_in_parameter"),
     "stickslip.response.preload": ("preload",),
     "stickslip.response.rigid": ("RigidPoint", "rigid_response"),
+    "stickslip.response.safe": ("Interference", "Safe", "safe"),
     "stickslip.response.sweep": (
         "ForcedPoint",
         "ForcedProblem",
@@ -216,9 +237,11 @@ __all__ = [
     "BladePair",
     "Bonded",
     "BoucWen",
+    "Campbell",
     "ComplianceForm",
     "ContactPoints",
     "CoupledCoulomb",
+    "Crossing",
     "CubicSpring",
     "Dahl",
     "Discretisation",
@@ -231,13 +254,17 @@ __all__ = [
     "ForcedPoint",
     "ForcedProblem",
     "FourParameter",
+    "GyroscopicModes",
     "HarmonicLoad",
     "InputError",
     "Interface",
+    "Interference",
     "Iwan",
     "Jenkins",
     "Material",
+    "Modes",
     "Newton",
+    "NodalDiameterMap",
     "Pairing",
     "ParameterPoint",
     "PeakPoint",
@@ -246,6 +273,7 @@ __all__ = [
     "RigidBody",
     "RigidCoulomb",
     "RigidPoint",
+    "Safe",
     "Signals",
     "SingularError",
     "SolidMesh",
@@ -264,6 +292,7 @@ __all__ = [
     "accepted_points",
     "assemble_solid",
     "branch_in_parameter",
+    "campbell",
     "chain",
     "check_law",
     "compile_contacts",
@@ -276,6 +305,7 @@ __all__ = [
     "forced_problem",
     "forced_response",
     "gap_operator",
+    "gyroscopic_modes",
     "harmonic_balance",
     "in_relative_coordinates",
     "integrate",
@@ -289,6 +319,7 @@ __all__ = [
     "nodal_surface",
     "node_to_node",
     "node_to_segment",
+    "normal_modes",
     "paired_interface",
     "preload",
     "rayleigh_damping",
@@ -296,6 +327,7 @@ __all__ = [
     "rigid_response",
     "rigid_surface",
     "run_study",
+    "safe",
     "save_structure",
     "segment_to_segment",
     "signals",

@@ -1,0 +1,122 @@
+"""Natural frequencies with the Coriolis matrix: ``(K + iω G - ω² M) φ = 0`` with a skew G.
+
+F. Tisseur and K. Meerbergen, "The quadratic eigenvalue problem", SIAM Review 43 (2001) 235-286, section 3.3 (gyroscopic systems).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse
+
+from stickslip.arrays import ComplexArray, FloatArray, Matrix
+from stickslip.errors import input_error
+from stickslip.model.factorisation import DENSE, factorise
+from stickslip.model.modes import lowest_modes
+from stickslip.model.structure import Structure
+
+SPARE = 10  # modes beyond twice as many as are asked for
+SHIFT = (
+    1e-8  # share of the mean of K/M that keeps the factorised matrix regular where a body is free
+)
+
+
+@dataclass(frozen=True, eq=False)
+class GyroscopicModes:
+    """Modes in the rotating frame, ``u = Re φ exp((growth + 2πif) t)``, lowest frequency first.
+
+    Parameters
+    ----------
+    frequencies_hz
+        (n,) not negative.
+    shapes
+        (N, n) complex, of unit mass: ``φᴴ M φ = 1``.
+    growth
+        (n,) in 1/s, zero where the structure is stable.
+    """
+
+    frequencies_hz: FloatArray
+    shapes: ComplexArray
+    growth: FloatArray
+
+
+def gyroscopic_modes(
+    structure: Structure, n_modes: int, *, n_basis: int | None = None
+) -> GyroscopicModes:
+    """Return the lowest modes of a structure whose damping matrix holds Coriolis terms.
+
+    Parameters
+    ----------
+    structure
+        Real and symmetric, or Hermitian at a wave number; of `damping` the skew part counts, dissipation is left out.
+    n_modes
+        Number of frequencies. At a wave number these are waves ``exp(+iωt)``; those of the opposite sense belong to the negative wave
+        number.
+    n_basis
+        Modes at rest that span the basis, twice `n_modes` and ten more if not given. Modes alone converge slowly, so that the static
+        answers to their Coriolis forces are added. Structures of a few hundred dofs are solved whole.
+
+    Raises
+    ------
+    InputError
+        If more modes are asked for than there are dofs, or in the basis.
+    """
+    n_basis = min(2 * n_modes + SPARE if n_basis is None else n_basis, structure.n)
+    if not 0 < n_modes <= n_basis:
+        raise input_error(
+            "gyroscopic_modes",
+            f"{n_modes} modes asked of {structure.n} dofs, with {n_basis} in the basis",
+            "Ask for at least one, and at most as many as the basis has.",
+        )
+    G = structure.damping
+    G = 0.5 * (G - G.T.conj())
+    basis = None if structure.n <= DENSE else _basis(structure, G, n_basis)
+    K, G, M = (_projected(a, basis) for a in (structure.stiffness, G, structure.mass))
+    squares, vectors = scipy.linalg.eigh(K, M)
+    rates, amplitudes = _eigenpairs(squares, vectors.conj().T @ G @ vectors)
+    first = np.argsort(rates.imag, kind="stable")[:n_modes]
+    shapes = vectors @ amplitudes[:, first]
+    if basis is not None:
+        shapes = basis @ shapes
+    return GyroscopicModes(rates.imag[first] / (2 * np.pi), shapes, rates.real[first])
+
+
+def _eigenpairs(squares: FloatArray, coriolis: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    """Return rates λ with ``Im λ ≥ 0`` and vectors of unit length of ``λ² + λ G + diag(squares)``."""
+    n = squares.size
+    if squares[0] >= 0.0:
+        # with √K q beside q̇ the state matrix is skew: i times it is Hermitian, frequencies come out real
+        root = np.diag(np.sqrt(squares))
+        state = np.block([[np.zeros((n, n)), 1j * root], [-1j * root, -1j * coriolis]])
+        omega, states = scipy.linalg.eigh(state)
+        rates: ComplexArray = -1j * omega
+    else:
+        state = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(squares), -coriolis]])
+        rates, states = scipy.linalg.eig(state)
+    kept = np.argsort(-rates.imag, kind="stable")[:n]
+    # velocities are λ times displacements, and never vanish where λ does not
+    shapes = states[n:, kept]
+    still = np.linalg.norm(shapes, axis=0) == 0.0
+    shapes[:, still] = states[:n, kept][:, still]
+    return rates[kept], shapes / np.linalg.norm(shapes, axis=0)
+
+
+def _basis(structure: Structure, coriolis: Matrix, n_basis: int) -> Matrix:
+    """Return modes at rest and the static answers to their Coriolis forces."""
+    K, M = structure.stiffness, structure.mass
+    shift = SHIFT * abs(K.diagonal()).sum() / abs(M.diagonal()).sum()
+    solve = factorise(K + shift * M)
+    _, modes = lowest_modes(K, M, n_basis, solve, -shift)
+    answers = solve(np.asarray(coriolis @ modes))
+    answers = answers - modes @ (modes.conj().T @ (M @ answers))
+    return np.linalg.qr(
+        np.hstack(
+            [modes / np.linalg.norm(modes, axis=0), answers / np.linalg.norm(answers, axis=0)]
+        )
+    )[0]
+
+
+def _projected(matrix: Matrix, basis: Matrix | None) -> Matrix:
+    if basis is None:
+        return matrix.toarray() if scipy.sparse.issparse(matrix) else matrix
+    return basis.conj().T @ (matrix @ basis)

@@ -1,0 +1,313 @@
+"""Campbell diagram: natural frequencies against rotor speed, followed by mode shape, and where engine orders meet them."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.optimize
+
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from stickslip.errors import input_error
+from stickslip.model.gyroscopic import gyroscopic_modes
+from stickslip.model.factorisation import factorise
+from stickslip.model.modes import lowest_modes
+from stickslip.model.structure import Structure
+
+CLEAR = 0.7  # modal assurance below which a step in speed is halved
+HALVINGS = 5  # of a step; two modes may change places as slowly as they like
+SPARE = 4  # modes beyond those followed, so that one that rises among them can leave
+NEARNESS = 1e-3  # weight of a relative step in frequency beside the assurance: it decides where shapes do not
+SAME = 1e-6  # relative distance of frequencies whose shapes are one space: equal blades, a wheel's pairs
+
+StructureAt = Callable[[float], Structure]
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A speed at which an engine order meets a natural frequency.
+
+    Parameters
+    ----------
+    engine_order
+        Oscillations per revolution.
+    mode
+        Column of `Campbell.frequencies_hz`, from 0.
+    speed
+        In rad/s.
+    frequency_hz
+        ``engine_order * speed / (2π)``.
+    """
+
+    engine_order: int
+    mode: int
+    speed: float
+    frequency_hz: float
+
+
+@dataclass(frozen=True, eq=False)
+class Campbell:
+    """Natural frequencies against speed, each column one mode followed by its shape.
+
+    Parameters
+    ----------
+    speeds
+        (s,) in rad/s, ascending.
+    frequencies_hz
+        (s, n_modes) in the rotating frame; columns in the order of the first speed.
+    agreement
+        (s, n_modes) least modal assurance (1: same shape) on the way from the speed before; ones at the first.
+    engine_orders
+        Whose crossings were looked for.
+    crossings
+        By engine order, then by speed.
+    wave_number, sectors
+        Of the travelling wave that the structure stands for; 0 and 1 for a structure that is not cyclic.
+    """
+
+    speeds: FloatArray
+    frequencies_hz: FloatArray
+    agreement: FloatArray
+    engine_orders: tuple[int, ...]
+    crossings: tuple[Crossing, ...]
+    wave_number: int = 0
+    sectors: int = 1
+
+    @property
+    def nodal_diameter(self) -> int:
+        """Number of nodal diameters, between 0 and half the number of sectors."""
+        return min(self.wave_number, self.sectors - self.wave_number)
+
+    @property
+    def stationary_hz(self) -> FloatArray:
+        """(s, n_modes) seen by an observer who does not rotate: ``f - kΩ/2π`` for backward waves, ``f + kΩ/2π`` for forward ones.
+
+        Magnitudes; a backward wave that rotation overtakes runs forward to the observer.
+        """
+        k = (
+            self.wave_number
+            if 2 * self.wave_number <= self.sectors
+            else self.wave_number - self.sectors
+        )
+        return np.abs(self.frequencies_hz - k * self.speeds[:, None] / (2 * np.pi))
+
+    def engine_order_hz(self, engine_order: int) -> FloatArray:
+        """Return the (s,) frequencies of an engine order."""
+        return engine_order * self.speeds / (2 * np.pi)
+
+
+@dataclass(frozen=True, eq=False)
+class _Spectrum:
+    """Frequencies and comparable shapes at one speed."""
+
+    speed: float
+    hertz: FloatArray  # (c,)
+    shapes: FloatArray | ComplexArray  # (n, c)
+    weighted: FloatArray | ComplexArray  # (n, c), the same times the mass
+    agreement: FloatArray  # (c,)
+
+    def take(self, index: IntArray, agreement: FloatArray) -> "_Spectrum":
+        return _Spectrum(
+            self.speed, self.hertz[index], self.shapes[:, index], self.weighted[:, index], agreement
+        )
+
+
+@dataclass(eq=False)
+class _Speeds:
+    """Spectra of one family of structures, each computed once."""
+
+    structure_at: StructureAt
+    n_modes: int
+    coriolis: bool
+    known: dict[float, _Spectrum] = field(default_factory=dict)
+
+    def at(self, speed: float) -> _Spectrum:
+        if speed not in self.known:
+            self.known[speed] = _spectrum(
+                self.structure_at(speed), speed, self.n_modes, self.coriolis
+            )
+        return self.known[speed]
+
+    def forget(self, below: float) -> None:
+        """Drop what lies below a speed: shapes of large models take much memory."""
+        for speed in [s for s in self.known if s < below]:
+            del self.known[speed]
+
+
+def campbell(
+    structure_at: StructureAt,
+    speeds: Sequence[float] | FloatArray,
+    n_modes: int,
+    engine_orders: Sequence[int] = (),
+    *,
+    coriolis: bool = False,
+    tolerance: float = 1e-6,
+    progress: Callable[[float], None] | None = None,
+) -> Campbell:
+    """Follow the lowest modes of a structure through a range of speeds and find the crossings with engine orders.
+
+    Parameters
+    ----------
+    structure_at
+        Speed in rad/s -> structure in the rotating frame, with centrifugal stiffening and spin softening as they matter. Coordinates
+        must be the same at all speeds, or the structures must lead back to the same full model.
+    speeds
+        Ascending, in rad/s; a crossing is found where the frequency minus the engine order's changes its sign from one to the next.
+    n_modes
+        How many modes, counted at the first speed.
+    engine_orders
+        Positive.
+    coriolis
+        Whether the skew part of the structure's damping counts (`gyroscopic_modes`). Dissipation never does.
+    tolerance
+        Of the speed of a crossing, relative.
+    progress
+        Called with each speed when it is done.
+
+    Returns
+    -------
+    Campbell
+        A step in speed over which a shape changes much is halved up to five times, so that modes that veer apart keep their names and
+        those that cross exchange theirs. What is left of doubt stands in `agreement`.
+
+    Raises
+    ------
+    InputError
+        If speeds do not ascend, or numbers do not make sense.
+    """
+    speeds = _checked(speeds, n_modes, engine_orders)
+    family = _Speeds(structure_at, n_modes, coriolis)
+    first = family.at(float(speeds[0]))
+    if first.hertz.size < n_modes:
+        raise input_error(
+            "campbell: n_modes",
+            f"{n_modes} of a structure with {first.hertz.size}",
+            "Ask for fewer.",
+        )
+    here = first.take(np.arange(n_modes), np.ones(n_modes))
+    rows: list[_Spectrum] = [_without_shapes(here)]
+    crossings: list[Crossing] = []
+    for speed in speeds[1:]:
+        after = _follow(family, here, float(speed), HALVINGS)
+        crossings += _crossings(family, here, after, engine_orders, tolerance)
+        here = after
+        rows.append(_without_shapes(here))
+        family.forget(here.speed)
+        if progress is not None:
+            progress(here.speed)
+    return Campbell(
+        speeds,
+        np.array([row.hertz for row in rows]),
+        np.array([row.agreement for row in rows]),
+        tuple(engine_orders),
+        tuple(sorted(crossings, key=lambda c: (c.engine_order, c.speed))),
+    )
+
+
+def _checked(
+    speeds: Sequence[float] | FloatArray, n_modes: int, engine_orders: Sequence[int]
+) -> FloatArray:
+    values = np.asarray(speeds, dtype=float)
+    if values.ndim != 1 or not values.size or not np.all(np.isfinite(values)) or values[0] < 0 or np.any(np.diff(values) <= 0):  # fmt: skip
+        raise input_error(
+            "campbell: speeds",
+            f"must ascend from 0 or more, got {values[:6].tolist() if values.ndim else values}",
+            "Give rad/s.",
+        )
+    if n_modes < 1:
+        raise input_error("campbell: n_modes", f"must be positive, got {n_modes}", "Ask for one.")
+    wrong = [m for m in engine_orders if m < 1 or m != int(m)]
+    if wrong:
+        raise input_error(
+            "campbell: engine_orders",
+            f"must be positive whole numbers, got {wrong[0]}",
+            "The static load is order 0 and excites nothing.",
+        )
+    return values
+
+
+def _spectrum(structure: Structure, speed: float, n_modes: int, coriolis: bool) -> _Spectrum:
+    count = min(n_modes + SPARE, structure.n)
+    if coriolis:
+        modes = gyroscopic_modes(structure, count)
+        hertz = modes.frequencies_hz
+        shapes: FloatArray | ComplexArray = modes.shapes
+    else:
+        squares, shapes = lowest_modes(
+            structure.stiffness, structure.mass, count, factorise(structure.stiffness)
+        )
+        hertz = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
+    # reduced coordinates need not mean the same at two speeds, those of the full model do
+    whole = structure.expand(shapes)
+    weighted = structure.mass @ shapes if structure.basis is None else whole
+    return _Spectrum(speed, hertz, whole, weighted, np.ones(hertz.size))
+
+
+def _without_shapes(spectrum: _Spectrum) -> _Spectrum:
+    empty = np.zeros((0, spectrum.hertz.size), dtype=complex)
+    return _Spectrum(spectrum.speed, spectrum.hertz, empty, empty, spectrum.agreement)
+
+
+def _assurance(before: _Spectrum, after: _Spectrum) -> FloatArray:
+    """Return the modal assurance of all pairs of shapes."""
+    cross = before.weighted.conj().T @ after.shapes
+    own = np.sum(before.weighted.conj() * before.shapes, axis=0).real
+    other = np.sum(after.weighted.conj() * after.shapes, axis=0).real
+    return np.asarray(np.abs(cross) ** 2 / np.outer(own, other))
+
+
+def _matched(before: _Spectrum, after: _Spectrum) -> _Spectrum:
+    """Return those of the modes `after` that continue those `before`, in their order."""
+    assurance = _assurance(before, after)
+    distance = np.abs(before.hertz[:, None] - after.hertz)
+    total = before.hertz[:, None] + after.hertz
+    step = distance / np.where(total > 0.0, total, 1.0)
+    _, chosen = scipy.optimize.linear_sum_assignment(NEARNESS * step - assurance)
+    # within a space of equal frequencies shapes are free: what counts is their share in the whole of it
+    spread = np.sum(assurance * _equal(after.hertz[chosen], after.hertz), axis=1)
+    gathered = np.diagonal(_equal(before.hertz, before.hertz) @ assurance[:, chosen])
+    return after.take(chosen, np.minimum(np.maximum(spread, gathered), 1.0))
+
+
+def _equal(one: FloatArray, other: FloatArray) -> BoolArray:
+    return np.abs(one[:, None] - other) <= SAME * (one[:, None] + other)
+
+
+def _follow(family: _Speeds, before: _Spectrum, speed: float, halvings: int) -> _Spectrum:
+    """Return the modes `before` at another speed, by way of speeds between where shapes change much."""
+    matched = _matched(before, family.at(speed))
+    if halvings == 0 or np.all(matched.agreement >= CLEAR):
+        return matched
+    between = _follow(family, before, 0.5 * (before.speed + speed), halvings - 1)
+    after = _follow(family, between, speed, halvings - 1)
+    least = np.minimum(between.agreement, after.agreement)
+    return after.take(np.arange(least.size), least)
+
+
+def _crossings(
+    family: _Speeds,
+    before: _Spectrum,
+    after: _Spectrum,
+    engine_orders: Sequence[int],
+    tolerance: float,
+) -> list[Crossing]:
+    """Return the crossings in the interval between two speeds, its end included."""
+    found = []
+    for order in engine_orders:
+        low, high = (s.hertz - order * s.speed / (2 * np.pi) for s in (before, after))
+        for mode in np.flatnonzero((low * high < 0) | ((high == 0.0) & (low != 0.0))):
+            speed = _crossing_speed(family, before, after, order, int(mode), tolerance)
+            found.append(Crossing(int(order), int(mode), speed, order * speed / (2 * np.pi)))
+    return found
+
+
+def _crossing_speed(
+    family: _Speeds, before: _Spectrum, after: _Spectrum, order: int, mode: int, tolerance: float
+) -> float:
+    def distance(speed: float) -> float:
+        followed = _follow(family, before, speed, HALVINGS)
+        return float(followed.hertz[mode] - order * speed / (2 * math.pi))
+
+    return float(
+        scipy.optimize.brentq(distance, before.speed, after.speed, xtol=tolerance * after.speed)
+    )
