@@ -1,7 +1,6 @@
-"""Natural frequencies and modes of dense and sparse structures."""
+"""Natural frequencies and modes of dense and sparse structures, real or at a wave number."""
 
-from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
@@ -10,30 +9,96 @@ import scipy.sparse.csgraph
 import scipy.sparse.linalg
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
-from stickslip.errors import SingularError, input_error
+from stickslip.errors import input_error
+from stickslip.model.factorisation import DENSE, Say, Solve, factorise, silent
 from stickslip.model.structure import Structure
 
-DENSE = 400  # below this many dofs a dense eigensolver is faster than shift-invert
+RIGID = (
+    1e-14  # strain energy of a mode over the sum of its terms' magnitudes: below, it is rounding
+)
+SHIFT = 1e-8  # below zero, as a fraction of the mean K_ii / M_ii: regular where a body is free
 
-Solve = Callable[[FloatArray], FloatArray]
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Undamped modes, lowest first.
+
+    Parameters
+    ----------
+    squares
+        (n,) squares of the circular frequencies in rad²/s²; rigid motions have exactly zero.
+    shapes
+        (N, n) mass-normalised, complex for a complex Hermitian structure.
+    """
+
+    squares: FloatArray
+    shapes: Matrix
+
+    @property
+    def frequencies_hz(self) -> FloatArray:
+        """(n,) in Hz; negative where the square is: the motion diverges instead of vibrating."""
+        return np.asarray(np.sign(self.squares) * np.sqrt(np.abs(self.squares)) / (2 * np.pi))
+
+    @property
+    def rigid(self) -> int:
+        """Number of modes without strain."""
+        return int(np.count_nonzero(self.squares == 0))
+
+
+def normal_modes(
+    structure: Structure, n: int, *, shift: float | None = None, say: Say = silent
+) -> Modes:
+    """Return the `n` lowest undamped modes.
+
+    Parameters
+    ----------
+    structure
+        Real symmetric or complex Hermitian, dense or sparse; it may be free to move, and dofs may
+        have no mass.
+    n
+        At least one, at most the number of dofs with mass.
+    shift
+        In rad²/s², at most the lowest square; the matrix ``K − shift M`` is factorised. By default
+        slightly below zero, so that a free body gives no singular matrix.
+    say
+        Called with a sentence before each long step.
+
+    Raises
+    ------
+    InputError
+        If the structure has fewer than `n` modes.
+    SingularError
+        If ``K − shift M`` is singular: a dof has neither stiffness nor mass, or a body is free and
+        the shift zero.
+    """
+    _check_count("normal_modes", structure, n)
+    if shift is None:
+        shift = -SHIFT * _mean_square(structure)
+    squares, shapes = [], []
+    for part in connected_parts(structure.stiffness, structure.mass):
+        K, M = (submatrix(m, part, part) for m in (structure.stiffness, structure.mass))
+        count = min(n, int(np.count_nonzero(M.diagonal())))
+        if not count:
+            continue
+        solve = None if _small(K, count) else factorise(K - shift * M, say=say)
+        say(f"{count} modes of {len(part)} dofs")
+        values, vectors = lowest_modes(K, M, count, solve, shift)
+        values[_strain_share(K, vectors) < RIGID] = 0.0
+        whole = np.zeros((structure.n, count), dtype=vectors.dtype)
+        whole[part] = vectors
+        squares.append(values)
+        shapes.append(whole)
+    lowest = np.argsort(np.concatenate(squares), kind="stable")[:n]
+    return Modes(np.concatenate(squares)[lowest], np.hstack(shapes)[:, lowest])
 
 
 def natural_frequencies(structure: Structure, n: int) -> FloatArray:
-    """Return the `n` lowest undamped natural frequencies in Hz; rigid-body modes count as zeros."""
-    if not 0 < n <= structure.n:
-        raise input_error(
-            "natural_frequencies",
-            f"{n} asked of a structure with {structure.n} dofs",
-            "Ask for at least one and at most as many.",
-        )
-    # the shift keeps the factorised matrix regular where a body is free to move
-    scale = abs(structure.stiffness.diagonal()).sum() / structure.mass.diagonal().sum()
-    squares = []
-    for part in connected_parts(structure.stiffness, structure.mass):
-        K, M = submatrix(structure.stiffness, part, part), submatrix(structure.mass, part, part)
-        squares.append(_lowest_squares(K, M, min(n, len(part)), 1e-8 * scale))
-    lowest = np.sort(np.concatenate(squares))[:n]
-    return np.asarray(np.sqrt(np.maximum(lowest, 0.0)) / (2 * np.pi))
+    """Return the `n` lowest undamped natural frequencies in Hz; rigid-body modes count as zeros.
+
+    So do diverging ones; `normal_modes` tells them apart.
+    """
+    _check_count("natural_frequencies", structure, n)
+    return np.maximum(normal_modes(structure, n).frequencies_hz, 0.0)
 
 
 def with_springs(structure: Structure, operator: Matrix, stiffness: FloatArray) -> Structure:
@@ -75,64 +140,94 @@ def submatrix(matrix: Matrix, rows: IntArray, columns: IntArray) -> Matrix:
     return matrix[np.ix_(rows, columns)]
 
 
-def factorise(matrix: Matrix) -> Solve:
-    """Factorise a symmetric matrix; return the map from right-hand sides to solutions.
-
-    Raises
-    ------
-    SingularError
-        If a pivot vanishes.
-    """
-    if len(matrix.shape) == 2 and matrix.shape[0] <= DENSE:
-        dense = matrix.toarray() if scipy.sparse.issparse(matrix) else matrix
-        inverse = scipy.linalg.lu_factor(dense, check_finite=True)
-        if not np.all(np.diag(inverse[0])):
-            raise SingularError("factorise: the matrix is singular")
-        return lambda b: np.asarray(scipy.linalg.lu_solve(inverse, b))
-    try:
-        lu = scipy.sparse.linalg.splu(
-            scipy.sparse.csc_array(matrix),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.01,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError as error:
-        raise SingularError(f"factorise: {error}") from error
-    return lambda b: np.asarray(lu.solve(np.asarray(b, dtype=float)))
-
-
 def lowest_modes(
-    stiffness: Matrix, mass: Matrix, n: int, solve: Solve, shift: float = 0.0
-) -> tuple[FloatArray, FloatArray]:
+    stiffness: Matrix, mass: Matrix, n: int, solve: Solve | None, shift: float = 0.0
+) -> tuple[FloatArray, Matrix]:
     """Return the `n` lowest squares of circular frequencies and mass-normalised modes.
 
     Parameters
     ----------
     stiffness, mass
-        Symmetric (size, size).
+        Real symmetric or complex Hermitian (size, size); the mass may be singular.
     n
-        At most size.
+        At most the rank of the mass.
     solve
-        Solves with ``stiffness − shift · mass`` (`factorise`).
+        Solves with ``stiffness − shift · mass`` (`factorise`); not used where dense algebra is
+        faster.
     shift
         In rad²/s², at most the lowest square.
     """
-    size = stiffness.shape[0]
-    if size <= DENSE or n > size // 3:
+    if solve is None or _small(stiffness, n):
         K, M = (m.toarray() if scipy.sparse.issparse(m) else m for m in (stiffness, mass))
-        values, vectors = scipy.linalg.eigh(K, M, subset_by_index=(0, n - 1))
-        return np.asarray(values), np.asarray(vectors)
-    inverse = scipy.sparse.linalg.LinearOperator((size, size), matvec=solve, dtype=float)
-    start = np.random.default_rng(0).standard_normal(size)  # the same in every run
-    values, vectors = scipy.sparse.linalg.eigsh(
-        stiffness, n, M=mass, sigma=shift, OPinv=inverse, v0=start
-    )
+        return _dense_modes(K, M, n, shift)
+    values, vectors = _krylov(stiffness, mass, n, solve, shift)
     order = np.argsort(values)
     return values[order], vectors[:, order]
 
 
-def _lowest_squares(stiffness: Matrix, mass: Matrix, n: int, shift: float) -> FloatArray:
-    if stiffness.shape[0] <= DENSE:
-        return lowest_modes(stiffness, mass, n, lambda b: b)[0]
-    solve = factorise(stiffness + shift * mass)
-    return lowest_modes(stiffness, mass, n, solve, -shift)[0]
+def _check_count(place: str, structure: Structure, n: int) -> None:
+    if not 0 < n <= structure.n:
+        raise input_error(
+            place,
+            f"{n} asked of a structure with {structure.n} dofs",
+            "Ask for at least one and at most as many.",
+        )
+    heavy = int(np.count_nonzero(structure.mass.diagonal()))
+    if n > heavy:
+        raise input_error(
+            place,
+            f"{n} asked of a structure with {structure.n} dofs, of which {heavy} have mass",
+            "Ask for at most as many as have mass.",
+        )
+
+
+def _mean_square(structure: Structure) -> float:
+    """Return the mean stiffness over the mean mass of single dofs, in rad²/s²."""
+    stiffness, mass = (m.diagonal().real for m in (structure.stiffness, structure.mass))
+    return float(abs(stiffness).sum() / mass.sum())
+
+
+def _small(stiffness: Matrix, n: int) -> bool:
+    size = stiffness.shape[0]
+    return bool(size <= DENSE or n > size // 3)
+
+
+def _dense_modes(K: Matrix, M: Matrix, n: int, shift: float) -> tuple[FloatArray, Matrix]:
+    try:
+        values, vectors = scipy.linalg.eigh(K, M, subset_by_index=(0, n - 1))
+    except np.linalg.LinAlgError:  # dofs without mass: the reciprocal problem is regular
+        size = len(K)
+        largest = (size - n, size - 1)
+        inverse, vectors = scipy.linalg.eigh(M, K - shift * M, subset_by_index=largest)
+        values = shift + 1.0 / inverse[::-1]
+        vectors = (vectors / np.sqrt(inverse))[:, ::-1]
+    return np.asarray(values), np.asarray(vectors)
+
+
+def _krylov(
+    stiffness: Matrix, mass: Matrix, n: int, solve: Solve, shift: float
+) -> tuple[FloatArray, Matrix]:
+    """Return `n` modes by shift-invert Lanczos, Rayleigh-Ritz last: eigsh leaves equal complex ones oblique."""
+    kind = np.result_type(stiffness.dtype, mass.dtype, float)
+    size = stiffness.shape[0]
+    start = np.random.default_rng(0).standard_normal(size)  # the same in every run
+    values, vectors = scipy.sparse.linalg.eigsh(
+        stiffness.astype(kind),
+        n,
+        M=mass,
+        sigma=shift,
+        OPinv=scipy.sparse.linalg.LinearOperator((size, size), matvec=solve, dtype=kind),
+        v0=start.astype(kind),
+    )
+    if kind.kind == "f":
+        return values, vectors
+    K, M = (vectors.conj().T @ (m @ vectors) for m in (stiffness, mass))
+    values, turn = scipy.linalg.eigh((K + K.conj().T) / 2, (M + M.conj().T) / 2)
+    return values, vectors @ turn
+
+
+def _strain_share(stiffness: Matrix, shapes: Matrix) -> FloatArray:
+    """Return the strain energy of each shape over the sum of the magnitudes of its terms."""
+    energy = np.sum((shapes.conj() * (stiffness @ shapes)).real, axis=0)
+    terms = np.sum(abs(shapes) * (abs(stiffness) @ abs(shapes)), axis=0)
+    return np.asarray(np.abs(energy) / np.where(terms > 0, terms, 1.0))

@@ -10,7 +10,8 @@ import scipy.sparse
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import SingularError, input_error
 from stickslip.model.dofs import Dofs, join_dofs, modal_dofs
-from stickslip.model.modes import connected_parts, factorise, lowest_modes, submatrix
+from stickslip.model.factorisation import factorise
+from stickslip.model.modes import connected_parts, lowest_modes, submatrix
 from stickslip.model.structure import Structure
 
 RIGID = 1e-9  # strain energy of a rigid motion over that of single dofs: below, nothing holds it
