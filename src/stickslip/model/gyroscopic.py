@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
-import scipy.sparse
 
 from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.factorisation import DENSE, factorise
-from stickslip.model.modes import lowest_modes
+from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
 
 SPARE = 10  # modes beyond twice as many as are asked for
@@ -61,24 +60,25 @@ def gyroscopic_modes(
     InputError
         If more modes are asked for than there are dofs, or in the basis.
     """
-    n_basis = min(2 * n_modes + SPARE if n_basis is None else n_basis, structure.n)
+    movable = int(np.count_nonzero(structure.mass.diagonal()))
+    n_basis = min(2 * n_modes + SPARE if n_basis is None else n_basis, movable)
     if not 0 < n_modes <= n_basis:
         raise input_error(
             "gyroscopic_modes",
-            f"{n_modes} modes asked of {structure.n} dofs, with {n_basis} in the basis",
+            f"{n_modes} modes asked of {movable} dofs with mass, {n_basis} in the basis",
             "Ask for at least one, and at most as many as the basis has.",
         )
-    G = structure.damping
-    G = 0.5 * (G - G.T.conj())
-    basis = None if structure.n <= DENSE else _basis(structure, G, n_basis)
-    K, G, M = (_projected(a, basis) for a in (structure.stiffness, G, structure.mass))
-    squares, vectors = scipy.linalg.eigh(K, M)
-    rates, amplitudes = _eigenpairs(squares, vectors.conj().T @ G @ vectors)
+    G = 0.5 * (structure.damping - structure.damping.T.conj())
+    whole = structure.n <= DENSE
+    modes = normal_modes(structure, movable if whole else n_basis)
+    squares, shapes = modes.squares, modes.shapes
+    if not whole:
+        squares, shapes = _enriched(structure, G, shapes)
+    rates, amplitudes = _eigenpairs(squares, shapes.conj().T @ (G @ shapes))
     first = np.argsort(rates.imag, kind="stable")[:n_modes]
-    shapes = vectors @ amplitudes[:, first]
-    if basis is not None:
-        shapes = basis @ shapes
-    return GyroscopicModes(rates.imag[first] / (2 * np.pi), shapes, rates.real[first])
+    return GyroscopicModes(
+        rates.imag[first] / (2 * np.pi), shapes @ amplitudes[:, first], rates.real[first]
+    )
 
 
 def _eigenpairs(squares: FloatArray, coriolis: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
@@ -101,22 +101,13 @@ def _eigenpairs(squares: FloatArray, coriolis: ComplexArray) -> tuple[ComplexArr
     return rates[kept], shapes / np.linalg.norm(shapes, axis=0)
 
 
-def _basis(structure: Structure, coriolis: Matrix, n_basis: int) -> Matrix:
-    """Return modes at rest and the static answers to their Coriolis forces."""
+def _enriched(structure: Structure, coriolis: Matrix, modes: Matrix) -> tuple[FloatArray, Matrix]:
+    """Return squares and shapes of the structure on its lowest modes and the static answers to their Coriolis forces."""
     K, M = structure.stiffness, structure.mass
     shift = SHIFT * abs(K.diagonal()).sum() / abs(M.diagonal()).sum()
-    solve = factorise(K + shift * M)
-    _, modes = lowest_modes(K, M, n_basis, solve, -shift)
-    answers = solve(np.asarray(coriolis @ modes))
+    answers = factorise(K + shift * M)(np.asarray(coriolis @ modes))
     answers = answers - modes @ (modes.conj().T @ (M @ answers))
-    return np.linalg.qr(
-        np.hstack(
-            [modes / np.linalg.norm(modes, axis=0), answers / np.linalg.norm(answers, axis=0)]
-        )
-    )[0]
-
-
-def _projected(matrix: Matrix, basis: Matrix | None) -> Matrix:
-    if basis is None:
-        return matrix.toarray() if scipy.sparse.issparse(matrix) else matrix
-    return basis.conj().T @ (matrix @ basis)
+    columns = [each / np.linalg.norm(each, axis=0) for each in (modes, answers)]
+    basis = np.linalg.qr(np.hstack(columns))[0]
+    squares, vectors = scipy.linalg.eigh(*(basis.conj().T @ (a @ basis) for a in (K, M)))
+    return squares, basis @ vectors

@@ -10,8 +10,7 @@ import scipy.optimize
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.model.gyroscopic import gyroscopic_modes
-from stickslip.model.factorisation import factorise
-from stickslip.model.modes import lowest_modes
+from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
 
 CLEAR = 0.7  # modal assurance below which a step in speed is halved
@@ -54,7 +53,8 @@ class Campbell:
     speeds
         (s,) in rad/s, ascending.
     frequencies_hz
-        (s, n_modes) in the rotating frame; columns in the order of the first speed.
+        (s, n_modes) in the rotating frame; columns in the order of the first speed. Negative where a motion diverges instead of
+        vibrating.
     agreement
         (s, n_modes) least modal assurance (1: same shape) on the way from the speed before; ones at the first.
     engine_orders
@@ -227,16 +227,14 @@ def _checked(
 
 
 def _spectrum(structure: Structure, speed: float, n_modes: int, coriolis: bool) -> _Spectrum:
-    count = min(n_modes + SPARE, structure.n)
+    count = min(n_modes + SPARE, int(np.count_nonzero(structure.mass.diagonal())))
     if coriolis:
         modes = gyroscopic_modes(structure, count)
         hertz = modes.frequencies_hz
         shapes: FloatArray | ComplexArray = modes.shapes
     else:
-        squares, shapes = lowest_modes(
-            structure.stiffness, structure.mass, count, factorise(structure.stiffness)
-        )
-        hertz = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
+        at_rest = normal_modes(structure, count)
+        hertz, shapes = at_rest.frequencies_hz, at_rest.shapes
     # reduced coordinates need not mean the same at two speeds, those of the full model do
     whole = structure.expand(shapes)
     weighted = structure.mass @ shapes if structure.basis is None else whole
@@ -260,7 +258,7 @@ def _matched(before: _Spectrum, after: _Spectrum) -> _Spectrum:
     """Return those of the modes `after` that continue those `before`, in their order."""
     assurance = _assurance(before, after)
     distance = np.abs(before.hertz[:, None] - after.hertz)
-    total = before.hertz[:, None] + after.hertz
+    total = np.abs(before.hertz[:, None]) + np.abs(after.hertz)
     step = distance / np.where(total > 0.0, total, 1.0)
     _, chosen = scipy.optimize.linear_sum_assignment(NEARNESS * step - assurance)
     # within a space of equal frequencies shapes are free: what counts is their share in the whole of it
@@ -270,7 +268,7 @@ def _matched(before: _Spectrum, after: _Spectrum) -> _Spectrum:
 
 
 def _equal(one: FloatArray, other: FloatArray) -> BoolArray:
-    return np.abs(one[:, None] - other) <= SAME * (one[:, None] + other)
+    return np.abs(one[:, None] - other) <= SAME * (np.abs(one[:, None]) + np.abs(other))
 
 
 def _follow(family: _Speeds, before: _Spectrum, speed: float, halvings: int) -> _Spectrum:
