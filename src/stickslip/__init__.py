@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from stickslip.harmonic.dlft import dynamic_lagrangian
     from stickslip.harmonic.dynamic_stiffness import condense
     from stickslip.harmonic.excitation import HarmonicLoad
+    from stickslip.model.axis import Axis
     from stickslip.model.blade_mesh import mesh_blade_pair
     from stickslip.model.blade_pair import BladePair
     from stickslip.model.damper import (
@@ -64,6 +65,7 @@ if TYPE_CHECKING:
     )
     from stickslip.model.damping import rayleigh_damping
     from stickslip.model.dofs import Dofs
+    from stickslip.model.elements import Quadrature
     from stickslip.model.gyroscopic import (
         GyroscopicModes,
         gyroscopic_modes,
@@ -82,6 +84,11 @@ if TYPE_CHECKING:
         normal_modes,
     )
     from stickslip.model.rigid_body import RigidBody
+    from stickslip.model.rotation import (
+        RotatingSolid,
+        SpeedPolynomial,
+        rotating_solid,
+    )
     from stickslip.model.solid import (
         Material,
         assemble_solid,
@@ -95,7 +102,16 @@ if TYPE_CHECKING:
         save_structure,
     )
     from stickslip.reduction.craig_bampton import craig_bampton
+    from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
     from stickslip.reduction.relative import in_relative_coordinates
+    from stickslip.reduction.waves import (
+        Wave,
+        excited_wave,
+        to_sectors,
+        to_waves,
+        wave,
+    )
+    from stickslip.reduction.wheel import wheel, wheel_shape
     from stickslip.report.page import write_report
     from stickslip.response.campbell import (
         Campbell,
@@ -191,21 +207,27 @@ _MODULES = {
     "stickslip.harmonic.dlft": ("dynamic_lagrangian",),
     "stickslip.harmonic.dynamic_stiffness": ("condense",),
     "stickslip.harmonic.excitation": ("HarmonicLoad",),
+    "stickslip.model.axis": ("Axis",),
     "stickslip.model.blade_mesh": ("mesh_blade_pair",),
     "stickslip.model.blade_pair": ("BladePair",),
     "stickslip.model.damper": ("ContactPoints", "FlatCurvedDamper", "gap_operator"),
     "stickslip.model.damping": ("rayleigh_damping",),
     "stickslip.model.dofs": ("Dofs",),
+    "stickslip.model.elements": ("Quadrature",),
     "stickslip.model.gyroscopic": ("GyroscopicModes", "gyroscopic_modes"),
     "stickslip.model.lumped": ("chain", "lumped"),
     "stickslip.model.mesh": ("SolidMesh", "write_mesh"),
     "stickslip.model.modes": ("Modes", "natural_frequencies", "normal_modes"),
     "stickslip.model.rigid_body": ("RigidBody",),
+    "stickslip.model.rotation": ("RotatingSolid", "SpeedPolynomial", "rotating_solid"),
     "stickslip.model.solid": ("Material", "assemble_solid"),
     "stickslip.model.structure": ("Structure", "join"),
     "stickslip.model.structure_file": ("load_structure", "save_structure"),
     "stickslip.reduction.craig_bampton": ("craig_bampton",),
+    "stickslip.reduction.cyclic": ("CyclicSector", "cyclic_sector", "travelling_wave"),
     "stickslip.reduction.relative": ("in_relative_coordinates",),
+    "stickslip.reduction.waves": ("Wave", "excited_wave", "to_sectors", "to_waves", "wave"),
+    "stickslip.reduction.wheel": ("wheel", "wheel_shape"),
     "stickslip.report.page": ("write_report",),
     "stickslip.response.campbell": ("Campbell", "Crossing", "campbell"),
     "stickslip.response.drift": ("Drift", "drift"),
@@ -234,6 +256,7 @@ _MODULES = {
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
+    "Axis",
     "BladePair",
     "Bonded",
     "BoucWen",
@@ -243,6 +266,7 @@ __all__ = [
     "CoupledCoulomb",
     "Crossing",
     "CubicSpring",
+    "CyclicSector",
     "Dahl",
     "Discretisation",
     "Dofs",
@@ -269,14 +293,17 @@ __all__ = [
     "ParameterPoint",
     "PeakPoint",
     "PolynomialSpring",
+    "Quadrature",
     "RegularisedCoulomb",
     "RigidBody",
     "RigidCoulomb",
     "RigidPoint",
+    "RotatingSolid",
     "Safe",
     "Signals",
     "SingularError",
     "SolidMesh",
+    "SpeedPolynomial",
     "Status",
     "StickslipError",
     "Structure",
@@ -288,6 +315,7 @@ __all__ = [
     "TransientResult",
     "UniformBand",
     "UnilateralSpring",
+    "Wave",
     "__version__",
     "accepted_points",
     "assemble_solid",
@@ -299,8 +327,10 @@ __all__ = [
     "condense",
     "contact_forces",
     "craig_bampton",
+    "cyclic_sector",
     "drift",
     "dynamic_lagrangian",
+    "excited_wave",
     "fields",
     "forced_problem",
     "forced_response",
@@ -326,6 +356,7 @@ __all__ = [
     "read_study",
     "rigid_response",
     "rigid_surface",
+    "rotating_solid",
     "run_study",
     "safe",
     "save_structure",
@@ -333,7 +364,13 @@ __all__ = [
     "signals",
     "smallest_peak",
     "structure_surface",
+    "to_sectors",
+    "to_waves",
     "track_peak",
+    "travelling_wave",
+    "wave",
+    "wheel",
+    "wheel_shape",
     "write_mesh",
     "write_report",
 ]

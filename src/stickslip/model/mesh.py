@@ -9,35 +9,79 @@ import numpy as np
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error, missing_package
 
+CELL_NAMES = {4: "tetra", 10: "tetra10", 8: "hexahedron", 20: "hexahedron20"}
 TET_FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])  # outward
+HEX_FACES = np.array(
+    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
+)  # outward
 
 
 @dataclass(frozen=True, eq=False)
 class SolidMesh:
-    """A mesh of second-order tetrahedra.
+    """A mesh of tetrahedra or hexahedra of first or second order; one kind of cell a mesh.
 
     Parameters
     ----------
     points
         (n, 3) nodes in metres.
     cells
-        (m, 10) nodes of each tetrahedron in VTK order.
+        (m, k) nodes of each cell in VTK order: k = 4 or 10 for tetrahedra, 8 or 20 (serendipity) for hexahedra.
     node_sets
-        Name -> nodes; ``root`` is clamped.
+        Name -> nodes, as indices into `points`; ``root`` is clamped.
+    numbers
+        (n,) node numbers of the program that wrote the mesh; 0 ... n − 1 by default.
+    cell_numbers
+        (m,) cell numbers of that program; 0 ... m − 1 by default.
+
+    Raises
+    ------
+    InputError
+        If the cells have another number of nodes or name nodes that are not there, or there are not as many numbers
+        as nodes and cells.
     """
 
     points: FloatArray
     cells: IntArray
     node_sets: Mapping[str, IntArray]
+    numbers: IntArray = None  # type: ignore[assignment]  # counted in __post_init__
+    cell_numbers: IntArray = None  # type: ignore[assignment]  # counted in __post_init__
+
+    def __post_init__(self) -> None:
+        if self.cells.ndim != 2 or self.cells.shape[1] not in CELL_NAMES:
+            raise input_error(
+                "SolidMesh.cells",
+                f"needs rows of 4, 10, 8 or 20 nodes, got an array of shape {self.cells.shape}",
+                "Use tetrahedra or hexahedra of first or second order, one kind a mesh.",
+            )
+        n, m = len(self.points), len(self.cells)
+        if m and not 0 <= self.cells.min() <= self.cells.max() < n:
+            raise input_error(
+                "SolidMesh.cells",
+                f"name nodes from {self.cells.min()} to {self.cells.max()}, but there are {n} points",
+                "Cells hold indices into points, counted from 0, not node numbers.",
+            )
+        for name, count in (("numbers", n), ("cell_numbers", m)):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, np.arange(count))
+            elif getattr(self, name).shape != (count,):
+                raise input_error(
+                    f"SolidMesh.{name}",
+                    f"has shape {getattr(self, name).shape} for {count}",
+                    "Give one number each.",
+                )
 
     @property
     def surface(self) -> IntArray:
-        """(k, 3) corner nodes of the skin's triangles, oriented outward."""
-        faces = self.cells[:, TET_FACES].reshape(-1, 3)
+        """(k, 3) corner nodes of the skin's triangles, oriented outward; a quadrilateral gives two."""
+        pattern = TET_FACES if self.cells.shape[1] in (4, 10) else HEX_FACES
+        faces = self.cells[:, pattern].reshape(-1, pattern.shape[1])
         _, first, count = np.unique(
             np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
         )
-        return np.asarray(faces[np.sort(first[count == 1])])
+        skin = faces[np.sort(first[count == 1])]
+        if skin.shape[1] == 4:
+            skin = skin[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+        return np.asarray(skin)
 
 
 def write_mesh(mesh: SolidMesh, path: Path) -> None:
@@ -56,7 +100,8 @@ def write_mesh(mesh: SolidMesh, path: Path) -> None:
     if path.suffix == ".msh":
         ones = np.ones(len(mesh.cells), dtype=np.int32)
         tags = {"gmsh:physical": [ones], "gmsh:geometrical": [ones]}
-    data = meshio.Mesh(mesh.points, [("tetra10", mesh.cells)], point_data=flags, cell_data=tags)
+    kind = CELL_NAMES[mesh.cells.shape[1]]
+    data = meshio.Mesh(mesh.points, [(kind, mesh.cells)], point_data=flags, cell_data=tags)
     if path.suffix == ".msh":
         meshio.write(path, data, file_format="gmsh22", binary=True)
     else:

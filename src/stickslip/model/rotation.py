@@ -1,0 +1,299 @@
+"""Elastic solids that rotate: centrifugal load, its static displacement, and the matrices of small vibrations about it.
+
+In axes that turn with the solid, ``M ü + (C + 2 Ω G) u̇ + K(Ω) u = f``.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import BoolArray, FloatArray, Matrix
+from stickslip.errors import StickslipError, input_error
+from stickslip.model.axis import Axis
+from stickslip.model.elements import EXACT, NodeBlocks, Quadrature, Shape, shape_functions
+from stickslip.model.factorisation import factorise
+from stickslip.model.mesh import SolidMesh
+from stickslip.model.prestress import PrestressTerms, internal_force, prestress_terms
+from stickslip.model.solid import Material, clamp, clamped_nodes, integrate
+from stickslip.model.structure import Structure
+
+Tangent = Literal["consistent", "textbook", "nonlinear"]
+TANGENTS = ("consistent", "textbook", "nonlinear")
+Z_AXIS = Axis()
+NEWTON_STEPS = 25
+BALANCED = 1e-10  # residual of the nonlinear statics as a fraction of the centrifugal load
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedPolynomial:
+    """A stiffness that is a polynomial of the speed: ``rest + Ω² square + Ω⁴ fourth``.
+
+    Parameters
+    ----------
+    rest, square, fourth
+        (n, n) CSR matrices in N/m, N s²/m, N s⁴/m; `fourth` is None where there is none.
+    """
+
+    rest: Matrix
+    square: Matrix
+    fourth: Matrix | None = None
+
+    def at(self, speed: float) -> Matrix:
+        """Return the stiffness in N/m at `speed` in rad/s."""
+        stiffness = self.rest + speed**2 * self.square
+        if self.fourth is not None:
+            stiffness = stiffness + speed**4 * self.fourth
+        return scipy.sparse.csr_array(stiffness)
+
+
+@dataclass(frozen=True, eq=False)
+class RotatingSolid:
+    """An elastic solid about an axis of rotation; `rotating_solid` makes one.
+
+    Parameters
+    ----------
+    structure
+        The solid at rest.
+    mesh, material, axis, quadrature
+        What it was made of.
+    free
+        (nodes,) which nodes are not clamped.
+    centrifugal
+        (n,) centrifugal load at 1 rad/s, in N s².
+    """
+
+    structure: Structure
+    mesh: SolidMesh
+    material: Material
+    axis: Axis
+    quadrature: Quadrature
+    free: BoolArray
+    centrifugal: FloatArray
+    _unit: dict[int, tuple[Matrix | None, FloatArray]] = field(
+        default_factory=dict, init=False, repr=False
+    )
+    _known: dict[tuple[int, str], SpeedPolynomial] = field(
+        default_factory=dict, init=False, repr=False
+    )
+
+    @cached_property
+    def spin_softening(self) -> Matrix:
+        """(n, n) S in kg: rotation takes ``Ω² S`` off the stiffness."""
+        perpendicular = -self.axis.cross @ self.axis.cross
+        return self._of_mass(perpendicular)
+
+    @cached_property
+    def coriolis(self) -> Matrix:
+        """(n, n) skew G in kg: rotation adds ``2 Ω G`` to the damping."""
+        return self._of_mass(self.axis.cross)
+
+    def _of_mass(self, block: FloatArray) -> Matrix:
+        """Return the mass matrix with `block` in place of the unit matrix of each pair of nodes."""
+        nodes = self.structure.n // 3
+        each = scipy.sparse.kron(scipy.sparse.eye_array(nodes), block, format="csr")
+        return scipy.sparse.csr_array(self.structure.mass @ each)
+
+    def centrifugal_load(self, speed: float) -> FloatArray:
+        """Return the (n,) load in N at `speed` in rad/s, on the undeformed solid."""
+        return speed**2 * self.centrifugal
+
+    def displacement(
+        self, speed: float, *, tie: Matrix | None = None, nonlinear: bool = False
+    ) -> FloatArray:
+        """Return the static displacement under the centrifugal load.
+
+        Parameters
+        ----------
+        speed
+            In rad/s.
+        tie
+            (n, m) sparse: displacements ``tie @ q`` are admissible (a cyclic sector's tie at wave number 0); None: all.
+        nonlinear
+            Find the equilibrium at finite displacement (St. Venant-Kirchhoff, load on the deformed solid) by Newton's
+            method; else solve ``K u = f`` as linear elasticity and as the solvers' linear static step does.
+
+        Returns
+        -------
+        FloatArray
+            (n,) in metres.
+
+        Raises
+        ------
+        SingularError
+            If nothing holds the solid.
+        StickslipError
+            If Newton's method finds no equilibrium.
+        """
+        _check_speed(speed)
+        linear = speed**2 * self._unit_displacement(tie)
+        return self._equilibrium(speed, tie, linear)[0] if nonlinear else linear
+
+    def polynomial(
+        self, tie: Matrix | None = None, *, tangent: Tangent = "consistent"
+    ) -> SpeedPolynomial:
+        """Return the stiffness as a polynomial of the speed, exact where the static displacement is linear.
+
+        Parameters
+        ----------
+        tie
+            As in `displacement`. Give the same object again and nothing is computed twice.
+        tangent
+            As in `at_speed`; ``"nonlinear"`` has no polynomial.
+        """
+        if tangent not in TANGENTS[:2]:
+            raise input_error(
+                "RotatingSolid.polynomial",
+                f"tangent {tangent!r} is no polynomial of the speed",
+                "Use 'consistent' or 'textbook', or at_speed.",
+            )
+        key = (id(tie), tangent)
+        if key not in self._known:
+            self._known[key] = self._assemble_polynomial(tie, tangent)
+        return self._known[key]
+
+    def at_speed(
+        self,
+        speed: float,
+        *,
+        tie: Matrix | None = None,
+        tangent: Tangent = "consistent",
+        coriolis: bool = False,
+    ) -> Structure:
+        """Return the structure of small vibrations about the state of steady rotation.
+
+        Parameters
+        ----------
+        speed
+            In rad/s; its sign matters to the Coriolis matrix alone.
+        tie
+            As in `displacement`: used for the static displacement; the structure itself stays untied.
+        tangent
+            ``"consistent"``: the tangent ``K_L(u0) + K_G(σ) − Ω² S`` at the linear static displacement u0, with
+            initial-displacement terms. ``"textbook"``: ``K + K_G(σ) − Ω² S`` without them, which is off by the order
+            of the static strain. ``"nonlinear"``: the exact tangent at the equilibrium at finite displacement.
+        coriolis
+            Add ``2 Ω G`` to the damping.
+        """
+        _check_speed(speed)
+        if tangent == "nonlinear":
+            start = speed**2 * self._unit_displacement(tie)
+            stiffness = self._equilibrium(speed, tie, start)[1]
+        else:
+            stiffness = self.polynomial(tie, tangent=tangent).at(speed)
+        damping = self.structure.damping
+        if coriolis:
+            damping = scipy.sparse.csr_array(damping + 2 * speed * self.coriolis)
+        return replace(self.structure, stiffness=stiffness, damping=damping)
+
+    @cached_property
+    def _places(self) -> NodeBlocks:
+        return NodeBlocks(self.mesh, self.free)
+
+    @cached_property
+    def _shape(self) -> Shape:
+        return shape_functions(self.mesh.cells.shape[1], self.quadrature.stiffness)
+
+    def _of_nodes(self, vector: FloatArray) -> FloatArray:
+        """Return a vector (n,) of the free nodes as (nodes, 3) with zeros at clamped ones."""
+        full = np.zeros_like(self.mesh.points)
+        full[self.free] = vector.reshape(-1, 3)
+        return full
+
+    def _terms(self, displacement: FloatArray, green: bool = False) -> PrestressTerms:
+        where = self._of_nodes(displacement)
+        return prestress_terms(
+            self.mesh, self.material, self._shape, self._places, where, green=green
+        )
+
+    def _unit_displacement(self, tie: Matrix | None) -> FloatArray:
+        """Return the linear static displacement (n,) at 1 rad/s, in m s²."""
+        if id(tie) not in self._unit:  # the tie is kept, or another one could get its id
+            self._unit[id(tie)] = (
+                tie,
+                _solve(self.structure.stiffness, self.centrifugal, tie),
+            )
+        return self._unit[id(tie)][1]
+
+    def _equilibrium(
+        self, speed: float, tie: Matrix | None, start: FloatArray
+    ) -> tuple[FloatArray, Matrix]:
+        """Return displacement (n,) and tangent (n, n) of the equilibrium at finite displacement."""
+        displacement, S = start, self.spin_softening
+        goal = BALANCED * np.linalg.norm(_on_tie(self.centrifugal_load(speed), tie))
+        for _ in range(NEWTON_STEPS):
+            where = self._of_nodes(displacement)
+            inner = internal_force(self.mesh, self.material, self._shape, where)[self.free].ravel()
+            outer = speed**2 * (self.centrifugal + S @ displacement)
+            terms = self._terms(displacement, green=True)
+            stiffness = self.structure.stiffness + terms.linear + terms.quadratic + terms.geometric
+            stiffness = scipy.sparse.csr_array(stiffness - speed**2 * S)
+            if np.linalg.norm(_on_tie(outer - inner, tie)) <= goal:
+                return displacement, stiffness
+            displacement = displacement + _solve(stiffness, outer - inner, tie)
+        raise StickslipError(
+            f"RotatingSolid: Newton's method found no equilibrium at {speed:g} rad/s in {NEWTON_STEPS} steps. "
+            "The solid may be unstable at this speed: try a lower one, and look at displacement(speed)."
+        )
+
+    def _assemble_polynomial(self, tie: Matrix | None, tangent: Tangent) -> SpeedPolynomial:
+        terms = self._terms(self._unit_displacement(tie))
+        square = terms.geometric - self.spin_softening
+        if tangent == "textbook":
+            return SpeedPolynomial(self.structure.stiffness, square)
+        return SpeedPolynomial(self.structure.stiffness, square + terms.linear, terms.quadratic)
+
+
+def rotating_solid(
+    mesh: SolidMesh,
+    material: Material,
+    axis: Axis = Z_AXIS,
+    *,
+    clamped: tuple[str, ...] = ("root",),
+    quadrature: Quadrature = EXACT,
+) -> RotatingSolid:
+    """Assemble a solid that rotates about an axis with the nodes of the sets `clamped`.
+
+    Parameters
+    ----------
+    mesh, material, clamped, quadrature
+        As in `assemble_solid`.
+    axis
+        Axis of rotation.
+
+    Returns
+    -------
+    RotatingSolid
+        Matrices at rest, load, Coriolis matrix and spin softening at once; what depends on the static displacement
+        when it is asked for.
+
+    Raises
+    ------
+    InputError
+        As `assemble_solid` does.
+    """
+    mass, stiffness = integrate(mesh, material, quadrature)
+    held = clamped_nodes(mesh, clamped)
+    structure = clamp(mesh, mass, stiffness, held, clamped)
+    # positions are interpolated like displacements, so the mass matrix integrates the load exactly
+    load = (mass @ axis.arm(mesh.points).ravel()).reshape(-1, 3)[~held].ravel()
+    return RotatingSolid(structure, mesh, material, axis, quadrature, ~held, load)
+
+
+def _solve(stiffness: Matrix, load: FloatArray, tie: Matrix | None) -> FloatArray:
+    if tie is None:
+        return np.asarray(factorise(stiffness)(load))
+    inner = scipy.sparse.csr_array(tie.T @ stiffness @ tie)
+    return np.asarray(tie @ factorise(inner)(tie.T @ load))
+
+
+def _on_tie(force: FloatArray, tie: Matrix | None) -> FloatArray:
+    return force if tie is None else np.asarray(tie.T @ force)
+
+
+def _check_speed(speed: float) -> None:
+    if not math.isfinite(speed):
+        raise input_error("speed", f"must be a number in rad/s, got {speed}", "Give rad/s.")
