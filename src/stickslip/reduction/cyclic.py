@@ -1,0 +1,256 @@
+"""Cyclic symmetry: travelling waves on a wheel, from one of its sectors.
+
+M. Krack, L. Salles and F. Thouverez, "Vibration prediction of bladed disks coupled by friction joints", Archives of
+Computational Methods in Engineering 24 (2017) 589-636, appendices 1 and 2.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse
+
+from stickslip.arrays import IntArray, Matrix
+from stickslip.errors import input_error
+from stickslip.model.axis import Axis
+from stickslip.model.dofs import Dofs
+from stickslip.model.structure import Structure
+from stickslip.reduction.cyclic_faces import face, pair_faces
+from stickslip.reduction.selection import selection, surviving_sets
+from stickslip.reduction.turning import dof_rotation, node_table
+from stickslip.reduction.waves import check_sectors, wave
+
+ROUNDING = 1e-9  # entries of null vectors below are rounding
+
+
+@dataclass(frozen=True, eq=False)
+class CyclicSector:
+    """A sector of a wheel and how it meets its neighbours: ``u_high = e^{iθ} R u_low``.
+
+    `cyclic_sector` makes one from geometry. A lumped sector is made directly, with ``axis=None``: its coordinates are
+    scalars that mean the same in every sector. It holds a copy of the neighbour's coordinates in `high`, without
+    their mass, for the springs that lead there: for a ring of masses, ``Structure`` of two coordinates, mass
+    ``diag(m, 0)``, a spring between them, ``low=[0]``, ``high=[1]``. A coordinate in both `low` and `high` is shared
+    by all sectors (a hub); give it the mass and stiffness of one sector's share.
+
+    Parameters
+    ----------
+    structure
+        The sector, its faces free.
+    sectors
+        Number of sectors n_s; sector n lies at angle ``n * pitch`` about the axis.
+    low, high
+        (m,) dofs that meet the sector before and the one behind; those at the same place in both are partners, and
+        a node has its components side by side.
+    axis
+        Axis of rotation; None for coordinates that no rotation changes.
+
+    Raises
+    ------
+    InputError
+        If `low` and `high` do not fit the structure or each other.
+    """
+
+    structure: Structure
+    sectors: int
+    low: IntArray
+    high: IntArray
+    axis: Axis | None = field(default_factory=Axis)
+
+    def __post_init__(self) -> None:
+        check_sectors("CyclicSector", self.sectors)
+        low, high = (np.asarray(side, dtype=np.int64) for side in (self.low, self.high))
+        object.__setattr__(self, "low", low)
+        object.__setattr__(self, "high", high)
+        if low.shape != high.shape or low.ndim != 1:
+            raise input_error(
+                "CyclicSector: low, high",
+                f"have shapes {low.shape} and {high.shape}",
+                "Give each dof of one face and its partner on the other.",
+            )
+        both = np.concatenate([low, high[high != low]])
+        if both.size and (both.min() < 0 or both.max() >= self.structure.n):
+            raise input_error(
+                "CyclicSector: low, high",
+                f"hold dofs outside the structure's {self.structure.n}",
+                "Take the indices from the structure's sets.",
+            )
+        if np.unique(both).size != both.size:
+            values, counts = np.unique(both, return_counts=True)
+            twice = self.structure.dofs.labels[values[counts > 1][0]]
+            raise input_error(
+                "CyclicSector: low, high",
+                f"name {twice} more than once",
+                "A dof has one partner; one shared by all sectors stands at the same place in both.",
+            )
+
+    @property
+    def pitch(self) -> float:
+        """Angle of a sector in rad."""
+        return 2 * math.pi / self.sectors
+
+    @property
+    def independent(self) -> IntArray:
+        """Dofs that neither follow the low face nor lie on the axis, in the structure's order."""
+        return np.setdiff1d(np.arange(self.structure.n), self.high)
+
+    @property
+    def shared(self) -> IntArray:
+        """Dofs that all sectors share: those of nodes on the axis, or of a hub."""
+        return np.asarray(self.low[self.low == self.high])
+
+    @property
+    def tie(self) -> Matrix:
+        """(n, m) real CSR matrix P_0 of displacements that all sectors have alike: ``u = tie @ q``."""
+        return self.wave_tie(0)
+
+    def wave_tie(self, wave_number: int) -> Matrix:
+        """Return P_k (eq. 50): the sector's displacements from the coordinates of a travelling wave.
+
+        Parameters
+        ----------
+        wave_number
+            Any whole number, modulo the number of sectors.
+
+        Returns
+        -------
+        scipy.sparse.csr_array
+            (n, m), real for standing waves. Columns: `independent` dofs, then what a wave leaves free at nodes on
+            the axis (the axial motion for k = 0, a whirl for k = 1 and n_s − 1, nothing for others).
+        """
+        phase = wave(wave_number, self.sectors).phase
+        n, free = self.structure.n, self.independent
+        own = selection(free, np.arange(free.size), (n, free.size))
+        tied = self.low != self.high
+        low, high = self.low[tied], self.high[tied]
+        turn = phase * self._turn(low, 1)
+        into = selection(high, np.arange(high.size), (n, high.size))
+        tie = own + into @ turn @ own[low]
+        return scipy.sparse.hstack([tie, self._whirl(phase)], format="csr")
+
+    def turn(self, sectors: int) -> Matrix:
+        """Return the (n, n) matrix from displacements in the sector's frame to those `sectors` farther on, in global axes."""
+        return self._turn(np.arange(self.structure.n), sectors)
+
+    def _turn(self, index: IntArray, sectors: int) -> Matrix:
+        if self.axis is None or not sectors % self.sectors:
+            return scipy.sparse.eye_array(index.size, format="csr")
+        angle = sectors % self.sectors * self.pitch
+        return dof_rotation(
+            self.structure.dofs.take(index), self.axis.rotation(angle), "CyclicSector"
+        )
+
+    def _whirl(self, phase: complex) -> Matrix:
+        """Return the motions of shared nodes that the turn to the next sector changes by the phase alone."""
+        shared = self.shared
+        turn = (phase * self._turn(shared, 1)).toarray() - np.eye(shared.size)
+        columns = [np.zeros((self.structure.n, 0))]
+        groups = [np.array([i]) for i in range(shared.size)]
+        if self.axis is not None:
+            groups = [row[row >= 0] for row in node_table(self.structure.dofs.take(shared))]
+        for group in groups:
+            null = scipy.linalg.null_space(turn[np.ix_(group, group)], rcond=ROUNDING)
+            null[np.abs(null) < ROUNDING] = 0.0
+            whirl = np.zeros((self.structure.n, null.shape[1]), dtype=null.dtype)
+            whirl[shared[group]] = null
+            columns.append(whirl)
+        return scipy.sparse.csr_array(np.hstack(columns))
+
+
+def cyclic_sector(
+    structure: Structure,
+    sectors: int,
+    *,
+    low: str = "cyclic_low",
+    high: str = "cyclic_high",
+    axis: Axis = Axis(),  # noqa: B008  # frozen
+    tolerance: float | None = None,
+) -> CyclicSector:
+    """Pair the nodes of the two cut faces of a sector by their positions.
+
+    Parameters
+    ----------
+    structure
+        One sector, its faces free; nodes clamped (removed) on both faces are no obstacle.
+    sectors
+        Number of sectors of the wheel.
+    low, high
+        Names of the sets of dofs; `high` is `low` turned by 2π/sectors about `axis` by the right-hand rule. A node
+        on the axis may stand in either or both.
+    axis
+        Axis of the wheel.
+    tolerance
+        Largest distance of partners in metres; None takes 1e-5 of the size of the faces.
+
+    Returns
+    -------
+    CyclicSector
+        With the pairs in the order of `low`.
+
+    Raises
+    ------
+    InputError
+        If nodes have no partner; the message lists them, and says so where faces are swapped or the number of
+        sectors is another.
+    """
+    check_sectors("cyclic_sector", sectors)
+    faces = [face(structure.dofs, structure.dof_set(name), name) for name in (low, high)]
+    pairs = pair_faces(faces[0], faces[1], sectors, axis, tolerance)
+    return CyclicSector(structure, sectors, *pairs, axis)
+
+
+def travelling_wave(sector: CyclicSector, wave_number: int) -> Structure:
+    """Return the structure of all waves of a wave number (eq. 49), from one sector.
+
+    Parameters
+    ----------
+    sector
+        The sector.
+    wave_number
+        k of ``u^(n) = R^n u^(0) exp(2πi k n / n_s)``; any whole number, modulo the number of sectors.
+
+    Returns
+    -------
+    Structure
+        Complex Hermitian, real for standing waves; CSR where the sector's matrices are. Its coordinates are those of
+        the sector without the high face; sets whose dofs are among them survive. `basis` leads to the sector's
+        displacements, or to the model that was reduced to the sector.
+    """
+    tie = sector.wave_tie(wave_number)
+    structure = sector.structure
+    free = sector.independent
+    return Structure(
+        _hermitian(_projected(structure.mass, tie)),
+        _projected(structure.damping, tie),
+        _hermitian(_projected(structure.stiffness, tie)),
+        _wave_dofs(structure.dofs, free, tie[:, free.size :]),
+        surviving_sets(structure, free),
+        structure.expand(tie),
+    )
+
+
+def _projected(matrix: Matrix, tie: Matrix) -> Matrix:
+    product = tie.conj().T @ matrix @ tie
+    return scipy.sparse.csr_array(product) if scipy.sparse.issparse(matrix) else np.asarray(product)
+
+
+def _hermitian(matrix: Matrix) -> Matrix:
+    return (matrix + matrix.conj().T) / 2
+
+
+def _wave_dofs(dofs: Dofs, free: IntArray, whirl: Matrix) -> Dofs:
+    """Return the table of a travelling wave; a coordinate of the axis is named by the component it moves alone."""
+    kept = dofs.take(free)
+    if not whirl.shape[1]:
+        return kept
+    columns = scipy.sparse.csc_array(whirl)
+    moved = np.split(columns.indices, columns.indptr[1:-1])
+    more = dofs.take(np.array([rows[0] for rows in moved]))
+    names = tuple(dofs.component[rows[0]] if rows.size == 1 else "axis" for rows in moved)
+    return Dofs(
+        np.concatenate([kept.node, more.node]),
+        kept.component + names,
+        np.vstack([kept.position, more.position]),
+        kept.part + more.part,
+    )

@@ -1,0 +1,109 @@
+"""Rotation of the coordinates of nodes: vectors turn, everything else stays."""
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.errors import input_error
+from stickslip.model.dofs import Dofs
+
+COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
+ROUNDING = 1e-14  # entries of a rotation matrix below are sines of multiples of pi
+
+
+def node_table(dofs: Dofs) -> IntArray:
+    """Return the rows of the dof table that belong to each node.
+
+    Parameters
+    ----------
+    dofs
+        Any table. Nodes of different parts differ; coordinates without a node number (-1) belong together where they
+        share their position.
+
+    Returns
+    -------
+    numpy.ndarray
+        (p, 6) rows of the components ``x y z rx ry rz``, -1 where a node lacks one; modal and other scalar
+        coordinates do not appear.
+
+    Raises
+    ------
+    InputError
+        If a node has the same component twice.
+    """
+    code = {name: i for i, name in enumerate(COMPONENTS)}
+    component = np.array([code.get(name, -1) for name in dofs.component], dtype=np.int64)
+    vector = np.flatnonzero(component >= 0)
+    part = np.unique(np.array(dofs.part)[vector], return_inverse=True)[1].reshape(-1)
+    place = np.zeros(vector.size, dtype=np.int64)
+    loose = dofs.node[vector] < 0
+    if loose.any():
+        at = dofs.position[vector[loose]]
+        place[loose] = np.unique(at, axis=0, return_inverse=True)[1].reshape(-1)
+    keys = np.column_stack([part, dofs.node[vector], place])
+    first, owner = np.unique(keys, axis=0, return_index=True, return_inverse=True)[1:]
+    # nodes in the order in which the table names them first
+    rank = np.empty(first.size, dtype=np.int64)
+    rank[np.argsort(first)] = np.arange(first.size)
+    table = np.full((first.size, 6), -1, dtype=np.int64)
+    table[rank[owner.reshape(-1)], component[vector]] = vector
+    if np.count_nonzero(table >= 0) != vector.size:
+        twice = np.setdiff1d(vector, table)[0]
+        raise input_error(
+            "Dofs",
+            f"{dofs.labels[twice]} appears twice",
+            "Number the nodes differently, or give the parts names.",
+        )
+    return table
+
+
+def dof_rotation(dofs: Dofs, rotation: FloatArray, place: str) -> Matrix:
+    """Return the matrix that turns the displacement vector of `dofs`.
+
+    Parameters
+    ----------
+    dofs
+        Table of n coordinates.
+    rotation
+        (3, 3) rotation of vectors.
+    place
+        Who asks, for messages.
+
+    Returns
+    -------
+    scipy.sparse.csr_array
+        (n, n), one at coordinates that are no component of a vector.
+
+    Raises
+    ------
+    InputError
+        If a node lacks a component that the rotation mixes with one it has.
+    """
+    R = np.where(np.abs(rotation) < ROUNDING, 0.0, rotation)
+    table = node_table(dofs)
+    scalar = np.setdiff1d(np.arange(len(dofs)), table)
+    rows, columns, values = [scalar], [scalar], [np.ones(scalar.size)]
+    for vector in (table[:, :3], table[:, 3:]):
+        for a, b in zip(*np.nonzero(R), strict=True):
+            both = (vector[:, a] >= 0) & (vector[:, b] >= 0)
+            torn = (vector[:, a] >= 0) & ~both
+            if torn.any():
+                raise _torn(dofs, int(vector[torn, a][0]), COMPONENTS[b], place)
+            rows.append(vector[both, a])
+            columns.append(vector[both, b])
+            values.append(np.full(np.count_nonzero(both), R[a, b]))
+    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    return scipy.sparse.csr_array(entries, shape=(len(dofs), len(dofs)))
+
+
+def _torn(dofs: Dofs, row: int, missing: str, place: str) -> Exception:
+    return input_error(
+        place,
+        f"node {dofs.node[row]} at {_point(dofs.position[row])} has {dofs.component[row]} without "
+        f"{missing}, and the rotation from sector to sector mixes the two",
+        "Clamp all components of a node or none, or give the sector identity frames (axis=None).",
+    )
+
+
+def _point(position: FloatArray) -> str:
+    return "(" + ", ".join(f"{v:.6g}" for v in position) + ") m"
