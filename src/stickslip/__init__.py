@@ -21,11 +21,7 @@ if TYPE_CHECKING:
     from stickslip.contact.laws.dahl import Dahl
     from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
     from stickslip.contact.laws.iwan import Iwan
-    from stickslip.contact.laws.iwan_populations import (
-        FirstLoading,
-        FourParameter,
-        UniformBand,
-    )
+    from stickslip.contact.laws.iwan_populations import FirstLoading, FourParameter, UniformBand
     from stickslip.contact.laws.jenkins import Jenkins
     from stickslip.contact.laws.polynomial_spring import PolynomialSpring
     from stickslip.contact.laws.regularised_coulomb import RegularisedCoulomb
@@ -38,113 +34,52 @@ if TYPE_CHECKING:
         paired_interface,
         segment_to_segment,
     )
-    from stickslip.contact.surface import (
-        Surface,
-        nodal_surface,
-        rigid_surface,
-        structure_surface,
-    )
-    from stickslip.errors import (
-        InputError,
-        SingularError,
-        StickslipError,
-    )
+    from stickslip.contact.surface import Surface, nodal_surface, rigid_surface, structure_surface
+    from stickslip.errors import InputError, SingularError, StickslipError
     from stickslip.harmonic.aft import contact_forces
     from stickslip.harmonic.balance import harmonic_balance
     from stickslip.harmonic.compliance import ComplianceForm
     from stickslip.harmonic.dlft import dynamic_lagrangian
     from stickslip.harmonic.dynamic_stiffness import condense
     from stickslip.harmonic.excitation import HarmonicLoad
+    from stickslip.model.annulus import annular_sector
     from stickslip.model.axis import Axis
     from stickslip.model.blade_mesh import mesh_blade_pair
     from stickslip.model.blade_pair import BladePair
-    from stickslip.model.damper import (
-        ContactPoints,
-        FlatCurvedDamper,
-        gap_operator,
-    )
+    from stickslip.model.damper import ContactPoints, FlatCurvedDamper, gap_operator
     from stickslip.model.damping import rayleigh_damping
+    from stickslip.model.deck import CalculixRun, write_deck
     from stickslip.model.dofs import Dofs
     from stickslip.model.elements import Quadrature
-    from stickslip.model.gyroscopic import (
-        GyroscopicModes,
-        gyroscopic_modes,
-    )
-    from stickslip.model.lumped import (
-        chain,
-        lumped,
-    )
-    from stickslip.model.mesh import (
-        SolidMesh,
-        write_mesh,
-    )
-    from stickslip.model.modes import (
-        Modes,
-        natural_frequencies,
-        normal_modes,
-    )
+    from stickslip.model.gyroscopic import GyroscopicModes, gyroscopic_modes
+    from stickslip.model.lumped import chain, lumped
+    from stickslip.model.mesh import SolidMesh, write_mesh
+    from stickslip.model.modes import Modes, natural_frequencies, normal_modes
     from stickslip.model.rigid_body import RigidBody
-    from stickslip.model.rotation import (
-        RotatingSolid,
-        SpeedPolynomial,
-        rotating_solid,
-    )
-    from stickslip.model.solid import (
-        Material,
-        assemble_solid,
-    )
-    from stickslip.model.structure import (
-        Structure,
-        join,
-    )
-    from stickslip.model.structure_file import (
-        load_structure,
-        save_structure,
-    )
+    from stickslip.model.rotation import RotatingSolid, SpeedPolynomial, rotating_solid
+    from stickslip.model.sector import BladedSector
+    from stickslip.model.sector_mesh import mesh_sector
+    from stickslip.model.sector_parts import Airfoil, DiskProfile, Platform, Shroud
+    from stickslip.model.solid import Material, assemble_solid
+    from stickslip.model.structure import Structure, join
+    from stickslip.model.structure_file import load_structure, save_structure
     from stickslip.reduction.craig_bampton import craig_bampton
     from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
+    from stickslip.reduction.lumped_disks import blade_ring, blisk_with_ring, mistuned_blade_ring
     from stickslip.reduction.relative import in_relative_coordinates
-    from stickslip.reduction.waves import (
-        Wave,
-        excited_wave,
-        to_sectors,
-        to_waves,
-        wave,
-    )
+    from stickslip.reduction.waves import Wave, excited_wave, to_sectors, to_waves, wave
     from stickslip.reduction.wheel import wheel, wheel_shape
     from stickslip.report.page import write_report
-    from stickslip.response.campbell import (
-        Campbell,
-        Crossing,
-        campbell,
-    )
-    from stickslip.response.drift import (
-        Drift,
-        drift,
-    )
-    from stickslip.response.fields import (
-        Fields,
-        Signals,
-        fields,
-        signals,
-    )
+    from stickslip.response.campbell import Campbell, Crossing, campbell
+    from stickslip.response.cyclic_campbell import cyclic_campbell
+    from stickslip.response.drift import Drift, drift
+    from stickslip.response.fields import Fields, Signals, fields, signals
     from stickslip.response.forced import forced_response
-    from stickslip.response.nodal_diameters import NodalDiameterMap
-    from stickslip.response.parameter import (
-        Discretisation,
-        ParameterPoint,
-        branch_in_parameter,
-    )
+    from stickslip.response.nodal_diameters import NodalDiameterMap, nodal_diameter_map
+    from stickslip.response.parameter import Discretisation, ParameterPoint, branch_in_parameter
     from stickslip.response.preload import preload
-    from stickslip.response.rigid import (
-        RigidPoint,
-        rigid_response,
-    )
-    from stickslip.response.safe import (
-        Interference,
-        Safe,
-        safe,
-    )
+    from stickslip.response.rigid import RigidPoint, rigid_response
+    from stickslip.response.safe import Interference, Safe, safe
     from stickslip.response.sweep import (
         ForcedPoint,
         ForcedProblem,
@@ -153,26 +88,12 @@ if TYPE_CHECKING:
         forced_problem,
     )
     from stickslip.response.system import System
-    from stickslip.response.tracking import (
-        PeakPoint,
-        smallest_peak,
-        track_peak,
-    )
-    from stickslip.response.transient import (
-        TimeStepping,
-        TransientResult,
-        integrate,
-    )
-    from stickslip.solve.newton import (
-        Newton,
-        newton,
-    )
+    from stickslip.response.tracking import PeakPoint, smallest_peak, track_peak
+    from stickslip.response.transient import TimeStepping, TransientResult, integrate
+    from stickslip.solve.newton import Newton, newton
     from stickslip.solve.status import Status
     from stickslip.study.run import run_study
-    from stickslip.study.schema import (
-        Study,
-        read_study,
-    )
+    from stickslip.study.schema import Study, read_study
 
 _MODULES = {
     "stickslip.contact.check_law": ("check_law",),
@@ -207,11 +128,13 @@ _MODULES = {
     "stickslip.harmonic.dlft": ("dynamic_lagrangian",),
     "stickslip.harmonic.dynamic_stiffness": ("condense",),
     "stickslip.harmonic.excitation": ("HarmonicLoad",),
+    "stickslip.model.annulus": ("annular_sector",),
     "stickslip.model.axis": ("Axis",),
     "stickslip.model.blade_mesh": ("mesh_blade_pair",),
     "stickslip.model.blade_pair": ("BladePair",),
     "stickslip.model.damper": ("ContactPoints", "FlatCurvedDamper", "gap_operator"),
     "stickslip.model.damping": ("rayleigh_damping",),
+    "stickslip.model.deck": ("CalculixRun", "write_deck"),
     "stickslip.model.dofs": ("Dofs",),
     "stickslip.model.elements": ("Quadrature",),
     "stickslip.model.gyroscopic": ("GyroscopicModes", "gyroscopic_modes"),
@@ -220,20 +143,25 @@ _MODULES = {
     "stickslip.model.modes": ("Modes", "natural_frequencies", "normal_modes"),
     "stickslip.model.rigid_body": ("RigidBody",),
     "stickslip.model.rotation": ("RotatingSolid", "SpeedPolynomial", "rotating_solid"),
+    "stickslip.model.sector": ("BladedSector",),
+    "stickslip.model.sector_mesh": ("mesh_sector",),
+    "stickslip.model.sector_parts": ("Airfoil", "DiskProfile", "Platform", "Shroud"),
     "stickslip.model.solid": ("Material", "assemble_solid"),
     "stickslip.model.structure": ("Structure", "join"),
     "stickslip.model.structure_file": ("load_structure", "save_structure"),
     "stickslip.reduction.craig_bampton": ("craig_bampton",),
     "stickslip.reduction.cyclic": ("CyclicSector", "cyclic_sector", "travelling_wave"),
+    "stickslip.reduction.lumped_disks": ("blade_ring", "blisk_with_ring", "mistuned_blade_ring"),
     "stickslip.reduction.relative": ("in_relative_coordinates",),
     "stickslip.reduction.waves": ("Wave", "excited_wave", "to_sectors", "to_waves", "wave"),
     "stickslip.reduction.wheel": ("wheel", "wheel_shape"),
     "stickslip.report.page": ("write_report",),
     "stickslip.response.campbell": ("Campbell", "Crossing", "campbell"),
+    "stickslip.response.cyclic_campbell": ("cyclic_campbell",),
     "stickslip.response.drift": ("Drift", "drift"),
     "stickslip.response.fields": ("Fields", "Signals", "fields", "signals"),
     "stickslip.response.forced": ("forced_response",),
-    "stickslip.response.nodal_diameters": ("NodalDiameterMap",),
+    "stickslip.response.nodal_diameters": ("NodalDiameterMap", "nodal_diameter_map"),
     "stickslip.response.parameter": ("Discretisation", "ParameterPoint", "branch_in_parameter"),
     "stickslip.response.preload": ("preload",),
     "stickslip.response.rigid": ("RigidPoint", "rigid_response"),
@@ -256,10 +184,13 @@ _MODULES = {
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
+    "Airfoil",
     "Axis",
     "BladePair",
+    "BladedSector",
     "Bonded",
     "BoucWen",
+    "CalculixRun",
     "Campbell",
     "ComplianceForm",
     "ContactPoints",
@@ -269,6 +200,7 @@ __all__ = [
     "CyclicSector",
     "Dahl",
     "Discretisation",
+    "DiskProfile",
     "Dofs",
     "Drift",
     "ElasticCoulomb",
@@ -292,6 +224,7 @@ __all__ = [
     "Pairing",
     "ParameterPoint",
     "PeakPoint",
+    "Platform",
     "PolynomialSpring",
     "Quadrature",
     "RegularisedCoulomb",
@@ -300,6 +233,7 @@ __all__ = [
     "RigidPoint",
     "RotatingSolid",
     "Safe",
+    "Shroud",
     "Signals",
     "SingularError",
     "SolidMesh",
@@ -318,7 +252,10 @@ __all__ = [
     "Wave",
     "__version__",
     "accepted_points",
+    "annular_sector",
     "assemble_solid",
+    "blade_ring",
+    "blisk_with_ring",
     "branch_in_parameter",
     "campbell",
     "chain",
@@ -327,6 +264,7 @@ __all__ = [
     "condense",
     "contact_forces",
     "craig_bampton",
+    "cyclic_campbell",
     "cyclic_sector",
     "drift",
     "dynamic_lagrangian",
@@ -344,8 +282,11 @@ __all__ = [
     "load_structure",
     "lumped",
     "mesh_blade_pair",
+    "mesh_sector",
+    "mistuned_blade_ring",
     "natural_frequencies",
     "newton",
+    "nodal_diameter_map",
     "nodal_surface",
     "node_to_node",
     "node_to_segment",
@@ -371,6 +312,7 @@ __all__ = [
     "wave",
     "wheel",
     "wheel_shape",
+    "write_deck",
     "write_mesh",
     "write_report",
 ]
