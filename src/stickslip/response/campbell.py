@@ -14,7 +14,7 @@ from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
 
 CLEAR = 0.7  # modal assurance below which a step in speed is halved
-HALVINGS = 5  # of a step; two modes may change places as slowly as they like
+HALVINGS = 5  # of a step: a veering narrower than a thirtieth of it counts as a crossing
 SPARE = 4  # modes beyond those followed, so that one that rises among them can leave
 NEARNESS = 1e-3  # weight of a relative step in frequency beside the assurance: it decides where shapes do not
 SAME = 1e-6  # relative distance of frequencies whose shapes are one space: equal blades, a wheel's pairs
@@ -167,8 +167,8 @@ def campbell(
     Returns
     -------
     Campbell
-        A step in speed over which a shape changes much is halved up to five times, so that modes that veer apart keep their names and
-        those that cross exchange theirs. What is left of doubt stands in `agreement`.
+        A step over which a shape changes much, or two modes change places, is halved up to five times: modes that veer apart keep
+        their places, modes that cross keep their shapes. What is left of doubt stands in `agreement`.
 
     Raises
     ------
@@ -272,14 +272,21 @@ def _equal(one: FloatArray, other: FloatArray) -> BoolArray:
 
 
 def _follow(family: _Speeds, before: _Spectrum, speed: float, halvings: int) -> _Spectrum:
-    """Return the modes `before` at another speed, by way of speeds between where shapes change much."""
+    """Return the modes `before` at another speed, by way of speeds between where shapes or the order of modes change."""
     matched = _matched(before, family.at(speed))
-    if halvings == 0 or np.all(matched.agreement >= CLEAR):
+    clear = np.all(matched.agreement >= CLEAR) and not _exchanged(before.hertz, matched.hertz)
+    if halvings == 0 or clear:
         return matched
     between = _follow(family, before, 0.5 * (before.speed + speed), halvings - 1)
     after = _follow(family, between, speed, halvings - 1)
     least = np.minimum(between.agreement, after.agreement)
     return after.take(np.arange(least.size), least)
+
+
+def _exchanged(before: FloatArray, after: FloatArray) -> bool:
+    """Whether two modes seem to have crossed: a veering would look the same from afar."""
+    gaps = [np.where(_equal(f, f), 0.0, f[:, None] - f) for f in (before, after)]
+    return bool(np.any(gaps[0] * gaps[1] < 0.0))
 
 
 def _crossings(

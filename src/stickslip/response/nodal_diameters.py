@@ -1,11 +1,16 @@
 """Natural frequencies of a bladed disk by nodal diameter."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
+from stickslip.model.gyroscopic import gyroscopic_modes
+from stickslip.model.modes import normal_modes
+from stickslip.model.structure import Structure
+from stickslip.reduction.cyclic import CyclicSector, travelling_wave
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,3 +54,71 @@ class NodalDiameterMap:
         backward = 2 * k <= self.sectors
         table = self.frequencies_hz if backward else self.forward_hz
         return np.asarray(table[self.row(k if backward else self.sectors - k)])
+
+
+def nodal_diameter_map(
+    sector: CyclicSector,
+    n_modes: int,
+    nodal_diameters: Sequence[int] | None = None,
+    *,
+    coriolis: bool = False,
+    shapes: bool = False,
+    progress: Callable[[int], None] | None = None,
+) -> NodalDiameterMap:
+    """Return the lowest natural frequencies of a wheel by nodal diameter.
+
+    Parameters
+    ----------
+    sector
+        One sector, at rest or at speed.
+    n_modes
+        Frequencies of each nodal diameter.
+    nodal_diameters
+        Ascending; all if not given.
+    coriolis
+        Whether the skew part of the sector's damping counts, which parts backward from forward waves.
+    shapes
+        Whether to keep the mode shapes of `frequencies_hz`.
+    progress
+        Called with each nodal diameter when it is done.
+
+    Raises
+    ------
+    InputError
+        If there is no such nodal diameter, or fewer modes than asked for.
+    """
+    half = sector.sectors // 2
+    diameters = np.arange(half + 1) if nodal_diameters is None else np.asarray(nodal_diameters)
+    if not diameters.size or diameters.min() < 0 or diameters.max() > half or np.any(np.diff(diameters) <= 0):  # fmt: skip
+        raise input_error(
+            "nodal_diameter_map: nodal_diameters",
+            f"must ascend from 0 to at most {half}, got {diameters[:8].tolist()}",
+            f"A wheel of {sector.sectors} sectors has no others.",
+        )
+    backward, forward, kept = [], [], []
+    for diameter in diameters.tolist():
+        hertz, vectors = _wave_modes(travelling_wave(sector, diameter), n_modes, coriolis)
+        backward.append(hertz)
+        kept.append(vectors)
+        if coriolis and 0 < 2 * diameter < sector.sectors:
+            hertz, _ = _wave_modes(travelling_wave(sector, -diameter), n_modes, True)
+        forward.append(hertz)
+        if progress is not None:
+            progress(diameter)
+    return NodalDiameterMap(
+        sector.sectors,
+        diameters.astype(np.int64),
+        np.array(backward),
+        np.array(forward),
+        tuple(kept) if shapes else None,
+    )
+
+
+def _wave_modes(
+    structure: Structure, n_modes: int, coriolis: bool
+) -> tuple[FloatArray, FloatArray | ComplexArray]:
+    if coriolis:
+        turning = gyroscopic_modes(structure, n_modes)
+        return turning.frequencies_hz, turning.shapes
+    modes = normal_modes(structure, n_modes)
+    return modes.frequencies_hz, modes.shapes

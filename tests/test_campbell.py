@@ -1,0 +1,239 @@
+"""Campbell diagrams against closed forms: crossings, modes followed through crossings and veerings, Coriolis forces."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.sparse
+
+import stickslip as ss
+
+SPIN = np.array([[0.0, -1.0], [1.0, 0.0]])
+TWO_PI = 2 * np.pi
+
+
+def of_squares(*squares):
+    """Single masses of one kilogram on springs."""
+    return ss.lumped(np.ones(len(squares)), np.diag(squares))
+
+
+def rotor(speed, omega=10.0):
+    """A mass on isotropic springs at rest, seen from the rotating frame: frequencies |ω ± Ω|."""
+    at_rest = of_squares(omega**2 - speed**2, omega**2 - speed**2)
+    return at_rest.with_damping(2 * speed * SPIN)
+
+
+def stiffened(speed):
+    """Two modes that rise with speed and a constant one in their way: ω² = 1 + 2Ω², 4, 9 + Ω²/2."""
+    return of_squares(1 + 2 * speed**2, 4.0, 9 + 0.5 * speed**2)
+
+
+def test_modes_that_cross_keep_their_columns():
+    speeds = np.linspace(0.0, 3.0, 4)
+    found = ss.campbell(stiffened, speeds, 3).frequencies_hz * TWO_PI
+    exact = np.sqrt(np.column_stack([1 + 2 * speeds**2, 4 + 0 * speeds, 9 + 0.5 * speeds**2]))
+    np.testing.assert_allclose(found, exact, rtol=1e-12)
+
+
+@pytest.mark.parametrize("steps", [3, 9, 40])
+def test_modes_that_veer_do_not_change_places(steps):
+    # seen from the ends of a step alone the shapes seem to cross: they turn within 0.03 of the speed
+    def coupled(speed):
+        return ss.lumped(np.ones(2), np.array([[1 + speed**2, 0.05], [0.05, 4.0]]))
+
+    found = ss.campbell(coupled, np.linspace(0.0, 3.0, steps), 2)
+    assert np.all(np.diff(found.frequencies_hz, axis=1) > 0)
+    if steps > 3:
+        assert np.min(found.agreement) > 0.7
+
+
+def test_crossings_to_the_tolerance():
+    # (mΩ)² = 1 + 2Ω² and = 4: closed forms
+    found = ss.campbell(stiffened, np.linspace(0.0, 3.0, 4), 2, (1, 2, 3), tolerance=1e-9)
+    exact = {
+        (2, 0): np.sqrt(1 / 2),
+        (3, 0): np.sqrt(1 / 7),
+        (1, 1): 2.0,
+        (2, 1): 1.0,
+        (3, 1): 2 / 3,
+    }
+    speeds = {(c.engine_order, c.mode): c.speed for c in found.crossings}
+    assert speeds.keys() == exact.keys()  # order 1 never meets the first: 1 + 2Ω² > Ω²
+    for which, speed in exact.items():
+        assert speeds[which] == pytest.approx(speed, rel=1e-8), which
+    for crossing in found.crossings:
+        assert crossing.frequency_hz * TWO_PI == pytest.approx(
+            crossing.engine_order * crossing.speed
+        )
+    assert [c.engine_order for c in found.crossings] == sorted(
+        c.engine_order for c in found.crossings
+    )
+
+
+def test_a_looser_tolerance_costs_fewer_structures():
+    def counted(tolerance):
+        asked = []
+
+        def at(speed):
+            asked.append(speed)
+            return stiffened(speed)
+
+        ss.campbell(at, [0.0, 1.4], 1, (2,), tolerance=tolerance)
+        return len(asked)
+
+    assert counted(1e-2) < counted(1e-10)
+
+
+def test_isotropic_rotor_in_the_rotating_frame():
+    speeds = np.linspace(0.0, 8.0, 5)
+    found = ss.campbell(rotor, speeds, 2, (1, 3), coriolis=True)
+    together = np.sort(found.frequencies_hz * TWO_PI, axis=1)
+    np.testing.assert_allclose(together, np.column_stack([10 - speeds, 10 + speeds]), atol=1e-12)
+    # 10 ± Ω = mΩ
+    crossed = sorted((c.engine_order, round(c.speed, 5)) for c in found.crossings)
+    assert crossed == [(1, 5.0), (3, 2.5), (3, 5.0)]
+    without = ss.campbell(rotor, speeds, 2)
+    np.testing.assert_allclose(without.frequencies_hz[-1] * TWO_PI, 6.0)
+
+
+def test_rotor_beyond_its_critical_speed_is_stable_by_coriolis_forces_alone():
+    modes = ss.gyroscopic_modes(rotor(25.0), 2)
+    np.testing.assert_allclose(modes.frequencies_hz * TWO_PI, [15.0, 35.0], rtol=1e-9)
+    np.testing.assert_allclose(modes.growth, 0.0, atol=1e-6)
+    assert np.all(ss.campbell(rotor, [25.0], 2).frequencies_hz < 0)  # diverges without them
+
+
+def gyroscopic_chain(n, speed=1.0):
+    """Sparse chain of n planar masses with Coriolis forces between their two directions."""
+    K = scipy.sparse.diags_array(
+        [-np.ones(n - 1), 2 * np.ones(n), -np.ones(n - 1)], offsets=[-1, 0, 1]
+    )
+    K = scipy.sparse.kron(K, np.diag([1.0, 1.7])) * 1e4
+    # as if the masses lay farther and farther from the axis of rotation: not the same for all, so that modes mix
+    G = scipy.sparse.kron(scipy.sparse.diags_array(np.linspace(0.0, 1.0, n)), SPIN) * 2 * speed
+    dofs = ss.Dofs(np.arange(2 * n), ("x", "y") * n, np.zeros((2 * n, 3)))
+    parts = (scipy.sparse.csr_array(a) for a in (scipy.sparse.eye_array(2 * n), G, K))
+    return ss.Structure(*parts, dofs)
+
+
+def quadratic(structure):
+    """All frequencies of the quadratic problem, from the general companion matrix."""
+    M, C, K = (a.toarray() for a in (structure.mass, structure.damping, structure.stiffness))
+    state = np.block(
+        [[np.zeros_like(K), np.eye(len(K))], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]]
+    )
+    rates = scipy.linalg.eigvals(state)
+    return np.sort(rates.imag[rates.imag > 0]) / TWO_PI
+
+
+def test_small_structures_are_solved_whole():
+    structure = gyroscopic_chain(20, speed=3.0)
+    modes = ss.gyroscopic_modes(structure, 40)
+    np.testing.assert_allclose(modes.frequencies_hz, quadratic(structure), rtol=1e-9)
+    omega = TWO_PI * modes.frequencies_hz
+    K, G, M = (a.toarray() for a in (structure.stiffness, structure.damping, structure.mass))
+    left = K @ modes.shapes + 1j * G @ modes.shapes * omega - M @ modes.shapes * omega**2
+    assert np.max(np.abs(left)) < 1e-7 * np.max(np.abs(K))
+    np.testing.assert_allclose(np.sum(np.abs(modes.shapes) ** 2, axis=0), 1.0)
+
+
+def test_static_answers_make_a_modal_basis_converge():
+    structure = gyroscopic_chain(201, speed=3.0)
+    exact = quadratic(structure)[:6]
+    enriched = ss.gyroscopic_modes(structure, 6, n_basis=12).frequencies_hz
+    # the same twelve modes without the answers
+    K, G, M = (a.toarray() for a in (structure.stiffness, structure.damping, structure.mass))
+    _, basis = scipy.linalg.eigh(K, M, subset_by_index=(0, 11))
+    small = [scipy.sparse.csr_array(basis.T @ a @ basis) for a in (M, G, K)]
+    dofs = ss.Dofs(np.arange(12), ("mode",) * 12, np.zeros((12, 3)))
+    modal = quadratic(ss.Structure(*small, dofs))[:6]
+    shift = np.max(np.abs(exact - ss.natural_frequencies(structure, 6)))
+    assert np.max(np.abs(enriched - exact)) < 1e-3 * shift
+    assert np.max(np.abs(enriched - exact)) <= np.max(np.abs(modal - exact))
+
+
+def turning_ring(speed, sectors=7, blades=1.0):
+    """Planar masses on a circle, springs to ground and neighbours, Coriolis forces: radial and tangential motion."""
+    own, tie = blades * np.diag([4.0, 2.5]) - speed**2 * np.eye(2), np.diag([0.6, 0.3])
+    K = np.block([[own + tie, -tie], [-tie, tie]])
+    C, M = np.zeros((4, 4)), np.zeros((4, 4))
+    C[:2, :2], M[:2, :2] = 2 * speed * SPIN, np.eye(2)
+    dofs = ss.Dofs(np.array([0, 0, 1, 1]), ("radial", "tangential") * 2, np.zeros((4, 3)))
+    return ss.CyclicSector(
+        ss.Structure(M, C, K, dofs), sectors, np.array([0, 1]), np.array([2, 3]), axis=None
+    )
+
+
+def test_waves_of_both_senses_are_the_whole_wheel():
+    sector = turning_ring(0.8)
+    table = ss.nodal_diameter_map(sector, 2, coriolis=True)
+    assert np.all(table.forward_hz[0] == table.frequencies_hz[0])
+    both = [table.frequencies_hz, table.forward_hz[1:]]
+    whole = ss.gyroscopic_modes(ss.wheel(sector), 14).frequencies_hz
+    np.testing.assert_allclose(
+        np.sort(np.concatenate([b.ravel() for b in both])), whole, rtol=1e-10
+    )
+
+
+def test_engine_orders_meet_the_wave_they_excite():
+    # orders 2 and 5 excite waves 2 and 5: backward and forward with two nodal diameters on seven sectors
+    diagrams = ss.cyclic_campbell(
+        turning_ring, np.linspace(0.0, 1.2, 5), 2, (2, 5, 9), coriolis=True
+    )
+    assert [d.wave_number for d in diagrams] == [2, 5]
+    assert [d.nodal_diameter for d in diagrams] == [2, 2]
+    assert {c.engine_order for c in diagrams[0].crossings} == {2, 9}
+    assert {c.engine_order for c in diagrams[1].crossings} == {5}
+    merged = ss.cyclic_campbell(turning_ring, np.linspace(0.0, 1.2, 5), 2, (2, 5, 9))
+    assert [d.wave_number for d in merged] == [2]
+    assert {c.engine_order for c in merged[0].crossings} == {2, 5, 9}
+
+
+def test_hub_on_springs_whirls_at_one_frequency_for_who_stands_still():
+    # a hub shared by all sectors: k = 1 and k = n_s - 1 are its backward and forward whirl
+    def hub(speed, sectors=5):
+        structure = rotor(speed)
+        dofs = ss.Dofs(np.zeros(2, dtype=int), ("x", "y"), np.zeros((2, 3)))
+        return ss.CyclicSector(replace(structure, dofs=dofs), sectors, np.arange(2), np.arange(2))
+
+    # each sector has its share of the hub, here all of its mass and stiffness: frequencies do not change
+    speeds = np.linspace(0.0, 8.0, 5)
+    backward, forward = ss.cyclic_campbell(hub, speeds, 1, (1, 4), coriolis=True)
+    np.testing.assert_allclose(backward.frequencies_hz[:, 0] * TWO_PI, 10 + speeds, rtol=1e-9)
+    np.testing.assert_allclose(forward.frequencies_hz[:, 0] * TWO_PI, 10 - speeds, rtol=1e-9)
+    for diagram in (backward, forward):
+        np.testing.assert_allclose(diagram.stationary_hz * TWO_PI, 10.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "place"),
+    [
+        ({"speeds": [2.0, 1.0]}, "speeds"),
+        ({"speeds": [-1.0, 1.0]}, "speeds"),
+        ({"n_modes": 0}, "n_modes"),
+        ({"n_modes": 4}, "n_modes"),
+        ({"engine_orders": (0,)}, "engine_orders"),
+        ({"engine_orders": (1.5,)}, "engine_orders"),
+    ],
+)
+def test_wrong_input_is_named(change, place):
+    arguments = {"speeds": [0.0, 1.0], "n_modes": 2, "engine_orders": (1,)} | change
+    with pytest.raises(ss.InputError, match=place):
+        ss.campbell(stiffened, **arguments)
+
+
+def test_reduced_structures_are_compared_in_the_full_model():
+    # each speed has its own reduction: coordinates differ, the blade does not
+    def reduced(speed):
+        K = 3.0 * np.eye(8) - np.eye(8, k=1) - np.eye(8, k=-1)
+        full = ss.lumped(np.ones(8), K + np.diag(np.arange(8.0)) * 0.2 * speed**2)
+        return ss.craig_bampton(full, np.array([0]), 7)
+
+    def full(speed):
+        K = 3.0 * np.eye(8) - np.eye(8, k=1) - np.eye(8, k=-1)
+        return ss.lumped(np.ones(8), K + np.diag(np.arange(8.0)) * 0.2 * speed**2)
+
+    speeds = np.linspace(0.0, 3.0, 4)
+    one, other = (ss.campbell(f, speeds, 3) for f in (reduced, full))
+    np.testing.assert_allclose(one.frequencies_hz, other.frequencies_hz, rtol=1e-10)
