@@ -1,0 +1,170 @@
+"""Matrices that CalculiX stores with ``*FREQUENCY, SOLVER=MATRIXSTORAGE``: ``.sti``, ``.mas``, ``.dof``."""
+
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import IntArray, Matrix
+from stickslip.errors import input_error
+from stickslip.model.mesh import SolidMesh
+from stickslip.model.readers.entries import SYMMETRY, from_triangle
+from stickslip.model.readers.node_table import COMPONENTS
+from stickslip.model.readers.positions import find_nodes
+from stickslip.model.readers.text import CUT_SHORT, number_table, read_text, whole_numbers
+from stickslip.model.readers.units import Units, check_units, in_si
+from stickslip.model.structure import Structure
+
+SUFFIXES = {".sti": "stiffness", ".mas": "mass", ".dof": "list of dofs"}
+
+
+def read_calculix_matrices(
+    path: Path | str,
+    *,
+    units: Units,
+    mesh: SolidMesh | Path | str | None = None,
+    mass: Path | str | None = None,
+    plausible: bool = True,
+) -> Structure:
+    """Read stiffness and mass that CalculiX stored.
+
+    Parameters
+    ----------
+    path
+        The job's name without suffix, or one of its files; gzipped ones (``.sti.gz``) are read as well.
+    units
+        Unit system of the model.
+    mesh
+        Where the nodes lie, which the matrices do not say: the deck (``.inp``), the results (``.frd``), a CSV file with
+        the columns ``node, x, y, z`` or a mesh in metres; the job's deck by default. Its node sets become sets of dofs.
+    mass
+        The ``.mas`` file where it is another job's: CalculiX stores the same mass at rest and preloaded.
+    plausible
+        False takes mass and size as they are, though they do not fit together.
+
+    Returns
+    -------
+    Structure
+        Sparse, undamped, in SI, dofs in the order of the ``.dof`` file. The matrices of a cyclic job are complex
+        Hermitian: those of a travelling wave on the nodes that the cyclic tie left.
+
+    Raises
+    ------
+    InputError
+        If a file is missing, cut short or of another run, or the positions are unknown.
+    """
+    stem = _stem(Path(path))
+    node, component = _read_dof(_find(stem, ".dof"))
+    n = len(node)
+    nodes = find_nodes(_deck(stem) if mesh is None else mesh, units)
+    dofs = nodes.dofs(node, component)
+    stiffness = _read_matrix(_find(stem, ".sti"), n)
+    inertia = _read_matrix(_find(stem, ".mas") if mass is None else Path(mass), n)
+    if np.iscomplexobj(stiffness) != np.iscomplexobj(inertia):
+        raise input_error(
+            str(mass or stem),
+            "one of mass and stiffness is of a cyclic job, the other is not",
+            "Give both of the same kind of job.",
+        )
+    damping = scipy.sparse.csr_array((n, n))
+    raw = Structure(inertia, damping, stiffness, dofs, nodes.dof_sets(dofs))
+    structure = in_si(raw, units)
+    if plausible:
+        check_units(structure, units, str(stem))
+    return structure
+
+
+def _stem(path: Path) -> Path:
+    plain = path.with_suffix("") if path.suffix == ".gz" else path
+    return plain.with_suffix("") if plain.suffix in SUFFIXES else plain
+
+
+def _find(stem: Path, suffix: str) -> Path:
+    """Return the job's file, plain or gzipped."""
+    plain = stem.with_name(stem.name + suffix)
+    packed = stem.with_name(stem.name + suffix + ".gz")
+    for path in (plain, packed):
+        if path.is_file():
+            return path
+    raise input_error(
+        str(plain),
+        f"the {SUFFIXES[suffix]} is not there",
+        "Run CalculiX with *FREQUENCY, SOLVER=MATRIXSTORAGE"
+        + (", or give mass=… of the job that has it." if suffix == ".mas" else "."),
+    )
+
+
+def _deck(stem: Path) -> Path:
+    path = stem.with_name(stem.name + ".inp")
+    if path.is_file():
+        return path
+    raise input_error(
+        str(stem),
+        "positions of the nodes are not in the matrices, and no deck of the same name is beside them",
+        "Give mesh=… (a deck .inp, results .frd, a CSV of nodes, or a mesh).",
+    )
+
+
+def _read_dof(path: Path) -> tuple[IntArray, list[str]]:
+    """Return node and component of each equation from lines ``node.direction``."""
+    text = read_text(path)
+    _check_end(path, text)
+    nodes, components = [], []
+    for number, line in enumerate(text.splitlines(), 1):
+        node, _, direction = line.strip().partition(".")
+        if not (node.isdecimal() and direction in {"1", "2", "3", "4", "5", "6"}):
+            raise input_error(
+                f"{path}: line {number}",
+                f"needs node.direction, got {line[:60]!r}",
+                "Give the .dof file of CalculiX.",
+            )
+        nodes.append(int(node))
+        components.append(COMPONENTS[int(direction) - 1])
+    pairs = set(zip(nodes, components, strict=True))
+    if not nodes or len(pairs) < len(nodes):
+        raise input_error(
+            str(path), "names a dof twice, or none", "Give the .dof file of a single run."
+        )
+    return np.array(nodes, dtype=np.int64), components
+
+
+def _check_end(path: Path, text: str) -> None:
+    """Refuse a file whose last line has no end: a number may be cut in two."""
+    if not text.endswith("\n"):
+        raise input_error(str(path), "ends in the middle of a line", CUT_SHORT)
+
+
+def _read_matrix(path: Path, n: int) -> Matrix:
+    """Return the (n, n) matrix of lines ``row column value``, complex where the file holds twice the equations."""
+    text = read_text(path)
+    _check_end(path, text)
+    table = number_table(path, text, 3)
+    index = whole_numbers(path, table, ("row", "column")) - 1
+    size = int(index.max()) + 1 if len(index) else 0
+    if size not in (n, 2 * n):
+        raise input_error(
+            str(path),
+            f"is of {size} equations, the .dof file lists {n}",
+            "The files belong to different runs, or one is cut short.",
+        )
+    matrix = from_triangle(index[:, 0], index[:, 1], table[:, 2], size, str(path))
+    stored = np.zeros(size, dtype=bool)
+    stored[index[index[:, 0] == index[:, 1], 0]] = True
+    if not stored.all():
+        raise input_error(
+            str(path), f"lacks the diagonal of equation {np.flatnonzero(~stored)[0] + 1}", CUT_SHORT
+        )
+    return matrix if size == n else _complex(matrix, n, path)
+
+
+def _complex(pair: Matrix, n: int, path: Path) -> Matrix:
+    """Return the Hermitian matrix that a cyclic job stores as ``[[R, -I], [I, R]]``."""
+    real, repeated, minus = pair[:n, :n], pair[n:, n:], pair[:n, n:]
+    scale = float(abs(real).max())
+    if max(float(abs(real - repeated).max()), float(abs(minus + minus.T).max())) > SYMMETRY * scale:
+        raise input_error(
+            str(path),
+            f"has twice the {n} equations of the .dof file, but is not the pair of a travelling wave",
+            "Give the files of one cyclic job with a single nodal diameter (NMIN = NMAX).",
+        )
+    return scipy.sparse.csr_array(real - 1j * minus)

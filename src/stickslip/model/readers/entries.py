@@ -1,0 +1,83 @@
+"""Symmetric matrices from lists of entries (row, column, value), checked."""
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.errors import input_error
+
+SYMMETRY = 1e-9  # relative to the largest entry: the text formats carry 14 digits or more
+
+
+def check_range(rows: IntArray, columns: IntArray, n: int, place: str) -> None:
+    """Refuse entries outside an (n, n) matrix, before anything of its size is made."""
+    wrong = np.flatnonzero((rows < 0) | (rows >= n) | (columns < 0) | (columns >= n))
+    if wrong.size:
+        i = wrong[0]
+        raise input_error(
+            f"{place}: entry {i + 1}",
+            f"row {rows[i] + 1}, column {columns[i] + 1} is outside a matrix of {n} equations",
+            "The matrix and the list of its dofs belong to different runs, or one is cut short.",
+        )
+
+
+def check_unique(rows: IntArray, columns: IntArray, n: int, place: str) -> None:
+    """Refuse entries that are given twice."""
+    key = np.sort(rows * n + columns)
+    twice = np.flatnonzero(np.diff(key) == 0)
+    if twice.size:
+        row, column = divmod(int(key[twice[0]]), n)
+        raise input_error(
+            place,
+            f"gives row {row + 1}, column {column + 1} more than once ({twice.size} such entries)",
+            "Write each entry once; the file may hold several matrices.",
+        )
+
+
+def from_triangle(
+    rows: IntArray, columns: IntArray, values: FloatArray, n: int, place: str
+) -> Matrix:
+    """Return the symmetric (n, n) CSR matrix of which one triangle, or all of it, is given.
+
+    Parameters
+    ----------
+    rows, columns
+        (k,) indices from 0; the upper triangle, the lower, or both.
+    values
+        (k,) entries.
+    n
+        Size.
+    place
+        For messages.
+
+    Raises
+    ------
+    InputError
+        If an entry is out of range or given twice, or two mirrored entries differ.
+    """
+    check_range(rows, columns, n, place)
+    check_unique(rows, columns, n, place)
+    matrix = scipy.sparse.coo_array((values, (rows, columns)), shape=(n, n)).tocsr()
+    above, below = bool((rows < columns).any()), bool((rows > columns).any())
+    if above and below:
+        check_symmetric(matrix, place)
+        return matrix
+    diagonal = scipy.sparse.diags_array(matrix.diagonal())
+    return scipy.sparse.csr_array(matrix + matrix.T - diagonal)
+
+
+def check_symmetric(matrix: Matrix, place: str) -> None:
+    """Refuse a matrix that is not Hermitian; the message names the worst pair."""
+    difference = abs(matrix - matrix.conj().T)
+    largest = float(abs(matrix).max()) if matrix.shape[0] else 0.0
+    if largest == 0.0 or float(difference.max()) <= SYMMETRY * largest:
+        return
+    dense = not scipy.sparse.issparse(difference)
+    where = int(difference.argmax()) if dense else int(difference.tocsr().argmax())
+    row, column = divmod(where, matrix.shape[0])
+    raise input_error(
+        place,
+        f"is not symmetric: row {row + 1}, column {column + 1} and its mirror are "
+        f"{matrix[row, column]:.6g} and {matrix[column, row]:.6g}",
+        "Export symmetric matrices; a Coriolis or bearing matrix belongs into the damping.",
+    )

@@ -1,0 +1,289 @@
+"""CalculiX results, ASCII ``.frd``: the mesh, and fields on its nodes."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.errors import InputError, input_error
+from stickslip.model.mesh import SolidMesh
+from stickslip.model.readers.node_table import NodeTable, node_table
+from stickslip.model.readers.text import CUT_SHORT, SHOWN, read_text
+from stickslip.model.readers.units import Units
+
+# element type -> nodes, and where VTK's nodes stand (the format lists a brick's upright edges before its top ones)
+HEX20 = (*range(12), 16, 17, 18, 19, 12, 13, 14, 15)
+CELLS: dict[int, tuple[int, ...]] = {
+    1: tuple(range(8)),
+    3: tuple(range(4)),
+    4: HEX20,
+    6: tuple(range(10)),
+}
+WIDTHS = {0: 5, 1: 10}  # of a node number in the short and the long format
+VALUE = 12  # characters of a value
+PER_LINE = 6  # values of a line
+MODAL = 2  # kind of a result: 0 static, 1 time step, 2 frequency, 3 load step
+
+
+@dataclass(frozen=True, eq=False)
+class NodalField:
+    """Results on nodes at one step.
+
+    Parameters
+    ----------
+    name
+        As in the file: ``DISP``, ``STRESS``, ...
+    components
+        Names of the columns, e.g. ``("D1", "D2", "D3")``.
+    values
+        (n, k) in SI for ``DISP`` (m), ``STRESS`` (Pa) and ``FORC`` (N), else as in the file. Mode shapes are those of
+        unit modal mass in SI.
+    nodes
+        (n,) node numbers.
+    step
+        Counted through the file.
+    frequency_hz
+        Of a mode; None elsewhere.
+    """
+
+    name: str
+    components: tuple[str, ...]
+    values: FloatArray
+    nodes: IntArray
+    step: int
+    frequency_hz: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class FrdResults:
+    """What an ``.frd`` file holds, in SI.
+
+    Parameters
+    ----------
+    mesh
+        Nodes and cells; None where the cells are shells, beams, wedges or of several kinds.
+    nodes
+        Numbers and positions in metres.
+    fields
+        In the file's order.
+    """
+
+    mesh: SolidMesh | None
+    nodes: NodeTable
+    fields: tuple[NodalField, ...]
+
+    def field(self, name: str, step: int | None = None) -> NodalField:
+        """Return the first field `name`, or that of `step`; an `InputError` lists what there is."""
+        for candidate in self.fields:
+            if candidate.name == name and step in (None, candidate.step):
+                return candidate
+        raise input_error(
+            self.nodes.place,
+            f"has no field {name!r}" + ("" if step is None else f" at step {step}"),
+            "It has "
+            + (", ".join(f"{f.name} at step {f.step}" for f in self.fields) or "none")
+            + ".",
+        )
+
+
+def read_frd(path: Path | str, *, units: Units) -> FrdResults:
+    """Read an ASCII ``.frd`` file of CalculiX.
+
+    Parameters
+    ----------
+    path
+        The file, or the same gzipped.
+    units
+        Unit system of the model.
+
+    Raises
+    ------
+    InputError
+        If it is binary, cut short or damaged; the message names the line.
+    """
+    path = Path(path)
+    reader = _Frd(path)
+    reader.read()
+    nodes = reader.nodes()
+    nodes = replace(nodes, points=units.length * nodes.points)
+    fields = tuple(_in_si(field, modal, units) for field, modal in reader.fields)
+    return FrdResults(_mesh(nodes, reader.cells, path), nodes, fields)
+
+
+def frd_nodes(path: Path) -> NodeTable:
+    """Return the nodes of an ASCII ``.frd`` file, in its unit of length."""
+    reader = _Frd(path)
+    reader.read()
+    return reader.nodes()
+
+
+def _mesh(nodes: NodeTable, cells: dict[int, list[list[int]]], path: Path) -> SolidMesh | None:
+    if len(cells) != 1 or not set(cells) <= set(CELLS):
+        return None
+    ((kind, rows),) = cells.items()
+    table = np.array(rows, dtype=np.int64)
+    connected = nodes.index(table[:, 1:].ravel()).reshape(len(rows), -1)[:, list(CELLS[kind])]
+    return SolidMesh(nodes.points, connected, {}, numbers=nodes.numbers, cell_numbers=table[:, 0])
+
+
+def _in_si(field: NodalField, modal: bool, units: Units) -> NodalField:
+    factor = {
+        "DISP": 1 / math.sqrt(units.mass) if modal else units.length,
+        "STRESS": units.stress,
+        "FORC": units.force,
+    }.get(field.name, 1.0)
+    frequency = None if field.frequency_hz is None else field.frequency_hz / units.time
+    return replace(field, values=factor * field.values, frequency_hz=frequency)
+
+
+class _Frd:
+    """One pass over the lines of a file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.lines = read_text(path).splitlines()
+        self.at = 0  # index of the next line
+        self.tables: list[tuple[IntArray, FloatArray]] = []
+        self.cells: dict[int, list[list[int]]] = {}
+        self.fields: list[tuple[NodalField, bool]] = []
+
+    def read(self) -> None:
+        while self.at < len(self.lines):
+            line = self.lines[self.at]
+            self.at += 1
+            key = line[:6].strip()
+            if key == "9999":
+                return
+            if key == "2C":
+                self.tables.append(self._rows(line, 3, self._format(line[73:74])))
+            elif key == "3C":
+                self._read_cells(WIDTHS[self._format(line[73:74])])
+            elif key == "100C":
+                self._read_field(line)
+        raise input_error(str(self.path), "does not end with 9999", CUT_SHORT)
+
+    def nodes(self) -> NodeTable:
+        if not self.tables:
+            raise input_error(
+                str(self.path), "holds no nodes", "Ask for output with *NODE FILE in the deck."
+            )
+        numbers, points = (np.concatenate(parts) for parts in zip(*self.tables, strict=True))
+        return node_table(numbers, points, str(self.path))
+
+    def _wrong(self, problem: str) -> InputError:
+        line = self.lines[self.at - 1] if 0 < self.at <= len(self.lines) else ""
+        return input_error(
+            f"{self.path}: line {self.at}",
+            f"{problem}: {line[:SHOWN]!r}",
+            "Check that the file is a whole ASCII .frd of CalculiX.",
+        )
+
+    def _format(self, digit: str) -> int:
+        if digit.strip() not in {"", "0", "1"}:
+            raise self._wrong("binary .frd files are not read")
+        return int(digit.strip() or 0)
+
+    def _whole(self, text: str) -> int:
+        try:
+            return int(text)
+        except ValueError as error:
+            raise self._wrong(f"{text!r} is no whole number") from error
+
+    def _block(self) -> list[str]:
+        """Return the lines up to the next ``-3``."""
+        first = self.at
+        while self.at < len(self.lines) and self.lines[self.at][:3] in {" -1", " -2"}:
+            self.at += 1
+        block = self.lines[first : self.at]
+        self.at += 1
+        if self.at > len(self.lines) or self.lines[self.at - 1].strip() != "-3":
+            raise self._wrong("a block does not end with -3")
+        return block
+
+    def _rows(self, header: str, columns: int, layout: int) -> tuple[IntArray, FloatArray]:
+        """Return node numbers and `columns` values each of a block of fixed columns."""
+        count = self._whole(header[24:36])
+        first, width = self.at, WIDTHS[layout]
+        block = self._block()
+        each = -(-columns // PER_LINE)
+        if len(block) != each * count:
+            raise self._wrong(f"a block has {len(block)} lines, its header says {each * count}")
+        try:
+            numbers = np.array([line[3 : 3 + width] for line in block[::each]], dtype="U10")
+            start, texts = 3 + width, []
+            for part in range(each):
+                here = min(PER_LINE, columns - PER_LINE * part)
+                for i in range(here):
+                    span = slice(start + VALUE * i, start + VALUE * (i + 1))
+                    texts.append([line[span] for line in block[part::each]])
+            values = np.array(texts, dtype="U12").astype(float).T.reshape(count, columns)
+            found = numbers.astype(np.int64), values
+        except (ValueError, OverflowError):
+            found = np.empty(0, dtype=np.int64), np.full((1, columns), np.nan)
+        if not np.isfinite(found[1]).all():
+            raise self._spoiled(block, first, width)
+        return found
+
+    def _spoiled(self, block: Sequence[str], first: int, width: int) -> InputError:
+        """Find the line with something else than a number."""
+        for i, line in enumerate(block):
+            rest = line[3 + width :].rstrip()
+            fields = [line[3 : 3 + width].strip() or "0"]
+            fields += [rest[k : k + VALUE] for k in range(0, max(len(rest), 1), VALUE)]
+            for text in fields:
+                try:
+                    fine = math.isfinite(float(text))
+                except ValueError:
+                    fine = False
+                if not fine:
+                    self.at = first + i + 1
+                    return self._wrong(f"{text!r} is no finite number")
+        return self._wrong("a block is no table of numbers")
+
+    def _read_cells(self, width: int) -> None:
+        """Take the element block: a line with number and kind, then lines of nodes."""
+        first = self.at
+        block = self._block()
+        after = self.at
+        row: list[int] = []
+        for self.at, line in enumerate(block, first + 1):  # messages name this line
+            if line.startswith(" -1"):
+                row = [self._whole(line[3 : 3 + width])]
+                kind = self._whole(line[3 + width : 8 + width])
+                self.cells.setdefault(kind, []).append(row)
+            elif not row:
+                raise self._wrong("nodes before the first element")
+            else:
+                text = line[3:].rstrip()
+                row += [self._whole(text[k : k + width]) for k in range(0, len(text), width)]
+        self.at = after
+        for kind, rows in self.cells.items():
+            wanted = len(CELLS.get(kind, rows[0][1:])) + 1
+            if any(len(row) != wanted for row in rows):
+                raise self._wrong(f"an element of type {kind} has another number of nodes")
+
+    def _read_field(self, header: str) -> None:
+        layout = self._format(header[74:75])
+        modal = header[56:58].strip() == str(MODAL)
+        try:
+            value = float(header[12:24])
+        except ValueError as error:
+            raise self._wrong("no step value") from error
+        step = self._whole(header[58:63])
+        if self.at >= len(self.lines) or not self.lines[self.at].startswith(" -4"):
+            self.at += 1
+            raise self._wrong("a result block without its -4 line")
+        name = self.lines[self.at][5:13].strip()
+        components = []
+        self.at += 1
+        while self.at < len(self.lines) and self.lines[self.at].startswith(" -5"):
+            line = self.lines[self.at]
+            if line[33:38].strip() != "1":  # 1: derived by the viewer, not in the file
+                components.append(line[5:13].strip())
+            self.at += 1
+        nodes, values = self._rows(header, len(components), layout)
+        field = NodalField(name, tuple(components), values, nodes, step, value if modal else None)
+        self.fields.append((field, modal))

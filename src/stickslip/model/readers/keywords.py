@@ -1,0 +1,253 @@
+"""Keyword files (CalculiX, Abaqus): blocks of a ``*KEYWORD, PARAMETER=VALUE`` line and its data lines."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.errors import InputError, input_error
+from stickslip.model.readers.text import SHOWN, number_table, read_text
+
+MOST_INCLUDES = 200
+DEEPEST_INCLUDE = 10
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Data lines that stand together in one file; comments in them are empty lines."""
+
+    path: Path
+    first_line: int
+    text: str
+
+
+@dataclass(frozen=True)
+class Block:
+    """A keyword with its data.
+
+    Parameters
+    ----------
+    keyword
+        Upper case, without the star, one blank between words.
+    parameters
+        Upper case names -> values as written, unquoted; empty for flags.
+    path, line
+        Where the keyword stands.
+    """
+
+    keyword: str
+    parameters: dict[str, str]
+    path: Path
+    line: int
+    segments: list[Segment] = field(default_factory=list)
+
+    @property
+    def place(self) -> str:
+        """For messages."""
+        return f"{self.path}: line {self.line}, *{self.keyword}"
+
+    def parameter(self, name: str) -> str:
+        """Return a parameter that must be there."""
+        value = self.parameters.get(name, "")
+        if not value:
+            raise input_error(self.place, f"lacks the parameter {name}", f"Write {name}=….")
+        return value
+
+    def rows(self) -> Iterator[tuple[str, list[str]]]:
+        """Yield place and fields of each data line; a comma at its end counts for nothing."""
+        for segment in self.segments:
+            for number, line in enumerate(segment.text.splitlines(), segment.first_line):
+                if line.strip():
+                    fields = [part.strip() for part in line.strip().rstrip(",").split(",")]
+                    yield f"{segment.path}: line {number}", fields
+
+    def table(self, columns: int) -> FloatArray:
+        """Return data lines that all have the same count of numbers, (rows, columns)."""
+        tables = [
+            number_table(s.path, _without_last_commas(s.text), columns, separator=",",
+                         first_line=s.first_line)
+            for s in self.segments
+        ]  # fmt: skip
+        return np.vstack(tables) if tables else np.empty((0, columns))
+
+
+def keyword_blocks(path: Path) -> list[Block]:
+    """Return the blocks of a keyword file, in order, with included files put in their place.
+
+    Parameters
+    ----------
+    path
+        The file; ``*INCLUDE`` may name files of its folder and of folders below it.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, an included one lies elsewhere, or files include each other without end.
+    """
+    blocks: list[Block] = []
+    _read_into(blocks, path, [], [0])
+    if not blocks:
+        raise input_error(
+            str(path), "has no keyword line", "Give an input deck, with lines such as *NODE."
+        )
+    return blocks
+
+
+def whole_number(text: str, place: str, what: str) -> int:
+    """Return an integer field of a data line."""
+    try:
+        return int(text)
+    except ValueError as error:
+        raise input_error(
+            place, f"the {what} {text[:SHOWN]!r} is no whole number", "Check the line."
+        ) from error
+
+
+def real_number(text: str, place: str, what: str) -> float:
+    """Return a finite number of a data line."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not np.isfinite(value):
+        raise input_error(
+            place, f"the {what} {text[:SHOWN]!r} is no finite number", "Check the line."
+        )
+    return value
+
+
+def members(
+    blocks: list[Block], kind: str, numbers: IntArray, named: dict[str, IntArray]
+) -> dict[str, IntArray]:
+    """Return the sets of nodes or elements that the blocks define, in the order they list them.
+
+    Parameters
+    ----------
+    blocks
+        Of the whole file.
+    kind
+        ``NSET`` or ``ELSET``.
+    numbers
+        Numbers of all nodes or elements, in any order.
+    named
+        Sets that ``*NODE, NSET=`` and ``*ELEMENT, ELSET=`` name.
+
+    Returns
+    -------
+    dict
+        Upper case name -> numbers, each once.
+
+    Raises
+    ------
+    InputError
+        If a set names what is not there.
+    """
+    known = np.sort(numbers)
+    parts = {name: [listed] for name, listed in named.items()}
+    for block in blocks:
+        if block.keyword == kind:
+            name = block.parameter(kind).upper()
+            parts.setdefault(name, []).extend(_listed(block, parts, known))
+    return {
+        name: unique_in_order(np.concatenate([*p, np.empty(0, int)])) for name, p in parts.items()
+    }
+
+
+def unique_in_order(values: IntArray) -> IntArray:
+    """Return each value once, where it first stands."""
+    _, first = np.unique(values, return_index=True)
+    return np.asarray(values[np.sort(first)], dtype=np.int64)
+
+
+def _listed(block: Block, sets: dict[str, list[IntArray]], known: IntArray) -> Iterator[IntArray]:
+    what = "node" if block.keyword == "NSET" else "element"
+    if "GENERATE" in block.parameters:
+        for place, fields in block.rows():
+            first, last, step = (whole_number(f, place, what) for f in [*fields, "1"][:3])
+            if step < 1 or len(fields) < 2:
+                raise input_error(place, "needs first, last, step", "Give a step of at least 1.")
+            yield known[(known >= first) & (known <= last) & ((known - first) % step == 0)]
+        return
+    for place, fields in block.rows():
+        for text in fields:
+            if text.upper() in sets:
+                yield from list(sets[text.upper()])
+                continue
+            number = whole_number(text, place, what)
+            index = np.searchsorted(known, number)
+            if index == len(known) or known[index] != number:
+                raise input_error(
+                    place, f"there is no {what} {number}", "Define it, or take it out of the set."
+                )
+            yield np.array([number])
+
+
+def _without_last_commas(text: str) -> str:
+    if ",\n" not in text.replace(" ", ""):
+        return text
+    return "\n".join(line.rstrip().rstrip(",") for line in text.splitlines())
+
+
+def _read_into(blocks: list[Block], path: Path, stack: list[Path], count: list[int]) -> None:
+    """Append the blocks of one file; data lines before its first keyword belong to the last block."""
+    pending: list[str] = []
+    start = 1
+
+    def flush() -> None:
+        if blocks and any(line.strip() for line in pending):
+            blocks[-1].segments.append(Segment(path, start, "\n".join(pending)))
+        pending.clear()
+
+    lines = read_text(path).splitlines()
+    number = 0
+    while number < len(lines):
+        line = lines[number]
+        number += 1
+        if line.startswith("**") or not line.startswith("*"):
+            pending.append("" if line.startswith("**") else line)
+            continue
+        flush()
+        first = number
+        while line.rstrip().endswith(",") and number < len(lines):
+            line = line.rstrip() + lines[number]
+            number += 1
+        block = _parse_keyword(line, path, first)
+        if block.keyword == "INCLUDE":
+            _read_into(blocks, _included(block, path, stack, count), [*stack, path], count)
+        else:
+            blocks.append(block)
+        start = number + 1
+    flush()
+
+
+def _parse_keyword(line: str, path: Path, number: int) -> Block:
+    head, *rest = line[1:].split(",")
+    parameters = {}
+    for part in rest:
+        name, _, value = part.partition("=")
+        if name.strip():
+            parameters[" ".join(name.upper().split())] = value.strip().strip('"')
+    return Block(" ".join(head.upper().split()), parameters, path, number)
+
+
+def _included(block: Block, path: Path, stack: list[Path], count: list[int]) -> Path:
+    """Return the file an ``*INCLUDE`` names, if it may be read."""
+    root = (stack or [path])[0].resolve().parent
+    name = block.parameter("INPUT")
+    target = (root / name).resolve()
+    if not target.is_relative_to(root):
+        raise _refused(block, name, f"lies outside the deck's folder {root.name!r}")
+    count[0] += 1
+    if count[0] > MOST_INCLUDES or len(stack) >= DEEPEST_INCLUDE:
+        raise _refused(block, name, "is one of too many, or files include each other")
+    return target
+
+
+def _refused(block: Block, name: str, why: str) -> InputError:
+    return input_error(
+        block.place,
+        f"the included file {name!r} {why}",
+        "Put the files into one folder, or in one file.",
+    )

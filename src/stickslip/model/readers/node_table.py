@@ -1,0 +1,204 @@
+"""Nodes of a model: numbers, positions and sets; what a file of matrices does not know of its dofs."""
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.errors import did_you_mean, input_error
+from stickslip.model.dofs import Dofs
+from stickslip.model.mesh import SolidMesh
+from stickslip.model.readers.keywords import Block, keyword_blocks, members, unique_in_order
+from stickslip.model.readers.text import SHOWN, read_text, whole_numbers
+
+COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")  # directions 1 to 6 of the solvers
+
+
+@dataclass(frozen=True, eq=False)
+class NodeTable:
+    """Nodes by number.
+
+    Parameters
+    ----------
+    numbers
+        (n,) ascending node numbers.
+    points
+        (n, 3) positions, in the unit of length of the file they come from.
+    node_sets
+        Name -> node numbers, in an order that has a meaning.
+    place
+        Where they come from, for messages.
+    """
+
+    numbers: IntArray
+    points: FloatArray
+    node_sets: Mapping[str, IntArray] = field(default_factory=dict)
+    place: str = "nodes"
+
+    def index(self, numbers: IntArray) -> IntArray:
+        """Return the rows of node `numbers`; an `InputError` names those that are not there."""
+        if not len(self.numbers):
+            raise input_error(self.place, "holds no nodes", "Give the file with the nodes.")
+        found = np.minimum(np.searchsorted(self.numbers, numbers), len(self.numbers) - 1)
+        missing = np.unique(numbers[self.numbers[found] != numbers])
+        if missing.size:
+            raise input_error(
+                self.place,
+                f"lacks {missing.size} nodes, e.g. {', '.join(map(str, missing[:5]))}",
+                "Give the nodes of the same model.",
+            )
+        return np.asarray(found, dtype=np.int64)
+
+    def dofs(self, numbers: IntArray, components: Sequence[str]) -> Dofs:
+        """Return the table of dofs of node `numbers` (n,) with `components` (n names)."""
+        return Dofs(
+            np.asarray(numbers, dtype=np.int64),
+            tuple(components),
+            self.points[self.index(numbers)].astype(float),
+        )
+
+    def dof_sets(self, dofs: Dofs) -> dict[str, IntArray]:
+        """Return, for each node set, its dofs: node by node in the set's order, components in the table's order.
+
+        Nodes without dofs (clamped ones) are passed over, and sets of such nodes alone are left out.
+        """
+        order = np.argsort(dofs.node, kind="stable")
+        nodes = dofs.node[order]
+        sets = {}
+        for name, numbers in self.node_sets.items():
+            first, last = np.searchsorted(nodes, numbers), np.searchsorted(nodes, numbers, "right")
+            ranges = [order[a:b] for a, b in zip(first, last, strict=True)]
+            index = np.concatenate([*ranges, np.empty(0, dtype=np.int64)])
+            if index.size:
+                sets[name] = np.asarray(index, dtype=np.int64)
+        return sets
+
+
+def node_table(
+    numbers: IntArray,
+    points: FloatArray,
+    place: str,
+    node_sets: Mapping[str, IntArray] | None = None,
+) -> NodeTable:
+    """Sort nodes by number; refuse numbers that stand twice with different positions."""
+    order = np.argsort(numbers, kind="stable")
+    numbers, points = np.asarray(numbers[order], dtype=np.int64), points[order]
+    twice = np.flatnonzero(np.diff(numbers) == 0)
+    if twice.size:
+        moved = twice[(points[twice] != points[twice + 1]).any(axis=1)]
+        if moved.size:
+            raise input_error(
+                place,
+                f"defines node {numbers[moved[0]]} twice, at different places",
+                "Give each node once.",
+            )
+        keep = np.append(np.diff(numbers) > 0, True)
+        numbers, points = numbers[keep], points[keep]
+    return NodeTable(numbers, points, node_sets or {}, place)
+
+
+def mesh_nodes(mesh: SolidMesh) -> NodeTable:
+    """Return the nodes of a mesh, in metres, with its node sets."""
+    sets = {name: mesh.numbers[index] for name, index in mesh.node_sets.items()}
+    return node_table(mesh.numbers, mesh.points, "mesh", sets)
+
+
+def deck_nodes(path: Path) -> NodeTable:
+    """Return nodes and node sets of a CalculiX or Abaqus deck, whatever else it holds."""
+    return block_nodes(keyword_blocks(path), path)
+
+
+def block_nodes(blocks: list[Block], path: Path) -> NodeTable:
+    """Return nodes and node sets of the blocks of a deck."""
+    tables = []
+    named: dict[str, list[IntArray]] = {}
+    for block in blocks:
+        if block.keyword != "NODE":
+            continue
+        if block.parameters.get("SYSTEM", "R").upper() != "R":
+            raise input_error(
+                block.place,
+                f"coordinates of SYSTEM={block.parameters['SYSTEM']} are not read",
+                "Write the nodes in Cartesian coordinates.",
+            )
+        tables.append(block.table(4))
+        if "NSET" in block.parameters:
+            numbers = whole_numbers(path, tables[-1], ("node number",))[:, 0]
+            named.setdefault(block.parameters["NSET"].upper(), []).append(numbers)
+    if not tables:
+        raise input_error(str(path), "has no *NODE", "Give the deck with the mesh.")
+    table = np.vstack(tables)
+    numbers = whole_numbers(path, table, ("node number",))[:, 0]
+    sets = members(
+        blocks, "NSET", numbers, {name: np.concatenate(parts) for name, parts in named.items()}
+    )
+    return node_table(numbers, table[:, 1:], str(path), sets)
+
+
+def csv_columns(path: Path, required: tuple[str, ...]) -> dict[str, list[str]]:
+    """Return the columns of a CSV file with a header line; `required` ones must be there.
+
+    Raises
+    ------
+    InputError
+        If a column is missing, or a line has another number of fields.
+    """
+    rows = list(csv.reader(io.StringIO(read_text(path))))
+    if not rows:
+        raise input_error(str(path), "is empty", f"Give a header: {','.join(required)}.")
+    header = [name.strip().lower() for name in rows[0]]
+    for name in required:
+        if name not in header:
+            raise input_error(
+                str(path),
+                f"has no column {name!r}",
+                f"{did_you_mean(name, header)} The header is {','.join(required)}.",
+            )
+    for number, row in enumerate(rows[1:], 2):
+        if row and len(row) != len(header):
+            raise input_error(
+                f"{path}: line {number}",
+                f"has {len(row)} fields, the header {len(header)}",
+                "Check the line; the file may be cut short.",
+            )
+    return {name: [row[i].strip() for row in rows[1:] if row] for i, name in enumerate(header)}
+
+
+def csv_numbers(path: Path, name: str, texts: list[str]) -> FloatArray:
+    """Return a column of a CSV file as finite numbers."""
+    try:
+        values = np.array(texts, dtype=float) if texts else np.empty(0)
+    except ValueError:
+        values = np.full(1, np.nan)
+    if np.isfinite(values).all():
+        return values
+    for text in texts:
+        try:
+            finite = bool(np.isfinite(float(text)))
+        except ValueError:
+            finite = False
+        if not finite:
+            raise input_error(
+                str(path), f"column {name!r} holds {text[:SHOWN]!r}, no finite number", "Mend it."
+            )
+    return values
+
+
+def csv_nodes(path: Path) -> NodeTable:
+    """Return the nodes of a CSV file with the columns ``node, x, y, z``; a ``set`` column names node sets.
+
+    A node in several sets has their names separated by blanks.
+    """
+    columns = csv_columns(path, ("node", "x", "y", "z"))
+    table = np.column_stack([csv_numbers(path, c, columns[c]) for c in ("node", "x", "y", "z")])
+    numbers = whole_numbers(path, table, ("node",))[:, 0]
+    sets: dict[str, list[int]] = {}
+    for number, names in zip(numbers, columns.get("set", []), strict=False):
+        for name in names.split():
+            sets.setdefault(name, []).append(int(number))
+    named = {name: unique_in_order(np.array(listed)) for name, listed in sets.items()}
+    return node_table(numbers, table[:, 1:], str(path), named)
