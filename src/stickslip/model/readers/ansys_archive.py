@@ -1,0 +1,165 @@
+"""Meshes and materials from ANSYS archives (``.cdb``)."""
+
+from pathlib import Path
+
+import numpy as np
+
+from stickslip.arrays import IntArray
+from stickslip.errors import input_error
+from stickslip.model.mesh import SolidMesh
+from stickslip.model.readers.ansys_blocks import (
+    CUT_SHORT,
+    NUMBER,
+    TYPE,
+    WRITE,
+    Blocks,
+    read_blocks,
+)
+from stickslip.model.readers.units import Units, check_material
+from stickslip.model.solid import Material
+
+NODES_OF_SOLID = {
+    185: (8, 4),
+    186: (20,),
+    187: (10, 4),
+}  # element type -> its regular numbers of nodes
+WITHOUT_STIFFNESS = {
+    154,
+    200,
+}  # surface effect elements for pressures, and meshes that are not solved
+
+
+def read_ansys_archive(path: Path | str, *, units: Units | None = None) -> SolidMesh:
+    """Read the solid elements of an ANSYS archive.
+
+    Parameters
+    ----------
+    path
+        The ``.cdb`` file: ``CDWRITE,DB,model,cdb`` with elements of the types SOLID185, SOLID186 or SOLID187.
+    units
+        Unit system of the model, SI by default: the file does not say.
+
+    Returns
+    -------
+    SolidMesh
+        In metres, with the numbers of nodes and elements; node components are node sets in lower case.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged; if elements are degenerate, lack mid-side nodes, are of different shapes, or of types
+        that carry stiffness but are no solids.
+    """
+    units = Units.si() if units is None else units
+    path = Path(path)
+    blocks = read_blocks(path)
+    kept = _solids(path, blocks)
+    cells = _cells(path, blocks, kept)
+    used = np.unique(cells)
+    order = np.argsort(blocks.numbers, kind="stable")
+    numbers = blocks.numbers[order]
+    missing = np.setdiff1d(used, numbers)
+    if len(missing):
+        raise input_error(
+            str(path), f"has elements at node {missing[0]}, which is not there", CUT_SHORT
+        )
+    points = blocks.points[order][np.searchsorted(numbers, used)]
+    sets = {
+        name: np.flatnonzero(np.isin(used, members))
+        for name, members in blocks.node_sets.items()
+    }
+    return SolidMesh(
+        units.length * points,
+        np.searchsorted(used, cells),
+        {name: members for name, members in sets.items() if len(members)},
+        used,
+        blocks.heads[kept, NUMBER],
+    )
+
+
+def read_ansys_materials(
+    path: Path | str, *, units: Units | None = None, plausible: bool = True
+) -> dict[int, Material]:
+    """Read the isotropic materials of an ANSYS archive.
+
+    Parameters
+    ----------
+    path
+        The ``.cdb`` file.
+    units
+        Unit system of the model, SI by default: the file does not say.
+    plausible
+        Whether density and Young's modulus are checked against what solids have.
+
+    Returns
+    -------
+    dict
+        Material number -> material, in SI; those that lack modulus, Poisson's ratio or density are left out.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged, or a material is orthotropic or no solid's.
+    """
+    units = Units.si() if units is None else units
+    materials = {}
+    for number, values in read_blocks(Path(path)).properties.items():
+        place = f"{path}: material {number}"
+        if any(name in values and values[name] != values.get("EX") for name in ("EY", "EZ")):
+            raise input_error(place, "is orthotropic", "Only isotropic materials are read.")
+        poisson = values.get("NUXY", values.get("PRXY"))
+        if poisson is None or not {"EX", "DENS"} <= values.keys():
+            continue
+        material = Material(
+            young_modulus=units.stress * values["EX"],
+            poisson_ratio=poisson,
+            density=units.density * values["DENS"],
+        )
+        if plausible:
+            check_material(material.density, material.young_modulus, units, place)
+        materials[number] = material
+    return materials
+
+
+def _solids(path: Path, blocks: Blocks) -> IntArray:
+    """Return the rows of the solid elements; refuse others that have a stiffness."""
+    kinds = np.array([blocks.types.get(int(t), 0) for t in blocks.heads[:, TYPE]], dtype=np.int64)
+    others = sorted(set(kinds.tolist()) - NODES_OF_SOLID.keys() - WITHOUT_STIFFNESS)
+    if others:
+        raise input_error(
+            str(path),
+            f"has elements of the types {others}; a mesh of solids holds SOLID185, 186 and 187",
+            WRITE,
+        )
+    rows = np.flatnonzero(np.isin(kinds, list(NODES_OF_SOLID)))
+    if not len(rows):
+        raise input_error(str(path), "has no elements SOLID185, 186 or 187", WRITE)
+    for row in rows:
+        nodes, allowed = blocks.nodes[row], NODES_OF_SOLID[int(kinds[row])]
+        place = f"{path}: element {blocks.heads[row, NUMBER]}, SOLID{kinds[row]}"
+        if len(nodes) not in allowed or (nodes <= 0).any():
+            raise input_error(
+                place,
+                f"has {int((nodes > 0).sum())} nodes, regular are {' or '.join(map(str, allowed))}",
+                "Mesh with mid-side nodes in all places (EMID,ADD).",
+            )
+        if len(np.unique(nodes)) < len(nodes):
+            raise input_error(
+                place,
+                "is degenerate: a prism, pyramid or tetrahedron written as a brick with repeated nodes",
+                "Mesh with bricks only, or with SOLID187: TCHG,186,187 changes degenerate tetrahedra.",
+            )
+    return np.asarray(rows)
+
+
+def _cells(path: Path, blocks: Blocks, kept: IntArray) -> IntArray:
+    """Return the (m, k) node numbers of the solids in VTK order, which is ANSYS's for regular shapes."""
+    counts, often = np.unique([len(blocks.nodes[row]) for row in kept], return_counts=True)
+    if len(counts) > 1:
+        raise input_error(
+            str(path),
+            "has solids of different shapes: "
+            + ", ".join(f"{n} with {k} nodes" for k, n in zip(counts, often, strict=True)),
+            "A mesh holds one kind of cell: mesh all of it alike.",
+        )
+    return np.array([blocks.nodes[row] for row in kept])

@@ -1,0 +1,168 @@
+"""Nodes of an ANSYS model, from a ``.cdb`` or ``.rst`` file: positions, components, nodal coordinate systems."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.errors import input_error
+from stickslip.model.readers.ansys_blocks import read_blocks
+from stickslip.model.readers.ansys_records import Records, long_pointer, open_records
+
+RESULT = 12
+COMPONENTS = {1: "x", 2: "y", 3: "z", 4: "rx", 5: "ry", 6: "rz"}  # by ANSYS's numbers
+NODE_FIELDS = 7  # number, x, y, z, and three angles
+
+
+@dataclass(frozen=True, eq=False)
+class AnsysNodes:
+    """Nodes as ANSYS numbers them, in the model's units.
+
+    Parameters
+    ----------
+    numbers
+        (n,) node numbers, ascending.
+    points
+        (n, 3) positions.
+    angles
+        (n, 3) angles of the nodal coordinate systems in degrees: about z, then about the new x, then about the new y.
+    node_sets
+        Node component -> node numbers.
+    """
+
+    numbers: IntArray
+    points: FloatArray
+    angles: FloatArray
+    node_sets: Mapping[str, IntArray]
+
+    def of_dofs(self, node: IntArray, place: str) -> tuple[FloatArray, dict[str, IntArray]]:
+        """Return the positions of coordinates of the nodes `node`, and the sets as indices into them.
+
+        A component without any of these coordinates is no set.
+        """
+        if not len(self.numbers):
+            return np.full((len(node), 3), np.nan), {}
+        at = np.minimum(np.searchsorted(self.numbers, node), len(self.numbers) - 1)
+        unknown = np.unique(node[self.numbers[at] != node])
+        if len(unknown):
+            raise input_error(
+                place,
+                f"has {len(unknown)} nodes that the file of nodes lacks, e.g. {unknown[0]}",
+                "Give the .cdb or .rst of the same model.",
+            )
+        sets = {
+            name: np.flatnonzero(np.isin(node, members)) for name, members in self.node_sets.items()
+        }
+        return self.points[at], {name: members for name, members in sets.items() if len(members)}
+
+
+def no_nodes() -> AnsysNodes:
+    """Return an empty table, for files read alone."""
+    return AnsysNodes(np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 3)), {})
+
+
+def read_ansys_nodes(path: Path | str) -> AnsysNodes:
+    """Read the nodes of a ``.cdb`` (text) or ``.rst`` (binary) file.
+
+    Raises
+    ------
+    InputError
+        If the file is neither, or damaged.
+    """
+    path = Path(path)
+    if path.suffix.lower() in {".rst", ".rth"}:
+        return _nodes_of_results(open_records(path, RESULT))
+    blocks = read_blocks(path)
+    return _sorted(blocks.numbers, blocks.points, blocks.angles, blocks.node_sets)
+
+
+def _nodes_of_results(file: Records) -> AnsysNodes:
+    header = file.header("header of the results")
+    read = file.integers(long_pointer(header[15], header[45]), 1000, "header of the geometry")
+    geometry = np.concatenate([read, np.zeros(100, dtype=np.int64)])
+    n = int(geometry[3])
+    at = long_pointer(geometry[26], geometry[27]) or int(geometry[8])
+    if not 0 < n <= len(file.words) // NODE_FIELDS:
+        raise file.damaged("header of the geometry", f"tells of {n} nodes")
+    table = np.zeros((n, NODE_FIELDS))
+    for row in range(n):
+        fields, at = file.record(at, 4 * NODE_FIELDS, f"node {row + 1} of {n}")
+        if fields.dtype.kind != "f" or len(fields) < 4 or not np.isfinite(fields).all():
+            raise file.damaged(f"node {row + 1} of {n}", "holds no number and position")
+        table[row, : min(len(fields), NODE_FIELDS)] = fields[:NODE_FIELDS]
+    return _sorted(table[:, 0].astype(np.int64), table[:, 1:4], table[:, 4:7], {})
+
+
+def _sorted(
+    numbers: IntArray, points: FloatArray, angles: FloatArray, sets: Mapping[str, IntArray]
+) -> AnsysNodes:
+    order = np.argsort(numbers, kind="stable")
+    return AnsysNodes(numbers[order], points[order], angles[order], sets)
+
+
+def rotations(known: AnsysNodes, node: IntArray) -> FloatArray | None:
+    """Return (k, 3, 3) matrices from the nodal systems of the nodes `node` to the global axes; None where all agree."""
+    if not known.angles.any():
+        return None
+    angles = np.radians(known.angles[np.searchsorted(known.numbers, node)])
+    cosine, sine = np.cos(angles), np.sin(angles)
+
+    def about(axis: int, column: int) -> FloatArray:
+        turn = np.tile(np.eye(3), (len(node), 1, 1))
+        a, b = (axis + 1) % 3, (axis + 2) % 3
+        turn[:, a, a] = turn[:, b, b] = cosine[:, column]
+        turn[:, a, b], turn[:, b, a] = -sine[:, column], sine[:, column]
+        return turn
+
+    return about(2, 0) @ about(0, 1) @ about(1, 2)
+
+
+def stack_rotations(
+    node: IntArray, component: IntArray, known: AnsysNodes, place: str
+) -> Matrix | None:
+    """Return the (n, n) rotation from nodal to global coordinates; None where all nodal systems are the global one.
+
+    Parameters
+    ----------
+    node, component
+        (n,) node number and component 1 ... 6, sorted by node.
+    known
+        The nodes.
+    place
+        For messages.
+
+    Raises
+    ------
+    InputError
+        If a turned node has lost some components to constraints: the others cannot be turned without them.
+    """
+    if not known.angles.any():
+        return None
+    triple = (component - 1) // 3
+    turned = known.numbers[known.angles.any(axis=1)]
+    at = np.arange(len(node))
+    rows, columns, values = [], [], []
+    for kind in (0, 1):
+        here = at[(triple == kind) & np.isin(node, turned)]
+        owners, counts = np.unique(node[here], return_counts=True)
+        if (counts != 3).any():
+            raise input_error(
+                place,
+                f"node {owners[counts != 3][0]} has a coordinate system of its own and only some free components, "
+                "which cannot be turned into the global axes",
+                "Constrain all three components of such nodes, or none; or undo NROTAT.",
+            )
+        turn = rotations(known, owners)
+        if turn is None or not len(owners):
+            continue
+        block = here.reshape(-1, 3)
+        rows.append(np.repeat(block, 3, axis=1).ravel())
+        columns.append(np.tile(block, (1, 3)).ravel())
+        values.append(turn.ravel())
+    same = at[~np.isin(node, turned)]
+    data = np.concatenate([np.ones(len(same)), *values])
+    index = (np.concatenate([same, *rows]), np.concatenate([same, *columns]))
+    return scipy.sparse.csr_array((data, index), shape=(len(node), len(node)))
