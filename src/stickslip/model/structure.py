@@ -66,6 +66,10 @@ class Structure:
         """Return the full-model vector(s) of reduced coordinates `vector` (n,) or (n, k)."""
         return vector if self.basis is None else self.basis @ vector
 
+    def project(self, load: Matrix) -> Matrix:
+        """Return the load(s) on the reduced coordinates of full-model load(s) (n_full,) or (n_full, k)."""
+        return load if self.basis is None else self.basis.conj().T @ load
+
     def with_damping(self, damping: Matrix) -> "Structure":
         """Return the same structure with another damping matrix."""
         return replace(self, damping=damping)
