@@ -213,16 +213,22 @@ def _bases(mesh: SolidMesh, quadrature: Quadrature) -> tuple[dict[int, Any], Int
     dofs = bases[quadrature.mass].element_dofs
     theirs = np.empty(len(mesh.points), dtype=np.int64)
     theirs[mesh.cells[:, order].T] = dofs
-    apart = np.argwhere(theirs[mesh.cells[:, order].T] != dofs)
-    if len(apart) or len(mesh.points) != bases[quadrature.mass].N:
-        place, cell = apart[0] if len(apart) else (0, 0)
+    _check_shared(mesh, theirs, dofs[np.argsort(order)].T)
+    return bases, theirs
+
+
+def _check_shared(mesh: SolidMesh, theirs: IntArray, dofs: IntArray) -> None:
+    """Refuse nodes (n,) that do not stand for one of scikit-fem's dofs (m, k) each, in every cell the same."""
+    used = np.bincount(theirs, minlength=len(theirs))
+    wrong = (theirs[mesh.cells] != dofs) | (used[theirs] > 1)[mesh.cells]
+    if wrong.any():
+        cell, place = np.argwhere(wrong)[0]
         raise input_error(
             "mesh",
-            "neighbours do not share their mid-side nodes, or a corner of one is a mid-side node of another, e.g. node "
-            f"{mesh.numbers[mesh.cells[cell, order[place]]]} of cell {mesh.cell_numbers[cell]}",
+            f"neighbours do not share their mid-side nodes, or a corner of one is a mid-side node of another, e.g. node "
+            f"{mesh.numbers[mesh.cells[cell, place]]} of cell {mesh.cell_numbers[cell]}",
             "Merge coincident nodes, and use cells of one order.",
         )
-    return bases, theirs
 
 
 def _unit(a: int, b: int) -> FloatArray:
