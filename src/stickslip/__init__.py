@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from stickslip.model.blade_mesh import mesh_blade_pair
     from stickslip.model.blade_pair import BladePair
     from stickslip.model.damper import ContactPoints, FlatCurvedDamper, gap_operator
-    from stickslip.model.damping import rayleigh_damping
+    from stickslip.model.damping import modal_damping, rayleigh_damping, structural_damping
     from stickslip.model.deck import CalculixRun, write_deck
     from stickslip.model.dofs import Dofs
     from stickslip.model.elements import Quadrature
@@ -133,7 +133,7 @@ _MODULES = {
     "stickslip.model.blade_mesh": ("mesh_blade_pair",),
     "stickslip.model.blade_pair": ("BladePair",),
     "stickslip.model.damper": ("ContactPoints", "FlatCurvedDamper", "gap_operator"),
-    "stickslip.model.damping": ("rayleigh_damping",),
+    "stickslip.model.damping": ("modal_damping", "rayleigh_damping", "structural_damping"),
     "stickslip.model.deck": ("CalculixRun", "write_deck"),
     "stickslip.model.dofs": ("Dofs",),
     "stickslip.model.elements": ("Quadrature",),
@@ -284,6 +284,7 @@ __all__ = [
     "mesh_blade_pair",
     "mesh_sector",
     "mistuned_blade_ring",
+    "modal_damping",
     "natural_frequencies",
     "newton",
     "nodal_diameter_map",
@@ -304,6 +305,7 @@ __all__ = [
     "segment_to_segment",
     "signals",
     "smallest_peak",
+    "structural_damping",
     "structure_surface",
     "to_sectors",
     "to_waves",

@@ -1,9 +1,19 @@
-"""Proportional damping."""
+"""Damping: proportional, by mode, and structural."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import FloatArray, Matrix
 from stickslip.errors import input_error
+from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
+
+ROUNDING = 1e-12  # share of a damping matrix below which its skew part is rounding
+LARGEST = 5000  # dofs of a full damping matrix: 0.2 GB
 
 
 def rayleigh_damping(
@@ -14,7 +24,7 @@ def rayleigh_damping(
     Parameters
     ----------
     structure
-        Its own damping matrix is replaced.
+        Its own damping matrix is replaced; Coriolis terms (the skew part) stay.
     ratio
         Damping ratio (fraction of critical) at both frequencies; it is lower between them.
     between_hz
@@ -30,4 +40,99 @@ def rayleigh_damping(
     total = 2 * math.pi * (low + high)
     alpha = 2 * ratio * (2 * math.pi) ** 2 * low * high / total
     beta = 2 * ratio / total
-    return structure.with_damping(alpha * structure.mass + beta * structure.stiffness)
+    return _with_dissipation(structure, alpha * structure.mass + beta * structure.stiffness)
+
+
+def modal_damping(structure: Structure, ratios: float | Sequence[float] | FloatArray) -> Structure:
+    """Return the structure with given damping ratios of its lowest modes, ``C = M Φ diag(2 ζ ω) Φᴴ M``.
+
+    Parameters
+    ----------
+    structure
+        Its own damping matrix is replaced; Coriolis terms (the skew part) stay. Modes are those of its mass and stiffness as they are:
+        join parts or tie contacts first if the ratios are those of the assembly.
+    ratios
+        Fraction of critical of each mode, lowest first; modes beyond are undamped, rigid ones always. One number damps all modes alike.
+
+    Returns
+    -------
+    Structure
+        The damping matrix is full, whatever it was.
+
+    Raises
+    ------
+    InputError
+        If a ratio is negative, there are more ratios than modes, a mode diverges, or the matrix would be too large.
+    """
+    n = structure.n
+    if n > LARGEST:
+        raise input_error(
+            "modal_damping", f"{n} dofs would need a full matrix", "Reduce the structure first."
+        )
+    movable = int(np.count_nonzero(structure.mass.diagonal()))
+    given = np.asarray(ratios, dtype=float)
+    zeta = np.full(movable, given) if given.ndim == 0 else given
+    if zeta.ndim != 1 or not 0 < zeta.size <= movable or not np.all((zeta >= 0) & (zeta < np.inf)):
+        raise input_error(
+            "modal_damping: ratios",
+            f"must be numbers from 0, at most {movable} of them, got {given.tolist()}",
+            "0.001 is 0.1 % of critical.",
+        )
+    modes = normal_modes(structure, zeta.size)
+    if np.any(modes.squares < 0):
+        raise input_error(
+            "modal_damping",
+            f"{int(np.count_nonzero(modes.squares < 0))} modes diverge: the stiffness is not positive",
+            "Damp the structure at a speed at which it is stable.",
+        )
+    weighted = structure.mass @ modes.shapes
+    rates = 2.0 * zeta * np.sqrt(modes.squares)
+    damping = (weighted * rates) @ weighted.conj().T
+    return _with_dissipation(structure, (damping + damping.conj().T) / 2)
+
+
+def structural_damping(
+    structure: Structure, loss_factor: float, *, elastic: Matrix | None = None
+) -> Structure:
+    """Return the structure with structural (hysteretic) damping: stiffness ``K + i η K`` in vibration, K alone in statics.
+
+    Parameters
+    ----------
+    structure
+        Loss it had is replaced, viscous damping stays.
+    loss_factor
+        η, twice the damping ratio of a resonance. Parts of different material: one call each, then `join`.
+    elastic
+        (n, n) stiffness that dissipates, N/m; that of the structure if not given. At speed give the one at rest: neither tension nor spin
+        softening dissipates.
+
+    Raises
+    ------
+    InputError
+        If the loss factor is negative or `elastic` has another size.
+    """
+    if not 0 <= loss_factor < math.inf:
+        raise input_error(
+            "structural_damping: loss_factor",
+            f"must not be negative, got {loss_factor}",
+            "Metals: 1e-4 to 1e-2.",
+        )
+    source = structure.stiffness if elastic is None else elastic
+    if source.shape != structure.stiffness.shape:
+        raise input_error(
+            "structural_damping: elastic",
+            f"has shape {source.shape} for {structure.n} dofs",
+            "Give the stiffness in the coordinates of the structure.",
+        )
+    return replace(structure, loss=loss_factor * source)
+
+
+def _with_dissipation(structure: Structure, damping: Matrix) -> Structure:
+    """Return the structure with another dissipation, its Coriolis terms kept."""
+    own = structure.damping
+    skew = (own - own.conj().T) / 2
+    if structure.n and abs(skew).max() > ROUNDING * abs(own).max():
+        damping = damping + skew
+    if scipy.sparse.issparse(structure.stiffness) and not scipy.sparse.issparse(damping):
+        damping = scipy.sparse.csr_array(damping)
+    return structure.with_damping(damping)

@@ -28,6 +28,9 @@ class Structure:
     basis
         (n_full, n) matrix with ``full = basis @ reduced``, dense or SciPy CSR, complex for a travelling wave;
         None where nothing was reduced.
+    loss
+        (n, n) structural (hysteretic) damping in N/m, the imaginary part of the stiffness in vibration: symmetric, or Hermitian
+        as the stiffness is; None for none. A static load does not feel it.
 
     Raises
     ------
@@ -41,6 +44,7 @@ class Structure:
     dofs: Dofs
     sets: Mapping[str, IntArray] = field(default_factory=dict)
     basis: Matrix | None = None
+    loss: Matrix | None = None
 
     def __post_init__(self) -> None:
         n = len(self.dofs)
@@ -48,6 +52,8 @@ class Structure:
             shape = getattr(self, name).shape
             if shape != (n, n):
                 raise ValueError(f"Structure.{name}: shape {shape} for {n} dofs")
+        if self.loss is not None and self.loss.shape != (n, n):
+            raise ValueError(f"Structure.loss: shape {self.loss.shape} for {n} dofs")
 
     @property
     def n(self) -> int:
@@ -89,6 +95,11 @@ def join(**parts: Structure) -> Structure:
 
     def stack(which: str) -> Matrix:
         blocks = [getattr(s, which) for s in parts.values()]
+        # parts without loss beside parts with it
+        blocks = [
+            np.zeros((s.n, s.n)) if b is None else b
+            for s, b in zip(parts.values(), blocks, strict=True)
+        ]
         if any(scipy.sparse.issparse(b) for b in blocks):
             return scipy.sparse.block_diag(blocks, format="csr")
         return scipy.linalg.block_diag(*blocks)
@@ -99,4 +110,5 @@ def join(**parts: Structure) -> Structure:
         stack("stiffness"),
         join_dofs({k: s.dofs for k, s in parts.items()}),
         sets,
+        loss=stack("loss") if any(s.loss is not None for s in parts.values()) else None,
     )
