@@ -1,6 +1,7 @@
 """A sector of a bladed disk, meshed with second-order tetrahedra whose cyclic faces match node by node."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -147,23 +148,29 @@ def _wire(occ: Any, section: FloatArray) -> int:
     return int(occ.addWire(curves))
 
 
-def _sizes(geometry: BladedSector) -> Any:
-    """Return gmsh's callback for the element size at a point: by radius, finer in the shroud."""
+def _sizes(geometry: BladedSector) -> Callable[..., float]:
+    """Return gmsh's callback for the element size at a point, a function of its radius.
+
+    It has no jumps: gmsh would call it a million times to find out where they are.
+    """
     g = geometry
     rim = g.disk.rim_radius
-    shroud = (math.inf, -math.inf)
+    radii, sizes = [rim - g.disk.rim_height], [g.disk_size]
+    if g.platform is not None:
+        radii += [rim, g.base_radius, g.base_radius + g.airfoil_size]
+        sizes += [g.platform_size, g.platform_size, g.airfoil_size]
+    else:
+        radii, sizes = [*radii, rim], [*sizes, g.airfoil_size]
+    inner, outer = (math.inf, math.inf)
     if g.shroud is not None:
-        middle, half = g.shroud_radius, g.shroud.thickness
-        shroud = (middle - half, middle + half)
+        inner = g.shroud_radius - g.shroud.thickness / 2
+        outer = g.shroud_radius + g.shroud.thickness / 2
 
     def size(dim: int, tag: int, x: float, y: float, z: float, lc: float) -> float:
         del dim, tag, z, lc
         radius = math.hypot(x, y)
-        if radius < rim:
-            return g.disk_size
-        if radius < g.base_radius or shroud[0] < radius < shroud[1]:
-            return g.platform_size
-        return g.airfoil_size
+        body = float(np.interp(radius, radii, sizes))
+        return min(body, g.platform_size + max(inner - radius, radius - outer, 0.0))
 
     return size
 
