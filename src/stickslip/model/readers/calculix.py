@@ -12,7 +12,7 @@ from stickslip.model.readers.entries import SYMMETRY, from_triangle
 from stickslip.model.readers.node_table import COMPONENTS
 from stickslip.model.readers.positions import find_nodes
 from stickslip.model.readers.text import CUT_SHORT, number_table, read_text, whole_numbers
-from stickslip.model.readers.units import Units, check_units, in_si
+from stickslip.model.readers.units import SI, Units, check_units, in_si
 from stickslip.model.structure import Structure
 
 SUFFIXES = {".sti": "stiffness", ".mas": "mass", ".dof": "list of dofs"}
@@ -21,7 +21,7 @@ SUFFIXES = {".sti": "stiffness", ".mas": "mass", ".dof": "list of dofs"}
 def read_calculix_matrices(
     path: Path | str,
     *,
-    units: Units,
+    units: Units = SI,
     mesh: SolidMesh | Path | str | None = None,
     mass: Path | str | None = None,
     plausible: bool = True,

@@ -66,15 +66,18 @@ def from_triangle(
     return scipy.sparse.csr_array(matrix + matrix.T - diagonal)
 
 
+def asymmetry(matrix: Matrix) -> float:
+    """Return the largest difference between mirrored entries, over the largest entry."""
+    largest = float(abs(matrix).max()) if matrix.shape[0] else 0.0
+    return float(abs(matrix - matrix.conj().T).max()) / largest if largest else 0.0
+
+
 def check_symmetric(matrix: Matrix, place: str) -> None:
     """Refuse a matrix that is not Hermitian; the message names the worst pair."""
-    difference = abs(matrix - matrix.conj().T)
-    largest = float(abs(matrix).max()) if matrix.shape[0] else 0.0
-    if largest == 0.0 or float(difference.max()) <= SYMMETRY * largest:
+    if asymmetry(matrix) <= SYMMETRY:
         return
-    dense = not scipy.sparse.issparse(difference)
-    where = int(difference.argmax()) if dense else int(difference.tocsr().argmax())
-    row, column = divmod(where, matrix.shape[0])
+    difference = scipy.sparse.csr_array(abs(matrix - matrix.conj().T))
+    row, column = divmod(int(difference.argmax()), matrix.shape[0])
     raise input_error(
         place,
         f"is not symmetric: row {row + 1}, column {column + 1} and its mirror are "

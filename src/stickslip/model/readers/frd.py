@@ -12,7 +12,7 @@ from stickslip.errors import InputError, input_error
 from stickslip.model.mesh import SolidMesh
 from stickslip.model.readers.node_table import NodeTable, node_table
 from stickslip.model.readers.text import CUT_SHORT, SHOWN, read_text
-from stickslip.model.readers.units import Units
+from stickslip.model.readers.units import SI, Units
 
 # element type -> nodes, and where VTK's nodes stand (the format lists a brick's upright edges before its top ones)
 HEX20 = (*range(12), 16, 17, 18, 19, 12, 13, 14, 15)
@@ -89,7 +89,7 @@ class FrdResults:
         )
 
 
-def read_frd(path: Path | str, *, units: Units) -> FrdResults:
+def read_frd(path: Path | str, *, units: Units = SI) -> FrdResults:
     """Read an ASCII ``.frd`` file of CalculiX.
 
     Parameters

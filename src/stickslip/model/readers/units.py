@@ -117,6 +117,9 @@ class Units:
         return np.where(np.isin(dofs.component, ("x", "y", "z")), self.length, 1.0)
 
 
+SI = Units.si()
+
+
 def _known() -> tuple[Units, ...]:
     return (
         Units.si(),

@@ -1,0 +1,326 @@
+"""Input decks of CalculiX and Abaqus: the mesh, its material, supports, speed and cyclic symmetry.
+
+The parser is our own: meshio, which the mesher brings along, reads nodes, elements and sets of such a file and passes
+over materials, supports, ties and steps without a word, and it is not there when only NumPy and SciPy are installed.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse
+from scipy.spatial import cKDTree
+
+from stickslip.arrays import BoolArray, FloatArray, IntArray
+from stickslip.errors import did_you_mean, input_error
+from stickslip.model.axis import Axis
+from stickslip.model.dofs import nodal_dofs
+from stickslip.model.elements import Quadrature
+from stickslip.model.mesh import SolidMesh
+from stickslip.model.readers.deck_model import DeckModel, interpret
+from stickslip.model.readers.keywords import keyword_blocks
+from stickslip.model.readers.node_table import block_nodes
+from stickslip.model.readers.units import SI, Units, check_material
+from stickslip.model.solid import Material, integrate, node_dofs
+from stickslip.model.structure import Structure
+
+PAIRED = (
+    1e-3  # of the face's size: how far a rotated face may lie from the other to be taken for it
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Deck:
+    """What an input deck holds, in SI.
+
+    Parameters
+    ----------
+    mesh
+        Nodes that belong to cells, and the cells. Its sets: those of the deck without their clamped nodes; ``root``,
+        the clamped ones; with cyclic symmetry ``cyclic_low`` and ``cyclic_high``, of which the first, turned by one
+        pitch, is the second.
+    element_type
+        As in the deck, e.g. ``C3D10``.
+    materials
+        Name -> material.
+    cell_material
+        (m,) material name of each cell.
+    held
+        (n, 3) which components of each node are supported; ``root`` has those with all three.
+    speed
+        Rotor speed in rad/s of the last ``CENTRIF`` load; None without one.
+    axis
+        Of rotation; the z axis where the deck names none.
+    sectors
+        Number of sectors; None without cyclic symmetry.
+    ignored
+        Keywords and loads that were passed over, with their lines.
+    """
+
+    mesh: SolidMesh
+    element_type: str
+    materials: Mapping[str, Material]
+    cell_material: tuple[str, ...]
+    held: BoolArray
+    speed: float | None
+    axis: Axis
+    sectors: int | None
+    ignored: tuple[str, ...]
+
+    @property
+    def material(self) -> Material:
+        """The only material; an `InputError` where there are several."""
+        used = sorted(set(self.cell_material))
+        if len(used) != 1:
+            raise input_error(
+                "Deck.material", f"there are {len(used)}: {', '.join(used)}", "Use assemble_deck."
+            )
+        return self.materials[used[0]]
+
+    @property
+    def quadrature(self) -> Quadrature:
+        """The quadrature rules of CalculiX for the element type; exact ones for types that are more than a rule."""
+        return QUADRATURES.get(self.element_type, Quadrature())
+
+
+# found by comparing with matrices that CalculiX 2.20 stored: equal to 2e-14
+QUADRATURES = {
+    "C3D4": Quadrature(stiffness=1, mass=1),
+    "C3D10": Quadrature.calculix(),
+    "C3D10T": Quadrature.calculix(),
+    "C3D8": Quadrature(stiffness=3, mass=3),
+    "C3D20": Quadrature(stiffness=5, mass=5),
+    "C3D20R": Quadrature(stiffness=3, mass=3),
+}
+
+
+def read_deck(
+    path: Path | str,
+    *,
+    units: Units = SI,
+    ignore: tuple[str, ...] = (),
+    plausible: bool = True,
+) -> Deck:
+    """Read an input deck of CalculiX or Abaqus.
+
+    Parameters
+    ----------
+    path
+        The ``.inp`` file, plain or gzipped; ``*INCLUDE`` may name files in its folder.
+    units
+        Unit system of the deck.
+    ignore
+        Keywords to go on without, e.g. ``("MPC",)``, though they change the model; they are listed in `Deck.ignored`.
+    plausible
+        False takes density and stiffness as they are, though no solid has such.
+
+    Returns
+    -------
+    Deck
+        In SI.
+
+    Raises
+    ------
+    InputError
+        If the deck is damaged or incomplete, or holds what changes the model and is not read (multi-point constraints,
+        shells, contact, orientations); the message names the line.
+    """
+    path = Path(path)
+    blocks = keyword_blocks(path)
+    model = interpret(blocks, block_nodes(blocks, path), ignore)
+    materials = _materials(model, units, plausible)
+    mesh, keep = _mesh(model, units)
+    held: BoolArray = _held(model)[keep]
+    axis = _axis(model, units)
+    sets = {name: _index(mesh, nodes) for name, nodes in model.nodes.node_sets.items()}
+    if model.tie is not None and model.sectors:
+        faces = _index(mesh, model.tie[0]), _index(mesh, model.tie[1])
+        faces = _oriented(mesh.points, faces, axis, model.sectors)
+        held = _held_by_tie(mesh.points, held, faces, axis, 2 * math.pi / model.sectors)
+        sets |= {"cyclic_low": faces[0], "cyclic_high": faces[1]}
+    root: BoolArray = held.min(axis=1)
+    free_sets = {name: nodes[~root[nodes]] for name, nodes in sets.items()}
+    node_sets = {name: nodes for name, nodes in free_sets.items() if nodes.size}
+    if root.any():
+        node_sets["root"] = np.flatnonzero(root)
+    if model.element_type not in QUADRATURES:
+        model.ignored.append(f"what makes {model.element_type} another element than its plain kind")
+    square = model.speed_squares[-1] if model.speed_squares else None
+    return Deck(
+        replace(mesh, node_sets=node_sets),
+        model.element_type,
+        materials,
+        _cell_materials(model),
+        held,
+        None if square is None else math.sqrt(square) / units.time,
+        axis,
+        model.sectors,
+        tuple(model.ignored),
+    )
+
+
+def assemble_deck(deck: Deck, *, quadrature: Quadrature | None = None) -> Structure:
+    """Assemble mass and stiffness of a deck at rest, supports applied, cyclic faces untied.
+
+    Parameters
+    ----------
+    deck
+        With one material or several.
+    quadrature
+        The rules; `Deck.quadrature` by default.
+
+    Returns
+    -------
+    Structure
+        Sparse, undamped. Each node set becomes a set of dofs, without those that are supported.
+    """
+    rules = deck.quadrature if quadrature is None else quadrature
+    n = 3 * len(deck.mesh.points)
+    mass, stiffness = scipy.sparse.csr_array((n, n)), scipy.sparse.csr_array((n, n))
+    of_cell = np.array(deck.cell_material)
+    for name in dict.fromkeys(deck.cell_material):
+        cells = deck.mesh.cells[of_cell == name]
+        nodes, local = np.unique(cells, return_inverse=True)
+        part = SolidMesh(deck.mesh.points[nodes], local.reshape(cells.shape), {})
+        place = scipy.sparse.csr_array(
+            (np.ones(3 * len(nodes)), (node_dofs(nodes), np.arange(3 * len(nodes)))),
+            shape=(n, 3 * len(nodes)),
+        )
+        M, K = integrate(part, deck.materials[name], rules)
+        mass, stiffness = mass + place @ M @ place.T, stiffness + place @ K @ place.T
+    free = np.flatnonzero(~deck.held.ravel())
+    new = np.full(n, -1)
+    new[free] = np.arange(len(free))
+    sets = {}
+    for name, members in deck.mesh.node_sets.items():
+        index = new[node_dofs(members)]
+        if name != "root":
+            sets[name] = index[index >= 0]
+    return Structure(
+        mass.tocsr()[free][:, free],
+        scipy.sparse.csr_array((len(free), len(free))),
+        stiffness.tocsr()[free][:, free],
+        nodal_dofs(deck.mesh.points, deck.mesh.numbers).take(free),
+        sets,
+    )
+
+
+def _materials(model: DeckModel, units: Units, plausible: bool) -> dict[str, Material]:
+    """Return the materials of the sections."""
+    materials = {}
+    for name, _, place in model.sections:
+        for what, table in (("*ELASTIC", model.elastic), ("*DENSITY", model.density)):
+            if name not in table:
+                raise input_error(
+                    place,
+                    f"material {name!r} has no {what}",
+                    f"Add it. {did_you_mean(name, sorted({*model.elastic, *model.density}))}",
+                )
+        modulus, ratio = model.elastic[name]
+        modulus, density = units.stress * modulus, units.density * model.density[name]
+        if plausible:
+            check_material(density, modulus, units, place)
+        materials[name] = Material(young_modulus=modulus, poisson_ratio=ratio, density=density)
+    return materials
+
+
+def _cell_materials(model: DeckModel) -> tuple[str, ...]:
+    """Return the material of each cell; the last section counts where two name it."""
+    numbers = model.cells[:, 0]
+    name = np.full(len(numbers), -1)
+    for i, (_, elements, _) in enumerate(model.sections):
+        name[np.isin(numbers, model.element_sets[elements])] = i
+    if (name < 0).any():
+        raise input_error(
+            model.nodes.place,
+            f"{(name < 0).sum()} elements have no material, e.g. {numbers[name < 0][0]}",
+            "Name an element set that holds them in a *SOLID SECTION.",
+        )
+    return tuple(model.sections[i][0] for i in name)
+
+
+def _mesh(model: DeckModel, units: Units) -> tuple[SolidMesh, IntArray]:
+    """Return the mesh without sets, and the rows of the nodes that it kept."""
+    rows = model.nodes.index(model.cells[:, 1:].ravel())
+    kept, cells = np.unique(rows, return_inverse=True)
+    if len(kept) < len(model.nodes.numbers):
+        model.ignored.append(f"{len(model.nodes.numbers) - len(kept)} nodes that belong to no cell")
+    mesh = SolidMesh(
+        units.length * model.nodes.points[kept],
+        cells.reshape(len(model.cells), -1),
+        {},
+        numbers=model.nodes.numbers[kept],
+        cell_numbers=model.cells[:, 0],
+    )
+    return mesh, kept
+
+
+def _index(mesh: SolidMesh, numbers: IntArray) -> IntArray:
+    """Return the nodes with these numbers, in their order, as far as the mesh has them."""
+    place = np.minimum(np.searchsorted(mesh.numbers, numbers), len(mesh.numbers) - 1)
+    return np.asarray(place[mesh.numbers[place] == numbers], dtype=np.int64)
+
+
+def _held(model: DeckModel) -> BoolArray:
+    """Return which components of all nodes of the deck are supported, (n, 3)."""
+    held = np.zeros((len(model.nodes.numbers), 3), dtype=bool)
+    for i, component in enumerate("xyz"):
+        for nodes in model.fixed[component]:
+            held[model.nodes.index(nodes), i] = True
+    return held
+
+
+def _axis(model: DeckModel, units: Units) -> Axis:
+    """Return the axis that all of the deck's axes lie on; the cyclic model's comes first."""
+    if not model.axes:
+        return Axis()
+    axes = [
+        (place, Axis(_three(direction), _three([units.length * x for x in origin])))
+        for place, origin, direction in model.axes
+    ]
+    first = axes[0][1]
+    for place, axis in axes[1:]:
+        parallel = np.linalg.norm(first.cross @ axis.unit) < PAIRED
+        away = float(np.linalg.norm(first.arm(np.array([axis.origin]))))
+        if not parallel or away > PAIRED * max(1.0, float(np.linalg.norm(axis.origin))):
+            raise input_error(
+                place, "its axis is another one than that of the cyclic symmetry", "Use one axis."
+            )
+    return first
+
+
+def _three(values: list[float]) -> tuple[float, float, float]:
+    x, y, z = values
+    return x, y, z
+
+
+def _oriented(
+    points: FloatArray, faces: tuple[IntArray, IntArray], axis: Axis, sectors: int
+) -> tuple[IntArray, IntArray]:
+    """Return the faces such that the first, turned by one pitch, comes to lie on the second."""
+    pitch = 2 * math.pi / sectors
+    misses = [
+        float(cKDTree(points[faces[1]]).query(axis.turned(points[faces[0]], angle))[0].max())
+        for angle in (pitch, -pitch)
+    ]
+    return faces if misses[0] <= misses[1] else (faces[1], faces[0])
+
+
+def _held_by_tie(
+    points: FloatArray, held: BoolArray, faces: tuple[IntArray, IntArray], axis: Axis, pitch: float
+) -> BoolArray:
+    """Return the supports with those that the cyclic tie carries over to the other face.
+
+    CalculiX takes no support on the dependent face: its nodes are held because their partners are.
+    """
+    low, high = faces
+    distance, partner = cKDTree(points[high]).query(axis.turned(points[low], pitch))
+    near = distance <= PAIRED * float(np.ptp(points[high], axis=0).max())
+    first, second = low[near], high[partner[near]]
+    both = held[first].all(axis=1) | held[second].all(axis=1)
+    held = held.copy()
+    held[first[both]] = True
+    held[second[both]] = True
+    return held

@@ -1,0 +1,315 @@
+"""What a CalculiX or Abaqus deck says: cells, materials, boundary conditions, rotation, cyclic symmetry."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stickslip.arrays import IntArray
+from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.model.readers.keywords import (
+    Block,
+    members,
+    real_number,
+    unique_in_order,
+    whole_number,
+)
+from stickslip.model.readers.node_table import NodeTable
+
+NODES_OF = {
+    "C3D4": 4, "C3D10": 10, "C3D10M": 10, "C3D10T": 10,
+    "C3D8": 8, "C3D8I": 8, "C3D8R": 8, "C3D20": 20, "C3D20R": 20,
+}  # fmt: skip
+
+# Keywords that say nothing about mass, stiffness or supports: steps, output, loads of single nodes
+SILENT = {
+    "HEADING", "NODE", "ELEMENT", "NSET", "ELSET", "MATERIAL", "STEP", "END STEP", "STATIC", "FREQUENCY",
+    "COMPLEX FREQUENCY", "BUCKLE", "STEADY STATE DYNAMICS", "MODAL DYNAMIC", "DYNAMIC", "SELECT CYCLIC SYMMETRY MODES",
+    "NODE PRINT", "NODE FILE", "NODE OUTPUT", "EL PRINT", "EL FILE", "ELEMENT OUTPUT", "ENERGY OUTPUT", "CONTACT FILE",
+    "CONTACT PRINT", "OUTPUT", "PREPRINT", "RESTART", "SURFACE", "PART", "END PART", "ASSEMBLY", "END ASSEMBLY",
+    "INSTANCE", "END INSTANCE", "MATRIX GENERATE", "MATRIX OUTPUT", "FILE FORMAT", "MONITOR", "AMPLITUDE", "TIME POINTS",
+    "MODAL DAMPING", "BASE MOTION", "PHYSICAL CONSTANTS", "USER OUTPUT", "PRINT", "FIELD", "SOLID SECTION", "ELASTIC",
+    "DENSITY", "BOUNDARY", "DLOAD", "TIE", "CYCLIC SYMMETRY MODEL",
+}  # fmt: skip
+# Keywords without which the matrices would be others, and which are not read
+REFUSED = {
+    "MPC", "EQUATION", "RIGID BODY", "COUPLING", "KINEMATIC", "DISTRIBUTING", "DISTRIBUTING COUPLING", "CONTACT PAIR",
+    "CONTACT", "SHELL SECTION", "BEAM SECTION", "BEAM GENERAL SECTION", "MEMBRANE SECTION", "SPRING", "DASHPOT", "MASS",
+    "ROTARY INERTIA", "GAP", "SUBMODEL", "MODEL CHANGE", "ORIENTATION", "PRE-TENSION SECTION", "USER ELEMENT",
+    "MATRIX INPUT", "MATRIX ASSEMBLE", "NCOPY", "NGEN", "NFILL", "NMAP", "ELGEN", "ELCOPY", "SYSTEM", "TRANSFORM",
+    "DISTRIBUTION", "FOUNDATION", "EMBEDDED ELEMENT", "CONNECTOR SECTION", "SUPER ELEMENT", "SUBSTRUCTURE",
+    "HYPERELASTIC", "HYPERFOAM", "USER MATERIAL", "SUBSTRUCTURE PROPERTY", "SHELL TO SOLID COUPLING", "PHYSICAL",
+}  # fmt: skip
+
+
+@dataclass
+class DeckModel:
+    """Contents of a deck with its own numbers and units, as far as they were read.
+
+    Cells are rows ``number, nodes…``; sections are pairs of material and element set; ``fixed`` holds nodes by
+    component ``x``, ``y``, ``z``; speeds are squares of circular frequencies.
+    """
+
+    nodes: NodeTable
+    element_type: str = ""
+    cells: IntArray = field(default_factory=lambda: np.empty((0, 0), dtype=np.int64))
+    element_sets: dict[str, IntArray] = field(default_factory=dict)
+    elastic: dict[str, tuple[float, float]] = field(default_factory=dict)
+    density: dict[str, float] = field(default_factory=dict)
+    sections: list[tuple[str, str, str]] = field(default_factory=list)  # material, set, place
+    fixed: dict[str, list[IntArray]] = field(default_factory=lambda: {"x": [], "y": [], "z": []})
+    speed_squares: list[float] = field(default_factory=list)
+    axes: list[tuple[str, list[float], list[float]]] = field(
+        default_factory=list
+    )  # place, origin, direction
+    sectors: int | None = None
+    tie: tuple[IntArray, IntArray] | None = None  # nodes of the dependent and the independent face
+    ignored: list[str] = field(default_factory=list)
+
+
+def interpret(blocks: list[Block], nodes: NodeTable, ignore: tuple[str, ...]) -> DeckModel:
+    """Read the blocks of a deck.
+
+    Parameters
+    ----------
+    blocks
+        Of the whole file.
+    nodes
+        Its nodes and node sets.
+    ignore
+        Keywords to pass over though the model is another one without them.
+
+    Raises
+    ------
+    InputError
+        If something is missing, wrong, or changes the matrices in a way that is not read.
+    """
+    model = DeckModel(nodes)
+    _cells(model, blocks)
+    passed = {" ".join(word.upper().strip("* ").split()) for word in ignore}
+    material = ""
+    for block in blocks:
+        word = block.keyword
+        if word == "MATERIAL":
+            material = block.parameter("NAME").upper()
+        elif word in passed:
+            model.ignored.append(f"*{word} ({block.path.name}: line {block.line}), as asked")
+        elif word in REFUSED:
+            raise _unread(block, f"*{word} changes the model and is not read")
+        elif word in ("ELASTIC", "DENSITY"):
+            _material(model, block, material)
+        elif word in _ACTIONS:
+            _ACTIONS[word](model, block)
+        elif word not in SILENT:
+            model.ignored.append(f"*{word} ({block.path.name}: line {block.line})")
+    _cyclic(model, blocks, passed)
+    return model
+
+
+def _unread(block: Block, problem: str) -> InputError:
+    return input_error(
+        block.place,
+        problem,
+        f"Let the solver write its matrices and read those, or pass ignore=({block.keyword!r},) to go on without.",
+    )
+
+
+def _cells(model: DeckModel, blocks: list[Block]) -> None:
+    """Take elements, all with the same count of nodes, and the element sets."""
+    parts, named = [], dict[str, list[IntArray]]()
+    for block in blocks:
+        if block.keyword != "ELEMENT":
+            continue
+        kind = block.parameter("TYPE").upper()
+        if kind not in NODES_OF:
+            raise _unread(block, f"elements of type {kind} are not read")
+        count = NODES_OF[kind]
+        model.element_type = model.element_type or kind
+        if kind != model.element_type:
+            raise input_error(
+                block.place,
+                f"elements of type {kind} beside {model.element_type}",
+                "Use one type a deck: C3D4, C3D10, C3D8 or C3D20.",
+            )
+        rows = np.array(list(_connectivity(block, count)), dtype=np.int64).reshape(-1, count + 1)
+        parts.append(rows)
+        if "ELSET" in block.parameters:
+            named.setdefault(block.parameters["ELSET"].upper(), []).append(rows[:, 0])
+    if not parts:
+        raise input_error(
+            model.nodes.place, "has no *ELEMENT", "Give the deck with the mesh, solid elements."
+        )
+    model.cells = np.vstack(parts)
+    if len(np.unique(model.cells[:, 0])) < len(model.cells):
+        number, times = np.unique(model.cells[:, 0], return_counts=True)
+        raise input_error(
+            model.nodes.place, f"defines element {number[times > 1][0]} twice", "Give it once."
+        )
+    model.element_sets = members(
+        blocks, "ELSET", model.cells[:, 0], {name: np.concatenate(p) for name, p in named.items()}
+    )
+
+
+def _connectivity(block: Block, count: int) -> Iterator[list[int]]:
+    """Yield number and nodes of each element; a long one goes over several lines."""
+    row: list[int] = []
+    place = block.place
+    for place, fields in block.rows():
+        row += [whole_number(text, place, "node") for text in fields]
+        if len(row) > count + 1:
+            raise input_error(
+                place, f"an element has {len(row) - 1} nodes, not {count}", "Check TYPE and lines."
+            )
+        if len(row) == count + 1:
+            yield row
+            row = []
+    if row:
+        raise input_error(
+            place, f"the last element has {len(row) - 1} nodes of {count}", "The file is cut short."
+        )
+
+
+def _material(model: DeckModel, block: Block, material: str) -> None:
+    if not material:
+        raise input_error(block.place, "belongs to no *MATERIAL", "Put it below its material.")
+    kind = block.parameters.get("TYPE", "ISO").upper()
+    if block.keyword == "ELASTIC" and not kind.startswith("ISO"):
+        raise _unread(block, f"TYPE={kind} is not read, only isotropic materials")
+    rows = list(block.rows())
+    wanted = 2 if block.keyword == "ELASTIC" else 1
+    if len(rows) != 1:
+        raise _unread(block, f"has {len(rows)} lines of data: values by temperature are not read")
+    place, fields = rows[0]
+    if len(fields) < wanted:
+        raise input_error(place, f"needs {wanted} numbers, got {len(fields)}", "Check the line.")
+    values = [real_number(text, place, "value") for text in fields[:wanted]]
+    if block.keyword == "ELASTIC":
+        model.elastic[material] = (values[0], values[1])
+    else:
+        model.density[material] = values[0]
+
+
+def _section(model: DeckModel, block: Block) -> None:
+    if "ORIENTATION" in block.parameters:
+        raise _unread(block, "an ORIENTATION is not read")
+    name, elements = block.parameter("MATERIAL").upper(), block.parameter("ELSET").upper()
+    if elements not in model.element_sets:
+        raise _unknown(block.place, "element set", elements, list(model.element_sets))
+    model.sections.append((name, elements, block.place))
+
+
+def _unknown(place: str, what: str, name: str, known: list[str]) -> InputError:
+    return input_error(place, f"there is no {what} {name!r}", did_you_mean(name, known))
+
+
+def nodes_named(model: DeckModel, text: str, place: str) -> IntArray:
+    """Return the nodes of a set, or a single node by its number."""
+    if text.upper() in model.nodes.node_sets:
+        return model.nodes.node_sets[text.upper()]
+    if not text.lstrip("+-").isdigit():
+        raise _unknown(place, "node set", text.upper(), list(model.nodes.node_sets))
+    number = np.array([int(text)])
+    model.nodes.index(number)
+    return number
+
+
+def _boundary(model: DeckModel, block: Block) -> None:
+    """Take supports: ``node or set, first direction, last direction, value`` or ``ENCASTRE`` and the like."""
+    words = {"ENCASTRE": (1, 6), "PINNED": (1, 3)}
+    if block.parameters.get("OP", "MOD").upper() == "NEW":
+        model.fixed = {"x": [], "y": [], "z": []}
+    for place, fields in block.rows():
+        nodes = nodes_named(model, fields[0], place)
+        if len(fields) > 1 and fields[1].upper() in words:
+            first, last = words[fields[1].upper()]
+        else:
+            if len(fields) < 2:
+                raise input_error(place, "names no direction", "Write node, first, last.")
+            first = whole_number(fields[1], place, "direction")
+            last = (
+                whole_number(fields[2] or str(first), place, "direction")
+                if len(fields) > 2
+                else first
+            )
+        value = real_number(fields[3], place, "value") if len(fields) > 3 else 0.0
+        if value:
+            raise _unread(block, f"a prescribed displacement of {value:g} is not read")
+        if not 1 <= first <= last:
+            raise input_error(place, f"directions {first} to {last}", "They count from 1 to 3.")
+        for direction, component in enumerate("xyz", 1):
+            if first <= direction <= last:
+                model.fixed[component].append(nodes)
+
+
+def _distributed_load(model: DeckModel, block: Block) -> None:
+    """Take rotation: ``elements, CENTRIF, speed², point of the axis, direction``; list other loads as ignored."""
+    for place, fields in block.rows():
+        kind = fields[1].upper() if len(fields) > 1 else ""
+        if kind != "CENTRIF":
+            model.ignored.append(f"load {kind or '?'} ({place})")
+            continue
+        if len(fields) < 9:
+            raise input_error(
+                place, f"CENTRIF with {len(fields)} fields", "Give speed², a point and a direction."
+            )
+        numbers = [real_number(text, place, "CENTRIF value") for text in fields[2:9]]
+        if numbers[0] < 0:
+            raise input_error(place, f"speed² is {numbers[0]:g}", "It cannot be negative.")
+        model.speed_squares.append(numbers[0])
+        model.axes.append((place, numbers[1:4], numbers[4:7]))
+
+
+def _cyclic_model(model: DeckModel, block: Block) -> None:
+    model.sectors = whole_number(block.parameter("N"), block.place, "number of sectors N")
+    if model.sectors < 1:
+        raise input_error(block.place, f"N={model.sectors}", "Give the number of sectors.")
+    rows = list(block.rows())
+    if len(rows) != 1 or len(rows[0][1]) < 6:
+        raise input_error(block.place, "needs one line with two points of the axis", "Add it.")
+    place, fields = rows[0]
+    numbers = [real_number(text, place, "coordinate") for text in fields[:6]]
+    direction = [b - a for a, b in zip(numbers[:3], numbers[3:], strict=True)]
+    model.axes.insert(0, (place, numbers[:3], direction))
+
+
+_ACTIONS = {
+    "SOLID SECTION": _section,
+    "BOUNDARY": _boundary,
+    "DLOAD": _distributed_load,
+    "CYCLIC SYMMETRY MODEL": _cyclic_model,
+}
+
+
+def _cyclic(model: DeckModel, blocks: list[Block], passed: set[str]) -> None:
+    """Take the faces of the cyclic tie; refuse other ties."""
+    instances = [b for b in blocks if b.keyword == "INSTANCE"]
+    if len(instances) > 1 or any(list(b.rows()) for b in instances):
+        raise _unread(instances[-1], "several instances, or a moved one, are not read")
+    surfaces = {b.parameter("NAME").upper(): b for b in blocks if b.keyword == "SURFACE"}
+    for block in blocks:
+        if block.keyword != "TIE" or "TIE" in passed:
+            continue
+        if "CYCLIC SYMMETRY" not in block.parameters:
+            raise _unread(block, "a *TIE that is not cyclic changes the model and is not read")
+        rows = list(block.rows())
+        if len(rows) != 1 or len(rows[0][1]) < 2:
+            raise input_error(block.place, "needs one line with two surfaces", "Add it.")
+        place, fields = rows[0]
+        low, high = (_surface_nodes(model, surfaces, name.upper(), place) for name in fields[:2])
+        model.tie = (low, high)
+
+
+def _surface_nodes(model: DeckModel, surfaces: dict[str, Block], name: str, place: str) -> IntArray:
+    if name not in surfaces:
+        raise _unknown(place, "surface", name, list(surfaces))
+    block = surfaces[name]
+    if block.parameters.get("TYPE", "ELEMENT").upper() != "NODE":
+        raise input_error(
+            block.place,
+            "a cyclic face of element faces is not read",
+            "Define the surface with TYPE=NODE, from a node set.",
+        )
+    parts = [nodes_named(model, fields[0], where) for where, fields in block.rows()]
+    if not parts:
+        raise input_error(block.place, "holds no nodes", "List node sets.")
+    return unique_in_order(np.concatenate(parts))

@@ -1,0 +1,181 @@
+"""What is in a model: counts, mass, size, first frequencies, and whether they make sense."""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.errors import StickslipError
+from stickslip.model.factorisation import Say, silent
+from stickslip.model.mesh import SolidMesh
+from stickslip.model.modes import normal_modes
+from stickslip.model.readers.entries import SYMMETRY, asymmetry
+from stickslip.model.readers.units import SI, Units, doubt_about_units, translational_mass
+from stickslip.model.structure import Structure
+
+DIGITS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class ModelSummary:
+    """What `stickslip inspect` prints; quantities that the file does not give are None.
+
+    Parameters
+    ----------
+    kind
+        What the file holds, e.g. ``matrices``.
+    nodes, cells, dofs
+        Counts.
+    components
+        Name -> number of dofs of that kind.
+    sets
+        Name -> number of members: dofs of matrices, nodes of a mesh.
+    mass
+        (3,) kg that move with a unit translation along x, y, z; without supported dofs.
+    centre
+        (3,) centre of that mass in m.
+    box
+        (2, 3) lowest and highest coordinates in m.
+    symmetric
+        Whether mass and stiffness are symmetric, or Hermitian.
+    rigid_modes
+        Modes without strain among the first.
+    frequencies_hz
+        The first natural frequencies, or those the file stores.
+    remarks
+        Sentences: what is doubtful, missing or was passed over.
+    """
+
+    kind: str
+    nodes: int
+    cells: int | None = None
+    dofs: int | None = None
+    components: Mapping[str, int] = field(default_factory=dict)
+    sets: Mapping[str, int] = field(default_factory=dict)
+    mass: FloatArray | None = None
+    centre: FloatArray | None = None
+    box: FloatArray | None = None
+    symmetric: bool | None = None
+    rigid_modes: int | None = None
+    frequencies_hz: FloatArray | None = None
+    remarks: tuple[str, ...] = ()
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Return name and value of all that is known, as texts, for a table."""
+        counts = {"nodes": self.nodes, "cells": self.cells, "dofs": self.dofs}
+        found = [("holds", self.kind)]
+        found += [(name, str(count)) for name, count in counts.items() if count is not None]
+        if self.components:
+            found.append(("components", ", ".join(f"{k}: {v}" for k, v in self.components.items())))
+        found += [("set " + name, str(count)) for name, count in self.sets.items()]
+        if self.box is not None:
+            spans = zip("xyz", *self.box, strict=True)
+            found.append(("box (m)", ", ".join(f"{k} {a:.5g} … {b:.5g}" for k, a, b in spans)))
+        for name, values in (
+            ("mass along x, y, z (kg)", self.mass),
+            ("centre of mass (m)", self.centre),
+            ("frequencies (Hz)", self.frequencies_hz),
+        ):
+            if values is not None:
+                found.append((name, ", ".join(f"{v:.{DIGITS}g}" for v in values)))
+        if self.symmetric is not None:
+            found.append(("symmetric", "yes" if self.symmetric else "no"))
+        if self.rigid_modes is not None:
+            found.append(("rigid modes", str(self.rigid_modes)))
+        return found + [("remark", text) for text in self.remarks]
+
+
+def structure_summary(
+    structure: Structure, *, n_modes: int = 10, units: Units = SI, say: Say = silent
+) -> ModelSummary:
+    """Summarise matrices.
+
+    Parameters
+    ----------
+    structure
+        In SI.
+    n_modes
+        Frequencies to compute; none for 0.
+    units
+        The system it was converted from, which a doubt about mass and size names.
+    say
+        Called with a sentence before each long step.
+    """
+    dofs = structure.dofs
+    remarks = []
+    doubt = doubt_about_units(structure, units)
+    if doubt:
+        remarks.append(f"Units: {doubt}.")
+    massless = int(np.count_nonzero(structure.mass.diagonal() == 0))
+    if massless:
+        remarks.append(f"{massless} dofs have no mass.")
+    finite = dofs.position[np.isfinite(dofs.position).all(axis=1)]
+    symmetric = max(asymmetry(structure.mass), asymmetry(structure.stiffness)) <= SYMMETRY
+    travelling = np.iscomplexobj(structure.stiffness)
+    if travelling:
+        remarks.append("Complex matrices, those of a travelling wave.")
+    mass = None if travelling else translational_mass(structure)
+    summary = ModelSummary(
+        "matrices",
+        len(np.unique(dofs.node[dofs.node >= 0])),
+        dofs=structure.n,
+        components=dict(Counter(dofs.component)),
+        sets={name: len(members) for name, members in structure.sets.items()},
+        mass=mass,
+        centre=None if mass is None else _centre(structure),
+        box=np.vstack([finite.min(axis=0), finite.max(axis=0)]) if len(finite) else None,
+        symmetric=symmetric,
+        remarks=tuple(remarks),
+    )
+    if not symmetric:
+        more = "Not symmetric: no frequencies computed."
+        return replace(summary, remarks=(*summary.remarks, more))
+    return _with_modes(summary, structure, min(n_modes, structure.n - massless), say)
+
+
+def mesh_summary(mesh: SolidMesh, kind: str = "mesh") -> ModelSummary:
+    """Summarise a mesh."""
+    return ModelSummary(
+        kind,
+        len(mesh.points),
+        cells=len(mesh.cells),
+        sets={name: len(members) for name, members in mesh.node_sets.items()},
+        box=np.vstack([mesh.points.min(axis=0), mesh.points.max(axis=0)]),
+    )
+
+
+def _centre(structure: Structure) -> FloatArray | None:
+    """Return the centre of the mass that moves along the first direction that has any."""
+    components = np.array(structure.dofs.component)
+    for axis in ("x", "y", "z"):
+        unit = (components == axis).astype(float)
+        weight = unit * np.real(structure.mass @ unit)
+        if weight.sum() > 0:
+            weighed = weight != 0
+            return np.asarray(weight[weighed] @ structure.dofs.position[weighed] / weight.sum())
+    return None
+
+
+def _with_modes(
+    summary: ModelSummary, structure: Structure, n_modes: int, say: Say
+) -> ModelSummary:
+    if n_modes < 1:
+        return summary
+    try:
+        modes = normal_modes(structure, n_modes, say=say)
+    except StickslipError as error:  # a summary tells what it can
+        return replace(summary, remarks=(*summary.remarks, f"No frequencies: {error}"))
+    remarks = summary.remarks
+    if modes.rigid:
+        remarks = (
+            *remarks,
+            f"{modes.rigid} of its first {n_modes} modes are rigid: it is not held.",
+        )
+    return replace(
+        summary,
+        rigid_modes=modes.rigid,
+        frequencies_hz=modes.frequencies_hz,
+        remarks=remarks,
+    )
