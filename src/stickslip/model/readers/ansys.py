@@ -17,9 +17,10 @@ from stickslip.model.readers.ansys_nodes import (
     AnsysNodes,
     no_nodes,
     read_ansys_nodes,
-    stack_rotations,
+    rotations,
 )
 from stickslip.model.readers.ansys_records import HEADER, Records, long_pointer, open_records
+from stickslip.model.readers.nodal_axes import rotation_to_global
 from stickslip.model.readers.units import Units, check_units, in_si
 from stickslip.model.structure import Structure
 
@@ -196,8 +197,10 @@ def _structure(
 ) -> Structure:
     """Put mass, damping, stiffness and nodes together, in the file's units and the global axes."""
     position, sets = known.of_dofs(node, place)
-    turn = stack_rotations(node, component, known, place)
-    if turn is not None:
+    turned = known.numbers[known.angles.any(axis=1)]
+    if np.isin(node, turned).any():
+        turns = rotations(known, turned)
+        turn = rotation_to_global(node, component, turned, turns, place)
         matrices = [(turn @ matrix @ turn.T).tocsr() for matrix in matrices]
     mass, damping, stiffness = matrices
     massless = np.flatnonzero(abs(mass).sum(axis=1) == 0)

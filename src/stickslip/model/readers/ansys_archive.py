@@ -65,8 +65,7 @@ def read_ansys_archive(path: Path | str, *, units: Units | None = None) -> Solid
         )
     points = blocks.points[order][np.searchsorted(numbers, used)]
     sets = {
-        name: np.flatnonzero(np.isin(used, members))
-        for name, members in blocks.node_sets.items()
+        name: np.flatnonzero(np.isin(used, members)) for name, members in blocks.node_sets.items()
     }
     return SolidMesh(
         units.length * points,

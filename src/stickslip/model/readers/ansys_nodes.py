@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import scipy.sparse
 
-from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.model.readers.ansys_blocks import read_blocks
 from stickslip.model.readers.ansys_records import Records, long_pointer, open_records
@@ -103,10 +102,8 @@ def _sorted(
     return AnsysNodes(numbers[order], points[order], angles[order], sets)
 
 
-def rotations(known: AnsysNodes, node: IntArray) -> FloatArray | None:
-    """Return (k, 3, 3) matrices from the nodal systems of the nodes `node` to the global axes; None where all agree."""
-    if not known.angles.any():
-        return None
+def rotations(known: AnsysNodes, node: IntArray) -> FloatArray:
+    """Return (k, 3, 3) matrices from the nodal systems of the nodes `node` to the global axes."""
     angles = np.radians(known.angles[np.searchsorted(known.numbers, node)])
     cosine, sine = np.cos(angles), np.sin(angles)
 
@@ -117,52 +114,4 @@ def rotations(known: AnsysNodes, node: IntArray) -> FloatArray | None:
         turn[:, a, b], turn[:, b, a] = -sine[:, column], sine[:, column]
         return turn
 
-    return about(2, 0) @ about(0, 1) @ about(1, 2)
-
-
-def stack_rotations(
-    node: IntArray, component: IntArray, known: AnsysNodes, place: str
-) -> Matrix | None:
-    """Return the (n, n) rotation from nodal to global coordinates; None where all nodal systems are the global one.
-
-    Parameters
-    ----------
-    node, component
-        (n,) node number and component 1 ... 6, sorted by node.
-    known
-        The nodes.
-    place
-        For messages.
-
-    Raises
-    ------
-    InputError
-        If a turned node has lost some components to constraints: the others cannot be turned without them.
-    """
-    if not known.angles.any():
-        return None
-    triple = (component - 1) // 3
-    turned = known.numbers[known.angles.any(axis=1)]
-    at = np.arange(len(node))
-    rows, columns, values = [], [], []
-    for kind in (0, 1):
-        here = at[(triple == kind) & np.isin(node, turned)]
-        owners, counts = np.unique(node[here], return_counts=True)
-        if (counts != 3).any():
-            raise input_error(
-                place,
-                f"node {owners[counts != 3][0]} has a coordinate system of its own and only some free components, "
-                "which cannot be turned into the global axes",
-                "Constrain all three components of such nodes, or none; or undo NROTAT.",
-            )
-        turn = rotations(known, owners)
-        if turn is None or not len(owners):
-            continue
-        block = here.reshape(-1, 3)
-        rows.append(np.repeat(block, 3, axis=1).ravel())
-        columns.append(np.tile(block, (1, 3)).ravel())
-        values.append(turn.ravel())
-    same = at[~np.isin(node, turned)]
-    data = np.concatenate([np.ones(len(same)), *values])
-    index = (np.concatenate([same, *rows]), np.concatenate([same, *columns]))
-    return scipy.sparse.csr_array((data, index), shape=(len(node), len(node)))
+    return np.asarray(about(2, 0) @ about(0, 1) @ about(1, 2))

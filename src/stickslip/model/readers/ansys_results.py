@@ -162,16 +162,16 @@ def _mode(file: Records, pointer: int, n_nodes: int, n_components: int) -> Float
     return mode
 
 
-def _turned(shapes: FloatArray, components: list[int], turn: FloatArray | None) -> FloatArray:
+def _turned(shapes: FloatArray, components: list[int], turn: FloatArray) -> FloatArray:
     """Return modes (k, nodes, components) out of the nodal systems (nodes, 3, 3)."""
-    if turn is None:
+    if (turn == np.eye(3)).all():
         return shapes
     turned = shapes.copy()
     for triple in ([1, 2, 3], [4, 5, 6]):
         if set(triple) <= set(components):
             places = [components.index(c) for c in triple]
             turned[:, :, places] = np.einsum("nab,knb->kna", turn, shapes[:, :, places])
-        elif set(triple) & set(components) and not np.allclose(turn, np.eye(3)):
+        elif set(triple) & set(components):
             raise input_error(
                 "nodal coordinate systems",
                 "are turned, but not all three components are there",

@@ -1,0 +1,291 @@
+"""Matrices from Nastran's OP4 files, and modes from OP2 files, through the optional package pyYeti."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.errors import did_you_mean, input_error
+from stickslip.model.dofs import Dofs
+from stickslip.model.readers.nastran_dofs import NastranDofs, read_nastran_dofs
+from stickslip.model.readers.nastran_library import (
+    CUT_SHORT,
+    check_records,
+    existing_file,
+    is_binary,
+    nastran_library,
+    reading,
+)
+from stickslip.model.readers.units import Units, check_units, in_si
+from stickslip.model.structure import Structure
+
+
+@dataclass(frozen=True, eq=False)
+class NastranResults:
+    """Modes in an OP2 file of Nastran.
+
+    Parameters
+    ----------
+    frequencies_hz
+        (k,) natural frequencies.
+    shapes
+        (n, k) modes along the basic axes, mass-normalised in SI where Nastran normalised them to mass; (0, k) where
+        the file has none.
+    dofs
+        Table of the n coordinates; scalar points are modal ones.
+    """
+
+    frequencies_hz: FloatArray
+    shapes: FloatArray
+    dofs: Dofs
+
+
+def read_nastran_op4(
+    path: Path | str,
+    *,
+    mass: str,
+    stiffness: str,
+    geometry: Path | str,
+    dof_set: str,
+    damping: str | None = None,
+    units: Units | None = None,
+    plausible: bool = True,
+) -> Structure:
+    """Read mass, stiffness and damping from an OP4 file, text or binary, of any precision and byte order.
+
+    Coordinates with neither mass nor stiffness are left out.
+
+    Parameters
+    ----------
+    path
+        The file, as ``OUTPUT4`` writes it.
+    mass, stiffness, damping
+        Names of the matrices, e.g. ``"maa"`` and ``"kaa"``; where several have the same name, ``"maa[0]"`` is the first
+        and ``"maa[-1]"`` the last.
+    geometry
+        The ``.op2`` file or the bulk data of the same model, for the degrees of freedom and the positions.
+    dof_set
+        Nastran's set that the matrices belong to: ``"g"``, ``"f"``, ``"a"`` ...; sets other than ``"g"`` need an ``.op2``
+        file with the table ``USET``.
+    units
+        Unit system of the model, SI by default: the files do not say.
+    plausible
+        Whether mass and size are checked against what solids have.
+
+    Returns
+    -------
+    Structure
+        Sparse, in SI, along the basic axes. Scalar points are coordinates of the kind ``mode``. The set ``massless`` holds
+        the coordinates without mass, if any.
+
+    Raises
+    ------
+    InputError
+        If a file is damaged, a name unknown, or the size of the matrices is not that of the set.
+    StickslipError
+        If pyYeti is not installed.
+    """
+    units = Units.si() if units is None else units
+    path = existing_file(path)
+    names = [name.lower() for name in (mass, stiffness, damping) if name is not None]
+    found = _op4_matrices(path, names)
+    known = read_nastran_dofs(geometry)
+    rows = known.rows(dof_set)
+    for name in names:
+        if found[name].shape != (len(rows), len(rows)):
+            raise input_error(
+                f"{path}: {name}",
+                f"is {' x '.join(map(str, found[name].shape))}, the {dof_set}-set of {known.place} has {len(rows)} "
+                "degrees of freedom",
+                _fitting(known, found[name].shape[0]),
+            )
+    dependent = np.intersect1d(known.sets.get("m", []), rows)
+    if len(dependent):
+        raise input_error(
+            f"{path}: {dof_set}-set",
+            f"holds {len(dependent)} degrees of freedom that depend on others (MPC, RBE), without the equations",
+            "Write the matrices of the f-set or the a-set.",
+        )
+    free = np.flatnonzero(~np.isin(rows, known.sets.get("s", [])))  # others are held (SPC)
+    matrices = [found[name][free][:, free] for name in names]
+    structure = assembled(matrices, known, rows[free])
+    structure = in_si(structure, units)
+    if plausible:
+        check_units(structure, units, str(path))
+    return structure
+
+
+def _fitting(known: NastranDofs, size: int) -> str:
+    fits = [name for name, rows in known.sets.items() if len(rows) == size]
+    sizes = ", ".join(f"{name} {len(rows)}" for name, rows in known.sets.items())
+    if fits:
+        return f"Sets of that size: {', '.join(fits)}."
+    return f"Give the geometry of the same run; its sets: {sizes}."
+
+
+def assembled(matrices: list[Matrix], known: NastranDofs, rows: IntArray) -> Structure:
+    """Put mass, stiffness and perhaps damping together, along the basic axes, in the file's units.
+
+    Parameters
+    ----------
+    matrices
+        Two or three (n, n) sparse ones.
+    known
+        All degrees of freedom.
+    rows
+        (n,) those of the matrices.
+    """
+    turn = known.rotation(rows)
+    if turn is not None:
+        matrices = [(turn @ matrix @ turn.T).tocsr() for matrix in matrices]
+    used = np.flatnonzero(sum(abs(matrix).sum(axis=1) for matrix in matrices))
+    mass, stiffness, *damping = [matrix[used][:, used] for matrix in matrices]
+    massless = np.flatnonzero(abs(mass).sum(axis=1) == 0)
+    return Structure(
+        mass,
+        damping[0] if damping else scipy.sparse.csr_array(mass.shape),
+        stiffness,
+        known.table(rows[used]),
+        {"massless": massless} if len(massless) else {},
+    )
+
+
+def _op4_matrices(path: Path, names: list[str]) -> dict[str, Matrix]:
+    """Return the named matrices, real, symmetric and sparse."""
+    op4 = nastran_library("op4")
+    if is_binary(path):
+        check_records(path)
+    plain = {name: name.split("[")[0] for name in names}
+    with reading(path):
+        there = [str(name) for name in op4.dir(str(path), verbose=False)[0]]
+        for name in plain.values():
+            if name not in there:
+                raise input_error(
+                    str(path), f"holds no matrix {name!r}", did_you_mean(name, sorted(set(there)))
+                )
+        # sparse, whatever the header says: memory then follows from what is stored
+        read = op4.load(str(path), namelist=list(plain.values()), into="list", sparse=True)
+    found = {}
+    for name in names:
+        same = [matrix for other, matrix in zip(*read[:2], strict=True) if other == plain[name]]
+        pick = _pick(path, name, len(same))
+        found[name] = real_symmetric(scipy.sparse.csr_array(same[pick]), f"{path}: {name}")
+    return found
+
+
+def _pick(path: Path, name: str, count: int) -> int:
+    """Return which of `count` matrices of the same name is meant by ``name`` or ``name[index]``."""
+    plain = name.split("[", maxsplit=1)[0]
+    index = re.fullmatch(r"[^\[]+(?:\[(-?\d{1,6})\])?", name)
+    if index is None or (index[1] is None and count > 1):
+        raise input_error(
+            str(path),
+            f"holds {count} matrices {name!r}",
+            f"Say which: '{plain}[0]' is the first, '{plain}[-1]' the last.",
+        )
+    pick = int(index[1] or 0)
+    if not -count <= pick < count:
+        raise input_error(str(path), f"has no {name!r}: there are {count}", "Count from 0.")
+    return pick
+
+
+def real_symmetric(matrix: Matrix, place: str) -> Matrix:
+    """Return a real symmetric (n, n) CSR matrix with the symmetric part of `matrix`; refuse others.
+
+    Raises
+    ------
+    InputError
+        If it is not square, complex, not finite, or unsymmetric by more than rounding.
+    """
+    if matrix.shape[0] != matrix.shape[1]:
+        raise input_error(
+            place, f"is {matrix.shape[0]} x {matrix.shape[1]}", "Give square matrices."
+        )
+    if np.iscomplexobj(matrix.data):
+        if matrix.data.imag.any():
+            raise input_error(
+                place,
+                "is complex",
+                "Structural damping is an operation on the real stiffness here: write it without.",
+            )
+        matrix = matrix.real
+    if not np.isfinite(matrix.data).all():
+        raise input_error(place, "holds numbers that are not finite", CUT_SHORT)
+    matrix = scipy.sparse.csr_array(matrix, dtype=float)
+    skew, largest = abs(matrix - matrix.T).max(), abs(matrix).max()
+    if skew > 1e-6 * largest:  # what single precision and few digits leave
+        raise input_error(
+            place,
+            f"is not symmetric: entries differ by {skew:.3g} from those across the diagonal",
+            "Give mass, stiffness and damping of a structure at rest.",
+        )
+    return scipy.sparse.csr_array((matrix + matrix.T) / 2)
+
+
+def read_nastran_op2(path: Path | str, *, units: Units | None = None) -> NastranResults:
+    """Read natural frequencies and modes from an OP2 file (``PARAM,POST,-1``).
+
+    Parameters
+    ----------
+    path
+        The file.
+    units
+        Unit system of the model, SI by default: the file does not say.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged or holds no natural frequencies.
+    StickslipError
+        If pyYeti is not installed.
+    """
+    units = Units.si() if units is None else units
+    path = existing_file(path)
+    check_records(path)
+    with reading(path):
+        with nastran_library("op2").OP2(str(path)) as file:
+            found = file.rdparampost(get_mats=False, get_dr_tables=False, get_ougs=True)
+        table = found.get("lama")
+        if table is None:
+            raise input_error(
+                str(path),
+                "holds no natural frequencies (table LAMA)",
+                "Run SOL 103 with PARAM,POST,-1 and DISPLACEMENT(PLOT)=ALL.",
+            )
+        frequencies = np.asarray(table, dtype=float)[:, 4] / units.time
+        modes = next((v for k, v in found.items() if k in {"ougv1", "oug1", "bophig"}), None)
+    if modes is None:
+        empty = Dofs(np.empty(0, dtype=np.int64), (), np.empty((0, 3)))
+        return NastranResults(frequencies, np.zeros((0, len(frequencies))), empty)
+    return _with_modes(path, frequencies, modes, units)
+
+
+def _with_modes(path: Path, frequencies: FloatArray, table: Any, units: Units) -> NastranResults:
+    """Bring pyYeti's table of modes, rows (grid, component), together with the geometry of the same file."""
+    known = read_nastran_dofs(path)
+    with reading(path):
+        wanted = 10 * np.asarray(table.index.get_level_values(0), dtype=np.int64)
+        wanted += np.asarray(table.index.get_level_values(1), dtype=np.int64)
+        shapes = np.asarray(table, dtype=float)
+    key = 10 * known.ids + known.components
+    order = np.argsort(key, kind="stable")
+    rows = order[np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)]
+    if (key[rows] != wanted).any() or shapes.shape != (len(rows), len(frequencies)):
+        raise input_error(
+            str(path),
+            f"has modes of shape {shapes.shape}, {len(frequencies)} frequencies and {len(key)} degrees of freedom, "
+            "which do not belong together",
+            "Write one solution of one structure to a file.",
+        )
+    turn, dofs = known.rotation(rows), known.table(rows)
+    # φᵀMφ = 1 in the file's units and in SI: a rotation's part is per length
+    scale = units.lengths(dofs) / (np.sqrt(units.mass) * units.length)
+    shapes = shapes if turn is None else turn @ shapes
+    position = units.length * dofs.position
+    return NastranResults(
+        frequencies, scale[:, None] * shapes, Dofs(dofs.node, dofs.component, position)
+    )

@@ -1,0 +1,177 @@
+"""Degrees of freedom of a Nastran model: grids, scalar points, set membership and output coordinate systems.
+
+They come from the tables of an ``.op2`` file or from the ``GRID`` and ``CORD2`` cards of bulk data.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
+from stickslip.errors import did_you_mean, input_error
+from stickslip.model.dofs import Dofs
+from stickslip.model.readers.nastran_library import (
+    check_records,
+    existing_file,
+    is_binary,
+    nastran_library,
+    reading,
+)
+from stickslip.model.readers.nodal_axes import rotation_to_global
+
+COMPONENTS = ("mode", "x", "y", "z", "rx", "ry", "rz")  # 0 is a scalar point
+RECTANGULAR, CYLINDRICAL, SPHERICAL = 1, 2, 3
+
+
+@dataclass(frozen=True, eq=False)
+class NastranDofs:
+    """The g-set of a Nastran model, in its internal order and units.
+
+    Parameters
+    ----------
+    ids
+        (n,) identification number of the grid or scalar point of each degree of freedom.
+    components
+        (n,) 1 ... 6, or 0 for a scalar point.
+    points
+        (n, 3) positions in the basic system; NaN for scalar points.
+    turned
+        (k,) grids whose output system (field CD) is not parallel to the basic one, ascending.
+    turns
+        (k, 3, 3) columns: their axes.
+    sets
+        Name of a set of Nastran, such as ``a`` -> its degrees of freedom; only ``g`` where the file does not tell.
+    place
+        The file, for messages.
+    """
+
+    ids: IntArray
+    components: IntArray
+    points: FloatArray
+    turned: IntArray
+    turns: FloatArray
+    sets: Mapping[str, IntArray]
+    place: str
+
+    def rows(self, dof_set: str) -> IntArray:
+        """Return the degrees of freedom of a set; an `InputError` names those that are known."""
+        if dof_set not in self.sets:
+            raise input_error(
+                self.place,
+                f"does not say which degrees of freedom are in the {dof_set}-set",
+                did_you_mean(dof_set, list(self.sets))
+                + " The others need the table USET, which the .op2 file has after PARAM,POST,-1.",
+            )
+        return self.sets[dof_set]
+
+    def table(self, rows: IntArray) -> Dofs:
+        """Return the table of the degrees of freedom `rows`, in the file's units; modal coordinates have node −1."""
+        names = tuple(COMPONENTS[int(c)] for c in self.components[rows])
+        return Dofs(
+            np.where(self.components[rows] == 0, -1, self.ids[rows]), names, self.points[rows]
+        )
+
+    def rotation(self, rows: IntArray) -> Matrix | None:
+        """Return the rotation of the degrees of freedom `rows` into the basic system; None where all are parallel to it."""
+        if not np.isin(self.ids[rows], self.turned).any():
+            return None
+        return rotation_to_global(
+            self.ids[rows], self.components[rows], self.turned, self.turns, self.place
+        )
+
+
+def read_nastran_dofs(path: Path | str) -> NastranDofs:
+    """Read the degrees of freedom of a model from an ``.op2`` file or from bulk data.
+
+    ``INCLUDE`` is not followed.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged or holds no grids.
+    """
+    path = existing_file(path)
+    if is_binary(path):
+        check_records(path)
+        with reading(path):
+            table, known = _table_of_op2(path)
+    else:
+        bulk = nastran_library("bulk")
+        with reading(path):
+            table, known = bulk.bulk2uset(str(path), follow_includes=False)[0], False
+    if table is None or not len(table):
+        raise input_error(
+            str(path),
+            "holds no grids",
+            "Give bulk data with GRID cards, or an .op2 file written with PARAM,POST,-1.",
+        )
+    ids = np.asarray(table.index.get_level_values(0), dtype=np.int64)
+    components = np.asarray(table.index.get_level_values(1), dtype=np.int64)
+    with reading(path):
+        return _dofs(ids, components, table, known, str(path))
+
+
+def _table_of_op2(path: Path) -> tuple[Any, bool]:
+    """Return pyYeti's table of the g-set of the residual structure, and whether it has set membership."""
+    with nastran_library("op2").OP2(str(path)) as file:
+        names = {str(name) for name in file.dbnames}
+        if names & {"SUPERID", "EMAP", "EMAPS", "SLIST"}:  # the alter NAS2CAM wrote it
+            return file.rdn2cop2()["uset"].get(0), True
+        found = file.rdparampost(get_mats=False, get_dr_tables=False)
+    return found.get("uset"), any(name.startswith("USET") for name in names)
+
+
+def _dofs(ids: IntArray, components: IntArray, table: Any, known: bool, place: str) -> NastranDofs:
+    values = np.asarray(table[["x", "y", "z"]], dtype=float)
+    points = np.full((len(ids), 3), np.nan)
+    first = np.flatnonzero(components == 1)
+    for offset in range(6):  # six rows a grid: position, system, origin, axes
+        points[first + offset] = values[first]
+    turns = np.array([_axes(values[row : row + 6], int(ids[row]), place) for row in first])
+    own = (np.abs(turns.reshape(-1, 3, 3) - np.eye(3)) > 1e-14).any(axis=(1, 2))
+    order = np.argsort(ids[first[own]])
+    sets: dict[str, IntArray] = {"g": np.arange(len(ids))}
+    if known:
+        member = np.asarray(table["nasset"], dtype=np.int64)
+        masks = nastran_library("n2p").mkusetmask()
+        sets |= {name: _members(member, int(mask)) for name, mask in masks.items() if name != "p"}
+    return NastranDofs(
+        ids,
+        components,
+        points,
+        ids[first[own]][order],
+        turns.reshape(-1, 3, 3)[own][order],
+        {name: rows for name, rows in sets.items() if len(rows)},
+        place,
+    )
+
+
+def _members(member: IntArray, mask: int) -> IntArray:
+    inside: BoolArray = (member & mask) != 0
+    return np.flatnonzero(inside)
+
+
+def _axes(rows: FloatArray, grid: int, place: str) -> FloatArray:
+    """Return the (3, 3) axes, as columns, of a grid's output system, from its six rows of pyYeti's table."""
+    kind, system = int(rows[1, 1]), rows[3:]
+    if not np.allclose(system @ system.T, np.eye(3), atol=1e-9):
+        raise input_error(place, f"the output system of grid {grid} is not orthogonal", "Check it.")
+    if kind == RECTANGULAR:
+        return system
+    x, y, z = system.T @ (rows[0] - rows[2])
+    azimuth = np.arctan2(y, x)
+    c, s = np.cos(azimuth), np.sin(azimuth)
+    if kind == CYLINDRICAL:
+        local = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    elif kind == SPHERICAL:
+        polar = np.arctan2(np.hypot(x, y), z)
+        cp, sp = np.cos(polar), np.sin(polar)
+        local = np.array([[sp * c, cp * c, -s], [sp * s, cp * s, c], [cp, -sp, 0.0]])
+    else:
+        raise input_error(
+            place, f"grid {grid} has an output system of kind {kind}", "Use CORD2R, C or S."
+        )
+    return np.asarray(system @ local)
