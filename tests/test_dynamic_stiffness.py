@@ -17,6 +17,7 @@ from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded, to_complex, to_real
 from stickslip.harmonic.spectral import Modes, Poles, StateSpace
+from stickslip.harmonic.structured import real_matrix
 from stickslip.model.lumped import lumped
 from stickslip.model.structure import Structure
 
@@ -103,7 +104,17 @@ def structure_of(kind, seed=0, n=9):
             scipy.sparse.csr_array(mass), scipy.sparse.csr_array(damping["general"]), scipy.sparse.csr_array(stiffness),
             table(("q",) * n),
         )  # fmt: skip
-    return Structure(mass, damping.get(kind, damping["general"]), stiffness, table(("q",) * n))
+    if kind.startswith("coriolis"):
+        spin = rng.standard_normal((n, n))
+        dissipation = np.zeros((n, n)) if kind == "coriolis alone" else damping["general"]
+        damping[kind] = dissipation + 1.5 * (spin - spin.T)
+    loss = None
+    if kind == "uniform loss":
+        damping[kind], loss = damping["proportional"], 0.05 * stiffness
+    elif "loss" in kind:
+        loss = positive(rng, n)
+    structure = Structure(mass, damping.get(kind, damping["general"]), stiffness, table(("q",) * n))
+    return replace(structure, loss=loss)
 
 
 def loaded(seed, n=9):
@@ -119,11 +130,12 @@ def dense(matrix):
 
 
 def dynamic(structure, w):
-    return (
+    D = (
         dense(structure.stiffness)
         + 1j * w * dense(structure.damping)
         - w**2 * dense(structure.mass)
     )
+    return D if structure.loss is None or w == 0 else D + 1j * dense(structure.loss)
 
 
 def schur(structure, load, omega, order):
@@ -140,14 +152,18 @@ def schur(structure, load, omega, order):
     return np.array(out), np.array(loads)
 
 
-KINDS = ["proportional", "general", "none", "massless", "sparse"]
+KINDS = [
+    "proportional", "general", "none", "massless", "sparse",
+    "coriolis", "coriolis alone", "coriolis and loss", "loss", "uniform loss",
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_condensed_is_the_schur_complement(kind):
     structure, load = structure_of(kind), loaded(0)
     linear = condense(structure, RETAINED, load)
-    assert linear.diagonal == (kind in ("proportional", "none"))
+    assert linear.diagonal == (kind in ("proportional", "none", "uniform loss"))
+    assert (linear.spectral.terms is None) == ("loss" in kind)
     got = linear.condensed(OMEGA, ORDER)
     stiffness, force = schur(structure, load, OMEGA, ORDER)
     # an undamped interior may be close to resonance: the tolerance leaves room for its condition
@@ -183,6 +199,35 @@ def test_condensed_solution_and_recovery_are_the_full_solution(kind):
     q = np.linalg.solve(condensed.stiffness, condensed.load[:, :, None])[:, :, 0]
     assert np.allclose(q, full[:, RETAINED], rtol=0, atol=1e-9 * np.abs(full).max())
     assert np.allclose(linear.recover(OMEGA, q), full, rtol=0, atol=1e-9 * np.abs(full).max())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_products_are_those_of_the_schur_complement(kind):
+    structure, load = structure_of(kind, seed=5), loaded(5)
+    linear = condense(structure, RETAINED, load)
+    products = at_frequency(linear, OMEGA, ORDER)
+    stiffness, force = schur(structure, load, OMEGA, ORDER)
+    slope = linear.condensed(OMEGA, ORDER)  # itself compared with differences above
+    size = 1e-9 * np.abs(stiffness).max()
+    for h in range(ORDER + 1):
+        np.testing.assert_allclose(products.block(h), stiffness[h], rtol=0, atol=size)
+    rows = np.random.default_rng(6).standard_normal((2 * ORDER + 1, 3))
+    q = to_complex(rows)[:, :, None]
+    product, by_omega = products.product_and_slope(rows)
+    np.testing.assert_allclose(product, to_real((stiffness @ q)[:, :, 0]), rtol=0, atol=10 * size)
+    np.testing.assert_allclose(products.product(rows), product, rtol=0, atol=10 * size)
+    expected = to_real((slope.derivative @ q)[:, :, 0])
+    np.testing.assert_allclose(by_omega, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    np.testing.assert_allclose(
+        products.load, to_real(force), rtol=0, atol=1e-9 * np.abs(force).max()
+    )
+    np.testing.assert_allclose(
+        products.load_slope, to_real(slope.load_derivative), rtol=0, atol=1e-9 * np.abs(slope.load_derivative).max()
+    )  # fmt: skip
+    transposed = real_matrix(stiffness).T @ rows.ravel()
+    np.testing.assert_allclose(
+        products.transposed_product(rows).ravel(), transposed, rtol=0, atol=10 * size
+    )
 
 
 def test_change_of_all_dofs_is_the_difference_of_two_recoveries():
@@ -405,9 +450,40 @@ def test_a_tiny_mass_is_condensed():
     assert got.stiffness[1, 0, 0] == pytest.approx(d[0, 0] - d[0, 2] ** 2 / d[2, 2], rel=1e-10)
 
 
-@pytest.mark.parametrize("name", ["mass", "damping", "stiffness"])
-def test_a_matrix_that_is_not_symmetric_is_named(name):
+def test_static_problem_feels_no_loss():
+    structure = structure_of("loss")
+    with_loss, without = (
+        condense(s, RETAINED, loaded(0)).condensed(OMEGA, 0)
+        for s in (structure, replace(structure, loss=None))
+    )
+    assert np.array_equal(with_loss.stiffness, without.stiffness)
+    assert np.array_equal(with_loss.load, without.load)
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    spin=st.sampled_from([1e-3, 1.0, 30.0]),
+    frequency=st.floats(-2.0, 2.0),
+)
+def test_coriolis_terms_are_summed_over_poles(seed, spin, frequency):
+    rng = np.random.default_rng(seed)
+    skew = rng.standard_normal((12, 12))
+    damping = 0.1 * positive(rng, 12) + spin * (skew - skew.T)
+    structure = Structure(positive(rng, 12), damping, 20 * positive(rng, 12), table(("q",) * 12))
+    linear = assert_schur(structure, [10.0**frequency])
+    assert isinstance(linear.spectral.terms, Poles)
+
+
+def test_one_triangle_of_a_damping_matrix_is_no_coriolis_matrix():
     structure = structure_of("general")
+    with pytest.raises(InputError, match=r"Structure\.damping: holds one triangle alone"):
+        condense(replace(structure, damping=np.triu(structure.damping)), RETAINED, loaded(0))
+
+
+@pytest.mark.parametrize("name", ["mass", "stiffness", "loss"])
+def test_a_matrix_that_is_not_symmetric_is_named(name):
+    structure = structure_of("loss")
     skew = np.array(getattr(structure, name))
     skew[0, 3] += 1.0
     with pytest.raises(InputError, match=rf"Structure\.{name}: is not symmetric"):

@@ -5,6 +5,7 @@ condensation; one harmonic at a time is formed where it is to be factorised.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg
@@ -15,6 +16,9 @@ from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.spectral import StateSpace
 
 Parts = tuple[FloatArray, FloatArray, FloatArray]  # K, C, M, or their products with the same rows
+Lossy = tuple[
+    FloatArray, FloatArray, FloatArray, FloatArray | None
+]  # products with K, C, M and structural damping
 # interior dynamic stiffness of each harmonic: its diagonal, or its state-space eigenvectors and ihω, or its LU factors
 InnerOne = ComplexArray | tuple[StateSpace, complex] | tuple[ComplexArray, IntArray]
 Inner = tuple[InnerOne, ...]
@@ -46,45 +50,54 @@ class CondensedProduct:
     def product(self, rows: FloatArray) -> FloatArray:
         """Return the rows of ``Z q`` for the `rows` of q."""
         s = self.frequencies
-        moved = _solve_inner(self.inner, _dynamic(_times(self.linear.nl, rows), s))
-        return _dynamic(_times(self.linear.nn, rows), s) - _dynamic(
-            _times_transposed(self.linear.nl, moved), s
-        )
+        moved = _solve_inner(self.inner, _dynamic(_onto(self.linear, rows), s))
+        return _dynamic(_near(self.linear, rows), s) - _dynamic(_back(self.linear, moved), s)
+
+    @cached_property
+    def transposed(self) -> "CondensedProduct":
+        """The product with the transposed Z; itself where damping is symmetric."""
+        if self.linear.ln is None:
+            return self
+        return at_frequency(self.linear.transposed, self.omega, self.order)
 
     def transposed_product(self, rows: FloatArray) -> FloatArray:
-        """Return the rows of the product with the transpose of the real form of Z, whose complex blocks are symmetric."""
+        """Return the rows of the product with the transpose of the real form of Z, the conjugate of the product of Zᵀ and the conjugate."""
         mirrored = rows.copy()
         mirrored[2::2] *= -1.0
-        out = self.product(mirrored)
+        out = self.transposed.product(mirrored)
         out[2::2] *= -1.0
         return out
 
     def product_and_slope(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return ``Z q`` and ``∂Z/∂ω q``."""
         s = self.frequencies
-        near, far = _times(self.linear.nn, rows), _times(self.linear.nl, rows)
+        near, far = _near(self.linear, rows), _onto(self.linear, rows)
         moved = _solve_inner(self.inner, _dynamic(far, s))
-        back = _times_transposed(self.linear.nl, moved)
+        back = _back(self.linear, moved)
         turned = _solve_inner(
             self.inner, _slope(far, s) - _slope(_inner_parts(self.linear, moved), s)
         )
         slope = _slope(near, s) - _slope(back, s)
-        slope -= _dynamic(_times_transposed(self.linear.nl, turned), s)
+        slope -= _dynamic(_back(self.linear, turned), s)
         return _dynamic(near, s) - _dynamic(back, s), _by_omega(slope)
 
     def block(self, harmonic: int) -> ComplexArray:
         """Return ``Z_h``, (n, n) complex in Fortran order."""
         s = harmonic * self.omega
-        (k, c, m), (k_nl, c_nl, m_nl) = self.linear.nn, self.linear.nl
+        k, c, m = self.linear.nn
         # symmetric: their transposes are in Fortran order
         out = np.empty(k.shape, dtype=complex, order="F")
         np.multiply(m.T, -(s**2), out=out.real)
         out.real += k.T
-        np.multiply(c.T, s, out=out.imag)
-        far = k_nl + 1j * s * c_nl - s**2 * m_nl
+        np.multiply(c.T if self.linear.ln is None else c, s, out=out.imag)
+        loss = self.linear.loss if s > 0.0 else None
+        if loss is not None:
+            out.imag += loss[0].T
+        far = _across(self.linear.nl, loss, s)
         if far.shape[1] == 0:
             return out
-        moved = _solve_one(self.inner[harmonic], far.T)
+        onto = far if self.linear.ln is None else _across(self.linear.ln, loss, s)
+        moved = _solve_one(self.inner[harmonic], onto.T)
         # in place: for thousands of coordinates this is the largest array there is
         return np.asarray(
             scipy.linalg.blas.zgemm(-1.0, far, moved, beta=1.0, c=out, overwrite_c=True)
@@ -119,9 +132,9 @@ def _with_inner_load(bare: CondensedProduct, inner_load: FloatArray) -> Condense
     """Move the load of the interior, (2 order + 1, l), to the retained coordinates: ``F = F_N - D_NL D_LL⁻¹ F_L``."""
     s = bare.frequencies
     moved = _solve_inner(bare.inner, inner_load)
-    back = _times_transposed(bare.linear.nl, moved)
+    back = _back(bare.linear, moved)
     turned = _solve_inner(bare.inner, _slope(_inner_parts(bare.linear, moved), s))
-    slope = _dynamic(_times_transposed(bare.linear.nl, turned), s) - _slope(back, s)
+    slope = _dynamic(_back(bare.linear, turned), s) - _slope(back, s)
     return CondensedProduct(
         bare.linear, bare.omega, bare.order, s, bare.inner, bare.load - _dynamic(back, s), _by_omega(slope)
     )  # fmt: skip
@@ -129,14 +142,22 @@ def _with_inner_load(bare: CondensedProduct, inner_load: FloatArray) -> Condense
 
 def _inner(linear: CondensedStiffness, omega: float, order: int) -> Inner:
     k, c, m = linear.ll
+    loss = np.zeros_like(k) if linear.loss is None else linear.loss[2]
     s = omega * np.arange(order + 1)
     if linear.diagonal:
-        k, c, m = np.diagonal(k), np.diagonal(c), np.diagonal(m)
-        return tuple(k + 1j * w * c - w**2 * m for w in s)
+        k, c, m, loss = (np.diagonal(a) for a in (k, c, m, loss))
+        return tuple(k + 1j * (w * c + (w > 0.0) * loss) - w**2 * m for w in s)
     states = linear.spectral.states if np.any(s) else None
     if states is not None:
         return tuple((states, 1j * w) for w in s)
-    return tuple(scipy.linalg.lu_factor(k + 1j * w * c - w**2 * m) for w in s)
+    return tuple(scipy.linalg.lu_factor(k + 1j * (w * c + (w > 0.0) * loss) - w**2 * m) for w in s)
+
+
+def _across(blocks: Parts, loss: Parts | None, s: float) -> ComplexArray:
+    """Return D between retained coordinates and interior at one frequency."""
+    k, c, m = blocks
+    across: ComplexArray = np.asarray(k + 1j * s * c - s**2 * m)
+    return across if loss is None else np.asarray(across + 1j * loss[1])
 
 
 def _solve_inner(inner: Inner, rows: FloatArray) -> FloatArray:
@@ -154,11 +175,34 @@ def _solve_one(inner: InnerOne, right: ComplexArray) -> ComplexArray:
     return np.asarray(scipy.linalg.lu_solve((first, second), right))
 
 
-def _inner_parts(linear: CondensedStiffness, rows: FloatArray) -> Parts:
+def _near(linear: CondensedStiffness, rows: FloatArray) -> Lossy:
+    """Return the products of the retained coordinates' own matrices."""
+    k, c, m = linear.nn
+    loss = None if linear.loss is None else rows @ linear.loss[0]
+    return rows @ k, rows @ (c if linear.ln is None else c.T), rows @ m, loss
+
+
+def _onto(linear: CondensedStiffness, rows: FloatArray) -> Lossy:
+    """Return the products from retained coordinates to the interior."""
+    k, c, m = linear.far
+    loss = None if linear.loss is None else rows @ linear.loss[1]
+    return rows @ k, rows @ c, rows @ m, loss
+
+
+def _back(linear: CondensedStiffness, rows: FloatArray) -> Lossy:
+    """Return the products from the interior to retained coordinates."""
+    k, c, m = linear.nl
+    loss = None if linear.loss is None else rows @ linear.loss[1].T
+    return rows @ k.T, rows @ c.T, rows @ m.T, loss
+
+
+def _inner_parts(linear: CondensedStiffness, rows: FloatArray) -> Lossy:
+    """Return the products of the interior's own matrices, for their slope: structural damping has none."""
     if linear.diagonal:
         k, c, m = (rows * np.diagonal(a) for a in linear.ll)
-        return k, c, m
-    return _times(linear.ll, rows)
+        return k, c, m, None
+    k, c, m = linear.ll
+    return rows @ k, rows @ (c if linear.ln is None else c.T), rows @ m, None
 
 
 def _by_omega(slope: FloatArray) -> FloatArray:
@@ -166,25 +210,18 @@ def _by_omega(slope: FloatArray) -> FloatArray:
     return np.asarray(((np.arange(slope.shape[0])[:, None] + 1) // 2) * slope)
 
 
-def _times(blocks: Parts, rows: FloatArray) -> Parts:
-    k, c, m = blocks
-    return rows @ k, rows @ c, rows @ m
+def _dynamic(parts: Lossy, s: FloatArray) -> FloatArray:
+    """Return ``K q + i L q + i s C q - s² M q`` from the products of the matrices with the rows of q; the static row has no L."""
+    k, c, m, loss = parts
+    moved = s * c
+    if loss is not None:
+        moved += np.where(s > 0.0, loss, 0.0)
+    return k + _turned(moved) - s**2 * m
 
 
-def _times_transposed(blocks: Parts, rows: FloatArray) -> Parts:
-    k, c, m = blocks
-    return rows @ k.T, rows @ c.T, rows @ m.T
-
-
-def _dynamic(parts: Parts, s: FloatArray) -> FloatArray:
-    """Return ``K q + i s C q - s² M q`` from the products of the three matrices with the rows of q."""
-    k, c, m = parts
-    return k + _turned(s * c) - s**2 * m
-
-
-def _slope(parts: Parts, s: FloatArray) -> FloatArray:
+def _slope(parts: Lossy, s: FloatArray) -> FloatArray:
     """Return the derivative of `_dynamic` by s."""
-    _, c, m = parts
+    _, c, m, _ = parts
     return _turned(c) - 2.0 * s * m
 
 

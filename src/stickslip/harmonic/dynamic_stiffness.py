@@ -1,8 +1,9 @@
 """Dynamic stiffness condensed exactly to the retained coordinates (Gastaldi & Berruti 2017, eq. 2-5).
 
-``D(Ω) = K + iΩ C - Ω² M``. The interior is written once in its own undamped modes, and where these do not diagonalise the damping in
+``D(Ω) = K + iΩ C - Ω² M``, with ``K + iL`` for K above harmonic 0 where there is structural damping. The interior is written once in its own undamped modes, and where these do not diagonalise the damping in
 its state-space eigenvectors; a frequency then costs a few products and no factorisation (`harmonic.spectral`). Only where those
-eigenvectors are ill-conditioned, or the interior is very large, is it factorised at each frequency.
+eigenvectors are ill-conditioned, the interior is very large, or structural damping makes its stiffness complex, is it solved at each
+frequency.
 """
 
 from collections.abc import Iterable
@@ -23,6 +24,7 @@ from stickslip.model.structure import Structure
 DIAGONAL_TOLERANCE = (
     1e-10  # off-diagonal modal damping below this share of the largest counts as proportional
 )
+SYMMETRY = 1e-8  # share of the largest entry by which transposed entries may differ
 LARGEST_INTERIOR = 5000  # dense eigenproblem of the interior; reduce larger structures first
 
 
@@ -50,7 +52,8 @@ class _Sums:
 class CondensedStiffness:
     """A structure and its load, seen from the retained coordinates.
 
-    Build it with `condense`. Retained blocks carry ``n``, interior ones ``l``, in undamped modes of unit stiffness.
+    Build it with `condense`. Retained blocks carry ``n``, interior ones ``l``, in undamped modes of unit stiffness. Only damping may lack
+    symmetry, by Coriolis forces.
     """
 
     retained: IntArray
@@ -62,11 +65,32 @@ class CondensedStiffness:
     diagonal: bool
     load: HarmonicLoad
     spectral: Interior  # the same blocks, and what is derived from them when first needed
+    ln: Blocks | None = (
+        None  # transposes of the blocks that lead back, where damping is not symmetric
+    )
+    loss: Blocks | None = None  # structural damping on nn, nl, ll
 
     @property
     def n(self) -> int:
         """Number of retained coordinates."""
         return int(self.retained.size)
+
+    @property
+    def far(self) -> Blocks:
+        """Transposed blocks from the retained coordinates to the forces on the interior."""
+        return self.nl if self.ln is None else self.ln
+
+    @cached_property
+    def transposed(self) -> "CondensedStiffness":
+        """The structure with the transposed damping, and no load."""
+        if self.ln is None:
+            return self.with_load(HarmonicLoad(np.zeros(self.load.static.size)))
+        nn, ll = (_turned(blocks) for blocks in (self.nn, self.ll))
+        return CondensedStiffness(
+            self.retained, self.interior, nn, self.ln, ll, self.modes, self.diagonal,
+            HarmonicLoad(np.zeros(self.load.static.size)),
+            Interior(nn, self.ln, ll, self.diagonal, self.nl, self.loss), self.nl, self.loss,
+        )  # fmt: skip
 
     def with_load(self, load: HarmonicLoad) -> "CondensedStiffness":
         """Return the same structure under another load."""
@@ -95,24 +119,34 @@ class CondensedStiffness:
         h = np.arange(order + 1)
         s = (h * omega)[:, None, None]
         f_n, f_l = self._loads(order)
-        d_nn, g_nn = _dynamic(self.nn, s)
-        d_nl, g_nl = _dynamic(self.nl, s)
+        d_nn, g_nn = _dynamic(self.nn, s, self.loss and self.loss[0])
+        d_nl, g_nl = _dynamic(self.nl, s, self.loss and self.loss[1])
+        d_ln, g_ln = (d_nl, g_nl) if self.ln is None else self._back(s)
         solved = self._solve_interior(
-            s, np.concatenate([d_nl.transpose(0, 2, 1), f_l[:, :, None]], axis=2)
+            s, np.concatenate([d_ln.transpose(0, 2, 1), f_l[:, :, None]], axis=2)
         )
         _, g_ll = self._interior_dynamic(s)
         g_x = g_ll * solved if self.diagonal else g_ll @ solved
-        x_nt = solved[:, :, :-1].transpose(0, 2, 1)
+        x_nt = (
+            solved[:, :, :-1]
+            if self.ln is None
+            else self._solve_interior(s, d_nl.transpose(0, 2, 1), True)
+        ).transpose(0, 2, 1)
         d_x = d_nl @ solved
         g_nl_x = g_nl @ solved
         stiffness = d_nn - d_x[:, :, :-1]
         cross = g_nl_x[:, :, :-1]
+        other = cross.transpose(0, 2, 1) if self.ln is None else x_nt @ g_ln.transpose(0, 2, 1)
         inner = x_nt @ g_x
-        derivative = g_nn - cross - cross.transpose(0, 2, 1) + inner[:, :, :-1]
+        derivative = g_nn - cross - other + inner[:, :, :-1]
         load = f_n - d_x[:, :, -1]
         load_derivative = inner[:, :, -1] - g_nl_x[:, :, -1]
         h_ = h[:, None]
         return Condensed(stiffness, h_[:, :, None] * derivative, load, h_ * load_derivative)
+
+    def _back(self, s: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return the transpose of D from the retained coordinates to the interior, and its derivative by s."""
+        return _dynamic(self.far, s, self.loss and self.loss[1])
 
     def recover(self, omega: float, q: ComplexArray) -> ComplexArray:
         """Return the (H+1, n_all) coefficients of every dof from those of the retained ones (eq. 5 with the sign mended).
@@ -134,8 +168,8 @@ class CondensedStiffness:
 
     def _spread(self, omega: float, q: ComplexArray, f_l: ComplexArray) -> ComplexArray:
         s = (np.arange(q.shape[0]) * omega)[:, None, None]
-        d_nl, _ = _dynamic(self.nl, s)
-        right = f_l[:, :, None] - d_nl.transpose(0, 2, 1) @ q[:, :, None]
+        d_ln, _ = self._back(s)
+        right = f_l[:, :, None] - d_ln.transpose(0, 2, 1) @ q[:, :, None]
         states = self.spectral.states if np.any(s) else None
         if states is None:
             moved = self._solve_interior(s, right)[:, :, 0]
@@ -168,24 +202,36 @@ class CondensedStiffness:
 
     def _interior_dynamic(self, s: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Interior D and dD/dΩ at Ω = `s`; as columns where they are diagonal."""
+        loss = None if self.loss is None else self.loss[2]
         if self.diagonal:
             k, c, m = (np.diagonal(a)[None, :, None] for a in self.ll)
-            return _dynamic((k, c, m), s)
-        return _dynamic(self.ll, s)
+            return _dynamic((k, c, m), s, None if loss is None else np.diagonal(loss)[:, None])
+        return _dynamic(self.ll, s, loss)
 
-    def _solve_interior(self, s: FloatArray, right: ComplexArray) -> ComplexArray:
+    def _solve_interior(
+        self, s: FloatArray, right: ComplexArray, transposed: bool = False
+    ) -> ComplexArray:
         d_ll, _ = self._interior_dynamic(s)
         if self.diagonal:
             return right / d_ll
         if not np.any(s):
             return right  # modes of unit stiffness
-        return np.linalg.solve(d_ll, right)
+        return np.linalg.solve(d_ll.transpose(0, 2, 1) if transposed else d_ll, right)
 
 
-def _dynamic(blocks: Blocks, s: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Return K + is C - s² M and its derivative by s, stacked over the frequencies `s` (H+1, 1, 1)."""
+def _turned(blocks: Blocks) -> Blocks:
+    k, c, m = blocks
+    return k, np.ascontiguousarray(c.T), m
+
+
+def _dynamic(
+    blocks: Blocks, s: FloatArray, loss: FloatArray | None = None
+) -> tuple[ComplexArray, ComplexArray]:
+    """Return K + is C - s² M, with + i loss where s > 0, and its derivative by s, stacked over the frequencies `s` (H+1, 1, 1)."""
     k, c, m = blocks
     stiffness: ComplexArray = np.asarray(k + 1j * s * c - s**2 * m)
+    if loss is not None:
+        stiffness += 1j * (s > 0.0) * loss
     slope: ComplexArray = np.asarray(1j * c - 2.0 * s * m)
     return stiffness, slope
 
@@ -196,7 +242,7 @@ def condense(structure: Structure, retained: IntArray, load: HarmonicLoad) -> Co
     Parameters
     ----------
     structure
-        Reduced or lumped structure; matrices must be symmetric.
+        Reduced or lumped structure; mass, stiffness and loss must be symmetric, damping may have Coriolis terms.
     retained
         Dof indices that stay unknown: contact coordinates and free rigid bodies.
     load
@@ -205,7 +251,7 @@ def condense(structure: Structure, retained: IntArray, load: HarmonicLoad) -> Co
     Raises
     ------
     InputError
-        If a matrix is not real and symmetric, `retained` are not different dofs, the interior is too large, or it can move freely.
+        If a matrix is not real, one but the damping not symmetric, `retained` are not different dofs, the interior is too large, or it can move freely.
     """
     if load.static.size != structure.n:
         raise input_error(
@@ -219,19 +265,36 @@ def condense(structure: Structure, retained: IntArray, load: HarmonicLoad) -> Co
             f"{interior.size} interior dofs",
             "Reduce the structure first (craig_bampton).",
         )
-    full = tuple(_dense_symmetric(structure, name) for name in ("stiffness", "damping", "mass"))
+    full = tuple(_dense(structure, name) for name in ("stiffness", "damping", "mass"))
     nn = _three(a[np.ix_(retained, retained)] for a in full)
     nl = tuple(a[np.ix_(retained, interior)] for a in full)
     ll = tuple(a[np.ix_(interior, interior)] for a in full)
     modes = _interior_modes(ll[0], ll[2])
     to_modes = _three(a @ modes for a in nl)
+    back = None
+    if _asymmetry(full[1]) > SYMMETRY:
+        back = to_modes[0], full[1].T[np.ix_(retained, interior)] @ modes, to_modes[2]
     damping = modes.T @ ll[1] @ modes
-    diagonal = _is_diagonal(damping)
+    loss = _loss(structure, retained, interior, modes)
+    diagonal = _is_diagonal(damping) and (loss is None or _is_diagonal(loss[2]))
     own = _modal(modes, ll[2], np.diag(np.diagonal(damping)) if diagonal else damping)
     return CondensedStiffness(
         retained, interior, nn, to_modes, own, modes, diagonal, load,
-        Interior(nn, to_modes, own, diagonal),
+        Interior(nn, to_modes, own, diagonal, back, loss), back, loss,
     )  # fmt: skip
+
+
+def _loss(
+    structure: Structure, retained: IntArray, interior: IntArray, modes: FloatArray
+) -> Blocks | None:
+    """Return structural damping on the retained coordinates, across, and on the interior's modes; None where there is none."""
+    if structure.loss is None:
+        return None
+    matrix = _dense(structure, "loss")
+    if not np.any(matrix):
+        return None
+    across, own = matrix[np.ix_(retained, interior)], matrix[np.ix_(interior, interior)]
+    return matrix[np.ix_(retained, retained)], across @ modes, modes.T @ own @ modes
 
 
 def _checked_dofs(retained: IntArray, n: int) -> IntArray:
@@ -280,13 +343,20 @@ def _is_diagonal(damping: FloatArray) -> bool:
     return bool(off <= DIAGONAL_TOLERANCE * size)
 
 
-def _dense_symmetric(structure: Structure, name: str) -> FloatArray:
+def _asymmetry(matrix: FloatArray) -> float:
+    """Return the largest difference from the transpose over the largest entry."""
+    size = float(np.max(np.abs(matrix), initial=0.0))
+    return float(np.max(np.abs(matrix - matrix.T), initial=0.0)) / size if size else 0.0
+
+
+def _dense(structure: Structure, name: str) -> FloatArray:
     matrix = getattr(structure, name)
     if np.iscomplexobj(matrix):
         raise input_error(
             f"Structure.{name}",
             "is complex",
-            "Structural damping is not supported yet: give viscous damping as a real matrix.",
+            "Give structural damping as Structure.loss (structural_damping), viscous damping as a real matrix. Of travelling waves, "
+            "assemble the wheel.",
         )
     dense = np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix, dtype=float)
     if not np.all(np.isfinite(dense)):
@@ -295,10 +365,12 @@ def _dense_symmetric(structure: Structure, name: str) -> FloatArray:
             "contains NaN or infinite entries",
             "Check the model that was read.",
         )
-    if np.max(np.abs(dense - dense.T), initial=0.0) > 1e-8 * np.max(np.abs(dense), initial=0.0):
+    if name != "damping" and _asymmetry(dense) > SYMMETRY:
         raise input_error(
             f"Structure.{name}",
             "is not symmetric",
-            "Give both triangles; gyroscopic terms are not supported yet.",
+            "Give both triangles. Coriolis terms belong into the damping.",
         )
+    if _asymmetry(dense) > SYMMETRY and not (np.any(np.triu(dense, 1)) and np.any(np.tril(dense, -1))):  # fmt: skip
+        raise input_error(f"Structure.{name}", "holds one triangle alone", "Give both triangles.")
     return dense

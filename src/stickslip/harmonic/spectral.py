@@ -6,6 +6,8 @@ the interior ``D_NL(p) = p (c + p m)``. Two exact sums follow, in which frequenc
 - modes, where C is diagonal too and the columns of c are multiples of those of m (Rayleigh damping, damping by mode);
 - poles, with any other C: ``D_LL⁻¹ = Σ φ ψᵀ / (1 - p ν)`` over the 2 l state-space eigenvectors, ``(ν² + ν C + M) φ = 0``. There are no
   infinite ν: coordinates without mass have ν = 0. The numerator is divided by ``1 - p ν``, so that residues do not depend on p.
+
+Coriolis terms make C unsymmetric: the sum over poles then has another c on its right, ``D_LN(p) = p (c' + p m)ᵀ``.
 """
 
 from dataclasses import dataclass
@@ -48,6 +50,7 @@ class Modes:
     ratio: FloatArray  # (l,) κ
     damping: FloatArray  # (l,)
     mass: FloatArray  # (l,)
+    symmetric: bool = True
 
     def weights(self, p: ComplexArray) -> tuple[ComplexArray, ...]:
         """Return w, dw/dp, v and dv/dp, each (H, J), at `p` (H, 1)."""
@@ -98,6 +101,7 @@ class Poles:
     direct: FloatArray
     power: FloatArray  # (J,) a: 2 for fast poles, 1 for slow ones
     states: StateSpace
+    symmetric: bool
 
     def weights(self, p: ComplexArray) -> tuple[ComplexArray, ...]:
         """Return w, dw/dp, v and dv/dp, each (H, J), at `p` (H, 1)."""
@@ -147,21 +151,29 @@ class Interior:
     nl: Blocks
     ll: Blocks
     diagonal: bool
+    ln: Blocks | None = None  # transposes of the blocks back, where they differ
+    loss: Blocks | None = None
 
     @cached_property
     def states(self) -> StateSpace | None:
-        """State-space eigenvectors, or None where damping is diagonal, the interior too large or its eigenvectors ill-conditioned."""
+        """State-space eigenvectors, or None where damping is diagonal or structural, the interior too large or its eigenvectors ill-conditioned."""
         _, damping, mass = self.ll
-        if self.diagonal or not 0 < damping.shape[0] <= LARGEST_STATE_SPACE:
+        if (
+            self.diagonal
+            or self.loss is not None
+            or not 0 < damping.shape[0] <= LARGEST_STATE_SPACE
+        ):
             return None
         return state_space(damping, np.diagonal(mass))
 
     @cached_property
     def terms(self) -> Terms | None:
         """Terms of the condensed stiffness, or None where there is no such sum."""
+        if self.loss is not None:
+            return None
         if self.diagonal:
-            return _modes(self.nn, self.nl, self.ll)
-        return None if self.states is None else _poles(self.nn, self.nl, self.ll, self.states)
+            return _modes(self.nn, self.nl, self.ll) if self.ln is None else None
+        return None if self.states is None else _poles(self, self.states)
 
 
 def state_space(damping: FloatArray, mass: FloatArray) -> StateSpace | None:
@@ -170,7 +182,7 @@ def state_space(damping: FloatArray, mass: FloatArray) -> StateSpace | None:
     Parameters
     ----------
     damping
-        (l, l) C, symmetric, in coordinates of unit stiffness.
+        (l, l) C in coordinates of unit stiffness.
     mass
         (l,) M, not negative.
 
@@ -197,19 +209,20 @@ def state_space(damping: FloatArray, mass: FloatArray) -> StateSpace | None:
 
 
 def _statically_condensed(
-    nn: Blocks, nl: Blocks, ll: Blocks
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return (3, n, n) K, C, M condensed with the static shapes of the interior, and c and m (n, l)."""
+    nn: Blocks, nl: Blocks, ll: Blocks, ln: Blocks | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return (3, n, n) K, C, M condensed with the static shapes of the interior, and c, m and c' (n, l)."""
     far = nl[0]
     c, m = (cross - far @ own for cross, own in zip(nl[1:], ll[1:], strict=True))
+    back = c if ln is None else ln[1] - far @ ll[1].T
     whole = [nn[0] - far @ far.T]
-    for near, cross, moved in zip(nn[1:], nl[1:], (c, m), strict=True):
+    for near, cross, moved in zip(nn[1:], nl[1:], (back, m), strict=True):
         whole.append(near - cross @ far.T - far @ moved.T)
-    return np.array(whole), c, m
+    return np.array(whole), c, m, back
 
 
 def _modes(nn: Blocks, nl: Blocks, ll: Blocks) -> Modes | None:
-    whole, c, m = _statically_condensed(nn, nl, ll)
+    whole, c, m, _ = _statically_condensed(nn, nl, ll)
     squares = np.sum(m * m, axis=0)
     ratio = np.sum(c * m, axis=0) / np.where(squares > 0.0, squares, 1.0)
     largest = np.sum(np.abs(nl[1]) + np.abs(nl[0] @ ll[1]), axis=0)
@@ -220,17 +233,18 @@ def _modes(nn: Blocks, nl: Blocks, ll: Blocks) -> Modes | None:
     return Modes(m, np.ascontiguousarray(m.T), polynomial, np.zeros_like(m), ratio, damping, mass)
 
 
-def _poles(nn: Blocks, nl: Blocks, ll: Blocks, states: StateSpace) -> Poles:
-    """Divide ``p² (c + p m) φ ψᵀ (c + p m)ᵀ`` by ``1 - p ν``.
+def _poles(interior: Interior, states: StateSpace) -> Poles:
+    """Divide ``p² (c + p m) φ ψᵀ (c' + p m)ᵀ`` by ``1 - p ν``.
 
     With ``(c + p m) φ = p r + (1 - p ν) c φ`` and ``r = (ν c + m) φ`` where ν is small, with ``= v - (1 - p ν) m φ / ν`` and
     ``v = (c + m / ν) φ`` where it is large: neither part is much larger than their sum at the frequencies of interest.
     """
-    whole, c, m = _statically_condensed(nn, nl, ll)
+    ll = interior.ll
+    whole, c, m, back = _statically_condensed(interior.nn, interior.nl, ll, interior.ln)
     nu, forward, backward = states.nu, states.forward, states.backward
     slow = FAST * np.abs(nu) > np.sqrt(np.max(np.diagonal(ll[2])))
     safe = np.where(slow, nu, 1.0)
-    c_left, m_left, c_right, m_right = c @ forward, m @ forward, backward @ c.T, backward @ m.T
+    c_left, m_left, c_right, m_right = c @ forward, m @ forward, backward @ back.T, backward @ m.T
     left = np.where(slow, c_left + m_left / safe, nu * c_left + m_left)
     right = np.where(slow, c_right.T + m_right.T / safe, nu * c_right.T + m_right.T).T
     # what the division leaves, (1 - p ν) times: c, or -m / ν
@@ -248,7 +262,7 @@ def _poles(nn: Blocks, nl: Blocks, ll: Blocks, states: StateSpace) -> Poles:
     polynomial = np.concatenate([whole, -cube.real[None]])
     return Poles(
         left, np.ascontiguousarray(right), polynomial, (left_rest @ backward).real,
-        np.where(slow, 1.0, 2.0), states,
+        np.where(slow, 1.0, 2.0), states, interior.ln is None,
     )  # fmt: skip
 
 
@@ -281,9 +295,9 @@ def summed(terms: Terms, p: ComplexArray, source: ComplexArray, direct: ComplexA
 
 
 def _products(terms: Terms, weights: ComplexArray) -> ComplexArray:
-    """Return ``left diag(weights) right``, symmetric, for each row of `weights` (k, J)."""
+    """Return ``left diag(weights) right`` for each row of `weights` (k, J)."""
     k, (n, size) = weights.shape[0], terms.left.shape
-    if size < FEWEST or size * n * (n + 1) / 2 > LARGEST_TABLE:
+    if not terms.symmetric or size < FEWEST or size * n * (n + 1) / 2 > LARGEST_TABLE:
         scaled = (terms.left * weights[:, None, :]).reshape(k * n, size)
         return np.asarray(scaled @ terms.right).reshape(k, n, n)
     on_rows = terms.on_residues(weights)
