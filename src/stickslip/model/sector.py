@@ -199,6 +199,12 @@ class BladedSector:
             )
         if s.gap >= self.shroud_radius * self.pitch:
             raise _bad("shroud.gap", f"{s.gap} m leaves no shroud", "Make the gap smaller.")
+        if s.span < 1 and inner + s.thickness >= self.tip_radius:
+            raise _bad(
+                "shroud.span",
+                f"{s.span} lets the shroud end at the tip",
+                "Use 1, or move it inward.",
+            )
         outline = self.airfoil.section(s.span)
         y, z = outline.T
         ahead = _turned_y(self.shroud_radius, y, -self.shroud_angle / 2) - z * math.tan(
