@@ -150,7 +150,7 @@ def test_bad_choices_are_named(keep, modes, message):
 def test_a_body_that_nothing_holds_is_named():
     damper = FlatCurvedDamper().body().structure()
     whole = join(blades=chain(5, mass=1.0, stiffness=1.0), damper=damper)
-    with pytest.raises(SingularError, match=r"the body of dof damper\.x .*is not held"):
+    with pytest.raises(SingularError, match=r"fixed: 6 bodies are not held.*damper\.x"):
         craig_bampton(whole, np.array([0]), 1)
 
 
@@ -158,7 +158,9 @@ def test_a_floating_chain_is_singular():
     stiffness = 100.0 * (2 * np.eye(5) - np.eye(5, k=1) - np.eye(5, k=-1))
     stiffness[0, 0] = stiffness[4, 4] = 100.0
     floating = lumped(np.ones(5), stiffness)
-    with pytest.raises(SingularError, match="is not held when the kept dofs are fixed"):
+    with pytest.raises(
+        SingularError, match=r"with the kept dofs fixed: one body is not held.*translation along x"
+    ):
         craig_bampton(floating, np.array([], dtype=int), 2)
     assert natural_frequencies(floating, 1)[0] == pytest.approx(0.0, abs=1e-6)
 

@@ -67,6 +67,12 @@ if TYPE_CHECKING:
     from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
     from stickslip.reduction.lumped_disks import blade_ring, blisk_with_ring, mistuned_blade_ring
     from stickslip.reduction.relative import in_relative_coordinates
+    from stickslip.reduction.truncation import (
+        FrequencyError,
+        FrequencyErrors,
+        ModesBelow,
+        frequency_errors,
+    )
     from stickslip.reduction.waves import Wave, excited_wave, to_sectors, to_waves, wave
     from stickslip.reduction.wheel import wheel, wheel_shape
     from stickslip.report.page import write_report
@@ -153,6 +159,12 @@ _MODULES = {
     "stickslip.reduction.cyclic": ("CyclicSector", "cyclic_sector", "travelling_wave"),
     "stickslip.reduction.lumped_disks": ("blade_ring", "blisk_with_ring", "mistuned_blade_ring"),
     "stickslip.reduction.relative": ("in_relative_coordinates",),
+    "stickslip.reduction.truncation": (
+        "FrequencyError",
+        "FrequencyErrors",
+        "ModesBelow",
+        "frequency_errors",
+    ),
     "stickslip.reduction.waves": ("Wave", "excited_wave", "to_sectors", "to_waves", "wave"),
     "stickslip.reduction.wheel": ("wheel", "wheel_shape"),
     "stickslip.report.page": ("write_report",),
@@ -210,6 +222,8 @@ __all__ = [
     "ForcedPoint",
     "ForcedProblem",
     "FourParameter",
+    "FrequencyError",
+    "FrequencyErrors",
     "GyroscopicModes",
     "HarmonicLoad",
     "InputError",
@@ -219,6 +233,7 @@ __all__ = [
     "Jenkins",
     "Material",
     "Modes",
+    "ModesBelow",
     "Newton",
     "NodalDiameterMap",
     "Pairing",
@@ -272,6 +287,7 @@ __all__ = [
     "fields",
     "forced_problem",
     "forced_response",
+    "frequency_errors",
     "gap_operator",
     "gyroscopic_modes",
     "harmonic_balance",

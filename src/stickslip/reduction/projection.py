@@ -1,0 +1,86 @@
+"""Matrices and dof tables in the coordinates of a reduction."""
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import IntArray, Matrix
+from stickslip.errors import input_error
+from stickslip.model.dofs import Dofs, join_dofs, modal_dofs
+from stickslip.model.structure import Structure
+
+BLOCK = 32  # columns handled at a time: what is dense beside the basis stays a tenth of it
+SYMMETRY = 1e-12  # relative, below which a matrix counts as Hermitian
+
+
+def project(matrix: Matrix, basis: Matrix) -> Matrix:
+    """Return ``basisᴴ matrix basis``, Hermitian to the last digit where `matrix` is.
+
+    Parameters
+    ----------
+    matrix
+        (n, n), dense or sparse; the skew part of a damping matrix (Coriolis) stays.
+    basis
+        (n, m), dense or sparse, real or complex.
+
+    Returns
+    -------
+    numpy.ndarray or scipy.sparse.csr_array
+        Sparse where both are.
+    """
+    if scipy.sparse.issparse(basis):
+        product = basis.conj().T @ matrix @ basis
+        product = product.tocsr() if scipy.sparse.issparse(product) else np.asarray(product)
+    else:
+        product = _dense_product(matrix, basis)
+    return (product + product.conj().T) / 2 if is_hermitian(matrix) else product
+
+
+def is_hermitian(matrix: Matrix) -> bool:
+    """Whether a matrix equals its conjugate transpose to rounding."""
+    difference = abs(matrix - matrix.conj().T)
+    if not min(matrix.shape):
+        return True
+    return bool(difference.max() <= SYMMETRY * abs(matrix).max())
+
+
+def _dense_product(matrix: Matrix, basis: Matrix) -> Matrix:
+    m = basis.shape[1]
+    product = np.empty((m, m), dtype=np.result_type(matrix.dtype, basis.dtype))
+    adjoint = matrix.conj().T
+    for first in range(0, m, BLOCK):
+        rows = slice(first, first + BLOCK)
+        product[rows] = np.asarray(adjoint @ basis[:, rows]).conj().T @ basis
+    return product
+
+
+def kept_dofs(place: str, structure: Structure, keep: IntArray) -> IntArray:
+    """Return the dofs to keep as an index array, after checking them.
+
+    Raises
+    ------
+    InputError
+        If one is not in the structure or stands there twice.
+    """
+    keep = np.asarray(keep, dtype=np.int64).reshape(-1)
+    outside = keep[(keep < 0) | (keep >= structure.n)]
+    if outside.size:
+        raise input_error(
+            f"{place}: keep",
+            f"dof {outside[0]} is not among the structure's {structure.n} dofs",
+            "Take the indices from the structure's sets.",
+        )
+    values, counts = np.unique(keep, return_counts=True)
+    if np.any(counts > 1):
+        twice = structure.dofs.labels[values[counts > 1][0]]
+        raise input_error(
+            f"{place}: keep",
+            f"dof {values[counts > 1][0]} ({twice}) is listed more than once",
+            "Two of the sets share a node: list it once.",
+        )
+    return keep
+
+
+def with_modal_dofs(kept: Dofs, n_modes: int) -> Dofs:
+    """Return the kept rows followed by modal rows, with the parts the kept rows had."""
+    table = join_dofs({"kept": kept, "modal": modal_dofs(n_modes)})
+    return Dofs(table.node, table.component, table.position, kept.part + ("",) * n_modes)

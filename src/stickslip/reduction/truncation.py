@@ -1,0 +1,222 @@
+"""How many modes a reduction keeps: up to a frequency, or until the estimated error of its frequencies is small."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import BoolArray, FloatArray, Matrix
+from stickslip.errors import input_error
+from stickslip.model.factorisation import Say, silent
+from stickslip.model.modes import normal_modes
+from stickslip.model.structure import Structure
+from stickslip.reduction.bodies import Body, free_bodies
+
+
+@dataclass(frozen=True)
+class ModesBelow:
+    """Keep all component modes below ``factor * up_to_hz``.
+
+    Parameters
+    ----------
+    up_to_hz
+        Highest frequency that the reduced model is meant for.
+    factor
+        1.5 to 2 by common practice; the higher, the smaller the error.
+
+    Raises
+    ------
+    InputError
+        If a number is not positive.
+    """
+
+    up_to_hz: float
+    factor: float = 1.5
+
+    def __post_init__(self) -> None:
+        _positive("ModesBelow", up_to_hz=self.up_to_hz, factor=self.factor)
+
+
+@dataclass(frozen=True)
+class FrequencyError:
+    """Keep component modes until the reduced model's frequencies have at most a given estimated error.
+
+    Parameters
+    ----------
+    error
+        Relative error of the natural frequencies below `up_to_hz`, as `frequency_errors` estimates it.
+    up_to_hz
+        Highest frequency that the reduced model is meant for.
+
+    Raises
+    ------
+    InputError
+        If a number is not positive.
+    """
+
+    error: float
+    up_to_hz: float
+
+    def __post_init__(self) -> None:
+        _positive("FrequencyError", error=self.error, up_to_hz=self.up_to_hz)
+
+
+ModeChoice = int | ModesBelow | FrequencyError
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyErrors:
+    """Natural frequencies of a reduced model and the estimated errors of each.
+
+    Parameters
+    ----------
+    frequencies_hz
+        (m,) of the reduced model.
+    relative
+        (m,) estimated relative errors: the full model's frequency is lower by that share; zero for rigid motions.
+    """
+
+    frequencies_hz: FloatArray
+    relative: FloatArray
+
+    @property
+    def worst(self) -> float:
+        """Largest relative error."""
+        return float(np.max(self.relative, initial=0.0))
+
+
+def frequency_errors(
+    structure: Structure, reduced: Structure, up_to_hz: float, *, say: Say = silent
+) -> FrequencyErrors:
+    """Estimate the errors of a reduced model's natural frequencies from its residuals in the full model.
+
+    Parameters
+    ----------
+    structure
+        The model before the reduction.
+    reduced
+        The same after `craig_bampton`, `rubin`, `reduce_interface`, or several of them.
+    up_to_hz
+        Frequencies up to here.
+    say
+        Called with a sentence before each long step.
+
+    Returns
+    -------
+    FrequencyErrors
+        Of all natural frequencies of `reduced` up to the limit.
+
+    Raises
+    ------
+    InputError
+        If `reduced` does not come from `structure`.
+
+    Notes
+    -----
+    A reduced mode ``x``, mass-normalised, with ``λ`` leaves the residual ``r = K x − λ M x``, orthogonal to the reduced
+    space. To first order ``λ`` is too large by ``Σ |φ_dᴴ r|² / (λ_d − λ)`` over the modes left out. Instead of these modes
+    it takes one solution ``y = K⁻¹ r``: ``t0 = rᴴ y`` and ``t1 = λ yᴴ M y`` begin the series in ``λ/λ_d``, of which
+    ``t0 / (1 − t1/t0)`` is the sum where one mode dominates. The exact sum is not smaller (Cauchy-Schwarz); the ratio to
+    the true error tends to one as modes are added.
+    """
+    _positive("frequency_errors", up_to_hz=up_to_hz)
+    basis = _basis_between(structure, reduced)
+    bodies = free_bodies(structure, say)
+    return errors_of(structure, reduced, basis, bodies, up_to_hz)
+
+
+def errors_of(
+    structure: Structure, reduced: Structure, basis: Matrix, bodies: list[Body], up_to_hz: float
+) -> FrequencyErrors:
+    """Return the estimated errors, given the basis and what solves with the stiffness.
+
+    Parameters
+    ----------
+    structure
+        The model before the reduction, n dofs.
+    reduced
+        The model after it, m coordinates.
+    basis
+        (n, m) from the coordinates of `reduced` to those of `structure`.
+    bodies
+        Of the structure, free, or fixed at dofs whose unit displacements are in the reduced space.
+    up_to_hz
+        Frequencies up to here.
+    """
+    modes = normal_modes(reduced, int(np.count_nonzero(reduced.mass.diagonal())))
+    below: BoolArray = modes.frequencies_hz <= up_to_hz
+    squares = modes.squares[below]
+    shapes = basis @ modes.shapes[:, below]
+    residual = structure.stiffness @ shapes - (structure.mass @ shapes) * squares
+    first, second = np.zeros(squares.size), np.zeros(squares.size)
+    for body in bodies:
+        r = residual[body.dofs]
+        y = body.solve(r)
+        first += np.sum((r.conj() * y).real, axis=0)
+        second += squares * np.sum((y.conj() * (body.mass @ y)).real, axis=0)
+    ratio = np.divide(second, first, out=np.zeros_like(first), where=first > 0)
+    too_high = first / np.maximum(1.0 - ratio, 0.5)  # beyond a half the series says little
+    elastic = squares > 0
+    relative = np.zeros(squares.size)
+    relative[elastic] = np.maximum(too_high[elastic], 0.0) / (2 * squares[elastic])
+    return FrequencyErrors(modes.frequencies_hz[below], relative)
+
+
+def enough_modes(
+    choice: FrequencyError, start: int, most: int, errors: Callable[[int], FrequencyErrors]
+) -> int:
+    """Return the number of modes at which the estimated errors suffice, growing by a quarter at a time.
+
+    Parameters
+    ----------
+    choice
+        What suffices.
+    start, most
+        Number tried first; number of modes there are.
+    errors
+        Estimate with a given number of modes.
+    """
+    count = min(start, most)
+    while errors(count).worst > choice.error and count < most:
+        count = min(most, max(count + 2, math.ceil(1.25 * count)))
+    return count
+
+
+def _basis_between(structure: Structure, reduced: Structure) -> Matrix:
+    """Return the map from the coordinates of `reduced` to those of `structure`."""
+    if reduced.basis is None:
+        raise input_error("frequency_errors", "nothing was reduced", "Give the reduced structure.")
+    if structure.basis is None:
+        basis = reduced.basis
+        if basis.shape[0] != structure.n:
+            raise _not_of(structure.n, basis.shape[0])
+        return basis
+    before, after = structure.basis, reduced.basis
+    if before.shape[0] != after.shape[0]:
+        raise _not_of(before.shape[0], after.shape[0])
+    gram, right = before.conj().T @ before, before.conj().T @ after
+    gram, right = (m.toarray() if hasattr(m, "toarray") else m for m in (gram, right))
+    scale = 1 / np.sqrt(np.diag(gram).real)
+    inner = scale[:, None] * np.linalg.solve(scale[:, None] * gram * scale, scale[:, None] * right)
+    if np.linalg.norm(before @ inner - after) > 1e-6 * np.linalg.norm(after):
+        raise input_error(
+            "frequency_errors",
+            "the shapes of the reduced model are no combinations of those of the other one",
+            "Give the structure from which it was reduced.",
+        )
+    return inner
+
+
+def _not_of(full: int, reduced: int) -> Exception:
+    return input_error(
+        "frequency_errors",
+        f"the reduced model leads back to {reduced} dofs, the structure has {full}",
+        "Give the structure from which it was reduced.",
+    )
+
+
+def _positive(place: str, **numbers: float) -> None:
+    for name, value in numbers.items():
+        if not (math.isfinite(value) and value > 0):
+            raise input_error(f"{place}.{name}", f"must be positive, got {value}", "Check.")

@@ -1,0 +1,136 @@
+"""How many modes: by a frequency, by an estimated error, and how good the estimate is."""
+
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.sparse
+from cyclic_models import random_sector, wedge
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stickslip.errors import InputError
+from stickslip.model.lumped import chain
+from stickslip.model.modes import natural_frequencies
+from stickslip.model.solid import Material, assemble_solid
+from stickslip.model.structure import join
+from stickslip.reduction.craig_bampton import craig_bampton
+from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
+from stickslip.reduction.truncation import FrequencyError, ModesBelow, frequency_errors
+
+
+@pytest.fixture(scope="module")
+def solid():
+    """A clamped wedge of a ring and the dofs of its rim."""
+    structure = assemble_solid(wedge(8, cells=(3, 2, 1)), Material())
+    return structure, structure.dof_set("tip")
+
+
+def fixed_frequencies(structure, keep):
+    inner = np.setdiff1d(np.arange(structure.n), keep)
+    K, M = (m.toarray()[np.ix_(inner, inner)] for m in (structure.stiffness, structure.mass))
+    return np.sqrt(scipy.linalg.eigvalsh(K, M)) / (2 * np.pi)
+
+
+def test_modes_below_a_frequency_are_all_of_them(solid):
+    structure, keep = solid
+    exact = fixed_frequencies(structure, keep)
+    for limit in (0.3 * exact[0], 0.5 * (exact[6] + exact[7]), 0.5 * (exact[40] + exact[41])):
+        reduced = craig_bampton(structure, keep, ModesBelow(limit / 1.5))
+        assert len(reduced.dof_set("modes")) == np.count_nonzero(exact < limit)
+        same = craig_bampton(structure, keep, ModesBelow(limit, factor=1.0))
+        assert same.n == reduced.n
+
+
+def test_equal_bodies_keep_equal_numbers():
+    twins = join(a=chain(30, 1.0, 1e4), b=chain(30, 1.0, 1e4))
+    reduced = craig_bampton(twins, np.array([29, 59]), ModesBelow(8.0))
+    assert len(reduced.dof_set("modes")) % 2 == 0
+
+
+def test_error_that_was_asked_for_is_met(solid):
+    """The true errors, by a dense solver, are below what was asked, and not by far."""
+    structure, keep = solid
+    band = 6000.0
+    exact = natural_frequencies(structure, 40)
+    exact = exact[exact < band]
+    sizes = []
+    for error in (1e-2, 1e-3, 1e-4):
+        reduced = craig_bampton(structure, keep, FrequencyError(error, up_to_hz=band))
+        found = natural_frequencies(reduced, len(exact))
+        true = found / exact - 1
+        assert np.all(true > -1e-9)
+        assert true.max() < 1.05 * error
+        sizes.append(reduced.n)
+    assert sizes[0] < sizes[1] < sizes[2] < structure.n / 2
+
+
+def test_estimate_tends_to_the_true_error(solid):
+    """Effectivity: one to first order, so nearer to it the smaller the error."""
+    structure, keep = solid
+    exact = natural_frequencies(structure, 8)
+    for count, tolerance in ((12, 2e-2), (20, 2e-3), (60, 1e-3)):
+        reduced = craig_bampton(structure, keep, count)
+        errors = frequency_errors(structure, reduced, 1.02 * exact[-1])
+        true = errors.frequencies_hz[:6] / exact[:6] - 1
+        np.testing.assert_allclose(errors.relative[:6] / true, 1.0, atol=tolerance)
+
+
+@settings(max_examples=15)
+@given(seed=st.integers(0, 500), k=st.integers(0, 4), count=st.integers(8, 20))
+def test_estimate_holds_at_a_wave_number_too(seed, k, count):
+    sector = cyclic_sector(random_sector(5, seed, inner=8), 5)
+    structure = travelling_wave(sector, k)
+    keep = structure.dof_set("inner")[:4]
+    reduced = craig_bampton(structure, keep, count)
+    exact = scipy.linalg.eigvalsh(structure.stiffness.toarray(), structure.mass.toarray())
+    exact = np.sqrt(np.maximum(exact, 0)) / (2 * np.pi)
+    cutoff = fixed_frequencies(structure, keep)[count]
+    errors = frequency_errors(structure, reduced, 0.7 * cutoff)
+    true = errors.frequencies_hz / exact[: errors.frequencies_hz.size] - 1
+    small = (errors.relative < 1e-3) & (true > 1e-9)
+    np.testing.assert_allclose(errors.relative[small], true[small], rtol=0.1)
+
+
+def test_rigid_motions_have_no_error():
+    free = assemble_solid(wedge(8, clamp=False), Material())
+    keep = free.dof_set("cyclic_low")[:30]
+    errors = frequency_errors(free, craig_bampton(free, keep, 5), 1e4)
+    assert np.count_nonzero(errors.frequencies_hz == 0) == 6
+    assert np.all(errors.relative[:6] == 0)
+    assert np.all(errors.relative[6:] > 0)
+
+
+def test_all_modes_leave_no_error():
+    full = chain(12, mass=1.0, stiffness=1e4)
+    errors = frequency_errors(full, craig_bampton(full, np.array([11]), 11), 1e3)
+    assert errors.frequencies_hz.size == 12
+    assert errors.worst < 1e-12
+
+
+def test_error_of_a_chain_of_reductions(solid):
+    """Estimated against the first model and against the one between, with the basis found back."""
+    structure, keep = solid
+    once = craig_bampton(structure, keep, 40)
+    twice = craig_bampton(once, np.arange(6), 12)
+    whole = frequency_errors(structure, twice, 3000.0)
+    between = frequency_errors(once, twice, 3000.0)
+    exact = natural_frequencies(once, whole.frequencies_hz.size)
+    true = between.frequencies_hz / exact - 1
+    np.testing.assert_allclose(between.relative[:3], true[:3], rtol=0.2)
+    assert np.all(whole.relative > between.relative)
+
+
+def test_wrong_questions_are_refused(solid):
+    structure, keep = solid
+    reduced = craig_bampton(structure, keep, 3)
+    with pytest.raises(InputError, match="nothing was reduced"):
+        frequency_errors(structure, structure, 1.0)
+    with pytest.raises(InputError, match="leads back to 12 dofs, the structure has"):
+        frequency_errors(structure, craig_bampton(chain(12, 1.0, 1.0), np.array([3]), 2), 1.0)
+    other = craig_bampton(structure, keep, 5)
+    with pytest.raises(InputError, match="are no combinations of those of the other"):
+        frequency_errors(reduced, craig_bampton(other, np.array([0]), 3), 1.0)
+    with pytest.raises(InputError, match=r"ModesBelow.factor: must be positive, got 0"):
+        ModesBelow(100.0, factor=0.0)
+    with pytest.raises(InputError, match=r"FrequencyError.error: must be positive, got nan"):
+        FrequencyError(float("nan"), 100.0)
