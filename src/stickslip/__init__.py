@@ -55,6 +55,11 @@ if TYPE_CHECKING:
     from stickslip.model.lumped import chain, lumped
     from stickslip.model.mesh import SolidMesh, write_mesh
     from stickslip.model.modes import Modes, natural_frequencies, normal_modes
+    from stickslip.model.readers.ansys import read_ansys_full
+    from stickslip.model.readers.ansys_archive import read_ansys_archive, read_ansys_materials
+    from stickslip.model.readers.ansys_results import AnsysResults, read_ansys_results
+    from stickslip.model.readers.nastran import NastranResults, read_nastran_op2, read_nastran_op4
+    from stickslip.model.readers.nastran_dmig import read_nastran_dmig
     from stickslip.model.rigid_body import RigidBody
     from stickslip.model.rotation import RotatingSolid, SpeedPolynomial, rotating_solid
     from stickslip.model.sector import BladedSector
@@ -147,6 +152,11 @@ _MODULES = {
     "stickslip.model.lumped": ("chain", "lumped"),
     "stickslip.model.mesh": ("SolidMesh", "write_mesh"),
     "stickslip.model.modes": ("Modes", "natural_frequencies", "normal_modes"),
+    "stickslip.model.readers.ansys": ("read_ansys_full",),
+    "stickslip.model.readers.ansys_archive": ("read_ansys_archive", "read_ansys_materials"),
+    "stickslip.model.readers.ansys_results": ("AnsysResults", "read_ansys_results"),
+    "stickslip.model.readers.nastran": ("NastranResults", "read_nastran_op2", "read_nastran_op4"),
+    "stickslip.model.readers.nastran_dmig": ("read_nastran_dmig",),
     "stickslip.model.rigid_body": ("RigidBody",),
     "stickslip.model.rotation": ("RotatingSolid", "SpeedPolynomial", "rotating_solid"),
     "stickslip.model.sector": ("BladedSector",),
@@ -197,6 +207,7 @@ _HOME = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
     "Airfoil",
+    "AnsysResults",
     "Axis",
     "BladePair",
     "BladedSector",
@@ -234,6 +245,7 @@ __all__ = [
     "Material",
     "Modes",
     "ModesBelow",
+    "NastranResults",
     "Newton",
     "NodalDiameterMap",
     "Pairing",
@@ -311,6 +323,13 @@ __all__ = [
     "paired_interface",
     "preload",
     "rayleigh_damping",
+    "read_ansys_archive",
+    "read_ansys_full",
+    "read_ansys_materials",
+    "read_ansys_results",
+    "read_nastran_dmig",
+    "read_nastran_op2",
+    "read_nastran_op4",
     "read_study",
     "rigid_response",
     "rigid_surface",
