@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.linalg
 import scipy.sparse
+from cyclic_models import random_sector
 from models import blades_and_damper, solved, table
 
 from stickslip.contact.interface import Interface
@@ -13,6 +15,7 @@ from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
 from stickslip.reduction.craig_bampton import craig_bampton
+from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.relative import in_relative_coordinates
 from stickslip.response.system import System
 
@@ -156,3 +159,26 @@ def test_no_contacts_leave_the_structure_as_it_is():
     structure, gap = in_relative_coordinates(system.structure, np.zeros((0, system.structure.n)))
     np.testing.assert_allclose(structure.stiffness, system.structure.stiffness)
     assert gap.shape == (0, system.structure.n)
+
+
+def test_a_travelling_wave_keeps_its_waves_in_relative_coordinates():
+    """Contacts between neighbours: the gap operator has the neighbour's phase, the spectrum stays, gaps are exact."""
+    sector = cyclic_sector(random_sector(5, 3, inner=4), 5)
+    wave = travelling_wave(sector, 2)
+    contact = wave.dof_set("inner")
+    phase = np.exp(2j * np.pi * 2 / 5)
+    gap = np.zeros((6, wave.n), dtype=complex)
+    gap[np.arange(6), contact[:6]] = phase
+    gap[np.arange(6), contact[6:12]] = -1.0
+    structure, operator = in_relative_coordinates(wave, gap)
+    K, M = (m.toarray() for m in (structure.stiffness, structure.mass))
+    assert abs(K - K.conj().T).max() == 0.0
+    before = scipy.linalg.eigvalsh(wave.stiffness.toarray(), wave.mass.toarray())
+    np.testing.assert_allclose(scipy.linalg.eigvalsh(K, M), before, rtol=1e-10)
+    state = np.random.default_rng(0).standard_normal((structure.n, 2)) @ [1.0, 1.0j]
+    own = np.linalg.lstsq(wave.basis.toarray(), structure.expand(state))[0]
+    np.testing.assert_allclose(gap @ own, operator @ state, atol=1e-12)
+    # a skew damping matrix stays skew: it is that of Coriolis forces
+    C = wave.damping.toarray()
+    L = np.linalg.lstsq(wave.basis.toarray(), structure.basis.toarray())[0]
+    np.testing.assert_allclose(structure.damping.toarray(), L.conj().T @ C @ L, atol=1e-13)

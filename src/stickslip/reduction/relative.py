@@ -10,6 +10,8 @@ from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
+from stickslip.reduction.projection import project
+from stickslip.reduction.selection import surviving_sets
 
 RANK = 1e-9  # smallest singular value over largest, below which gaps depend on each other
 DIRECTIONS = ("t", "w", "n")
@@ -17,7 +19,7 @@ DIRECTIONS = ("t", "w", "n")
 
 def in_relative_coordinates(
     structure: Structure, gap_operator: Matrix, names: Sequence[str] = ()
-) -> tuple[Structure, FloatArray]:
+) -> tuple[Structure, Matrix]:
     """Write a structure in the gaps of its contacts and the coordinates that leave the gaps alone.
 
     ``u = L [g, rest]`` with ``L = [B⁺ N]``, the pseudo-inverse and the null space of the gap operator, block by block over the groups of
@@ -27,9 +29,10 @@ def in_relative_coordinates(
     Parameters
     ----------
     structure
-        Structure that the contacts join.
+        Structure that the contacts join; also a travelling wave.
     gap_operator
-        (3 n_contacts, n) rows t, w, n of each contact; rows of zeros are directions without a gap and get no coordinate.
+        (3 n_contacts, n) rows t, w, n of each contact; rows of zeros are directions without a gap and get no coordinate. Complex
+        for contacts between neighbouring sectors of a travelling wave, ``g = B u`` with the neighbour's phase in B.
     names
         Names of the contacts, for labels and messages; numbers where none are given.
 
@@ -67,30 +70,32 @@ def in_relative_coordinates(
     operator[used, gaps] = 1.0
     return (
         Structure(
-            _project(structure.mass, L),
-            _project(structure.damping, L),
-            _project(structure.stiffness, L),
+            _projected(structure.mass, L),
+            _projected(structure.damping, L),
+            _projected(structure.stiffness, L),
             _dofs(structure.dofs, used, contacts, rest.size, free),
-            _surviving_sets(structure, free, rest.size + used.size) | {"gaps": gaps, "rest": rest},
+            surviving_sets(structure, free, rest.size + used.size) | {"gaps": gaps, "rest": rest},
             structure.expand(L if scipy.sparse.issparse(structure.stiffness) else L.toarray()),
+            None if structure.loss is None else _projected(structure.loss, L),
         ),
         operator,
     )
 
 
-def _dense(matrix: Matrix) -> FloatArray:
-    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix, dtype=float)
+def _dense(matrix: Matrix) -> Matrix:
+    full = np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
+    return full if np.iscomplexobj(full) else full.astype(float)
 
 
 def _local_inverses(
-    B: FloatArray, used: IntArray, touched: IntArray, contacts: tuple[str, ...]
+    B: Matrix, used: IntArray, touched: IntArray, contacts: tuple[str, ...]
 ) -> tuple[Matrix, Matrix]:
     """Return B⁺ and the null space of B on all dofs, from the blocks of contacts that share dofs."""
     pattern = scipy.sparse.csr_array(B[np.ix_(used, touched)] != 0.0)
     graph = scipy.sparse.block_array([[None, pattern], [pattern.T, None]], format="csr")
     count, group = scipy.sparse.csgraph.connected_components(graph, directed=False)
-    inverse = scipy.sparse.lil_array((B.shape[1], used.size))
-    columns: list[tuple[IntArray, FloatArray]] = []
+    inverse = scipy.sparse.lil_array((B.shape[1], used.size), dtype=B.dtype)
+    columns: list[tuple[IntArray, Matrix]] = []
     for g in range(count):
         rows = np.flatnonzero(group[: used.size] == g)
         dofs = touched[group[used.size :] == g]
@@ -98,9 +103,9 @@ def _local_inverses(
         u, s, vt = np.linalg.svd(block)
         if rows.size > dofs.size or s[-1] <= RANK * s[0]:
             _refuse(u, s, used[rows], contacts)
-        inverse[np.ix_(dofs, rows)] = vt[: s.size].T @ (u.T / s[:, None])
-        columns.append((dofs, _tidy(vt[s.size :].T)))
-    null = scipy.sparse.lil_array((B.shape[1], sum(v.shape[1] for _, v in columns)))
+        inverse[np.ix_(dofs, rows)] = vt[: s.size].conj().T @ (u.conj().T / s[:, None])
+        columns.append((dofs, _tidy(vt[s.size :].conj().T)))
+    null = scipy.sparse.lil_array((B.shape[1], sum(v.shape[1] for _, v in columns)), dtype=B.dtype)
     at = 0
     for dofs, vectors in columns:
         null[np.ix_(dofs, np.arange(at, at + vectors.shape[1]))] = vectors
@@ -108,7 +113,7 @@ def _local_inverses(
     return inverse.tocsr(), null.tocsr()
 
 
-def _tidy(vectors: FloatArray) -> FloatArray:
+def _tidy(vectors: Matrix) -> Matrix:
     """Return a basis of the same space with as many zeros as elimination gives, orthonormal: a block has no preferred one."""
     if not vectors.size:
         return vectors
@@ -117,7 +122,7 @@ def _tidy(vectors: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.qr(vectors @ np.linalg.inv(vectors[pivots]))[0])
 
 
-def _refuse(u: FloatArray, s: FloatArray, rows: IntArray, contacts: tuple[str, ...]) -> None:
+def _refuse(u: Matrix, s: FloatArray, rows: IntArray, contacts: tuple[str, ...]) -> None:
     """Name the contacts whose gaps depend on each other."""
     rank = int(np.count_nonzero(s > RANK * s[0]))
     share = np.linalg.norm(u[:, rank:], axis=1)
@@ -130,9 +135,8 @@ def _refuse(u: FloatArray, s: FloatArray, rows: IntArray, contacts: tuple[str, .
     )
 
 
-def _project(matrix: Matrix, L: Matrix) -> Matrix:
-    product = L.T @ matrix @ L
-    product = (product + product.T) / 2
+def _projected(matrix: Matrix, L: Matrix) -> Matrix:
+    product = project(matrix, L)
     return scipy.sparse.csr_array(product) if scipy.sparse.issparse(matrix) else np.asarray(product)
 
 
@@ -147,10 +151,3 @@ def _dofs(
         np.vstack([np.full((new, 3), np.nan), kept.position]),
         tuple(contacts[r // 3] for r in used) + ("",) * n_rest + kept.part,
     )
-
-
-def _surviving_sets(structure: Structure, free: IntArray, offset: int) -> dict[str, IntArray]:
-    place = np.full(structure.n, -1)
-    place[free] = offset + np.arange(free.size)
-    moved = {name: place[index] for name, index in structure.sets.items()}
-    return {name: index for name, index in moved.items() if np.all(index >= 0)}
