@@ -41,6 +41,8 @@ def save_structure(structure: Structure, path: Path | str) -> None:
         arrays |= _packed(name, getattr(structure, name))
     if structure.basis is not None:
         arrays |= _packed("basis", structure.basis)
+    if structure.loss is not None:
+        arrays |= _packed("loss", structure.loss)
     dofs = structure.dofs
     arrays |= {
         "dofs.node": dofs.node,
@@ -104,12 +106,13 @@ def _unpack(arrays: Arrays) -> Structure:
         basis = unpacked("basis", arrays)
         if basis.ndim != 2 or basis.shape[1] != len(dofs):
             raise ValueError(f"basis of shape {basis.shape} for {len(dofs)} dofs")
+    loss = unpacked("loss", arrays) if "loss" in arrays or "loss.data" in arrays else None
     mass, damping, stiffness = (unpacked(name, arrays) for name in MATRICES)
     sets = {
         str(name): _members(arrays[f"set.{i}"], len(dofs))
         for i, name in enumerate(arrays["set_names"].astype(np.str_, casting="safe"))
     }
-    return Structure(mass, damping, stiffness, dofs, sets, basis)
+    return Structure(mass, damping, stiffness, dofs, sets, basis, loss)
 
 
 def _members(index: IntArray, n: int) -> IntArray:

@@ -5,6 +5,7 @@ R. R. Craig and M. C. C. Bampton, "Coupling of substructures for dynamic analyse
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -121,18 +122,12 @@ def _reduced(structure: Structure, keep: IntArray, basis: Matrix, modes: BodyMod
         stiffness,
         with_modal_dofs(structure.dofs.take(keep), m),
         surviving_sets(structure, keep) | {"modes": np.arange(k, k + m)},
+        loss=None if structure.loss is None else project(structure.loss, basis),
     )
 
 
 def _on_model(structure: Structure, reduced: Structure, basis: Matrix) -> Structure:
-    return Structure(
-        reduced.mass,
-        reduced.damping,
-        reduced.stiffness,
-        reduced.dofs,
-        reduced.sets,
-        structure.expand(basis),
-    )
+    return replace(reduced, basis=structure.expand(basis))
 
 
 def _until_exact_enough(

@@ -227,6 +227,7 @@ def travelling_wave(sector: CyclicSector, wave_number: int) -> Structure:
         _wave_dofs(structure.dofs, free, tie[:, free.size :]),
         surviving_sets(structure, free),
         structure.expand(tie),
+        None if structure.loss is None else _hermitian(_projected(structure.loss, tie)),
     )
 
 

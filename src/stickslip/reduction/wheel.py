@@ -57,6 +57,7 @@ def wheel(sector: CyclicSector) -> Structure:
         _wheel_dofs(sector),
         sets,
         basis,
+        None if structure.loss is None else assembled(structure.loss),
     )
 
 

@@ -90,6 +90,12 @@ def step_operators(
     law
         (n_contacts, 5): k_t, k_w, k_n (N/m), mu, preload (N) of each contact; the rest as in `integrate`.
     """
+    if structure.loss is not None:
+        raise input_error(
+            "integrate: structure",
+            "has structural damping, which is defined for vibration at one frequency and not in time",
+            "Use viscous damping: modal_damping with half the loss factor has the same effect at resonance.",
+        )
     gap_operator = _dense(gap_operator)
     _check(structure.n, gap_operator, law, load, omega)
     springs = law[:, :3].reshape(-1, 1)

@@ -160,6 +160,7 @@ def in_si(structure: Structure, units: Units) -> Structure:
         mass=scaled(structure.mass, energy),
         damping=scaled(structure.damping, energy / units.time),
         stiffness=scaled(structure.stiffness, energy / units.time**2),
+        loss=None if structure.loss is None else scaled(structure.loss, energy / units.time**2),
         dofs=replace(structure.dofs, position=units.length * structure.dofs.position),
     )
 
