@@ -55,11 +55,19 @@ if TYPE_CHECKING:
     from stickslip.model.lumped import chain, lumped
     from stickslip.model.mesh import SolidMesh, write_mesh
     from stickslip.model.modes import Modes, natural_frequencies, normal_modes
+    from stickslip.model.readers.abaqus import read_abaqus_matrices
     from stickslip.model.readers.ansys import read_ansys_full
     from stickslip.model.readers.ansys_archive import read_ansys_archive, read_ansys_materials
     from stickslip.model.readers.ansys_results import AnsysResults, read_ansys_results
+    from stickslip.model.readers.calculix import read_calculix_matrices
+    from stickslip.model.readers.calculix_deck import Deck, assemble_deck, read_deck
+    from stickslip.model.readers.frd import FrdResults, NodalField, read_frd
+    from stickslip.model.readers.matrix_files import read_matrix_files
     from stickslip.model.readers.nastran import NastranResults, read_nastran_op2, read_nastran_op4
     from stickslip.model.readers.nastran_dmig import read_nastran_dmig
+    from stickslip.model.readers.open_model import model_summary, read_model
+    from stickslip.model.readers.summary import ModelSummary
+    from stickslip.model.readers.units import Units
     from stickslip.model.rigid_body import RigidBody
     from stickslip.model.rotation import RotatingSolid, SpeedPolynomial, rotating_solid
     from stickslip.model.sector import BladedSector
@@ -152,11 +160,19 @@ _MODULES = {
     "stickslip.model.lumped": ("chain", "lumped"),
     "stickslip.model.mesh": ("SolidMesh", "write_mesh"),
     "stickslip.model.modes": ("Modes", "natural_frequencies", "normal_modes"),
+    "stickslip.model.readers.abaqus": ("read_abaqus_matrices",),
     "stickslip.model.readers.ansys": ("read_ansys_full",),
     "stickslip.model.readers.ansys_archive": ("read_ansys_archive", "read_ansys_materials"),
     "stickslip.model.readers.ansys_results": ("AnsysResults", "read_ansys_results"),
+    "stickslip.model.readers.calculix": ("read_calculix_matrices",),
+    "stickslip.model.readers.calculix_deck": ("Deck", "assemble_deck", "read_deck"),
+    "stickslip.model.readers.frd": ("FrdResults", "NodalField", "read_frd"),
+    "stickslip.model.readers.matrix_files": ("read_matrix_files",),
     "stickslip.model.readers.nastran": ("NastranResults", "read_nastran_op2", "read_nastran_op4"),
     "stickslip.model.readers.nastran_dmig": ("read_nastran_dmig",),
+    "stickslip.model.readers.open_model": ("model_summary", "read_model"),
+    "stickslip.model.readers.summary": ("ModelSummary",),
+    "stickslip.model.readers.units": ("Units",),
     "stickslip.model.rigid_body": ("RigidBody",),
     "stickslip.model.rotation": ("RotatingSolid", "SpeedPolynomial", "rotating_solid"),
     "stickslip.model.sector": ("BladedSector",),
@@ -222,6 +238,7 @@ __all__ = [
     "CubicSpring",
     "CyclicSector",
     "Dahl",
+    "Deck",
     "Discretisation",
     "DiskProfile",
     "Dofs",
@@ -233,6 +250,7 @@ __all__ = [
     "ForcedPoint",
     "ForcedProblem",
     "FourParameter",
+    "FrdResults",
     "FrequencyError",
     "FrequencyErrors",
     "GyroscopicModes",
@@ -243,11 +261,13 @@ __all__ = [
     "Iwan",
     "Jenkins",
     "Material",
+    "ModelSummary",
     "Modes",
     "ModesBelow",
     "NastranResults",
     "Newton",
     "NodalDiameterMap",
+    "NodalField",
     "Pairing",
     "ParameterPoint",
     "PeakPoint",
@@ -276,10 +296,12 @@ __all__ = [
     "TransientResult",
     "UniformBand",
     "UnilateralSpring",
+    "Units",
     "Wave",
     "__version__",
     "accepted_points",
     "annular_sector",
+    "assemble_deck",
     "assemble_solid",
     "blade_ring",
     "blisk_with_ring",
@@ -313,6 +335,7 @@ __all__ = [
     "mesh_sector",
     "mistuned_blade_ring",
     "modal_damping",
+    "model_summary",
     "natural_frequencies",
     "newton",
     "nodal_diameter_map",
@@ -323,10 +346,16 @@ __all__ = [
     "paired_interface",
     "preload",
     "rayleigh_damping",
+    "read_abaqus_matrices",
     "read_ansys_archive",
     "read_ansys_full",
     "read_ansys_materials",
     "read_ansys_results",
+    "read_calculix_matrices",
+    "read_deck",
+    "read_frd",
+    "read_matrix_files",
+    "read_model",
     "read_nastran_dmig",
     "read_nastran_op2",
     "read_nastran_op4",

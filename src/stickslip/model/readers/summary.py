@@ -1,12 +1,12 @@
 """What is in a model: counts, mass, size, first frequencies, and whether they make sense."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import StickslipError
 from stickslip.model.factorisation import Say, silent
 from stickslip.model.mesh import SolidMesh
@@ -177,5 +177,19 @@ def _with_modes(
         summary,
         rigid_modes=modes.rigid,
         frequencies_hz=modes.frequencies_hz,
+        remarks=remarks,
+    )
+
+
+def results_summary(
+    nodes: IntArray, points: FloatArray, frequencies_hz: Sequence[float], remarks: tuple[str, ...]
+) -> ModelSummary:
+    """Summarise results: nodes (with repetitions), their positions, stored frequencies."""
+    finite = points[np.isfinite(points).all(axis=1)]
+    return ModelSummary(
+        "results",
+        len(np.unique(nodes[nodes >= 0])),
+        box=np.vstack([finite.min(axis=0), finite.max(axis=0)]) if len(finite) else None,
+        frequencies_hz=np.array(frequencies_hz) if len(frequencies_hz) else None,
         remarks=remarks,
     )

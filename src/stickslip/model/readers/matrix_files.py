@@ -1,0 +1,252 @@
+"""Matrices in neutral files: Matrix Market, SciPy's ``.npz``, HDF5; with a CSV file of their dofs."""
+
+import io
+from pathlib import Path
+
+import numpy as np
+import scipy.io
+import scipy.sparse
+
+from stickslip.arrays import IntArray, Matrix
+from stickslip.errors import input_error, missing_package
+from stickslip.model.dofs import Dofs
+from stickslip.model.npz import BROKEN, DEFLATE_RATIO, Arrays, read_npz
+from stickslip.model.readers.entries import check_symmetric, check_unique
+from stickslip.model.readers.node_table import COMPONENTS, csv_columns, csv_numbers
+from stickslip.model.readers.text import CUT_SHORT, read_text, whole_numbers
+from stickslip.model.readers.units import SI, Units, check_units, in_si
+from stickslip.model.structure import Structure
+
+HDF5 = (".h5", ".hdf5")
+SPARSE = {
+    "csr": ("data", "indices", "indptr", "shape"),
+    "csc": ("data", "indices", "indptr", "shape"),
+    "coo": ("data", "row", "col", "shape"),
+}
+KINDS = (*COMPONENTS, "mode")
+
+
+def read_matrix_files(
+    stiffness: Path | str,
+    mass: Path | str,
+    *,
+    nodes: Path | str,
+    damping: Path | str | None = None,
+    units: Units = SI,
+    plausible: bool = True,
+) -> Structure:
+    """Read matrices from neutral files, which any program can write.
+
+    Parameters
+    ----------
+    stiffness, mass, damping
+        Matrix Market (``.mtx``, ``.mtx.gz``), `scipy.sparse.save_npz` or a dense array in ``.npz``, or HDF5 (``.h5``), in
+        which the matrix is the group or dataset called ``stiffness``, ``mass`` or ``damping``.
+    nodes
+        CSV file, one line a dof in the order of the equations, with the columns ``node, component, x, y, z``; components
+        are x, y, z, rx, ry, rz and mode. A further column ``set`` names sets, separated by blanks.
+    units
+        Unit system of matrices and positions.
+    plausible
+        False takes mass and size as they are, though they do not fit together.
+
+    Returns
+    -------
+    Structure
+        In SI; sparse or dense as the files are.
+
+    Raises
+    ------
+    InputError
+        If a file is damaged, sizes differ, or mass or stiffness is not symmetric.
+    """
+    dofs, sets = read_dof_table(Path(nodes))
+    files = {"stiffness": Path(stiffness), "mass": Path(mass)}
+    if damping is not None:
+        files["damping"] = Path(damping)
+    n = len(dofs)
+    found = {name: read_matrix(path, name, n) for name, path in files.items()}
+    for name in ("stiffness", "mass"):
+        check_symmetric(found[name], str(files[name]))
+    none = scipy.sparse.csr_array((n, n))
+    raw = Structure(found["mass"], found.get("damping", none), found["stiffness"], dofs, sets)
+    structure = in_si(raw, units)
+    if plausible:
+        check_units(structure, units, str(stiffness))
+    return structure
+
+
+def read_dof_table(path: Path) -> tuple[Dofs, dict[str, IntArray]]:
+    """Return the dofs and sets of a CSV file ``node, component, x, y, z`` and, if it is there, ``set``."""
+    columns = csv_columns(path, ("node", "component", "x", "y", "z"))
+    numbers = csv_numbers(path, "node", columns["node"])
+    node = whole_numbers(path, numbers[:, None], ("node",))[:, 0]
+    components = tuple(columns["component"])
+    for line, component in enumerate(components, 2):
+        if component not in KINDS:
+            raise input_error(
+                f"{path}: line {line}", f"component {component!r}", f"Use {', '.join(KINDS)}."
+            )
+    position = np.full((len(node), 3), np.nan)
+    placed = np.array([kind != "mode" for kind in components], dtype=bool)
+    for i, axis in enumerate(("x", "y", "z")):
+        texts = [t for t, there in zip(columns[axis], placed, strict=True) if there]
+        position[placed, i] = csv_numbers(path, axis, texts)
+    pairs = [p for p in zip(node, components, strict=True) if p[1] != "mode"]
+    if len(set(pairs)) < len(pairs):
+        twice = next(p for p in pairs if pairs.count(p) > 1)
+        raise input_error(str(path), f"lists node {twice[0]}, {twice[1]} twice", "One line a dof.")
+    sets: dict[str, list[int]] = {}
+    for i, names in enumerate(columns.get("set", [])):
+        for name in names.split():
+            sets.setdefault(name, []).append(i)
+    return Dofs(node, components, position), {k: np.array(v) for k, v in sets.items()}
+
+
+def read_matrix(path: Path, name: str, n: int) -> Matrix:
+    """Return one (n, n) matrix, sparse as CSR; `name` picks it from a file that holds several.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged, of an unknown kind or of another size, asks for more than it can hold, or has entries
+        that are not finite.
+    """
+    suffixes = [s.lower() for s in path.suffixes]
+    last = suffixes[-2] if suffixes[-1:] == [".gz"] and suffixes[:-1] else "".join(suffixes[-1:])
+    if last in (".mtx", ".mm"):
+        matrix = _matrix_market(path, n)
+    elif last == ".npz":
+        matrix = _from_arrays(read_npz(path), name, n, str(path))
+    elif last in HDF5:
+        matrix = _from_arrays(_read_hdf5(path, name), name, n, str(path))
+    else:
+        raise input_error(
+            str(path), f"unknown kind of matrix file {last!r}", "Use .mtx, .npz or .h5."
+        )
+    values = matrix.data if scipy.sparse.issparse(matrix) else matrix
+    if not np.isfinite(values).all():
+        raise input_error(
+            str(path), f"the {name} has entries that are not finite", "They come from a failed run."
+        )
+    return matrix
+
+
+def _check_size(shape: tuple[int, int], n: int, place: str) -> None:
+    if shape != (n, n):
+        raise input_error(
+            place,
+            f"is of {shape[0]} x {shape[1]}, the table lists {n} dofs",
+            "Give matrices and dofs of the same model.",
+        )
+
+
+def _matrix_market(path: Path, n: int) -> Matrix:
+    """Read a Matrix Market file after its counts were checked against its size."""
+    text = read_text(path)
+    if not text.startswith("%%MatrixMarket"):
+        raise input_error(
+            str(path),
+            "is no Matrix Market file",
+            "Its first line is %%MatrixMarket; matrices of Abaqus are read by read_abaqus_matrices.",
+        )
+    damaged = (ValueError, OverflowError, StopIteration, IndexError)
+    try:
+        rows, columns, entries, _, kind, _ = scipy.io.mminfo(io.BytesIO(text.encode()))
+    except damaged as error:
+        raise input_error(str(path), f"has no right header: {error}", CUT_SHORT) from error
+    _check_size((rows, columns), n, str(path))
+    if kind == "pattern" or entries > len(text):
+        raise input_error(str(path), f"has no room for {entries} values", CUT_SHORT)
+    try:
+        matrix = scipy.io.mmread(io.BytesIO(text.encode()))
+    except damaged as error:
+        raise input_error(str(path), f"cannot be read: {error}", CUT_SHORT) from error
+    if not scipy.sparse.issparse(matrix):
+        return np.asarray(matrix)
+    check_unique(matrix.coords[0], matrix.coords[1], max(matrix.shape), str(path))
+    return scipy.sparse.csr_array(matrix)
+
+
+def _read_hdf5(path: Path, name: str) -> Arrays:
+    """Return dataset `name`, or the datasets of group `name`, after their sizes were checked."""
+    try:
+        import h5py
+    except ModuleNotFoundError as error:
+        raise missing_package("h5py", error, "report") from error
+    if not path.is_file():
+        raise input_error(str(path), "there is no such file", "Check the path.")
+    try:
+        with h5py.File(path, "r") as file:
+            if not isinstance(file.get(name, getlink=True), h5py.HardLink):
+                raise input_error(
+                    str(path), f"holds no {name}, but {', '.join(file)}", "Name it so in the file."
+                )
+            item = file[name]
+            if isinstance(item, h5py.Dataset):
+                return {name: _dataset(item, path)}
+            links = {key: item.get(key, getlink=True) for key in item}
+            return {
+                key: _dataset(item[key], path)
+                for key, link in links.items()
+                if isinstance(link, h5py.HardLink) and isinstance(item[key], h5py.Dataset)
+            }
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+        raise input_error(str(path), f"cannot be read ({error})", BROKEN) from error
+
+
+def _dataset(dataset: Matrix, path: Path) -> Matrix:
+    """Read one dataset of HDF5 into memory if it lies in the file and can be as large as it says."""
+    place = f"{path}: {dataset.name}"
+    if dataset.external or dataset.is_virtual or dataset.dtype.kind not in "fciuSO":
+        raise input_error(
+            place, "lies in another file or is no array of numbers", "Copy it plainly."
+        )
+    if dataset.dtype.kind in "SO":
+        return np.array("" if dataset.shape else dataset.asstr()[()])
+    if dataset.size * dataset.dtype.itemsize > DEFLATE_RATIO * dataset.id.get_storage_size():
+        raise input_error(place, f"claims {dataset.shape}, more than it can hold", BROKEN)
+    return dataset[()]
+
+
+def _from_arrays(arrays: Arrays, name: str, n: int, place: str) -> Matrix:
+    """Return a matrix from its arrays: dense, or in one of SciPy's sparse layouts."""
+    if name not in arrays and len(arrays) == 1:
+        name = next(iter(arrays))
+    if name in arrays:
+        dense = arrays[name]
+        if dense.ndim != 2 or dense.dtype.kind not in "fciu":
+            raise input_error(
+                place, f"{name} is an array of {dense.shape}, no matrix of numbers", "Check it."
+            )
+        _check_size((dense.shape[0], dense.shape[1]), n, place)
+        return dense
+    layout = arrays.get("format", np.array("csr"))
+    kind = layout.item() if layout.shape == () else ""
+    kind = kind.decode(errors="replace") if isinstance(kind, bytes) else str(kind)
+    if kind not in SPARSE or not set(SPARSE[kind]) <= set(arrays):
+        raise input_error(
+            place,
+            f"holds no {name}, but {', '.join(sorted(arrays)) or 'nothing'}",
+            "Write it with scipy.sparse.save_npz, or in the layout of the page on matrix files.",
+        )
+    data, first, second, shape = (arrays[key] for key in SPARSE[kind])
+    if (
+        any(a.dtype.kind not in "iu" for a in (first, second, shape))
+        or data.dtype.kind not in "fciu"
+    ):
+        raise input_error(place, "has indices that are no integers, or no numbers", BROKEN)
+    if shape.shape != (2,):
+        raise input_error(place, "has a shape that is no pair", BROKEN)
+    _check_size((int(shape[0]), int(shape[1])), n, place)
+    try:
+        if kind == "coo":
+            matrix = scipy.sparse.coo_array((data, (first, second)), shape=(n, n))
+            check_unique(first, second, n, place)
+        else:
+            build = scipy.sparse.csr_array if kind == "csr" else scipy.sparse.csc_array
+            matrix = build((data, first, second), shape=(n, n))
+            matrix.check_format(full_check=True)
+    except (ValueError, IndexError, TypeError) as error:
+        raise input_error(place, f"its arrays do not fit together ({error})", BROKEN) from error
+    return scipy.sparse.csr_array(matrix)

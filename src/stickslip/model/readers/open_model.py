@@ -1,0 +1,223 @@
+"""Open a file of a model, whichever of the readers it takes; and say what is in it."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from stickslip.errors import InputError, input_error
+from stickslip.model.factorisation import Say, silent
+from stickslip.model.mesh import SolidMesh
+from stickslip.model.readers.abaqus import read_abaqus_matrices
+from stickslip.model.readers.ansys import read_ansys_full
+from stickslip.model.readers.ansys_archive import read_ansys_archive
+from stickslip.model.readers.ansys_results import AnsysResults, read_ansys_results
+from stickslip.model.readers.calculix import read_calculix_matrices
+from stickslip.model.readers.calculix_deck import Deck, assemble_deck, read_deck
+from stickslip.model.readers.frd import FrdResults, read_frd
+from stickslip.model.readers.matrix_files import read_matrix_files
+from stickslip.model.readers.nastran import NastranResults, read_nastran_op2
+from stickslip.model.readers.summary import (
+    ModelSummary,
+    mesh_summary,
+    results_summary,
+    structure_summary,
+)
+from stickslip.model.readers.text import read_text
+from stickslip.model.readers.units import SI, Units
+from stickslip.model.structure import Structure
+from stickslip.model.structure_file import load_structure
+
+Model = Structure | Deck | SolidMesh | FrdResults | AnsysResults | NastranResults
+READS = ".inp, .sti, .mas, .dof, .frd, .full, .rst, .cdb, .op2, .mtx, .npz, .h5"
+
+
+@dataclass(frozen=True)
+class _Files:
+    """What a reader may need."""
+
+    path: Path
+    units: Units
+    mesh: Path | None
+    mass: Path | None
+    damping: Path | None
+    nodes: Path | None
+    plausible: bool
+
+
+def read_model(
+    path: Path | str,
+    *,
+    units: Units = SI,
+    mesh: Path | str | None = None,
+    mass: Path | str | None = None,
+    damping: Path | str | None = None,
+    nodes: Path | str | None = None,
+    plausible: bool = True,
+) -> Model:
+    """Read a model or results, by the suffix of the file.
+
+    Parameters
+    ----------
+    path
+        A deck (``.inp``), results (``.frd``, ``.rst``, ``.op2``), a mesh (``.cdb``), a structure of `save_structure`
+        (``.npz``) or matrices; of matrices in several files the stiffness.
+    units
+        Unit system of the file; a structure of `save_structure` is in SI.
+    mesh, nodes
+        Where the nodes lie, beside matrices that do not say: see the reader of each format.
+    mass, damping
+        Beside matrices in several files. With CalculiX the mass of another job, with Abaqus the file whose name has
+        ``MASS`` for ``STIF`` by default.
+    plausible
+        False takes mass, size and materials as they are, though no solid has such.
+
+    Returns
+    -------
+    Structure, Deck, SolidMesh, FrdResults, AnsysResults or NastranResults
+        In SI.
+
+    Raises
+    ------
+    InputError
+        If the kind of file is unknown, a file beside it is missing, or the reader finds it damaged.
+    """
+    path = Path(path)
+    files = _Files(path, units, _path(mesh), _path(mass), _path(damping), _path(nodes), plausible)
+    suffixes = [s.lower() for s in path.suffixes]
+    suffix = suffixes[-2] if suffixes[-1:] == [".gz"] and suffixes[:-1] else "".join(suffixes[-1:])
+    if suffix not in _READERS:
+        raise input_error(
+            str(path),
+            f"no reader for files {suffix!r}" if suffix else "a file without suffix",
+            _OTHERS.get(suffix, f"Files that are read: {READS}."),
+        )
+    if not path.is_file():
+        read_text(path)  # its message names the file that may be meant
+    return _READERS[suffix](files)
+
+
+def _path(name: Path | str | None) -> Path | None:
+    return None if name is None else Path(name)
+
+
+def model_summary(
+    model: Model, *, n_modes: int = 10, units: Units = SI, say: Say = silent
+) -> ModelSummary:
+    """Say what is in a model that `read_model` returned.
+
+    Parameters
+    ----------
+    model
+        The model; a deck is assembled.
+    n_modes
+        Natural frequencies to compute; none for 0.
+    units
+        The system it was read with, which a doubt about mass and size names.
+    say
+        Called with a sentence before each long step.
+    """
+    if isinstance(model, Structure):
+        return structure_summary(model, n_modes=n_modes, units=units, say=say)
+    if isinstance(model, SolidMesh):
+        return mesh_summary(model)
+    if isinstance(model, Deck):
+        return _deck_summary(model, n_modes, units, say)
+    if isinstance(model, FrdResults):
+        found = [f.frequency_hz for f in model.fields if f.frequency_hz is not None]
+        remarks = tuple(f"field {f.name} at step {f.step}" for f in model.fields)
+        return results_summary(model.nodes.numbers, model.nodes.points, found, remarks)
+    dofs = model.dofs
+    return results_summary(dofs.node, dofs.position, list(model.frequencies_hz), ())
+
+
+def _deck_summary(deck: Deck, n_modes: int, units: Units, say: Say) -> ModelSummary:
+    shown = mesh_summary(deck.mesh, f"deck of {deck.element_type} cells")
+    structure = assemble_deck(deck)
+    found = structure_summary(structure, n_modes=n_modes, units=units, say=say)
+    remarks = [
+        f"material {name}: E {m.young_modulus:.4g} Pa, ν {m.poisson_ratio:g}, ρ {m.density:.4g} kg/m³"
+        for name, m in deck.materials.items()
+    ]
+    if deck.sectors:
+        remarks.append(f"one of {deck.sectors} sectors; frequencies with free cyclic faces")
+    if deck.speed is not None:
+        remarks.append(f"rotates at {deck.speed:.6g} rad/s; frequencies at rest")
+    remarks += [f"passed over: {text}" for text in deck.ignored]
+    return replace(
+        found, kind=shown.kind, cells=shown.cells, sets=shown.sets, nodes=shown.nodes,
+        box=shown.box, remarks=(*remarks, *found.remarks),
+    )  # fmt: skip
+
+
+def _calculix(files: _Files) -> Structure:
+    return read_calculix_matrices(
+        files.path,
+        units=files.units,
+        mesh=files.mesh or files.nodes,
+        mass=files.mass,
+        plausible=files.plausible,
+    )
+
+
+def _npz(files: _Files) -> Structure:
+    return load_structure(files.path) if files.mass is None else _neutral(files)
+
+
+def _mtx(files: _Files) -> Structure:
+    """Tell Matrix Market from the text of Abaqus, which has the same suffix."""
+    if read_text(files.path).startswith("%%MatrixMarket"):
+        return _neutral(files)
+    partner = re.sub("STIF", "MASS", files.path.name)
+    mass = files.mass or files.path.with_name(partner)
+    if mass == files.path or not mass.is_file():
+        raise _lacks(files.path, "mass=…, the matrix of the mass")
+    nodes = files.nodes or files.mesh
+    if nodes is None:
+        raise _lacks(files.path, "nodes=…, a deck or a CSV file with the positions of the nodes")
+    return read_abaqus_matrices(
+        files.path, mass, damping=files.damping, nodes=nodes, units=files.units,
+        plausible=files.plausible,
+    )  # fmt: skip
+
+
+def _neutral(files: _Files) -> Structure:
+    if files.nodes is None:
+        raise _lacks(files.path, "nodes=…, a CSV file node, component, x, y, z with one line a dof")
+    # HDF5 may hold all matrices in one file
+    mass = files.mass or (files.path if files.path.suffix.lower() in (".h5", ".hdf5") else None)
+    if mass is None:
+        raise _lacks(files.path, "mass=…, the matrix of the mass")
+    return read_matrix_files(
+        files.path, mass, nodes=files.nodes, damping=files.damping, units=files.units,
+        plausible=files.plausible,
+    )  # fmt: skip
+
+
+def _lacks(path: Path, what: str) -> InputError:
+    return input_error(str(path), "is one matrix, not a whole model", f"Give {what}.")
+
+
+_READERS: dict[str, Callable[[_Files], Model]] = {
+    ".inp": lambda f: read_deck(f.path, units=f.units, plausible=f.plausible),
+    ".sti": _calculix,
+    ".mas": _calculix,
+    ".dof": _calculix,
+    ".frd": lambda f: read_frd(f.path, units=f.units),
+    ".full": lambda f: read_ansys_full(
+        f.path, nodes=f.nodes or f.mesh, units=f.units, plausible=f.plausible
+    ),
+    ".rst": lambda f: read_ansys_results(f.path, units=f.units),
+    ".cdb": lambda f: read_ansys_archive(f.path, units=f.units),
+    ".op2": lambda f: read_nastran_op2(f.path, units=f.units),
+    ".mtx": _mtx,
+    ".npz": _npz,
+    ".h5": _neutral,
+    ".hdf5": _neutral,
+}
+_OTHERS = {
+    ".op4": "Use read_nastran_op4, which asks for the names of the matrices in it.",
+    ".pch": "Use read_nastran_dmig, which asks for the names of the matrices in it.",
+    ".bdf": "Use read_nastran_dmig, which asks for the names of the matrices in it.",
+    ".dat": "Use read_nastran_dmig for bulk data; results of CalculiX are in its .frd file.",
+}
