@@ -1,6 +1,8 @@
 """Factorisations of structural matrices: one function from a matrix to the map that solves with it."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.util import find_spec
 
 import numpy as np
 import scipy.linalg
@@ -8,79 +10,180 @@ import scipy.sparse
 import scipy.sparse.linalg
 
 from stickslip.arrays import Matrix
-from stickslip.errors import SingularError
+from stickslip.errors import SingularError, input_error, missing_package
 
 DENSE = 400  # below this many rows dense algebra is faster than sparse
+LARGE = 3000  # below this many rows SuperLU is as fast as the optional package
 SINGULAR = 1e13  # a condition number above which nothing of a solution is known
+SYMMETRIC = 1e-10  # a matrix counts as Hermitian where it differs by less, over its largest entry
+BACKENDS = ("auto", "dense", "superlu", "feral")
 
 Solve = Callable[[Matrix], Matrix]
 Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Factorisation:
+    """A factorised matrix; call it with right-hand sides.
+
+    Parameters
+    ----------
+    solve
+        Takes (n,) or (n, k), real or complex, and returns the same shape.
+    backend
+        What factorised it: ``dense``, ``superlu`` or ``feral``.
+    negative
+        Number of negative eigenvalues; None where the factors do not tell.
+    """
+
+    solve: Solve
+    backend: str
+    negative: int | None = None
+
+    def __call__(self, right: Matrix) -> Matrix:
+        """Return the solution(s) for right-hand side(s) (n,) or (n, k)."""
+        return self.solve(right)
 
 
 def silent(_: str) -> None:
     """Say nothing: the default of functions that report their progress."""
 
 
-def factorise(matrix: Matrix, *, say: Say = silent) -> Solve:
+def factorise(matrix: Matrix, *, backend: str = "auto", say: Say = silent) -> Factorisation:
     """Factorise a square matrix; return the map from right-hand sides to solutions.
 
     Parameters
     ----------
     matrix
         (n, n), dense or sparse, real or complex: symmetric, Hermitian or general.
+    backend
+        ``dense``; ``superlu`` (SciPy's); ``feral`` (optional, for real symmetric and complex
+        Hermitian matrices); ``auto`` takes the fastest of those that are installed and apply.
     say
         Called with a sentence before a long factorisation.
-
-    Returns
-    -------
-    Solve
-        Takes (n,) or (n, k), real or complex, and returns the same shape.
 
     Raises
     ------
     SingularError
         If a pivot vanishes, or if the condition number exceeds `SINGULAR`.
+    InputError
+        If `backend` is unknown, or is ``feral`` and the matrix is neither symmetric nor Hermitian.
+    StickslipError
+        If `backend` is ``feral`` and the package is not installed.
     """
-    if matrix.shape[0] <= DENSE or not scipy.sparse.issparse(matrix):
-        solve = _dense(matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix))
+    chosen = _chosen(matrix, backend)
+    if chosen == "dense":
+        found = _dense(matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix))
     else:
-        say(f"factorising {matrix.shape[0]} equations")
-        solve = _superlu(matrix)
-    solve = _of_complex(solve, np.iscomplexobj(matrix))
-    _refuse_singular(matrix, solve)
-    return solve
+        say(f"factorising {matrix.shape[0]} equations ({chosen})")
+        found = (_feral if chosen == "feral" else _superlu)(scipy.sparse.csc_array(matrix))
+    _refuse_singular(matrix, found)
+    return found
 
 
-def _dense(matrix: Matrix) -> Solve:
+def _chosen(matrix: Matrix, backend: str) -> str:
+    """Return the name of what factorises `matrix`."""
+    if backend not in BACKENDS:
+        raise input_error(
+            "factorise: backend", f"got {backend!r}", f"Use one of {', '.join(BACKENDS)}."
+        )
+    if backend == "feral" and not _hermitian(matrix):
+        raise input_error(
+            "factorise: backend",
+            "feral factorises real symmetric and complex Hermitian matrices, which this is not",
+            "Use superlu.",
+        )
+    if backend != "auto":
+        return backend
+    if matrix.shape[0] <= DENSE or not scipy.sparse.issparse(matrix):
+        return "dense"
+    if matrix.shape[0] > LARGE and find_spec("feral") is not None and _hermitian(matrix):
+        return "feral"
+    return "superlu"
+
+
+def _hermitian(matrix: Matrix) -> bool:
+    largest = np.max(np.abs(matrix.data if scipy.sparse.issparse(matrix) else matrix), initial=0.0)
+    difference = abs(matrix - matrix.conj().T).max() if largest > 0 else 0.0
+    return bool(difference <= SYMMETRIC * largest)
+
+
+def _dense(matrix: Matrix) -> Factorisation:
     if not np.all(np.isfinite(matrix)):
         raise SingularError("factorise: the matrix has entries that are not finite")
-    factors = scipy.linalg.lapack.get_lapack_funcs("getrf", (matrix,))(matrix)
-    if factors[2] != 0:
+    getrf = scipy.linalg.get_lapack_funcs("getrf", (matrix,))
+    lu, pivots, info = getrf(matrix)
+    if info != 0:
         raise SingularError("factorise: the matrix is singular")
-    return lambda b: np.asarray(scipy.linalg.lu_solve(factors[:2], b))
+    return Factorisation(lambda b: np.asarray(scipy.linalg.lu_solve((lu, pivots), b)), "dense")
 
 
-def _superlu(matrix: Matrix) -> Solve:
+def _superlu(matrix: Matrix) -> Factorisation:
     try:
         lu = scipy.sparse.linalg.splu(
-            scipy.sparse.csc_array(matrix),
+            matrix,
             permc_spec="MMD_AT_PLUS_A",
             diag_pivot_thresh=0.01,
             options={"SymmetricMode": True},
         )
     except RuntimeError as error:
         raise SingularError(f"factorise: {error}") from error
-    kind = complex if np.iscomplexobj(matrix) else float
-    return lambda b: np.asarray(lu.solve(np.asarray(b, dtype=kind)))
+    if np.iscomplexobj(matrix):
+        return Factorisation(
+            lambda b: np.asarray(lu.solve(np.asarray(b, dtype=complex))), "superlu"
+        )
+    return Factorisation(_of_complex(lambda b: np.asarray(lu.solve(b))), "superlu")
 
 
-def _of_complex(solve: Solve, complex_matrix: bool) -> Solve:
+def _feral(matrix: Matrix) -> Factorisation:
+    """Factorise a real symmetric or, as a real matrix of twice the size, a Hermitian matrix."""
+    try:
+        import feral
+    except ImportError as error:
+        raise missing_package("feral-solver", error, "sparse") from error
+    if not np.iscomplexobj(matrix):
+        solver = _factored(feral, matrix)
+        return Factorisation(_of_complex(solver.solve), "feral", solver.num_negative_eigenvalues)
+    real, imaginary = matrix.real, matrix.imag
+    imaginary.eliminate_zeros()
+    doubled = scipy.sparse.block_array([[real, -imaginary], [imaginary, real]], format="csc")
+    solver, n = _factored(feral, doubled), matrix.shape[0]
+
+    def solve(right: Matrix) -> Matrix:
+        both = solver.solve(np.concatenate([np.real(right), np.imag(right)]))
+        return np.asarray(both[:n] + 1j * both[n:])
+
+    return Factorisation(solve, "feral", solver.num_negative_eigenvalues // 2)
+
+
+def _factored(feral: Matrix, matrix: Matrix) -> Matrix:
+    """Return the package's solver of a real symmetric CSC matrix.
+
+    One thread: a study has a process for each core. Fused multiply-add changes the last digits only.
+    """
+    lower = scipy.sparse.tril(matrix, format="csc")
+    lower.sort_indices()
+    solver = feral.Solver(parallel=False, fma=True)
+    pattern = lower.indptr.astype(np.int64), lower.indices.astype(np.int64)
+    try:
+        solver.factor(feral.CscMatrix(lower.shape[0], *pattern, lower.data))
+    except feral.FeralError as error:
+        raise SingularError(f"factorise: {error}") from error
+    if solver.inertia.n_zero:
+        raise SingularError(
+            f"factorise: the matrix of {lower.shape[0]} equations is singular: "
+            f"{solver.inertia.n_zero} pivots vanish"
+        )
+    return solver
+
+
+def _of_complex(solve: Solve) -> Solve:
     """Let the factors of a real matrix take complex right-hand sides."""
-    if complex_matrix:
-        return solve
 
     def both(b: Matrix) -> Matrix:
-        return solve(b.real) + 1j * solve(b.imag) if np.iscomplexobj(b) else solve(b)
+        if np.iscomplexobj(b):
+            return solve(np.ascontiguousarray(b.real)) + 1j * solve(np.ascontiguousarray(b.imag))
+        return solve(np.asarray(b, dtype=float))
 
     return both
 

@@ -6,11 +6,11 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 import scipy.sparse.csgraph
-import scipy.sparse.linalg
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.factorisation import DENSE, Say, Solve, factorise, silent
+from stickslip.model.lanczos import lanczos
 from stickslip.model.structure import Structure
 
 RIGID = (
@@ -160,7 +160,8 @@ def lowest_modes(
     if solve is None or _small(stiffness, n):
         K, M = (m.toarray() if scipy.sparse.issparse(m) else m for m in (stiffness, mass))
         return _dense_modes(K, M, n, shift)
-    values, vectors = _krylov(stiffness, mass, n, solve, shift)
+    kind = complex if np.iscomplexobj(stiffness) or np.iscomplexobj(mass) else float
+    values, vectors = lanczos(mass, n, solve, shift, kind)
     order = np.argsort(values)
     return values[order], vectors[:, order]
 
@@ -202,28 +203,6 @@ def _dense_modes(K: Matrix, M: Matrix, n: int, shift: float) -> tuple[FloatArray
         values = shift + 1.0 / inverse[::-1]
         vectors = (vectors / np.sqrt(inverse))[:, ::-1]
     return np.asarray(values), np.asarray(vectors)
-
-
-def _krylov(
-    stiffness: Matrix, mass: Matrix, n: int, solve: Solve, shift: float
-) -> tuple[FloatArray, Matrix]:
-    """Return `n` modes by shift-invert Lanczos, Rayleigh-Ritz last: eigsh leaves equal complex ones oblique."""
-    kind = np.result_type(stiffness.dtype, mass.dtype, float)
-    size = stiffness.shape[0]
-    start = np.random.default_rng(0).standard_normal(size)  # the same in every run
-    values, vectors = scipy.sparse.linalg.eigsh(
-        stiffness.astype(kind),
-        n,
-        M=mass,
-        sigma=shift,
-        OPinv=scipy.sparse.linalg.LinearOperator((size, size), matvec=solve, dtype=kind),
-        v0=start.astype(kind),
-    )
-    if kind.kind == "f":
-        return values, vectors
-    K, M = (vectors.conj().T @ (m @ vectors) for m in (stiffness, mass))
-    values, turn = scipy.linalg.eigh((K + K.conj().T) / 2, (M + M.conj().T) / 2)
-    return values, vectors @ turn
 
 
 def _strain_share(stiffness: Matrix, shapes: Matrix) -> FloatArray:

@@ -1,0 +1,123 @@
+"""Block Lanczos iteration for the lowest modes of large structures.
+
+R. G. Grimes, J. G. Lewis and H. D. Simon, "A shifted block Lanczos algorithm for solving sparse symmetric generalized
+eigenproblems", SIAM Journal on Matrix Analysis and Applications 15 (1994) 228-272; here with full reorthogonalisation and
+one shift.
+"""
+
+import numpy as np
+
+from stickslip.arrays import FloatArray, Matrix
+from stickslip.errors import input_error
+from stickslip.model.factorisation import Solve
+
+BLOCK = 8  # vectors solved for together; as many equal frequencies are found for certain
+CONVERGED = 1e-10  # residual of a mode over its eigenvalue; the frequency's error is its square
+ROUNDING = 1e-14  # the same over the largest eigenvalue: nothing below can be reached
+NOTHING = 1e-30  # squared length over that before orthogonalisation: only rounding is left
+
+
+def lanczos(
+    mass: Matrix, n: int, solve: Solve, shift: float, kind: type
+) -> tuple[FloatArray, Matrix]:
+    """Return the `n` eigenvalues of ``K φ = λ M φ`` nearest to `shift`, and M-orthonormal vectors.
+
+    Parameters
+    ----------
+    mass
+        (size, size), positive semidefinite.
+    n
+        At most the rank of the mass.
+    solve
+        Solves with ``K − shift M``.
+    shift
+        Between eigenvalues.
+    kind
+        `float` or `complex`.
+
+    Raises
+    ------
+    InputError
+        If the rank of the mass is below `n`.
+
+    Notes
+    -----
+    The Krylov space of ``(K − shift M)⁻¹ M``, which is self-adjoint in the mass, is built from blocks; its image at the
+    start keeps out what has no mass.
+    """
+    size = mass.shape[0]
+    random = np.random.default_rng(0)  # the same in every run
+
+    def operate(block: Matrix) -> Matrix:
+        return solve(mass @ block)
+
+    def fresh(count: int) -> Matrix:
+        block = operate(random.standard_normal((size, count)).astype(kind))
+        length = np.sqrt(np.sum((block.conj() * (mass @ block)).real, axis=0))
+        return block / np.where(length > 0, length, 1.0)
+
+    basis = np.empty((size, min(size, 2 * n + 12 * BLOCK)), dtype=kind, order="F")
+    projected: Matrix = np.zeros((0, 0), dtype=kind)
+    block = _orthonormal(mass, fresh(min(BLOCK, size)), basis[:, :0], fresh)
+    while block.shape[1]:
+        basis, known = _appended(basis, len(projected), block)
+        image = operate(block)
+        column = known.conj().T @ (mass @ image)
+        image -= known @ column
+        projected = _bordered(projected, column)
+        block = _orthonormal(mass, image, known, fresh)
+        coupling = block.conj().T @ (mass @ image)
+        if len(projected) < n:
+            continue
+        largest, turn = np.linalg.eigh(projected, UPLO="U")
+        chosen = np.argsort(-abs(largest))[:n]
+        largest, turn = largest[chosen], turn[:, chosen]
+        rest = np.linalg.norm(coupling @ turn[-image.shape[1] :], axis=0)
+        if np.all(rest <= np.maximum(CONVERGED * abs(largest), ROUNDING * abs(largest[0]))):
+            break
+    if len(projected) < n:
+        raise input_error(
+            "normal_modes",
+            f"{n} asked of {size} dofs whose mass has the rank {len(projected)}",
+            "Ask for at most as many.",
+        )
+    return shift + 1.0 / largest, known @ turn
+
+
+def _appended(basis: Matrix, count: int, block: Matrix) -> tuple[Matrix, Matrix]:
+    """Return the basis with `block` after its first `count` columns, enlarged where needed, and its used part."""
+    end = count + block.shape[1]
+    if end > basis.shape[1]:
+        larger = np.empty((len(basis), 2 * end), dtype=basis.dtype, order="F")
+        larger[:, :count] = basis[:, :count]
+        basis = larger
+    basis[:, count:end] = block
+    return basis, basis[:, :end]
+
+
+def _bordered(projected: Matrix, column: Matrix) -> Matrix:
+    """Return the projected operator with new columns; only its upper triangle is used."""
+    old, end = len(projected), len(column)
+    larger = np.zeros((end, end), dtype=column.dtype)
+    larger[:old, :old] = projected
+    larger[:, old:] = column
+    return larger
+
+
+def _orthonormal(mass: Matrix, image: Matrix, known: Matrix, fresh: Solve) -> Matrix:
+    """Return M-orthonormal columns of `image`, M-orthogonal to `known`; new directions where it has none.
+
+    Three passes: the first leaves rounding errors of the size of what it removed.
+    """
+    block = image
+    for last in (False, False, True):
+        heavy = mass @ block
+        reference = np.max(np.sum((block.conj() * heavy).real, axis=0), initial=0.0)
+        if known.shape[1]:
+            block = block - known @ (known.conj().T @ heavy)
+        squares, turn = np.linalg.eigh(block.conj().T @ (mass @ block))
+        weak = squares <= NOTHING * reference
+        block = (block @ turn[:, ~weak]) / np.sqrt(squares[~weak])
+        if np.any(weak) and not last:
+            block = np.hstack([block, fresh(int(np.count_nonzero(weak)))])
+    return block
