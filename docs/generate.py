@@ -1,9 +1,11 @@
-"""Write the parts of the documentation that are made from the code: study file, public names, validation."""
+"""Write the parts of the documentation that are made from the code: study file, public names, validation, a drawing."""
 
 import ast
 import json
 from pathlib import Path
 from typing import Any
+
+from sector_drawing import draw_sector
 
 import stickslip
 
@@ -27,6 +29,7 @@ def write_all(folder: Path) -> None:
     (folder / "study_file.md").write_text(study_file(), encoding="utf-8")
     (folder / "validation.md").write_text(validation(), encoding="utf-8")
     (folder / "api.md").write_text(api(), encoding="utf-8")
+    draw_sector(folder / "sector.svg")
 
 
 def study_file() -> str:
