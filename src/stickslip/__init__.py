@@ -80,6 +80,7 @@ if TYPE_CHECKING:
     from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
     from stickslip.reduction.lumped_disks import blade_ring, blisk_with_ring, mistuned_blade_ring
     from stickslip.reduction.relative import in_relative_coordinates
+    from stickslip.reduction.rubin import rubin
     from stickslip.reduction.truncation import (
         FrequencyError,
         FrequencyErrors,
@@ -185,6 +186,7 @@ _MODULES = {
     "stickslip.reduction.cyclic": ("CyclicSector", "cyclic_sector", "travelling_wave"),
     "stickslip.reduction.lumped_disks": ("blade_ring", "blisk_with_ring", "mistuned_blade_ring"),
     "stickslip.reduction.relative": ("in_relative_coordinates",),
+    "stickslip.reduction.rubin": ("rubin",),
     "stickslip.reduction.truncation": (
         "FrequencyError",
         "FrequencyErrors",
@@ -363,6 +365,7 @@ __all__ = [
     "rigid_response",
     "rigid_surface",
     "rotating_solid",
+    "rubin",
     "run_study",
     "safe",
     "save_structure",

@@ -1,5 +1,7 @@
 """Matrices and dof tables in the coordinates of a reduction."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import scipy.sparse
 
@@ -33,6 +35,31 @@ def project(matrix: Matrix, basis: Matrix) -> Matrix:
     else:
         product = _dense_product(matrix, basis)
     return (product + product.conj().T) / 2 if is_hermitian(matrix) else product
+
+
+def in_coordinates(
+    structure: Structure, basis: Matrix, dofs: Dofs, sets: Mapping[str, IntArray]
+) -> Structure:
+    """Return a structure in other coordinates: all its matrices projected, the way back chained.
+
+    Parameters
+    ----------
+    structure
+        n dofs.
+    basis
+        (n, m) with ``u = basis @ new``.
+    dofs, sets
+        Of the m new coordinates.
+    """
+    return Structure(
+        project(structure.mass, basis),
+        project(structure.damping, basis),
+        project(structure.stiffness, basis),
+        dofs,
+        sets,
+        structure.expand(basis),
+        None if structure.loss is None else project(structure.loss, basis),
+    )
 
 
 def is_hermitian(matrix: Matrix) -> bool:

@@ -10,7 +10,7 @@ from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.reduction.projection import project
+from stickslip.reduction.projection import in_coordinates
 from stickslip.reduction.selection import surviving_sets
 
 RANK = 1e-9  # smallest singular value over largest, below which gaps depend on each other
@@ -69,14 +69,11 @@ def in_relative_coordinates(
     operator = np.zeros_like(B)
     operator[used, gaps] = 1.0
     return (
-        Structure(
-            _projected(structure.mass, L),
-            _projected(structure.damping, L),
-            _projected(structure.stiffness, L),
+        in_coordinates(
+            structure,
+            L if scipy.sparse.issparse(structure.stiffness) else L.toarray(),
             _dofs(structure.dofs, used, contacts, rest.size, free),
             surviving_sets(structure, free, rest.size + used.size) | {"gaps": gaps, "rest": rest},
-            structure.expand(L if scipy.sparse.issparse(structure.stiffness) else L.toarray()),
-            None if structure.loss is None else _projected(structure.loss, L),
         ),
         operator,
     )
@@ -133,11 +130,6 @@ def _refuse(u: Matrix, s: FloatArray, rows: IntArray, contacts: tuple[str, ...])
         f"the gaps of contacts {listed} depend on each other: {rows.size} gaps of which {rank} are independent",
         "Keep nodal coordinates (harmonic_balance takes both), or leave out contacts that share nodes.",
     )
-
-
-def _projected(matrix: Matrix, L: Matrix) -> Matrix:
-    product = project(matrix, L)
-    return scipy.sparse.csr_array(product) if scipy.sparse.issparse(matrix) else np.asarray(product)
 
 
 def _dofs(
