@@ -39,7 +39,7 @@ class NodalField:
     components
         Names of the columns, e.g. ``("D1", "D2", "D3")``.
     values
-        (n, k) in SI for ``DISP`` (m), ``STRESS`` (Pa) and ``FORC`` (N), else as in the file. Mode shapes are those of
+        (n, k) in SI for ``DISP`` and ``DISPI`` (m), ``STRESS`` (Pa) and ``FORC`` (N), else as in the file. Mode shapes are those of
         unit modal mass in SI.
     nodes
         (n,) node numbers.
@@ -47,6 +47,9 @@ class NodalField:
         Counted through the file.
     frequency_hz
         Of a mode; None elsewhere.
+    nodal_diameter
+        Of a mode of a cyclic analysis, whose fields ``DISP`` and ``DISPI`` are the real and the imaginary part; None
+        elsewhere.
     """
 
     name: str
@@ -55,6 +58,7 @@ class NodalField:
     nodes: IntArray
     step: int
     frequency_hz: float | None = None
+    nodal_diameter: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,8 +134,10 @@ def _mesh(nodes: NodeTable, cells: dict[int, list[list[int]]], path: Path) -> So
 
 
 def _in_si(field: NodalField, modal: bool, units: Units) -> NodalField:
+    displacement = 1 / math.sqrt(units.mass) if modal else units.length
     factor = {
-        "DISP": 1 / math.sqrt(units.mass) if modal else units.length,
+        "DISP": displacement,
+        "DISPI": displacement,
         "STRESS": units.stress,
         "FORC": units.force,
     }.get(field.name, 1.0)
@@ -149,6 +155,7 @@ class _Frd:
         self.tables: list[tuple[IntArray, FloatArray]] = []
         self.cells: dict[int, list[list[int]]] = {}
         self.fields: list[tuple[NodalField, bool]] = []
+        self.diameter: int | None = None  # of the fields that follow
 
     def read(self) -> None:
         while self.at < len(self.lines):
@@ -161,6 +168,9 @@ class _Frd:
                 self.tables.append(self._rows(line, 3, self._format(line[73:74])))
             elif key == "3C":
                 self._read_cells(WIDTHS[self._format(line[73:74])])
+            elif line.startswith("    1PHID"):
+                number = self._whole(line[9:])
+                self.diameter = number if number >= 0 else None
             elif key == "100C":
                 self._read_field(line)
         raise input_error(str(self.path), "does not end with 9999", CUT_SHORT)
@@ -285,5 +295,6 @@ class _Frd:
                 components.append(line[5:13].strip())
             self.at += 1
         nodes, values = self._rows(header, len(components), layout)
-        field = NodalField(name, tuple(components), values, nodes, step, value if modal else None)
+        frequency = value if modal else None
+        field = NodalField(name, tuple(components), values, nodes, step, frequency, self.diameter)
         self.fields.append((field, modal))
