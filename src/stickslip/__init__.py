@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from stickslip.harmonic.excitation import HarmonicLoad
     from stickslip.model.annulus import annular_sector
     from stickslip.model.axis import Axis
+    from stickslip.model.beam import Beam, beam, rotating_beam
     from stickslip.model.blade_mesh import mesh_blade_pair
     from stickslip.model.blade_pair import BladePair
     from stickslip.model.damper import ContactPoints, FlatCurvedDamper, gap_operator
@@ -78,6 +79,7 @@ if TYPE_CHECKING:
     from stickslip.model.structure_file import load_structure, save_structure
     from stickslip.reduction.craig_bampton import craig_bampton
     from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
+    from stickslip.reduction.interface_modes import reduce_interface
     from stickslip.reduction.lumped_disks import blade_ring, blisk_with_ring, mistuned_blade_ring
     from stickslip.reduction.relative import in_relative_coordinates
     from stickslip.reduction.rubin import rubin
@@ -150,6 +152,7 @@ _MODULES = {
     "stickslip.harmonic.excitation": ("HarmonicLoad",),
     "stickslip.model.annulus": ("annular_sector",),
     "stickslip.model.axis": ("Axis",),
+    "stickslip.model.beam": ("Beam", "beam", "rotating_beam"),
     "stickslip.model.blade_mesh": ("mesh_blade_pair",),
     "stickslip.model.blade_pair": ("BladePair",),
     "stickslip.model.damper": ("ContactPoints", "FlatCurvedDamper", "gap_operator"),
@@ -184,6 +187,7 @@ _MODULES = {
     "stickslip.model.structure_file": ("load_structure", "save_structure"),
     "stickslip.reduction.craig_bampton": ("craig_bampton",),
     "stickslip.reduction.cyclic": ("CyclicSector", "cyclic_sector", "travelling_wave"),
+    "stickslip.reduction.interface_modes": ("reduce_interface",),
     "stickslip.reduction.lumped_disks": ("blade_ring", "blisk_with_ring", "mistuned_blade_ring"),
     "stickslip.reduction.relative": ("in_relative_coordinates",),
     "stickslip.reduction.rubin": ("rubin",),
@@ -227,6 +231,7 @@ __all__ = [
     "Airfoil",
     "AnsysResults",
     "Axis",
+    "Beam",
     "BladePair",
     "BladedSector",
     "Bonded",
@@ -305,6 +310,7 @@ __all__ = [
     "annular_sector",
     "assemble_deck",
     "assemble_solid",
+    "beam",
     "blade_ring",
     "blisk_with_ring",
     "branch_in_parameter",
@@ -362,8 +368,10 @@ __all__ = [
     "read_nastran_op2",
     "read_nastran_op4",
     "read_study",
+    "reduce_interface",
     "rigid_response",
     "rigid_surface",
+    "rotating_beam",
     "rotating_solid",
     "rubin",
     "run_study",

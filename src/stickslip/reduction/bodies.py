@@ -100,13 +100,13 @@ def bodies_fixed_at(structure: Structure, keep: IntArray, place: str, say: Say) 
     return bodies
 
 
-def free_bodies(structure: Structure, say: Say) -> list[Body]:
-    """Return the bodies with nothing fixed; those that can move rigidly get a shift."""
+def loose_bodies(structure: Structure, inner: IntArray, say: Say) -> list[Body]:
+    """Return the bodies among the dofs `inner` with all others fixed; those that can move rigidly get a shift."""
     bodies = []
-    for part in _parts(structure, np.arange(structure.n)):
+    for part in _parts(structure, inner):
         K, M = _own(structure, part)
         try:
-            refuse_unheld(K, structure.dofs.take(part), "free_bodies")
+            refuse_unheld(K, structure.dofs.take(part), "loose_bodies")
             bodies.append(Body(part, K, M, factorise(K, say=say)))
         except SingularError:
             stiff, heavy = (float(abs(m.diagonal()).sum()) for m in (K, M))

@@ -77,6 +77,13 @@ def craig_bampton(
             "Ask for at most that many.",
         )
     bodies = bodies_fixed_at(structure, keep, "craig_bampton: with the kept dofs fixed", say)
+    return fixed_interface_reduction(structure, keep, bodies, n_modes, say)
+
+
+def fixed_interface_reduction(
+    structure: Structure, keep: IntArray, bodies: list[Body], n_modes: ModeChoice, say: Say
+) -> Structure:
+    """Return the reduction of `craig_bampton`, given the bodies that are left when `keep` is fixed."""
     if isinstance(n_modes, FrequencyError):
         return _until_exact_enough(structure, keep, bodies, n_modes, say)
     if isinstance(n_modes, ModesBelow):

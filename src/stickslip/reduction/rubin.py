@@ -14,7 +14,7 @@ from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import SingularError, input_error
 from stickslip.model.factorisation import Say, silent
 from stickslip.model.structure import Structure
-from stickslip.reduction.bodies import Body, BodyModes, free_bodies, lowest_of, modes_up_to
+from stickslip.reduction.bodies import Body, BodyModes, loose_bodies, lowest_of, modes_up_to
 from stickslip.reduction.projection import BLOCK, in_coordinates, kept_dofs, with_modal_dofs
 from stickslip.reduction.selection import surviving_sets
 from stickslip.reduction.truncation import FrequencyError, ModesBelow
@@ -71,7 +71,7 @@ def rubin(
             f"got {n_modes}, and {most} dofs are not kept",
             "Give a number of modes up to that, or ModesBelow a frequency (kept modes are exact).",
         )
-    bodies = free_bodies(structure, say)
+    bodies = loose_bodies(structure, np.arange(structure.n), say)
     modes = _free_modes(bodies, n_modes, say)
     flexibility = _residual_flexibility(structure, keep, bodies, modes, say)
     basis = _basis(structure, keep, bodies, modes, flexibility)

@@ -11,7 +11,9 @@ from stickslip.errors import input_error
 from stickslip.model.factorisation import Say, silent
 from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
-from stickslip.reduction.bodies import Body, free_bodies
+from stickslip.reduction.bodies import Body, loose_bodies
+
+REACH = 2.0  # frequencies that a poor reduction puts so far above the limit are looked at, too
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,7 @@ def frequency_errors(
     Returns
     -------
     FrequencyErrors
-        Of all natural frequencies of `reduced` up to the limit.
+        Of the natural frequencies of `reduced` that may lie below the limit once their error is taken off.
 
     Raises
     ------
@@ -122,7 +124,7 @@ def frequency_errors(
     """
     _positive("frequency_errors", up_to_hz=up_to_hz)
     basis = _basis_between(structure, reduced)
-    bodies = free_bodies(structure, say)
+    bodies = loose_bodies(structure, np.arange(structure.n), say)
     return errors_of(structure, reduced, basis, bodies, up_to_hz)
 
 
@@ -145,7 +147,7 @@ def errors_of(
         Frequencies up to here.
     """
     modes = normal_modes(reduced, int(np.count_nonzero(reduced.mass.diagonal())))
-    below: BoolArray = modes.frequencies_hz <= up_to_hz
+    below: BoolArray = modes.frequencies_hz <= REACH * up_to_hz
     squares = modes.squares[below]
     shapes = basis @ modes.shapes[:, below]
     residual = structure.stiffness @ shapes - (structure.mass @ shapes) * squares
@@ -160,7 +162,9 @@ def errors_of(
     elastic = squares > 0
     relative = np.zeros(squares.size)
     relative[elastic] = np.maximum(too_high[elastic], 0.0) / (2 * squares[elastic])
-    return FrequencyErrors(modes.frequencies_hz[below], relative)
+    frequencies = modes.frequencies_hz[below]
+    inside = frequencies * (1.0 - relative) <= up_to_hz
+    return FrequencyErrors(frequencies[inside], relative[inside])
 
 
 def enough_modes(
