@@ -194,15 +194,26 @@ def _small(stiffness: Matrix, n: int) -> bool:
 
 
 def _dense_modes(K: Matrix, M: Matrix, n: int, shift: float) -> tuple[FloatArray, Matrix]:
+    """Solve the reciprocal problem for few modes: of a fine mesh the direct one has the lowest to six digits only."""
+    size = len(K)
+    few = 2 * n <= size
     try:
-        values, vectors = scipy.linalg.eigh(K, M, subset_by_index=(0, n - 1))
-    except np.linalg.LinAlgError:  # dofs without mass: the reciprocal problem is regular
-        size = len(K)
-        largest = (size - n, size - 1)
-        inverse, vectors = scipy.linalg.eigh(M, K - shift * M, subset_by_index=largest)
-        values = shift + 1.0 / inverse[::-1]
-        vectors = (vectors / np.sqrt(inverse))[:, ::-1]
+        return (_reciprocal if few else _direct)(K, M, n, shift)
+    except np.linalg.LinAlgError:  # a mode diverges, or dofs have no mass
+        return (_direct if few else _reciprocal)(K, M, n, shift)
+
+
+def _direct(K: Matrix, M: Matrix, n: int, _: float) -> tuple[FloatArray, Matrix]:
+    values, vectors = scipy.linalg.eigh(K, M, subset_by_index=(0, n - 1))
     return np.asarray(values), np.asarray(vectors)
+
+
+def _reciprocal(K: Matrix, M: Matrix, n: int, shift: float) -> tuple[FloatArray, Matrix]:
+    size = len(K)
+    largest = (size - n, size - 1)
+    inverse, vectors = scipy.linalg.eigh(M, K - shift * M, subset_by_index=largest)
+    values = shift + 1.0 / inverse[::-1]
+    return np.asarray(values), np.asarray((vectors / np.sqrt(inverse))[:, ::-1])
 
 
 def _strain_share(stiffness: Matrix, shapes: Matrix) -> FloatArray:
