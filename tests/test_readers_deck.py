@@ -1,0 +1,271 @@
+"""Keyword decks: what is read, what is refused by line, what is listed; unit systems."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stickslip import (
+    InputError,
+    Material,
+    Units,
+    assemble_deck,
+    chain,
+    natural_frequencies,
+    read_deck,
+)
+from stickslip.model.dofs import Dofs
+from stickslip.model.readers.units import check_material, doubt_about_units, in_si
+from stickslip.model.structure import Structure
+
+CUBE = """** a unit cube of eight nodes, and a ninth that belongs to nothing
+*Heading
+ Würfel
+*NODE, NSET=Nall
+1, 0., 0., 0.
+2, 1., 0., 0.
+3, 1., 1., 0.,
+4, 0., 1., 0.
+** a comment among the data
+5, 0., 0., 1.
+6, 1., 0., 1.
+7, 1., 1., 1.
+8, 0., 1., 1.
+99, 5., 5., 5.
+*ELEMENT, TYPE=C3D8, ELSET=Eall
+1, 1, 2, 3, 4,
+5, 6, 7, 8
+*NSET, NSET=BOTTOM, GENERATE
+1, 4
+*NSET, NSET=TOP
+8, 7,
+BOTTOM
+*NSET, NSET=TOP
+6, 5, 8
+*MATERIAL, NAME=Steel
+*ELASTIC
+2.1e11, 0.3
+*DENSITY
+7850.
+*SOLID SECTION, ELSET=EALL, MATERIAL=STEEL
+*BOUNDARY
+BOTTOM, 1, 3
+"""
+
+
+def deck_of(tmp_path, text, **options):
+    path = tmp_path / "deck.inp"
+    path.write_text(text)
+    return read_deck(path, **options)
+
+
+def test_a_deck_says_what_it_holds(tmp_path):
+    deck = deck_of(tmp_path, CUBE)
+    assert deck.material == Material(young_modulus=2.1e11, poisson_ratio=0.3, density=7850.0)
+    assert deck.mesh.cells.tolist() == [list(range(8))]
+    assert deck.mesh.numbers.tolist() == list(range(1, 9))
+    assert deck.ignored == ("1 nodes that belong to no cell",)
+    # order of the set is kept, each node stands once, clamped ones are taken out
+    assert deck.mesh.numbers[deck.mesh.node_sets["TOP"]].tolist() == [8, 7, 6, 5]
+    assert deck.mesh.numbers[deck.mesh.node_sets["root"]].tolist() == [1, 2, 3, 4]
+    assert "BOTTOM" not in deck.mesh.node_sets
+    assert deck.speed is None
+    assert deck.sectors is None
+    structure = assemble_deck(deck)
+    assert structure.n == 12
+    assert structure.sets["TOP"].tolist() == [9, 10, 11, 6, 7, 8, 3, 4, 5, 0, 1, 2]
+
+
+def test_supports_of_single_directions(tmp_path):
+    """A roller in z at one corner more: the dof is gone, its neighbours stay."""
+    deck = deck_of(tmp_path, CUBE + "7, 3, 3\n8, 2\n")
+    structure = assemble_deck(deck)
+    names = set(zip(structure.dofs.node.tolist(), structure.dofs.component, strict=True))
+    assert (7, "z") not in names
+    assert (8, "y") not in names
+    assert {(7, "x"), (7, "y"), (8, "x"), (8, "z")} <= names
+    assert structure.n == 10
+    assert structure.sets["TOP"].size == 10
+    deck = deck_of(tmp_path, CUBE + "*STEP\n*BOUNDARY, OP=NEW\n1, ENCASTRE\n2, PINNED\n*END STEP\n")
+    assert assemble_deck(deck).n == 18
+
+
+def test_two_materials_are_assembled_each_with_its_own(tmp_path):
+    """Two cubes on top of each other, the upper one of half density: mass is the sum, cell by cell."""
+    upper = "\n".join(
+        f"{n + 4}, {x}, {y}, 2." for n, x, y in ((5, 0, 0), (6, 1, 0), (7, 1, 1), (8, 0, 1))
+    )
+    text = CUBE.replace("99, 5., 5., 5.\n", upper + "\n").replace(
+        "*NSET, NSET=BOTTOM", "*ELEMENT, TYPE=C3D8, ELSET=UP\n2, 5, 6, 7, 8, 9, 10, 11, 12\n*NSET, NSET=BOTTOM", 1
+    )  # fmt: skip
+    text = text.split("*BOUNDARY")[0]
+    text += "*MATERIAL, NAME=LIGHT\n*DENSITY\n3925.\n*ELASTIC\n1e11, 0.2\n*SOLID SECTION, ELSET=UP, MATERIAL=LIGHT\n"
+    deck = deck_of(tmp_path, text)
+    assert deck.cell_material == ("STEEL", "LIGHT")
+    with pytest.raises(InputError, match=r"there are 2: LIGHT, STEEL.*assemble_deck"):
+        _ = deck.material
+    structure = assemble_deck(deck)
+    along = (np.array(structure.dofs.component) == "x").astype(float)
+    assert along @ structure.mass @ along == pytest.approx(7850 + 3925)
+    assert np.sum(natural_frequencies(structure, 7) == 0) == 6
+
+
+def test_rotation_and_axis(tmp_path):
+    load = "*STEP\n*STATIC\n*DLOAD\nEall, CENTRIF, 1.E4, 0.1, 0., 0., 1., 0., 0.\nEALL, GRAV, 9.81, 0.,0.,-1.\n*END STEP\n"
+    deck = deck_of(tmp_path, CUBE + load, units=Units(1.0, 1.0, 0.5))
+    assert deck.speed == pytest.approx(200.0)  # 100 rad each half second
+    assert deck.axis.unit.tolist() == [1.0, 0.0, 0.0]
+    assert deck.axis.origin == (0.1, 0.0, 0.0)
+    assert any("GRAV" in text for text in deck.ignored)
+
+
+def test_included_files_stay_in_the_folder(tmp_path):
+    (tmp_path / "parts").mkdir()
+    nodes = CUBE.split("*ELEMENT", maxsplit=1)[0]
+    (tmp_path / "parts" / "nodes.inc").write_text(nodes)
+    deck = deck_of(tmp_path, CUBE.replace(nodes, "*INCLUDE, INPUT=parts/nodes.inc\n"))
+    assert len(deck.mesh.points) == 8
+    (tmp_path.parent / "outside.inc").write_text(nodes)
+    with pytest.raises(InputError, match=r"line 1, \*INCLUDE: .*lies outside the deck's folder"):
+        deck_of(tmp_path, "*INCLUDE, INPUT=../outside.inc\n" + CUBE)
+    with pytest.raises(InputError, match="include each other"):
+        deck_of(tmp_path, CUBE + "*INCLUDE, INPUT=deck.inp\n")
+    with pytest.raises(InputError, match=r"nodes\.inx: there is no such file"):
+        deck_of(tmp_path, CUBE + "*INCLUDE, INPUT=parts/nodes.inx\n")
+
+
+def test_keywords_that_change_the_model_are_refused(tmp_path):
+    text = CUBE + "*EQUATION\n2\n7,1,1.,8,1,-1.\n"
+    with pytest.raises(
+        InputError, match=r"deck\.inp: line 33, \*EQUATION: \*EQUATION changes the model"
+    ):
+        deck_of(tmp_path, text)
+    deck = deck_of(tmp_path, text, ignore=("*Equation",))
+    assert "*EQUATION (deck.inp: line 33), as asked" in deck.ignored
+
+
+def test_unknown_keywords_are_listed(tmp_path):
+    deck = deck_of(tmp_path, CUBE + "*EXPANSION\n1.e-5\n*CLOAD\n7, 1, 5.\n")
+    assert [text.split(" (")[0] for text in deck.ignored[:2]] == ["*EXPANSION", "*CLOAD"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("TYPE=C3D8", "TYPE=S4", "elements of type S4 are not read"),
+        ("TYPE=C3D8", "TYPE=C3D20", r"line 17: the last element has 8 nodes of 20"),
+        ("5, 6, 7, 8\n", "5, 6, 7, 8, 9\n", r"line 17: an element has 9 nodes, not 8"),
+        ("5, 6, 7, 8\n", "5, 6, 7, 88\n", r"lacks 1 nodes, e\.g\. 88"),
+        ("5, 6, 7, 8\n", "5, 6, 7, x8\n", "the node 'x8' is no whole number"),
+        ("6, 1., 0., 1.", "6, 1., 0.", r"line 11: needs 4 numbers, got 3"),
+        ("6, 1., 0., 1.", "6, 1., nan, 1.", r"line 11: 'nan' is no finite number"),
+        ("99, 5., 5., 5.", "8, 5., 5., 5.", "defines node 8 twice"),
+        ("8, 7,\n", "8, 77,\n", "there is no node 77"),
+        ("8, 7,\n", "8, TOPS,\n", "the node 'TOPS' is no whole number"),
+        ("ELSET=EALL, M", "ELSET=ALL, M", r"no element set 'ALL'. Did you mean 'EALL'"),
+        ("MATERIAL=STEEL", "MATERIAL=STEAL", r"material 'STEAL' has no \*ELASTIC.*STEEL"),
+        ("*DENSITY\n7850.\n", "", r"material 'STEEL' has no \*DENSITY"),
+        ("2.1e11, 0.3", "2.1e11", r"needs 2 numbers, got 1"),
+        ("2.1e11, 0.3", "2.1e11, 0.3\n2.0e11, 0.3, 400.", "values by temperature are not read"),
+        ("*ELASTIC", "*ELASTIC, TYPE=ORTHO", "TYPE=ORTHO is not read"),
+        ("*SOLID SECTION, ELSET=EALL, MATERIAL=STEEL\n", "", r"1 elements have no material, e\.g\. 1"),
+        ("BOTTOM, 1, 3\n", "BOTTEM, 1, 3\n", r"no node set 'BOTTEM'. Did you mean 'BOTTOM'"),
+        ("BOTTOM, 1, 3\n", "BOTTOM, 1, 3, 0.1\n", "a prescribed displacement of 0.1"),
+        ("BOTTOM, 1, 3\n", "BOTTOM, 3, 1\n", "directions 3 to 1"),
+        ("*NODE, NSET=Nall", "*NODE, SYSTEM=C", "SYSTEM=C are not read"),
+        ("7850.", "7.85e-9", r"line 30, \*SOLID SECTION: in SI the density is 7.85e-09"),
+        ("*ELEMENT, TYPE=C3D8, ELSET=Eall", "*ELEMENT, ELSET=Eall", "lacks the parameter TYPE"),
+        ("\n1, 4\n*NSET", "\n1, 4, 0\n*NSET", "first, last, step"),
+    ],
+)  # fmt: skip
+def test_damaged_decks_are_named(tmp_path, old, new, message):
+    assert old in CUBE
+    with pytest.raises(InputError, match=message):
+        deck_of(tmp_path, CUBE.replace(old, new, 1))
+
+
+def test_decks_without_the_mesh(tmp_path):
+    for text, message in (
+        ("1 1 2.0\n", "has no keyword line"),
+        ("*MATERIAL, NAME=A\n", r"has no \*NODE"),
+        ("*NODE\n1, 0., 0., 0.\n", r"has no \*ELEMENT"),
+    ):
+        with pytest.raises(InputError, match=message):
+            deck_of(tmp_path, text)
+
+
+def test_cyclic_ties(tmp_path):
+    tie = "*SURFACE, NAME=LO, TYPE=NODE\nBOTTOM\n*SURFACE, NAME=HI\nEALL, S1\n*TIE, NAME=T{}\nLO, HI\n"
+    with pytest.raises(InputError, match=r"a \*TIE that is not cyclic changes the model"):
+        deck_of(tmp_path, CUBE + tie.format(""))
+    with pytest.raises(InputError, match="of element faces is not read"):
+        deck_of(tmp_path, CUBE + tie.format(", CYCLIC SYMMETRY"))
+    model = "*CYCLIC SYMMETRY MODEL, N=4, NGRAPH=1, TIE=T\n0.,0.,0.,0.,0.,1.\n"
+    load = "*DLOAD\nEALL, CENTRIF, 1., 0., 0., 0., 1., 0., 0.\n"
+    with pytest.raises(InputError, match="its axis is another one"):
+        deck_of(tmp_path, CUBE + model + load)
+    assert deck_of(tmp_path, CUBE + model).sectors == 4
+
+
+# ---- units
+
+
+@pytest.mark.parametrize(
+    ("units", "density", "modulus"),
+    [
+        (Units.si(), 7850.0, 2.1e11),
+        (Units.mm_t_s(), 7.85e-9, 2.1e5),
+        (Units.mm_kg_ms(), 7.85e-6, 210.0),
+        (Units.mm_kg_s(), 7.85e-6, 2.1e8),
+        (Units.inch_lbf_s(), 7.3453e-4, 3.0458e7),
+        (Units.foot_slug_s(), 15.2315, 4.3859e9),
+    ],
+)
+def test_steel_is_steel_in_every_system(units, density, modulus):
+    """Handbook numbers of one material: each system's units of density and stress."""
+    assert density * units.density == pytest.approx(7850, rel=1e-4)
+    assert modulus * units.stress == pytest.approx(2.1e11, rel=1e-4)
+    check_material(density * units.density, modulus * units.stress, units, "deck")
+    if units.name not in ("SI", "foot-slug-s"):
+        with pytest.raises(InputError, match=f"looks like .*{units.name}"):
+            check_material(density, modulus, Units.si(), "deck")
+
+
+def test_units_by_name():
+    assert Units.named("MM-T-S") == Units.mm_t_s()
+    with pytest.raises(InputError, match=r"unknown unit system 'mm-t'.*Did you mean 'mm-t-s'"):
+        Units.named("mm-t")
+    with pytest.raises(InputError, match=r"Units\.mass: must be positive, got 0"):
+        Units(1.0, 0.0, 1.0)
+
+
+@given(
+    st.sampled_from(["x", "rx", "mode"]),
+    st.floats(1e-3, 1e3),
+    st.floats(1e-3, 1e3),
+    st.floats(1e-3, 1e3),
+)
+def test_a_vibration_is_the_same_in_all_units(kind, length, mass, time):
+    """Frequencies are per unit of time; kinetic energy of a unit velocity has the units of its coordinates."""
+    raw = chain(3, 2.0, 5.0, 1e-3)
+    dofs = Dofs(np.arange(3), ("x", kind, "x"), np.zeros((3, 3)))
+    raw = Structure(raw.mass, raw.damping, raw.stiffness, dofs)
+    structure = in_si(raw, Units(length, mass, time))
+    np.testing.assert_allclose(
+        time * natural_frequencies(structure, 3), natural_frequencies(raw, 3), rtol=1e-9
+    )
+    scale = np.array(
+        [length, length if kind == "x" else 1.0, length]
+    )  # one unit of each coordinate
+    velocity = np.array([0.3, -0.2, 0.1])
+    energy = mass * length**2 / time**2
+    np.testing.assert_allclose(
+        (velocity * scale / time) @ structure.mass @ (velocity * scale / time),
+        energy * (velocity @ raw.mass @ velocity),
+        rtol=1e-12,
+    )
+
+
+def test_doubt_needs_a_box():
+    flat = chain(3, 1e-12, 1.0)
+    assert doubt_about_units(flat, Units.si()) is None
