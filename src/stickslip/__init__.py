@@ -77,6 +77,7 @@ if TYPE_CHECKING:
     from stickslip.model.solid import Material, assemble_solid
     from stickslip.model.structure import Structure, join
     from stickslip.model.structure_file import load_structure, save_structure
+    from stickslip.reduction.cache import cached
     from stickslip.reduction.craig_bampton import craig_bampton
     from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
     from stickslip.reduction.interface_modes import reduce_interface
@@ -185,6 +186,7 @@ _MODULES = {
     "stickslip.model.solid": ("Material", "assemble_solid"),
     "stickslip.model.structure": ("Structure", "join"),
     "stickslip.model.structure_file": ("load_structure", "save_structure"),
+    "stickslip.reduction.cache": ("cached",),
     "stickslip.reduction.craig_bampton": ("craig_bampton",),
     "stickslip.reduction.cyclic": ("CyclicSector", "cyclic_sector", "travelling_wave"),
     "stickslip.reduction.interface_modes": ("reduce_interface",),
@@ -314,6 +316,7 @@ __all__ = [
     "blade_ring",
     "blisk_with_ring",
     "branch_in_parameter",
+    "cached",
     "campbell",
     "chain",
     "check_law",

@@ -1,0 +1,145 @@
+"""Reduced structures kept on disk under the hash of what they were made from."""
+
+import dataclasses
+import hashlib
+import uuid
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse
+
+import stickslip
+from stickslip.arrays import Matrix
+from stickslip.errors import InputError, input_error
+from stickslip.model.dofs import Dofs
+from stickslip.model.factorisation import Say, silent
+from stickslip.model.structure import Structure
+from stickslip.model.structure_file import load_structure, save_structure
+
+LAYOUT = 1  # raised when the same input no longer gives the same hash
+
+
+def cached(
+    reduction: Callable[..., Structure],
+    structure: Structure,
+    *arguments: object,
+    folder: Path | str,
+    say: Say = silent,
+) -> Structure:
+    """Return ``reduction(structure, *arguments)``, from disk where it was computed before.
+
+    Parameters
+    ----------
+    reduction
+        A function of a module, such as `craig_bampton`, `rubin` or `reduce_interface`.
+    structure
+        What is reduced. Every number of its matrices, dofs, sets and basis counts.
+    *arguments
+        Further arguments: numbers, texts, None, arrays, and dataclasses of these such as `ModesBelow`.
+    folder
+        Where the files lie; it is made if need be, and may be deleted at any time.
+    say
+        Called with a sentence where a file is used, written, or of no use.
+
+    Returns
+    -------
+    Structure
+        The same to the last bit, whether computed or read.
+
+    Raises
+    ------
+    InputError
+        If the function has no name of its own, or an argument is of another kind.
+
+    Notes
+    -----
+    A file is named by the SHA-256 of the function's name, the version of this package and all content, and holds plain
+    arrays, nothing that could be executed. It is put in place once it is whole; a damaged one is computed again.
+    """
+    path = Path(folder) / f"{_key(reduction, structure, arguments)}.npz"
+    if path.exists():
+        try:
+            found = load_structure(path)
+        except InputError as error:
+            say(f"the cached reduction is of no use and is computed again: {error}")
+        else:
+            say(f"reduction read from {path}")
+            return found
+    made = reduction(structure, *arguments)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        own = path.with_name(f"{uuid.uuid4().hex}.npz")  # two runs may write at once
+        save_structure(made, own)
+        own.replace(path)
+    except (InputError, OSError) as error:
+        say(f"the reduction could not be kept: {error}")
+    else:
+        say(f"reduction kept in {path}")
+    return made
+
+
+def _key(
+    reduction: Callable[..., Structure], structure: Structure, arguments: tuple[object, ...]
+) -> str:
+    name = getattr(reduction, "__qualname__", "<none>")
+    if "<" in name:
+        raise input_error(
+            "cached: reduction",
+            f"{name} has no name by which to find it again",
+            "Give a function of a module and its arguments, e.g. cached(craig_bampton, structure, keep, 50, folder=…).",
+        )
+    digest = hashlib.sha256()
+    _add(digest, "what", f"{LAYOUT} {stickslip.__version__} {reduction.__module__}.{name}")
+    _add(digest, "structure", structure)
+    for i, argument in enumerate(arguments):
+        _add(digest, f"argument {i + 1}", argument)
+    return digest.hexdigest()
+
+
+def _add(digest: "hashlib._Hash", name: str, value: object) -> None:
+    """Feed a value to the hash, with its name and kind, so that no two contents read the same."""
+    digest.update(f"\n{name}:{type(value).__name__}:".encode())
+    parts = _parts(value)
+    if parts is not None:
+        for part, content in parts:
+            _add(digest, part, content)
+    elif scipy.sparse.issparse(value):
+        _add_sparse(digest, value)
+    elif isinstance(value, np.ndarray) and value.dtype.kind in "biufc":
+        _add_array(digest, value)
+    elif isinstance(value, bool | int | float | complex | str | np.number | None):
+        digest.update(repr(value).encode())
+    else:
+        raise input_error(
+            f"cached: {name}",
+            f"a {type(value).__name__} has no content that could be compared",
+            "Give numbers, texts, arrays, or dataclasses of these.",
+        )
+
+
+def _parts(value: object) -> list[tuple[str, object]] | None:
+    """Return what a value consists of, by name; None for one that is whole."""
+    if isinstance(value, Dofs):
+        words = "\0".join([*value.component, "", *value.part])
+        return [("node", value.node), ("position", value.position), ("words", words)]
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return [(field.name, getattr(value, field.name)) for field in dataclasses.fields(value)]
+    if isinstance(value, Mapping):
+        return [(str(key), value[key]) for key in sorted(value)]
+    if isinstance(value, tuple | list):
+        return [(str(i), item) for i, item in enumerate(value)]
+    return None
+
+
+def _add_array(digest: "hashlib._Hash", array: Matrix) -> None:
+    digest.update(f"{array.dtype.str}{array.shape}".encode())
+    digest.update(np.ascontiguousarray(array).data)
+
+
+def _add_sparse(digest: "hashlib._Hash", matrix: Matrix) -> None:
+    csr = scipy.sparse.csr_array(matrix)
+    digest.update(f"{csr.shape}".encode())
+    for array in (csr.indptr, csr.indices):
+        _add_array(digest, array.astype(np.int64))
+    _add_array(digest, csr.data)
