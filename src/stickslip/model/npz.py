@@ -16,7 +16,7 @@ from stickslip.errors import InputError, input_error
 Arrays = dict[str, npt.NDArray[Any]]
 
 DEFLATE_RATIO = 1032  # no deflated stream is longer than this many times its compressed length
-READABLE_KINDS = "biufcU"
+READABLE_KINDS = "biufcSU"
 _GARBLED = (
     OSError,
     ValueError,
