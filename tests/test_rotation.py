@@ -225,6 +225,9 @@ def test_stiffness_is_a_polynomial_of_the_speed(plate):
         K = at[0]
         assert np.abs(K - K.T).max() < 1e-12 * np.abs(K).max()
     assert plate.polynomial() is plate.polynomial()
+    ties = [scipy.sparse.eye_array(plate.structure.n, format="csr") for _ in range(2)]
+    assert plate.polynomial(ties[0]) is plate.polynomial(ties[1])
+    assert plate.polynomial(ties[0]) is not plate.polynomial(2 * ties[0])
 
 
 @pytest.mark.parametrize("mirror", [False, True])

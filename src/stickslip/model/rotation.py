@@ -3,6 +3,7 @@
 In axes that turn with the solid, ``M ü + (C + 2 Ω G) u̇ + K(Ω) u = f``.
 """
 
+import hashlib
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -73,10 +74,8 @@ class RotatingSolid:
     quadrature: Quadrature
     free: BoolArray
     centrifugal: FloatArray
-    _unit: dict[int, tuple[Matrix | None, FloatArray]] = field(
-        default_factory=dict, init=False, repr=False
-    )
-    _known: dict[tuple[int, str], SpeedPolynomial] = field(
+    _displacements: dict[str, FloatArray] = field(default_factory=dict, init=False, repr=False)
+    _polynomials: dict[tuple[str, str], SpeedPolynomial] = field(
         default_factory=dict, init=False, repr=False
     )
 
@@ -140,7 +139,7 @@ class RotatingSolid:
         Parameters
         ----------
         tie
-            As in `displacement`. Give the same object again and nothing is computed twice.
+            As in `displacement`. Nothing is computed twice for the same tie.
         tangent
             As in `at_speed`; ``"nonlinear"`` has no polynomial.
         """
@@ -150,10 +149,10 @@ class RotatingSolid:
                 f"tangent {tangent!r} is no polynomial of the speed",
                 "Use 'consistent' or 'textbook', or at_speed.",
             )
-        key = (id(tie), tangent)
-        if key not in self._known:
-            self._known[key] = self._assemble_polynomial(tie, tangent)
-        return self._known[key]
+        key = (_content(tie), tangent)
+        if key not in self._polynomials:
+            self._polynomials[key] = self._assemble_polynomial(tie, tangent)
+        return self._polynomials[key]
 
     def at_speed(
         self,
@@ -211,12 +210,10 @@ class RotatingSolid:
 
     def _unit_displacement(self, tie: Matrix | None) -> FloatArray:
         """Return the linear static displacement (n,) at 1 rad/s, in m s²."""
-        if id(tie) not in self._unit:  # the tie is kept, or another one could get its id
-            self._unit[id(tie)] = (
-                tie,
-                _solve(self.structure.stiffness, self.centrifugal, tie),
-            )
-        return self._unit[id(tie)][1]
+        key = _content(tie)
+        if key not in self._displacements:
+            self._displacements[key] = _solve(self.structure.stiffness, self.centrifugal, tie)
+        return self._displacements[key]
 
     def _equilibrium(
         self, speed: float, tie: Matrix | None, start: FloatArray
@@ -281,6 +278,17 @@ def rotating_solid(
     # positions are interpolated like displacements, so the mass matrix integrates the load exactly
     load = (mass @ axis.arm(mesh.points).ravel()).reshape(-1, 3)[~held].ravel()
     return RotatingSolid(structure, mesh, material, axis, quadrature, ~held, load)
+
+
+def _content(tie: Matrix | None) -> str:
+    """Return a name that two ties share only if they are equal; sectors make theirs anew each time."""
+    if tie is None:
+        return ""
+    tie = scipy.sparse.csr_array(tie)
+    digest = hashlib.sha256(repr(tie.shape).encode())
+    for part in (tie.indptr, tie.indices, tie.data):
+        digest.update(np.ascontiguousarray(part).tobytes())
+    return digest.hexdigest()
 
 
 def _solve(stiffness: Matrix, load: FloatArray, tie: Matrix | None) -> FloatArray:
