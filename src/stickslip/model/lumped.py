@@ -90,7 +90,7 @@ def _symmetric(name: str, matrix: FloatArray, n: int | None = None) -> FloatArra
         raise input_error(
             f"lumped: {name}",
             "is complex",
-            "Structural damping is not supported yet: give viscous damping as a real matrix.",
+            "Give the real part, and structural damping by structural_damping or as Structure.loss.",
         )
     matrix = np.asarray(matrix, dtype=float)
     expected = len(matrix) if n is None and matrix.ndim else n
