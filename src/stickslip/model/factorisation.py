@@ -119,20 +119,40 @@ def _dense(matrix: Matrix) -> Factorisation:
 
 
 def _superlu(matrix: Matrix) -> Factorisation:
+    """Factorise a real matrix, or a complex one as a real matrix of twice the size.
+
+    The complex routines of SuperLU take eight times as long as the real ones on the doubled matrix (8361 equations of a
+    travelling wave: 4 s against 0.5 s), real and imaginary part side by side.
+    """
+    doubled = np.iscomplexobj(matrix)
     try:
         lu = scipy.sparse.linalg.splu(
-            matrix,
+            _doubled(matrix) if doubled else matrix,
             permc_spec="MMD_AT_PLUS_A",
             diag_pivot_thresh=0.01,
             options={"SymmetricMode": True},
         )
     except RuntimeError as error:
         raise SingularError(f"factorise: {error}") from error
-    if np.iscomplexobj(matrix):
-        return Factorisation(
-            lambda b: np.asarray(lu.solve(np.asarray(b, dtype=complex))), "superlu"
-        )
-    return Factorisation(_of_complex(lambda b: np.asarray(lu.solve(b))), "superlu")
+    if not doubled:
+        return Factorisation(_of_complex(lambda b: np.asarray(lu.solve(b))), "superlu")
+
+    def solve(right: Matrix) -> Matrix:
+        b = np.asarray(right)
+        both = np.stack([b.real, b.imag], axis=1).reshape(2 * len(b), *b.shape[1:])
+        parts = lu.solve(both).reshape(len(b), 2, *b.shape[1:])
+        return np.asarray(parts[:, 0] + 1j * parts[:, 1])
+
+    return Factorisation(solve, "superlu")
+
+
+def _doubled(matrix: Matrix) -> Matrix:
+    """Return the real (2n, 2n) CSC matrix that acts on real and imaginary parts, side by side."""
+    imaginary = scipy.sparse.csc_array(matrix.imag)
+    imaginary.eliminate_zeros()
+    real = scipy.sparse.kron(matrix.real, np.eye(2), format="csc")
+    turned = scipy.sparse.kron(imaginary, np.array([[0.0, -1.0], [1.0, 0.0]]), format="csc")
+    return scipy.sparse.csc_array(real + turned)
 
 
 def _feral(matrix: Matrix) -> Factorisation:

@@ -5,6 +5,8 @@ eigenproblems", SIAM Journal on Matrix Analysis and Applications 15 (1994) 228-2
 one shift.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from stickslip.arrays import FloatArray, Matrix
@@ -14,7 +16,7 @@ from stickslip.model.factorisation import Solve
 BLOCK = 8  # vectors solved for together; as many equal frequencies are found for certain
 CONVERGED = 1e-10  # residual of a mode over its eigenvalue; the frequency's error is its square
 ROUNDING = 1e-14  # the same over the largest eigenvalue: nothing below can be reached
-NOTHING = 1e-30  # squared length over that before orthogonalisation: only rounding is left
+NOTHING = 1e-24  # squared length over that before orthogonalisation: only rounding is left
 
 
 def lanczos(
@@ -104,20 +106,26 @@ def _bordered(projected: Matrix, column: Matrix) -> Matrix:
     return larger
 
 
-def _orthonormal(mass: Matrix, image: Matrix, known: Matrix, fresh: Solve) -> Matrix:
-    """Return M-orthonormal columns of `image`, M-orthogonal to `known`; new directions where it has none.
+def _orthonormal(
+    mass: Matrix, image: Matrix, known: Matrix, fresh: Callable[[int], Matrix]
+) -> Matrix:
+    """Return M-orthonormal columns of `image`, which was made M-orthogonal to `known` once.
 
-    Three passes: the first leaves rounding errors of the size of what it removed.
+    That left rounding errors of the size of what was removed, hence once more. Columns of nothing
+    but such errors give way to new directions, as long as there are any.
     """
-    block = image
-    for last in (False, False, True):
+    block, added = image, False
+    for again in (False, True, True):
         heavy = mass @ block
         reference = np.max(np.sum((block.conj() * heavy).real, axis=0), initial=0.0)
-        if known.shape[1]:
+        if again:
             block = block - known @ (known.conj().T @ heavy)
-        squares, turn = np.linalg.eigh(block.conj().T @ (mass @ block))
+            heavy = mass @ block
+        squares, turn = np.linalg.eigh(block.conj().T @ heavy)
         weak = squares <= NOTHING * reference
         block = (block @ turn[:, ~weak]) / np.sqrt(squares[~weak])
-        if np.any(weak) and not last:
-            block = np.hstack([block, fresh(int(np.count_nonzero(weak)))])
+        if np.any(weak) and not again:
+            block, added = np.hstack([block, fresh(int(np.count_nonzero(weak)))]), True
+        elif again and not added:
+            break
     return block

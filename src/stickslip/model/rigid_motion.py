@@ -115,14 +115,15 @@ def _screw(six: Matrix, centre: FloatArray, size: float) -> str:
         return f"{six.shape[1]} combinations of translations and rotations"
     shift, turn = six[:3, 0], six[3:, 0] / size
     if np.linalg.norm(turn) * size < 1e-6 * np.linalg.norm(shift):
-        along = shift / np.linalg.norm(shift)
-        return f"translation along ({along[0]:.3g}, {along[1]:.3g}, {along[2]:.3g})"
+        return f"translation along {_triple(shift / np.linalg.norm(shift))}"
     point = centre + np.cross(turn, shift) / (turn @ turn)
-    about = turn / np.linalg.norm(turn)
-    return (
-        f"rotation about ({about[0]:.3g}, {about[1]:.3g}, {about[2]:.3g}) "
-        f"through ({point[0]:.3g}, {point[1]:.3g}, {point[2]:.3g}) m"
-    )
+    point = size * np.round(point / size, 9)
+    return f"rotation about {_triple(turn / np.linalg.norm(turn))} through {_triple(point)} m"
+
+
+def _triple(vector: FloatArray) -> str:
+    rounded = np.round(vector, 9) + 0.0  # no minus before a zero
+    return f"({rounded[0]:.3g}, {rounded[1]:.3g}, {rounded[2]:.3g})"
 
 
 def _six_motions(dofs: Dofs) -> tuple[FloatArray, FloatArray, float]:

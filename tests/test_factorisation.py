@@ -1,0 +1,135 @@
+"""Factorisations against dense solutions: every backend, real and complex, and what is singular."""
+
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+import scipy.sparse
+
+from stickslip.errors import InputError, SingularError, StickslipError
+from stickslip.model import factorisation
+from stickslip.model.factorisation import factorise
+
+RNG = np.random.default_rng(5)
+needs_feral = pytest.mark.skipif(
+    find_spec("feral") is None, reason="feral is not installed: pip install 'stickslip[sparse]'"
+)
+SPARSE = ["superlu", pytest.param("feral", marks=needs_feral)]
+
+
+def laplacian(shape, shift=0.0):
+    """The graph Laplacian of a grid: symmetric, with one zero eigenvalue without a shift."""
+    parts = []
+    for n in shape:
+        line = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+        line[0, 0] = line[-1, -1] = 1.0
+        parts.append(scipy.sparse.csr_array(line))
+    whole = scipy.sparse.kronsum(parts[0], parts[1])
+    return scipy.sparse.csr_array(whole) + shift * scipy.sparse.eye_array(whole.shape[0])
+
+
+def hermitian(shape, shift):
+    """The same with a phase on every edge along the first axis of the lower half."""
+    matrix = laplacian(shape, shift).toarray().astype(complex)
+    turn = np.exp(1j * np.linspace(0, 3, len(matrix)))
+    matrix = matrix * np.where(np.eye(len(matrix)) > 0, 1.0, turn[:, None] * turn.conj()[None, :])
+    matrix[3, 4] *= 1j
+    matrix[4, 3] *= -1j
+    return scipy.sparse.csr_array(matrix)
+
+
+def check(found, matrix):
+    n = matrix.shape[0]
+    for right in (
+        RNG.standard_normal(n),
+        RNG.standard_normal((n, 5)),
+        RNG.standard_normal((n, 2)) + 1j * RNG.standard_normal((n, 2)),
+        np.asfortranarray(RNG.standard_normal((n, 3)))[:, 1:],
+    ):
+        answer = found(right)
+        assert answer.shape == right.shape
+        np.testing.assert_allclose(matrix @ answer, right, atol=1e-9)
+
+
+@pytest.mark.parametrize("backend", ["dense", *SPARSE])
+@pytest.mark.parametrize("shift", [0.3, -0.3])  # definite, indefinite
+@pytest.mark.parametrize("draw", [laplacian, hermitian])
+def test_solutions_of_every_backend(backend, shift, draw):
+    matrix = draw((23, 22), shift)
+    found = factorise(matrix, backend=backend)
+    assert found.backend == backend
+    check(found, matrix)
+    if backend == "feral":  # Sylvester: the signs of the pivots are those of the eigenvalues
+        negative = int(np.count_nonzero(np.linalg.eigvalsh(matrix.toarray()) < 0))
+        assert found.negative == negative
+        assert (negative > 0) == (shift < 0)
+
+
+@pytest.mark.parametrize("kind", [float, complex])
+def test_general_matrices_go_to_superlu(kind, monkeypatch):
+    monkeypatch.setattr(factorisation, "LARGE", 100)
+    skew = scipy.sparse.csr_array(np.eye(506, k=3) - np.eye(506, k=-3))
+    matrix = laplacian((23, 22), 0.3) + skew
+    if kind is complex:  # complex symmetric: a loss factor
+        matrix = laplacian((23, 22), 0.3) * (1 + 0.01j)
+    found = factorise(matrix)
+    assert found.backend == "superlu"
+    check(found, matrix)
+    with pytest.raises(InputError, match="which this is not"):
+        factorise(matrix, backend="feral")
+
+
+@needs_feral
+def test_large_hermitian_matrices_go_to_the_package(monkeypatch):
+    monkeypatch.setattr(factorisation, "LARGE", 500)
+    assert factorise(laplacian((23, 22), 0.3)).backend == "feral"
+    assert factorise(laplacian((21, 22), 0.3)).backend == "superlu"
+
+
+def test_without_the_package_superlu_does_it(monkeypatch):
+    monkeypatch.setattr(factorisation, "LARGE", 100)
+    monkeypatch.setattr(factorisation, "find_spec", lambda name: None)
+    assert factorise(laplacian((23, 22), 0.3)).backend == "superlu"
+
+
+@pytest.mark.skipif(find_spec("feral") is not None, reason="feral is installed")
+def test_the_extra_is_named_where_the_package_is_absent():
+    with pytest.raises(StickslipError, match=r"feral-solver: not installed.*stickslip\[sparse\]"):
+        factorise(laplacian((23, 22), 0.3), backend="feral")
+
+
+def test_an_unknown_backend_is_refused():
+    with pytest.raises(InputError, match=r"got 'cholmod'\. Use one of auto, dense"):
+        factorise(np.eye(3), backend="cholmod")
+
+
+@pytest.mark.parametrize("backend", ["dense", *SPARSE])
+@pytest.mark.parametrize("units", [1.0, 1e9])
+def test_a_free_body_is_singular_in_any_unit(backend, units):
+    with pytest.raises(SingularError, match="singular"):
+        factorise(units * laplacian((23, 22)), backend=backend)
+
+
+@pytest.mark.parametrize("backend", ["dense", *SPARSE])
+def test_unlike_units_in_one_matrix_are_not_singular(backend):
+    """Metres and radians: rows that differ by twelve decades are scaled before they are judged."""
+    scale = scipy.sparse.diags_array(np.where(np.arange(506) % 2, 1e6, 1.0))
+    matrix = scipy.sparse.csr_array(scale @ laplacian((23, 22), 0.3) @ scale)
+    found = factorise(matrix, backend=backend)
+    right = matrix @ np.ones(506)
+    np.testing.assert_allclose(found(right), 1.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("backend", SPARSE)
+def test_a_weakly_held_body_is_not_singular(backend):
+    matrix = laplacian((23, 22)).tolil()
+    matrix[7, 7] += 1e-7
+    check_right = np.ones(506)
+    answer = factorise(scipy.sparse.csr_array(matrix), backend=backend)(check_right)
+    np.testing.assert_allclose(answer, 506 / 1e-7, rtol=1e-3)  # all load hangs on the one spring
+
+
+@pytest.mark.parametrize("matrix", [np.zeros((2, 2)), np.full((2, 2), np.nan), np.ones((2, 2))])
+def test_hopeless_matrices_are_refused(matrix):
+    with pytest.raises(SingularError, match=r"singular|not finite"):
+        factorise(matrix)
