@@ -25,6 +25,7 @@ from stickslip import (
     save_structure,
 )
 from stickslip.model.readers.abaqus import read_coordinate_matrix
+from stickslip.model.readers.matrix_market import read_matrix_market
 
 DATA = Path(__file__).parent / "data" / "calculix"
 MM = Units.mm_t_s()
@@ -247,22 +248,42 @@ def test_modal_dofs_need_no_position(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("3 3 3\n", "is no Matrix Market file"),
-        ("%%MatrixMarket matrix coordinate real symmetric\n3 3 3\n1 1 1.0\n2 2 1.0\n", "cannot be read"),
-        ("%%MatrixMarket matrix coordinate real symmetric\n3 3 1000000000000\n1 1 1.0\n", "no room for 1000000000000"),
+        ("3 3 3\n", "line 1: is no Matrix Market"),
+        ("%%MatrixMarket matrix coordinate real symmetric\n3 3 3\n1 1 1.0\n2 2 1.0\n", "has 2 entries, its header says 3"),
+        ("%%MatrixMarket matrix coordinate real symmetric\n3 3 1000000000000\n1 1 1.0\n", "header says 1000000000000"),
         ("%%MatrixMarket matrix coordinate real symmetric\n900000000 900000000 1\n1 1 1.0\n", "900000000 x 900000000"),
-        ("%%MatrixMarket matrix coordinate real symmetric\n3 3 1\n4 1 1.0\n", "out of bounds"),
+        ("%%MatrixMarket matrix coordinate real symmetric\n%\n\n3 3 1\n1 1 a\n", r"line 5: 'a' is no finite number"),
+        ("%%MatrixMarket matrix coordinate real symmetric\n3 3 1\n4 1 1.0\n", "row 4, column 1 is outside"),
         ("%%MatrixMarket matrix coordinate real general\n3 3 2\n1 1 1.0\n1 2 1.0\n", "is not symmetric: row 1, column 2"),
         ("%%MatrixMarket matrix coordinate real symmetric\n3 3 2\n1 1 1.0\n1 1 1.0\n", "more than once"),
-        ("%%MatrixMarket matrix coordinate real symmetric\n3 3 1\n1 1 nan\n", "not finite|cannot be read"),
-        ("%%MatrixMarket matrix coordinate pattern symmetric\n3 3 1\n1 1\n", "no room for"),
+        ("%%MatrixMarket matrix coordinate real symmetric\n3 3 2\n1 2 1.0\n2 1 1.0\n", "both sides of the diagonal"),
+        ("%%MatrixMarket matrix coordinate real symmetric\n3 3 1\n1 1 nan\n", "'nan' is no finite number"),
+        ("%%MatrixMarket matrix coordinate pattern symmetric\n3 3 1\n1 1\n", "no Matrix Market matrix of numbers"),
         ("%%MatrixMarket matrix array real general\n2 2\n1\n0\n0\n1\n", "is of 2 x 2, the table lists 3 dofs"),
-        ("%%MatrixMarket", "no right header"),
+        ("%%MatrixMarket matrix coordinate real symmetric", r"line 2: needs 3 counts"),
     ],
 )  # fmt: skip
 def test_damaged_matrix_market_files_are_named(tmp_path, text, message):
     with pytest.raises(InputError, match=message):
         two_by_two(tmp_path, text)
+
+
+@pytest.mark.parametrize("symmetry", ["general", "symmetric", "hermitian", "skew-symmetric"])
+@pytest.mark.parametrize("sparse", [True, False])
+@pytest.mark.parametrize("dtype", [float, complex, int])
+def test_matrix_market_as_scipy_writes_it(tmp_path, symmetry, sparse, dtype):
+    rng = np.random.default_rng(5)
+    A = rng.integers(-9, 9, (4, 4)) * (1 + (0.5j if dtype is complex else 0))
+    A = {
+        "general": A, "symmetric": A + A.T, "hermitian": A + A.conj().T, "skew-symmetric": A - A.T,
+    }[symmetry].astype(dtype)  # fmt: skip
+    A[abs(A) < 2] = 0
+    path = tmp_path / "A.mtx"
+    stored = "symmetric" if symmetry == "hermitian" and dtype is not complex else symmetry
+    scipy.io.mmwrite(str(path), scipy.sparse.coo_array(A) if sparse else A, symmetry=stored)
+    found = read_matrix_market(path, 4)
+    assert scipy.sparse.issparse(found) == sparse
+    np.testing.assert_array_equal(found.toarray() if sparse else found, A)
 
 
 @pytest.mark.parametrize(

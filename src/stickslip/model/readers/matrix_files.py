@@ -1,10 +1,8 @@
 """Matrices in neutral files: Matrix Market, SciPy's ``.npz``, HDF5; with a CSV file of their dofs."""
 
-import io
 from pathlib import Path
 
 import numpy as np
-import scipy.io
 import scipy.sparse
 
 from stickslip.arrays import IntArray, Matrix
@@ -12,8 +10,9 @@ from stickslip.errors import input_error, missing_package
 from stickslip.model.dofs import Dofs
 from stickslip.model.npz import BROKEN, DEFLATE_RATIO, Arrays, read_npz
 from stickslip.model.readers.entries import check_symmetric, check_unique
+from stickslip.model.readers.matrix_market import read_matrix_market
 from stickslip.model.readers.node_table import COMPONENTS, csv_columns, csv_numbers
-from stickslip.model.readers.text import CUT_SHORT, read_text, whole_numbers
+from stickslip.model.readers.text import whole_numbers
 from stickslip.model.readers.units import SI, Units, check_units, in_si
 from stickslip.model.structure import Structure
 
@@ -115,7 +114,7 @@ def read_matrix(path: Path, name: str, n: int) -> Matrix:
     suffixes = [s.lower() for s in path.suffixes]
     last = suffixes[-2] if suffixes[-1:] == [".gz"] and suffixes[:-1] else "".join(suffixes[-1:])
     if last in (".mtx", ".mm"):
-        matrix = _matrix_market(path, n)
+        matrix = read_matrix_market(path, n)
     elif last == ".npz":
         matrix = _from_arrays(read_npz(path), name, n, str(path))
     elif last in HDF5:
@@ -139,33 +138,6 @@ def _check_size(shape: tuple[int, int], n: int, place: str) -> None:
             f"is of {shape[0]} x {shape[1]}, the table lists {n} dofs",
             "Give matrices and dofs of the same model.",
         )
-
-
-def _matrix_market(path: Path, n: int) -> Matrix:
-    """Read a Matrix Market file after its counts were checked against its size."""
-    text = read_text(path)
-    if not text.startswith("%%MatrixMarket"):
-        raise input_error(
-            str(path),
-            "is no Matrix Market file",
-            "Its first line is %%MatrixMarket; matrices of Abaqus are read by read_abaqus_matrices.",
-        )
-    damaged = (ValueError, OverflowError, StopIteration, IndexError)
-    try:
-        rows, columns, entries, _, kind, _ = scipy.io.mminfo(io.BytesIO(text.encode()))
-    except damaged as error:
-        raise input_error(str(path), f"has no right header: {error}", CUT_SHORT) from error
-    _check_size((rows, columns), n, str(path))
-    if kind == "pattern" or entries > len(text):
-        raise input_error(str(path), f"has no room for {entries} values", CUT_SHORT)
-    try:
-        matrix = scipy.io.mmread(io.BytesIO(text.encode()))
-    except damaged as error:
-        raise input_error(str(path), f"cannot be read: {error}", CUT_SHORT) from error
-    if not scipy.sparse.issparse(matrix):
-        return np.asarray(matrix)
-    check_unique(matrix.coords[0], matrix.coords[1], max(matrix.shape), str(path))
-    return scipy.sparse.csr_array(matrix)
 
 
 def _read_hdf5(path: Path, name: str) -> Arrays:
