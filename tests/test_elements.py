@@ -31,6 +31,22 @@ def test_matrices_against_plain_loops(width):
     assert relative(solid.stiffness.toarray(), stiffness) < 1e-13
 
 
+def test_materials_of_cells_against_plain_loops():
+    """Every other cell of another material, through which mid-side nodes are shared."""
+    mesh = without_sets(box(20, SIZE, (1, 2, 2), 0.002))
+    light = Material(young_modulus=110e9, poisson_ratio=0.34, density=4430.0)
+    materials = [STEEL, light, light, STEEL]
+    parts = [
+        plain_matrices(SolidMesh(mesh.points, mesh.cells[[i]], {}), one)
+        for i, one in enumerate(materials)
+    ]
+    solid = assemble_solid(mesh, materials)
+    for found, exact in zip((solid.mass, solid.stiffness), zip(*parts, strict=True), strict=True):
+        assert relative(found.toarray(), sum(exact)) < 1e-13
+    with pytest.raises(InputError, match="material: is a list of 3 for 4 cells"):
+        assemble_solid(mesh, materials[:3])
+
+
 @pytest.mark.parametrize("width", KINDS)
 def test_rigid_motions_strain_nothing_and_carry_the_mass(width):
     mesh = without_sets(box(width, SIZE, (2, 1, 2), 0.002))
@@ -157,6 +173,13 @@ def test_neighbours_that_do_not_share_a_mid_side_node_are_refused():
     doubled = SolidMesh(np.vstack([mesh.points, mesh.points[shared]]), cells, {})
     with pytest.raises(InputError, match=rf"do not share .*node ({shared}|{len(mesh.points)}) of"):
         assemble_solid(doubled, STEEL)
+    # a corner at the place of a mid-side node of the neighbour, as cells of half the size would have it
+    cells = mesh.cells.copy()
+    cells[1, 8] = cells[0, 0]
+    used, cells = np.unique(cells, return_inverse=True)
+    mixed = SolidMesh(mesh.points[used], cells.reshape(2, 20), {})
+    with pytest.raises(InputError, match=r"Jacobian|a corner or the middle of another"):
+        assemble_solid(mixed, STEEL)
 
 
 def test_meshes_that_cannot_be_are_refused():

@@ -10,7 +10,7 @@ import numpy as np
 from stickslip.arrays import FloatArray, Matrix
 from stickslip.model.elements import NodeBlocks, Shape, chunks, gradients
 from stickslip.model.mesh import SolidMesh
-from stickslip.model.solid import Material
+from stickslip.model.solid import Materials, lame_constants
 
 PAIRS = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)]  # rows of a strain vector, shears doubled
 
@@ -36,7 +36,7 @@ class PrestressTerms:
 
 def prestress_terms(
     mesh: SolidMesh,
-    material: Material,
+    material: Materials,
     shape: Shape,
     places: NodeBlocks,
     displacement: FloatArray,
@@ -54,7 +54,7 @@ def prestress_terms(
     green
         Take the stress of the Green strain; else that of the small strain, which is linear in the displacement.
     """
-    elasticity = _elasticity(material)
+    lame = lame_constants(mesh, material)
     stores = [places.zeros(9), places.zeros(9), places.zeros(1)]
     for piece in chunks(mesh, shape):
         slopes, volume = gradients(mesh, shape, piece)
@@ -62,10 +62,12 @@ def prestress_terms(
         small = _strain_operator(np.broadcast_to(np.eye(3), turn.shape), slopes)
         large = _strain_operator(turn, slopes)
         m, q, k, _ = slopes.shape
-        stressed = (volume[:, :, None, None] * (elasticity @ large)).reshape(m, 6 * q, 3 * k)
+        stressed = (volume[:, :, None, None] * (_elasticity(lame[piece]) @ large)).reshape(
+            m, 6 * q, 3 * k
+        )
         mixed = small.reshape(m, 6 * q, 3 * k).transpose(0, 2, 1) @ stressed
         square = large.reshape(m, 6 * q, 3 * k).transpose(0, 2, 1) @ stressed
-        stress = volume[:, :, None, None] * second_stress(material, turn, green)
+        stress = volume[:, :, None, None] * second_stress(lame[piece], turn, green)
         pulled = np.matmul(slopes, stress).transpose(0, 2, 1, 3).reshape(m, k, 3 * q)
         geometric = pulled @ slopes.transpose(0, 1, 3, 2).reshape(m, 3 * q, k)
         places.add(stores[0], piece, _blocks(mixed + mixed.transpose(0, 2, 1)))
@@ -75,14 +77,14 @@ def prestress_terms(
 
 
 def internal_force(
-    mesh: SolidMesh, material: Material, shape: Shape, displacement: FloatArray
+    mesh: SolidMesh, material: Materials, shape: Shape, displacement: FloatArray
 ) -> FloatArray:
     """Return the (nodes, 3) forces in N that hold the solid at a finite displacement (nodes, 3)."""
-    force = np.zeros_like(mesh.points)
+    force, lame = np.zeros_like(mesh.points), lame_constants(mesh, material)
     for piece in chunks(mesh, shape):
         slopes, volume = gradients(mesh, shape, piece)
         turn = displacement_gradients(mesh, slopes, piece, displacement)
-        first = (np.eye(3) + turn) @ second_stress(material, turn, green=True)
+        first = (np.eye(3) + turn) @ second_stress(lame[piece], turn, green=True)
         pull = np.einsum("mqac,mqkc,mq->mka", first, slopes, volume, optimize=True)
         nodes = mesh.cells[piece].ravel()
         for axis in range(3):
@@ -98,12 +100,15 @@ def displacement_gradients(
     return np.asarray(moved[:, None] @ slopes)
 
 
-def second_stress(material: Material, turn: FloatArray, green: bool) -> FloatArray:
-    """Return the (..., 3, 3) stress in Pa of displacement gradients: of their Green or their small strain."""
+def second_stress(lame: FloatArray, turn: FloatArray, green: bool) -> FloatArray:
+    """Return the (m, q, 3, 3) stress in Pa of displacement gradients: of their Green or their small strain.
+
+    `lame` holds Lamé's constants (m, 2).
+    """
     strain = (turn + np.swapaxes(turn, -1, -2)) / 2
     if green:
         strain = strain + np.swapaxes(turn, -1, -2) @ turn / 2
-    first, second = material.lame
+    first, second = lame.T[:, :, None, None, None]
     trace = np.trace(strain, axis1=-2, axis2=-1)[..., None, None]
     return np.asarray(first * trace * np.eye(3) + 2 * second * strain)
 
@@ -119,11 +124,13 @@ def _strain_operator(turn: FloatArray, slopes: FloatArray) -> FloatArray:
     return stacked.reshape(*stacked.shape[:3], -1)
 
 
-def _elasticity(material: Material) -> FloatArray:
-    first, second = material.lame
-    matrix = np.diag([2 * second] * 3 + [second] * 3)
-    matrix[:3, :3] += first
-    return matrix
+def _elasticity(lame: FloatArray) -> FloatArray:
+    """Return (m, 1, 6, 6) matrices from strain vectors to stress vectors."""
+    first, second = lame.T[:, :, None, None]
+    volume = np.zeros((6, 6))
+    volume[:3, :3] = 1.0
+    law = first * volume + second * np.diag([2.0] * 3 + [1.0] * 3)
+    return np.asarray(law[:, None])
 
 
 def _blocks(matrix: FloatArray) -> FloatArray:

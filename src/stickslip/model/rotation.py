@@ -19,7 +19,7 @@ from stickslip.model.elements import EXACT, NodeBlocks, Quadrature, Shape, shape
 from stickslip.model.factorisation import factorise
 from stickslip.model.mesh import SolidMesh
 from stickslip.model.prestress import PrestressTerms, internal_force, prestress_terms
-from stickslip.model.solid import Material, clamp, clamped_nodes, integrate
+from stickslip.model.solid import Materials, clamp, clamped_nodes, integrate
 from stickslip.model.structure import Structure
 
 Tangent = Literal["consistent", "textbook", "nonlinear"]
@@ -69,7 +69,7 @@ class RotatingSolid:
 
     structure: Structure
     mesh: SolidMesh
-    material: Material
+    material: Materials
     axis: Axis
     quadrature: Quadrature
     free: BoolArray
@@ -246,7 +246,7 @@ class RotatingSolid:
 
 def rotating_solid(
     mesh: SolidMesh,
-    material: Material,
+    material: Materials,
     axis: Axis = Z_AXIS,
     *,
     clamped: tuple[str, ...] = ("root",),

@@ -4,7 +4,7 @@ scikit-fem is imported only when a solid is assembled.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,8 @@ from stickslip.errors import did_you_mean, input_error
 from stickslip.model.dofs import nodal_dofs
 from stickslip.model.elements import (
     EXACT,
+    HEX_EDGES,
+    TET_EDGES,
     Quadrature,
     check_jacobians,
     library,
@@ -67,9 +69,12 @@ class Material:
         return e * nu / ((1 + nu) * (1 - 2 * nu)), e / (2 * (1 + nu))
 
 
+Materials = Material | Sequence[Material]  # one for all cells, or one for each
+
+
 def assemble_solid(
     mesh: SolidMesh,
-    material: Material,
+    material: Materials,
     *,
     clamped: tuple[str, ...] = ("root",),
     quadrature: Quadrature = EXACT,
@@ -81,7 +86,7 @@ def assemble_solid(
     mesh
         Any mesh; one without ``root`` stays free unless `clamped` names other sets.
     material
-        Its material.
+        Its material, or a list of m materials, one for each cell.
     clamped
         Names of node sets.
     quadrature
@@ -147,16 +152,58 @@ def node_dofs(nodes: IntArray) -> IntArray:
     return np.asarray((3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel(), dtype=np.int64)
 
 
-def integrate(mesh: SolidMesh, material: Material, quadrature: Quadrature) -> tuple[Matrix, Matrix]:
-    """Return mass and stiffness of the free body, dofs node-major in the mesh's own order.
+def integrate(
+    mesh: SolidMesh, material: Materials, quadrature: Quadrature
+) -> tuple[Matrix, Matrix]:
+    """Return mass and stiffness of the free body, dofs node-major in the mesh's own order."""
+    check_nodes(mesh)
+    for degree in {quadrature.stiffness, quadrature.mass}:
+        check_jacobians(mesh, shape_functions(mesh.cells.shape[1], degree))
+    check_shared(mesh)
+    if isinstance(material, Material):
+        return _integrate(mesh, material, quadrature)
+    n = 3 * len(mesh.points)
+    mass, stiffness = scipy.sparse.csr_array((n, n)), scipy.sparse.csr_array((n, n))
+    known = list(dict.fromkeys(material))
+    which = np.array([known.index(m) for m in _of_cells(mesh, material)])
+    for index, one in enumerate(known):
+        cells = mesh.cells[which == index]
+        nodes, local = np.unique(cells, return_inverse=True)
+        part = SolidMesh(mesh.points[nodes], local.reshape(cells.shape), {})
+        rows = node_dofs(nodes)
+        place = scipy.sparse.csr_array(
+            (np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(n, len(rows))
+        )
+        M, K = _integrate(part, one, quadrature)
+        mass, stiffness = mass + place @ M @ place.T, stiffness + place @ K @ place.T
+    return scipy.sparse.csr_array(mass), scipy.sparse.csr_array(stiffness)
 
-    Both are put together from scalar integrals, ``∫ φ_p φ_q`` and ``∫ ∂_a φ_p ∂_b φ_q``:
+
+def lame_constants(mesh: SolidMesh, material: Materials) -> FloatArray:
+    """Return Lamé's constants λ and G of each cell, (m, 2), in Pa."""
+    if isinstance(material, Material):
+        return np.tile(material.lame, (len(mesh.cells), 1))
+    return np.array([one.lame for one in _of_cells(mesh, material)])
+
+
+def _of_cells(mesh: SolidMesh, material: Sequence[Material]) -> Sequence[Material]:
+    if len(material) != len(mesh.cells):
+        raise input_error(
+            "material",
+            f"is a list of {len(material)} for {len(mesh.cells)} cells",
+            "Give one material, or one for each cell.",
+        )
+    return material
+
+
+def _integrate(
+    mesh: SolidMesh, material: Material, quadrature: Quadrature
+) -> tuple[Matrix, Matrix]:
+    """Integrate a body of one material.
+
+    Both matrices are put together from scalar integrals, ``∫ φ_p φ_q`` and ``∫ ∂_a φ_p ∂_b φ_q``:
     ``K_ab = λ D_ab + G D_ba + G δ_ab Σ_c D_cc``. That costs a fraction of the vector-valued form.
     """
-    check_nodes(mesh)
-    width = mesh.cells.shape[1]
-    for degree in {quadrature.stiffness, quadrature.mass}:
-        check_jacobians(mesh, shape_functions(width, degree))
     bases, theirs = _bases(mesh, quadrature)
 
     def assemble(integrand: Callable[..., FloatArray], degree: int) -> Matrix:
@@ -210,24 +257,38 @@ def _bases(mesh: SolidMesh, quadrature: Quadrature) -> tuple[dict[int, Any], Int
     degrees = {quadrature.stiffness, quadrature.mass}
     bases = {degree: skfem.Basis(grid, element, intorder=degree) for degree in degrees}
     # scikit-fem renumbers mid-side nodes: go from its dofs back to our nodes
-    dofs = bases[quadrature.mass].element_dofs
     theirs = np.empty(len(mesh.points), dtype=np.int64)
-    theirs[mesh.cells[:, order].T] = dofs
-    _check_shared(mesh, theirs, dofs[np.argsort(order)].T)
+    theirs[mesh.cells[:, order].T] = bases[quadrature.mass].element_dofs
     return bases, theirs
 
 
-def _check_shared(mesh: SolidMesh, theirs: IntArray, dofs: IntArray) -> None:
-    """Refuse nodes (n,) that do not stand for one of scikit-fem's dofs (m, k) each, in every cell the same."""
-    used = np.bincount(theirs, minlength=len(theirs))
-    wrong = (theirs[mesh.cells] != dofs) | (used[theirs] > 1)[mesh.cells]
+def check_shared(mesh: SolidMesh) -> None:
+    """Refuse edges of the same two corners with different mid-side nodes, and corners that are mid-side nodes."""
+    width = mesh.cells.shape[1]
+    corners = 4 if width in (4, 10) else 8
+    if width == corners:
+        return
+    edges = TET_EDGES if corners == 4 else HEX_EDGES
+    ends = np.sort(mesh.cells[:, np.array(edges)].reshape(-1, 2), axis=1)
+    middle = mesh.cells[:, corners:].ravel()
+    _, first, edge = np.unique(ends, axis=0, return_index=True, return_inverse=True)
+    is_corner = np.zeros(len(mesh.points), dtype=bool)
+    is_corner[mesh.cells[:, :corners]] = True
+    # of all edges that a node is the middle of, the last one stays here: the others differ from it
+    owner = np.zeros(len(mesh.points), dtype=np.int64)
+    owner[middle] = edge.ravel()
+    wrong = (
+        (middle[first][edge.ravel()] != middle)
+        | is_corner[middle]
+        | (owner[middle] != edge.ravel())
+    )
     if wrong.any():
-        cell, place = np.argwhere(wrong)[0]
+        cell, place = divmod(int(np.flatnonzero(wrong)[0]), len(edges))
         raise input_error(
             "mesh",
-            f"neighbours do not share their mid-side nodes, or a corner of one is a mid-side node of another, e.g. node "
-            f"{mesh.numbers[mesh.cells[cell, place]]} of cell {mesh.cell_numbers[cell]}",
-            "Merge coincident nodes, and use cells of one order.",
+            "neighbours do not share their mid-side nodes, or one has a node that is a corner or the middle of another edge: "
+            f"node {mesh.numbers[mesh.cells[cell, corners + place]]} of cell {mesh.cell_numbers[cell]}",
+            "Merge coincident nodes, and use cells of one order, their nodes in VTK's order.",
         )
 
 
