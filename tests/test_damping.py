@@ -170,6 +170,7 @@ def turning_and_lossy(seed=2, n=8):
 
 REDUCTIONS = {
     "craig_bampton": lambda s: ss.craig_bampton(s, np.array([0, 3]), s.n - 2),
+    "rubin": lambda s: ss.rubin(s, np.array([0, 3]), s.n - 2),
     "relative": lambda s: ss.in_relative_coordinates(s, np.eye(3, s.n) - np.eye(3, s.n, k=3))[0],
 }
 
@@ -290,4 +291,30 @@ def test_time_integration_is_right_with_coriolis_terms_and_refuses_loss():
     with pytest.raises(ss.InputError, match="structural damping"):
         ss.integrate(
             turning_and_lossy(), laws.gap_operator, laws.laws, load, 5.0, np.arange(structure.n)
+        )
+
+
+def test_forced_response_of_a_turning_lossy_structure_in_bonded_contact():
+    structure = turning_and_lossy()
+    rows = np.zeros((3, structure.n))
+    rows[0, 1], rows[2, 2] = 1.0, 1.0
+    system = ss.System(
+        structure,
+        ss.Interface(("c",), (ss.Bonded(k_t=40.0, k_w=40.0, k_n=60.0),), rows),
+        outputs=np.array([0, 5]),
+    )
+    force = np.zeros(structure.n, dtype=complex)
+    force[0] = 3.0 + 1.0j
+    load = ss.HarmonicLoad(np.zeros(structure.n), {1: force})
+    sweep = ss.Sweep(omega_range=(5.0, 9.0))
+    problem = ss.forced_problem(system, load, sweep)
+    stuck = replace(
+        structure, stiffness=structure.stiffness + rows.T @ np.diag([40.0, 40.0, 60.0]) @ rows
+    )
+    points = ss.accepted_points(list(ss.forced_response(system, load, sweep)))
+    assert len(points) > 5
+    for point in points:
+        exact = full_response(stuck, force, point.omega)[[0, 5]]
+        np.testing.assert_allclose(
+            ss.fields(problem, point).outputs[1], exact, atol=1e-6 * np.abs(exact).max()
         )
