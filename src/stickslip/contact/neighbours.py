@@ -1,0 +1,116 @@
+"""Contacts between neighbouring sectors of a wheel: shrouds, platforms that touch."""
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.contact.interface import Interface
+from stickslip.contact.law import ContactLaw
+from stickslip.contact.pairing import contact_frames
+from stickslip.errors import input_error
+from stickslip.model.axis import Axis
+from stickslip.model.structure import Structure
+
+FLAT = 1e-3  # thickness of a plane face over its width
+
+Z_AXIS = Axis()
+
+
+def neighbour_interface(
+    wheel: Structure,
+    sectors: int,
+    law: ContactLaw | Callable[[int], ContactLaw],
+    *,
+    low: str,
+    high: str,
+    axis: Axis = Z_AXIS,
+    normal: FloatArray | None = None,
+) -> Interface:
+    """Pair the nodes of the high face of every sector with those of the low face of the next one.
+
+    Parameters
+    ----------
+    wheel
+        `ReducedWheel.structure` or `wheel`, with the sets ``sector0.low`` and so on, x, y, z of each node.
+    sectors
+        Number of sectors.
+    law
+        One law for all contacts, or a function from the number of the node in its set.
+    low, high
+        Names of the sets; the i-th nodes of both are partners.
+    axis
+        Axis of the wheel.
+    normal
+        (3,) unit normal of sector 0's high face, out of it; None: that of the plane through its nodes.
+
+    Returns
+    -------
+    Interface
+        Contacts ``sector0.1`` ... in the order of the sectors. t lies in the face along the radius, w = n × t; gaps are
+        positive when open. The faces count as touching at rest: a clearance or a preload belongs to the law.
+
+    Raises
+    ------
+    InputError
+        If the sets do not fit each other, or the nodes of a face lie in no plane.
+    """
+    own, partner = _nodes(wheel, f"sector0.{high}"), _nodes(wheel, f"sector0.{low}")
+    if own.shape != partner.shape:
+        raise input_error(
+            "neighbour_interface",
+            f"{high!r} has {len(own)} nodes and {low!r} has {len(partner)}",
+            "Keep partners on both faces; the meshes of shrouds match by their order.",
+        )
+    points = wheel.dofs.position[own[:, 0]]
+    outward = _plane_normal(points, axis, high) if normal is None else np.asarray(normal, float)
+    radial = axis.arm(points.mean(axis=0)[None])[0]
+    frame = contact_frames(outward[None], radial)[0]
+    pitch = 2 * np.pi / sectors
+    rows, columns, entries = [], [], []
+    for n in range(sectors):
+        here = _nodes(wheel, f"sector{n}.{high}")
+        there = _nodes(wheel, f"sector{(n + 1) % sectors}.{low}")
+        to_frame = (axis.rotation(n * pitch) @ frame).T
+        for i, (a, b) in enumerate(zip(here, there, strict=True)):
+            row = 3 * (n * len(own) + i) + np.arange(3)
+            for nodes, sign in ((b, 1.0), (a, -1.0)):
+                rows.append(np.repeat(row, 3))
+                columns.append(np.tile(nodes, 3))
+                entries.append(sign * to_frame.ravel())
+    shape = (3 * sectors * len(own), wheel.n)
+    index = (np.concatenate(rows), np.concatenate(columns))
+    gaps = scipy.sparse.coo_array((np.concatenate(entries), index), shape=shape).tocsr()
+    laws = tuple(law(i) if callable(law) else law for i in range(len(own))) * sectors
+    names = tuple(f"sector{n}.{i + 1}" for n in range(sectors) for i in range(len(own)))
+    return Interface(names, laws, gaps)
+
+
+def _nodes(wheel: Structure, name: str) -> IntArray:
+    """Return the (p, 3) dofs x, y, z of the nodes of a set."""
+    index = wheel.dof_set(name)
+    nodes = index.reshape(-1, 3) if index.size % 3 == 0 else np.zeros((0, 3), dtype=np.int64)
+    components = np.array(wheel.dofs.component)[nodes]
+    if not nodes.size or np.any(components != np.array(["x", "y", "z"])):
+        raise input_error(
+            "neighbour_interface",
+            f"the set {name!r} does not hold x, y, z of each of its nodes, in this order",
+            "Keep whole nodes in the reduction.",
+        )
+    return nodes
+
+
+def _plane_normal(points: FloatArray, axis: Axis, name: str) -> FloatArray:
+    """Return the unit normal of the plane through `points`, towards the next sector."""
+    spread = points - points.mean(axis=0)
+    size, directions = np.linalg.svd(spread, full_matrices=True)[1:]
+    if len(points) < 3 or size[1] < FLAT * size[0] or size[2] > FLAT * size[1]:
+        raise input_error(
+            f"neighbour_interface: {name}",
+            f"its {len(points)} nodes do not lie in one plane that they define",
+            "Keep three nodes or more of a plane face that are not in a row, or give the normal.",
+        )
+    ahead = axis.cross @ axis.arm(points.mean(axis=0)[None])[0]
+    normal = directions[2]
+    return np.asarray(normal if normal @ ahead > 0 else -normal)

@@ -1,0 +1,228 @@
+"""The whole wheel, reduced wave by wave: a model for contacts between its sectors.
+
+Every wave number is reduced on its own, so the cost is that of sectors and the factorisations are those of sectors; back in
+physical coordinates all sectors have the same kept dofs, and the matrices are block-circulant.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.errors import input_error
+from stickslip.model.dofs import Dofs
+from stickslip.model.structure import Structure
+from stickslip.reduction.craig_bampton import craig_bampton
+from stickslip.reduction.cyclic import CyclicSector, travelling_wave
+from stickslip.reduction.turning import dof_rotation
+from stickslip.reduction.waves import to_sectors, to_waves, wave
+
+Reduce = Callable[[Structure, IntArray, int], Structure]
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedWheel:
+    """A wheel reduced to kept dofs and some modes of every sector; `reduced_wheel` makes one.
+
+    Parameters
+    ----------
+    structure
+        The wheel: sector by sector the kept dofs in global axes, then modal coordinates. Sets are those of `wheel`:
+        ``tip`` of all sectors, ``sector3.tip`` of one.
+    sector
+        What was reduced.
+    waves
+        Reduced travelling waves of the wave numbers 0 to n_s/2; the others are their conjugates.
+    to_global
+        (m, m) turn of a sector's coordinates by one pitch.
+    """
+
+    structure: Structure
+    sector: CyclicSector
+    waves: tuple[Structure, ...]
+    to_global: FloatArray
+
+    def expand(self, vector: Matrix) -> Matrix:
+        """Return the (n_s, n) displacements of all sectors, each in its own axes, from coordinates of the wheel.
+
+        Parameters
+        ----------
+        vector
+            (N,) real or complex coordinates on `structure`.
+        """
+        if np.shape(vector) != (self.structure.n,):
+            raise input_error(
+                "ReducedWheel.expand",
+                f"got shape {np.shape(vector)} for {self.structure.n} coordinates",
+                "Give one state of the whole wheel.",
+            )
+        own = self._own_axes(np.asarray(vector).reshape(self.sector.sectors, -1))
+        waves = to_waves(own)
+        full = np.array([self._expanded(k, waves[k]) for k in range(self.sector.sectors)])
+        sectors = to_sectors(full)
+        return sectors if np.iscomplexobj(vector) else sectors.real
+
+    def load(self, force: Matrix, wave_number: int = 0) -> ComplexArray:
+        """Return the (N,) load on the wheel's coordinates of a load that travels around it.
+
+        Parameters
+        ----------
+        force
+            (n,) load on the sector's dofs in N, real or complex: sector n carries ``R^n force exp(2πi k n / n_s)``. What
+            acts on the cut faces is this sector's share, as an assembled load is.
+        wave_number
+            k: 0 for a steady centrifugal load, `excited_wave` of an engine order.
+        """
+        force = np.asarray(force)
+        if force.shape != (self.sector.structure.n,):
+            raise input_error(
+                "ReducedWheel.load: force",
+                f"has shape {force.shape} for a sector of {self.sector.structure.n} dofs",
+                "Give one number a dof of the sector.",
+            )
+        own = wave(wave_number, self.sector.sectors)
+        reduced = self._projected(own.wave_number, force)
+        phases = np.exp(1j * own.phase_angle * np.arange(own.sectors))
+        sectors = phases[:, None] * reduced
+        turned = [self._turn(n) @ sectors[n] for n in range(own.sectors)]
+        return np.concatenate(turned)
+
+    def _own_axes(self, sectors: Matrix) -> Matrix:
+        return np.array([self._turn(n).T @ row for n, row in enumerate(sectors)])
+
+    def _turn(self, number: int) -> FloatArray:
+        return np.asarray(np.linalg.matrix_power(self.to_global, number))
+
+    def _expanded(self, k: int, coordinates: Matrix) -> Matrix:
+        if k < len(self.waves):
+            return self.waves[k].expand(coordinates)
+        mirrored = self.waves[self.sector.sectors - k]
+        return np.conj(mirrored.expand(np.conj(coordinates)))
+
+    def _projected(self, k: int, force: Matrix) -> Matrix:
+        if k < len(self.waves):
+            return self.waves[k].project(force)
+        return np.conj(self.waves[self.sector.sectors - k].project(np.conj(force)))
+
+
+def reduced_wheel(
+    sector: CyclicSector,
+    keep: IntArray,
+    n_modes: int,
+    *,
+    reduce: Reduce = craig_bampton,
+) -> ReducedWheel:
+    """Reduce all travelling waves of a wheel and return to the coordinates of its sectors.
+
+    Parameters
+    ----------
+    sector
+        One sector of a full model.
+    keep
+        (k,) dofs of the sector that stay physical in every sector: contacts between sectors, excitation, outputs; none of
+        the high face or of the axis. All components of a node, if the axis turns them.
+    n_modes
+        Modes of every wave number kept beside them, and so modal coordinates of every sector.
+    reduce
+        `craig_bampton` or `rubin`.
+
+    Returns
+    -------
+    ReducedWheel
+        Its spectrum is the union of those of the reduced travelling waves.
+
+    Raises
+    ------
+    InputError
+        If a kept dof is not among the coordinates of a travelling wave.
+
+    Notes
+    -----
+    With the reduced ``A_k`` of wave number k, sectors n and m are coupled by ``Σ_k A_k exp(2πi k (n − m) / n_s) / n_s``
+    (Krack, Salles & Thouverez 2017, eq. 41); it is real, since ``A_{n_s−k}`` is the conjugate of ``A_k``.
+    """
+    if sector.structure.basis is not None:
+        raise input_error(
+            "reduced_wheel: sector",
+            "is a reduced model already",
+            "Give the sector of the full model: it is reduced here.",
+        )
+    keep = np.asarray(keep, dtype=np.int64)
+    place = _places(sector, keep)
+    half = sector.sectors // 2 + 1
+    waves = tuple(reduce(travelling_wave(sector, k), place, n_modes) for k in range(half))
+    size = waves[0].n
+    turn = np.eye(size)
+    if sector.axis is not None:
+        table = sector.structure.dofs.take(keep)
+        rotation = sector.axis.rotation(sector.pitch)
+        turn[: keep.size, : keep.size] = dof_rotation(table, rotation, "reduced_wheel").toarray()
+
+    def physical(name: str) -> FloatArray:
+        return _circulant([getattr(w, name) for w in waves], sector.sectors, turn)
+
+    has_loss = sector.structure.loss is not None
+
+    structure = Structure(
+        physical("mass"),
+        physical("damping"),
+        physical("stiffness"),
+        _dofs(sector, waves[0].dofs, keep.size),
+        _sets(waves[0], sector.sectors),
+        loss=physical("loss") if has_loss else None,
+    )
+    return ReducedWheel(structure, sector, waves, turn)
+
+
+def _places(sector: CyclicSector, keep: IntArray) -> IntArray:
+    """Return where the kept dofs stand among the coordinates of a travelling wave."""
+    free = sector.independent
+    lost = np.setdiff1d(keep, free)
+    if lost.size:
+        raise input_error(
+            "reduced_wheel: keep",
+            f"{sector.structure.dofs.labels[lost[0]]} is on the high face or on the axis, {lost.size} such dofs in all",
+            "Keep the partners on the low face.",
+        )
+    return np.searchsorted(free, keep)
+
+
+def _circulant(blocks: list[Matrix], sectors: int, turn: FloatArray) -> FloatArray:
+    """Return the matrix of the wheel from its waves 0 to n_s/2, in global axes."""
+    waves = np.array(
+        [blocks[k] if k < len(blocks) else np.conj(blocks[sectors - k]) for k in range(sectors)]
+    )
+    first = np.fft.ifft(waves, axis=0).real  # coupling of sector n with sector 0, in sector axes
+    size = len(turn)
+    turns = [np.linalg.matrix_power(turn, n) for n in range(sectors)]
+    matrix = np.empty((sectors, size, sectors, size))
+    for n in range(sectors):
+        for m in range(sectors):
+            matrix[n, :, m] = turns[n] @ first[(n - m) % sectors] @ turns[m].T
+    return np.asarray(matrix.reshape(sectors * size, sectors * size))
+
+
+def _dofs(sector: CyclicSector, own: Dofs, kept: int) -> Dofs:
+    position = np.tile(own.position, (sector.sectors, 1, 1))
+    if sector.axis is not None:
+        for n in range(sector.sectors):
+            position[n, :kept] = sector.axis.turned(own.position[:kept], n * sector.pitch)
+    parts = [
+        f"sector{n}.{p}" if p else f"sector{n}" for n in range(sector.sectors) for p in own.part
+    ]
+    return Dofs(
+        np.tile(own.node, sector.sectors),
+        own.component * sector.sectors,
+        position.reshape(-1, 3),
+        tuple(parts),
+    )
+
+
+def _sets(own: Structure, sectors: int) -> dict[str, IntArray]:
+    sets = {}
+    for name, index in own.sets.items():
+        copies = [index + n * own.n for n in range(sectors)]
+        sets[name] = np.concatenate(copies)
+        sets.update({f"sector{n}.{name}": copy for n, copy in enumerate(copies)})
+    return sets
