@@ -34,6 +34,8 @@ class Plot:
     case_captions
         Load case -> HTML added to the caption while that case is chosen; empty if the figure does not depend
         on the choice. Traces of such a figure carry the load case in ``meta``.
+    controls
+        HTML above the figure, for scripts that change it.
     """
 
     key: str
@@ -41,6 +43,7 @@ class Plot:
     caption: str
     figure: go.Figure | None = None
     case_captions: Mapping[int, str] = field(default_factory=dict)
+    controls: str = ""
 
 
 def absent(key: str, title: str, reason: str) -> Plot:

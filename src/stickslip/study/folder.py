@@ -12,8 +12,17 @@ MESHES = ("blades.vtu", "blades.msh")
 OWN = (JOURNAL, JOURNAL + "-journal", RESULT, "result.nc.part", REPORT, LOG, *MESHES)
 
 
-def prepare_folder(folder: Path, *, fresh: bool) -> None:
+def prepare_folder(folder: Path, *, fresh: bool, own: tuple[str, ...] = OWN) -> None:
     """Make the folder, empty it of an earlier run if `fresh`, and make sure that a run's files fit into it.
+
+    Parameters
+    ----------
+    folder
+        To be made; its parents too.
+    fresh
+        Remove the files named in `own`.
+    own
+        What this kind of run writes.
 
     Raises
     ------
@@ -24,7 +33,7 @@ def prepare_folder(folder: Path, *, fresh: bool) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         if fresh:
             # only what a run writes: a folder may hold the user's own files
-            for name in OWN:
+            for name in own:
                 (folder / name).unlink(missing_ok=True)
         trial = folder / ".stickslip-trial"
         with trial.open("wb") as stream:

@@ -2,20 +2,17 @@
 
 import json
 import math
-import platform
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from hashlib import sha256
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from time import perf_counter
-from typing import Protocol
 
 import numpy as np
 
 from stickslip import __version__
-from stickslip.errors import SingularError, StickslipError
+from stickslip.errors import SingularError
 from stickslip.response.drift import drift
 from stickslip.response.forced import (
     ForcedPoint,
@@ -28,33 +25,13 @@ from stickslip.study.build import Case, case_of
 from stickslip.study.collect import HZ, CaseResult, collect
 from stickslip.study.folder import JOURNAL, LOG, MESHES, RESULT, prepare_folder
 from stickslip.study.journal import Journal
+from stickslip.study.netcdf import write_dataset
+from stickslip.study.progress import Interrupted, Log, Sink, library_versions
 from stickslip.study.retention import peak_shift
 from stickslip.study.schema import Study, read_study
-from stickslip.study.store import Provenance, dataset, write_dataset
+from stickslip.study.store import Provenance, dataset
 from stickslip.study.summary import RunSummary, alert_sentence, row
 from stickslip.study.verify import Check, require_integrable, verify
-
-LIBRARIES = ("numpy", "scipy", "numba", "gmsh", "scikit-fem", "pydantic", "xarray", "h5netcdf")
-
-
-class Interrupted(StickslipError):  # noqa: N818  stopping a run is no error
-    """The user stopped a run; what is finished is kept."""
-
-
-class Sink(Protocol):
-    """Where a run tells how far it is."""
-
-    def say(self, text: str) -> None:
-        """Take a line of text."""
-        ...
-
-    def begin(self, title: str) -> None:
-        """Take the title of a load case that starts."""
-        ...
-
-    def advance(self, fraction: float, text: str) -> None:
-        """Take the share of the load case that is done, and its state in words."""
-        ...
 
 
 def run_study(
@@ -86,7 +63,7 @@ def run_study(
     prepare_folder(study.folder, fresh=fresh)
     versions = library_versions()
     with Journal(study.folder / JOURNAL, fingerprint(study, versions), ForcedPoint) as journal:
-        log = _Log(study.folder / LOG, sink)
+        log = Log(study.folder / LOG, sink)
         try:
             return _run(_Run(study, versions, journal, log), verify_in_time=verify_in_time)
         except KeyboardInterrupt:
@@ -114,30 +91,6 @@ def fingerprint(study: Study, versions: dict[str, str]) -> str:
     return sha256(json.dumps([study.content_hash, versions], sort_keys=True).encode()).hexdigest()
 
 
-def library_versions() -> dict[str, str]:
-    """Return the versions of this package, Python and the libraries that make numbers."""
-    found = {"stickslip": __version__, "python": platform.python_version()}
-    for name in LIBRARIES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
-
-
-@dataclass(frozen=True, eq=False)
-class _Log:
-    """Every line of the run on the disk, and on to the user's sink."""
-
-    path: Path
-    sink: Sink
-
-    def say(self, text: str) -> None:
-        with self.path.open("a", encoding="utf-8") as stream:
-            stream.write(f"{datetime.now(UTC).isoformat(timespec='seconds')} {text}\n")
-        self.sink.say(text)
-
-
 @dataclass(frozen=True, eq=False)
 class _Run:
     """What every step of a run needs."""
@@ -145,7 +98,7 @@ class _Run:
     study: Study
     versions: dict[str, str]
     journal: Journal
-    log: _Log
+    log: Log
     began: float = field(default_factory=perf_counter)
     created: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
     warnings: list[str] = field(default_factory=list)

@@ -5,7 +5,7 @@ import tomllib
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from pydantic import Field, ValidationError
 
@@ -90,14 +90,14 @@ def read_study(path: Path) -> Study:
     InputError
         Naming every problem of the file, one a line.
     """
-    text = _text(path)
-    try:
-        raw = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    text, raw = read_toml(path)
+    if "model" in raw and "blades" not in raw:
         raise input_error(
-            str(path), f"is not valid TOML: {error}", "Correct the line named."
-        ) from None
-    _check_version(path, raw.get("schema_version"))
+            str(path),
+            "is a study of a bladed disk, this command is for two blades and a damper",
+            f"Use 'stickslip modes {path}', 'stickslip campbell' or 'stickslip safe'.",
+        )
+    check_version(path, raw.get("schema_version"))
     try:
         tables = StudyTables.model_validate(raw, context={"study": path})
     except ValidationError as error:
@@ -108,6 +108,23 @@ def read_study(path: Path) -> Study:
 def json_schema() -> str:
     """Return the JSON Schema of study files."""
     return json.dumps(StudyTables.model_json_schema(), indent=2)
+
+
+def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
+    """Return the text of a study file and its raw content.
+
+    Raises
+    ------
+    InputError
+        If it is not there, too large, or no TOML.
+    """
+    text = _text(path)
+    try:
+        return text, tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise input_error(
+            str(path), f"is not valid TOML: {error}", "Correct the line named."
+        ) from None
 
 
 def _text(path: Path) -> str:
@@ -143,7 +160,7 @@ def _text(path: Path) -> str:
         ) from None
 
 
-def _check_version(path: Path, found: object) -> None:
+def check_version(path: Path, found: object) -> None:
     """Refuse another version of the layout before its keys are judged by this one's."""
     known = get_args(SCHEMA_VERSION)
     if found is not None and (found not in known or isinstance(found, bool | float)):

@@ -7,19 +7,18 @@ strings: no compound types, no booleans, nothing that needs this package.
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from stickslip.arrays import ComplexArray, FloatArray
-from stickslip.errors import input_error
 from stickslip.response.fields import Fields
 from stickslip.solve.status import Status
 from stickslip.study.alert_points import alert_variables
 from stickslip.study.build import Case
 from stickslip.study.collect import HZ, Accepted, CaseResult
+from stickslip.study.netcdf import variable
 from stickslip.study.verify import Check
 
 DIRECTIONS = ("t", "w", "n")
@@ -143,34 +142,6 @@ def dataset(
     return xr.Dataset(data, coords=coordinates, attrs=attributes)
 
 
-def write_dataset(data: xr.Dataset, path: Path) -> None:
-    """Write netCDF-4 under a temporary name and put it in place, so that `path` is always a whole file.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be written.
-    """
-    temporary = path.with_suffix(".nc.part")
-    try:
-        # whichever of netCDF4 and h5netcdf is installed: both write the same plain features
-        data.to_netcdf(temporary, format="NETCDF4")
-        temporary.replace(path)
-    # the HDF5 libraries tell of a full disk by RuntimeError
-    except (OSError, RuntimeError) as error:
-        raise input_error(
-            str(path),
-            f"cannot be written ({error})",
-            "Make room and run the same command again: no finished point is lost.",
-        ) from error
-
-
-def _variable(dims: str, values: object, units: str, long_name: str) -> xr.Variable:
-    return xr.Variable(
-        tuple(dims.split()), np.asarray(values), {"units": units, "long_name": long_name}
-    )
-
-
 def _parts(values: ComplexArray) -> FloatArray:
     return np.stack([values.real, values.imag], axis=-1)
 
@@ -199,7 +170,7 @@ def _case_variables(case: Case, results: Sequence[CaseResult]) -> dict[str, xr.V
         for i, r in enumerate(results)
     ]
     return {
-        name: _variable("load_case", [row[name] for row in rows], units, about)
+        name: variable("load_case", [row[name] for row in rows], units, about)
         for name, (units, about) in CASE_QUANTITIES.items()
     }
 
@@ -211,7 +182,7 @@ def _point_variables(
     n_out = len(case.output_labels)
     rows = [_point_row(i, a) for i, a in pairs]
     found = {
-        name: _variable("point", np.array([row[name] for row in rows]), units, about)
+        name: variable("point", np.array([row[name] for row in rows]), units, about)
         for name, (units, about) in POINT_QUANTITIES.items()
     }
     found["status"].attrs |= {
@@ -230,34 +201,32 @@ def _point_variables(
     energy = [np.full(n_contacts, np.nan) if a.fields is None else a.fields.energy for a in every]
     contact = "point harmonic contact direction part"
     return found | {
-        "amplitude": _variable(
+        "amplitude": variable(
             "point output", [a.amplitudes(n_out) for a in every], "m", "first-harmonic amplitude"
         ),
-        "amplitude_low": _variable(
+        "amplitude_low": variable(
             "point output",
             [a.low_amplitudes(n_out) for a in every],
             "m",
             "first-harmonic amplitude with few harmonics",
         ),
-        "output_displacement": _variable(
+        "output_displacement": variable(
             "point harmonic output part",
             block((n_out,), "outputs"),
             "m",
             "displacement of the outputs",
         ),
-        "retained_displacement": _variable(
+        "retained_displacement": variable(
             "point harmonic retained part",
             _parts(np.stack(retained)),
             "m",
             "displacement of contact and damper coordinates, rotations in rad",
         ),
-        "gap": _variable(
+        "gap": variable(
             contact, block((n_contacts, 3), "gaps"), "m", "relative displacement at the contacts"
         ),
-        "contact_force": _variable(contact, block((n_contacts, 3), "forces"), "N", "contact force"),
-        "dissipated_energy": _variable(
-            "point contact", energy, "J", "energy dissipated in a cycle"
-        ),
+        "contact_force": variable(contact, block((n_contacts, 3), "forces"), "N", "contact force"),
+        "dissipated_energy": variable("point contact", energy, "J", "energy dissipated in a cycle"),
     }
 
 
@@ -305,14 +274,14 @@ def _peak_variables(case: Case, results: Sequence[CaseResult]) -> dict[str, xr.V
             )
             state[i] = result.signals.state
     found = {
-        "peak_time": _variable("load_case sample", time, "s", "time within the period at the peak"),
-        "peak_gap": _variable(
+        "peak_time": variable("load_case sample", time, "s", "time within the period at the peak"),
+        "peak_gap": variable(
             "load_case contact direction sample", gap, "m", "contact gap at the peak"
         ),
-        "peak_force": _variable(
+        "peak_force": variable(
             "load_case contact direction sample", force, "N", "contact force at the peak"
         ),
-        "peak_state": _variable(
+        "peak_state": variable(
             "load_case contact tangent sample", state, "1", "contact state at the peak, -1 if none"
         ),
     }
@@ -338,25 +307,25 @@ def _model_variables(case: Case) -> dict[str, xr.Variable]:
         ),
     }
     return {
-        name: _variable("mode", values, "Hz", about) for name, (values, about) in modes.items()
+        name: variable("mode", values, "Hz", about) for name, (values, about) in modes.items()
     } | {
-        "static_gap": _variable(
+        "static_gap": variable(
             "contact direction", case.static_gap, "m", "contact gap under the centrifugal load"
         ),
-        "static_force": _variable(
+        "static_force": variable(
             "contact direction", case.static_force, "N", "contact force under the centrifugal load"
         ),
-        "contact_law": _variable("contact", list(case.law_names), "1", "law of the contact"),
-        "contact_position": _variable(
+        "contact_law": variable("contact", list(case.law_names), "1", "law of the contact"),
+        "contact_position": variable(
             "contact xyz", case.contacts.position, "m", "position of the contact points"
         ),
-        "contact_frame": _variable(
+        "contact_frame": variable(
             "contact xyz direction", case.contacts.frame, "1", "axes t, w, n of the contact frames"
         ),
-        "surface_point": _variable(
+        "surface_point": variable(
             "surface_node xyz", case.blades.surface_point, "m", "skin of the meshed blades"
         ),
-        "surface_triangle": _variable(
+        "surface_triangle": variable(
             "face corner", case.blades.surface_triangle, "1", "triangles of the skin"
         ),
     }
@@ -395,4 +364,4 @@ def _check_variables(checks: Sequence[Check]) -> dict[str, xr.Variable]:
         ),
         "verify_sentence": ([c.sentence for c in checks], "1", "what happened, in words"),
     }
-    return {name: _variable("check", *column) for name, column in columns.items()}
+    return {name: variable("check", *column) for name, column in columns.items()}

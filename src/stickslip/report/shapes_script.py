@@ -1,0 +1,128 @@
+"""The script that draws mode shapes in the page, and its style; needs plotly.js and nothing else."""
+
+STYLE = """
+form.shapes { display: flex; flex-wrap: wrap; gap: 8px 18px; align-items: center; font-size: 14px; margin: 0 0 4px;
+  padding: 8px 12px; background: var(--soft); border: 1px solid var(--rule); }
+form.shapes label { display: flex; align-items: center; gap: 7px; }
+form.shapes select, form.shapes button { font: inherit; padding: 3px 8px; }
+form.shapes button { background: white; border: 1px solid var(--rule); border-radius: 4px; cursor: pointer; min-width: 62px; }
+form.shapes input[type="range"] { width: 120px; accent-color: var(--accent); }
+@media print { form.shapes { display: none; } }
+"""
+
+SCRIPT = """
+(() => {
+  const holder = document.getElementById("shapes-data"), form = document.getElementById("shapes-form");
+  const plot = document.getElementById("plot-shapes");
+  if (!holder || !form || !plot) return;
+  const data = JSON.parse(holder.textContent);
+  const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer;
+  const points = new Float32Array(bytes(data.points)), faces = new Int32Array(bytes(data.faces));
+  const wheelPoints = new Int32Array(bytes(data.wheelPoints)), wheelFaces = new Int32Array(bytes(data.wheelFaces));
+  const all = Int32Array.from({length: points.length / 3}, (_, n) => n);
+  const cache = new Map();
+  const shape = (wave, mode) => {
+    const key = wave + "/" + mode;
+    if (!cache.has(key)) cache.set(key, new Int16Array(bytes(data.shapes[wave][mode])));
+    return cache.get(key);
+  };
+  const turn = angle => {  // Rodrigues' rotation about the axis
+    const [a, b, c] = data.axis, co = Math.cos(angle), si = Math.sin(angle), v = 1 - co;
+    return [co + a * a * v, a * b * v - c * si, a * c * v + b * si,
+            b * a * v + c * si, co + b * b * v, b * c * v - a * si,
+            c * a * v - b * si, c * b * v + a * si, co + c * c * v];
+  };
+  const column = (rows, part) => Int32Array.from({length: rows.length / 3}, (_, n) => rows[3 * n + part]);
+  const build = whole => {  // nodes, triangles and places at rest of a view
+    const nodes = whole ? wheelPoints : all, rows = whole ? wheelFaces : faces, copies = whole ? data.sectors : 1;
+    const many = new Int32Array(rows.length * copies), rest = new Float32Array(3 * nodes.length * copies);
+    for (let s = 0; s < copies; s++) {
+      const r = turn(2 * Math.PI * s / data.sectors);
+      for (let n = 0; n < rows.length; n++) many[s * rows.length + n] = rows[n] + s * nodes.length;
+      for (let n = 0; n < nodes.length; n++) {
+        const p = [0, 1, 2].map(d => points[3 * nodes[n] + d] - data.origin[d]);
+        for (let d = 0; d < 3; d++) {
+          rest[3 * (s * nodes.length + n) + d] =
+            data.origin[d] + r[3 * d] * p[0] + r[3 * d + 1] * p[1] + r[3 * d + 2] * p[2];
+        }
+      }
+    }
+    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+    for (let n = 0; n < rest.length; n++) {
+      low[n % 3] = Math.min(low[n % 3], rest[n]); high[n % 3] = Math.max(high[n % 3], rest[n]);
+    }
+    const span = Math.max(...high.map((h, d) => h - low[d]));
+    return {nodes, copies, rest, low, high, span, i: column(many, 0), j: column(many, 1), k: column(many, 2)};
+  };
+  const views = {}, view = name => views[name] ??= build(name === "wheel");
+  const moved = (v, wave, mode, phase, size) => {
+    const u = shape(wave, mode), n = v.nodes.length, total = n * v.copies;
+    const out = [0, 1, 2].map(() => new Float32Array(total)), intensity = new Float32Array(total);
+    const theta = 2 * Math.PI * data.waveNumbers[wave] / data.sectors, scale = size * v.span;
+    let largest = 0;  // of the length of the displacement over all phases, on the view's points
+    for (let p = 0; p < n; p++) {
+      let sum = 0;
+      for (let d = 0; d < 6; d++) sum += u[6 * v.nodes[p] + d] ** 2;
+      largest = Math.max(largest, sum);
+    }
+    largest = Math.sqrt(largest) || 1;
+    for (let s = 0; s < v.copies; s++) {
+      const r = turn(2 * Math.PI * s / data.sectors), co = Math.cos(phase + s * theta), si = Math.sin(phase + s * theta);
+      for (let p = 0; p < n; p++) {
+        const at = 6 * v.nodes[p], to = s * n + p;
+        const q = [0, 2, 4].map(d => (u[at + d] * co - u[at + d + 1] * si) / largest);
+        intensity[to] = Math.hypot(q[0], q[1], q[2]);
+        for (let d = 0; d < 3; d++) {
+          out[d][to] = v.rest[3 * to + d] + scale * (r[3 * d] * q[0] + r[3 * d + 1] * q[1] + r[3 * d + 2] * q[2]);
+        }
+      }
+    }
+    return [...out, intensity];
+  };
+  let shown = "";
+  const draw = () => {
+    const get = name => form.elements[name].value, name = get("view"), v = view(name);
+    const wave = Number(get("wave")), mode = Number(get("mode"));
+    const [x, y, z, intensity] =
+      moved(v, wave, mode, Number(get("phase")) * Math.PI / 180, Number(get("size")) / 100);
+    const title = `${data.waves[wave]}, mode ${mode + 1}: ${data.hertz[wave][mode]} Hz`;
+    const change = {x: [x], y: [y], z: [z], intensity: [intensity]}, layout = {};
+    if (plot.layout.title.text !== title) layout["title.text"] = title;
+    if (shown !== name) {
+      Object.assign(change, {i: [v.i], j: [v.j], k: [v.k]});
+      const size = {}, margin = 0.1 * v.span, longest = v.span + 2 * margin;
+      ["x", "y", "z"].forEach((a, d) => {
+        layout[`scene.${a}axis.range`] = [v.low[d] - margin, v.high[d] + margin];
+        size[a] = 1.75 * (v.high[d] - v.low[d] + 2 * margin) / longest;
+      });
+      layout["scene.aspectratio"] = size;
+      const [a, b, c] = data.axis;  // look along the wheel's axis at a slant, on the sector from the side
+      const eye = name === "wheel" ? [a + 0.5, b - 0.45, c + 0.4] : [1.1, -1.3, 0.8];
+      const up = Math.abs(c) > 0.7 && name === "wheel" ? [0, 1, 0] : [0, 0, 1];
+      const xyz = v3 => ({x: v3[0], y: v3[1], z: v3[2]});
+      layout["scene.camera.eye"] = xyz(eye);
+      layout["scene.camera.up"] = xyz(up);
+      shown = name;
+      document.body.dataset.shapes = `${name} ${v.nodes.length * v.copies}`;
+      Plotly.restyle(plot, {visible: name === "sector"}, [1]);
+    }
+    const done = Plotly.restyle(plot, change, [0]);
+    return Object.keys(layout).length ? done.then(() => Plotly.relayout(plot, layout)) : done;
+  };
+  let playing = false;
+  const step = () => {
+    if (!playing) return;
+    const phase = form.elements.phase;
+    phase.value = (Number(phase.value) + 10) % 360;
+    Promise.resolve(draw()).then(() => requestAnimationFrame(step));
+  };
+  form.addEventListener("input", () => { draw(); });
+  form.addEventListener("submit", event => event.preventDefault());
+  form.elements.play.addEventListener("click", () => {
+    playing = !playing;
+    form.elements.play.textContent = playing ? "stop" : "play";
+    if (playing) step();
+  });
+  draw();
+})();
+"""

@@ -1,0 +1,229 @@
+"""The table [model.file]: from the files of a finite-element program to what a model is made of."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from stickslip.arrays import IntArray
+from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.model.axis import Axis
+from stickslip.model.elements import EXACT, Quadrature
+from stickslip.model.mesh import SolidMesh
+from stickslip.model.readers.ansys import read_ansys_full
+from stickslip.model.readers.ansys_archive import read_ansys_archive, read_ansys_materials
+from stickslip.model.readers.calculix import read_calculix_matrices
+from stickslip.model.readers.calculix_deck import Deck, assemble_deck, read_deck
+from stickslip.model.readers.units import Units
+from stickslip.model.solid import Material
+from stickslip.model.structure import Structure
+from stickslip.study.structure_study import StructureStudy
+from stickslip.study.structure_tables import FileModel
+
+LOW, HIGH, ROOT = "cyclic_low", "cyclic_high", "root"
+DECKS, ARCHIVES = (".inp", ".inp.gz"), (".cdb",)
+
+
+@dataclass(frozen=True, eq=False)
+class FileContent:
+    """What a model is made of.
+
+    Parameters
+    ----------
+    mesh
+        With the sets ``cyclic_low`` and ``cyclic_high`` of a sector, and ``root``, which is clamped; None for matrices
+        without one.
+    material
+        Of the mesh, to assemble it and let it rotate; None where `structure` is complete as it is.
+    structure
+        Matrices; None where they are assembled from mesh and material. Its sets have the names of those of the mesh.
+    axis
+        Of rotation.
+    quadrature
+        Of the assembly.
+    warnings
+        What the user should know.
+    """
+
+    mesh: SolidMesh | None
+    material: Material | None
+    structure: Structure | None
+    axis: Axis
+    quadrature: Quadrature = EXACT
+    warnings: tuple[str, ...] = ()
+
+
+def read_file_model(study: StructureStudy, say: Callable[[str], None]) -> FileContent:
+    """Read the files that [model.file] names.
+
+    Parameters
+    ----------
+    study
+        The study.
+    say
+        Takes a line of text for each step.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, the study and the file disagree, or a set is not there.
+    """
+    table = study.tables.model.file
+    assert table is not None
+    path = study.model_files["path"]
+    say(f"reading {path}")
+    name = path.name.lower()
+    try:
+        if name.endswith(DECKS):
+            return _from_deck(
+                study, table, read_deck(path, units=_units(table), plausible=table.plausible)
+            )
+        if name.endswith(ARCHIVES):
+            return _from_archive(study, table, path)
+        return _from_matrices(study, table)
+    except InputError as error:
+        # the readers speak of their arguments, a study has keys
+        text = str(error).replace(
+            "Give units=Units.…(), or plausible=False",
+            "Give model.file.units, or model.file.plausible = false,",
+        )
+        raise InputError(text) from None
+
+
+def _units(table: FileModel) -> Units:
+    return Units.named(table.units)
+
+
+def _from_deck(study: StructureStudy, table: FileModel, deck: Deck) -> FileContent:
+    if deck.sectors is not None and deck.sectors != table.sectors:
+        raise input_error(
+            f"{study.path}: model.file.sectors",
+            f"is {table.sectors}, but the deck's cyclic symmetry has {deck.sectors}",
+            f"Give sectors = {deck.sectors}.",
+        )
+    quadrature = deck.quadrature if table.quadrature == "calculix" else EXACT
+    axis = table.axis() or deck.axis
+    warnings = tuple(f"{table.path}: passed over {text}" for text in deck.ignored)
+    partly = deck.held.any(axis=1) & ~deck.held.all(axis=1)
+    if partly.any() or (study.tables.material is None and len(set(deck.cell_material)) > 1):
+        _refuse_clamped(
+            study, table, "a deck with supports of single directions or several materials"
+        )
+        structure = assemble_deck(deck, quadrature=quadrature)
+        return FileContent(
+            deck.mesh, None, _with_faces(study, table, structure), axis, quadrature, warnings
+        )
+    material = study.tables.material.library() if study.tables.material else deck.material
+    mesh = _prepared(study, table, deck.mesh)
+    return FileContent(mesh, material, None, axis, quadrature, warnings)
+
+
+def _from_archive(study: StructureStudy, table: FileModel, path: Path) -> FileContent:
+    mesh = read_ansys_archive(path, units=_units(table))
+    if study.tables.material is not None:
+        material = study.tables.material.library()
+    else:
+        found = read_ansys_materials(path, units=_units(table), plausible=table.plausible)
+        if len(found) != 1:
+            raise input_error(
+                f"{study.path}: material",
+                f"is missing, and {path.name} holds {len(found)} materials",
+                "Add the table [material].",
+            )
+        material = next(iter(found.values()))
+    quadrature = Quadrature.calculix() if table.quadrature == "calculix" else EXACT
+    return FileContent(
+        _prepared(study, table, mesh), material, None, table.axis() or Axis(), quadrature
+    )
+
+
+def _from_matrices(study: StructureStudy, table: FileModel) -> FileContent:
+    _refuse_clamped(study, table, "a model of matrices, which hold their supports already")
+    files, mesh = study.model_files, None
+    structure = _matrices(study, table)
+    if "mesh" in files and files["mesh"].name.lower().endswith(DECKS):
+        mesh = read_deck(files["mesh"], units=_units(table), plausible=table.plausible).mesh
+    return FileContent(mesh, None, _with_faces(study, table, structure), table.axis() or Axis())
+
+
+def _matrices(study: StructureStudy, table: FileModel) -> Structure:
+    """Read matrices by the suffix of their file."""
+    files, units, plausible = study.model_files, _units(table), table.plausible
+    path = files["path"]
+    suffix = Path(path.name.lower().removesuffix(".gz")).suffix
+    if suffix in (".sti", ".mas", ".dof"):
+        return read_calculix_matrices(
+            path, units=units, mesh=files.get("mesh"), mass=files.get("mass"), plausible=plausible
+        )
+    if suffix == ".full":
+        return read_ansys_full(path, nodes=files.get("nodes"), units=units, plausible=plausible)
+    raise input_error(
+        f"{study.path}: model.file.path",
+        f"files like {path.name} are not read here",
+        "Give a deck (.inp), an archive (.cdb), or matrices (.sti, .full).",
+    )
+
+
+def _refuse_clamped(study: StructureStudy, table: FileModel, what: str) -> None:
+    if table.clamped:
+        raise input_error(
+            f"{study.path}: model.file.clamped",
+            f"cannot be applied to {what}",
+            "Leave it out, and hold the nodes in the program that wrote the file.",
+        )
+
+
+def _prepared(study: StructureStudy, table: FileModel, mesh: SolidMesh) -> SolidMesh:
+    """Return the mesh with its cyclic faces and clamped nodes under the names that assembly knows."""
+    sets = dict(mesh.node_sets)
+    held = set(sets.pop(ROOT, np.zeros(0, dtype=np.int64)).tolist())
+    for i, name in enumerate(table.clamped):
+        held.update(sets[_known(study, f"clamped[{i}]", name, sets)].tolist())
+    for key, role in (("low_face", LOW), ("high_face", HIGH)):
+        name = getattr(table, key)
+        if name is not None:
+            sets[role] = sets[_known(study, key, name, sets)]
+        elif table.sectors > 1 and role not in sets:
+            raise _no_face(study, key, table, sets)
+    root = np.array(sorted(held), dtype=np.int64)
+    kept = {name: _without(members, root) for name, members in sets.items()}
+    return replace(mesh, node_sets={ROOT: root} | {k: m for k, m in kept.items() if m.size})
+
+
+def _with_faces(study: StructureStudy, table: FileModel, structure: Structure) -> Structure:
+    """Return the structure with its cyclic faces under the names that pairing knows."""
+    sets = dict(structure.sets)
+    for key, role in (("low_face", LOW), ("high_face", HIGH)):
+        name = getattr(table, key)
+        if name is not None:
+            sets[role] = sets[_known(study, key, name, sets)]
+        elif table.sectors > 1 and role not in sets:
+            raise _no_face(study, key, table, sets)
+    return replace(structure, sets=sets)
+
+
+def _no_face(study: StructureStudy, key: str, table: FileModel, sets: Iterable[str]) -> InputError:
+    return input_error(
+        f"{study.path}: model.file.{key}",
+        f"is missing with sectors = {table.sectors}, and the file has no cyclic tie",
+        f"Name one of its sets: {', '.join(sorted(sets)) or 'it has none'}.",
+    )
+
+
+def _known(study: StructureStudy, key: str, name: str, sets: Mapping[str, IntArray]) -> str:
+    """Return the set's name in the file, which may differ in capitals."""
+    if name in sets:
+        return name
+    alike = [known for known in sets if known.lower() == name.lower()]
+    if len(alike) == 1:
+        return alike[0]
+    raise input_error(
+        f"{study.path}: model.file.{key}",
+        f"the file has no set {name!r} of free nodes",
+        did_you_mean(name, list(sets)) if sets else "It has no sets.",
+    )
+
+
+def _without(members: IntArray, held: IntArray) -> IntArray:
+    return np.asarray(members[~np.isin(members, held)])

@@ -1,0 +1,118 @@
+"""Frequencies to compare with, from a CSV file."""
+
+import csv
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.errors import InputError, input_error
+from stickslip.reduction.waves import wave
+from stickslip.study.structure_study import StructureStudy
+
+COLUMNS = ("nodal_diameter", "mode", "frequency_hz")
+MOST_ROWS = 100_000
+
+
+def read_reference(
+    study: StructureStudy, numbers: Sequence[int], sectors: int
+) -> FloatArray | None:
+    """Return the reference frequencies of waves, NaN where there is none; None if the study names no file.
+
+    Parameters
+    ----------
+    study
+        The study.
+    numbers
+        Wave numbers of the rows.
+    sectors
+        Of the wheel. Both directions of a nodal diameter are compared with the same frequencies.
+
+    Returns
+    -------
+    numpy.ndarray
+        (k, m) in Hz with the study's number of modes.
+
+    Raises
+    ------
+    InputError
+        If columns are missing, a line cannot be read, or nothing is left to compare with.
+    """
+    table = study.tables.modes
+    if table.reference is None:
+        return None
+    path = study.located(table.reference)
+    found = _rows(path, table.reference_case)
+    out = np.full((len(numbers), table.number), np.nan)
+    for i, number in enumerate(numbers):
+        diameter = wave(number, sectors).nodal_diameter
+        for mode in range(table.number):
+            out[i, mode] = found.get((diameter, mode + 1), np.nan)
+    if not np.isfinite(out).any():
+        raise input_error(
+            str(path),
+            "holds no frequency of the nodal diameters and modes of this study",
+            "Check the columns nodal_diameter and mode (1 is the lowest), and modes.reference_case.",
+        )
+    return out
+
+
+def _rows(path: Path, case: str | None) -> dict[tuple[int, int], float]:
+    found: dict[tuple[int, int], float] = {}
+    try:
+        with path.open(encoding="utf-8", newline="") as stream:
+            reader = csv.DictReader(stream)
+            needed = COLUMNS if case is None else (*COLUMNS, "case")
+            missing = [name for name in needed if name not in (reader.fieldnames or [])]
+            if missing:
+                raise input_error(
+                    str(path),
+                    f"has no column {', '.join(missing)}",
+                    f"The first line names the columns: {','.join(needed)}.",
+                )
+            for row in reader:
+                if reader.line_num > MOST_ROWS:
+                    raise input_error(
+                        str(path), f"has more than {MOST_ROWS} lines", "Cut it to what is compared."
+                    )
+                if case is not None and row["case"] != case:
+                    continue
+                key = _whole(path, reader.line_num, row, 0), _whole(path, reader.line_num, row, 1)
+                if key in found:
+                    raise input_error(
+                        f"{path}: line {reader.line_num}",
+                        f"nodal diameter {key[0]}, mode {key[1]} is there twice",
+                        "Choose the rows by a column 'case' and modes.reference_case.",
+                    )
+                found[key] = _hertz(path, reader.line_num, row)
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise input_error(
+            str(path), f"is not a CSV file in UTF-8 ({error})", "Save it as CSV."
+        ) from None
+    return found
+
+
+def _whole(path: Path, line: int, row: dict[str, str], column: int) -> int:
+    text = row[COLUMNS[column]]
+    if not (text or "").strip().isdigit():
+        raise _unreadable(path, line, COLUMNS[column], text, "a whole number")
+    return int(text)
+
+
+def _hertz(path: Path, line: int, row: dict[str, str]) -> float:
+    text = row[COLUMNS[2]]
+    try:
+        value = float(text)
+    except (TypeError, ValueError):
+        raise _unreadable(path, line, COLUMNS[2], text, "a number in Hz") from None
+    if not (math.isfinite(value) and value > 0):
+        raise _unreadable(path, line, COLUMNS[2], text, "a frequency above zero")
+    return value
+
+
+def _unreadable(path: Path, line: int, column: str, text: object, wanted: str) -> InputError:
+    return input_error(
+        f"{path}: line {line}: {column}", f"cannot be read, got {text!r}", f"Give {wanted}."
+    )

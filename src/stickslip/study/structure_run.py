@@ -1,0 +1,274 @@
+"""The commands for bladed disks, from a study file to results: modes, Campbell diagram, SAFE diagram."""
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from hashlib import sha256
+from pathlib import Path
+from time import perf_counter
+from typing import TypeVar
+
+import numpy as np
+
+from stickslip import __version__
+from stickslip.errors import input_error
+from stickslip.study.folder import prepare_folder
+from stickslip.study.journal import Journal
+from stickslip.study.netcdf import write_dataset
+from stickslip.study.progress import Interrupted, Log, Sink, library_versions
+from stickslip.study.reference import read_reference
+from stickslip.study.structure_model import DiskModel, disk_model
+from stickslip.study.structure_results import WaveBranches, WaveModes
+from stickslip.study.structure_store import (
+    RPM,
+    Origin,
+    campbell_dataset,
+    modes_dataset,
+    safe_dataset,
+)
+from stickslip.study.structure_study import Command, StructureStudy, read_structure_study
+from stickslip.study.structure_summary import (
+    StructureSummary,
+    TextTable,
+    campbell_tables,
+    modes_tables,
+    safe_tables,
+)
+from stickslip.study.waves import (
+    follow_wave,
+    interference,
+    solve_wave,
+    waves_of_campbell,
+    waves_of_modes,
+)
+
+W = TypeVar("W", WaveModes, WaveBranches)
+
+
+def run_structure(path: Path, command: Command, *, fresh: bool, sink: Sink) -> StructureSummary:
+    """Run a command for bladed disks, going on from what an interrupted run has finished.
+
+    Parameters
+    ----------
+    path
+        The study file.
+    command
+        ``modes``, ``campbell`` or ``safe``.
+    fresh
+        Forget what the results folder holds of this command.
+    sink
+        Where progress is told.
+
+    Raises
+    ------
+    InputError
+        If the study, its files or its folder do not allow it.
+    Interrupted
+        If the user stops it; the message says how to go on.
+    """
+    study = read_structure_study(path)
+    _require_table(study, command)
+    own = (
+        f"{command}.sqlite",
+        f"{command}.sqlite-journal",
+        f"{command}.nc",
+        f"{command}.nc.part",
+        f"{command}.log",
+    )
+    prepare_folder(study.folder, fresh=fresh, own=own)
+    versions = library_versions()
+    mark = sha256(json.dumps([study.content_hash(command), versions]).encode()).hexdigest()
+    point = WaveBranches if command == "campbell" else WaveModes
+    with Journal(study.folder / f"{command}.sqlite", mark, point) as journal:
+        log = Log(study.folder / f"{command}.log", sink)
+        run = _Run(study, command, versions, journal, log)
+        try:
+            return {"modes": _modes, "campbell": _campbell, "safe": _safe}[command](run)
+        except KeyboardInterrupt:
+            log.say("interrupted by the user")
+            raise Interrupted(
+                f"Interrupted. What is finished is kept in {study.folder}. The same command goes on from there."
+            ) from None
+
+
+def check_structure(path: Path, sink: Sink) -> list[str]:
+    """Do everything but the computation of modes; return warnings. Nothing is written."""
+    study = read_structure_study(path)
+    return list(disk_model(study, sink.say).warnings)
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """What every step of a run needs."""
+
+    study: StructureStudy
+    command: Command
+    versions: dict[str, str]
+    journal: Journal
+    log: Log
+    began: float = field(default_factory=perf_counter)
+    created: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
+
+    def model(self) -> DiskModel:
+        """Build the model, and tell what is doubtful about it."""
+        self.log.say(f"stickslip {__version__}, {self.command} of {self.study.path}")
+        model = disk_model(self.study, self.log.say)
+        for text in model.warnings:
+            self.log.say(f"WARNING: {text}")
+        return model
+
+    def origin(self, model: DiskModel, speed_rpm: float, *, complete: bool) -> Origin:
+        """Return the attributes of the result."""
+        x, y, z = (float(v) for v in model.axis.unit)
+        return Origin(
+            command=self.command,
+            title=self.study.tables.title,
+            study_toml=self.study.text,
+            stickslip_version=__version__,
+            versions=self.versions,
+            created=self.created,
+            wall_seconds=perf_counter() - self.began,
+            warnings=model.warnings,
+            complete=complete,
+            model_hash=self.study.content_hash(),
+            sectors=model.sectors,
+            axis_direction=(x, y, z),
+            axis_origin=model.axis.origin,
+            speed_rpm=speed_rpm,
+            rotation=_in_words(model, speed_rpm if self.command != "campbell" else None),
+        )
+
+    def each(
+        self,
+        numbers: Sequence[int],
+        solve: Callable[[int], W],
+        write: Callable[[list[W], bool], None],
+    ) -> list[W]:
+        """Return what `solve` finds for each wave number, journalled as it comes; `write` takes all there is, and whether it is all."""
+        done = {w.wave_number: w for w in self.journal.points(0)}
+        if done:
+            self.log.say(f"{len(done)} of {len(numbers)} waves are already there")
+        found: list[W] = []
+        self.log.sink.begin(f"{self.command}: {len(numbers)} waves")
+        for i, number in enumerate(numbers):
+            known = done.get(number)
+            wave = solve(number) if known is None else known
+            found.append(wave)
+            if known is None:
+                self.journal.add(0, wave)
+                if i + 1 < len(numbers):
+                    write(found, False)
+            self.log.sink.advance((i + 1) / len(numbers), _progress(wave))
+        write(found, True)
+        return found
+
+    @property
+    def target(self) -> Path:
+        """The result's file."""
+        return self.study.folder / f"{self.command}.nc"
+
+    def summary(self, tables: tuple[TextTable, ...], model: DiskModel) -> StructureSummary:
+        """Return what the command prints at its end."""
+        files = (self.target, self.log.path)
+        return StructureSummary(tables, model.warnings, self.target, files)
+
+
+def _modes(run: _Run) -> StructureSummary:
+    tables, model = run.study.tables, run.model()
+    speed = RPM * tables.rotation.speed_rpm
+    numbers = waves_of_modes(tables.modes.nodal_diameters, model, speed)
+    reference = read_reference(run.study, numbers, model.sectors)
+    shapes = tables.modes.shapes and model.skin is not None
+
+    def write(waves: list[WaveModes], complete: bool) -> None:
+        origin = run.origin(model, tables.rotation.speed_rpm, complete=complete)
+        rows = None if reference is None else reference[: len(waves)]
+        write_dataset(modes_dataset(waves, rows, model.skin, model.facts, origin), run.target)
+
+    waves = run.each(
+        numbers, lambda k: solve_wave(model, speed, k, tables.modes.number, shapes=shapes), write
+    )
+    return run.summary(modes_tables(waves, reference, model.sectors), model)
+
+
+def _campbell(run: _Run) -> StructureSummary:
+    table, model = run.study.tables.campbell, run.model()
+    assert table is not None
+    if model.rotating is None:
+        raise input_error(
+            f"{run.study.path}: campbell",
+            "the model is matrices, which no speed changes",
+            "Bring the mesh (a deck or an archive of one material) instead of matrices.",
+        )
+    speeds = RPM * np.linspace(table.speeds_rpm[0], table.speeds_rpm[1], table.points)
+    numbers = waves_of_campbell(table, model)
+
+    def write(waves: list[WaveBranches], complete: bool) -> None:
+        origin = run.origin(model, float("nan"), complete=complete)
+        write_dataset(
+            campbell_dataset(waves, speeds, table.engine_orders, model.facts, origin), run.target
+        )
+
+    def say(speed: float) -> None:
+        run.log.sink.say(f"  {speed / RPM:.0f} rpm done")
+
+    waves = run.each(numbers, lambda k: follow_wave(model, k, table, speeds, say), write)
+    return run.summary(campbell_tables(waves, speeds, model.sectors), model)
+
+
+def _safe(run: _Run) -> StructureSummary:
+    table, rotation = run.study.tables.safe, run.study.tables.rotation
+    assert table is not None
+    rpm = rotation.speed_rpm if table.speed_rpm is None else table.speed_rpm
+    if rpm <= 0:
+        raise input_error(
+            f"{run.study.path}: safe.speed_rpm",
+            f"must be above zero, got {rpm:g}",
+            "Give the speed at which the engine orders act.",
+        )
+    model = run.model()
+    if model.sector is None:
+        raise input_error(
+            f"{run.study.path}: safe",
+            "the model is a whole structure, not a sector",
+            "An interference diagram needs cyclic symmetry; give the sector and the number of sectors.",
+        )
+    speed = RPM * rpm
+    at = speed if model.rotating is not None else 0.0
+    numbers = waves_of_modes(None, model, at)
+
+    def write(waves: list[WaveModes], complete: bool) -> None:
+        if complete:
+            found = interference(waves, model, table, speed)
+            origin = run.origin(model, rpm, complete=True)
+            write_dataset(safe_dataset(waves, found, model.facts, origin), run.target)
+
+    waves = run.each(numbers, lambda k: solve_wave(model, at, k, table.modes, shapes=False), write)
+    return run.summary(safe_tables(interference(waves, model, table, speed)), model)
+
+
+def _progress(wave: WaveModes | WaveBranches) -> str:
+    low, high = wave.frequencies_hz.min(), wave.frequencies_hz.max()
+    return f"wave number {wave.wave_number}: {low:.6g} to {high:.6g} Hz in {wave.seconds:.1f} s"
+
+
+def _require_table(study: StructureStudy, command: Command) -> None:
+    """Refuse a command whose table is not in the study."""
+    if getattr(study.tables, command) is None:
+        raise input_error(
+            f"{study.path}: {command}",
+            "is missing",
+            f"Add the table [{command}]: 'stickslip new NAME --kind sector' writes an example.",
+        )
+
+
+def _in_words(model: DiskModel, rpm: float | None) -> str:
+    """Say which effects of rotation are in the numbers."""
+    if model.rotating is None:
+        return "matrices as read, unchanged by speed"
+    if rpm == 0:
+        return "at rest"
+    speed = "at each speed" if rpm is None else f"{rpm:g} rpm"
+    coriolis = "with" if model.rotation.coriolis else "without"
+    return f"{speed}, {model.rotation.tangent} tangent, {coriolis} Coriolis forces"

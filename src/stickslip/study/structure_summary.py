@@ -1,0 +1,133 @@
+"""What the commands for bladed disks print at their end: tables of text."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.response.safe import Safe
+from stickslip.study.structure_results import WaveBranches, WaveModes
+from stickslip.study.structure_store import RPM, wave_name
+
+MOST_PAIRS = 30  # of an interference table on the screen
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """A table as text.
+
+    Parameters
+    ----------
+    title
+        Its heading.
+    head
+        Names of the columns.
+    rows
+        Cells.
+    """
+
+    title: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True)
+class StructureSummary:
+    """What a command prints at its end.
+
+    Parameters
+    ----------
+    tables
+        To print.
+    warnings
+        In words.
+    result
+        The result's file.
+    files
+        All files of the run.
+    """
+
+    tables: tuple[TextTable, ...]
+    warnings: tuple[str, ...]
+    result: Path
+    files: tuple[Path, ...]
+
+
+def modes_tables(
+    waves: Sequence[WaveModes], reference: FloatArray | None, sectors: int
+) -> tuple[TextTable, ...]:
+    """Return the natural frequencies, and their differences from the reference."""
+    n = waves[0].frequencies_hz.size
+    head = ("wave", "kind", *(f"{m + 1}" for m in range(n)))
+    names = [_names(w.wave_number, sectors) for w in waves]
+    rows = tuple(
+        (*name, *(f"{f:.7g}" for f in w.frequencies_hz))
+        for name, w in zip(names, waves, strict=True)
+    )
+    tables = [TextTable("Natural frequencies in Hz", head, rows)]
+    if reference is not None:
+        off = np.array([w.frequencies_hz for w in waves]) / reference - 1
+        worst = np.unravel_index(np.nanargmax(np.abs(off)), off.shape)
+        title = (
+            f"Relative differences from the reference; the largest is {off[worst]:.2e} "
+            f"({names[worst[0]][0]}, mode {worst[1] + 1})"
+        )
+        rows = tuple(
+            (*name, *(f"{d:.1e}" if np.isfinite(d) else "-" for d in row))
+            for name, row in zip(names, off, strict=True)
+            if np.isfinite(row).any()
+        )
+        tables.append(TextTable(title, head, rows))
+    return tuple(tables)
+
+
+def campbell_tables(
+    waves: Sequence[WaveBranches], speeds: FloatArray, sectors: int
+) -> tuple[TextTable, ...]:
+    """Return frequencies at the ends of the speed range, and the crossings by speed."""
+    ends = (f"{speeds[0] / RPM:g} rpm", f"{speeds[-1] / RPM:g} rpm")
+    rows = tuple(
+        (_names(w.wave_number, sectors)[0], f"{m + 1}", f"{branch[0]:.6g}", f"{branch[-1]:.6g}")
+        for w in waves
+        for m, branch in enumerate(w.frequencies_hz.T)
+    )
+    first = TextTable("Frequencies in Hz", ("wave", "mode", *ends), rows)
+    crossings = sorted(
+        (float(speed), float(hertz), int(order), _names(w.wave_number, sectors)[0], int(mode) + 1)
+        for w in waves
+        for speed, hertz, order, mode in zip(
+            w.speeds, w.crossings_hz, w.engine_orders, w.modes, strict=True
+        )
+    )
+    found = tuple(
+        (f"{speed / RPM:.1f}", f"{hertz:.2f}", f"{order}", name, f"{mode}")
+        for speed, hertz, order, name, mode in crossings
+    )
+    head = ("rpm", "Hz", "engine order", "wave", "mode")
+    return first, TextTable("Crossings with engine orders that excite the mode", head, found)
+
+
+def safe_tables(found: Safe) -> tuple[TextTable, ...]:
+    """Return the pairs of engine order and mode, the nearest first."""
+    near = len(found.resonances)
+    rpm = found.speed_range[0] / RPM
+    shown = found.points[: max(MOST_PAIRS, near)]
+    rows = tuple(
+        (
+            f"{p.engine_order}", f"ND {p.nodal_diameter}", f"{p.mode + 1}", f"{p.frequency_hz:.6g}",
+            f"{p.speed / RPM:.1f}", f"{100 * p.margin:+.2f}", "NEAR" if abs(p.margin) <= found.allowed else "",
+        )
+        for p in shown
+    )  # fmt: skip
+    title = f"At {rpm:g} rpm: {near} near resonances within {100 * found.allowed:g} %"
+    if len(shown) < len(found.points):
+        title += f"; the nearest {len(shown)} of {len(found.points)} pairs"
+    head = ("engine order", "wave", "mode", "Hz", "resonance at rpm", "margin %", "")
+    return (TextTable(title, head, rows),)
+
+
+def _names(number: int, sectors: int) -> tuple[str, str]:
+    diameter, kind = wave_name(number, sectors)
+    return ("whole", "") if sectors == 1 else (f"ND {diameter}", kind)
