@@ -9,7 +9,7 @@ import scipy.optimize
 import scipy.sparse
 from solid_models import beam_root, box, rigid_motions, without_sets
 
-from stickslip.errors import InputError, SingularError
+from stickslip.errors import InputError, SingularError, StickslipError
 from stickslip.model.annulus import annular_sector
 from stickslip.model.axis import Axis
 from stickslip.model.gyroscopic import gyroscopic_modes
@@ -379,5 +379,13 @@ def test_wrong_requests_are_named(plate):
     with pytest.raises(InputError, match="tangent 'nonlinear' is no polynomial"):
         plate.polynomial(tangent="nonlinear")
     loose = rotating_solid(without_sets(box(8, SIZE, (1, 1, 1))), STEEL)
-    with pytest.raises(SingularError):
+    with pytest.raises(SingularError, match=r"is not determined .* Clamp nodes"):
         loose.displacement(100.0)
+    with pytest.raises(InputError, match=rf"tie: has 3 rows for {plate.structure.n} dofs"):
+        plate.at_speed(100.0, tie=scipy.sparse.eye_array(3, format="csr"))
+
+
+def test_speeds_without_equilibrium_are_named(plate):
+    """A billion rad/s: the first step is a billion times the plate's size, and Newton's method gives up, in words."""
+    with pytest.raises(StickslipError, match=r"no equilibrium at 1e\+09 rad/s"):
+        plate.displacement(1e9, nonlinear=True)

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.arrays import BoolArray, FloatArray, Matrix
-from stickslip.errors import StickslipError, input_error
+from stickslip.errors import SingularError, StickslipError, input_error
 from stickslip.model.axis import Axis
 from stickslip.model.elements import EXACT, NodeBlocks, Quadrature, Shape, shape_functions
 from stickslip.model.factorisation import factorise
@@ -211,6 +211,12 @@ class RotatingSolid:
     def _unit_displacement(self, tie: Matrix | None) -> FloatArray:
         """Return the linear static displacement (n,) at 1 rad/s, in m s²."""
         key = _content(tie)
+        if tie is not None and tie.shape[0] != self.structure.n:
+            raise input_error(
+                "RotatingSolid: tie",
+                f"has {tie.shape[0]} rows for {self.structure.n} dofs",
+                "Use the tie of a sector made of this solid's structure.",
+            )
         if key not in self._displacements:
             self._displacements[key] = _solve(self.structure.stiffness, self.centrifugal, tie)
         return self._displacements[key]
@@ -292,10 +298,16 @@ def _content(tie: Matrix | None) -> str:
 
 
 def _solve(stiffness: Matrix, load: FloatArray, tie: Matrix | None) -> FloatArray:
-    if tie is None:
-        return np.asarray(factorise(stiffness)(load))
-    inner = scipy.sparse.csr_array(tie.T @ stiffness @ tie)
-    return np.asarray(tie @ factorise(inner)(tie.T @ load))
+    inner = stiffness if tie is None else scipy.sparse.csr_array(tie.T @ stiffness @ tie)
+    try:
+        solve = factorise(inner)
+    except SingularError as error:
+        raise SingularError(
+            f"RotatingSolid: the static displacement under the centrifugal load is not determined ({error}). "
+            "Clamp nodes that hold the solid, also along the axis and around it."
+        ) from error
+    found = solve(_on_tie(load, tie))
+    return np.asarray(found if tie is None else tie @ found)
 
 
 def _on_tie(force: FloatArray, tie: Matrix | None) -> FloatArray:
