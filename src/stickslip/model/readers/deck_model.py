@@ -208,7 +208,7 @@ def nodes_named(model: DeckModel, text: str, place: str) -> IntArray:
         return model.nodes.node_sets[text.upper()]
     if not text.lstrip("+-").isdigit():
         raise _unknown(place, "node set", text.upper(), list(model.nodes.node_sets))
-    number = np.array([int(text)])
+    number = np.array([whole_number(text, place, "node")])
     model.nodes.index(number)
     return number
 

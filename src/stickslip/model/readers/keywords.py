@@ -12,6 +12,7 @@ from stickslip.model.readers.text import SHOWN, number_table, read_text
 
 MOST_INCLUDES = 200
 DEEPEST_INCLUDE = 10
+LARGEST = 2**53  # no program numbers further
 
 
 @dataclass(frozen=True)
@@ -98,11 +99,14 @@ def keyword_blocks(path: Path) -> list[Block]:
 def whole_number(text: str, place: str, what: str) -> int:
     """Return an integer field of a data line."""
     try:
-        return int(text)
-    except ValueError as error:
+        number = int(text)
+    except ValueError:
+        number = LARGEST + 1
+    if abs(number) > LARGEST:
         raise input_error(
             place, f"the {what} {text[:SHOWN]!r} is no whole number", "Check the line."
-        ) from error
+        )
+    return number
 
 
 def real_number(text: str, place: str, what: str) -> float:

@@ -147,7 +147,10 @@ def csv_columns(path: Path, required: tuple[str, ...]) -> dict[str, list[str]]:
     InputError
         If a column is missing, or a line has another number of fields.
     """
-    rows = list(csv.reader(io.StringIO(read_text(path))))
+    try:
+        rows = list(csv.reader(io.StringIO(read_text(path))))
+    except csv.Error as error:
+        raise input_error(str(path), f"is no CSV file ({error})", "Separate by commas.") from error
     if not rows:
         raise input_error(str(path), "is empty", f"Give a header: {','.join(required)}.")
     header = [name.strip().lower() for name in rows[0]]
