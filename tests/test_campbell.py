@@ -153,6 +153,12 @@ def test_static_answers_make_a_modal_basis_converge():
     assert np.max(np.abs(enriched - exact)) <= np.max(np.abs(modal - exact))
 
 
+def test_large_structures_at_rest_have_no_answers_to_add():
+    structure = gyroscopic_chain(201, speed=0.0)
+    found = ss.gyroscopic_modes(structure, 5).frequencies_hz
+    np.testing.assert_allclose(found, ss.natural_frequencies(structure, 5), rtol=1e-10)
+
+
 def turning_ring(speed, sectors=7, blades=1.0):
     """Planar masses on a circle, springs to ground and neighbours, Coriolis forces: radial and tangential motion."""
     own, tie = blades * np.diag([4.0, 2.5]) - speed**2 * np.eye(2), np.diag([0.6, 0.3])

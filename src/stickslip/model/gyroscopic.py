@@ -106,8 +106,11 @@ def _enriched(structure: Structure, coriolis: Matrix, modes: Matrix) -> tuple[Fl
     K, M = structure.stiffness, structure.mass
     shift = SHIFT * abs(K.diagonal()).sum() / abs(M.diagonal()).sum()
     answers = factorise(K + shift * M)(np.asarray(coriolis @ modes))
+    size = np.linalg.norm(answers, axis=0)
     answers = answers - modes @ (modes.conj().T @ (M @ answers))
-    columns = [each / np.linalg.norm(each, axis=0) for each in (modes, answers)]
+    # nothing is left of an answer where Coriolis forces vanish or the modes know it already
+    left = np.linalg.norm(answers, axis=0) > KNOWN * size
+    columns = [each / np.linalg.norm(each, axis=0) for each in (modes, answers[:, left])]
     basis = np.linalg.qr(np.hstack(columns))[0]
     squares, vectors = scipy.linalg.eigh(*(basis.conj().T @ (a @ basis) for a in (K, M)))
     return squares, basis @ vectors
