@@ -15,9 +15,8 @@ from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
 
 SPARE = 10  # modes beyond twice as many as are asked for
-SHIFT = (
-    1e-8  # share of the mean of K/M that keeps the factorised matrix regular where a body is free
-)
+SHIFT = 1e-8  # share of the mean of K/M: the factorised matrix is regular where a body is free
+KNOWN = 1e-8  # share of an answer that lies outside the modes, below which it is rounding
 
 
 @dataclass(frozen=True, eq=False)
