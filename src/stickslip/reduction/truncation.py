@@ -5,10 +5,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse
 
 from stickslip.arrays import BoolArray, FloatArray, Matrix
 from stickslip.errors import input_error
-from stickslip.model.factorisation import Say, silent
+from stickslip.model.factorisation import Say, factorise, silent
 from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
 from stickslip.reduction.bodies import Body, loose_bodies
@@ -200,9 +201,14 @@ def _basis_between(structure: Structure, reduced: Structure) -> Matrix:
     if before.shape[0] != after.shape[0]:
         raise _not_of(before.shape[0], after.shape[0])
     gram, right = before.conj().T @ before, before.conj().T @ after
-    gram, right = (m.toarray() if hasattr(m, "toarray") else m for m in (gram, right))
-    scale = 1 / np.sqrt(np.diag(gram).real)
-    inner = scale[:, None] * np.linalg.solve(scale[:, None] * gram * scale, scale[:, None] * right)
+    scale = 1 / np.sqrt(gram.diagonal().real)
+    if scipy.sparse.issparse(gram):
+        diagonal = scipy.sparse.diags_array(scale)
+        gram = scipy.sparse.csr_array(diagonal @ gram @ diagonal)
+    else:
+        gram = scale[:, None] * gram * scale
+    right = right.toarray() if scipy.sparse.issparse(right) else right
+    inner = scale[:, None] * factorise(gram)(scale[:, None] * right)
     if np.linalg.norm(before @ inner - after) > 1e-6 * np.linalg.norm(after):
         raise input_error(
             "frequency_errors",
