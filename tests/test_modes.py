@@ -161,6 +161,8 @@ def test_more_modes_than_the_mass_has_are_refused():
     with pytest.raises(InputError, match="whose mass has the rank 1"):
         normal_modes(structure(rank_one, K), 3)
     assert len(normal_modes(structure(rank_one, K), 1).squares) == 1
+    with pytest.raises(InputError, match="1 asked of 900 dofs whose mass has the rank 0"):
+        lanczos(0 * rank_one, 1, factorise(K), 0.0, float)
 
 
 def test_equal_bodies_keep_all_their_frequencies():

@@ -16,7 +16,10 @@ from stickslip.model.factorisation import Solve
 BLOCK = 8  # vectors solved for together; as many equal frequencies are found for certain
 CONVERGED = 1e-10  # residual of a mode over its eigenvalue; the frequency's error is its square
 ROUNDING = 1e-14  # the same over the largest eigenvalue: nothing below can be reached
-NOTHING = 1e-24  # squared length over that before orthogonalisation: only rounding is left
+NOTHING = (
+    1e-24,
+    1e-12,
+)  # squared length over the largest, at first and once normalised: only rounding
 
 
 def lanczos(
@@ -60,7 +63,8 @@ def lanczos(
 
     basis = np.empty((size, min(size, 2 * n + 12 * BLOCK)), dtype=kind, order="F")
     projected: Matrix = np.zeros((0, 0), dtype=kind)
-    block = _orthonormal(mass, fresh(min(BLOCK, size)), basis[:, :0], fresh)
+    known, largest, turn = basis[:, :0], np.zeros(0), np.zeros((0, 0))
+    block = _orthonormal(mass, fresh(min(BLOCK, size)), known, fresh)
     while block.shape[1]:
         basis, known = _appended(basis, len(projected), block)
         image = operate(block)
@@ -69,7 +73,7 @@ def lanczos(
         projected = _bordered(projected, column)
         block = _orthonormal(mass, image, known, fresh)
         coupling = block.conj().T @ (mass @ image)
-        if len(projected) < n:
+        if len(projected) < n and block.shape[1]:
             continue
         largest, turn = np.linalg.eigh(projected, UPLO="U")
         chosen = np.argsort(-abs(largest))[:n]
@@ -77,10 +81,11 @@ def lanczos(
         rest = np.linalg.norm(coupling @ turn[-image.shape[1] :], axis=0)
         if np.all(rest <= np.maximum(CONVERGED * abs(largest), ROUNDING * abs(largest[0]))):
             break
-    if len(projected) < n:
+    rank = int(np.count_nonzero(abs(largest) > ROUNDING * np.max(abs(largest), initial=0.0)))
+    if rank < n:
         raise input_error(
             "normal_modes",
-            f"{n} asked of {size} dofs whose mass has the rank {len(projected)}",
+            f"{n} asked of {size} dofs whose mass has the rank {rank}",
             "Ask for at most as many.",
         )
     return shift + 1.0 / largest, known @ turn
@@ -122,7 +127,7 @@ def _orthonormal(
             block = block - known @ (known.conj().T @ heavy)
             heavy = mass @ block
         squares, turn = np.linalg.eigh(block.conj().T @ heavy)
-        weak = squares <= NOTHING * reference
+        weak = squares <= NOTHING[again] * reference
         block = (block @ turn[:, ~weak]) / np.sqrt(squares[~weak])
         if np.any(weak) and not again:
             block, added = np.hstack([block, fresh(int(np.count_nonzero(weak)))]), True
