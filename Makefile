@@ -9,12 +9,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 DOCS_INSTALLED := $(VENV)/.docs-installed
+READERS_INSTALLED := $(VENV)/.readers-installed
 LOCK_FLAGS := --quiet --generate-hashes --strip-extras \
 	--no-emit-index-url --no-emit-find-links --no-emit-trusted-host
 # Two test workers on two cores: a threaded BLAS under each would only make them wait for each other.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help install run test lint docs bench bench-rival validate lock clean
+.PHONY: help install run test readers test-readers lint docs bench bench-rival validate lock clean
 .DELETE_ON_ERROR:
 
 help:  ## list the targets
@@ -38,6 +39,15 @@ run: $(INSTALLED)  ## solve the example of two blades and a damper, and write it
 
 test: $(INSTALLED)  ## run the tests and report their coverage
 	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --cov --cov-report=term:skip-covered
+
+readers: $(READERS_INSTALLED)  ## install what reads Nastran's binary files, and files of ANSYS to test with
+
+$(READERS_INSTALLED): $(INSTALLED) readers-requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r readers-requirements.lock
+	@touch $@
+
+test-readers: $(READERS_INSTALLED)  ## run the tests of the readers of ANSYS and Nastran files, none skipped
+	$(ONE_THREAD) STICKSLIP_READERS=required $(BIN)/python -m pytest tests/test_readers_ansys.py tests/test_readers_nastran.py
 
 lint: $(INSTALLED)  ## style, types and the direction of imports
 	$(BIN)/ruff check .
@@ -75,6 +85,8 @@ lock: $(INSTALLED)  ## resolve the newest versions and write both lock files
 		-c requirements.lock -o docs/requirements.lock pyproject.toml
 	CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra bench \
 		-o benchmarks/requirements.lock pyproject.toml
+	CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra readers --extra readers-test \
+		-c requirements.lock -c docs/requirements.lock -o readers-requirements.lock pyproject.toml
 
 clean:  ## remove everything that the other targets made, .venv included
 	rm -rf $(VENV) .venv-rival .coverage* htmlcov .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache \

@@ -1,7 +1,9 @@
 """Matrices from Nastran's OP4 files, and modes from OP2 files, through the optional package pyYeti."""
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -92,17 +94,9 @@ def read_nastran_op4(
     units = Units.si() if units is None else units
     path = existing_file(path)
     names = [name.lower() for name in (mass, stiffness, damping) if name is not None]
-    found = _op4_matrices(path, names)
     known = read_nastran_dofs(geometry)
     rows = known.rows(dof_set)
-    for name in names:
-        if found[name].shape != (len(rows), len(rows)):
-            raise input_error(
-                f"{path}: {name}",
-                f"is {' x '.join(map(str, found[name].shape))}, the {dof_set}-set of {known.place} has {len(rows)} "
-                "degrees of freedom",
-                _fitting(known, found[name].shape[0]),
-            )
+    found = op4_matrices(path, names, partial(_check_size, path, known, dof_set))
     dependent = np.intersect1d(known.sets.get("m", []), rows)
     if len(dependent):
         raise input_error(
@@ -111,7 +105,8 @@ def read_nastran_op4(
             "Write the matrices of the f-set or the a-set.",
         )
     free = np.flatnonzero(~np.isin(rows, known.sets.get("s", [])))  # others are held (SPC)
-    matrices = [found[name][free][:, free] for name in names]
+    whole = [real_symmetric(found[name], f"{path}: {name}") for name in names]
+    matrices = [matrix[free][:, free] for matrix in whole]
     structure = assembled(matrices, known, rows[free])
     structure = in_si(structure, units)
     if plausible:
@@ -119,12 +114,22 @@ def read_nastran_op4(
     return structure
 
 
-def _fitting(known: NastranDofs, size: int) -> str:
-    fits = [name for name, rows in known.sets.items() if len(rows) == size]
-    sizes = ", ".join(f"{name} {len(rows)}" for name, rows in known.sets.items())
-    if fits:
-        return f"Sets of that size: {', '.join(fits)}."
-    return f"Give the geometry of the same run; its sets: {sizes}."
+def _check_size(
+    path: Path, known: NastranDofs, dof_set: str, name: str, shape: tuple[int, int]
+) -> None:
+    """Refuse a matrix that does not belong to the set; the message names the sets of its size."""
+    n = len(known.rows(dof_set))
+    if shape == (n, n):
+        return
+    fits = [other for other, rows in known.sets.items() if shape == (len(rows), len(rows))]
+    sizes = ", ".join(f"{other} {len(rows)}" for other, rows in known.sets.items())
+    raise input_error(
+        f"{path}: {name}",
+        f"is {shape[0]} x {shape[1]}, the {dof_set}-set of {known.place} has {n} degrees of freedom",
+        f"Sets of that size: {', '.join(fits)}."
+        if fits
+        else f"Give the geometry of the same run; its sets: {sizes}.",
+    )
 
 
 def assembled(matrices: list[Matrix], known: NastranDofs, rows: IntArray) -> Structure:
@@ -154,27 +159,43 @@ def assembled(matrices: list[Matrix], known: NastranDofs, rows: IntArray) -> Str
     )
 
 
-def _op4_matrices(path: Path, names: list[str]) -> dict[str, Matrix]:
-    """Return the named matrices, real, symmetric and sparse."""
+def op4_matrices(
+    path: Path, names: list[str], check: Callable[[str, tuple[int, int]], None]
+) -> dict[str, Matrix]:
+    """Return the named matrices, sparse, as they stand in the file.
+
+    Parameters
+    ----------
+    path
+        Text or binary.
+    names
+        In lower case, with an index where several have the same name.
+    check
+        Called with the name and the shape that the file states, before anything is allocated.
+    """
     op4 = nastran_library("op4")
     if is_binary(path):
         check_records(path)
     plain = {name: name.split("[")[0] for name in names}
     with reading(path):
-        there = [str(name) for name in op4.dir(str(path), verbose=False)[0]]
-        for name in plain.values():
-            if name not in there:
+        there, shapes, *_ = op4.dir(str(path), verbose=False)
+        places = {}
+        for name, word in plain.items():
+            same = [i for i, other in enumerate(there) if other == word]
+            if not same:
                 raise input_error(
-                    str(path), f"holds no matrix {name!r}", did_you_mean(name, sorted(set(there)))
+                    str(path), f"holds no matrix {word!r}", did_you_mean(word, sorted(set(there)))
                 )
+            places[name] = _pick(path, name, len(same)) % len(same)
+            check(name, tuple(shapes[same[places[name]]]))
         # sparse, whatever the header says: memory then follows from what is stored
         read = op4.load(str(path), namelist=list(plain.values()), into="list", sparse=True)
-    found = {}
-    for name in names:
-        same = [matrix for other, matrix in zip(*read[:2], strict=True) if other == plain[name]]
-        pick = _pick(path, name, len(same))
-        found[name] = real_symmetric(scipy.sparse.csr_array(same[pick]), f"{path}: {name}")
-    return found
+        return {
+            name: scipy.sparse.csr_array(
+                [matrix for other, matrix in zip(*read[:2], strict=True) if other == plain[name]][i]
+            )
+            for name, i in places.items()
+        }
 
 
 def _pick(path: Path, name: str, count: int) -> int:
@@ -248,7 +269,12 @@ def read_nastran_op2(path: Path | str, *, units: Units | None = None) -> Nastran
     check_records(path)
     with reading(path):
         with nastran_library("op2").OP2(str(path)) as file:
-            found = file.rdparampost(get_mats=False, get_dr_tables=False, get_ougs=True)
+            there = any(str(name).startswith("LAMA") for name in file.dbnames)
+            found = (
+                file.rdparampost(get_mats=False, get_dr_tables=False, get_ougs=True)
+                if there
+                else {}
+            )
         table = found.get("lama")
         if table is None:
             raise input_error(
