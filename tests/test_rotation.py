@@ -280,6 +280,36 @@ def test_turned_and_mirrored_solids_have_the_same_frequencies(mirror):
         assert relative(dense(everywhere.T @ b @ everywhere), dense(a)) < 1e-11
 
 
+def test_supports_of_single_components():
+    """Components that are held: rows and columns of the free solid's matrices go, at rest and at speed, and nothing else."""
+    mesh = box(10, SIZE, (1, 1, 1), 0.001)
+    held = np.zeros(mesh.points.shape, dtype=bool)
+    held[mesh.node_sets["tip"], 2] = True
+    held[3, 0] = True
+    free = rotating_solid(mesh, STEEL, SKEW)
+    some = rotating_solid(mesh, STEEL, SKEW, held=held)
+    keep = np.flatnonzero(np.isin(free.moving, some.moving))
+    assert 0 < len(free.moving) - len(keep) == held[free.free].sum()
+    # the same static state, so that the same prestress is compared
+    tie = scipy.sparse.eye_array(free.structure.n, format="csr")[:, keep]
+    for tangent in ("consistent", "nonlinear"):
+        both = (
+            free.at_speed(5e3, tie=tie, tangent=tangent, coriolis=True),
+            some.at_speed(5e3, tangent=tangent, coriolis=True),
+        )
+        for name in ("mass", "damping", "stiffness"):
+            whole, part = (getattr(structure, name) for structure in both)
+            assert relative(dense(part), dense(whole[keep][:, keep])) < 1e-11
+    np.testing.assert_array_equal(some.centrifugal, free.centrifugal[keep])
+    tips = some.structure.dofs.take(some.structure.dof_set("tip"))
+    assert set(tips.component) == {"x", "y"}
+    u = some.displacement(5e3)
+    assert not some.at_nodes(u)[held].any()
+    np.testing.assert_array_equal(some.at_nodes(u).ravel()[some.moving], u)
+    with pytest.raises(InputError, match=r"held: has shape \(2, 3\) for"):
+        assemble_solid(mesh, STEEL, held=held[:2])
+
+
 # ---- beams --------------------------------------------------------------------------------------------------------------
 
 # B11: rotating cantilever, Euler-Bernoulli, η = Ω sqrt(ρAL⁴/EI), hub radius over length -> flap 1, flap 2, lag 1

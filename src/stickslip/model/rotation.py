@@ -12,14 +12,14 @@ from typing import Literal
 import numpy as np
 import scipy.sparse
 
-from stickslip.arrays import BoolArray, FloatArray, Matrix
+from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.errors import SingularError, StickslipError, input_error
 from stickslip.model.axis import Axis
 from stickslip.model.elements import EXACT, NodeBlocks, Quadrature, Shape, shape_functions
 from stickslip.model.factorisation import factorise
 from stickslip.model.mesh import SolidMesh
 from stickslip.model.prestress import PrestressTerms, internal_force, prestress_terms
-from stickslip.model.solid import Materials, clamp, clamped_nodes, integrate
+from stickslip.model.solid import Materials, integrate, node_dofs, support
 from stickslip.model.structure import Structure
 
 Tangent = Literal["consistent", "textbook", "nonlinear"]
@@ -61,8 +61,10 @@ class RotatingSolid:
         The solid at rest.
     mesh, material, axis, quadrature
         What it was made of.
-    free
-        (nodes,) which nodes are not clamped.
+    moving
+        (n,) place of each dof among the x, y, z of all nodes, node-major.
+    nodal_mass
+        (nodes, nodes) ``∫ ρ N_i N_j`` in kg.
     centrifugal
         (n,) centrifugal load at 1 rad/s, in N s².
     """
@@ -72,7 +74,8 @@ class RotatingSolid:
     material: Materials
     axis: Axis
     quadrature: Quadrature
-    free: BoolArray
+    moving: IntArray
+    nodal_mass: Matrix
     centrifugal: FloatArray
     _displacements: dict[str, FloatArray] = field(default_factory=dict, init=False, repr=False)
     _polynomials: dict[tuple[str, str], SpeedPolynomial] = field(
@@ -91,10 +94,29 @@ class RotatingSolid:
         return self._of_mass(self.axis.cross)
 
     def _of_mass(self, block: FloatArray) -> Matrix:
-        """Return the mass matrix with `block` in place of the unit matrix of each pair of nodes."""
-        nodes = self.structure.n // 3
-        each = scipy.sparse.kron(scipy.sparse.eye_array(nodes), block, format="csr")
-        return scipy.sparse.csr_array(self.structure.mass @ each)
+        """Return the matrix with a share of `block` (3, 3) for each pair of nodes."""
+        return self._of_dofs(scipy.sparse.kron(self.nodal_mass, block, format="csr"))
+
+    @property
+    def free(self) -> BoolArray:
+        """(nodes,) which nodes can move."""
+        free = np.zeros(len(self.mesh.points), dtype=bool)
+        free[self.moving // 3] = True
+        return free
+
+    def at_nodes(self, vector: FloatArray) -> FloatArray:
+        """Return a vector (n,) as (nodes, 3), with zeros where nodes are held."""
+        full = np.zeros(self.mesh.points.size, dtype=vector.dtype)
+        full[self.moving] = vector
+        return full.reshape(-1, 3)
+
+    def _of_dofs(self, matrix: Matrix) -> Matrix:
+        """Return a matrix of the x, y, z of all nodes, or of all free nodes, without the components that are held."""
+        index = self.moving
+        if matrix.shape[0] < self.mesh.points.size:
+            index = np.searchsorted(node_dofs(np.flatnonzero(self.free)), index)
+        whole = len(index) == matrix.shape[0]
+        return matrix if whole else scipy.sparse.csr_array(matrix[index][:, index])
 
     def centrifugal_load(self, speed: float) -> FloatArray:
         """Return the (n,) load in N at `speed` in rad/s, on the undeformed solid."""
@@ -196,17 +218,13 @@ class RotatingSolid:
     def _shape(self) -> Shape:
         return shape_functions(self.mesh.cells.shape[1], self.quadrature.stiffness)
 
-    def _of_nodes(self, vector: FloatArray) -> FloatArray:
-        """Return a vector (n,) of the free nodes as (nodes, 3) with zeros at clamped ones."""
-        full = np.zeros_like(self.mesh.points)
-        full[self.free] = vector.reshape(-1, 3)
-        return full
-
     def _terms(self, displacement: FloatArray, green: bool = False) -> PrestressTerms:
-        where = self._of_nodes(displacement)
-        return prestress_terms(
+        where = self.at_nodes(displacement)
+        terms = prestress_terms(
             self.mesh, self.material, self._shape, self._places, where, green=green
         )
+        parts = (terms.linear, terms.quadratic, terms.geometric)
+        return PrestressTerms(*(self._of_dofs(part) for part in parts))
 
     def _unit_displacement(self, tie: Matrix | None) -> FloatArray:
         """Return the linear static displacement (n,) at 1 rad/s, in m s²."""
@@ -228,8 +246,9 @@ class RotatingSolid:
         displacement, S = start, self.spin_softening
         goal = BALANCED * np.linalg.norm(_on_tie(self.centrifugal_load(speed), tie))
         for _ in range(NEWTON_STEPS):
-            where = self._of_nodes(displacement)
-            inner = internal_force(self.mesh, self.material, self._shape, where)[self.free].ravel()
+            where = self.at_nodes(displacement)
+            inner = internal_force(self.mesh, self.material, self._shape, where)
+            inner = inner.ravel()[self.moving]
             outer = speed**2 * (self.centrifugal + S @ displacement)
             terms = self._terms(displacement, green=True)
             stiffness = self.structure.stiffness + terms.linear + terms.quadratic + terms.geometric
@@ -256,13 +275,14 @@ def rotating_solid(
     axis: Axis = Z_AXIS,
     *,
     clamped: tuple[str, ...] = ("root",),
+    held: BoolArray | None = None,
     quadrature: Quadrature = EXACT,
 ) -> RotatingSolid:
-    """Assemble a solid that rotates about an axis with the nodes of the sets `clamped`.
+    """Assemble a solid that rotates about an axis, and its supports with it.
 
     Parameters
     ----------
-    mesh, material, clamped, quadrature
+    mesh, material, clamped, held, quadrature
         As in `assemble_solid`.
     axis
         Axis of rotation.
@@ -279,11 +299,11 @@ def rotating_solid(
         As `assemble_solid` does.
     """
     mass, stiffness = integrate(mesh, material, quadrature)
-    held = clamped_nodes(mesh, clamped)
-    structure = clamp(mesh, mass, stiffness, held, clamped)
+    structure, moving = support(mesh, mass, stiffness, clamped, held)
     # positions are interpolated like displacements, so the mass matrix integrates the load exactly
-    load = (mass @ axis.arm(mesh.points).ravel()).reshape(-1, 3)[~held].ravel()
-    return RotatingSolid(structure, mesh, material, axis, quadrature, ~held, load)
+    load = (mass @ axis.arm(mesh.points).ravel())[moving]
+    nodal_mass = scipy.sparse.csr_array(mass[::3][:, ::3])
+    return RotatingSolid(structure, mesh, material, axis, quadrature, moving, nodal_mass, load)
 
 
 def _content(tie: Matrix | None) -> str:

@@ -77,6 +77,7 @@ def assemble_solid(
     material: Materials,
     *,
     clamped: tuple[str, ...] = ("root",),
+    held: BoolArray | None = None,
     quadrature: Quadrature = EXACT,
 ) -> Structure:
     """Assemble mass and stiffness, with the nodes of the sets `clamped` removed.
@@ -88,7 +89,9 @@ def assemble_solid(
     material
         Its material, or a list of m materials, one for each cell.
     clamped
-        Names of node sets.
+        Names of node sets whose nodes do not move.
+    held
+        (nodes, 3) components x, y, z that are supported besides.
     quadrature
         The rules; the default integrates straight-edged cells exactly.
 
@@ -96,7 +99,7 @@ def assemble_solid(
     -------
     Structure
         Sparse, undamped; `Dofs.node` holds the mesh's node numbers. Each other node set becomes a set of dofs,
-        node-major (x, y, z); ``cyclic_low`` and ``cyclic_high`` without their clamped nodes.
+        node-major (x, y, z) without the components that are held; ``cyclic_low`` and ``cyclic_high`` lose their clamped nodes.
 
     Raises
     ------
@@ -105,10 +108,10 @@ def assemble_solid(
         `clamped` names an unknown set, or a set has clamped nodes.
     """
     mass, stiffness = integrate(mesh, material, quadrature)
-    return clamp(mesh, mass, stiffness, clamped_nodes(mesh, clamped), clamped)
+    return support(mesh, mass, stiffness, clamped, held)[0]
 
 
-def clamped_nodes(mesh: SolidMesh, clamped: tuple[str, ...]) -> BoolArray:
+def _clamped_nodes(mesh: SolidMesh, clamped: tuple[str, ...]) -> BoolArray:
     """Return which nodes (n,) belong to the node sets named `clamped`; ``root`` need not be there."""
     held = np.zeros(len(mesh.points), dtype=bool)
     for name in clamped:
@@ -123,28 +126,49 @@ def clamped_nodes(mesh: SolidMesh, clamped: tuple[str, ...]) -> BoolArray:
     return held
 
 
-def clamp(
-    mesh: SolidMesh, mass: Matrix, stiffness: Matrix, held: BoolArray, clamped: tuple[str, ...]
-) -> Structure:
-    """Return the structure without the nodes that are `held` (n,), from matrices of the free body."""
-    nodes = np.flatnonzero(~held)
-    free = node_dofs(nodes)
-    new = np.cumsum(~held) - 1
+def support(
+    mesh: SolidMesh,
+    mass: Matrix,
+    stiffness: Matrix,
+    clamped: tuple[str, ...],
+    held: BoolArray | None,
+) -> tuple[Structure, IntArray]:
+    """Take supported components out of the matrices of a free body.
+
+    Returns
+    -------
+    tuple[Structure, IntArray]
+        The structure, and the place (n,) of each of its dofs among those of the free body.
+    """
+    still = _clamped_nodes(mesh, clamped)
+    fixed = np.repeat(still[:, None], 3, axis=1)
+    if held is not None:
+        if held.shape != fixed.shape:
+            raise input_error(
+                "held",
+                f"has shape {held.shape} for {len(still)} nodes",
+                "Give x, y, z of each node.",
+            )
+        fixed = fixed | held
+    moving = np.flatnonzero(~fixed.ravel())
+    new = np.full(fixed.size, -1)
+    new[moving] = np.arange(len(moving))
     sets = {}
     for name, members in mesh.node_sets.items():
         if name in clamped:
             continue
-        if held[members].any() and name not in CUT_FACES:
+        if still[members].any() and name not in CUT_FACES:
             raise input_error(
                 f"mesh: node set {name!r}",
-                f"holds clamped nodes, e.g. {mesh.numbers[members[held[members]][0]]}",
+                f"holds clamped nodes, e.g. {mesh.numbers[members[still[members]][0]]}",
                 f"Take them out of {' or '.join(repr(c) for c in clamped)} or out of the set.",
             )
-        sets[name] = node_dofs(new[members[~held[members]]])
-    mass, stiffness = mass[free][:, free], stiffness[free][:, free]
+        index = new[node_dofs(members)]
+        sets[name] = index[index >= 0]
+    mass, stiffness = mass[moving][:, moving], stiffness[moving][:, moving]
     damping = scipy.sparse.csr_array(mass.shape)
-    table = nodal_dofs(mesh.points[nodes], mesh.numbers[nodes])
-    return Structure(mass, damping, stiffness, table, sets)
+    table = nodal_dofs(mesh.points, mesh.numbers).take(moving)
+    return Structure(mass, damping, stiffness, table, sets), moving
 
 
 def node_dofs(nodes: IntArray) -> IntArray:
