@@ -10,11 +10,13 @@ from stickslip.errors import InputError, StickslipError
 from stickslip.model.annulus import annular_sector
 from stickslip.model.axis import Axis
 from stickslip.model.deck import CalculixRun, write_deck
+from stickslip.model.modes import natural_frequencies
 from stickslip.model.readers.calculix_deck import read_deck
 from stickslip.model.sector import BladedSector
 from stickslip.model.sector_mesh import mesh_sector
 from stickslip.model.sector_parts import Airfoil, DiskProfile, Platform, Shroud
 from stickslip.model.solid import Material, assemble_solid
+from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 
 COARSE = {"disk_size": 0.025, "platform_size": 0.015, "airfoil_size": 0.020}
 SHROUDED = BladedSector(shroud=Shroud(gap=0.0004), **COARSE)
@@ -195,6 +197,19 @@ def test_ring_has_its_mass_and_matching_faces():
     np.testing.assert_allclose(turned, at(ring, "cyclic_high"), atol=1e-15)
     np.testing.assert_allclose(np.hypot(*at(ring, "root").T[:2]), 0.1, rtol=1e-14)
     np.testing.assert_array_equal(np.unique(ring.cells), np.arange(len(ring.points)))
+
+
+def test_a_disk_may_be_cut_in_any_number_of_sectors():
+    # the same elements cut in 3 and in 6: wave k of 3 sectors holds the waves k and k + 3 of 6
+    def frequencies(sectors, around, wave_number):
+        ring = annular_sector(0.1, 0.2, 0.02, sectors=sectors, divisions=(2, around, 1))
+        sector = cyclic_sector(assemble_solid(ring, Material()), sectors)
+        return natural_frequencies(travelling_wave(sector, wave_number), 6)
+
+    for wave_number in (0, 1):
+        whole = frequencies(3, 4, wave_number)
+        parts = [frequencies(6, 2, k) for k in (wave_number, wave_number + 3)]
+        np.testing.assert_allclose(np.sort(np.concatenate(parts))[:6], whole, rtol=1e-9)
 
 
 @pytest.mark.parametrize(
