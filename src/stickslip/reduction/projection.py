@@ -32,6 +32,8 @@ def project(matrix: Matrix, basis: Matrix) -> Matrix:
     if scipy.sparse.issparse(basis):
         product = basis.conj().T @ matrix @ basis
         product = product.tocsr() if scipy.sparse.issparse(product) else np.asarray(product)
+    elif scipy.sparse.issparse(matrix) and not matrix.nnz:  # no damping: a third of the work
+        return np.zeros((basis.shape[1],) * 2, dtype=np.result_type(matrix.dtype, basis.dtype))
     else:
         product = _dense_product(matrix, basis)
     return (product + product.conj().T) / 2 if is_hermitian(matrix) else product
