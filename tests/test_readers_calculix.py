@@ -199,6 +199,34 @@ def test_deck_with_a_cyclic_tie_gives_every_nodal_diameter():
             assert np.abs(found - frequency).min() < PRINTED
 
 
+def test_cyclic_faces_of_element_faces(tmp_path):
+    """The same ring, its faces given as element faces; supports along the axis cross the tie as well."""
+    copied(tmp_path, "ring2.inp", "ring_nodes.inc")
+    expected = read_deck(tmp_path / "ring2.inp", units=MM)
+    text = (tmp_path / "ring2.inp").read_text()
+    for name, nodes, faces in (
+        ("S_LO", "CYC_LO", "1, S3\n3, S3"),
+        ("S_HI", "CYC_HI", "2, S5\n4, S5"),
+    ):
+        text = text.replace(
+            f"*SURFACE, NAME={name}, TYPE=NODE\n{nodes}\n",
+            f"*SURFACE, NAME={name}, TYPE=ELEMENT\n{faces}\n",
+        )
+    (tmp_path / "faces.inp").write_text(text)
+    found = read_deck(tmp_path / "faces.inp", units=MM)
+    for name in ("cyclic_low", "cyclic_high", "root"):
+        assert set(found.mesh.node_sets[name]) == set(expected.mesh.node_sets[name])
+    (tmp_path / "axial.inp").write_text(text.replace("BORE, 1, 3", "BORE, 3, 3"))
+    held = read_deck(tmp_path / "axial.inp", units=MM).held
+    assert held.sum(axis=0).tolist() == [0, 0, 6]
+    (tmp_path / "oblique.inp").write_text(text.replace("BORE, 1, 3", "BORE, 1, 1"))
+    with pytest.raises(InputError, match="on the cyclic faces are not the same after a turn"):
+        read_deck(tmp_path / "oblique.inp", units=MM)
+    (tmp_path / "none.inp").write_text(text.replace("1, S3", "1, S7"))
+    with pytest.raises(InputError, match="'S7' is no face of C3D8"):
+        read_deck(tmp_path / "none.inp", units=MM)
+
+
 @needs_reference
 def test_reference_sector_at_rest():
     """Deck and stored matrices agree; frequencies are those that CalculiX printed with seven digits."""

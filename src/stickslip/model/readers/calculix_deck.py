@@ -26,9 +26,8 @@ from stickslip.model.readers.units import SI, Units, check_material
 from stickslip.model.solid import Material, integrate, node_dofs
 from stickslip.model.structure import Structure
 
-PAIRED = (
-    1e-3  # of the face's size: how far a rotated face may lie from the other to be taken for it
-)
+PAIRED = 1e-3  # of a face's size: how far a turned face may lie from the other
+ROUNDING = 1e-9  # squares of direction cosines below are zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +137,7 @@ def read_deck(
     if model.tie is not None and model.sectors:
         faces = _index(mesh, model.tie[0]), _index(mesh, model.tie[1])
         faces = _oriented(mesh.points, faces, axis, model.sectors)
-        held = _held_by_tie(mesh.points, held, faces, axis, 2 * math.pi / model.sectors)
+        held = _held_by_tie(mesh, held, faces, axis, 2 * math.pi / model.sectors)
         sets |= {"cyclic_low": faces[0], "cyclic_high": faces[1]}
     root: BoolArray = held.min(axis=1)
     free_sets = {name: nodes[~root[nodes]] for name, nodes in sets.items()}
@@ -309,18 +308,27 @@ def _oriented(
 
 
 def _held_by_tie(
-    points: FloatArray, held: BoolArray, faces: tuple[IntArray, IntArray], axis: Axis, pitch: float
+    mesh: SolidMesh, held: BoolArray, faces: tuple[IntArray, IntArray], axis: Axis, pitch: float
 ) -> BoolArray:
     """Return the supports with those that the cyclic tie carries over to the other face.
 
-    CalculiX takes no support on the dependent face: its nodes are held because their partners are.
+    CalculiX takes no support on the dependent face: its nodes are held because their partners are. With
+    ``u_high = R u_low`` a component of one is held if all components of the other are that it is made of.
     """
     low, high = faces
-    distance, partner = cKDTree(points[high]).query(axis.turned(points[low], pitch))
-    near = distance <= PAIRED * float(np.ptp(points[high], axis=0).max())
+    distance, partner = cKDTree(mesh.points[high]).query(axis.turned(mesh.points[low], pitch))
+    near = distance <= PAIRED * float(np.ptp(mesh.points[high], axis=0).max())
     first, second = low[near], high[partner[near]]
-    both = held[first].all(axis=1) | held[second].all(axis=1)
+    share = axis.rotation(pitch) ** 2  # of each component of the low face in one of the high face
     held = held.copy()
-    held[first[both]] = True
-    held[second[both]] = True
+    held[first] |= (~held[second]) @ share < ROUNDING
+    held[second] |= (~held[first]) @ share.T < ROUNDING
+    torn = np.flatnonzero(held[first].sum(axis=1) != held[second].sum(axis=1))
+    if torn.size:
+        numbers = mesh.numbers[first[torn[0]]], mesh.numbers[second[torn[0]]]
+        raise input_error(
+            "*BOUNDARY",
+            f"the supports of nodes {numbers[0]} and {numbers[1]} on the cyclic faces are not the same after a turn",
+            "Hold nodes there in all directions, or along the axis if that is a coordinate axis.",
+        )
     return held

@@ -21,6 +21,14 @@ NODES_OF = {
     "C3D8": 8, "C3D8I": 8, "C3D8R": 8, "C3D20": 20, "C3D20R": 20,
 }  # fmt: skip
 
+# corners of the faces S1, S2, … and ends of the edges that mid-side nodes stand on, counted from 0
+TET_FACES = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
+HEX_FACES = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
+TET_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
+HEX_EDGES = (
+    (0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7),
+)  # fmt: skip
+
 # Keywords that say nothing about mass, stiffness or supports: steps, output, loads of single nodes
 SILENT = {
     "HEADING", "NODE", "ELEMENT", "NSET", "ELSET", "MATERIAL", "STEP", "END STEP", "STATIC", "FREQUENCY",
@@ -135,7 +143,7 @@ def _cells(model: DeckModel, blocks: list[Block]) -> None:
         parts.append(rows)
         if "ELSET" in block.parameters:
             named.setdefault(block.parameters["ELSET"].upper(), []).append(rows[:, 0])
-    if not parts:
+    if not sum(map(len, parts)):
         raise input_error(
             model.nodes.place, "has no *ELEMENT", "Give the deck with the mesh, solid elements."
         )
@@ -303,13 +311,36 @@ def _surface_nodes(model: DeckModel, surfaces: dict[str, Block], name: str, plac
     if name not in surfaces:
         raise _unknown(place, "surface", name, list(surfaces))
     block = surfaces[name]
-    if block.parameters.get("TYPE", "ELEMENT").upper() != "NODE":
-        raise input_error(
-            block.place,
-            "a cyclic face of element faces is not read",
-            "Define the surface with TYPE=NODE, from a node set.",
-        )
-    parts = [nodes_named(model, fields[0], where) for where, fields in block.rows()]
+    kind = block.parameters.get("TYPE", "ELEMENT").upper()
+    if kind == "NODE":
+        parts = [nodes_named(model, fields[0], where) for where, fields in block.rows()]
+    elif kind == "ELEMENT":
+        parts = [_face_nodes(model, fields, where) for where, fields in block.rows()]
+    else:
+        raise _unread(block, f"a surface of TYPE={kind} is not read")
     if not parts:
-        raise input_error(block.place, "holds no nodes", "List node sets.")
+        raise input_error(block.place, "holds no nodes", "List node sets or element faces.")
     return unique_in_order(np.concatenate(parts))
+
+
+def _face_nodes(model: DeckModel, fields: list[str], place: str) -> IntArray:
+    """Return the nodes of ``element or set, face``, e.g. ``SIDE, S3``."""
+    count = model.cells.shape[1] - 1
+    faces = TET_FACES if count in (4, 10) else HEX_FACES
+    face = fields[1].upper() if len(fields) > 1 else ""
+    if face not in {f"S{i}" for i in range(1, len(faces) + 1)}:
+        raise input_error(
+            place, f"{face!r} is no face of {model.element_type}", f"Write S1 to S{len(faces)}."
+        )
+    corners = faces[int(face[1:]) - 1]
+    edges = TET_EDGES if count == 10 else HEX_EDGES if count == 20 else ()
+    first = 4 if count == 10 else 8
+    middles = [first + i for i, ends in enumerate(edges) if set(ends) <= set(corners)]
+    if fields[0].upper() in model.element_sets:
+        numbers = model.element_sets[fields[0].upper()]
+    else:
+        numbers = np.array([whole_number(fields[0], place, "element")])
+    rows = model.cells[np.isin(model.cells[:, 0], numbers)]
+    if not len(rows):
+        raise _unknown(place, "element or element set", fields[0], list(model.element_sets))
+    return np.asarray(rows[:, [1 + i for i in (*corners, *middles)]].ravel(), dtype=np.int64)

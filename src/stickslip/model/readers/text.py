@@ -11,6 +11,7 @@ from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import did_you_mean, input_error
 
 TEXT_RATIO = 200  # text of numbers packs to a fifth; a file that grows more is no such text
+PIECE = 2**24  # characters that are parsed at a time
 SHOWN = 60  # characters of a line in a message
 CUT_SHORT = "The file was cut short: write or copy it again."
 
@@ -84,15 +85,21 @@ def number_table(
     InputError
         If a line holds something else; the message names the line and what stands there.
     """
-    if not text.strip():
-        return np.empty((0, columns))
-    try:
-        table = np.loadtxt(io.StringIO(text), delimiter=separator, comments=None, ndmin=2)
-    except (ValueError, OverflowError):
-        table = np.empty((0, 0))
-    if table.shape[1] != columns or not np.isfinite(table).all():
-        raise _blame(path, text, columns, separator, first_line)
-    return np.asarray(table)
+    tables = [np.empty((0, columns))]
+    start = 0
+    while start < len(text):  # in pieces, because a stream of text takes four times its memory
+        end = text.find("\n", start + PIECE) + 1 or len(text)
+        piece, start = text[start:end], end
+        if not piece.strip():
+            continue
+        try:
+            table = np.loadtxt(io.StringIO(piece), delimiter=separator, comments=None, ndmin=2)
+        except (ValueError, OverflowError):
+            table = np.empty((0, 0))
+        if table.shape[1] != columns or not np.isfinite(table).all():
+            raise _blame(path, text, columns, separator, first_line)
+        tables.append(table)
+    return np.vstack(tables)
 
 
 def _blame(
