@@ -7,6 +7,8 @@ import pytest
 import scipy.integrate
 import scipy.optimize
 import scipy.sparse
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from solid_models import beam_root, box, rigid_motions, without_sets
 
 from stickslip.errors import InputError, SingularError, StickslipError
@@ -72,6 +74,36 @@ def test_spin_softening_against_the_mass():
     M, S = solid.structure.mass, solid.spin_softening
     across = scipy.sparse.diags_array(np.tile([1.0, 1.0, 0.0], len(mesh.points)))
     assert abs(S - M @ across).max() == 0.0
+
+
+@settings(max_examples=20)
+@given(
+    direction=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1),
+    origin=st.tuples(*[st.floats(-1, 1)] * 3),
+    seed=st.integers(0, 99),
+)
+def test_every_axis_gives_skew_coriolis_and_softening_between_nothing_and_the_mass(
+    direction, origin, seed
+):
+    """0 ≤ vᵀSv ≤ vᵀMv, equal when v has no component along the axis; Coriolis forces do no work; shifts of the axis load evenly."""
+    mesh = box(8, SIZE, (2, 1, 1), 0.001)
+    axis = Axis(direction, origin)
+    solid = rotating_solid(mesh, STEEL, axis)
+    M, S, G = solid.structure.mass, solid.spin_softening, solid.coriolis
+    v = np.random.default_rng(seed).standard_normal((solid.structure.n // 3, 3))
+    across = (v - np.outer(v @ axis.unit, axis.unit)).ravel()
+    v = v.ravel()
+    energy = v @ (M @ v)
+    assert -1e-13 * energy <= v @ (S @ v) <= energy * (1 + 1e-13)
+    assert v @ (S @ v) == pytest.approx(across @ (M @ across), rel=1e-10)
+    assert abs(v @ (G @ v)) < 1e-13 * energy
+    through_zero = rotating_solid(mesh, STEEL, Axis(direction)).centrifugal
+    whole = assemble_solid(without_sets(mesh), STEEL).mass
+    shift = np.tile(axis.arm(np.zeros((1, 3)))[0], len(mesh.points))
+    expected = through_zero + (whole @ shift)[solid.moving]
+    np.testing.assert_allclose(
+        solid.centrifugal, expected, atol=1e-12 * max(np.abs(expected).max(), 1e-9)
+    )
 
 
 # ---- static displacement ------------------------------------------------------------------------------------------------

@@ -295,17 +295,14 @@ def check_shared(mesh: SolidMesh) -> None:
     edges = TET_EDGES if corners == 4 else HEX_EDGES
     ends = np.sort(mesh.cells[:, np.array(edges)].reshape(-1, 2), axis=1)
     middle = mesh.cells[:, corners:].ravel()
-    _, first, edge = np.unique(ends, axis=0, return_index=True, return_inverse=True)
+    key = ends[:, 0] * len(mesh.points) + ends[:, 1]
+    _, first, edge = np.unique(key, return_index=True, return_inverse=True)
     is_corner = np.zeros(len(mesh.points), dtype=bool)
     is_corner[mesh.cells[:, :corners]] = True
     # of all edges that a node is the middle of, the last one stays here: the others differ from it
     owner = np.zeros(len(mesh.points), dtype=np.int64)
-    owner[middle] = edge.ravel()
-    wrong = (
-        (middle[first][edge.ravel()] != middle)
-        | is_corner[middle]
-        | (owner[middle] != edge.ravel())
-    )
+    owner[middle] = edge
+    wrong = (middle[first][edge] != middle) | is_corner[middle] | (owner[middle] != edge)
     if wrong.any():
         cell, place = divmod(int(np.flatnonzero(wrong)[0]), len(edges))
         raise input_error(
