@@ -414,6 +414,11 @@ def test_summary_of_results_and_waves():
     summary = model_summary(results)
     assert summary.nodes == 32
     assert summary.frequencies_hz[0] == pytest.approx(18243.46074)
+    assert summary.cells == 2
+    assert summary.remarks == ("field DISP at 6 steps",)
+    ring = model_summary(read_model(DATA / "ring_modes.frd.gz", units=MM))
+    assert len(ring.frequencies_hz) == 14
+    assert ring.remarks[-1].endswith("modes: 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6")
     wave = model_summary(read_model(DATA / "ring2.sti.gz", units=MM), units=MM)
     assert wave.mass is None
     assert wave.symmetric

@@ -1,6 +1,7 @@
 """Open a file of a model, whichever of the readers it takes; and say what is in it."""
 
 import re
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -124,11 +125,23 @@ def model_summary(
     if isinstance(model, Deck):
         return _deck_summary(model, n_modes, units, say)
     if isinstance(model, FrdResults):
-        found = [f.frequency_hz for f in model.fields if f.frequency_hz is not None]
-        remarks = tuple(f"field {f.name} at step {f.step}" for f in model.fields)
-        return results_summary(model.nodes.numbers, model.nodes.points, found, remarks)
+        return _frd_summary(model)
     dofs = model.dofs
     return results_summary(dofs.node, dofs.position, list(model.frequencies_hz), ())
+
+
+def _frd_summary(results: FrdResults) -> ModelSummary:
+    """Count steps by field; the two parts of a mode at a wave number are one frequency."""
+    modes = {f.step: f for f in results.fields if f.frequency_hz is not None}
+    steps = Counter(f.name for f in results.fields)
+    remarks = [f"field {name} at {count} steps" for name, count in steps.items()]
+    diameters = [f.nodal_diameter for f in modes.values() if f.nodal_diameter is not None]
+    if diameters:
+        remarks.append("nodal diameters of the modes: " + ", ".join(map(str, diameters)))
+    found = [f.frequency_hz for f in modes.values() if f.frequency_hz is not None]
+    summary = results_summary(results.nodes.numbers, results.nodes.points, found, tuple(remarks))
+    cells = None if results.mesh is None else len(results.mesh.cells)
+    return replace(summary, cells=cells)
 
 
 def _deck_summary(deck: Deck, n_modes: int, units: Units, say: Say) -> ModelSummary:
