@@ -4,7 +4,7 @@ CalculiX prints seven digits, of which the last may be off by half: 5e-7 where t
 """
 
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ import scipy.sparse.linalg
 
 from stickslip.arrays import FloatArray, Matrix
 from stickslip.model.annulus import annular_sector
+from stickslip.model.axis import Axis
 from stickslip.model.deck import CalculixRun, write_deck
 from stickslip.model.elements import Quadrature
 from stickslip.model.mesh import SolidMesh
@@ -45,17 +46,20 @@ class Wheel:
     quadrature: Quadrature
     n_modes: int
     nodal_diameters: tuple[int, int]
+    axis: Axis = field(default_factory=Axis)
 
 
 def wheels() -> list[Wheel]:
     """Return the wheels: a bladed disk, one whose shrouds stick together, a plain ring of hexahedra."""
     ring = annular_sector(0.06, 0.20, 0.012, sectors=18, divisions=(4, 1, 1))
+    elsewhere = Axis((1.0, 0.0, 0.0), (0.1, -0.2, 0.3))
+    ring = replace(ring, points=ring.points[:, [2, 0, 1]] + elsewhere.origin)
     shrouded = stuck(mesh_sector(BladedSector(shroud=Shroud(gap=0.0), **SIZES)))
     four_points = Quadrature.calculix()
     return [
         Wheel("24 blades", mesh_sector(BladedSector(**SIZES)), 24, four_points, 6, (0, 12)),
         Wheel("24 blades, shrouds stuck", shrouded, 24, four_points, 4, (0, 4)),
-        Wheel("ring of C3D20", ring, 18, Quadrature(), 5, (0, 9)),
+        Wheel("ring of C3D20, axis elsewhere", ring, 18, Quadrature(), 5, (0, 9), elsewhere),
     ]
 
 
@@ -71,9 +75,9 @@ def our_frequencies(
     solid: RotatingSolid, wheel: Wheel, speed: float
 ) -> tuple[dict[int, FloatArray], FloatArray]:
     """Return nodal diameter -> frequencies in Hz, and the static displacement (nodes, 3)."""
-    tie = cyclic_sector(solid.structure, wheel.sectors).tie
+    tie = cyclic_sector(solid.structure, wheel.sectors, axis=wheel.axis).tie
     structure = solid.at_speed(speed, tie=tie) if speed else solid.structure
-    sector = cyclic_sector(structure, wheel.sectors)
+    sector = cyclic_sector(structure, wheel.sectors, axis=wheel.axis)
     low, high = wheel.nodal_diameters
     found = {
         k: natural_frequencies(travelling_wave(sector, k), wheel.n_modes)
@@ -88,11 +92,11 @@ def our_frequencies(
 def compare_wheel(wheel: Wheel, folder: Path) -> list[Record]:
     """Compare frequencies of all nodal diameters at rest and at speed, and the static displacement."""
     case, material, records = f"CalculiX: {wheel.name}", Material(), []
-    solid = rotating_solid(wheel.mesh, material, quadrature=wheel.quadrature)
+    solid = rotating_solid(wheel.mesh, material, wheel.axis, quadrature=wheel.quadrature)
     for where, speed in (("at rest", 0.0), ("at 8000 rpm", SPEED)):
         deck = folder / "wheel.inp"
         run = CalculixRun(n_modes=wheel.n_modes, nodal_diameters=wheel.nodal_diameters, speed=speed)
-        write_deck(wheel.mesh, material, deck, sectors=wheel.sectors, run=run)
+        write_deck(wheel.mesh, material, deck, sectors=wheel.sectors, axis=wheel.axis, run=run)
         printed = run_deck(deck)
         theirs = frequencies_hz(printed)
         ours, static = our_frequencies(solid, wheel, speed)
