@@ -13,9 +13,11 @@ from hypothesis import strategies as st
 
 from stickslip.errors import InputError
 from stickslip.model.axis import Axis
+from stickslip.model.dofs import Dofs
 from stickslip.model.solid import Material, assemble_solid
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
+from stickslip.reduction.turning import dof_rotation
 from stickslip.reduction.waves import Wave, excited_wave, to_sectors, to_waves, wave
 from stickslip.reduction.wheel import wheel, wheel_shape
 
@@ -314,3 +316,49 @@ def test_sets_and_names_of_the_wheel():
     assert wave_sets.dofs.take(wave_sets.dof_set("inner")).labels == own.labels
     assert wave_sets.dofs.component[-1] == "axis"
     assert travelling_wave(sector, 0).dofs.component[-1] == "z"
+
+
+def test_two_nodes_may_not_share_a_partner():
+    """With a tolerance beyond the distance of nodes the pairs are no longer one to one, and that is said."""
+    structure = random_sector(6, faces=3)
+    low = np.unique(structure.dofs.node[structure.dof_set("cyclic_low")])
+    position = structure.dofs.position.copy()
+    for node in low[1:]:
+        position[structure.dofs.node == node] = position[structure.dofs.node == low[0]]
+    piled = replace(structure, dofs=replace(structure.dofs, position=position))
+    with pytest.raises(InputError, match="cyclic_low' and 'cyclic_high'"):
+        cyclic_sector(piled, 6, tolerance=5.0)
+    with pytest.raises(InputError, match="several nodes of 'cyclic_low' lie at one place"):
+        cyclic_sector(piled, 6, tolerance=5.0)
+
+
+def test_axis_off_the_origin_matters():
+    structure = random_sector(6, axis=TILTED)
+    with pytest.raises(
+        InputError, match=r"2 of 2 nodes of 'cyclic_low'.*axis \(0.3, -0.4, 0.8\) through"
+    ):
+        cyclic_sector(structure, 6, axis=replace(TILTED, origin=(0.0, 0.0, 0.0)))
+
+
+def test_vectors_of_all_kinds_are_turned():
+    """Displacements and rotations of nodes and rigid bodies turn, modal coordinates do not."""
+    node = np.array([7, 7, 7, -1, -1, -1, -1, -1, -1, -1, 7, 7, 7])
+    component = ("x", "z", "y", "x", "y", "z", "mode", "rx", "ry", "rz", "rx", "ry", "rz")
+    position = np.zeros((13, 3))
+    position[3:10] = 1.0
+    position[6] = np.nan
+    dofs = Dofs(node, component, position)
+    R = TILTED.rotation(0.7)
+    turned = dense(dof_rotation(dofs, R, "test"))
+    where = [np.array([0, 2, 1]), np.array([3, 4, 5]), np.array([7, 8, 9]), np.array([10, 11, 12])]
+    for rows in where:
+        np.testing.assert_allclose(turned[np.ix_(rows, rows)], R)
+    assert turned[6, 6] == 1.0
+    assert np.count_nonzero(turned) == 4 * 9 + 1
+    np.testing.assert_allclose(turned @ turned.T, np.eye(13), atol=1e-15)
+
+
+def test_a_component_that_appears_twice_is_named():
+    dofs = Dofs(np.array([3, 3]), ("x", "x"), np.zeros((2, 3)))
+    with pytest.raises(InputError, match=r"node3.x appears twice"):
+        dof_rotation(dofs, np.eye(3), "test")

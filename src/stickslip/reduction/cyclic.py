@@ -102,7 +102,7 @@ class CyclicSector:
 
     @property
     def tie(self) -> Matrix:
-        """(n, m) real CSR matrix P_0 of displacements that all sectors have alike: ``u = tie @ q``."""
+        """Real CSR matrix P_0 (n, m) of the displacements ``tie @ q`` that all sectors have alike."""
         return self.wave_tie(0)
 
     def wave_tie(self, wave_number: int) -> Matrix:

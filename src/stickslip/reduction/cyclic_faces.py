@@ -90,7 +90,8 @@ def pair_faces(
         raise input_error("cyclic_sector", "nodes of the faces have no position", "Give positions.")
     size = float(np.max(np.ptp(points, axis=0), initial=0.0))
     reach = TOLERANCE * size if tolerance is None else tolerance
-    hub, low, high = _split(low, high, axis, reach if sectors > 1 else -1.0)
+    # a wide tolerance for partners draws no nodes to the axis
+    hub, low, high = _split(low, high, axis, TOLERANCE * size if sectors > 1 else -1.0)
     partner, ok = _match(low, high, 2 * math.pi / sectors, axis, reach)
     if not (ok.all() and len(set(partner.tolist())) == len(high.node)):
         raise _unmatched(low, high, sectors, axis, reach)
