@@ -36,7 +36,7 @@ class Modes:
 
     @property
     def frequencies_hz(self) -> FloatArray:
-        """(n,) in Hz; negative where the square is: the motion diverges instead of vibrating."""
+        """Frequencies (n,) in Hz; negative where the square is, since the motion then diverges."""
         return np.asarray(np.sign(self.squares) * np.sqrt(np.abs(self.squares)) / (2 * np.pi))
 
     @property
