@@ -420,6 +420,7 @@ def test_spoilt_words_never_do_more_than_raise(tmp_path_factory, place, word):
         ({13: 1}, r"unsymmetric matrices\. Turn gyroscopic"),
         ({20: 12}, r"12 constraint equations.*Remove CE, CP"),
         ({0: 4}, r"frontal solver"),
+        ({62: 1}, r"one part of a distributed analysis.*COMBINE,FULL"),
         ({33: 0}, r"lacks the mass or the stiffness"),
         ({1: 10**9}, r"tells of 1000000000 equations"),
         ({8: 2}, r"stiffness matrix: has 9 terms or more, should have 2"),

@@ -68,6 +68,24 @@ def test_matrices_of_the_a_set_have_the_eigenvalues_that_nastran_found(samples, 
     assert np.isfinite(structure.dofs.position[~modal]).all()
 
 
+def test_external_superelement_is_the_one_that_was_assembled(samples):
+    folder = samples / "nas2cam_extseout"
+    external = read_nastran_op4(
+        folder / "inboard.op4",
+        mass="mxx",
+        stiffness="kxx",
+        geometry=folder / "inboard.asm",
+        dof_set="a",
+        plausible=False,
+    )
+    assert external.n == 32  # four grids, eight modal coordinates
+    assert external.dofs.component[-8:] == ("mode",) * 8
+    # grid 11 has axes of its own: only turned back does the free part carry no force in rigid motion
+    motions = rigid_motions(external.dofs)
+    scale = abs(external.stiffness).max() * np.linalg.norm(external.dofs.position[0])
+    assert abs(external.stiffness[:24, :24] @ motions[:24]).max() < 1e-13 * scale  # else 1e-2
+
+
 def rigid_motions(dofs):
     """Return the six rigid motions (n, 6) of a table of coordinates along the global axes."""
     motions = np.zeros((len(dofs), 6))

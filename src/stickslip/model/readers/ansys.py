@@ -97,12 +97,14 @@ def _supported(file: Records, header: IntArray) -> int:
         "was written by the frontal solver": header[0] >= 0,
         "holds a lumped mass matrix": header[10] != 0,
         "holds unsymmetric matrices": header[13] != 0,
+        "is one part of a distributed analysis": header[62] != 0,
         f"holds {header[20]} constraint equations, apart from the matrices": header[20] != 0,
     }
     remedies = (
         "Use a sparse solver: MODOPT,LANB.",
         "Run again after LUMPM,OFF.",
         "Turn gyroscopic terms (CORIOLIS) and other unsymmetric ones off: this package makes its own.",
+        "Give the combined file (COMBINE,FULL), or solve on shared memory (-smp).",
         "Remove CE, CP and MPC contacts, or tie the parts by common nodes.",
     )
     for (problem, found), remedy in zip(refused.items(), remedies, strict=True):

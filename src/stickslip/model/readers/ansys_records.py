@@ -107,7 +107,7 @@ class Records:
             raise input_error(
                 f"{self.path}: {what}",
                 "is packed with zlib, which this reader does not unpack",
-                "Write the file again after /FCOMP,ALL,0.",
+                "Write the file again after /FCOMP,RST,0.",
             )
         if flags & (WINDOWS | BITS) and len(words) < 2:
             raise self.damaged(what, "is packed, but shorter than the head of a packed record")

@@ -69,10 +69,11 @@ def read_nastran_op4(
         Names of the matrices, e.g. ``"maa"`` and ``"kaa"``; where several have the same name, ``"maa[0]"`` is the first
         and ``"maa[-1]"`` the last.
     geometry
-        The ``.op2`` file or the bulk data of the same model, for the degrees of freedom and the positions.
+        The ``.op2`` file, the bulk data or the ``.asm`` file (``EXTSEOUT``) of the same model, for the degrees of
+        freedom and the positions.
     dof_set
         Nastran's set that the matrices belong to: ``"g"``, ``"f"``, ``"a"`` ...; sets other than ``"g"`` need an ``.op2``
-        file with the table ``USET``.
+        file with the table ``USET``, or an ``.asm`` file, which knows its a-set.
     units
         Unit system of the model, SI by default: the files do not say.
     plausible

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
+from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import did_you_mean, input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.readers.nastran_library import (
@@ -84,7 +84,7 @@ class NastranDofs:
 
 
 def read_nastran_dofs(path: Path | str) -> NastranDofs:
-    """Read the degrees of freedom of a model from an ``.op2`` file or from bulk data.
+    """Read the degrees of freedom of a model from an ``.op2`` file, bulk data or the ``.asm`` file of ``EXTSEOUT``.
 
     ``INCLUDE`` is not followed.
 
@@ -94,37 +94,49 @@ def read_nastran_dofs(path: Path | str) -> NastranDofs:
         If the file is damaged or holds no grids.
     """
     path = existing_file(path)
-    if is_binary(path):
+    binary = is_binary(path)
+    if binary:
         check_records(path)
-        with reading(path):
-            table, known = _table_of_op2(path)
-    else:
-        bulk = nastran_library("bulk")
-        with reading(path):
-            table, known = bulk.bulk2uset(str(path), follow_includes=False)[0], False
+    with reading(path):
+        table, sets = _table_of_op2(path) if binary else _table_of_bulk(path)
     if table is None or not len(table):
         raise input_error(
             str(path),
             "holds no grids",
             "Give bulk data with GRID cards, or an .op2 file written with PARAM,POST,-1.",
         )
-    ids = np.asarray(table.index.get_level_values(0), dtype=np.int64)
-    components = np.asarray(table.index.get_level_values(1), dtype=np.int64)
     with reading(path):
-        return _dofs(ids, components, table, known, str(path))
+        return _dofs(table, sets, str(path))
 
 
-def _table_of_op2(path: Path) -> tuple[Any, bool]:
-    """Return pyYeti's table of the g-set of the residual structure, and whether it has set membership."""
+def _table_of_op2(path: Path) -> tuple[Any, dict[str, IntArray]]:
+    """Return pyYeti's table of the g-set of the residual structure, and the sets that the file tells of."""
     with nastran_library("op2").OP2(str(path)) as file:
         names = {str(name) for name in file.dbnames}
         if names & {"SUPERID", "EMAP", "EMAPS", "SLIST"}:  # the alter NAS2CAM wrote it
-            return file.rdn2cop2()["uset"].get(0), True
-        found = file.rdparampost(get_mats=False, get_dr_tables=False)
-    return found.get("uset"), any(name.startswith("USET") for name in names)
+            table = file.rdn2cop2()["uset"].get(0)
+        else:
+            table = file.rdparampost(get_mats=False, get_dr_tables=False).get("uset")
+    if table is None or not any(name.startswith("USET") for name in names):
+        return table, {}
+    member = np.asarray(table["nasset"], dtype=np.int64)
+    masks = nastran_library("n2p").mkusetmask()
+    return table, {name: np.flatnonzero(member & int(mask)) for name, mask in masks.items()}
 
 
-def _dofs(ids: IntArray, components: IntArray, table: Any, known: bool, place: str) -> NastranDofs:
+def _table_of_bulk(path: Path) -> tuple[Any, dict[str, IntArray]]:
+    """Return pyYeti's table of all grids; of an external superelement (``.asm``) also its a-set, in its own order."""
+    bulk = nastran_library("bulk")
+    if path.suffix.lower() != ".asm":
+        return bulk.bulk2uset(str(path), follow_includes=False)[0], {}
+    # which components the grids keep stands in the .pch file beside it
+    table, _, _, kept = bulk.asm2uset(str(path), try_rdextrn="pv_only", follow_includes=False)
+    return table, {"a": np.flatnonzero(kept)}
+
+
+def _dofs(table: Any, sets: dict[str, IntArray], place: str) -> NastranDofs:
+    ids = np.asarray(table.index.get_level_values(0), dtype=np.int64)
+    components = np.asarray(table.index.get_level_values(1), dtype=np.int64)
     values = np.asarray(table[["x", "y", "z"]], dtype=float)
     points = np.full((len(ids), 3), np.nan)
     first = np.flatnonzero(components == 1)
@@ -133,11 +145,7 @@ def _dofs(ids: IntArray, components: IntArray, table: Any, known: bool, place: s
     turns = np.array([_axes(values[row : row + 6], int(ids[row]), place) for row in first])
     own = (np.abs(turns.reshape(-1, 3, 3) - np.eye(3)) > 1e-14).any(axis=(1, 2))
     order = np.argsort(ids[first[own]])
-    sets: dict[str, IntArray] = {"g": np.arange(len(ids))}
-    if known:
-        member = np.asarray(table["nasset"], dtype=np.int64)
-        masks = nastran_library("n2p").mkusetmask()
-        sets |= {name: _members(member, int(mask)) for name, mask in masks.items() if name != "p"}
+    sets = {"g": np.arange(len(ids)), **sets}
     return NastranDofs(
         ids,
         components,
@@ -147,11 +155,6 @@ def _dofs(ids: IntArray, components: IntArray, table: Any, known: bool, place: s
         {name: rows for name, rows in sets.items() if len(rows)},
         place,
     )
-
-
-def _members(member: IntArray, mask: int) -> IntArray:
-    inside: BoolArray = (member & mask) != 0
-    return np.flatnonzero(inside)
 
 
 def _axes(rows: FloatArray, grid: int, place: str) -> FloatArray:
