@@ -141,7 +141,8 @@ def _unmatched(low: Face, high: Face, sectors: int, axis: Axis, reach: float) ->
     pitch = 360 / sectors
     names = f"{low.name!r} and {high.name!r}"
     found = _angle_between(low, high, axis)
-    if len(low.node) == len(high.node) and _match(low, high, found, axis, reach)[1].all():
+    partner, ok = _match(low, high, found, axis, reach)
+    if ok.all() and len(set(partner.tolist())) == len(low.node) == len(high.node):
         degrees = math.degrees(found)
         if math.isclose(degrees, -pitch, abs_tol=1e-3 * pitch):
             return input_error(
@@ -172,10 +173,9 @@ def _missing(here: Face, there: Face, angle: float, axis: Axis, reach: float) ->
     """List the nodes of one face whose turned position no node of the other has."""
     distance, nearest = _nearest(axis.turned(here.position, angle), there.position)
     lost = np.flatnonzero(distance > reach)
-    if not lost.size and len(here.node) <= len(there.node):
-        return ""
     if not lost.size:
-        return f"several nodes of {here.name!r} lie at one place of {there.name!r}; "
+        shared = np.unique(nearest).size < nearest.size
+        return f"several nodes of {here.name!r} meet one of {there.name!r}; " if shared else ""
     named = [_one_missing(here, there, i, distance[i], nearest[i]) for i in lost[:LISTED]]
     more = f", and {lost.size - LISTED} more" if lost.size > LISTED else ""
     return (
