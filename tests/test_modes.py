@@ -122,6 +122,16 @@ def test_a_free_body_has_six_rigid_modes_and_no_more():
     np.testing.assert_array_equal(natural_frequencies(structure(M, K, dofs), 6), 0.0)
 
 
+def test_a_free_body_without_a_shift_is_named():
+    points, K = grid((10, 6, 5))
+    dofs = nodal_dofs(points, np.arange(len(points)))
+    M = scipy.sparse.eye_array(len(dofs), format="csr")
+    with pytest.raises(
+        SingularError, match=r"normal_modes: one body is not held.*300 nodes.*rotation about z"
+    ):
+        normal_modes(structure(M, K, dofs), 3, shift=0.0)
+
+
 @pytest.mark.parametrize("spring", [1e-9, 1.0])
 def test_a_weak_support_is_not_taken_for_a_rigid_motion(spring):
     """Its frequency is that of the whole mass on the spring, to the ratio of the stiffnesses."""

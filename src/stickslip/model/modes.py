@@ -8,9 +8,10 @@ import scipy.sparse
 import scipy.sparse.csgraph
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
-from stickslip.errors import input_error
+from stickslip.errors import SingularError, input_error
 from stickslip.model.factorisation import DENSE, Say, Solve, factorise, silent
 from stickslip.model.lanczos import lanczos
+from stickslip.model.rigid_motion import refuse_unheld
 from stickslip.model.structure import Structure
 
 RIGID = (
@@ -59,7 +60,8 @@ def normal_modes(
         At least one, at most the number of dofs with mass.
     shift
         In rad²/s², at most the lowest square; the matrix ``K − shift M`` is factorised. By default
-        slightly below zero, so that a free body gives no singular matrix.
+        slightly below zero, so that a free body gives no singular matrix. Modes with negative
+        squares are found where these are nearer to it than the n-th.
     say
         Called with a sentence before each long step.
 
@@ -80,7 +82,7 @@ def normal_modes(
         count = min(n, int(np.count_nonzero(M.diagonal())))
         if not count:
             continue
-        solve = None if _small(K, count) else factorise(K - shift * M, say=say)
+        solve = None if _small(K, count) else _factorised(structure, part, K - shift * M, say)
         say(f"{count} modes of {len(part)} dofs")
         values, vectors = lowest_modes(K, M, count, solve, shift)
         values[_strain_share(K, vectors) < RIGID] = 0.0
@@ -90,6 +92,15 @@ def normal_modes(
         shapes.append(whole)
     lowest = np.argsort(np.concatenate(squares), kind="stable")[:n]
     return Modes(np.concatenate(squares)[lowest], np.hstack(shapes)[:, lowest])
+
+
+def _factorised(structure: Structure, part: IntArray, matrix: Matrix, say: Say) -> Solve:
+    """Factorise the matrix of a body; where it is singular, say how the body can move."""
+    try:
+        return factorise(matrix, say=say)
+    except SingularError:
+        refuse_unheld(matrix, structure.dofs.take(part), "normal_modes")
+        raise
 
 
 def natural_frequencies(structure: Structure, n: int) -> FloatArray:
