@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from validation import case_b9_friction_ring
 
 # benchmark B9: Laxalde et al. 2007, frequencies in Hz by nodal diameter, without the ring
 LAXALDE = {
@@ -69,6 +70,13 @@ def test_whole_blisk_has_the_frequencies_of_its_waves(blisk):
     np.testing.assert_allclose(
         np.sort(np.concatenate([t.ravel() for t in twice])), whole, rtol=1e-9
     )
+
+
+def test_friction_ring_on_the_whole_wheel_is_the_published_sector():
+    # temporal harmonic 3 must have found wave number 6 by itself: with wave number 2 for all the amplitude is 3 % less
+    wheel = case_b9_friction_ring.damped_wheel()
+    tips = case_b9_friction_ring.tips(wheel, 4.0, 624.0, 3)
+    np.testing.assert_allclose(tips, 1.65892122e-5, rtol=1e-6)
 
 
 def test_ring_of_blades_tuned_and_mistuned():
