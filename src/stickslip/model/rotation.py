@@ -84,13 +84,13 @@ class RotatingSolid:
 
     @cached_property
     def spin_softening(self) -> Matrix:
-        """(n, n) S in kg: rotation takes ``Ω² S`` off the stiffness."""
+        """(n, n) S in kg; rotation takes ``Ω² S`` off the stiffness."""
         perpendicular = -self.axis.cross @ self.axis.cross
         return self._of_mass(perpendicular)
 
     @cached_property
     def coriolis(self) -> Matrix:
-        """(n, n) skew G in kg: rotation adds ``2 Ω G`` to the damping."""
+        """(n, n) skew G in kg; rotation adds ``2 Ω G`` to the damping."""
         return self._of_mass(self.axis.cross)
 
     def _of_mass(self, block: FloatArray) -> Matrix:
