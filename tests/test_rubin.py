@@ -174,6 +174,17 @@ def test_free_chain_without_geometry():
     assert space_gap(small.basis, from_all_modes(floating, np.array([0, 19]), 4)) < 1e-9
 
 
+def test_a_free_body_whose_frequencies_lie_far_apart():
+    """One spring a hundred million times as stiff as the others: shifts meant for it drown the elastic modes."""
+    stiffness = 2 * np.eye(40) - np.eye(40, k=1) - np.eye(40, k=-1)
+    stiffness[0, 0] = stiffness[39, 39] = 1.0
+    stiffness[20:22, 20:22] += 1e8 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    floating, keep = lumped(np.ones(40), stiffness), np.array([0, 39])
+    for count in (1, 2, 5):
+        small = rubin(floating, keep, count)
+        assert space_gap(small.basis, from_all_modes(floating, keep, count)) < 1e-6
+
+
 def test_several_bodies_of_which_one_is_free():
     stiffness = 100.0 * (2 * np.eye(9) - np.eye(9, k=1) - np.eye(9, k=-1))
     stiffness[0, 0] = stiffness[8, 8] = 100.0
@@ -227,7 +238,7 @@ def test_rubin_needs_fewer_modes_than_craig_bampton_where_contacts_stick(held):
     assert worst[rubin] < 0.3 * worst[craig_bampton]
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(seed=st.integers(0, 300), count=st.integers(0, 6), mirror=st.booleans(), k=st.integers(0, 2))
 def test_rotation_and_mirror_change_nothing(seed, count, mirror, k):
     """In turned or mirrored axes the reduced model has the same frequencies and the same estimated errors."""
@@ -250,7 +261,7 @@ def test_rotation_and_mirror_change_nothing(seed, count, mirror, k):
         np.testing.assert_allclose(*errors, rtol=1e-5, atol=1e-12)
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(
     seed=st.integers(0, 300),
     k=st.integers(0, 2),

@@ -9,10 +9,12 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+import scipy.linalg
 
 from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import SingularError, input_error
-from stickslip.model.factorisation import Say, silent
+from stickslip.model.factorisation import Say, Solve, factorise, silent
+from stickslip.model.modes import submatrix
 from stickslip.model.structure import Structure
 from stickslip.reduction.bodies import Body, BodyModes, loose_bodies, lowest_of, modes_up_to
 from stickslip.reduction.projection import BLOCK, in_coordinates, kept_dofs, with_modal_dofs
@@ -20,8 +22,6 @@ from stickslip.reduction.selection import surviving_sets
 from stickslip.reduction.truncation import FrequencyError, ModesBelow
 
 DEPENDENT = 1e-8  # smallest eigenvalue of the scaled residual flexibility of the retained dofs
-REFINEMENTS = 50
-STALLED = 0.9  # of the residual before: only rounding is left
 NAMED = 4  # dofs that a message names
 
 
@@ -108,35 +108,39 @@ def _residual_flexibility(
         place = np.full(structure.n, -1)
         place[body.dofs] = np.arange(body.dofs.size)
         mine = np.flatnonzero(place[keep] >= 0)
-        _, shapes = modes.of(i)
+        which, shapes = modes.of(i)
+        if not mine.size:
+            continue
+        solve = _static_solve(body, shapes[:, modes.squares[which] == 0], say)
         for first in range(0, mine.size, BLOCK):
             some = mine[first : first + BLOCK]
             load = np.zeros((body.dofs.size, some.size), dtype=kind)
             load[place[keep[some]], np.arange(some.size)] = 1.0
-            R[np.ix_(body.dofs, some)] = _answer(body, shapes, load)
+            R[np.ix_(body.dofs, some)] = _answer(body, solve, shapes, load)
     return R
 
 
-def _answer(body: Body, shapes: Matrix, load: Matrix) -> Matrix:
-    """Return the static displacement under the part of `load` that the modes `shapes` do not answer.
+def _static_solve(body: Body, rigid: Matrix, say: Say) -> Solve:
+    """Return what answers loads in equilibrium: of a free body, with as many dofs held as it has rigid motions."""
+    if body.shift == 0:
+        return body.solve
+    order = scipy.linalg.qr(rigid.conj().T, mode="r", pivoting=True)[1]
+    loose = np.sort(order[rigid.shape[1] :])  # the first ones determine the rigid motions best
+    inner = factorise(submatrix(body.stiffness, loose, loose), say=say)
 
-    The factorised matrix of a free body has a small shift; refinement takes its effect away.
-    """
+    def solve(load: Matrix) -> Matrix:
+        answer = np.zeros_like(load)
+        answer[loose] = inner(load[loose])
+        return answer
+
+    return solve
+
+
+def _answer(body: Body, solve: Solve, shapes: Matrix, load: Matrix) -> Matrix:
+    """Return the static displacement under the part of `load` that the modes `shapes` do not answer."""
     heavy = body.mass @ shapes
-    load = load - heavy @ (shapes.conj().T @ load)
-    answer = np.zeros_like(load)
-    rest, size = load, np.inf
-    for _ in range(REFINEMENTS):
-        answer = answer + body.solve(rest)
-        answer = answer - shapes @ (heavy.conj().T @ answer)
-        if body.shift == 0:
-            break
-        rest = load - body.stiffness @ answer
-        rest = rest - heavy @ (shapes.conj().T @ rest)
-        before, size = size, float(np.linalg.norm(rest))
-        if size > STALLED * before:
-            break
-    return answer
+    answer = solve(load - heavy @ (shapes.conj().T @ load))
+    return np.asarray(answer - shapes @ (heavy.conj().T @ answer))
 
 
 def _basis(

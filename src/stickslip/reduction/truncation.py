@@ -157,7 +157,8 @@ def errors_of(
         r = residual[body.dofs]
         y = body.solve(r)
         first += np.sum((r.conj() * y).real, axis=0)
-        second += squares * np.sum((y.conj() * (body.mass @ y)).real, axis=0)
+        # the series begins at the shift of a free body
+        second += (squares - body.shift) * np.sum((y.conj() * (body.mass @ y)).real, axis=0)
     ratio = np.divide(second, first, out=np.zeros_like(first), where=first > 0)
     too_high = first / np.maximum(1.0 - ratio, 0.5)  # beyond a half the series says little
     elastic = squares > 0
