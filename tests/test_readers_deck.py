@@ -110,6 +110,42 @@ def test_two_materials_are_assembled_each_with_its_own(tmp_path):
     assert np.sum(natural_frequencies(structure, 7) == 0) == 6
 
 
+def test_a_deck_with_one_part_as_abaqus_writes_it(tmp_path):
+    nodes, rest = CUBE.split("*ELEMENT")
+    cells, rest = rest.split("*NSET", maxsplit=1)
+    material = rest.split("*MATERIAL")[1].split("*SOLID")[0]
+    text = (
+        f'*Part, name=Part-1\n{nodes}*ELEMENT{cells}*Solid Section, elset=Eall, material="Steel"\n,\n*End Part\n'
+        "*Assembly, name=Assembly\n*Instance, name=Part-1-1, part=Part-1\n*End Instance\n"
+        '*Nset, nset="Bottom face", instance=Part-1-1, generate\n 1, 4, 1\n*End Assembly\n'
+        f'*MATERIAL{material}*Boundary\n"Bottom face", ENCASTRE\n'
+    )
+    deck = deck_of(tmp_path, text)
+    assert assemble_deck(deck).n == 12
+    moved = text.replace("part=Part-1\n*End", "part=Part-1\n 0., 0., 5.\n*End")
+    with pytest.raises(InputError, match="several instances, or a moved one"):
+        deck_of(tmp_path, moved)
+
+
+def test_elements_that_are_not_read_can_be_left_out(tmp_path):
+    text = CUBE + "*ELEMENT, TYPE=SPRING1, ELSET=SPR\n77, 7\n"
+    with pytest.raises(InputError, match="elements of type SPRING1 are not read"):
+        deck_of(tmp_path, text)
+    deck = deck_of(tmp_path, text, ignore=("ELEMENT",))
+    assert any("SPRING1" in entry for entry in deck.ignored)
+    assert len(deck.mesh.cells) == 1
+    reduced = deck_of(tmp_path, CUBE.replace("TYPE=C3D8,", "TYPE=C3D8R,"))
+    assert any("C3D8R" in entry for entry in reduced.ignored)
+
+
+def test_node_sets_of_elements(tmp_path):
+    text = CUBE.split("*BOUNDARY", maxsplit=1)[0] + "*NSET, NSET=SKIN, ELSET=EALL\n"
+    deck = deck_of(tmp_path, text)
+    assert deck.mesh.numbers[deck.mesh.node_sets["SKIN"]].tolist() == list(range(1, 9))
+    with pytest.raises(InputError, match=r"no element set 'EAL'. Did you mean 'EALL'"):
+        deck_of(tmp_path, text.replace("ELSET=EALL\n", "ELSET=EAL\n"))
+
+
 def test_rotation_and_axis(tmp_path):
     load = "*STEP\n*STATIC\n*DLOAD\nEall, CENTRIF, 1.E4, 0.1, 0., 0., 1., 0., 0.\nEALL, GRAV, 9.81, 0.,0.,-1.\n*END STEP\n"
     deck = deck_of(tmp_path, CUBE + load, units=Units(1.0, 1.0, 0.5))

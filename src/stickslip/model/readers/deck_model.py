@@ -1,7 +1,7 @@
 """What a CalculiX or Abaqus deck says: cells, materials, boundary conditions, rotation, cyclic symmetry."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -93,14 +93,15 @@ def interpret(blocks: list[Block], nodes: NodeTable, ignore: tuple[str, ...]) ->
         If something is missing, wrong, or changes the matrices in a way that is not read.
     """
     model = DeckModel(nodes)
-    _cells(model, blocks)
     passed = {" ".join(word.upper().strip("* ").split()) for word in ignore}
+    _cells(model, blocks, passed)
+    _nodes_of_elements(model, blocks)
     material = ""
     for block in blocks:
         word = block.keyword
         if word == "MATERIAL":
             material = block.parameter("NAME").upper()
-        elif word in passed:
+        elif word in passed and word != "ELEMENT":
             model.ignored.append(f"*{word} ({block.path.name}: line {block.line}), as asked")
         elif word in REFUSED:
             raise _unread(block, f"*{word} changes the model and is not read")
@@ -122,13 +123,18 @@ def _unread(block: Block, problem: str) -> InputError:
     )
 
 
-def _cells(model: DeckModel, blocks: list[Block]) -> None:
+def _cells(model: DeckModel, blocks: list[Block], passed: set[str]) -> None:
     """Take elements, all with the same count of nodes, and the element sets."""
     parts, named = [], dict[str, list[IntArray]]()
     for block in blocks:
         if block.keyword != "ELEMENT":
             continue
         kind = block.parameter("TYPE").upper()
+        if kind not in NODES_OF and "ELEMENT" in passed:
+            model.ignored.append(
+                f"elements {kind} ({block.path.name}: line {block.line}), as asked"
+            )
+            continue
         if kind not in NODES_OF:
             raise _unread(block, f"elements of type {kind} are not read")
         count = NODES_OF[kind]
@@ -156,6 +162,21 @@ def _cells(model: DeckModel, blocks: list[Block]) -> None:
     model.element_sets = members(
         blocks, "ELSET", model.cells[:, 0], {name: np.concatenate(p) for name, p in named.items()}
     )
+
+
+def _nodes_of_elements(model: DeckModel, blocks: list[Block]) -> None:
+    """Add the node sets that ``*NSET, NSET=…, ELSET=…`` takes from elements."""
+    sets = dict(model.nodes.node_sets)
+    for block in blocks:
+        if block.keyword == "NSET" and "ELSET" in block.parameters:
+            elements = block.parameter("ELSET").upper()
+            if elements not in model.element_sets:
+                raise _unknown(block.place, "element set", elements, list(model.element_sets))
+            rows = model.cells[np.isin(model.cells[:, 0], model.element_sets[elements]), 1:]
+            name = block.parameter("NSET").upper()
+            known = sets.get(name, np.empty(0, dtype=np.int64))
+            sets[name] = unique_in_order(np.concatenate([known, np.sort(rows.ravel())]))
+    model.nodes = replace(model.nodes, node_sets=sets)
 
 
 def _connectivity(block: Block, count: int) -> Iterator[list[int]]:
@@ -291,7 +312,8 @@ _ACTIONS = {
 def _cyclic(model: DeckModel, blocks: list[Block], passed: set[str]) -> None:
     """Take the faces of the cyclic tie; refuse other ties."""
     instances = [b for b in blocks if b.keyword == "INSTANCE"]
-    if len(instances) > 1 or any(list(b.rows()) for b in instances):
+    moved = len(instances) > 1 or any(list(b.rows()) for b in instances)
+    if moved and "INSTANCE" not in passed:
         raise _unread(instances[-1], "several instances, or a moved one, are not read")
     surfaces = {b.parameter("NAME").upper(): b for b in blocks if b.keyword == "SURFACE"}
     for block in blocks:
@@ -317,7 +339,9 @@ def _surface_nodes(model: DeckModel, surfaces: dict[str, Block], name: str, plac
     elif kind == "ELEMENT":
         parts = [_face_nodes(model, fields, where) for where, fields in block.rows()]
     else:
-        raise _unread(block, f"a surface of TYPE={kind} is not read")
+        raise input_error(
+            block.place, f"a surface of TYPE={kind} is not read", "Use TYPE=NODE or ELEMENT."
+        )
     if not parts:
         raise input_error(block.place, "holds no nodes", "List node sets or element faces.")
     return unique_in_order(np.concatenate(parts))

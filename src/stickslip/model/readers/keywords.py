@@ -61,7 +61,7 @@ class Block:
         for segment in self.segments:
             for number, line in enumerate(segment.text.splitlines(), segment.first_line):
                 if line.strip():
-                    fields = [part.strip() for part in line.strip().rstrip(",").split(",")]
+                    fields = [part.strip(' \t"') for part in line.strip().rstrip(",").split(",")]
                     yield f"{segment.path}: line {number}", fields
 
     def table(self, columns: int) -> FloatArray:
@@ -141,7 +141,7 @@ def members(
     Returns
     -------
     dict
-        Upper case name -> numbers, each once.
+        Upper case name -> numbers, each once; ``*NSET, ELSET=`` is left to who knows the elements.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def members(
     known = np.sort(numbers)
     parts = {name: [listed] for name, listed in named.items()}
     for block in blocks:
-        if block.keyword == kind:
+        if block.keyword == kind and not (kind == "NSET" and "ELSET" in block.parameters):
             name = block.parameter(kind).upper()
             parts.setdefault(name, []).extend(_listed(block, parts, known))
     return {
