@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from stickslip.contact.laws.regularised_coulomb import RegularisedCoulomb
     from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
     from stickslip.contact.laws.unilateral_spring import UnilateralSpring
-    from stickslip.contact.neighbours import neighbour_interface
+    from stickslip.contact.neighbours import neighbour_gaps, neighbour_interface
     from stickslip.contact.pairing import (
         Pairing,
         node_to_node,
@@ -92,6 +92,7 @@ if TYPE_CHECKING:
         ModesBelow,
         frequency_errors,
     )
+    from stickslip.reduction.tuned_wheel import TunedWheel, tuned_wheel
     from stickslip.reduction.waves import Wave, excited_wave, to_sectors, to_waves, wave
     from stickslip.reduction.wheel import wheel, wheel_shape
     from stickslip.report.page import write_report
@@ -138,7 +139,7 @@ _MODULES = {
     "stickslip.contact.laws.regularised_coulomb": ("RegularisedCoulomb",),
     "stickslip.contact.laws.rigid_coulomb": ("RigidCoulomb",),
     "stickslip.contact.laws.unilateral_spring": ("UnilateralSpring",),
-    "stickslip.contact.neighbours": ("neighbour_interface",),
+    "stickslip.contact.neighbours": ("neighbour_gaps", "neighbour_interface"),
     "stickslip.contact.pairing": (
         "Pairing",
         "node_to_node",
@@ -203,6 +204,7 @@ _MODULES = {
         "ModesBelow",
         "frequency_errors",
     ),
+    "stickslip.reduction.tuned_wheel": ("TunedWheel", "tuned_wheel"),
     "stickslip.reduction.waves": ("Wave", "excited_wave", "to_sectors", "to_waves", "wave"),
     "stickslip.reduction.wheel": ("wheel", "wheel_shape"),
     "stickslip.report.page": ("write_report",),
@@ -246,24 +248,25 @@ __all__ = [
     "Quadrature", "ReducedWheel", "RegularisedCoulomb", "RigidBody", "RigidCoulomb", "RigidPoint",
     "RotatingSolid", "Safe", "Shroud", "Signals", "SingularError", "SolidMesh", "SpeedPolynomial",
     "Status", "StickslipError", "Structure", "Study", "Surface", "Sweep", "System", "TimeStepping",
-    "TransientResult", "UniformBand", "UnilateralSpring", "Units", "Wave", "__version__",
-    "accepted_points", "annular_sector", "assemble_deck", "assemble_solid", "beam", "blade_ring",
-    "blisk_with_ring", "branch_in_parameter", "cached", "campbell", "chain", "check_law",
-    "compile_contacts", "condense", "contact_forces", "craig_bampton", "cyclic_campbell",
-    "cyclic_sector", "drift", "dynamic_lagrangian", "excited_wave", "fields", "forced_problem",
-    "forced_response", "frequency_errors", "gap_operator", "gyroscopic_modes", "harmonic_balance",
-    "in_relative_coordinates", "integrate", "join", "law_kernel", "load_structure", "lumped",
-    "mesh_blade_pair", "mesh_sector", "mistuned_blade_ring", "modal_damping", "model_summary",
-    "natural_frequencies", "neighbour_interface", "newton", "nodal_diameter_map", "nodal_surface",
-    "node_to_node", "node_to_segment", "normal_modes", "paired_interface", "preload",
-    "rayleigh_damping", "read_abaqus_matrices", "read_ansys_archive", "read_ansys_full",
-    "read_ansys_materials", "read_ansys_results", "read_calculix_matrices", "read_deck", "read_frd",
-    "read_matrix_files", "read_model", "read_nastran_dmig", "read_nastran_op2", "read_nastran_op4",
-    "read_study", "reduce_interface", "reduced_wheel", "rigid_response", "rigid_surface",
-    "rotating_beam", "rotating_solid", "rubin", "run_study", "safe", "save_structure",
-    "segment_to_segment", "signals", "smallest_peak", "structural_damping", "structure_surface",
-    "to_sectors", "to_waves", "track_peak", "travelling_wave", "wave", "wheel", "wheel_shape",
-    "write_deck", "write_mesh", "write_report",
+    "TransientResult", "TunedWheel", "UniformBand", "UnilateralSpring", "Units", "Wave",
+    "__version__", "accepted_points", "annular_sector", "assemble_deck", "assemble_solid", "beam",
+    "blade_ring", "blisk_with_ring", "branch_in_parameter", "cached", "campbell", "chain",
+    "check_law", "compile_contacts", "condense", "contact_forces", "craig_bampton",
+    "cyclic_campbell", "cyclic_sector", "drift", "dynamic_lagrangian", "excited_wave", "fields",
+    "forced_problem", "forced_response", "frequency_errors", "gap_operator", "gyroscopic_modes",
+    "harmonic_balance", "in_relative_coordinates", "integrate", "join", "law_kernel",
+    "load_structure", "lumped", "mesh_blade_pair", "mesh_sector", "mistuned_blade_ring",
+    "modal_damping", "model_summary", "natural_frequencies", "neighbour_gaps",
+    "neighbour_interface", "newton", "nodal_diameter_map", "nodal_surface", "node_to_node",
+    "node_to_segment", "normal_modes", "paired_interface", "preload", "rayleigh_damping",
+    "read_abaqus_matrices", "read_ansys_archive", "read_ansys_full", "read_ansys_materials",
+    "read_ansys_results", "read_calculix_matrices", "read_deck", "read_frd", "read_matrix_files",
+    "read_model", "read_nastran_dmig", "read_nastran_op2", "read_nastran_op4", "read_study",
+    "reduce_interface", "reduced_wheel", "rigid_response", "rigid_surface", "rotating_beam",
+    "rotating_solid", "rubin", "run_study", "safe", "save_structure", "segment_to_segment",
+    "signals", "smallest_peak", "structural_damping", "structure_surface", "to_sectors", "to_waves",
+    "track_peak", "travelling_wave", "tuned_wheel", "wave", "wheel", "wheel_shape", "write_deck",
+    "write_mesh", "write_report",
 ]
 # fmt: on
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import scipy.sparse
 
-from stickslip.arrays import FloatArray, IntArray
+from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.contact.interface import Interface
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.pairing import contact_frames
@@ -56,35 +56,83 @@ def neighbour_interface(
     InputError
         If the sets do not fit each other, or the nodes of a face lie in no plane.
     """
-    own, partner = _nodes(wheel, f"sector0.{high}"), _nodes(wheel, f"sector0.{low}")
-    if own.shape != partner.shape:
-        raise input_error(
-            "neighbour_interface",
-            f"{high!r} has {len(own)} nodes and {low!r} has {len(partner)}",
-            "Keep partners on both faces; the meshes of shrouds match by their order.",
-        )
-    points = wheel.dofs.position[own[:, 0]]
-    outward = _plane_normal(points, axis, high) if normal is None else np.asarray(normal, float)
-    radial = axis.arm(points.mean(axis=0)[None])[0]
-    frame = contact_frames(outward[None], radial)[0]
     pitch = 2 * np.pi / sectors
-    rows, columns, entries = [], [], []
+    frame = _frame(wheel, (f"sector0.{low}", f"sector0.{high}"), axis, normal)
+    parts = []
     for n in range(sectors):
         here = _nodes(wheel, f"sector{n}.{high}")
         there = _nodes(wheel, f"sector{(n + 1) % sectors}.{low}")
         to_frame = (axis.rotation(n * pitch) @ frame).T
-        for i, (a, b) in enumerate(zip(here, there, strict=True)):
-            row = 3 * (n * len(own) + i) + np.arange(3)
-            for nodes, sign in ((b, 1.0), (a, -1.0)):
-                rows.append(np.repeat(row, 3))
-                columns.append(np.tile(nodes, 3))
-                entries.append(sign * to_frame.ravel())
-    shape = (3 * sectors * len(own), wheel.n)
-    index = (np.concatenate(rows), np.concatenate(columns))
-    gaps = scipy.sparse.coo_array((np.concatenate(entries), index), shape=shape).tocsr()
-    laws = tuple(law(i) if callable(law) else law for i in range(len(own))) * sectors
-    names = tuple(f"sector{n}.{i + 1}" for n in range(sectors) for i in range(len(own)))
+        parts.append(_rows(there, to_frame, wheel.n) - _rows(here, to_frame, wheel.n))
+    gaps = scipy.sparse.vstack(parts, format="csr")
+    laws = tuple(law(i) if callable(law) else law for i in range(len(here))) * sectors
+    names = tuple(f"sector{n}.{i + 1}" for n in range(sectors) for i in range(len(here)))
     return Interface(names, laws, gaps)
+
+
+def neighbour_gaps(
+    sector: Structure,
+    sectors: int,
+    *,
+    low: str,
+    high: str,
+    axis: Axis = Z_AXIS,
+    normal: FloatArray | None = None,
+) -> tuple[Matrix, Matrix]:
+    """Return the gaps between a sector's high face and the low face of the next sector.
+
+    Parameters
+    ----------
+    sector
+        One sector, with the sets `low` and `high`.
+    sectors, low, high, axis, normal
+        As in `neighbour_interface`.
+
+    Returns
+    -------
+    own, following
+        (3 p, n) CSR each: ``gap = own u^(0) + following u^(1)`` for displacements of both sectors in their own axes,
+        rows t, w, n of each pair; for `tuned_wheel`.
+
+    Raises
+    ------
+    InputError
+        As `neighbour_interface` does.
+    """
+    to_frame = _frame(sector, (low, high), axis, normal).T
+    turned = to_frame @ axis.rotation(2 * np.pi / sectors)
+    return (
+        -_rows(_nodes(sector, high), to_frame, sector.n),
+        _rows(_nodes(sector, low), turned, sector.n),
+    )
+
+
+def _frame(
+    structure: Structure, names: tuple[str, str], axis: Axis, normal: FloatArray | None
+) -> FloatArray:
+    """Return the (3, 3) columns t, w, n of the high face of sector 0."""
+    low, high = names
+    own, partner = _nodes(structure, high), _nodes(structure, low)
+    if own.shape != partner.shape:
+        raise input_error(
+            "neighbours",
+            f"{high!r} has {len(own)} nodes and {low!r} has {len(partner)}",
+            "Keep partners on both faces; the meshes of shrouds match by their order.",
+        )
+    points = structure.dofs.position[own[:, 0]]
+    outward = _plane_normal(points, axis, high) if normal is None else np.asarray(normal, float)
+    radial = axis.arm(points.mean(axis=0)[None])[0]
+    return np.asarray(contact_frames(outward[None], radial)[0])
+
+
+def _rows(nodes: IntArray, to_frame: FloatArray, n: int) -> Matrix:
+    """Return the (3 p, n) operator to the displacements of nodes (p, 3) in a frame."""
+    row = np.arange(nodes.size)
+    pick = scipy.sparse.csr_array(
+        (np.ones(nodes.size), (row, nodes.ravel())), shape=(nodes.size, n)
+    )
+    turn = scipy.sparse.kron(scipy.sparse.eye_array(len(nodes)), to_frame, format="csr")
+    return scipy.sparse.csr_array(turn @ pick)
 
 
 def _nodes(wheel: Structure, name: str) -> IntArray:
@@ -94,7 +142,7 @@ def _nodes(wheel: Structure, name: str) -> IntArray:
     components = np.array(wheel.dofs.component)[nodes]
     if not nodes.size or np.any(components != np.array(["x", "y", "z"])):
         raise input_error(
-            "neighbour_interface",
+            "neighbours",
             f"the set {name!r} does not hold x, y, z of each of its nodes, in this order",
             "Keep whole nodes in the reduction.",
         )
@@ -107,7 +155,7 @@ def _plane_normal(points: FloatArray, axis: Axis, name: str) -> FloatArray:
     size, directions = np.linalg.svd(spread, full_matrices=True)[1:]
     if len(points) < 3 or size[1] < FLAT * size[0] or size[2] > FLAT * size[1]:
         raise input_error(
-            f"neighbour_interface: {name}",
+            f"neighbours: {name}",
             f"its {len(points)} nodes do not lie in one plane that they define",
             "Keep three nodes or more of a plane face that are not in a row, or give the normal.",
         )

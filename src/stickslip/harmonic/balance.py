@@ -16,6 +16,7 @@ from stickslip.harmonic.condensed_product import CondensedProduct, at_frequency
 from stickslip.harmonic.dynamic_stiffness import CondensedStiffness
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded, to_complex, to_real
+from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.structured import StructuredJacobian, real_matrix
 
 JacobianForm = Literal["auto", "dense", "structured"]
@@ -44,7 +45,7 @@ class _LinearPart:
 
 
 @lru_cache(maxsize=4)
-def _linear_part(linear: CondensedStiffness, order: int, omega: float) -> _LinearPart:
+def _linear_part(linear: DynamicStiffness, order: int, omega: float) -> _LinearPart:
     """Assemble the linear side at one frequency; kept, because a Newton iteration at fixed frequency asks for it at every step."""
     part = linear.condensed(omega, order)
     return _LinearPart(
@@ -67,7 +68,7 @@ class HarmonicBalance:
     units. Build it with `harmonic_balance`.
     """
 
-    linear: CondensedStiffness
+    linear: DynamicStiffness
     interface: Interface  # on the retained coordinates
     compiled: CompiledContacts
     rows: SparseRows
@@ -84,7 +85,9 @@ class HarmonicBalance:
 
     @property
     def structured(self) -> bool:
-        """Whether the Jacobian is given by its products; without harmonics an array is as good."""
+        """Whether the Jacobian is given by its products; without harmonics, and for a tuned wheel, it is an array."""
+        if not isinstance(self.linear, CondensedStiffness):
+            return False
         large = self.size > CROSSOVER if self.jacobian == "auto" else self.jacobian == "structured"
         return large and self.order > 0
 
@@ -113,8 +116,10 @@ class HarmonicBalance:
         period = self._forces(x, omega)
         seconds = perf_counter() - start
         jac: FloatArray | StructuredJacobian
-        if self.size > CROSSOVER or self.structured:
-            linear, slope, jac = self._by_products(x, omega, period)
+        if isinstance(self.linear, CondensedStiffness) and (
+            self.size > CROSSOVER or self.structured
+        ):
+            linear, slope, jac = self._by_products(self.linear, x, omega, period)
         else:
             linear, slope, jac = self._by_matrices(x, omega, period)
         self.rows.add_forces(period.coefficients, linear)
@@ -141,15 +146,28 @@ class HarmonicBalance:
         return to_real(force[..., 0]), to_real(slope[..., 0]), jac
 
     def _by_products(
-        self, x: FloatArray, omega: float, period: ContactPeriod
+        self, own: CondensedStiffness, x: FloatArray, omega: float, period: ContactPeriod
     ) -> tuple[FloatArray, FloatArray, FloatArray | StructuredJacobian]:
         """Return the same without condensed matrices; the Jacobian by its products too if that was chosen."""
-        part = _product(self.linear, self.order, omega)
+        part = _product(own, self.order, omega)
         q = x.reshape(2 * self.order + 1, self.linear.n) * self.displacement_scale
         linear, slope = part.product_and_slope(q)
         factor = self.displacement_scale / self.force_scale
         jac = StructuredJacobian(part, period.blocks, self.rows, factor)
         return linear - part.load, slope - part.load_slope, jac if self.structured else jac.dense()
+
+    def linear_load(self, omega: float) -> FloatArray:
+        """Return the (2H+1, n) real coefficients of the condensed load at `omega` (rad/s)."""
+        if isinstance(self.linear, CondensedStiffness):
+            return _product(self.linear, self.order, omega).load
+        return to_real(self.linear.condensed(omega, self.order).load)
+
+    def linear_block(self, omega: float, harmonic: int) -> ComplexArray:
+        """Return the (n, n) condensed dynamic stiffness of a harmonic at `omega` (rad/s), to be changed at will."""
+        if isinstance(self.linear, CondensedStiffness):
+            return _product(self.linear, self.order, omega).block(harmonic)
+        stiffness = self.linear.condensed(omega, self.order).stiffness
+        return np.array(stiffness[harmonic], order="F")
 
     def with_order(self, order: int) -> "HarmonicBalance":
         """Return the same problem with harmonics 0..`order`."""
@@ -159,7 +177,7 @@ class HarmonicBalance:
 
 
 def harmonic_balance(
-    linear: CondensedStiffness,
+    linear: DynamicStiffness,
     interface: Interface,
     order: int,
     samples: int,
@@ -222,7 +240,7 @@ def harmonic_balance(
     )
 
 
-def _typical_stiffness(contact: FloatArray, linear: CondensedStiffness) -> float:
+def _typical_stiffness(contact: FloatArray, linear: DynamicStiffness) -> float:
     """Geometric mean of the contact stiffnesses; of the structure's diagonal where there is no contact."""
     values = contact[contact > 0] if np.any(contact > 0) else np.abs(np.diagonal(linear.nn[0]))
     values = values[values > 0]

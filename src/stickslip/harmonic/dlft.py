@@ -22,7 +22,7 @@ from stickslip.contact.rigid import RigidPeriod, project
 from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_balance
-from stickslip.harmonic.dynamic_stiffness import CondensedStiffness
+from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.rigid_contacts import NORMAL, RigidContacts, rigid_contacts
 
 SAMPLES_OF_OTHERS = 8  # per harmonic, least number at which contacts with stiffness are evaluated
@@ -52,7 +52,7 @@ class DynamicLagrangian:
         return self.balance.order
 
     @property
-    def linear(self) -> CondensedStiffness:
+    def linear(self) -> DynamicStiffness:
         """The condensed structure and its load."""
         return self.balance.linear
 
@@ -232,7 +232,7 @@ def _chain(blocks: FloatArray, slope: FloatArray, rigid: RigidContacts) -> Float
 
 
 def dynamic_lagrangian(
-    linear: CondensedStiffness,
+    linear: DynamicStiffness,
     interface: Interface,
     order: int,
     samples: int,

@@ -142,14 +142,9 @@ def reduced_wheel(
     With the reduced ``A_k`` of wave number k, sectors n and m are coupled by ``Σ_k A_k exp(2πi k (n − m) / n_s) / n_s``
     (Krack, Salles & Thouverez 2017, eq. 41); it is real, since ``A_{n_s−k}`` is the conjugate of ``A_k``.
     """
-    if sector.structure.basis is not None:
-        raise input_error(
-            "reduced_wheel: sector",
-            "is a reduced model already",
-            "Give the sector of the full model: it is reduced here.",
-        )
+    refuse_reduced("reduced_wheel", sector)
     keep = np.asarray(keep, dtype=np.int64)
-    place = _places(sector, keep)
+    place = kept_places("reduced_wheel", sector, keep)
     half = sector.sectors // 2 + 1
     waves = tuple(reduce(travelling_wave(sector, k), place, n_modes) for k in range(half))
     size = waves[0].n
@@ -175,13 +170,23 @@ def reduced_wheel(
     return ReducedWheel(structure, sector, waves, turn)
 
 
-def _places(sector: CyclicSector, keep: IntArray) -> IntArray:
-    """Return where the kept dofs stand among the coordinates of a travelling wave."""
+def refuse_reduced(who: str, sector: CyclicSector) -> None:
+    """Refuse a sector that is a reduced model: it would be reduced twice, and its fields would be lost."""
+    if sector.structure.basis is not None:
+        raise input_error(
+            f"{who}: sector",
+            "is a reduced model already",
+            "Give the sector of the full model: it is reduced here.",
+        )
+
+
+def kept_places(who: str, sector: CyclicSector, keep: IntArray) -> IntArray:
+    """Return where the kept dofs of a sector stand among the coordinates of a travelling wave."""
     free = sector.independent
     lost = np.setdiff1d(keep, free)
     if lost.size:
         raise input_error(
-            "reduced_wheel: keep",
+            f"{who}: keep",
             f"{sector.structure.dofs.labels[lost[0]]} is on the high face or on the axis, {lost.size} such dofs in all",
             "Keep the partners on the low face.",
         )

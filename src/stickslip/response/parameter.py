@@ -71,7 +71,7 @@ class Discretisation:
 
     def balance(self, system: System, load: HarmonicLoad, more: IntArray) -> HarmonicBalance:
         """Set up the periodic problem, the dofs `more` retained beside those of the contacts."""
-        linear = condense(system.structure, np.union1d(system.retained, more), load)
+        linear = condense(system.plain_structure, np.union1d(system.retained, more), load)
         return harmonic_balance(
             linear, system.interface, self.order, self.samples, self.evaluator, "dense"
         )

@@ -10,8 +10,6 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.product import add_stiffness
 from stickslip.errors import SingularError
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_balance
-from stickslip.harmonic.condensed_product import at_frequency
-from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex
 from stickslip.response.system import System
@@ -64,7 +62,7 @@ def preload(system: System, static_load: FloatArray, options: Newton | None = No
     if not np.any(static_load) and resting == 0.0:
         return np.zeros(system.retained.size)
     options = options or Newton(max_iterations=60)
-    linear = condense(system.structure, system.retained, HarmonicLoad(static_load))
+    linear = system.condensed(HarmonicLoad(static_load), 0)
     balance = harmonic_balance(linear, interface, 0, 1)
     # a faint static load beside a large preload cannot be resolved better than the preload's own rounding
     coarser = max(1.0, resting / balance.force_scale)
@@ -114,15 +112,14 @@ def bonded_start(balance: HarmonicBalance, omega: float, system: System) -> Floa
     SingularError
         If a body is held by nothing even then; the message names the coordinate.
     """
-    linear = at_frequency(balance.linear, omega, balance.order)
-    load = to_complex(linear.load)
+    load = to_complex(balance.linear_load(omega))
     rows = balance.rows
     springs = balance.interface.stuck_stiffness().reshape(-1, 3, 1) * np.eye(3)
     q = np.zeros((balance.order + 1, balance.linear.n), dtype=complex)
     for h in range(balance.order + 1):
         if h > 0 and not np.any(load[h]):
             continue
-        matrix = linear.block(h)
+        matrix = balance.linear_block(omega, h)
         add_stiffness(springs, rows.columns, rows.values, matrix)
         if h == 0:
             static = solve_dense(np.array(matrix.real, order="F"), load[0].real)

@@ -7,7 +7,6 @@ from typing import Any
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import ContactLaw
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation
-from stickslip.harmonic.condensed_product import at_frequency
 from stickslip.solve.rescue import ByDifference, Evaluate, Homotopy
 
 # shares of the excitation at which contacts hardly change: the problem is linear there
@@ -33,7 +32,7 @@ class GrowingLoad:
 
 def growing_load(balance: HarmonicBalance, omega: float) -> GrowingLoad:
     """Return the homotopy in the excitation at the frequency `omega` (rad/s)."""
-    load = at_frequency(balance.linear, omega, balance.order).load.copy()
+    load = balance.linear_load(omega).copy()
     load[0] = 0.0
     return GrowingLoad(balance, omega, load.reshape(-1) / balance.force_scale)
 

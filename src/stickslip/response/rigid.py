@@ -97,7 +97,7 @@ def rigid_response(
     how = discretisation or Discretisation()
     # where contacts stick throughout, their coordinates are zero and no measure of a step
     retained = np.union1d(system.retained, system.outputs)
-    linear = condense(system.structure, retained, load)
+    linear = condense(system.plain_structure, retained, load)
     problem = dynamic_lagrangian(
         linear, system.interface, how.order, how.samples, penalty, how.evaluator
     )

@@ -10,7 +10,6 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.contact.compiled import Evaluator, check_evaluator
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
-from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection import Solve
 from stickslip.response.system import System
@@ -238,7 +237,7 @@ def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedPr
             f"excites harmonic {top}, but the first passage keeps {sweep.first_order}",
             f"Give Sweep(low={top}, high={max(top, sweep.high)}) or more.",
         )
-    linear = condense(system.structure, system.retained, load)
+    linear = system.condensed(load, sweep.high)
     low = harmonic_balance(
         linear, system.interface, sweep.first_order, sweep.samples, sweep.evaluator
     )

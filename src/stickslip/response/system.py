@@ -8,8 +8,13 @@ import scipy.sparse
 from stickslip.arrays import IntArray
 from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
+from stickslip.harmonic.dynamic_stiffness import condense
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.linear import DynamicStiffness
+from stickslip.harmonic.travelling import condense_waves
 from stickslip.model.modes import with_springs
 from stickslip.model.structure import Structure
+from stickslip.reduction.tuned_wheel import TunedWheel
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +24,7 @@ class System:
     Parameters
     ----------
     structure
-        Blades joined with dampers, reduced.
+        Blades joined with dampers, reduced; or one sector of a tuned wheel.
     interface
         Contacts on the structure's dofs.
     outputs
@@ -30,7 +35,7 @@ class System:
         Dofs of rigid bodies that only contacts hold; they are retained whether or not a contact touches them.
     """
 
-    structure: Structure
+    structure: Structure | TunedWheel
     interface: Interface
     outputs: IntArray
     alert_outputs: IntArray | None = None
@@ -56,6 +61,30 @@ class System:
         labels = self.structure.dofs.labels
         return tuple(labels[i] for i in self.retained)
 
+    def condensed(self, load: HarmonicLoad, order: int) -> DynamicStiffness:
+        """Return the structure and a load on it, condensed to the retained dofs, for harmonics up to `order`."""
+        if isinstance(self.structure, TunedWheel):
+            waves = [self.structure.of_harmonic(h) for h in range(order + 1)]
+            return condense_waves(tuple(waves), self.retained, load)
+        return condense(self.structure, self.retained, load)
+
+    @property
+    def plain_structure(self) -> Structure:
+        """The structure, where one and the same vibrates in all harmonics.
+
+        Raises
+        ------
+        InputError
+            If it is a tuned wheel.
+        """
+        if isinstance(self.structure, TunedWheel):
+            raise input_error(
+                "System",
+                "this analysis has no form for a tuned wheel, whose harmonics are different travelling waves",
+                "Take the wheel of all sectors (reduced_wheel).",
+            )
+        return self.structure
+
     def with_retention(self, stiffness: float) -> "System":
         """Return the system with a spring of `stiffness` (N/m, rotations N m/rad per m²) from each free dof to ground.
 
@@ -63,24 +92,23 @@ class System:
         """
         if self.free is None or stiffness == 0.0:
             return self
-        added = np.zeros(self.structure.n)
-        dofs = self.structure.dofs
+        structure = self.plain_structure
+        added = np.zeros(structure.n)
+        dofs = structure.dofs
         turns = np.array([dofs.component[d].startswith("r") for d in self.free])
-        inertia = np.array([self.structure.mass[d, d] for d in self.free])
+        inertia = np.array([structure.mass[d, d] for d in self.free])
         for dof, turn, own in zip(self.free, turns, inertia, strict=True):
             same_body = np.array([dofs.part[d] == dofs.part[dof] for d in self.free]) & ~turns
             mass = np.max(inertia[same_body], initial=0.0)
             added[dof] = stiffness * (own / mass if turn and mass > 0.0 else 1.0)
         diagonal = (
             scipy.sparse.diags_array(added)
-            if scipy.sparse.issparse(self.structure.stiffness)
+            if scipy.sparse.issparse(structure.stiffness)
             else np.diag(added)
         )
-        return replace(
-            self, structure=replace(self.structure, stiffness=self.structure.stiffness + diagonal)
-        )
+        return replace(self, structure=replace(structure, stiffness=structure.stiffness + diagonal))
 
     def stuck_structure(self) -> Structure:
         """Return the linear structure with every contact bonded through its springs."""
         b = self.interface.gap_operator
-        return with_springs(self.structure, b, self.interface.stuck_stiffness())
+        return with_springs(self.plain_structure, b, self.interface.stuck_stiffness())

@@ -132,7 +132,7 @@ def make_case(tables: StudyTables, blades: ReducedBlades, damper: FlatCurvedDamp
         ratios=tuple(tables.loads.ratios),
         centrifugal=tables.loads.centrifugal_n,
         retention=tables.retention.stiffness_n_per_m,
-        force_dof=int(system.structure.dof_set("blades.force")[axis]),
+        force_dof=int(system.plain_structure.dof_set("blades.force")[axis]),
         output_labels=labels,
         law_names=tuple(tables.contact.of_side(side).law for side in contacts.side),
         static_gap=gap,
@@ -176,7 +176,7 @@ def system_of(
 def static_load(system: System, centrifugal: float) -> FloatArray:
     """Return the (n,) static forces: the centrifugal load on the damper, outward (+z)."""
     force = np.zeros(system.structure.n)
-    force[system.structure.dof_set("damper")[2]] = centrifugal
+    force[system.plain_structure.dof_set("damper")[2]] = centrifugal
     return force
 
 

@@ -244,7 +244,7 @@ def integrated(
     motion = problem.low.linear.recover(point.omega, point.coefficients)
     traction = signals(problem, point).force[:, :2, 0]
     return integrate(
-        system.structure,
+        system.plain_structure,
         system.interface.gap_operator,
         system.interface.laws,
         load,

@@ -1,0 +1,155 @@
+"""Dynamic stiffness of a tuned wheel: every temporal harmonic is a travelling wave with matrices of its own.
+
+M. Krack, L. Salles and F. Thouverez, "Vibration prediction of bladed disks coupled by friction joints", Archives of
+Computational Methods in Engineering 24 (2017) 589-636, section 3 and appendices 1, 2 and 5.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.errors import input_error
+from stickslip.harmonic.dynamic_stiffness import Condensed
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.spectral import Blocks
+from stickslip.model.structure import Structure
+
+Stack = ComplexArray  # (H+1, rows, columns)
+
+
+@dataclass(frozen=True, eq=False)
+class TravellingStiffness:
+    """The waves of a tuned wheel and its load, seen from the retained coordinates; `condense_waves` makes one.
+
+    The interior is solved at each frequency: reduced waves have few interior coordinates.
+    """
+
+    structures: tuple[Structure, ...]  # of harmonics 0, 1, ...
+    retained: IntArray
+    interior: IntArray
+    load: HarmonicLoad
+
+    @property
+    def n(self) -> int:
+        """Number of retained coordinates."""
+        return int(self.retained.size)
+
+    @property
+    def nn(self) -> Blocks:
+        """Stiffness, damping and mass of the first harmonic on the retained coordinates; for scales."""
+        k, c, m, _ = (part[min(1, len(part) - 1)] for part in self._matrices)
+        own = np.ix_(self.retained, self.retained)
+        return np.abs(k[own]), np.abs(c[own]), np.abs(m[own])
+
+    def with_load(self, load: HarmonicLoad) -> "TravellingStiffness":
+        """Return the same waves under another load."""
+        return replace(self, load=load)
+
+    def condensed(self, omega: float, order: int) -> Condensed:
+        """Return stiffness, load and their ω-derivatives for harmonics 0..`order` at `omega` (rad/s)."""
+        D, G = self._dynamic(omega, order)
+        f = self.load.coefficients(order)
+        near, far = self.retained, self.interior
+        d_ll, d_ln = _block(D, far, far), _block(D, far, near)
+        right = np.concatenate([d_ln, f[:, far, None]], axis=2)
+        solved = np.linalg.solve(d_ll, right)
+        x, x_load = solved[:, :, :-1], solved[:, :, -1:]
+        y = np.linalg.solve(d_ll.transpose(0, 2, 1), _block(D, near, far).transpose(0, 2, 1))
+        y = y.transpose(0, 2, 1)
+        across = _block(G, near, far) - y @ _block(G, far, far)
+        stiffness = _block(D, near, near) - _block(D, near, far) @ x
+        derivative = _block(G, near, near) - y @ _block(G, far, near) - across @ x
+        load = f[:, near] - (_block(D, near, far) @ x_load)[:, :, 0]
+        return Condensed(stiffness, derivative, load, -(across @ x_load)[:, :, 0])
+
+    def recover(self, omega: float, q: ComplexArray) -> ComplexArray:
+        """Return the (H+1, n_all) coefficients of every dof from those of the retained ones (H+1, n)."""
+        return self._spread(omega, q, self.load.coefficients(q.shape[0] - 1))
+
+    def recover_change(self, omega: float, dq: ComplexArray) -> ComplexArray:
+        """Return the change of every dof (H+1, n_all) that a change `dq` of the retained coordinates causes."""
+        all_dofs = self.retained.size + self.interior.size
+        return self._spread(omega, dq, np.zeros((dq.shape[0], all_dofs), dtype=complex))
+
+    def _spread(self, omega: float, q: ComplexArray, f: ComplexArray) -> ComplexArray:
+        D, _ = self._dynamic(omega, q.shape[0] - 1)
+        near, far = self.retained, self.interior
+        right = f[:, far, None] - _block(D, far, near) @ q[:, :, None]
+        out = np.empty(f.shape, dtype=complex)
+        out[:, near] = q
+        out[:, far] = np.linalg.solve(_block(D, far, far), right)[:, :, 0]
+        return out
+
+    def _dynamic(self, omega: float, order: int) -> tuple[Stack, Stack]:
+        """Return D of harmonics 0..`order` and its derivative by ω."""
+        if order >= len(self.structures):
+            raise input_error(
+                "TravellingStiffness",
+                f"has waves for harmonics up to {len(self.structures) - 1}, asked for {order}",
+                "Give tuned_wheel as many harmonics as the sweep's `high`.",
+            )
+        k, c, m, loss = (part[: order + 1] for part in self._matrices)
+        h = np.arange(order + 1)[:, None, None]
+        s = h * omega
+        D = k + 1j * s * c - s**2 * m + 1j * (s > 0) * loss
+        return D, h * (1j * c - 2 * s * m)
+
+    @cached_property
+    def _matrices(self) -> tuple[Stack, Stack, Stack, Stack]:
+        """Stiffness, damping, mass and loss of all harmonics."""
+
+        def stacked(name: str) -> Stack:
+            return np.array([_dense(getattr(s, name), s.n) for s in self.structures])
+
+        return stacked("stiffness"), stacked("damping"), stacked("mass"), stacked("loss")
+
+
+def condense_waves(
+    structures: tuple[Structure, ...], retained: IntArray, load: HarmonicLoad
+) -> TravellingStiffness:
+    """Prepare the exact condensation of the waves of a tuned wheel.
+
+    Parameters
+    ----------
+    structures
+        The wave of each harmonic 0, 1, ...; the retained dofs mean the same in all.
+    retained
+        Dof indices that stay unknown.
+    load
+        Load on all dofs, each harmonic in the coordinates of its wave, N.
+
+    Raises
+    ------
+    InputError
+        If sizes differ, or the load has more harmonics than there are waves.
+    """
+    n = structures[0].n
+    if load.static.size != n or any(s.n != n for s in structures):
+        sizes = sorted({s.n for s in structures})
+        raise input_error(
+            "condense_waves",
+            f"a load of {load.static.size} entries for waves of {sizes} dofs",
+            "Give the load in the coordinates of the waves (TunedWheel.project).",
+        )
+    top = max((h for h, f in load.harmonics.items() if np.any(f)), default=0)
+    if top >= len(structures):
+        raise input_error(
+            "HarmonicLoad",
+            f"excites harmonic {top}, and there are waves up to {len(structures) - 1}",
+            "Give tuned_wheel more harmonics.",
+        )
+    retained = np.asarray(retained, dtype=np.int64)
+    return TravellingStiffness(structures, retained, np.setdiff1d(np.arange(n), retained), load)
+
+
+def _block(stack: Stack, rows: IntArray, columns: IntArray) -> Stack:
+    return np.asarray(stack[:, rows[:, None], columns])
+
+
+def _dense(matrix: Matrix | None, n: int) -> FloatArray | ComplexArray:
+    if matrix is None:
+        return np.zeros((n, n))
+    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
