@@ -142,15 +142,18 @@ def _with_inner_load(bare: CondensedProduct, inner_load: FloatArray) -> Condense
 
 def _inner(linear: CondensedStiffness, omega: float, order: int) -> Inner:
     k, c, m = linear.ll
-    loss = np.zeros_like(k) if linear.loss is None else linear.loss[2]
+    loss = None if linear.loss is None else linear.loss[2]
     s = omega * np.arange(order + 1)
     if linear.diagonal:
-        k, c, m, loss = (np.diagonal(a) for a in (k, c, m, loss))
-        return tuple(k + 1j * (w * c + (w > 0.0) * loss) - w**2 * m for w in s)
+        k, c, m = np.diagonal(k), np.diagonal(c), np.diagonal(m)
+        loss = None if loss is None else np.diagonal(loss)
     states = linear.spectral.states if np.any(s) else None
     if states is not None:
         return tuple((states, 1j * w) for w in s)
-    return tuple(scipy.linalg.lu_factor(k + 1j * (w * c + (w > 0.0) * loss) - w**2 * m) for w in s)
+    each = (k + 1j * w * c - w**2 * m for w in s)
+    if loss is not None:
+        each = (d + 1j * (w > 0.0) * loss for d, w in zip(each, s, strict=True))
+    return tuple(each) if linear.diagonal else tuple(scipy.linalg.lu_factor(d) for d in each)
 
 
 def _across(blocks: Parts, loss: Parts | None, s: float) -> ComplexArray:
