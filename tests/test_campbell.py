@@ -71,6 +71,15 @@ def test_crossings_to_the_tolerance():
     )
 
 
+def test_a_crossing_on_a_speed_counts_once():
+    # the constant mode, 2 rad/s, meets order 1 at the first, a middle and the last speed
+    for speeds in ([2.0, 3.0], [1.0, 2.0, 3.0], [1.0, 2.0]):
+        met = ss.campbell(lambda _: of_squares(4.0), speeds, 1, (1,)).crossings
+        assert [c.speed for c in met] == [pytest.approx(2.0, rel=1e-6)]
+    free = ss.campbell(lambda _: of_squares(0.0, 1.0), [0.0, 0.5], 2, (1,))
+    assert not free.crossings  # a rigid mode meets every order at rest: that is no resonance
+
+
 def test_a_looser_tolerance_costs_fewer_structures():
     def counted(tolerance):
         asked = []

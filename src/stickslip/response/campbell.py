@@ -186,7 +186,7 @@ def campbell(
         )
     here = first.take(np.arange(n_modes), np.ones(n_modes))
     rows: list[_Spectrum] = [_without_shapes(here)]
-    crossings: list[Crossing] = []
+    crossings = _crossings_at(here, engine_orders)
     for speed in speeds[1:]:
         after = _follow(family, here, float(speed), HALVINGS)
         crossings += _crossings(family, here, after, engine_orders, tolerance)
@@ -287,6 +287,16 @@ def _exchanged(before: FloatArray, after: FloatArray) -> bool:
     """Whether two modes seem to have crossed: a veering would look the same from afar."""
     gaps = [np.where(_equal(f, f), 0.0, f[:, None] - f) for f in (before, after)]
     return bool(np.any(gaps[0] * gaps[1] < 0.0))
+
+
+def _crossings_at(here: _Spectrum, engine_orders: Sequence[int]) -> list[Crossing]:
+    """Return the crossings that happen to lie on the first speed."""
+    return [
+        Crossing(int(order), int(mode), here.speed, float(here.hertz[mode]))
+        for order in engine_orders
+        for mode in np.flatnonzero(here.hertz == order * here.speed / (2 * np.pi))
+        if here.speed > 0.0
+    ]
 
 
 def _crossings(
