@@ -316,6 +316,42 @@ def test_a_bricks_nodes_stand_in_vtk_order():
     np.testing.assert_array_equal(mesh.cells, deck.cells)
 
 
+def in_short_format(line: str) -> str:
+    """Return a line of an .frd file with node numbers in five columns instead of ten."""
+    if line.startswith(" -1") and len(line) > 20:
+        return line[:3] + line[8:]
+    if line.startswith(" -2") and len(line) > 20:
+        return line[:3] + "".join(line[k + 5 : k + 10] for k in range(3, 103, 10))
+    if line.startswith(("    2C", "    3C")):
+        return line[:73] + "0"
+    return line[:74] + "0" if line.startswith("  100C") else line
+
+
+def test_short_format_of_results(tmp_path):
+    copied(tmp_path, "brick.frd.gz")
+    lines = (tmp_path / "brick.frd").read_text().splitlines()
+    (tmp_path / "short.frd").write_text("\n".join(map(in_short_format, lines)) + "\n")
+    short, long = (read_frd(tmp_path / name, units=MM) for name in ("short.frd", "brick.frd"))
+    np.testing.assert_array_equal(short.mesh.cells, long.mesh.cells)
+    np.testing.assert_array_equal(short.mesh.numbers, long.mesh.numbers)
+    for a, b in zip(short.fields, long.fields, strict=True):
+        np.testing.assert_array_equal(a.values, b.values)
+
+
+@pytest.mark.parametrize("end", ["\r\n", "\n"])
+def test_line_ends_and_marks_of_other_systems(brick_folder, end):
+    copied(brick_folder, "brick.frd.gz")
+    expected = read_calculix_matrices(DATA / "brick_matrix", units=MM)
+    for path in brick_folder.iterdir():
+        text = path.read_text().replace("\n", end)
+        path.write_bytes("\ufeff".encode() + text.encode())
+    found = read_calculix_matrices(brick_folder / "brick_matrix", units=MM)
+    assert apart(found.stiffness, expected.stiffness) == 0
+    assert list(found.sets) == list(expected.sets)
+    assert len(read_frd(brick_folder / "brick.frd", units=MM).fields) == 6
+    assert assemble_deck(read_deck(brick_folder / "brick_matrix.inp", units=MM)).n == 72
+
+
 # ---- damage
 
 

@@ -26,7 +26,7 @@ def read_text(path: Path) -> str:
     """
     try:
         if path.suffix != ".gz":
-            return path.read_bytes().decode("utf-8", errors="replace")
+            return path.read_bytes().decode("utf-8-sig", errors="replace")  # some editors mark it
         limit = TEXT_RATIO * path.stat().st_size + 10_000
         with gzip.open(path) as stream:
             content = stream.read(limit + 1)
@@ -44,7 +44,7 @@ def read_text(path: Path) -> str:
             f"unpacks to more than {TEXT_RATIO} times its size, which no table of numbers does",
             "If the file is right, unpack it and give the plain one.",
         )
-    return content.decode("utf-8", errors="replace")
+    return content.decode("utf-8-sig", errors="replace")
 
 
 def _neighbours(path: Path) -> str:
