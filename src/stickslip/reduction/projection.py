@@ -10,7 +10,8 @@ from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs, join_dofs, modal_dofs
 from stickslip.model.structure import Structure
 
-BLOCK = 32  # columns handled at a time: what is dense beside the basis stays a tenth of it
+BLOCK = 32  # columns solved for at a time: what is dense beside the basis stays a tenth of it
+ROWS = 8192  # rows of the basis projected at a time, for the same reason
 SYMMETRY = 1e-12  # relative, below which a matrix counts as Hermitian
 
 
@@ -74,11 +75,14 @@ def is_hermitian(matrix: Matrix) -> bool:
 
 def _dense_product(matrix: Matrix, basis: Matrix) -> Matrix:
     m = basis.shape[1]
-    product = np.empty((m, m), dtype=np.result_type(matrix.dtype, basis.dtype))
-    adjoint = matrix.conj().T
-    for first in range(0, m, BLOCK):
-        rows = slice(first, first + BLOCK)
-        product[rows] = np.asarray(adjoint @ basis[:, rows]).conj().T @ basis
+    kind = np.result_type(matrix.dtype, basis.dtype)
+    if scipy.sparse.issparse(matrix) and not matrix.nnz:
+        return np.zeros((m, m), dtype=kind)  # no damping
+    product = np.zeros((m, m), dtype=kind)
+    matrix = matrix.tocsr() if scipy.sparse.issparse(matrix) else matrix
+    for first in range(0, basis.shape[0], ROWS):
+        rows = slice(first, first + ROWS)
+        product += basis[rows].conj().T @ (matrix[rows] @ basis)
     return product
 
 
