@@ -438,6 +438,8 @@ def test_wrong_requests_are_named(plate):
         plate.at_speed(math.nan)
     with pytest.raises(InputError, match=r"speed: must be a number in rad/s, got inf"):
         plate.displacement(math.inf)
+    with pytest.raises(InputError, match=r"no tangent 'consistant'\. Did you mean 'consistent'"):
+        plate.at_speed(1.0, tangent="consistant")
     with pytest.raises(InputError, match="tangent 'nonlinear' is no polynomial"):
         plate.polynomial(tangent="nonlinear")
     loose = rotating_solid(without_sets(box(8, SIZE, (1, 1, 1))), STEEL)

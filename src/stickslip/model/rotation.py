@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
-from stickslip.errors import SingularError, StickslipError, input_error
+from stickslip.errors import SingularError, StickslipError, did_you_mean, input_error
 from stickslip.model.axis import Axis
 from stickslip.model.elements import EXACT, NodeBlocks, Quadrature, Shape, shape_functions
 from stickslip.model.factorisation import factorise
@@ -200,6 +200,12 @@ class RotatingSolid:
             Add ``2 Ω G`` to the damping.
         """
         _check_speed(speed)
+        if tangent not in TANGENTS:
+            raise input_error(
+                "RotatingSolid.at_speed",
+                f"there is no tangent {tangent!r}",
+                did_you_mean(tangent, list(TANGENTS)),
+            )
         if tangent == "nonlinear":
             start = speed**2 * self._unit_displacement(tie)
             stiffness = self._equilibrium(speed, tie, start)[1]
