@@ -168,6 +168,17 @@ def test_large_structures_at_rest_have_no_answers_to_add():
     np.testing.assert_allclose(found, ss.natural_frequencies(structure, 5), rtol=1e-10)
 
 
+def test_free_bodies_with_coriolis_forces_keep_real_frequencies():
+    structure = gyroscopic_chain(201, speed=3.0)
+    K = structure.stiffness.toarray()
+    K[:2, :2] /= 2.0  # the first masses lose their grounding springs, the last ones too
+    K[-2:, -2:] /= 2.0
+    free = replace(structure, stiffness=scipy.sparse.csr_array(K))
+    modes = ss.gyroscopic_modes(free, 8)
+    np.testing.assert_array_equal(modes.growth, 0.0)
+    np.testing.assert_allclose(modes.frequencies_hz[2:], quadratic(free)[-400:][:6], rtol=1e-6)
+
+
 def turning_ring(speed, sectors=7, blades=1.0):
     """Planar masses on a circle, springs to ground and neighbours, Coriolis forces: radial and tangential motion."""
     own, tie = blades * np.diag([4.0, 2.5]) - speed**2 * np.eye(2), np.diag([0.6, 0.3])

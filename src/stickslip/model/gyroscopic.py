@@ -16,6 +16,7 @@ from stickslip.model.structure import Structure
 
 SPARE = 10  # modes beyond twice as many as are asked for
 SHIFT = 1e-8  # share of the mean of K/M: the factorised matrix is regular where a body is free
+RIGID = 1e-12  # of the largest square of a basis: a negative one nearer to zero is that of a rigid motion
 KNOWN = 1e-8  # share of an answer that lies outside the modes, below which it is rounding
 
 
@@ -112,4 +113,7 @@ def _enriched(structure: Structure, coriolis: Matrix, modes: Matrix) -> tuple[Fl
     columns = [each / np.linalg.norm(each, axis=0) for each in (modes, answers[:, left])]
     basis = np.linalg.qr(np.hstack(columns))[0]
     squares, vectors = scipy.linalg.eigh(*(basis.conj().T @ (a @ basis) for a in (K, M)))
-    return squares, basis @ vectors
+    # a rigid motion has no strain, but for rounding
+    return np.where(
+        squares < -RIGID * squares[-1], squares, np.maximum(squares, 0.0)
+    ), basis @ vectors
