@@ -20,7 +20,7 @@ from stickslip import (
 )
 from stickslip.model.readers.nastran import op4_matrices
 from stickslip.model.readers.nastran_dofs import read_nastran_dofs
-from stickslip.model.readers.nastran_library import check_records, reading
+from stickslip.model.readers.nastran_library import check_lines, check_records, reading
 from stickslip.model.readers.units import Units
 
 
@@ -381,6 +381,39 @@ def test_chain_of_records_is_followed_to_the_end(tmp_path):
     path.write_bytes(chain(77))
     with pytest.raises(InputError, match="does not start like a binary file of Nastran"):
         check_records(path)
+
+
+DENSE = """       2       2       6       2KAA     1P,3E23.16
+       1       1       2
+ 2.0000000000000000E+00 1.0000000000000000E+00
+       2       1       2
+ 1.0000000000000000E+00 3.0000000000000000E+00
+       3       1       1
+ 1.0000000000000000E+00
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("       2       1       2", "       2       1 9999999"),
+        ("       2       1       2", "       2       1      -2"),
+        ("       2       1       2", "      -2       1       2"),
+        ("       2       1       2", "       2       0       2"),
+        (" 1.0000000000000000E+00 3.0", " 1.0000000\r000000000E+00 3.0"),
+        ("       3       1       1\n 1.0000000000000000E+00\n", ""),
+        ("       2       2       6", "       2       x       6"),
+    ],
+)
+def test_columns_of_text_are_followed_to_the_end(tmp_path, old, new):
+    # pyYeti would take a damaged count at its word, and read empty lines a million times
+    path = tmp_path / "a.op4"
+    path.write_text(DENSE)
+    check_lines(path)
+    assert old in DENSE
+    path.write_text(DENSE.replace(old, new, 1))
+    with pytest.raises(InputError, match=r"a\.op4: matrix 1: breaks off or is garbled"):
+        check_lines(path)
 
 
 def test_what_the_library_raises_names_the_file():

@@ -16,6 +16,7 @@ from stickslip.model.dofs import Dofs
 from stickslip.model.readers.nastran_dofs import NastranDofs, read_nastran_dofs
 from stickslip.model.readers.nastran_library import (
     CUT_SHORT,
+    check_lines,
     check_records,
     existing_file,
     is_binary,
@@ -175,8 +176,7 @@ def op4_matrices(
         Called with the name and the shape that the file states, before anything is allocated.
     """
     op4 = nastran_library("op4")
-    if is_binary(path):
-        check_records(path)
+    (check_records if is_binary(path) else check_lines)(path)
     plain = {name: name.split("[")[0] for name in names}
     with reading(path):
         there, shapes, *_ = op4.dir(str(path), verbose=False)

@@ -130,6 +130,7 @@ def _table_of_bulk(path: Path) -> tuple[Any, dict[str, IntArray]]:
     if path.suffix.lower() != ".asm":
         return bulk.bulk2uset(str(path), follow_includes=False)[0], {}
     # which components the grids keep stands in the .pch file beside it
+    existing_file(path.with_suffix(".pch"))
     table, _, _, kept = bulk.asm2uset(str(path), try_rdextrn="pv_only", follow_includes=False)
     return table, {"a": np.flatnonzero(kept)}
 

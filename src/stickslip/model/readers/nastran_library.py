@@ -1,6 +1,7 @@
 """pyYeti, which knows Nastran's binary files: called only after the chain of records has been checked, and never blindly."""
 
 import importlib
+import re
 import struct
 import warnings
 from collections.abc import Iterator
@@ -78,6 +79,62 @@ def check_records(path: Path) -> None:
                 str(path), f"the chain of records breaks at byte {at} of {size}", CUT_SHORT
             )
         at = end + 4
+
+
+def check_lines(path: Path) -> None:
+    """Follow the columns of an OP4 file of text from end to end: each has the lines that its head tells of.
+
+    Only then may a library follow them, which would read on and on where a damaged count is large.
+
+    Raises
+    ------
+    InputError
+        If a head is none, or the lines end before the columns do.
+    """
+    with path.open(encoding="ascii", errors="replace") as stream:
+        number = 0
+        try:
+            for number, line in enumerate(stream, 1):  # noqa: B007  # named in the message
+                if not line.strip():
+                    return
+                _skip_matrix(stream, line)
+        except (ValueError, StopIteration) as error:
+            raise input_error(
+                f"{path}: matrix {number}", "breaks off or is garbled", CUT_SHORT
+            ) from error
+
+
+def _skip_matrix(lines: Iterator[str], head: str) -> None:
+    """Pass over the columns of one matrix of text."""
+    width = 16 if head.rstrip().endswith("|I16") else 8
+    columns, rows, kind = int(head[:width]), int(head[width : 2 * width]), 2 * width + 8
+    words = 1 if int(head[kind : kind + 8]) % 2 else 2  # a number
+    form = re.search(r"([1-9]\d*)[ED]\d+\.\d+", head[kind + 16 :].upper())
+    a_line = int(form[1]) if form else 5
+    big = rows < 0 or rows >= 65536
+    while True:
+        line = next(lines)
+        column, row, stored = (int(line[i : i + 8]) for i in (0, 8, 16))
+        if column > columns:
+            next(lines)  # the column past the last one ends a matrix
+            return
+        if column < 1 or stored < 0:
+            raise ValueError(line)
+        if row > 0:  # dense
+            _skip(lines, -(-stored // a_line))
+            continue
+        while stored > 0:
+            line = next(lines)
+            length = int(line[:8]) - 1 if big else (int(line) >> 16) - 1
+            if length < 1:
+                raise ValueError(line)
+            stored -= length + (2 if big else 1)
+            _skip(lines, -(-(length // words) // a_line))
+
+
+def _skip(lines: Iterator[str], count: int) -> None:
+    for _ in range(count):
+        next(lines)
 
 
 def _mark(four: bytes, order: str) -> int:
