@@ -27,6 +27,7 @@ def write_all(folder: Path) -> None:
     """Write every generated page part into `folder`."""
     folder.mkdir(exist_ok=True)
     (folder / "study_file.md").write_text(study_file(), encoding="utf-8")
+    (folder / "structure_study.md").write_text(structure_study(), encoding="utf-8")
     (folder / "validation.md").write_text(validation(), encoding="utf-8")
     (folder / "api.md").write_text(api(), encoding="utf-8")
     draw_sector(folder / "sector.svg")
@@ -40,6 +41,14 @@ def study_file() -> str:
     return "\n".join(_section("", schema, schema.get("$defs", {})))
 
 
+def structure_study() -> str:
+    """Return one table of keys for each table of a study of a bladed disk."""
+    from stickslip.study.structure_study import structure_schema
+
+    schema = json.loads(structure_schema())
+    return "\n".join(_section("", schema, schema.get("$defs", {})))
+
+
 def _section(path: str, node: dict[str, Any], definitions: dict[str, Any]) -> list[str]:
     rows, below = [], []
     for key, entry in node.get("properties", {}).items():
@@ -48,6 +57,7 @@ def _section(path: str, node: dict[str, Any], definitions: dict[str, Any]) -> li
             below += _section(f"{path}.{key}" if path else key, inner, definitions)
             continue
         default = "" if "default" not in entry else f"`{json.dumps(entry['default'])}`"
+        default = "(left out)" if default == "`null`" else default
         rows.append(
             f"| `{key}` | {_escaped(entry.get('description', ''))} | {default or '(required)'} |"
         )
@@ -59,9 +69,11 @@ def _section(path: str, node: dict[str, Any], definitions: dict[str, Any]) -> li
 
 
 def _resolved(entry: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
-    reference = entry.get("$ref") or next(
-        (part.get("$ref") for part in entry.get("allOf", [])), None
-    )
+    parts = [
+        *entry.get("allOf", []),
+        *entry.get("anyOf", []),
+    ]  # a table that may be left out is one of two
+    reference = entry.get("$ref") or next((p["$ref"] for p in parts if "$ref" in p), None)
     return definitions[reference.rsplit("/", 1)[1]] if reference else entry
 
 

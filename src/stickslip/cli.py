@@ -4,7 +4,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from rich.console import Console
@@ -15,6 +15,8 @@ from stickslip import __version__
 from stickslip.errors import InputError, StickslipError, input_error
 
 if TYPE_CHECKING:
+    from stickslip.study.structure_study import Command
+    from stickslip.study.structure_summary import StructureSummary
     from stickslip.study.summary import RunSummary
 
 PLAIN_WIDTH = 130  # columns of a table that is not on a terminal
@@ -27,6 +29,12 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file.")]
+Kind = Literal["blades", "sector"]
+StudyKind = Annotated[
+    Kind, typer.Option("--kind", help="blades: two blades and a damper; sector: a bladed disk.")
+]
+Fresh = Annotated[bool, typer.Option("--fresh", help="Forget what the results folder holds.")]
+Report = Annotated[bool, typer.Option("--report/--no-report", help="Write the HTML report.")]
 
 
 def main() -> None:
@@ -89,14 +97,10 @@ def run(
     verify: Annotated[
         bool, typer.Option("--verify", help="Integrate in time at three frequencies and compare.")
     ] = False,
-    fresh: Annotated[
-        bool, typer.Option("--fresh", help="Forget what the results folder holds.")
-    ] = False,
-    report: Annotated[
-        bool, typer.Option("--report/--no-report", help="Write the HTML report.")
-    ] = True,
+    fresh: Fresh = False,
+    report: Report = True,
 ) -> None:
-    """Run a study; an interrupted run goes on where it stopped."""
+    """Run a study of two blades and a damper; an interrupted run goes on where it stopped."""
     with _errors_as_text():
         from stickslip.study.run import run_study
 
@@ -111,12 +115,20 @@ def run(
 
 @app.command()
 def check(study: StudyFile) -> None:
-    """Do everything but the solve: read, mesh, reduce, place the damper."""
+    """Do everything but the computation: read, mesh, reduce, place the damper or pair the cyclic faces."""
     with _errors_as_text():
-        from stickslip.study.run import check_study
+        from stickslip.study.schema import read_toml
+        from stickslip.study.structure_study import is_structure_study
 
         with _screen() as sink:
-            warnings = check_study(study, sink)
+            if is_structure_study(read_toml(study)[1]):
+                from stickslip.study.structure_run import check_structure
+
+                warnings = check_structure(study, sink)
+            else:
+                from stickslip.study.run import check_study
+
+                warnings = check_study(study, sink)
         console = _console()
         for text in warnings:
             console.print(f"WARNING: {text}", markup=False, highlight=False, soft_wrap=True)
@@ -124,7 +136,9 @@ def check(study: StudyFile) -> None:
 
 
 @app.command()
-def new(name: Annotated[Path, typer.Argument(help="A folder to make.")]) -> None:
+def new(
+    name: Annotated[Path, typer.Argument(help="A folder to make.")], *, kind: StudyKind = "blades"
+) -> None:
     """Write a commented example study to NAME/study.toml."""
     with _errors_as_text():
         from stickslip.study.example import example_text
@@ -133,7 +147,7 @@ def new(name: Annotated[Path, typer.Argument(help="A folder to make.")]) -> None
         try:
             name.mkdir(parents=True, exist_ok=True)
             with target.open("x", encoding="utf-8", newline="\n") as stream:
-                stream.write(example_text())
+                stream.write(example_text(kind))
         except FileExistsError:
             raise input_error(
                 str(target), "exists already", "Give another name: nothing is overwritten."
@@ -144,26 +158,89 @@ def new(name: Annotated[Path, typer.Argument(help="A folder to make.")]) -> None
                 f"cannot be written ({error.strerror})",
                 "Give a folder you may write to.",
             ) from None
-        typer.echo(f"{target} written. Next: stickslip run {target}")
+        command = "run" if kind == "blades" else "modes"
+        typer.echo(f"{target} written. Next: stickslip {command} {target}")
 
 
 @app.command()
 def report(
     result: Annotated[
-        Path, typer.Argument(metavar="RESULT", help="A result.nc, or the folder that holds one.")
+        Path, typer.Argument(metavar="RESULT", help="A result's file, or the folder that holds it.")
     ],
 ) -> None:
     """Write the HTML report of a result."""
     with _errors_as_text():
-        typer.echo(f"{_write_report(result / 'result.nc' if result.is_dir() else result)} written")
+        folder = result if result.is_dir() else result.parent
+        of_wheel = any((folder / f"{c}.nc").is_file() for c in ("modes", "campbell", "safe"))
+        if of_wheel and (result.is_dir() or result.name != "result.nc"):
+            page = _write_wheel_report(result)
+        else:
+            page = _write_report(result / "result.nc" if result.is_dir() else result)
+        typer.echo(f"{page} written")
 
 
 @app.command()
-def schema() -> None:
+def modes(study: StudyFile, *, fresh: Fresh = False, report: Report = True) -> None:
+    """Find natural frequencies and mode shapes of a bladed disk for each nodal diameter."""
+    _run_structure(study, "modes", fresh=fresh, report=report)
+
+
+@app.command()
+def campbell(study: StudyFile, *, fresh: Fresh = False, report: Report = True) -> None:
+    """Follow the frequencies of a bladed disk over the speed and find where engine orders meet them."""
+    _run_structure(study, "campbell", fresh=fresh, report=report)
+
+
+@app.command()
+def safe(study: StudyFile, *, fresh: Fresh = False, report: Report = True) -> None:
+    """Say which modes of a bladed disk engine orders can excite at a speed (SAFE diagram)."""
+    _run_structure(study, "safe", fresh=fresh, report=report)
+
+
+@app.command()
+def inspect(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A file of a finite-element model.")],
+    *,
+    units: Annotated[
+        str, typer.Option(help="Its unit system: SI, mm-t-s, mm-kg-s, mm-kg-ms, inch-lbf-s, ...")
+    ] = "SI",
+    frequencies: Annotated[
+        int, typer.Option(min=0, max=200, help="Natural frequencies to compute.")
+    ] = 10,
+    mesh: Annotated[
+        Path | None, typer.Option(help="Where the nodes lie, beside matrices that do not say.")
+    ] = None,
+) -> None:
+    """Say what is in a file of a finite-element model: dofs, sets, mass, size, first frequencies."""
+    with _errors_as_text():
+        from stickslip.study.inspect_file import inspect_file
+
+        with _screen() as sink:
+            lines = inspect_file(file, units, frequencies, mesh, sink)
+        for line in lines:
+            _console().print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+@app.command()
+def schema(*, kind: StudyKind = "blades") -> None:
     """Print the JSON Schema of study files."""
     from stickslip.study.schema import json_schema
+    from stickslip.study.structure_study import structure_schema
 
-    typer.echo(json_schema())
+    typer.echo(json_schema() if kind == "blades" else structure_schema())
+
+
+def _run_structure(study: Path, command: "Command", *, fresh: bool, report: bool) -> None:
+    """Run a command for bladed disks and print what it found."""
+    with _errors_as_text():
+        from stickslip.study.structure_run import run_structure
+
+        with _screen() as sink:
+            summary = run_structure(study, command, fresh=fresh, sink=sink)
+        files = [*summary.files]
+        if report:
+            files.append(_write_wheel_report(summary.result))
+        _print_structure(summary, files)
 
 
 @contextmanager
@@ -216,15 +293,40 @@ def _write_report(result: Path) -> Path:
     return target
 
 
+def _write_wheel_report(result: Path) -> Path:
+    from stickslip.report.wheel_page import write_wheel_report
+
+    target = (result if result.is_dir() else result.parent) / "report.html"
+    write_wheel_report(result, target)
+    return target
+
+
+def _print_structure(summary: "StructureSummary", files: list[Path]) -> None:
+    console = _console()
+    for found in summary.tables:
+        table = Table(title=found.title, title_justify="left")
+        for name in found.head:
+            table.add_column(name, justify="right")
+        for cells in found.rows:
+            table.add_row(*cells)
+        console.print(table)
+    _print_lines(console, "Warnings", list(summary.warnings))
+    _print_lines(console, "Files", [str(f) for f in files])
+
+
+def _print_lines(console: Console, title: str, texts: list[str]) -> None:
+    if texts:
+        console.print(f"\n{title}", markup=False, highlight=False)
+    for text in texts:
+        console.print(f"  {text}", markup=False, highlight=False, soft_wrap=True)
+
+
 def _print_summary(summary: "RunSummary", files: list[Path]) -> None:
     console = _console()
     console.print(_table(summary))
 
     def lines(title: str, texts: list[str]) -> None:
-        if texts:
-            console.print(f"\n{title}", markup=False, highlight=False)
-        for text in texts:
-            console.print(f"  {text}", markup=False, highlight=False, soft_wrap=True)
+        _print_lines(console, title, texts)
 
     lines("Where the Jacobian Alert asked for more harmonics", list(summary.alerts))
     lines("Against time integration", [c.sentence for c in summary.checks])

@@ -78,6 +78,7 @@ def campbell_diagram(result: WheelResult) -> Plot:
     figure.update_xaxes(
         title_text="speed (rpm)", range=[rpm.min() - 0.01 * span, rpm.max() + 0.06 * span]
     )
+    figure.update_xaxes(exponentformat="none", separatethousands=True)
     figure.update_yaxes(title_text="frequency (Hz), rotating frame", range=[0, 1.04 * top])
     found = f"{counted(n, 'crossing')} marked" if n else "no crossing in the range"
     caption = (

@@ -93,7 +93,7 @@ SCRIPT = """
       const size = {}, margin = 0.1 * v.span, longest = v.span + 2 * margin;
       ["x", "y", "z"].forEach((a, d) => {
         layout[`scene.${a}axis.range`] = [v.low[d] - margin, v.high[d] + margin];
-        size[a] = 1.75 * (v.high[d] - v.low[d] + 2 * margin) / longest;
+        size[a] = 2.2 * (v.high[d] - v.low[d] + 2 * margin) / longest;
       });
       layout["scene.aspectratio"] = size;
       const [a, b, c] = data.axis;  // look along the wheel's axis at a slant, on the sector from the side

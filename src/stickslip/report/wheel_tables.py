@@ -98,7 +98,12 @@ def frequencies(result: WheelResult) -> str:
     """Return the natural frequencies: a row a wave, a column a mode."""
     hz = result.floats("frequency_hz")
     head = ["wave", *(f"mode {m + 1} (Hz)" for m in range(hz.shape[1]))]
-    kinds = result.data["wave_kind"].values
+    # where nothing parts the directions, both have the frequencies
+    parted = len(set(result.integers("nodal_diameter"))) < len(hz)
+    kinds = [
+        str(kind) if parted or kind == "standing" else "both ways"
+        for kind in result.data["wave_kind"].values
+    ]
     rows = [
         [
             f"{escape(name)}, {escape(str(kind))}" if result.sectors > 1 else name,

@@ -11,10 +11,9 @@ from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.axis import Axis
 from stickslip.model.elements import EXACT, Quadrature
 from stickslip.model.mesh import SolidMesh
-from stickslip.model.readers.ansys import read_ansys_full
 from stickslip.model.readers.ansys_archive import read_ansys_archive, read_ansys_materials
-from stickslip.model.readers.calculix import read_calculix_matrices
 from stickslip.model.readers.calculix_deck import Deck, assemble_deck, read_deck
+from stickslip.model.readers.open_model import read_model
 from stickslip.model.readers.units import Units
 from stickslip.model.solid import Material
 from stickslip.model.structure import Structure
@@ -149,19 +148,16 @@ def _from_matrices(study: StructureStudy, table: FileModel) -> FileContent:
 
 def _matrices(study: StructureStudy, table: FileModel) -> Structure:
     """Read matrices by the suffix of their file."""
-    files, units, plausible = study.model_files, _units(table), table.plausible
-    path = files["path"]
-    suffix = Path(path.name.lower().removesuffix(".gz")).suffix
-    if suffix in (".sti", ".mas", ".dof"):
-        return read_calculix_matrices(
-            path, units=units, mesh=files.get("mesh"), mass=files.get("mass"), plausible=plausible
-        )
-    if suffix == ".full":
-        return read_ansys_full(path, nodes=files.get("nodes"), units=units, plausible=plausible)
+    beside = {key: path for key, path in study.model_files.items() if key != "path"}
+    found = read_model(
+        study.model_files["path"], units=_units(table), plausible=table.plausible, **beside
+    )
+    if isinstance(found, Structure):
+        return found
     raise input_error(
         f"{study.path}: model.file.path",
-        f"files like {path.name} are not read here",
-        "Give a deck (.inp), an archive (.cdb), or matrices (.sti, .full).",
+        f"{table.path} holds results, not a model",
+        "Give a deck (.inp), an archive (.cdb), or matrices.",
     )
 
 

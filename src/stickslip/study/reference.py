@@ -2,7 +2,8 @@
 
 import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,47 +17,58 @@ COLUMNS = ("nodal_diameter", "mode", "frequency_hz")
 MOST_ROWS = 100_000
 
 
-def read_reference(
-    study: StructureStudy, numbers: Sequence[int], sectors: int
-) -> FloatArray | None:
-    """Return the reference frequencies of waves, NaN where there is none; None if the study names no file.
+@dataclass(frozen=True)
+class Reference:
+    """Frequencies to compare with.
 
     Parameters
     ----------
-    study
-        The study.
-    numbers
-        Wave numbers of the rows.
-    sectors
-        Of the wheel. Both directions of a nodal diameter are compared with the same frequencies.
+    path
+        Their file.
+    frequencies_hz
+        (nodal diameter, mode from 1) -> Hz.
+    """
 
-    Returns
-    -------
-    numpy.ndarray
-        (k, m) in Hz with the study's number of modes.
+    path: Path
+    frequencies_hz: Mapping[tuple[int, int], float]
+
+    def of_waves(self, numbers: Sequence[int], n_modes: int, sectors: int) -> FloatArray:
+        """Return the (k, m) frequencies in Hz of wave numbers, NaN where there is none.
+
+        Both directions of a nodal diameter are compared with the same frequencies.
+
+        Raises
+        ------
+        InputError
+            If nothing is left to compare with.
+        """
+        diameters = [wave(k, sectors).nodal_diameter for k in numbers]
+        modes = range(1, n_modes + 1)
+        out = np.array(
+            [[self.frequencies_hz.get((d, m), np.nan) for m in modes] for d in diameters]
+        )
+        if not np.isfinite(out).any():
+            raise input_error(
+                str(self.path),
+                "holds no frequency of the nodal diameters and modes of this study",
+                "Check the columns nodal_diameter and mode (1 is the lowest), and modes.reference_case.",
+            )
+        return out
+
+
+def read_reference(study: StructureStudy) -> Reference | None:
+    """Read the file that a study names; None if it names none.
 
     Raises
     ------
     InputError
-        If columns are missing, a line cannot be read, or nothing is left to compare with.
+        If columns are missing, or a line cannot be read.
     """
     table = study.tables.modes
     if table.reference is None:
         return None
     path = study.located(table.reference)
-    found = _rows(path, table.reference_case)
-    out = np.full((len(numbers), table.number), np.nan)
-    for i, number in enumerate(numbers):
-        diameter = wave(number, sectors).nodal_diameter
-        for mode in range(table.number):
-            out[i, mode] = found.get((diameter, mode + 1), np.nan)
-    if not np.isfinite(out).any():
-        raise input_error(
-            str(path),
-            "holds no frequency of the nodal diameters and modes of this study",
-            "Check the columns nodal_diameter and mode (1 is the lowest), and modes.reference_case.",
-        )
-    return out
+    return Reference(path, _rows(path, table.reference_case))
 
 
 def _rows(path: Path, case: str | None) -> dict[tuple[int, int], float]:

@@ -194,9 +194,10 @@ class SectorTable(Section):
             * (d.bore_width_m + d.web_width_m)
             / 2
         )
+        # thin plates have at least one element across
+        disk *= max(1.0, self.disk_size_m / d.web_width_m)
         thickness = (a.hub_thickness_m + a.tip_thickness_m) / 2
         blade = a.airfoil_length_m * (a.hub_chord_m + a.tip_chord_m) / 2 * thickness
-        # a thin plate has at least one element across
         blade *= max(1.0, self.airfoil_size_m / thickness)
         return NODES_A_CUBE * (disk / self.disk_size_m**3 + blade / self.airfoil_size_m**3)
 

@@ -146,7 +146,7 @@ def disk_model(study: StructureStudy, say: Say) -> DiskModel:
     assert study.tables.model.sector is not None
     assert study.tables.material is not None
     table = study.tables.model.sector
-    say(f"meshing a sector of {table.sectors}, about {table.nodes():.2g} nodes")
+    say(f"meshing one of {table.sectors} sectors")
     mesh = mesh_sector(table.library())
     if table.shroud is not None and table.shroud.joined:
         mesh = _with_joined_shrouds(mesh)

@@ -85,6 +85,8 @@ class WaveBranches:
         (c,) of each crossing; modes count from 0.
     speeds, crossings_hz
         (c,) in rad/s and Hz.
+    error
+        Largest relative error of the frequencies that the small basis was found to have.
     seconds
         Time of the computation.
     """
@@ -95,4 +97,5 @@ class WaveBranches:
     modes: IntArray
     speeds: FloatArray
     crossings_hz: FloatArray
+    error: float
     seconds: float

@@ -175,10 +175,12 @@ class _Run:
 
 
 def _modes(run: _Run) -> StructureSummary:
-    tables, model = run.study.tables, run.model()
-    speed = RPM * tables.rotation.speed_rpm
+    tables, known = run.study.tables, read_reference(run.study)
+    model, speed = run.model(), RPM * tables.rotation.speed_rpm
     numbers = waves_of_modes(tables.modes.nodal_diameters, model, speed)
-    reference = read_reference(run.study, numbers, model.sectors)
+    reference = None
+    if known is not None:
+        reference = known.of_waves(numbers, tables.modes.number, model.sectors)
     shapes = tables.modes.shapes and model.skin is not None
 
     def write(waves: list[WaveModes], complete: bool) -> None:
@@ -210,10 +212,7 @@ def _campbell(run: _Run) -> StructureSummary:
             campbell_dataset(waves, speeds, table.engine_orders, model.facts, origin), run.target
         )
 
-    def say(speed: float) -> None:
-        run.log.sink.say(f"  {speed / RPM:.0f} rpm done")
-
-    waves = run.each(numbers, lambda k: follow_wave(model, k, table, speeds, say), write)
+    waves = run.each(numbers, lambda k: follow_wave(model, k, table, speeds), write)
     return run.summary(campbell_tables(waves, speeds, model.sectors), model)
 
 
@@ -250,7 +249,10 @@ def _safe(run: _Run) -> StructureSummary:
 
 def _progress(wave: WaveModes | WaveBranches) -> str:
     low, high = wave.frequencies_hz.min(), wave.frequencies_hz.max()
-    return f"wave number {wave.wave_number}: {low:.6g} to {high:.6g} Hz in {wave.seconds:.1f} s"
+    basis = f", basis good to {wave.error:.0e}" if isinstance(wave, WaveBranches) else ""
+    return (
+        f"wave number {wave.wave_number}: {low:.6g} to {high:.6g} Hz in {wave.seconds:.1f} s{basis}"
+    )
 
 
 def _require_table(study: StructureStudy, command: Command) -> None:

@@ -142,6 +142,9 @@ def campbell_dataset(
             "wave speed mode", frequencies, "Hz", "natural frequency in the rotating frame"
         ),
         "seconds": variable("wave", [w.seconds for w in waves], "s", "time of the computation"),
+        "basis_error": variable(
+            "wave", [w.error for w in waves], "1", "relative error of frequencies between speeds"
+        ),
         "crossing_wave": variable("crossing", which, "1", "index of the wave"),
         "crossing_mode": variable("crossing", every("modes"), "1", "index of the mode"),
         "crossing_engine_order": variable(

@@ -61,7 +61,8 @@ def modes_tables(
     """Return the natural frequencies, and their differences from the reference."""
     n = waves[0].frequencies_hz.size
     head = ("wave", "kind", *(f"{m + 1}" for m in range(n)))
-    names = [_names(w.wave_number, sectors) for w in waves]
+    parted = any(2 * w.wave_number > sectors for w in waves)
+    names = [_names(w.wave_number, sectors, parted=parted) for w in waves]
     rows = tuple(
         (*name, *(f"{f:.7g}" for f in w.frequencies_hz))
         for name, w in zip(names, waves, strict=True)
@@ -128,6 +129,9 @@ def safe_tables(found: Safe) -> tuple[TextTable, ...]:
     return (TextTable(title, head, rows),)
 
 
-def _names(number: int, sectors: int) -> tuple[str, str]:
+def _names(number: int, sectors: int, *, parted: bool = True) -> tuple[str, str]:
+    """Return the name of a wave and its kind; where nothing parts the directions, both have the frequencies."""
     diameter, kind = wave_name(number, sectors)
-    return ("whole", "") if sectors == 1 else (f"ND {diameter}", kind)
+    if sectors == 1:
+        return "whole", ""
+    return f"ND {diameter}", kind if parted or kind == "standing" else "both ways"

@@ -1,6 +1,6 @@
 """What is computed for one travelling wave: its modes at a speed, or its branches over a range of speeds."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from time import perf_counter
 
 import numpy as np
@@ -12,6 +12,7 @@ from stickslip.reduction.waves import excited_wave
 from stickslip.response.campbell import campbell
 from stickslip.response.nodal_diameters import NodalDiameterMap
 from stickslip.response.safe import Safe, safe
+from stickslip.study.speed_basis import speed_basis
 from stickslip.study.structure_model import DiskModel
 from stickslip.study.structure_results import WaveBranches, WaveModes
 from stickslip.study.structure_tables import CampbellTable, SafeTable
@@ -81,19 +82,18 @@ def follow_wave(
     wave_number: int,
     table: CampbellTable,
     speeds: FloatArray,
-    say: Callable[[float], None],
 ) -> WaveBranches:
     """Return the branches of a wave over `speeds` (rad/s) and their crossings with the engine orders that excite it."""
     began = perf_counter()
     orders = [m for m in table.engine_orders if _diagram(m, model) == wave_number]
-    found = campbell(
+    coriolis = model.rotation.coriolis
+    small = speed_basis(
         lambda speed: model.at(speed, wave_number),
-        speeds,
+        (float(speeds[0]), float(speeds[-1])),
         table.modes,
-        orders,
-        coriolis=model.rotation.coriolis,
-        progress=say,
+        coriolis=coriolis,
     )
+    found = campbell(small.at, speeds, table.modes, orders, coriolis=coriolis)
     crossings = found.crossings
     return WaveBranches(
         wave_number,
@@ -102,6 +102,7 @@ def follow_wave(
         np.array([c.mode for c in crossings], dtype=np.int64),
         np.array([c.speed for c in crossings]),
         np.array([c.frequency_hz for c in crossings]),
+        small.error,
         perf_counter() - began,
     )
 

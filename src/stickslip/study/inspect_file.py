@@ -1,0 +1,38 @@
+"""What ``stickslip inspect`` says of a model's file, as lines of text."""
+
+from pathlib import Path
+
+from stickslip.model.readers.open_model import model_summary, read_model
+from stickslip.model.readers.units import Units
+from stickslip.study.progress import Sink
+
+WIDTH = 26  # of the column of names
+
+
+def inspect_file(path: Path, units: str, modes: int, mesh: Path | None, sink: Sink) -> list[str]:
+    """Return what is in a model's file.
+
+    Parameters
+    ----------
+    path
+        Any file that `read_model` opens.
+    units
+        Name of its unit system.
+    modes
+        Natural frequencies to compute; 0 for none.
+    mesh
+        Where the nodes lie, beside matrices that do not say.
+    sink
+        Where progress is told.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    system = Units.named(units)
+    sink.say(f"reading {path} in {system.name}")
+    # doubtful numbers are shown with a remark, not refused: that is what one inspects a file for
+    model = read_model(path, units=system, mesh=mesh, plausible=False)
+    found = model_summary(model, n_modes=modes, units=system, say=sink.say)
+    return [f"{name:<{WIDTH}}{value}" for name, value in found.rows()]

@@ -1,0 +1,360 @@
+"""Bladed disks through the command line: from a study to tables, results and a page, and what bad input is told."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from small_wheel import wheel_text, write_small_wheel
+from typer.testing import CliRunner, Result
+
+from stickslip.cli import app
+from stickslip.model.modes import normal_modes
+from stickslip.model.sector_mesh import mesh_sector
+from stickslip.model.structure_file import save_structure
+from stickslip.reduction.wheel import wheel
+from stickslip.study.example import example_text
+from stickslip.study.structure_model import disk_model
+from stickslip.study.structure_study import read_structure_study
+
+ROOT = Path(__file__).parents[1]
+
+
+def invoke(*words: str) -> Result:
+    return CliRunner().invoke(app, list(words))
+
+
+def done(*words: str) -> str:
+    """Return what a command prints that must end well."""
+    result = invoke(*words)
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def refused(*words: str) -> str:
+    """Return what a command says that must end with exit code 2 and without a traceback."""
+    result = invoke(*words)
+    assert result.exit_code == 2, result.output
+    assert isinstance(result.exception, SystemExit)
+    return result.stderr.strip()
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A study whose three commands have been run."""
+    path = write_small_wheel(tmp_path_factory.mktemp("wheel"))
+    for command in ("modes", "campbell", "safe"):
+        done(command, str(path))
+    return path
+
+
+def result(study: Path, command: str) -> xr.Dataset:
+    return xr.load_dataset(study.parent / "results" / f"{command}.nc", engine="h5netcdf")
+
+
+def test_example_in_the_repository_is_the_one_that_new_writes(tmp_path: Path) -> None:
+    said = done("new", str(tmp_path / "made"), "--kind", "sector")
+    assert f"stickslip modes {tmp_path / 'made' / 'study.toml'}" in said
+    written = (tmp_path / "made" / "study.toml").read_text(encoding="utf-8")
+    shipped = (ROOT / "examples/shrouded_sector/study.toml").read_text(encoding="utf-8")
+    assert written == shipped == example_text("sector")
+    read_structure_study(tmp_path / "made" / "study.toml")
+
+
+def test_frequencies_are_those_of_the_assembled_wheel(study: Path) -> None:
+    # the wheel of all sectors at speed shares the sector's matrices, but neither waves nor phases
+    model = disk_model(read_structure_study(study), lambda _: None)
+    speed = 6000 * 2 * np.pi / 60
+    sector = model.sector
+    assert sector is not None
+    assert model.rotating is not None
+    turning = model.rotating.at_speed(speed, tie=sector.tie)
+    whole = wheel(type(sector)(turning, sector.sectors, sector.low, sector.high, sector.axis))
+    hertz = normal_modes(whole, 8).frequencies_hz
+    data = result(study, "safe")  # all nodal diameters, two modes of each
+    both = np.where(data.wave_kind == "standing", 1, 2)
+    union = np.sort(np.repeat(data.frequency_hz.values, both, axis=0).ravel())
+    # the third modes of the diameters lie above the first eight of the wheel
+    np.testing.assert_allclose(union[:8], hertz, rtol=1e-8)
+    modes = result(study, "modes")
+    np.testing.assert_allclose(
+        modes.frequency_hz, data.frequency_hz.sel(wave=modes.wave_number.values), rtol=1e-9
+    )
+
+
+def test_crossings_lie_on_engine_order_and_mode(study: Path) -> None:
+    data = result(study, "campbell")
+    assert data.sizes["crossing"] > 0
+    assert float(data.basis_error.max()) < 1e-5
+    np.testing.assert_allclose(
+        data.crossing_frequency_hz, data.crossing_engine_order * data.crossing_speed_rpm / 60
+    )
+    # full modes at the speed of a crossing: no basis, no following
+    model = disk_model(read_structure_study(study), lambda _: None)
+    first = data.isel(crossing=0)
+    wave = int(data.wave_number[int(first.crossing_wave)])
+    at = model.at(float(first.crossing_speed_rpm) * 2 * np.pi / 60, wave)
+    nearest = np.abs(normal_modes(at, 3).frequencies_hz / float(first.crossing_frequency_hz) - 1)
+    assert nearest.min() < 1e-5
+    # on 8 sectors engine orders 2 and 6 both excite two nodal diameters
+    assert set(data.nodal_diameter.values) == {2}
+
+
+def test_mass_is_density_times_volume_and_shapes_meet_at_the_cut(study: Path) -> None:
+    data = result(study, "modes")
+    tables = read_structure_study(study).tables
+    mesh = mesh_sector(tables.model.sector.library())
+    corners = mesh.points[mesh.cells[:, :4]]
+    edges = corners[:, 1:] - corners[:, :1]
+    straight = np.abs(np.linalg.det(edges)).sum() / 6 * 7850.0
+    # curved faces differ from their chords by a little
+    assert data.attrs["mass_kg"] == pytest.approx(straight, rel=0.03)
+    shape = data["shape"].values[..., 0] + 1j * data["shape"].values[..., 1]
+    assert np.linalg.norm(shape, axis=-1).max() == pytest.approx(1.0, rel=1e-6)
+    # u_high = exp(i theta) R u_low at partners of the cut faces, found by position
+    angle = 2 * np.pi / 8
+    turn = np.array(
+        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+    )
+    points = data.skin_point.values
+    cut = np.unique(data.skin_triangle.values[data.skin_cut.values == 1])
+    turned = points[cut] @ turn.T
+    distance = np.linalg.norm(turned[:, None] - points[cut], axis=-1)
+    low, high = np.nonzero(distance < 1e-6)
+    assert len(low) > 5
+    wave = int(data.wave_number[1])
+    left = shape[1][:, cut[high]]
+    right = np.exp(1j * wave * angle) * shape[1][:, cut[low]] @ turn.T
+    np.testing.assert_allclose(left, right, atol=2e-6)
+
+
+def test_page_holds_all_three(study: Path) -> None:
+    page = (study.parent / "results" / "report.html").read_text(encoding="utf-8")
+    for key in ("diameters", "shapes", "campbell", "safe"):
+        assert f'<figure id="fig-{key}" class="all-cases">' in page
+    assert len(page) < 10e6
+    assert str(study.parent / "results" / "report.html") in done(
+        "report", str(study.parent / "results")
+    )
+
+
+def test_finished_waves_are_not_computed_again(
+    study: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = result(study, "modes")
+
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr("stickslip.study.structure_run.solve_wave", never)
+    assert "2 of 2 waves are already there" in done("modes", str(study), "--no-report")
+    xr.testing.assert_equal(before, result(study, "modes"))
+
+
+def test_interrupted_command_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import stickslip.study.structure_run as module
+
+    path, solve, asked = write_small_wheel(tmp_path), module.solve_wave, []
+
+    def once(model: object, speed: float, wave: int, *rest: object, **more: object) -> object:
+        if asked:
+            raise KeyboardInterrupt
+        asked.append(wave)
+        return solve(model, speed, wave, *rest, **more)
+
+    monkeypatch.setattr(module, "solve_wave", once)
+    stopped = invoke("modes", str(path))
+    assert stopped.exit_code == 130
+    assert "The same command goes on" in stopped.stderr
+    assert result(path, "modes").attrs["complete"] == 0
+    monkeypatch.setattr(module, "solve_wave", solve)
+    assert "1 of 2 waves are already there" in done("modes", str(path), "--no-report")
+    assert result(path, "modes").attrs["complete"] == 1
+
+
+def test_reference_frequencies_are_compared(study: Path, tmp_path: Path) -> None:
+    hertz = result(study, "modes").frequency_hz.values
+    rows = [
+        f"at rest,0,1,{float(hertz[0, 0])!r}",
+        f"at rest,2,2,{float(hertz[1, 1]) * 1.01!r}",
+        "other,2,2,7.0",
+    ]
+    (tmp_path / "ref.csv").write_text("\n".join(["case,nodal_diameter,mode,frequency_hz", *rows]))
+    path = write_small_wheel(tmp_path, **{"# reference": '"ref.csv"\nreference_case = "at rest"'})
+    assert "the largest is -9.90e-03 (ND 2, mode 2)" in " ".join(
+        done("modes", str(path), "--no-report").split()
+    )
+    off = result(path, "modes").difference.values
+    np.testing.assert_allclose(off, [[0, np.nan], [np.nan, 1 / 1.01 - 1]], atol=1e-9)
+
+
+def changed(folder: Path, old: str, new: str) -> Path:
+    """Write the study with one text replaced."""
+    text = wheel_text()
+    assert text.count(old) == 1
+    folder.mkdir(exist_ok=True)
+    path = folder / "study.toml"
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    return path
+
+
+WRONG = {
+    "unknown key": ("tangent =", "tangents =", "rotation.tangents: unknown key 'tangents'. Did you mean 'tangent'?"),
+    "unknown word": ('"consistent"', '"consistant"', "rotation.tangent: is not known, got 'consistant'. Did you mean 'consistent'?"),
+    "a geometry that cannot be": ("rim_height_m = 0.014", "rim_height_m = 0.1", "DiskProfile"),
+    "speeds that fall": ("[0.0, 16000.0]", "[9000.0, 0.0]", "campbell.speeds_rpm: must be the lower before the higher"),
+    "a diameter that is not there": ("nodal_diameters = [0, 2]", "nodal_diameters = [0, 5]", "modes.nodal_diameters: 5 is above half of 8 sectors. The nodal diameters go from 0 to 4."),
+    "joined with a gap": ("gap_m = 0.0 ", "gap_m = 0.001 ", "model.sector.shroud.joined: needs shrouds that touch, got gap_m = 0.001."),
+    "absurd units": ("young_modulus_pa = 2.1e11", "young_modulus_pa = -2.1e5", "material.young_modulus_pa: must be greater than 0"),
+    "no reference": ("# reference =", "reference =", "modes.reference: there is no file"),
+    "a folder outside": ('folder = "results"', 'folder = "../out"', "output.folder: must be a folder inside the study's folder"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_bad_studies_are_told_what_is_wrong(tmp_path: Path, name: str) -> None:
+    old, new, said = WRONG[name]
+    path = changed(tmp_path, old, new)
+    told = refused("modes", str(path))
+    assert told.startswith(f"{path}: ")
+    assert said in told
+    assert not (tmp_path / "results").exists()
+
+
+def test_studies_of_the_other_kind_name_their_command(tmp_path: Path) -> None:
+    done("new", str(tmp_path / "blades"))
+    blades = tmp_path / "blades" / "study.toml"
+    assert f"Use 'stickslip run {blades}'" in refused("modes", str(blades))
+    wheel_study = write_small_wheel(tmp_path / "wheel")
+    assert f"Use 'stickslip modes {wheel_study}'" in refused("run", str(wheel_study))
+
+
+def test_commands_whose_table_is_missing_and_missing_studies(tmp_path: Path) -> None:
+    text = wheel_text()
+    begin, end = text.index("[campbell]"), text.index("[safe]")
+    path = tmp_path / "study.toml"
+    path.write_text(text[:begin] + text[end:])
+    assert refused("campbell", str(path)).startswith(f"{path}: campbell: is missing. Add the table")
+    assert "there is no such file" in refused("safe", str(tmp_path / "none.toml"))
+    assert "there is no result of a bladed disk" not in refused("report", str(tmp_path))
+
+
+def test_safe_needs_a_speed(tmp_path: Path) -> None:
+    path = write_small_wheel(tmp_path, speed_rpm="0.0")
+    assert f"{path}: safe.speed_rpm: must be above zero, got 0." in refused("safe", str(path))
+
+
+def test_check_builds_the_model_and_writes_nothing(tmp_path: Path) -> None:
+    path = write_small_wheel(tmp_path)
+    said = done("check", str(path))
+    assert "pairs of dofs on the cyclic faces" in said
+    assert "good to run" in said
+    assert [p.name for p in tmp_path.iterdir()] == ["study.toml"]
+
+
+CUBE = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], dtype=float)
+
+
+def write_deck(path: Path, length: float = 1.0) -> Path:
+    """Write a cantilever of two cubes of a tenth of a metre (SI) or of other units as a deck."""
+    points = 0.1 * np.vstack([CUBE, CUBE[[1, 3, 5, 7]] + [1, 0, 0]]) / length
+    lines = [
+        "*NODE, NSET=ALL",
+        *(f"{i + 1}, {', '.join(map(repr, map(float, p)))}" for i, p in enumerate(points)),
+    ]
+    lines += [
+        "*ELEMENT, TYPE=C3D8, ELSET=E",
+        "1, 1, 2, 4, 3, 5, 6, 8, 7",
+        "2, 2, 9, 10, 4, 6, 11, 12, 8",
+    ]
+    lines += ["*NSET, NSET=FOOT", "1, 3, 5, 7", "*NSET, NSET=TIP", "9, 10, 11, 12"]
+    lines += ["*MATERIAL, NAME=STEEL", "*ELASTIC", "2.1e11, 0.3", "*DENSITY", "7850."]
+    lines += ["*SOLID SECTION, ELSET=E, MATERIAL=STEEL"]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def file_study(folder: Path, more: str = "", model: str = "deck.inp") -> Path:
+    path = folder / "study.toml"
+    path.write_text(
+        f'schema_version = 1\n[model.file]\npath = "{model}"\nunits = "SI"\n{more}\n[modes]\nnumber = 3\n'
+    )
+    return path
+
+
+def test_whole_structure_from_a_deck(tmp_path: Path) -> None:
+    write_deck(tmp_path / "deck.inp")
+    path = file_study(tmp_path, 'clamped = ["foot"]')
+    done("modes", str(path))
+    data = result(path, "modes")
+    # Euler-Bernoulli of a cube-sized stub is no reference; its own mass and symmetry are: two equal bending modes
+    assert data.attrs["mass_kg"] == pytest.approx(2 * 7850 * 1e-3, rel=1e-12)
+    np.testing.assert_allclose(data.attrs["centre_m"], [0.1, 0.05, 0.05], rtol=1e-12)
+    assert float(data.frequency_hz[0, 0]) == pytest.approx(float(data.frequency_hz[0, 1]), rel=1e-9)
+    assert data["shape"].dims == ("wave", "mode", "skin_point", "xyz", "part")
+    assert "a whole structure" in refused("safe", str(with_safe(path)))
+
+
+def with_safe(path: Path) -> Path:
+    path.write_text(path.read_text() + "[safe]\nspeed_rpm = 100.0\nengine_orders = [1]\n")
+    return path
+
+
+def test_matrices_have_modes_and_no_speed(tmp_path: Path) -> None:
+    write_deck(tmp_path / "deck.inp")
+    model = disk_model(
+        read_structure_study(file_study(tmp_path, 'clamped = ["FOOT"]')), lambda _: None
+    )
+    save_structure(model.structure, tmp_path / "beam.npz")
+    path = file_study(tmp_path, model="beam.npz")
+    done("modes", str(path))
+    expected = normal_modes(model.structure, 3).frequencies_hz
+    np.testing.assert_allclose(result(path, "modes").frequency_hz[0], expected, rtol=1e-12)
+    page = (tmp_path / "results" / "report.html").read_text()
+    assert "this result holds no mode shapes" in page
+    turning = path.read_text() + "[rotation]\nspeed_rpm = 10.0\n"
+    path.write_text(turning)
+    assert "the model is matrices, which no speed changes" in refused("modes", str(path), "--fresh")
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ('clamped = ["FEET"]', "model.file.clamped[0]: the file has no set 'FEET' of free nodes. Did you mean 'FOOT'?"),
+        ("sectors = 6", "model.file.low_face: is missing with sectors = 6, and the file has no cyclic tie. Name one of its sets: "),
+        ('sectors = 6\nlow_face = "FOOT"', "model.file.high_face: is missing, the other face is given."),
+        ('sectors = 6\nlow_face = "FOOT"\nhigh_face = "TIP"', "turned by"),
+        ('low_face = "FOOT"\nhigh_face = "TIP"', "model.file.sectors: must be above 1 with cyclic faces."),
+        ('mesh = "none.inp"', "model.file.mesh: there is no file"),
+    ],
+)  # fmt: skip
+def test_files_and_study_that_disagree(tmp_path: Path, more: str, said: str) -> None:
+    write_deck(tmp_path / "deck.inp")
+    assert said in refused("modes", str(file_study(tmp_path, more)))
+
+
+def test_units_that_give_absurd_numbers_are_doubted(tmp_path: Path) -> None:
+    write_deck(tmp_path / "deck.inp")
+    path = file_study(tmp_path)
+    path.write_text(path.read_text().replace('"SI"', '"mm-t-s"'))
+    said = refused("modes", str(path))
+    assert "that looks like SI" in said
+    assert "Give model.file.units, or model.file.plausible = false" in said
+
+
+def test_inspect_says_what_is_in_a_file(tmp_path: Path) -> None:
+    said = done("inspect", str(write_deck(tmp_path / "deck.inp")), "--frequencies", "8")
+    rows = {line[:26].strip(): line[26:].strip() for line in said.splitlines()}
+    assert rows["nodes"] == "12"
+    assert rows["dofs"] == "36"
+    assert rows["set FOOT"] == "4"
+    assert rows["rigid modes"] == "6"
+    assert len(rows["frequencies (Hz)"].split(",")) == 8
+    # beside the six rigid ones
+    assert float(rows["frequencies (Hz)"].split(",")[6]) > 100.0
+    assert "none.inp" in refused("inspect", str(tmp_path / "none.inp"))
+    (tmp_path / "notes.txt").write_text("x")
+    assert "no reader for files '.txt'" in refused("inspect", str(tmp_path / "notes.txt"))
+    assert "unknown unit system 'furlong'" in refused(
+        "inspect", str(tmp_path / "deck.inp"), "--units", "furlong"
+    )
