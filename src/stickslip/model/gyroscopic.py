@@ -11,7 +11,7 @@ import scipy.linalg
 from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.factorisation import DENSE, factorise
-from stickslip.model.modes import normal_modes
+from stickslip.model.modes import connected_parts, lowest_modes, normal_modes
 from stickslip.model.structure import Structure
 
 SPARE = 10  # modes beyond twice as many as are asked for
@@ -69,11 +69,11 @@ def gyroscopic_modes(
             "Ask for at least one, and at most as many as the basis has.",
         )
     G = 0.5 * (structure.damping - structure.damping.T.conj())
-    whole = structure.n <= DENSE
-    modes = normal_modes(structure, movable if whole else n_basis)
-    squares, shapes = modes.squares, modes.shapes
-    if not whole:
-        squares, shapes = _enriched(structure, G, shapes)
+    if structure.n <= DENSE:
+        modes = normal_modes(structure, movable)
+        squares, shapes = modes.squares, modes.shapes
+    else:
+        squares, shapes = _enriched(structure, G, n_basis)
     rates, amplitudes = _eigenpairs(squares, shapes.conj().T @ (G @ shapes))
     first = np.argsort(rates.imag, kind="stable")[:n_modes]
     return GyroscopicModes(
@@ -101,11 +101,16 @@ def _eigenpairs(squares: FloatArray, coriolis: ComplexArray) -> tuple[ComplexArr
     return rates[kept], shapes / np.linalg.norm(shapes, axis=0)
 
 
-def _enriched(structure: Structure, coriolis: Matrix, modes: Matrix) -> tuple[FloatArray, Matrix]:
+def _enriched(structure: Structure, coriolis: Matrix, n_basis: int) -> tuple[FloatArray, Matrix]:
     """Return squares and shapes of the structure on its lowest modes and the static answers to their Coriolis forces."""
     K, M = structure.stiffness, structure.mass
     shift = SHIFT * abs(K.diagonal()).sum() / abs(M.diagonal()).sum()
-    answers = factorise(K + shift * M)(np.asarray(coriolis @ modes))
+    solve = factorise(K + shift * M)
+    if len(connected_parts(K, M)) == 1:  # one factorisation for both
+        modes = lowest_modes(K, M, n_basis, solve, -shift)[1]
+    else:
+        modes = normal_modes(structure, n_basis).shapes
+    answers = solve(np.asarray(coriolis @ modes))
     size = np.linalg.norm(answers, axis=0)
     answers = answers - modes @ (modes.conj().T @ (M @ answers))
     # nothing is left of an answer where Coriolis forces vanish or the modes know it already
