@@ -201,7 +201,7 @@ def changed(folder: Path, old: str, new: str) -> Path:
 WRONG = {
     "unknown key": ("tangent =", "tangents =", "rotation.tangents: unknown key 'tangents'. Did you mean 'tangent'?"),
     "unknown word": ('"consistent"', '"consistant"', "rotation.tangent: is not known, got 'consistant'. Did you mean 'consistent'?"),
-    "a geometry that cannot be": ("rim_height_m = 0.014", "rim_height_m = 0.1", "DiskProfile"),
+    "a geometry that cannot be": ("rim_height_m = 0.014", "rim_height_m = 0.1", "model.sector.disk: bore_radius 0.06 m, hub_radius 0.095 m and the rim's inner radius 0.07 m do not grow in this order."),
     "speeds that fall": ("[0.0, 16000.0]", "[9000.0, 0.0]", "campbell.speeds_rpm: must be the lower before the higher"),
     "a diameter that is not there": ("nodal_diameters = [0, 2]", "nodal_diameters = [0, 5]", "modes.nodal_diameters: 5 is above half of 8 sectors. The nodal diameters go from 0 to 4."),
     "joined with a gap": ("gap_m = 0.0 ", "gap_m = 0.001 ", "model.sector.shroud.joined: needs shrouds that touch, got gap_m = 0.001."),
@@ -320,7 +320,7 @@ def test_matrices_have_modes_and_no_speed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        ('clamped = ["FEET"]', "model.file.clamped[0]: the file has no set 'FEET' of free nodes. Did you mean 'FOOT'?"),
+        ('clamped = ["FOOD"]', "model.file.clamped[0]: the file has no set 'FOOD' of free nodes. Did you mean 'FOOT'?"),
         ("sectors = 6", "model.file.low_face: is missing with sectors = 6, and the file has no cyclic tie. Name one of its sets: "),
         ('sectors = 6\nlow_face = "FOOT"', "model.file.high_face: is missing, the other face is given."),
         ('sectors = 6\nlow_face = "FOOT"\nhigh_face = "TIP"', "turned by"),

@@ -65,7 +65,7 @@ def _figure(points: FloatArray, triangles: npt.NDArray[np.int64]) -> go.Figure:
     """Return the sector at rest; the script puts the shape onto it."""
     x, y, z = points.astype(np.float32).T
     i, j, k = triangles.astype(np.int32).T
-    light = {"ambient": 0.6, "diffuse": 0.65, "specular": 0.12, "roughness": 0.85}
+    light = {"ambient": 0.78, "diffuse": 0.5, "specular": 0.08, "roughness": 0.9}
     bar = {"title": {"text": "displacement<br>/ largest"}, "len": 0.55, "thickness": 14}
     skin = go.Mesh3d(
         x=x, y=y, z=z, i=i, j=j, k=k, intensity=np.zeros(len(points), dtype=np.float32), cmin=0.0, cmax=1.0,
