@@ -216,6 +216,19 @@ def test_engine_orders_meet_the_wave_they_excite():
     assert {c.engine_order for c in merged[0].crossings} == {2, 5, 9}
 
 
+def test_waves_may_be_named_and_watched():
+    seen = []
+    diagrams = ss.cyclic_campbell(
+        turning_ring, [0.0, 0.5, 1.0], 1, (2,), wave_numbers=(0, 6), coriolis=True,
+        progress=lambda wave, speed: seen.append((wave, speed)),
+    )  # fmt: skip
+    assert [d.wave_number for d in diagrams] == [0, 6]
+    assert not diagrams[0].crossings + diagrams[1].crossings  # order 2 excites neither
+    assert seen == [(0, 0.5), (0, 1.0), (6, 0.5), (6, 1.0)]
+    with pytest.raises(ss.InputError, match=r"wave_numbers: must be from 0 to 6, got 7"):
+        ss.cyclic_campbell(turning_ring, [0.0], 1, (), wave_numbers=(7,))
+
+
 def test_hub_on_springs_whirls_at_one_frequency_for_who_stands_still():
     # a hub shared by all sectors: k = 1 and k = n_s - 1 are its backward and forward whirl
     def hub(speed, sectors=5):
@@ -230,6 +243,10 @@ def test_hub_on_springs_whirls_at_one_frequency_for_who_stands_still():
     np.testing.assert_allclose(forward.frequencies_hz[:, 0] * TWO_PI, 10 - speeds, rtol=1e-9)
     for diagram in (backward, forward):
         np.testing.assert_allclose(diagram.stationary_hz * TWO_PI, 10.0, rtol=1e-9)
+    table = ss.nodal_diameter_map(hub(3.0), 1, [1], coriolis=True)
+    assert table.frequencies_hz[0, 0] * TWO_PI == pytest.approx(13.0)
+    assert table.forward_hz[0, 0] * TWO_PI == pytest.approx(7.0)
+    np.testing.assert_allclose(np.array(table.stationary_hz(3.0)) * TWO_PI, 10.0, rtol=1e-9)
 
 
 @pytest.mark.parametrize(

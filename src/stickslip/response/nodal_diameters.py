@@ -55,6 +55,17 @@ class NodalDiameterMap:
         table = self.frequencies_hz if backward else self.forward_hz
         return np.asarray(table[self.row(k if backward else self.sectors - k)])
 
+    def stationary_hz(self, speed: float) -> tuple[FloatArray, FloatArray]:
+        """Return the frequencies of backward and of forward waves as seen by who does not rotate, (k, n_modes) each.
+
+        Parameters
+        ----------
+        speed
+            Of the rotor, in rad/s; the one that the sector was computed at.
+        """
+        turning = self.nodal_diameters[:, None] * speed / (2 * np.pi)
+        return np.abs(self.frequencies_hz - turning), np.abs(self.forward_hz + turning)
+
 
 def nodal_diameter_map(
     sector: CyclicSector,
