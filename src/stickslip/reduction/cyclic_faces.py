@@ -156,7 +156,7 @@ def _unmatched(low: Face, high: Face, sectors: int, axis: Axis, reach: float) ->
         return input_error(
             f"cyclic_sector: {names}",
             f"are {degrees:.5g}° apart, {sectors} sectors need {pitch:.5g}°",
-            f"Say sectors={fits}{', and swap them' if degrees < 0 else ''}."
+            f"Say sectors={fits}{', and swap them' if degrees < 0 else ''}, or check the axis {axis.direction}."
             if near
             else "Check the number of sectors and the axis.",
         )
