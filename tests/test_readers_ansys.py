@@ -413,6 +413,15 @@ def test_spoilt_words_never_do_more_than_raise(tmp_path_factory, place, word):
             assert name in str(error)  # noqa: PT017  # a spoilt number may also be a valid one
 
 
+def test_nodes_of_results_that_the_geometry_lacks_are_named(tmp_path):
+    whole = result_file([1.0], np.ones((1, 2, 3)), {1: (0, 0, 0), 2: (1, 1, 1)})
+    spoilt = whole.replace(record(np.array([1, 2])), record(np.array([1, 7])))
+    assert spoilt != whole
+    (tmp_path / "a.rst").write_bytes(spoilt)
+    with pytest.raises(InputError, match=r"has 1 nodes that the file of nodes lacks, e\.g\. 7"):
+        read_ansys_results(tmp_path / "a.rst")
+
+
 @pytest.mark.parametrize(
     ("header", "message"),
     [

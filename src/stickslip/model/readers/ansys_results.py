@@ -83,9 +83,9 @@ def read_ansys_results(path: Path | str, *, units: Units | None = None) -> Ansys
     modes = [_mode(file, pointer, len(numbers), len(components)) for pointer in pointers]
     order = np.argsort(numbers, kind="stable")
     shapes = np.array(modes).reshape(count, len(numbers), len(components))[:, order]
-    shapes = _turned(shapes, components, rotations(known, numbers[order]))
     node = np.repeat(numbers[order], len(components))
     position, _ = known.of_dofs(node, str(path))
+    shapes = _turned(shapes, components, rotations(known, numbers[order]))
     dofs = Dofs(
         node, tuple(COMPONENTS[c] for c in components) * len(numbers), units.length * position
     )

@@ -150,19 +150,7 @@ def reading(path: Path) -> Iterator[None]:
             yield
     except StickslipError:
         raise
-    except (
-        ArithmeticError,
-        AttributeError,
-        EOFError,
-        LookupError,
-        MemoryError,
-        OSError,
-        RuntimeError,
-        RuntimeWarning,
-        TypeError,
-        ValueError,
-        struct.error,
-    ) as error:
+    except Exception as error:  # pandas under the library raises errors of its own
         raise input_error(
             str(path), f"cannot be read ({type(error).__name__}: {error})", CUT_SHORT
         ) from error
