@@ -152,6 +152,8 @@ def _mode(file: Records, pointer: int, n_nodes: int, n_components: int) -> Float
     if width != n_components or values.dtype.kind != "f" or len(values) % width:
         raise file.damaged("displacements of a mode", f"has {len(values)} numbers, {width} a node")
     found = np.array(values, dtype=float).reshape(-1, width)
+    if not np.isfinite(found).all():
+        raise file.damaged("displacements of a mode", "holds numbers that are not finite")
     mode = np.zeros((n_nodes, width))
     rows: IntArray = np.arange(n_nodes)
     if len(found) < n_nodes:  # only some nodes: their places follow

@@ -285,6 +285,8 @@ def read_nastran_op2(path: Path | str, *, units: Units | None = None) -> Nastran
             )
         frequencies = np.asarray(table, dtype=float)[:, 4] / units.time
         modes = next((v for k, v in found.items() if k in {"ougv1", "oug1", "bophig"}), None)
+    if not np.isfinite(frequencies).all():
+        raise input_error(str(path), "has frequencies that are not finite", CUT_SHORT)
     if modes is None:
         empty = Dofs(np.empty(0, dtype=np.int64), (), np.empty((0, 3)))
         return NastranResults(frequencies, np.zeros((0, len(frequencies))), empty)
@@ -298,6 +300,8 @@ def _with_modes(path: Path, frequencies: FloatArray, table: Any, units: Units) -
         wanted = 10 * np.asarray(table.index.get_level_values(0), dtype=np.int64)
         wanted += np.asarray(table.index.get_level_values(1), dtype=np.int64)
         shapes = np.asarray(table, dtype=float)
+    if not np.isfinite(shapes).all():
+        raise input_error(str(path), "has modes that are not finite", CUT_SHORT)
     key = 10 * known.ids + known.components
     order = np.argsort(key, kind="stable")
     rows = order[np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)]
