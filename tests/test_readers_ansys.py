@@ -304,6 +304,31 @@ def test_full_file_written_here(tmp_path, packed):
     assert structure.dof_set("tip").tolist() == list(range(6))
 
 
+def test_rotations_are_turned_and_converted_too(tmp_path):
+    rng = np.random.default_rng(5)
+    half = rng.standard_normal((12, 12))
+    mass, stiffness = np.eye(12), half @ half.T  # in global axes
+    block = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])  # node 2 is turned by 90° about z
+    turn = scipy.linalg.block_diag(block, block, np.eye(6))
+    path, nodes = tmp_path / "file.full", tmp_path / "nodes.cdb"
+    content = full_file(mass, turn.T @ stiffness @ turn, [2, 5], kinds=(1, 2, 3, 4, 5, 6))
+    path.write_bytes(content)
+    nodes.write_text(ARCHIVE)
+    structure = read_ansys_full(path, nodes=nodes, units=Units.mm_t_s(), plausible=False)
+    assert structure.dofs.component == ("x", "y", "z", "rx", "ry", "rz") * 2
+    length = np.tile(np.repeat([1e-3, 1.0], 3), 2)
+    expected = 1e-3 * stiffness / np.outer(length, length)  # t mm²/s² is 1e-3 J
+    np.testing.assert_allclose(structure.stiffness.toarray(), expected, rtol=1e-12, atol=1e-9)
+    mixed = full_file(mass, stiffness, [2, 5], kinds=(1, 2, 3, 4, 5, 6), header={7: 6})
+    at = mixed.index(record(np.array([6, 6])))
+    mixed = mixed[:at] + record(np.array([5, 7])) + mixed[at + len(record(np.array([6, 6]))) :]
+    path.write_bytes(mixed)
+    with pytest.raises(
+        InputError, match="coordinates of each node: 2 node numbers, 2 counts that sum to 12"
+    ):
+        read_ansys_full(path)
+
+
 def test_coordinates_without_mass_are_named_and_empty_ones_left_out(tmp_path):
     mass, stiffness = small_model()
     mass[4], mass[:, 4] = 0, 0
