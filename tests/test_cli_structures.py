@@ -100,6 +100,20 @@ def test_crossings_lie_on_engine_order_and_mode(study: Path) -> None:
     assert set(data.nodal_diameter.values) == {2}
 
 
+def test_coriolis_forces_part_the_directions(tmp_path: Path) -> None:
+    changes = {"coriolis": "true", "speed_rpm": "16000.0", "# nodal_diameters": "[2]"}
+    path = write_small_wheel(tmp_path, **changes, engine_orders="[6]")
+    assert "ND 2 forward" in done("campbell", str(path), "--no-report")
+    assert "backward" in done("modes", str(path), "--no-report")
+    modes, branches = result(path, "modes"), result(path, "campbell")
+    assert list(modes.wave_number.values) == [2, 6]
+    assert list(branches.wave_number.values) == [6]
+    backward, forward = modes.frequency_hz.values
+    assert np.all(backward > 1.005 * forward)
+    # the basis of the branches holds the modes of the last speed, which modes finds without it
+    np.testing.assert_allclose(np.sort(branches.frequency_hz.values[0, -1]), forward, rtol=1e-7)
+
+
 def test_mass_is_density_times_volume_and_shapes_meet_at_the_cut(study: Path) -> None:
     data = result(study, "modes")
     tables = read_structure_study(study).tables

@@ -114,7 +114,7 @@ def safe_diagram(result: WheelResult) -> Plot:
     figure.add_trace(
         go.Scatter(
             x=at, y=orders * hertz, mode="markers+text" if len(orders) <= _MOST_LABELS else "markers",
-            name="engine orders asked", text=[f"EO {m}" for m in orders], textposition="middle right",
+            name="engine orders asked", text=[f"EO {m}" for m in orders], textposition="bottom center",
             textfont={"size": 11, "color": MUTED}, marker={"symbol": "square-open", "size": 8, "color": INK},
             hovertemplate="%{text}: %{y:.6g} Hz at nodal diameter %{x}<extra></extra>",
         )

@@ -89,8 +89,11 @@ class DiskModel:
         used, place = np.unique(triangles, return_inverse=True)
         cut = np.zeros(len(triangles), dtype=np.int64)
         if self.sector is not None:
+            held = self._held
             for face in (self.sector.low, self.sector.high):
-                cut |= self._on(face)[triangles].all(axis=1)
+                own = self._on(face)
+                inside = (own | held)[triangles].all(axis=1) & own[triangles].any(axis=1)
+                cut |= inside
         return Skin(self.mesh.points[used], place.reshape(triangles.shape), cut)
 
     def on_skin(self, field: Matrix) -> Matrix:
@@ -115,13 +118,20 @@ class DiskModel:
         components = np.array(["xyz".index(table.component[i]) for i in dofs], dtype=np.int64)
         return dofs, nodes[dofs], components
 
+    @property
+    def _held(self) -> BoolArray:
+        """Which nodes of the mesh are clamped."""
+        assert self.mesh is not None
+        mask = np.zeros(len(self.mesh.points), dtype=bool)
+        mask[self.mesh.node_sets.get(ROOT, np.zeros(0, dtype=np.int64))] = True
+        return mask
+
     def _on(self, face: IntArray) -> BoolArray:
-        """Return which nodes of the mesh have one of the dofs of a face, those clamped beside them included."""
+        """Return which nodes of the mesh have one of the dofs of a face; clamped ones have none."""
         assert self.mesh is not None
         dofs, nodes, _ = self._places
         mask = np.zeros(len(self.mesh.points), dtype=bool)
         mask[nodes[np.isin(dofs, face)]] = True
-        mask[self.mesh.node_sets.get(ROOT, np.zeros(0, dtype=np.int64))] = True
         return mask
 
 

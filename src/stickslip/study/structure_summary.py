@@ -89,14 +89,26 @@ def campbell_tables(
 ) -> tuple[TextTable, ...]:
     """Return frequencies at the ends of the speed range, and the crossings by speed."""
     ends = (f"{speeds[0] / RPM:g} rpm", f"{speeds[-1] / RPM:g} rpm")
+    parted = any(2 * w.wave_number > sectors for w in waves)
     rows = tuple(
-        (_names(w.wave_number, sectors)[0], f"{m + 1}", f"{branch[0]:.6g}", f"{branch[-1]:.6g}")
+        (
+            _label(w.wave_number, sectors, parted),
+            f"{m + 1}",
+            f"{branch[0]:.6g}",
+            f"{branch[-1]:.6g}",
+        )
         for w in waves
         for m, branch in enumerate(w.frequencies_hz.T)
     )
     first = TextTable("Frequencies in Hz", ("wave", "mode", *ends), rows)
     crossings = sorted(
-        (float(speed), float(hertz), int(order), _names(w.wave_number, sectors)[0], int(mode) + 1)
+        (
+            float(speed),
+            float(hertz),
+            int(order),
+            _label(w.wave_number, sectors, parted),
+            int(mode) + 1,
+        )
         for w in waves
         for speed, hertz, order, mode in zip(
             w.speeds, w.crossings_hz, w.engine_orders, w.modes, strict=True
@@ -115,9 +127,11 @@ def safe_tables(found: Safe) -> tuple[TextTable, ...]:
     near = len(found.resonances)
     rpm = found.speed_range[0] / RPM
     shown = found.points[: max(MOST_PAIRS, near)]
+    table = found.frequencies
+    parted = not np.array_equal(table.frequencies_hz, table.forward_hz)
     rows = tuple(
         (
-            f"{p.engine_order}", f"ND {p.nodal_diameter}", f"{p.mode + 1}", f"{p.frequency_hz:.6g}",
+            f"{p.engine_order}", _label(p.wave_number, table.sectors, parted), f"{p.mode + 1}", f"{p.frequency_hz:.6g}",
             f"{p.speed / RPM:.1f}", f"{100 * p.margin:+.2f}", "NEAR" if abs(p.margin) <= found.allowed else "",
         )
         for p in shown
@@ -135,3 +149,9 @@ def _names(number: int, sectors: int, *, parted: bool = True) -> tuple[str, str]
     if sectors == 1:
         return "whole", ""
     return f"ND {diameter}", kind if parted or kind == "standing" else "both ways"
+
+
+def _label(number: int, sectors: int, parted: bool) -> str:
+    """Return the name of a wave, with its direction where that matters."""
+    name, kind = _names(number, sectors)
+    return f"{name} {kind}" if parted and kind in ("backward", "forward") else name
