@@ -100,6 +100,20 @@ def test_crossings_lie_on_engine_order_and_mode(study: Path) -> None:
     assert set(data.nodal_diameter.values) == {2}
 
 
+def test_basis_that_is_too_small_is_told(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # two modes and none to spare, over a range in which the shapes change
+    monkeypatch.setattr("stickslip.study.speed_basis.SPARE", 0)
+    monkeypatch.setattr("stickslip.study.structure_run.BASIS_ERROR", 1e-9)
+    path = write_small_wheel(tmp_path, engine_orders="[2]")
+    assert "wave number 2: frequencies between the speeds of the basis are off" in done(
+        "campbell", str(path), "--no-report"
+    )
+    rough, fine = (float(result(p, "campbell").basis_error.max()) for p in (path, study))
+    assert rough > 10 * fine
+
+
 def test_coriolis_forces_part_the_directions(tmp_path: Path) -> None:
     changes = {"coriolis": "true", "speed_rpm": "16000.0", "# nodal_diameters": "[2]"}
     path = write_small_wheel(tmp_path, **changes, engine_orders="[6]")

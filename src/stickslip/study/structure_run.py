@@ -43,6 +43,9 @@ from stickslip.study.waves import (
     waves_of_modes,
 )
 
+BASIS_ERROR = (
+    1e-4  # relative error of frequencies in a Campbell diagram above which a warning is given
+)
 W = TypeVar("W", WaveModes, WaveBranches)
 
 
@@ -118,8 +121,10 @@ class _Run:
             self.log.say(f"WARNING: {text}")
         return model
 
-    def origin(self, model: DiskModel, speed_rpm: float, *, complete: bool) -> Origin:
-        """Return the attributes of the result."""
+    def origin(
+        self, model: DiskModel, speed_rpm: float, *, complete: bool, doubts: tuple[str, ...] = ()
+    ) -> Origin:
+        """Return the attributes of the result; `doubts` are warnings beside those of the model."""
         x, y, z = (float(v) for v in model.axis.unit)
         return Origin(
             command=self.command,
@@ -129,7 +134,7 @@ class _Run:
             versions=self.versions,
             created=self.created,
             wall_seconds=perf_counter() - self.began,
-            warnings=model.warnings,
+            warnings=(*model.warnings, *doubts),
             complete=complete,
             model_hash=self.study.content_hash(),
             sectors=model.sectors,
@@ -168,10 +173,12 @@ class _Run:
         """The result's file."""
         return self.study.folder / f"{self.command}.nc"
 
-    def summary(self, tables: tuple[TextTable, ...], model: DiskModel) -> StructureSummary:
+    def summary(
+        self, tables: tuple[TextTable, ...], model: DiskModel, doubts: tuple[str, ...] = ()
+    ) -> StructureSummary:
         """Return what the command prints at its end."""
         files = (self.target, self.log.path)
-        return StructureSummary(tables, model.warnings, self.target, files)
+        return StructureSummary(tables, (*model.warnings, *doubts), self.target, files)
 
 
 def _modes(run: _Run) -> StructureSummary:
@@ -207,13 +214,14 @@ def _campbell(run: _Run) -> StructureSummary:
     numbers = waves_of_campbell(table, model)
 
     def write(waves: list[WaveBranches], complete: bool) -> None:
-        origin = run.origin(model, float("nan"), complete=complete)
+        origin = run.origin(model, float("nan"), complete=complete, doubts=_basis_doubts(waves))
         write_dataset(
             campbell_dataset(waves, speeds, table.engine_orders, model.facts, origin), run.target
         )
 
     waves = run.each(numbers, lambda k: follow_wave(model, k, table, speeds), write)
-    return run.summary(campbell_tables(waves, speeds, model.sectors), model)
+    tables = campbell_tables(waves, speeds, model.sectors)
+    return run.summary(tables, model, _basis_doubts(waves))
 
 
 def _safe(run: _Run) -> StructureSummary:
@@ -245,6 +253,16 @@ def _safe(run: _Run) -> StructureSummary:
 
     waves = run.each(numbers, lambda k: solve_wave(model, at, k, table.modes, shapes=False), write)
     return run.summary(safe_tables(interference(waves, model, table, speed)), model)
+
+
+def _basis_doubts(waves: Sequence[WaveBranches]) -> tuple[str, ...]:
+    """Say where the basis of a Campbell diagram is too small for its digits."""
+    poor = [w for w in waves if not w.error <= BASIS_ERROR]
+    return tuple(
+        f"wave number {w.wave_number}: frequencies between the speeds of the basis are off by up to {w.error:.1e}, relative; "
+        "ask for more campbell.modes, or for a narrower range of speeds"
+        for w in poor
+    )
 
 
 def _progress(wave: WaveModes | WaveBranches) -> str:
