@@ -272,6 +272,18 @@ def test_safe_needs_a_speed(tmp_path: Path) -> None:
     assert f"{path}: safe.speed_rpm: must be above zero, got 0." in refused("safe", str(path))
 
 
+def test_fresh_gives_nothing_up_for_a_model_that_cannot_be_built(tmp_path: Path) -> None:
+    write_deck(tmp_path / "deck.inp")
+    path = file_study(tmp_path)
+    kept = tmp_path / "results" / "modes.nc"
+    kept.parent.mkdir()
+    kept.write_text("of an earlier run")
+    path.write_text(path.read_text().replace('"SI"', '"mm-t-s"'))
+    refused("modes", str(path), "--fresh")
+    assert kept.read_text() == "of an earlier run"
+    assert [p.name for p in kept.parent.iterdir()] == ["modes.nc"]
+
+
 def test_check_builds_the_model_and_writes_nothing(tmp_path: Path) -> None:
     path = write_small_wheel(tmp_path)
     said = done("check", str(path))

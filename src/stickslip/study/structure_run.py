@@ -71,7 +71,7 @@ def run_structure(path: Path, command: Command, *, fresh: bool, sink: Sink) -> S
         If the user stops it; the message says how to go on.
     """
     study = read_structure_study(path)
-    _require_table(study, command)
+    _check_cheaply(study, command)
     own = (
         f"{command}.sqlite",
         f"{command}.sqlite-journal",
@@ -79,13 +79,16 @@ def run_structure(path: Path, command: Command, *, fresh: bool, sink: Sink) -> S
         f"{command}.nc.part",
         f"{command}.log",
     )
+    prepare_folder(study.folder, fresh=False)
+    # what is there is not given up for a model that cannot be built
+    built = disk_model(study, sink.say) if fresh else None
     prepare_folder(study.folder, fresh=fresh, own=own)
     versions = library_versions()
     mark = sha256(json.dumps([study.content_hash(command), versions]).encode()).hexdigest()
     point = WaveBranches if command == "campbell" else WaveModes
     with Journal(study.folder / f"{command}.sqlite", mark, point) as journal:
         log = Log(study.folder / f"{command}.log", sink)
-        run = _Run(study, command, versions, journal, log)
+        run = _Run(study, command, versions, journal, log, built)
         try:
             return {"modes": _modes, "campbell": _campbell, "safe": _safe}[command](run)
         except KeyboardInterrupt:
@@ -110,13 +113,14 @@ class _Run:
     versions: dict[str, str]
     journal: Journal
     log: Log
+    built: DiskModel | None
     began: float = field(default_factory=perf_counter)
     created: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
 
     def model(self) -> DiskModel:
         """Build the model, and tell what is doubtful about it."""
         self.log.say(f"stickslip {__version__}, {self.command} of {self.study.path}")
-        model = disk_model(self.study, self.log.say)
+        model = self.built or disk_model(self.study, self.log.say)
         for text in model.warnings:
             self.log.say(f"WARNING: {text}")
         return model
@@ -225,22 +229,9 @@ def _campbell(run: _Run) -> StructureSummary:
 
 
 def _safe(run: _Run) -> StructureSummary:
-    table, rotation = run.study.tables.safe, run.study.tables.rotation
+    table, rpm = run.study.tables.safe, _safe_rpm(run.study)
     assert table is not None
-    rpm = rotation.speed_rpm if table.speed_rpm is None else table.speed_rpm
-    if rpm <= 0:
-        raise input_error(
-            f"{run.study.path}: safe.speed_rpm",
-            f"must be above zero, got {rpm:g}",
-            "Give the speed at which the engine orders act.",
-        )
     model = run.model()
-    if model.sector is None:
-        raise input_error(
-            f"{run.study.path}: safe",
-            "the model is a whole structure, not a sector",
-            "An interference diagram needs cyclic symmetry; give the sector and the number of sectors.",
-        )
     speed = RPM * rpm
     at = speed if model.rotating is not None else 0.0
     numbers = waves_of_modes(None, model, at)
@@ -273,14 +264,35 @@ def _progress(wave: WaveModes | WaveBranches) -> str:
     )
 
 
-def _require_table(study: StructureStudy, command: Command) -> None:
-    """Refuse a command whose table is not in the study."""
+def _check_cheaply(study: StructureStudy, command: Command) -> None:
+    """Refuse what can be told before the model is built."""
     if getattr(study.tables, command) is None:
         raise input_error(
             f"{study.path}: {command}",
             "is missing",
             f"Add the table [{command}]: 'stickslip new NAME --kind sector' writes an example.",
         )
+    if command == "modes":
+        read_reference(study)
+    if command == "safe" and _safe_rpm(study) <= 0:
+        raise input_error(
+            f"{study.path}: safe.speed_rpm",
+            f"must be above zero, got {_safe_rpm(study):g}",
+            "Give the speed at which the engine orders act.",
+        )
+    if command == "safe" and study.tables.sectors == 1:
+        raise input_error(
+            f"{study.path}: safe",
+            "the model is a whole structure, not a sector",
+            "An interference diagram needs cyclic symmetry; give the sector and the number of sectors.",
+        )
+
+
+def _safe_rpm(study: StructureStudy) -> float:
+    """Return the speed of the interference diagram."""
+    table = study.tables.safe
+    own = None if table is None else table.speed_rpm
+    return study.tables.rotation.speed_rpm if own is None else own
 
 
 def _in_words(model: DiskModel, rpm: float | None) -> str:
