@@ -1,5 +1,6 @@
 """Bladed disks through the command line: from a study to tables, results and a page, and what bad input is told."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,15 @@ from typer.testing import CliRunner, Result
 
 from stickslip.cli import app
 from stickslip.model.modes import normal_modes
+from stickslip.model.readers.calculix_deck import read_deck
 from stickslip.model.sector_mesh import mesh_sector
 from stickslip.model.structure_file import save_structure
+from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.wheel import wheel
 from stickslip.study.example import example_text
 from stickslip.study.structure_model import disk_model
 from stickslip.study.structure_study import read_structure_study
+from validation.case_calculix_materials import our_solid, write_decks
 
 ROOT = Path(__file__).parents[1]
 
@@ -398,3 +402,35 @@ def test_inspect_says_what_is_in_a_file(tmp_path: Path) -> None:
     assert "unknown unit system 'furlong'" in refused(
         "inspect", str(tmp_path / "deck.inp"), "--units", "furlong"
     )
+
+
+def test_decks_of_several_materials_and_single_supports_rotate(tmp_path: Path) -> None:
+    """Titanium blades, a bore that is free along the axis: the study's frequencies are those of the library."""
+    decks = write_decks(tmp_path)
+    path = tmp_path / "study.toml"
+    path.write_text(
+        'schema_version = 1\ntitle = "two materials"\n'
+        '[model.file]\npath = "speed.inp"\nunits = "SI"\nsectors = 24\nquadrature = "calculix"\n'
+        "[rotation]\nspeed_rpm = 8000.0\n[modes]\nnumber = 3\nnodal_diameters = [2]\n",
+        encoding="utf-8",
+    )
+    done("modes", str(path))
+    deck = read_deck(decks["at 8000 rpm"])
+    solid = our_solid(deck)
+    sector = cyclic_sector(solid.structure, 24)
+    turning = solid.at_speed(8000 * 2 * np.pi / 60, tie=sector.tie)
+    hertz = normal_modes(travelling_wave(replace(sector, structure=turning), 2), 3).frequencies_hz
+    data = result(path, "modes")
+    np.testing.assert_allclose(data.frequency_hz.values.ravel(), hertz, rtol=1e-10)
+    steel, titanium = (deck.materials[name].density for name in ("STEEL", "TITANIUM"))
+    assert titanium < steel
+    free = float(solid.structure.mass.sum()) / 3  # without what is clamped
+    assert free < data.attrs["mass_kg"] < free * steel / titanium
+
+
+def test_a_missing_key_of_an_optional_table_is_described(tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    (tmp_path / "a.inp").write_text("*NODE\n")
+    path.write_text('schema_version = 1\n[model.file]\npath = "a.inp"\n', encoding="utf-8")
+    said = refused("modes", str(path))
+    assert "model.file.units: is missing. Add it: the file's unit system: SI, mm-t-s" in said

@@ -5,24 +5,28 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.model.elements import chunks, gradients, shape_functions
 from stickslip.model.mesh import SolidMesh
+from stickslip.model.solid import Material, Materials
 from stickslip.model.structure import Structure
 from stickslip.study.structure_results import Facts
 
 DEGREE = 4  # integrates volume and first moment of straight-edged cells of second order exactly
 
 
-def facts_of_solid(mesh: SolidMesh, density: float, dofs: int) -> Facts:
-    """Return the facts of a mesh of one density in kg/m³, of which `dofs` are free; clamped nodes count."""
+def facts_of_solid(mesh: SolidMesh, material: Materials, dofs: int) -> Facts:
+    """Return the facts of a mesh, of which `dofs` are free; clamped nodes count."""
     shape = shape_functions(mesh.cells.shape[1], DEGREE)
-    volume, moment = 0.0, np.zeros(3)
+    each = [material] * len(mesh.cells) if isinstance(material, Material) else material
+    density = np.array([one.density for one in each])
+    mass, moment = 0.0, np.zeros(3)
     for piece in chunks(mesh, shape):
         _, weights = gradients(mesh, shape, piece)
         places = np.einsum("qk,mkx->mqx", shape.values, mesh.points[mesh.cells[piece]])
-        volume += float(weights.sum())
+        weights = weights * density[piece][:, None]
+        mass += float(weights.sum())
         moment += np.einsum("mq,mqx->x", weights, places)
     return Facts(
-        mass=density * volume,
-        centre=_triple(moment / volume),
+        mass=mass,
+        centre=_triple(moment / mass),
         low=_triple(mesh.points.min(axis=0)),
         high=_triple(mesh.points.max(axis=0)),
         dofs=dofs,

@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from stickslip.arrays import IntArray
+from stickslip.arrays import BoolArray, IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.axis import Axis
 from stickslip.model.elements import EXACT, Quadrature
 from stickslip.model.mesh import SolidMesh
 from stickslip.model.readers.ansys_archive import read_ansys_archive, read_ansys_materials
-from stickslip.model.readers.calculix_deck import Deck, assemble_deck, read_deck
+from stickslip.model.readers.calculix_deck import Deck, read_deck
 from stickslip.model.readers.open_model import read_model
 from stickslip.model.readers.units import Units
-from stickslip.model.solid import Material
+from stickslip.model.solid import Materials
 from stickslip.model.structure import Structure
 from stickslip.study.structure_study import StructureStudy
 from stickslip.study.structure_tables import FileModel
@@ -34,7 +34,7 @@ class FileContent:
         With the sets ``cyclic_low`` and ``cyclic_high`` of a sector, and ``root``, which is clamped; None for matrices
         without one.
     material
-        Of the mesh, to assemble it and let it rotate; None where `structure` is complete as it is.
+        Of the mesh or of each of its cells, to assemble it and let it rotate; None where `structure` is complete as it is.
     structure
         Matrices; None where they are assembled from mesh and material. Its sets have the names of those of the mesh.
     axis
@@ -43,14 +43,17 @@ class FileContent:
         Of the assembly.
     warnings
         What the user should know.
+    held
+        (nodes, 3) supports of single directions beside the clamped nodes; None where there are none.
     """
 
     mesh: SolidMesh | None
-    material: Material | None
+    material: Materials | None
     structure: Structure | None
     axis: Axis
     quadrature: Quadrature = EXACT
     warnings: tuple[str, ...] = ()
+    held: BoolArray | None = None
 
 
 def read_file_model(study: StructureStudy, say: Callable[[str], None]) -> FileContent:
@@ -104,18 +107,17 @@ def _from_deck(study: StructureStudy, table: FileModel, deck: Deck) -> FileConte
     quadrature = deck.quadrature if table.quadrature == "calculix" else EXACT
     axis = table.axis() or deck.axis
     warnings = tuple(f"{table.path}: passed over {text}" for text in deck.ignored)
-    partly = deck.held.any(axis=1) & ~deck.held.all(axis=1)
-    if partly.any() or (study.tables.material is None and len(set(deck.cell_material)) > 1):
-        _refuse_clamped(
-            study, table, "a deck with supports of single directions or several materials"
-        )
-        structure = assemble_deck(deck, quadrature=quadrature)
-        return FileContent(
-            deck.mesh, None, _with_faces(study, table, structure), axis, quadrature, warnings
-        )
-    material = study.tables.material.library() if study.tables.material else deck.material
+    material: Materials
+    if study.tables.material is not None:
+        material = study.tables.material.library()
+    elif len(set(deck.cell_material)) > 1:
+        material = [deck.materials[name] for name in deck.cell_material]
+    else:
+        material = deck.material
     mesh = _prepared(study, table, deck.mesh)
-    return FileContent(mesh, material, None, axis, quadrature, warnings)
+    partly = deck.held.any(axis=1) & ~deck.held.all(axis=1)
+    held = deck.held if partly.any() else None
+    return FileContent(mesh, material, None, axis, quadrature, warnings, held)
 
 
 def _from_archive(study: StructureStudy, table: FileModel, path: Path) -> FileContent:

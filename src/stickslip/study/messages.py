@@ -1,7 +1,7 @@
 """From what pydantic found to sentences that name the file, the key, the value got and a remedy."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails, PydanticCustomError
@@ -81,10 +81,15 @@ def _owner(model: type[BaseModel], path: Sequence[str]) -> type[BaseModel]:
     """Return the model of the table that holds the last key of `path`."""
     for part in path[:-1]:
         field = model.model_fields.get(part)
-        inner = None if field is None else field.annotation
-        if not (isinstance(inner, type) and issubclass(inner, BaseModel)):
+        annotation = None if field is None else field.annotation
+        tables = [
+            inner
+            for inner in (annotation, *get_args(annotation))  # of ``Table | None`` too
+            if isinstance(inner, type) and issubclass(inner, BaseModel)
+        ]
+        if not tables:
             break
-        model = inner
+        model = tables[0]
     return model
 
 

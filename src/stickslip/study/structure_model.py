@@ -179,10 +179,14 @@ def _finished(study: StructureStudy, content: FileContent, say: Say) -> DiskMode
     rotating = None
     if content.mesh is not None and content.material is not None:
         rotating = rotating_solid(
-            content.mesh, content.material, content.axis, quadrature=content.quadrature
+            content.mesh,
+            content.material,
+            content.axis,
+            held=content.held,
+            quadrature=content.quadrature,
         )
         structure = rotating.structure
-        facts = facts_of_solid(content.mesh, content.material.density, structure.n)
+        facts = facts_of_solid(content.mesh, content.material, structure.n)
     else:
         assert content.structure is not None
         structure = content.structure
