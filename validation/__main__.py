@@ -14,11 +14,14 @@ The exit code is 1 when a comparison does not hold.
 import importlib
 import json
 import sys
+import traceback
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
+
+from validation import compare
 
 HERE = Path(__file__).parent
 KEYS = {"case", "quantity", "ours", "reference", "tolerance", "holds", "source"}
@@ -30,12 +33,25 @@ def collect(word: str = "") -> list[dict[str, Any]]:
     for path in sorted(HERE.glob("case_*.py")):
         if word not in path.stem:
             continue
-        for record in importlib.import_module(f"validation.{path.stem}").run():
+        for record in _run(path.stem):
             if set(record) != KEYS:
                 raise ValueError(
                     f"{path.name}: a record has the keys {sorted(record)}, not {sorted(KEYS)}"
                 )
             records.append(record)
+    return records
+
+
+def _run(name: str) -> list[compare.Record]:
+    """Return the records of a case; one that breaks off counts as failed and does not end the others."""
+    try:
+        records: list[compare.Record] = importlib.import_module(f"validation.{name}").run()
+    except Exception as error:  # noqa: BLE001  # whatever a case or a program it runs may raise
+        traceback.print_exc()
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        return [
+            compare.record(name, f"ran to its end ({reason})", 0.0, 1.0, 0.0, "the case itself")
+        ]
     return records
 
 
