@@ -1,9 +1,9 @@
 """A large sector reduced to 100 interface nodes and 50 modes: CPU time of every step, peak memory.
 
-    python -m benchmarks.bench_scale 0.1865          # 100 k nodes: several minutes and 6 GB
-    python -m benchmarks.bench_scale 0.313 3         # 26 k nodes at wave number 3: complex matrices
+    python -m benchmarks.bench_scale 0.1865          # 110 k nodes: seven minutes and 6.5 GB
+    python -m benchmarks.bench_scale 0.313 3         # 28 k nodes at wave number 3: complex matrices
 
-`run` measures 14.8 k nodes in a process of its own, so that the peak is that of the reduction.
+`run` measures 16 k nodes in a process of its own, so that the peak is that of the reduction.
 """
 
 import json

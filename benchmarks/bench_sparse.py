@@ -13,7 +13,7 @@ import scipy.sparse
 from benchmarks.bench_scale import sector
 from stickslip.model.factorisation import factorise
 
-FINENESS = 0.4  # of the element sizes: 14.8 k nodes
+FINENESS = 0.4  # of the element sizes: 16 k nodes
 RIGHT = 50  # right-hand sides
 
 
