@@ -10,12 +10,13 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 DOCS_INSTALLED := $(VENV)/.docs-installed
 READERS_INSTALLED := $(VENV)/.readers-installed
+SPARSE_INSTALLED := $(VENV)/.sparse-installed
 LOCK_FLAGS := --quiet --generate-hashes --strip-extras \
 	--no-emit-index-url --no-emit-find-links --no-emit-trusted-host
 # Two test workers on two cores: a threaded BLAS under each would only make them wait for each other.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help install run test readers test-readers lint docs bench bench-rival validate lock clean
+.PHONY: help install run test readers test-readers sparse test-sparse lint docs bench bench-rival validate lock clean
 .DELETE_ON_ERROR:
 
 help:  ## list the targets
@@ -48,6 +49,15 @@ $(READERS_INSTALLED): $(INSTALLED) readers-requirements.lock
 
 test-readers: $(READERS_INSTALLED)  ## run the tests of the readers of ANSYS and Nastran files, none skipped
 	$(ONE_THREAD) STICKSLIP_READERS=required $(BIN)/python -m pytest tests/test_readers_ansys.py tests/test_readers_nastran.py
+
+sparse: $(SPARSE_INSTALLED)  ## install the faster factorisation of large models
+
+$(SPARSE_INSTALLED): $(INSTALLED) sparse-requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r sparse-requirements.lock
+	@touch $@
+
+test-sparse: $(SPARSE_INSTALLED)  ## run the tests of factorisations and modes with it
+	$(ONE_THREAD) $(BIN)/python -m pytest tests/test_factorisation.py tests/test_modes.py
 
 lint: $(INSTALLED)  ## style, types and the direction of imports
 	$(BIN)/ruff check .
@@ -87,6 +97,8 @@ lock: $(INSTALLED)  ## resolve the newest versions and write both lock files
 		-o benchmarks/requirements.lock pyproject.toml
 	CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra readers --extra readers-test \
 		-c requirements.lock -c docs/requirements.lock -o readers-requirements.lock pyproject.toml
+	CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra sparse \
+		-c requirements.lock -o sparse-requirements.lock pyproject.toml
 
 clean:  ## remove everything that the other targets made, .venv included
 	rm -rf $(VENV) .venv-rival .coverage* htmlcov .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache \

@@ -197,7 +197,12 @@ def test_no_tracked_file_knows_this_machine():
 
 
 def test_locked_requirements_have_hashes():
-    for name in ("requirements.lock", "docs/requirements.lock", "readers-requirements.lock"):
+    for name in (
+        "requirements.lock",
+        "docs/requirements.lock",
+        "readers-requirements.lock",
+        "sparse-requirements.lock",
+    ):
         pinned = re.findall(
             r"^[\w.-]+==\S+ \\\n    --hash=sha256:", (ROOT / name).read_text(), flags=re.MULTILINE
         )
