@@ -1,6 +1,7 @@
 """Reduced structures on disk: the same to the last bit, computed once, and again when anything changes."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -131,6 +132,25 @@ def test_what_cannot_be_compared_is_refused(wave, tmp_path):
     with pytest.raises(InputError, match="argument 2: a object has no content"):
         cached(counted, wave, wave.dof_set("inner"), object(), folder=tmp_path)
     assert counted.calls == 0
+
+
+@dataclass(frozen=True)
+class Reducer:
+    """A reduction with an argument of its own."""
+
+    modes: int
+
+    def reduced(self, structure, keep):
+        return craig_bampton(structure, keep, self.modes)
+
+    __call__ = reduced
+
+
+@pytest.mark.parametrize("of", [lambda r: r, lambda r: r.reduced, lambda r: partial(r.reduced)])
+def test_what_has_arguments_of_its_own_is_refused(of, wave, tmp_path):
+    """Two such methods have one name: the second would get what the first computed."""
+    with pytest.raises(InputError, match="arguments of its own"):
+        cached(of(Reducer(5)), wave, wave.dof_set("inner"), folder=tmp_path)
 
 
 @dataclass(frozen=True)

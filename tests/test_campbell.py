@@ -113,6 +113,20 @@ def test_rotor_beyond_its_critical_speed_is_stable_by_coriolis_forces_alone():
     assert np.all(ss.campbell(rotor, [25.0], 2).frequencies_hz < 0)  # diverges without them
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_what_diverges_grows(seed):
+    """Each creeping motion has a rate that grows and one that decays: the second alone would look stable."""
+    spin = np.random.default_rng(seed).standard_normal((3, 3))
+    for coriolis in (np.zeros((3, 3)), 0.3 * (spin - spin.T)):
+        structure = of_squares(-1.0, 2.0, -3.0).with_damping(coriolis)
+        M, C, K = structure.mass, structure.damping, structure.stiffness
+        state = np.block([[np.zeros((3, 3)), np.eye(3)], [-K, -np.linalg.solve(M, C)]])
+        growing = np.sort(np.linalg.eigvals(state).real)[:3:-1]  # two of six
+        found = ss.gyroscopic_modes(structure, 3)
+        np.testing.assert_allclose(found.growth, [*growing, 0.0], atol=1e-12)
+        assert found.frequencies_hz[2] > 0.1
+
+
 def gyroscopic_chain(n, speed=1.0):
     """Sparse chain of n planar masses with Coriolis forces between their two directions."""
     K = scipy.sparse.diags_array(

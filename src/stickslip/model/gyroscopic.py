@@ -17,6 +17,7 @@ from stickslip.model.structure import Structure
 SPARE = 10  # modes beyond twice as many as are asked for
 SHIFT = 1e-8  # share of the mean of K/M: the factorised matrix is regular where a body is free
 RIGID = 1e-12  # of the largest square of a basis: a negative one nearer to zero is that of a rigid motion
+STILL = 1e-9  # of the fastest rate: a smaller frequency is that of a motion that creeps, whatever its rounding
 KNOWN = 1e-8  # share of an answer that lies outside the modes, below which it is rounding
 
 
@@ -27,11 +28,12 @@ class GyroscopicModes:
     Parameters
     ----------
     frequencies_hz
-        (n,) not negative.
+        (n,) not negative, but for waves that rotation has overtaken: theirs go on through zero, as those of the same wave that runs the
+        other way.
     shapes
         (N, n) complex, of unit mass: ``φᴴ M φ = 1``.
     growth
-        (n,) in 1/s, zero where the structure is stable.
+        (n,) in 1/s, zero where the structure is stable; where a motion diverges, what grows comes before what decays.
     """
 
     frequencies_hz: FloatArray
@@ -75,7 +77,7 @@ def gyroscopic_modes(
     else:
         squares, shapes = _enriched(structure, G, n_basis)
     rates, amplitudes = _eigenpairs(squares, shapes.conj().T @ (G @ shapes))
-    first = np.argsort(rates.imag, kind="stable")[:n_modes]
+    first = np.lexsort((-rates.real, _without_rounding(rates)))[:n_modes]
     return GyroscopicModes(
         rates.imag[first] / (2 * np.pi), shapes @ amplitudes[:, first], rates.real[first]
     )
@@ -93,12 +95,19 @@ def _eigenpairs(squares: FloatArray, coriolis: ComplexArray) -> tuple[ComplexArr
     else:
         state = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(squares), -coriolis]])
         rates, states = scipy.linalg.eig(state)
-    kept = np.argsort(-rates.imag, kind="stable")[:n]
+    # of a motion that creeps both rates have the frequency zero: what grows counts
+    kept = np.lexsort((-rates.real, -_without_rounding(rates)))[:n]
     # velocities are λ times displacements, and never vanish where λ does not
     shapes = states[n:, kept]
     still = np.linalg.norm(shapes, axis=0) == 0.0
     shapes[:, still] = states[:n, kept][:, still]
     return rates[kept], shapes / np.linalg.norm(shapes, axis=0)
+
+
+def _without_rounding(rates: ComplexArray) -> FloatArray:
+    """Return the circular frequencies of rates, zero where only rounding keeps them from it."""
+    omega = rates.imag
+    return np.where(np.abs(omega) <= STILL * np.max(np.abs(rates), initial=0.0), 0.0, omega)
 
 
 def _enriched(structure: Structure, coriolis: Matrix, n_basis: int) -> tuple[FloatArray, Matrix]:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import hashlib
+import types
 import uuid
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -82,11 +83,13 @@ def cached(
 def _key(
     reduction: Callable[..., Structure], structure: Structure, arguments: tuple[object, ...]
 ) -> str:
-    name = getattr(reduction, "__qualname__", "<none>")
-    if "<" in name:
+    # a method, a partial or a callable object has arguments of its own, which no hash would see
+    plain = isinstance(reduction, types.FunctionType)
+    name = reduction.__qualname__ if plain else repr(reduction)
+    if not plain or "<" in name:
         raise input_error(
             "cached: reduction",
-            f"{name} has no name by which to find it again",
+            f"{name} has no name by which to find it again, or arguments of its own",
             "Give a function of a module and its arguments, e.g. cached(craig_bampton, structure, keep, 50, folder=…).",
         )
     digest = hashlib.sha256()
