@@ -330,6 +330,19 @@ def test_two_nodes_may_not_share_a_partner():
         cyclic_sector(piled, 6, tolerance=5.0)
 
 
+def test_nodes_on_the_axis_in_neither_face_are_named():
+    """Every sector would get a copy of its own; one face is enough to tell that they are shared."""
+    structure = random_sector(4, hub=2, axis=TILTED)
+    low, high = (structure.dof_set(f"cyclic_{side}") for side in ("low", "high"))
+    shared = np.intersect1d(low, high)
+    lower, upper = (face[~np.isin(face, shared)] for face in (low, high))
+    once = replace(structure, sets={"cyclic_low": low, "cyclic_high": upper})
+    assert wheel(cyclic_sector(once, 4, axis=TILTED)).n == 4 * (structure.n - 6 - 6) + 6
+    without = replace(structure, sets={"cyclic_low": lower, "cyclic_high": upper})
+    with pytest.raises(InputError, match="2 nodes on the axis are in neither face"):
+        cyclic_sector(without, 4, axis=TILTED)
+
+
 def test_axis_off_the_origin_matters():
     structure = random_sector(6, axis=TILTED)
     with pytest.raises(

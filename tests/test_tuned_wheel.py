@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.sparse
 from test_reduced_wheel import TILTED, shrouded
 
 import stickslip as ss
@@ -126,6 +127,61 @@ def test_one_sector_answers_as_the_wheel_of_all(engine_order):
         moved = wheel.expand(one.outputs[h], h)
         own = whole.expand(all_sectors.outputs[h])[0]
         assert np.abs(own - moved).max() < 1e-7 * np.abs(moved).max()
+
+
+@pytest.mark.parametrize(("sectors", "engine_order"), [(3, 7), (4, -1), (2, 4)])
+def test_one_sector_answers_as_all_of_them_integrated_in_time(sectors, engine_order):
+    """The whole wheel, assembled in global axes, step by step: no harmonics, no waves, no reduction; opening gaps, Coriolis forces.
+
+    What 15 harmonics and the time step leave out is below 2e-5 where measured.
+    """
+    order, omega = 15, 0.9
+    sector, (low, high) = shrouded(sectors)
+    free = sector.structure
+    stiffness = (free.stiffness + 0.8 * scipy.sparse.eye_array(free.n)).tocsr()
+    damping = (free.damping + 0.06 * stiffness + 0.02 * free.mass).tocsr()
+    sector = replace(sector, structure=replace(free, stiffness=stiffness, damping=damping))
+    law = ss.ElasticCoulomb(k_t=2.0, k_w=1.5, k_n=3.0, mu=0.4, preload=0.5)
+    static, force = np.zeros((2, free.n))
+    static[low] = 0.2, -0.1, 0.15
+    force[high] = 1.5, 1.0, -0.5
+    place = {"low": "left", "high": "right", "axis": TILTED, "normal": np.array([0.6, 0.0, 0.8])}
+    wheel, operator = ss.tuned_wheel(
+        sector, engine_order, order, ss.neighbour_gaps(sector.structure, sectors, **place)
+    )
+    system = ss.System(wheel, ss.Interface(("shroud",), (law,), operator), np.arange(wheel.n))
+    load = ss.HarmonicLoad(wheel.project(static, 0).real, {1: wheel.project(force, 1)})
+    sweep = ss.Sweep(
+        omega_range=(omega, 1.0), low=order, high=order, selection="always_low", frequencies=2,
+        peak_points=0,
+    )  # fmt: skip
+    problem = ss.forced_problem(system, load, sweep)
+    point = ss.accepted_points(list(ss.forced_response(system, load, sweep)))[0]
+    assert point.converged
+    balanced = ss.fields(problem, point)
+    assert balanced.energy[0] > 0.05
+    assert np.abs(balanced.forces[2]).max() > 1e-2 * np.abs(balanced.forces[1]).max()
+
+    whole = ss.wheel(sector)
+    pairs = ss.neighbour_interface(whole, sectors, law, **place)
+    phases = np.exp(2j * math.pi * engine_order * np.arange(sectors) / sectors)
+    f = np.zeros((2, whole.n), dtype=complex)
+    for n, phase in enumerate(phases):
+        turn = TILTED.rotation(2 * math.pi * n / sectors)
+        for side, rows in (("left", static[low]), ("right", force[high])):
+            mine = whole.dof_set(f"sector{n}.{side}")
+            f[0 if side == "left" else 1, mine] += turn @ rows * (1 if side == "left" else phase)
+    moved = ss.integrate(
+        whole, pairs.gap_operator, pairs.laws, ss.HarmonicLoad(f[0].real, {1: f[1]}), omega,
+        whole.dof_set("right"), stepping=ss.TimeStepping(max_periods=600, tolerance=1e-6),
+    )  # fmt: skip
+    assert moved.settled
+    scale = np.abs(moved.harmonics[1]).max()
+    for h in range(4):
+        own = wheel.expand(balanced.outputs[h], h)[high]
+        for n, phase in enumerate(phases):
+            turned = TILTED.rotation(2 * math.pi * n / sectors) @ own * phase**h
+            assert np.abs(moved.harmonics[h, 3 * n : 3 * n + 3] - turned).max() < 1e-4 * scale
 
 
 def test_derivative_by_frequency_is_that_of_differences():

@@ -16,7 +16,7 @@ from stickslip.errors import input_error
 from stickslip.model.axis import Axis
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.reduction.cyclic_faces import face, pair_faces
+from stickslip.reduction.cyclic_faces import face, pair_faces, refuse_torn_axis
 from stickslip.reduction.selection import selection, surviving_sets
 from stickslip.reduction.turning import dof_rotation, node_table
 from stickslip.reduction.waves import check_sectors, wave
@@ -192,11 +192,13 @@ def cyclic_sector(
     ------
     InputError
         If nodes have no partner; the message lists them, and says so where faces are swapped or the number of
-        sectors is another.
+        sectors is another. If nodes on the axis stand in neither face.
     """
     check_sectors("cyclic_sector", sectors)
     faces = [face(structure.dofs, structure.dof_set(name), name) for name in (low, high)]
     pairs = pair_faces(faces[0], faces[1], sectors, axis, tolerance)
+    if sectors > 1:
+        refuse_torn_axis(structure.dofs, pairs, axis)
     return CyclicSector(structure, sectors, *pairs, axis)
 
 

@@ -58,6 +58,36 @@ def face(dofs: Dofs, members: IntArray, name: str) -> Face:
     return Face(name, here.node[first], here.position[first], whole)
 
 
+def refuse_torn_axis(dofs: Dofs, pairs: tuple[IntArray, IntArray], axis: Axis) -> None:
+    """Refuse nodes on the axis that stand in neither face: each sector would have a copy of them.
+
+    Parameters
+    ----------
+    dofs
+        Of the sector.
+    pairs
+        Dofs of both faces.
+    axis
+        Axis of the wheel.
+
+    Raises
+    ------
+    InputError
+        Naming the nodes.
+    """
+    others = np.setdiff1d(np.flatnonzero(dofs.node >= 0), np.concatenate(pairs))
+    faces = dofs.position[pairs[0]]
+    size = float(np.max(np.ptp(faces, axis=0), initial=0.0)) if len(faces) else 0.0
+    near = np.linalg.norm(axis.arm(dofs.position[others]), axis=1) <= TOLERANCE * size
+    torn = np.unique(dofs.node[others[near]])
+    if torn.size:
+        raise input_error(
+            "cyclic_sector",
+            f"{torn.size} nodes on the axis are in neither face, e.g. node {torn[0]}",
+            "They belong to all sectors: put them into the set of one face or of both, or check the axis.",
+        )
+
+
 def pair_faces(
     low: Face, high: Face, sectors: int, axis: Axis, tolerance: float | None
 ) -> tuple[IntArray, IntArray]:
