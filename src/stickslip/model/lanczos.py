@@ -13,8 +13,11 @@ from stickslip.arrays import FloatArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.factorisation import Solve
 
-BLOCK = 8  # vectors solved for together; as many equal frequencies are found for certain
+BLOCK = 8  # vectors solved for together
 CONVERGED = 1e-10  # residual of a mode over its eigenvalue; the frequency's error is its square
+PROBE = 2  # new directions that look for equal frequencies beyond the eight
+STEPS = 5  # with them
+KNOWN = 1e-10  # a change of an eigenvalue above which they have found one
 ROUNDING = 1e-14  # the same over the largest eigenvalue: nothing below can be reached
 NOTHING = (
     1e-24,
@@ -48,7 +51,8 @@ def lanczos(
     Notes
     -----
     The Krylov space of ``(K − shift M)⁻¹ M``, which is self-adjoint in the mass, is built from blocks; its image at the
-    start keeps out what has no mass.
+    start keeps out what has no mass. A Krylov space holds no more vectors of one eigenvalue than a block has. So new directions
+    have their say once all has converged, until they bring nothing new.
     """
     size = mass.shape[0]
     random = np.random.default_rng(0)  # the same in every run
@@ -63,8 +67,10 @@ def lanczos(
 
     basis = np.empty((size, min(size, 2 * n + 12 * BLOCK)), dtype=kind, order="F")
     projected: Matrix = np.zeros((0, 0), dtype=kind)
-    known, largest, turn = basis[:, :0], np.zeros(0), np.zeros((0, 0))
+    known, turn = basis[:, :0], np.zeros((0, 0))
+    largest: FloatArray = np.zeros(0)
     block = _orthonormal(mass, fresh(min(BLOCK, size)), known, fresh)
+    before, pause = largest, 0
     while block.shape[1]:
         basis, known = _appended(basis, len(projected), block)
         image = operate(block)
@@ -72,15 +78,20 @@ def lanczos(
         image -= known @ column
         projected = _bordered(projected, column)
         block = _orthonormal(mass, image, known, fresh)
-        coupling = block.conj().T @ (mass @ image)
-        if len(projected) < n and block.shape[1]:
+        pause -= 1
+        if (len(projected) < n or pause > 0) and block.shape[1]:
             continue
-        largest, turn = np.linalg.eigh(projected, UPLO="U")
-        chosen = np.argsort(-abs(largest))[:n]
-        largest, turn = largest[chosen], turn[:, chosen]
-        rest = np.linalg.norm(coupling @ turn[-image.shape[1] :], axis=0)
+        largest, turn = _largest(projected, n)
+        rest = np.linalg.norm((block.conj().T @ (mass @ image)) @ turn[-image.shape[1] :], axis=0)
+        found = before.size and np.any(abs(largest - before) > KNOWN * abs(largest))
         if np.all(rest <= np.maximum(CONVERGED * abs(largest), ROUNDING * abs(largest[0]))):
-            break
+            if before.size and not found:
+                break
+            before, pause = largest, STEPS
+            block = _orthonormal(mass, _without(mass, fresh(min(PROBE, size)), known), known, fresh)
+        elif found and block.shape[1] < BLOCK:  # there may be many more
+            more = _without(mass, fresh(BLOCK - block.shape[1]), known)
+            block = _orthonormal(mass, np.hstack([block, more]), known, fresh)
     rank = int(np.count_nonzero(abs(largest) > ROUNDING * np.max(abs(largest), initial=0.0)))
     if rank < n:
         raise input_error(
@@ -89,6 +100,18 @@ def lanczos(
             "Ask for at most as many.",
         )
     return shift + 1.0 / largest, known @ turn
+
+
+def _largest(projected: Matrix, n: int) -> tuple[FloatArray, Matrix]:
+    """Return the `n` eigenvalues of largest magnitude, and their vectors."""
+    values, vectors = np.linalg.eigh(projected, UPLO="U")
+    chosen = np.argsort(-abs(values))[:n]
+    return values[chosen], vectors[:, chosen]
+
+
+def _without(mass: Matrix, block: Matrix, known: Matrix) -> Matrix:
+    """Return `block` without its share in the M-orthonormal `known`."""
+    return block - known @ (known.conj().T @ (mass @ block))
 
 
 def _appended(basis: Matrix, count: int, block: Matrix) -> tuple[Matrix, Matrix]:
