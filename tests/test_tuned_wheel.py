@@ -212,5 +212,13 @@ def test_what_a_tuned_wheel_cannot_do_is_said():
         ss.forced_problem(system, load, ss.Sweep(omega_range=(3900.0, 3910.0), high=5))
     with pytest.raises(ss.InputError, match="there are waves up to 3"):
         system.condensed(ss.HarmonicLoad(load.static, {5: load.harmonics[1]}), 3)
+    sector, (low, high) = shrouded(5)
+    place = {"low": "left", "high": "right", "axis": TILTED, "normal": np.array([0.6, 0.0, 0.8])}
+    gaps = ss.neighbour_gaps(sector.structure, 5, **place)
+    with pytest.raises(
+        ss.InputError, match=r"keep: lacks node\d+.x, on which .* 3 such dofs in all"
+    ):
+        ss.tuned_wheel(sector, 2, 1, gaps, keep=low, n_modes=5)
+    assert ss.tuned_wheel(sector, 2, 1, gaps, keep=np.append(high, low), n_modes=5)[0].n == 11
     with pytest.raises(ss.InputError, match="three rows"):
         ss.tuned_wheel(ss.blisk_with_ring(), 2, 1, (np.zeros((2, 6)), None))

@@ -7,6 +7,8 @@ Computational Methods in Engineering 24 (2017) 589-636, appendices 1 and 2.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs
@@ -123,7 +125,7 @@ def tuned_wheel(
     Raises
     ------
     InputError
-        If operators do not fit, or gaps depend on each other in one of the waves.
+        If operators do not fit, dofs of the contacts are not kept, or gaps depend on each other in one of the waves.
     """
     own, following = gaps
     n = sector.structure.n
@@ -137,6 +139,8 @@ def tuned_wheel(
             )
     wanted = {excited_wave(engine_order, sector.sectors, h) for h in range(harmonics + 1)}
     place = None if keep is None else kept_places("tuned_wheel", sector, keep)
+    if place is not None:
+        _refuse_lost_contacts(sector, place, own, following)
     waves: dict[int, Structure] = {}
     operator = own
     for k in sorted(wanted):
@@ -150,6 +154,25 @@ def tuned_wheel(
         whole = own if following is None else own + wave(k, sector.sectors).phase * following
         waves[k], operator = in_relative_coordinates(moving, whole @ moving.basis, names)
     return TunedWheel(waves, sector.sectors, engine_order, harmonics), operator.real  # ones alone
+
+
+def _refuse_lost_contacts(
+    sector: CyclicSector, place: IntArray, own: Matrix, following: Matrix | None
+) -> None:
+    """Refuse contacts on dofs that the reduction does not keep: few modes know little of forces there."""
+    operators = [own] if following is None else [own, following]
+    used = np.unique(np.concatenate([operator.nonzero()[1] for operator in operators]))
+    # what lies on the high face moves with its partners on the low one
+    lost = np.setdiff1d(sector.wave_tie(0)[used].nonzero()[1], place)
+    if lost.size:
+        free = sector.independent
+        dofs = sector.structure.dofs
+        name = dofs.labels[free[lost[0]]] if lost[0] < free.size else "a dof on the axis"
+        raise input_error(
+            "tuned_wheel: keep",
+            f"lacks {name}, on which a contact acts, {lost.size} such dofs in all",
+            "Keep the dofs of the contacts; the partners on the low face of those on the high one.",
+        )
 
 
 def _conjugate(structure: Structure) -> Structure:
