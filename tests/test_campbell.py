@@ -80,6 +80,14 @@ def test_a_crossing_on_a_speed_counts_once():
     assert not free.crossings  # a rigid mode meets every order at rest: that is no resonance
 
 
+@pytest.mark.parametrize("order", [2, 30, 3000])
+def test_tolerance_is_relative_to_the_crossing(order):
+    """Which may lie far below the first speeds: 1 + Ω²/2 = m²Ω²."""
+    met = ss.campbell(lambda w: of_squares(1 + w**2 / 2), [0.0, 100.0], 1, (order,), tolerance=1e-3)
+    exact = 1 / np.sqrt(order**2 - 0.5)
+    assert [c.speed for c in met.crossings] == [pytest.approx(exact, rel=1e-3)]
+
+
 def test_a_looser_tolerance_costs_fewer_structures():
     def counted(tolerance):
         asked = []

@@ -323,6 +323,7 @@ def _crossing_speed(
         followed = _follow(family, before, speed, HALVINGS)
         return float(followed.hertz[mode] - order * speed / (2 * math.pi))
 
-    return float(
-        scipy.optimize.brentq(distance, before.speed, after.speed, xtol=tolerance * after.speed)
-    )
+    # relative to the crossing, which may lie far below the interval's end
+    least = float(np.finfo(float).eps)
+    rtol, xtol = max(tolerance, 4 * least), least * after.speed
+    return float(scipy.optimize.brentq(distance, before.speed, after.speed, xtol=xtol, rtol=rtol))
