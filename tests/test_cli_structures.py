@@ -365,7 +365,7 @@ def test_matrices_have_modes_and_no_speed(tmp_path: Path) -> None:
     ("more", "said"),
     [
         ('clamped = ["FOOD"]', "model.file.clamped[0]: the file has no set 'FOOD' of free nodes. Did you mean 'FOOT'?"),
-        ("sectors = 6", "model.file.low_face: is missing with sectors = 6, and the file has no cyclic tie. Name one of its sets: "),
+        ("sectors = 6", "model.file.low_face: is missing with 6 sectors, and the file has no cyclic tie. Name one of its sets: "),
         ('sectors = 6\nlow_face = "FOOT"', "model.file.high_face: is missing, the other face is given."),
         ('sectors = 6\nlow_face = "FOOT"\nhigh_face = "TIP"', "turned by"),
         ('low_face = "FOOT"\nhigh_face = "TIP"', "model.file.sectors: must be above 1 with cyclic faces."),
@@ -434,3 +434,64 @@ def test_a_missing_key_of_an_optional_table_is_described(tmp_path: Path) -> None
     path.write_text('schema_version = 1\n[model.file]\npath = "a.inp"\n', encoding="utf-8")
     said = refused("modes", str(path))
     assert "model.file.units: is missing. Add it: the file's unit system: SI, mm-t-s" in said
+
+
+# Decks of sectors, materials and keys as a user meets them first
+
+
+def sector_study(folder: Path, sectors: str, more: str = "number = 2") -> Path:
+    """Write a study of a deck with a cyclic tie of 24 sectors."""
+    write_decks(folder)
+    path = folder / "study.toml"
+    path.write_text(
+        f'schema_version = 1\n[model.file]\npath = "speed.inp"\nunits = "SI"\n{sectors}\n[modes]\n{more}\n',
+        encoding="utf-8",
+    )
+    return path
+
+
+def test_number_of_sectors_is_the_decks(tmp_path: Path) -> None:
+    path = sector_study(tmp_path, "", "nodal_diameters = [12]\nnumber = 2")
+    done("modes", str(path))
+    left_out = result(path, "modes")
+    assert left_out.attrs["sectors"] == 24
+    path = sector_study(tmp_path, "sectors = 24", "nodal_diameters = [12]\nnumber = 2")
+    done("modes", str(path), "--fresh")
+    np.testing.assert_array_equal(left_out.frequency_hz, result(path, "modes").frequency_hz)
+
+
+@pytest.mark.parametrize(
+    ("sectors", "diameter", "said"),
+    [
+        ("", 13, "modes.nodal_diameters: 13 is above half of 24 sectors. The nodal diameters go from 0 to 12."),
+        ("sectors = 23", 12, "model.file.sectors: is 23, but the deck's cyclic symmetry has 24. Give sectors = 24, or leave it out."),
+        ("sectors = 1", 12, "model.file.sectors: is 1, but the deck's cyclic symmetry has 24."),
+    ],
+)  # fmt: skip
+def test_nodal_diameters_are_judged_by_the_true_number_of_sectors(
+    tmp_path: Path, sectors: str, diameter: int, said: str
+) -> None:
+    path = sector_study(tmp_path, sectors, f"nodal_diameters = [{diameter}]")
+    assert refused("modes", str(path)).startswith(f"{path}: {said}")
+
+
+def test_a_cyclic_tie_without_number_is_refused(tmp_path: Path) -> None:
+    path = sector_study(tmp_path, "")
+    lines = (tmp_path / "speed.inp").read_text().splitlines()
+    at = next(i for i, line in enumerate(lines) if line.startswith("*CYCLIC SYMMETRY MODEL"))
+    (tmp_path / "speed.inp").write_text("\n".join(lines[:at] + lines[at + 2 :]) + "\n")
+    said = refused("check", str(path))
+    assert "*TIE: is cyclic, but nothing says how many sectors there are. Add *CYCLIC" in said
+
+
+def test_a_misspelt_key_of_a_nested_table_lists_that_tables_keys(tmp_path: Path) -> None:
+    path = write_small_wheel(tmp_path)
+    path.write_text(path.read_text().replace("hub_chord_m", "hub_cord_m"))
+    said = refused("check", str(path))
+    assert (
+        "model.sector.airfoil.hub_cord_m: unknown key 'hub_cord_m'. Did you mean 'hub_chord_m'?"
+        in said
+    )
+    path.write_text(path.read_text().replace("hub_cord_m", "zzz"))
+    said = refused("check", str(path))
+    assert "unknown key 'zzz'. Known: airfoil_length_m, " in said

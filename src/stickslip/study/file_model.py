@@ -45,6 +45,8 @@ class FileContent:
         What the user should know.
     held
         (nodes, 3) supports of single directions beside the clamped nodes; None where there are none.
+    sectors
+        Of the wheel; 1 for a whole structure.
     """
 
     mesh: SolidMesh | None
@@ -54,6 +56,7 @@ class FileContent:
     quadrature: Quadrature = EXACT
     warnings: tuple[str, ...] = ()
     held: BoolArray | None = None
+    sectors: int = 1
 
 
 def read_file_model(study: StructureStudy, say: Callable[[str], None]) -> FileContent:
@@ -78,12 +81,13 @@ def read_file_model(study: StructureStudy, say: Callable[[str], None]) -> FileCo
     name = path.name.lower()
     try:
         if name.endswith(DECKS):
-            return _from_deck(
+            content = _from_deck(
                 study, table, read_deck(path, units=_units(table), plausible=table.plausible)
             )
-        if name.endswith(ARCHIVES):
-            return _from_archive(study, table, path)
-        return _from_matrices(study, table)
+        elif name.endswith(ARCHIVES):
+            content = _from_archive(study, table, path)
+        else:
+            content = _from_matrices(study, table)
     except InputError as error:
         # the readers speak of their arguments, a study has keys
         text = str(error).replace(
@@ -91,6 +95,29 @@ def read_file_model(study: StructureStudy, say: Callable[[str], None]) -> FileCo
             "Give model.file.units, or model.file.plausible = false,",
         )
         raise InputError(text) from None
+    wrong = study.tables.excess(content.sectors)
+    if wrong:
+        key, problem, remedy = wrong
+        raise input_error(f"{study.path}: {key}", problem, remedy)
+    return content
+
+
+def _sectors(study: StructureStudy, table: FileModel, of_deck: int | None = None) -> int:
+    """Return the number of sectors: the deck's, which the study may repeat, or the study's."""
+    if of_deck is not None and table.sectors not in (None, of_deck):
+        raise input_error(
+            f"{study.path}: model.file.sectors",
+            f"is {table.sectors}, but the deck's cyclic symmetry has {of_deck}",
+            f"Give sectors = {of_deck}, or leave it out.",
+        )
+    sectors = of_deck or table.sectors or 1
+    if sectors == 1 and table.low_face is not None:
+        raise input_error(
+            f"{study.path}: model.file.sectors",
+            "must be above 1 with cyclic faces",
+            "Give the number of sectors of the wheel, or leave the faces out.",
+        )
+    return sectors
 
 
 def _units(table: FileModel) -> Units:
@@ -98,12 +125,7 @@ def _units(table: FileModel) -> Units:
 
 
 def _from_deck(study: StructureStudy, table: FileModel, deck: Deck) -> FileContent:
-    if deck.sectors is not None and deck.sectors != table.sectors:
-        raise input_error(
-            f"{study.path}: model.file.sectors",
-            f"is {table.sectors}, but the deck's cyclic symmetry has {deck.sectors}",
-            f"Give sectors = {deck.sectors}.",
-        )
+    sectors = _sectors(study, table, deck.sectors)
     quadrature = deck.quadrature if table.quadrature == "calculix" else EXACT
     axis = table.axis() or deck.axis
     warnings = tuple(f"{table.path}: passed over {text}" for text in deck.ignored)
@@ -114,10 +136,10 @@ def _from_deck(study: StructureStudy, table: FileModel, deck: Deck) -> FileConte
         material = [deck.materials[name] for name in deck.cell_material]
     else:
         material = deck.material
-    mesh = _prepared(study, table, deck.mesh)
+    mesh = _prepared(study, table, deck.mesh, sectors)
     partly = deck.held.any(axis=1) & ~deck.held.all(axis=1)
     held = deck.held if partly.any() else None
-    return FileContent(mesh, material, None, axis, quadrature, warnings, held)
+    return FileContent(mesh, material, None, axis, quadrature, warnings, held, sectors)
 
 
 def _from_archive(study: StructureStudy, table: FileModel, path: Path) -> FileContent:
@@ -133,19 +155,25 @@ def _from_archive(study: StructureStudy, table: FileModel, path: Path) -> FileCo
                 "Add the table [material].",
             )
         material = next(iter(found.values()))
-    quadrature = Quadrature.calculix() if table.quadrature == "calculix" else EXACT
+    sectors = _sectors(study, table)
     return FileContent(
-        _prepared(study, table, mesh), material, None, table.axis() or Axis(), quadrature
+        _prepared(study, table, mesh, sectors),
+        material,
+        None,
+        table.axis() or Axis(),
+        Quadrature.calculix() if table.quadrature == "calculix" else EXACT,
+        sectors=sectors,
     )
 
 
 def _from_matrices(study: StructureStudy, table: FileModel) -> FileContent:
     _refuse_clamped(study, table, "a model of matrices, which hold their supports already")
-    files, mesh = study.model_files, None
+    files, mesh, sectors = study.model_files, None, _sectors(study, table)
     structure = _matrices(study, table)
     if "mesh" in files and files["mesh"].name.lower().endswith(DECKS):
         mesh = read_deck(files["mesh"], units=_units(table), plausible=table.plausible).mesh
-    return FileContent(mesh, None, _with_faces(study, table, structure), table.axis() or Axis())
+    structure = _with_faces(study, table, structure, sectors)
+    return FileContent(mesh, None, structure, table.axis() or Axis(), sectors=sectors)
 
 
 def _matrices(study: StructureStudy, table: FileModel) -> Structure:
@@ -172,7 +200,7 @@ def _refuse_clamped(study: StructureStudy, table: FileModel, what: str) -> None:
         )
 
 
-def _prepared(study: StructureStudy, table: FileModel, mesh: SolidMesh) -> SolidMesh:
+def _prepared(study: StructureStudy, table: FileModel, mesh: SolidMesh, sectors: int) -> SolidMesh:
     """Return the mesh with its cyclic faces and clamped nodes under the names that assembly knows."""
     sets = dict(mesh.node_sets)
     held = set(sets.pop(ROOT, np.zeros(0, dtype=np.int64)).tolist())
@@ -182,29 +210,31 @@ def _prepared(study: StructureStudy, table: FileModel, mesh: SolidMesh) -> Solid
         name = getattr(table, key)
         if name is not None:
             sets[role] = sets[_known(study, key, name, sets)]
-        elif table.sectors > 1 and role not in sets:
-            raise _no_face(study, key, table, sets)
+        elif sectors > 1 and role not in sets:
+            raise _no_face(study, key, sectors, sets)
     root = np.array(sorted(held), dtype=np.int64)
     kept = {name: _without(members, root) for name, members in sets.items()}
     return replace(mesh, node_sets={ROOT: root} | {k: m for k, m in kept.items() if m.size})
 
 
-def _with_faces(study: StructureStudy, table: FileModel, structure: Structure) -> Structure:
+def _with_faces(
+    study: StructureStudy, table: FileModel, structure: Structure, sectors: int
+) -> Structure:
     """Return the structure with its cyclic faces under the names that pairing knows."""
     sets = dict(structure.sets)
     for key, role in (("low_face", LOW), ("high_face", HIGH)):
         name = getattr(table, key)
         if name is not None:
             sets[role] = sets[_known(study, key, name, sets)]
-        elif table.sectors > 1 and role not in sets:
-            raise _no_face(study, key, table, sets)
+        elif sectors > 1 and role not in sets:
+            raise _no_face(study, key, sectors, sets)
     return replace(structure, sets=sets)
 
 
-def _no_face(study: StructureStudy, key: str, table: FileModel, sets: Iterable[str]) -> InputError:
+def _no_face(study: StructureStudy, key: str, sectors: int, sets: Iterable[str]) -> InputError:
     return input_error(
         f"{study.path}: model.file.{key}",
-        f"is missing with sectors = {table.sectors}, and the file has no cyclic tie",
+        f"is missing with {sectors} sectors, and the file has no cyclic tie",
         f"Name one of its sets: {', '.join(sorted(sets)) or 'it has none'}.",
     )
 

@@ -160,7 +160,9 @@ def disk_model(study: StructureStudy, say: Say) -> DiskModel:
     mesh = mesh_sector(table.library())
     if table.shroud is not None and table.shroud.joined:
         mesh = _with_joined_shrouds(mesh)
-    content = FileContent(mesh, study.tables.material.library(), None, Axis())
+    content = FileContent(
+        mesh, study.tables.material.library(), None, Axis(), sectors=table.sectors
+    )
     return _finished(study, content, say)
 
 
@@ -175,7 +177,7 @@ def _with_joined_shrouds(mesh: SolidMesh) -> SolidMesh:
 
 def _finished(study: StructureStudy, content: FileContent, say: Say) -> DiskModel:
     """Assemble what was read, pair the faces, and say what it is."""
-    rotation, sectors = study.tables.rotation, study.tables.sectors
+    rotation, sectors = study.tables.rotation, content.sectors
     rotating = None
     if content.mesh is not None and content.material is not None:
         rotating = rotating_solid(

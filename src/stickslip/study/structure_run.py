@@ -232,6 +232,12 @@ def _safe(run: _Run) -> StructureSummary:
     table, rpm = run.study.tables.safe, _safe_rpm(run.study)
     assert table is not None
     model = run.model()
+    if model.sectors == 1:
+        raise input_error(
+            f"{run.study.path}: safe",
+            "the model is a whole structure, not a sector",
+            "An interference diagram needs cyclic symmetry; give the sector and the number of sectors.",
+        )
     speed = RPM * rpm
     at = speed if model.rotating is not None else 0.0
     numbers = waves_of_modes(None, model, at)
@@ -279,12 +285,6 @@ def _check_cheaply(study: StructureStudy, command: Command) -> None:
             f"{study.path}: safe.speed_rpm",
             f"must be above zero, got {_safe_rpm(study):g}",
             "Give the speed at which the engine orders act.",
-        )
-    if command == "safe" and study.tables.sectors == 1:
-        raise input_error(
-            f"{study.path}: safe",
-            "the model is a whole structure, not a sector",
-            "An interference diagram needs cyclic symmetry; give the sector and the number of sectors.",
         )
 
 

@@ -70,26 +70,25 @@ class StructureTables(Section):
             raise custom_error(
                 "is missing", "A parametric sector needs the table [material].", "material"
             )
-        highest = self.sectors // 2
+        # of a file the true number of sectors is known when it has been read
+        wrong = self.model.sector and self.excess(self.model.sector.sectors)
+        if wrong:
+            key, problem, remedy = wrong
+            raise custom_error(problem, remedy, key)
+        return self
+
+    def excess(self, sectors: int) -> tuple[str, str, str] | None:
+        """Return key, problem and remedy of nodal diameters that a wheel of `sectors` has not; None if all are right."""
         asked = {
             "modes.nodal_diameters": self.modes.nodal_diameters,
             "campbell.nodal_diameters": self.campbell and self.campbell.nodal_diameters,
         }
+        highest = sectors // 2
         for key, diameters in asked.items():
             if diameters and max(diameters) > highest:
-                raise custom_error(
-                    f"{max(diameters)} is above half of {self.sectors} sectors",
-                    f"The nodal diameters go from 0 to {highest}.",
-                    key,
-                )
-        return self
-
-    @property
-    def sectors(self) -> int:
-        """Number of sectors of the wheel; 1 for a whole structure."""
-        if self.model.sector is not None:
-            return self.model.sector.sectors
-        return self.model.file.sectors if self.model.file is not None else 1
+                problem = f"{max(diameters)} is above half of {sectors} sectors"
+                return key, problem, f"The nodal diameters go from 0 to {highest}."
+        return None
 
 
 @dataclass(frozen=True)

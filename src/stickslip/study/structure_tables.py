@@ -36,11 +36,12 @@ class FileModel(Section):
         True,
         description="whether mass and size are checked against what solids have: true, or false where the numbers are right",
     )
-    sectors: int = Field(
-        1,
+    sectors: int | None = Field(
+        None,
         ge=1,
         le=1000,
-        description="number of equal sectors that make the wheel; 1 if the file holds the whole structure",
+        description="number of equal sectors that make the wheel; left out: that of the deck's cyclic symmetry, else 1 for "
+        "the whole structure",
     )
     low_face: SetName | None = Field(
         None,
@@ -91,12 +92,6 @@ class FileModel(Section):
             missing = "low_face" if self.low_face is None else "high_face"
             raise custom_error(
                 "is missing, the other face is given", "Name both faces or neither.", missing
-            )
-        if self.sectors == 1 and self.low_face is not None:
-            raise custom_error(
-                "must be above 1 with cyclic faces",
-                "Give the number of sectors of the wheel, or leave the faces out.",
-                "sectors",
             )
         if self.axis_direction is not None and not any(self.axis_direction):
             raise custom_error("has no length", "The z axis is [0, 0, 1].", "axis_direction")

@@ -327,6 +327,12 @@ def _cyclic(model: DeckModel, blocks: list[Block], passed: set[str]) -> None:
         place, fields = rows[0]
         low, high = (_surface_nodes(model, surfaces, name.upper(), place) for name in fields[:2])
         model.tie = (low, high)
+        if model.sectors is None:
+            raise input_error(
+                block.place,
+                "is cyclic, but nothing says how many sectors there are",
+                "Add *CYCLIC SYMMETRY MODEL, N=….",
+            )
 
 
 def _surface_nodes(model: DeckModel, surfaces: dict[str, Block], name: str, place: str) -> IntArray:
