@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from stickslip.model.gyroscopic import GyroscopicModes, gyroscopic_modes
     from stickslip.model.lumped import chain, lumped
     from stickslip.model.mesh import SolidMesh, write_mesh
-    from stickslip.model.modes import Modes, natural_frequencies, normal_modes
+    from stickslip.model.modes import Modes, natural_frequencies, normal_modes, with_springs
     from stickslip.model.readers.abaqus import read_abaqus_matrices
     from stickslip.model.readers.ansys import read_ansys_full
     from stickslip.model.readers.ansys_archive import read_ansys_archive, read_ansys_materials
@@ -168,7 +168,7 @@ _MODULES = {
     "stickslip.model.gyroscopic": ("GyroscopicModes", "gyroscopic_modes"),
     "stickslip.model.lumped": ("chain", "lumped"),
     "stickslip.model.mesh": ("SolidMesh", "write_mesh"),
-    "stickslip.model.modes": ("Modes", "natural_frequencies", "normal_modes"),
+    "stickslip.model.modes": ("Modes", "natural_frequencies", "normal_modes", "with_springs"),
     "stickslip.model.readers.abaqus": ("read_abaqus_matrices",),
     "stickslip.model.readers.ansys": ("read_ansys_full",),
     "stickslip.model.readers.ansys_archive": ("read_ansys_archive", "read_ansys_materials"),
@@ -265,8 +265,8 @@ __all__ = [
     "reduce_interface", "reduced_wheel", "rigid_response", "rigid_surface", "rotating_beam",
     "rotating_solid", "rubin", "run_study", "safe", "save_structure", "segment_to_segment",
     "signals", "smallest_peak", "structural_damping", "structure_surface", "to_sectors", "to_waves",
-    "track_peak", "travelling_wave", "tuned_wheel", "wave", "wheel", "wheel_shape", "write_deck",
-    "write_mesh", "write_report",
+    "track_peak", "travelling_wave", "tuned_wheel", "wave", "wheel", "wheel_shape", "with_springs",
+    "write_deck", "write_mesh", "write_report",
 ]
 # fmt: on
 
