@@ -139,7 +139,9 @@ def test_results_of_another_study_are_not_mixed(tmp_path: Path) -> None:
     path = write_small_study(tmp_path, airfoil_size_m="1e-5")
     assert "limits" in refused("run", str(path))  # stops after the journal is made
     write_small_study(tmp_path, airfoil_size_m="1e-5", centrifugal_n="440.0")
-    assert "this results folder belongs to another study" in refused("run", str(path))
+    assert "what this command left here is of another or a changed study" in refused(
+        "run", str(path)
+    )
     assert "limits" in refused("run", str(path), "--fresh")
 
 
@@ -200,7 +202,9 @@ def test_results_of_another_law_or_evaluator_are_not_mixed(tmp_path: Path) -> No
         write_small_study(tmp_path, airfoil_size_m="1e-5", evaluator='"march"'),
         planar_friction(write_small_study(tmp_path, airfoil_size_m="1e-5"), "curved"),
     ):
-        assert "this results folder belongs to another study" in refused("run", str(changed))
+        assert "what this command left here is of another or a changed study" in refused(
+            "run", str(changed)
+        )
 
 
 def test_run_that_costs_too_much_is_refused_before_meshing(tmp_path: Path) -> None:

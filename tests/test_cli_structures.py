@@ -109,7 +109,7 @@ def test_basis_that_is_too_small_is_told(
 ) -> None:
     # two modes and none to spare, over a range in which the shapes change
     monkeypatch.setattr("stickslip.study.speed_basis.SPARE", 0)
-    monkeypatch.setattr("stickslip.study.structure_run.BASIS_ERROR", 1e-9)
+    monkeypatch.setattr("stickslip.study.structure_doubts.BASIS_ERROR", 1e-9)
     path = write_small_wheel(tmp_path, engine_orders="[2]")
     assert "wave number 2: frequencies between the speeds of the basis are off" in done(
         "campbell", str(path), "--no-report"
@@ -495,3 +495,37 @@ def test_a_misspelt_key_of_a_nested_table_lists_that_tables_keys(tmp_path: Path)
     path.write_text(path.read_text().replace("hub_cord_m", "zzz"))
     said = refused("check", str(path))
     assert "unknown key 'zzz'. Known: airfoil_length_m, " in said
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("young_modulus_pa", "114.0", ("material.young_modulus_pa: no solid has 114 Pa, which is 1.14e+11 Pa if it is in GPa. "
+         "Give a value from 1e+07 to 2e+12 Pa, or material.plausible = false where the number is right.")),
+        ("young_modulus_pa", "2.1e14", "material.young_modulus_pa: no solid has 2.1e+14 Pa. Give a value"),
+        ("density_kg_per_m3", "7.85", "material.density_kg_per_m3: no solid has 7.85 kg/m³, which is 7850 kg/m³ if it is in g/cm³."),
+        ("density_kg_per_m3", "7.85e-9", "which is 7850 kg/m³ if it is in t/mm³."),
+    ],
+)  # fmt: skip
+def test_a_material_that_no_solid_has_is_refused(
+    tmp_path: Path, key: str, value: str, said: str
+) -> None:
+    path = write_small_wheel(tmp_path, **{key: value})
+    assert said in refused("modes", str(path))
+    path.write_text(path.read_text().replace("[material]", "[material]\nplausible = false"))
+    material = read_structure_study(path).tables.material
+    assert material is not None
+    assert float(value) in (material.library().young_modulus, material.library().density)
+
+
+def test_fresh_removes_the_files_of_its_command_only(tmp_path: Path) -> None:
+    own = write_small_wheel(tmp_path)
+    done("modes", str(own))
+    done("safe", str(own))
+    kept = (tmp_path / "results" / "modes.nc").read_bytes()
+    own.write_text(own.read_text().replace("density_kg_per_m3 = 7850", "density_kg_per_m3 = 7800"))
+    said = refused("safe", str(own))
+    assert "what this command left here is of another or a changed study" in said
+    assert "--fresh, which removes this command's files of the folder and no others" in said
+    done("safe", str(own), "--fresh")
+    assert (tmp_path / "results" / "modes.nc").read_bytes() == kept

@@ -85,8 +85,8 @@ def test_folder_of_another_study_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         Journal(path, "b", ForcedPoint)
     assert str(caught.value) == (
-        f"{tmp_path}: this results folder belongs to another study, or to another version of stickslip or its libraries. "
-        "Start over with --fresh, which empties the folder, or name another folder under [output]."
+        f"{tmp_path}: what this command left here is of another or a changed study, or of another version of stickslip or its libraries. "
+        "Start over with --fresh, which removes this command's files of the folder and no others, or name another folder under [output]."
     )
 
 

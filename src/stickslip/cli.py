@@ -33,7 +33,13 @@ Kind = Literal["blades", "sector"]
 StudyKind = Annotated[
     Kind, typer.Option("--kind", help="blades: two blades and a damper; sector: a bladed disk.")
 ]
-Fresh = Annotated[bool, typer.Option("--fresh", help="Forget what the results folder holds.")]
+Fresh = Annotated[
+    bool,
+    typer.Option(
+        "--fresh",
+        help="Start over: remove what this command wrote into the results folder, and no other file.",
+    ),
+]
 Report = Annotated[bool, typer.Option("--report/--no-report", help="Write the HTML report.")]
 
 

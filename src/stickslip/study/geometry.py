@@ -4,13 +4,14 @@ import math
 from collections.abc import Callable
 from typing import Annotated, Any, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from stickslip.errors import InputError
 from stickslip.model.blade_pair import BladePair
 from stickslip.model.damper import FlatCurvedDamper
+from stickslip.model.readers.units import MODULI, SOLIDS
 from stickslip.model.solid import Material
-from stickslip.study.messages import library_error
+from stickslip.study.messages import custom_error, library_error
 from stickslip.study.sections import Positive, Section
 
 Length = Annotated[float, Field(gt=0, le=100)]  # m
@@ -122,9 +123,18 @@ class Blades(Section):
         return 2 * NODES_A_CUBE * (cubes + (shank + foot) / self.foot_size_m**3)
 
 
+# what a number may have been meant in, for messages
+STRESSES = {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3}
+DENSITIES = {"g/cm³": 1e3, "kg/mm³": 1e9, "t/mm³": 1e12}
+
+
 class MaterialTable(Section):
     """Material of the blades."""
 
+    plausible: bool = Field(
+        True,
+        description="whether stiffness and density are checked against what solids have: true, or false where the numbers are right",
+    )
     young_modulus_pa: Positive = Field(
         description="Young's modulus in Pa, greater than zero (steel: 2.1e11)"
     )
@@ -135,9 +145,27 @@ class MaterialTable(Section):
         description="density in kg/m³, greater than zero (steel: 7850)"
     )
 
+    @field_validator("young_modulus_pa", "density_kg_per_m3")
+    @classmethod
+    def _is_of_a_solid(cls, value: float, info: ValidationInfo) -> float:
+        """Refuse what no solid has, as the readers of decks do."""
+        stiff = info.field_name == "young_modulus_pa"
+        (low, high), unit = (MODULI, "Pa") if stiff else (SOLIDS, "kg/m³")
+        if low <= value <= high or not info.data.get("plausible", True):
+            return value
+        meant = [
+            f", which is {value * factor:.4g} {unit} if it is in {name}"
+            for name, factor in (STRESSES if stiff else DENSITIES).items()
+            if low <= value * factor <= high
+        ]
+        raise custom_error(
+            f"no solid has {value:g} {unit}{meant[0] if meant else ''}",
+            f"Give a value from {low:g} to {high:g} {unit}, or material.plausible = false where the number is right.",
+        )
+
     def library(self) -> Material:
         """Return the material."""
-        return Material(**arguments(self))
+        return Material(**{k: v for k, v in arguments(self).items() if k != "plausible"})
 
 
 class Damper(Section):

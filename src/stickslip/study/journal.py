@@ -88,8 +88,8 @@ class Journal:
             self._db.close()
             raise input_error(
                 str(self._path.parent),
-                "this results folder belongs to another study, or to another version of stickslip or its libraries",
-                "Start over with --fresh, which empties the folder, or name another folder under [output].",
+                "what this command left here is of another or a changed study, or of another version of stickslip or its libraries",
+                "Start over with --fresh, which removes this command's files of the folder and no others, or name another folder under [output].",
             )
 
     def add(self, load_case: int, point: object) -> None:
