@@ -1,6 +1,7 @@
 """Craig-Bampton reduction, natural frequencies, added springs, lumped structures."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -140,11 +141,31 @@ def test_keeping_all_dofs_needs_no_modes():
         ([0, 12], 1, "dof 12 is not among the structure's 12 dofs"),
         ([-1], 1, "dof -1 is not among"),
         ([0, 1], 11, "got 11, and 10 dofs are not kept"),
+        ("TIP", 1, r"craig_bampton: keep: holds the name 'TIP', which is no set.*dof_set"),
+        ([True, False], 1, r"keep: is a mask. Give indices: np.flatnonzero"),
+        ([0.5, 1.0], 1, "keep: holds .*0.5.*, which is no index"),
     ],
 )
 def test_bad_choices_are_named(keep, modes, message):
     with pytest.raises(InputError, match=message):
         craig_bampton(chain(12, mass=1.0, stiffness=1.0), np.array(keep), modes)
+
+
+def test_nothing_kept_is_modal_truncation():
+    """Documented: the lowest modes of a structure that its supports hold."""
+    full = chain(12, mass=1.0, stiffness=1.0)
+    small = craig_bampton(full, np.array([]), 3)
+    np.testing.assert_allclose(
+        natural_frequencies(small, 3), natural_frequencies(full, 3), rtol=1e-12
+    )
+
+
+def test_the_name_of_a_set_is_told_from_its_dofs():
+    full = replace(chain(12, mass=1.0, stiffness=1.0), sets={"tip": np.array([11])})
+    with pytest.raises(
+        InputError, match=r"holds the name 'tip'. Give its dofs: structure.dof_set\('tip'\)"
+    ):
+        craig_bampton(full, "tip", 1)
 
 
 def test_a_body_that_nothing_holds_is_named():

@@ -71,3 +71,33 @@ def test_chain_matrices(part):
         "damping": [[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]],
     }
     np.testing.assert_array_equal(getattr(small, part), expected[part])
+
+
+def test_printing_one_says_what_it_is_without_its_matrices():
+    """The text of a dataclass would hold all numbers of all matrices."""
+    full = chain(12, 1.0, 1.0)
+    full = Structure(
+        full.mass,
+        full.damping,
+        full.stiffness,
+        full.dofs,
+        {"tip": np.array([11]), "all": np.arange(12)},
+    )
+    assert repr(full) == "<Structure: 12 dofs; dense real; sets tip (1), all (12)>"
+    small = craig_bampton(full, full.dof_set("tip"), 2)
+    expected = "3 dofs; dense real; in other coordinates than the 12 dofs of its model; sets tip (1), modes (2)"
+    assert str(small) == f"<Structure: {expected}>"
+    many = Structure(
+        *(scipy.sparse.csr_array(1j * m) for m in (full.mass, full.damping, full.stiffness)),
+        full.dofs,
+        {f"set{i}": np.arange(i) for i in range(30)},
+        loss=full.stiffness,
+    )
+    assert repr(many).startswith(
+        "<Structure: 12 dofs; sparse complex; structural damping; sets set0 (0), "
+    )
+    assert repr(many).endswith("set7 (7) and 22 more>")
+    assert (
+        repr(Structure(*(np.eye(1),) * 3, modal_dofs(1)))
+        == "<Structure: 1 dofs; dense real; no sets>"
+    )

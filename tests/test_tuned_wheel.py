@@ -222,3 +222,45 @@ def test_what_a_tuned_wheel_cannot_do_is_said():
     assert ss.tuned_wheel(sector, 2, 1, gaps, keep=np.append(high, low), n_modes=5)[0].n == 11
     with pytest.raises(ss.InputError, match="three rows"):
         ss.tuned_wheel(ss.blisk_with_ring(), 2, 1, (np.zeros((2, 6)), None))
+
+
+def test_any_function_may_reduce_the_waves_and_is_told_what_it_got_wrong():
+    """Without the look at what it returns: an AttributeError, or gaps in the wrong coordinates."""
+    sector, (low, high) = shrouded(5)
+    place = {"low": "left", "high": "right", "axis": TILTED, "normal": np.array([0.6, 0.0, 0.8])}
+    gaps = ss.neighbour_gaps(sector.structure, 5, **place)
+    keep = np.append(high, low)
+
+    def tuned(reduce):
+        return ss.tuned_wheel(sector, 2, 1, gaps, keep=keep, n_modes=5, reduce=reduce)[0]
+
+    def own(wave, first, count):
+        return ss.craig_bampton(wave, first, count)
+
+    expected = tuned(ss.craig_bampton)
+    np.testing.assert_array_equal(tuned(own).waves[2].stiffness, expected.waves[2].stiffness)
+    assert repr(expected) == (
+        "<TunedWheel: 5 sectors; engine order 2; harmonics 0 to 1; waves 0, 2; 11 coordinates>"
+    )
+    wrong = {
+        "returned NoneType": lambda wave, first, count: None,
+        "first coordinates are not the kept dofs": lambda wave, first, count: ss.craig_bampton(
+            wave, first[::-1], count
+        ),
+        "with a basis of shape": lambda wave, first, count: ss.chain(11, 1.0, 1.0),
+        "left 10 coordinates of wave 2 and 11 of wave 0": lambda wave, first, count: (
+            ss.craig_bampton(wave, first, count - np.iscomplexobj(wave.stiffness))
+        ),
+    }
+    for message, reduce in wrong.items():
+        with pytest.raises(ss.InputError, match=f"tuned_wheel: reduce: .*{message}"):
+            tuned(reduce)
+        with pytest.raises(ss.InputError, match="reduced_wheel: reduce: "):
+            ss.reduced_wheel(sector, keep, 5, reduce=reduce)
+    with pytest.raises(ss.InputError, match="tuned_wheel: keep: is a mask"):
+        ss.tuned_wheel(sector, 2, 1, gaps, keep=np.ones(sector.structure.n, dtype=bool))
+    wheel = ss.reduced_wheel(sector, keep, 5)
+    assert repr(wheel).startswith(
+        "<ReducedWheel: 5 sectors of 11 coordinates; <Structure: 55 dofs;"
+    )
+    assert repr(sector).startswith("<CyclicSector: one of 5; ")

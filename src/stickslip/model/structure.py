@@ -11,6 +11,8 @@ from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import did_you_mean, input_error
 from stickslip.model.dofs import Dofs, join_dofs
 
+NAMED = 8  # sets that a short description names
+
 
 @dataclass(frozen=True, eq=False)
 class Structure:
@@ -54,6 +56,21 @@ class Structure:
                 raise ValueError(f"Structure.{name}: shape {shape} for {n} dofs")
         if self.loss is not None and self.loss.shape != (n, n):
             raise ValueError(f"Structure.loss: shape {self.loss.shape} for {n} dofs")
+
+    def __repr__(self) -> str:
+        """Return what it is in a line, without its matrices."""
+        matrices = [self.mass, self.damping, self.stiffness]
+        kind = "sparse" if any(scipy.sparse.issparse(m) for m in matrices) else "dense"
+        numbers = "complex" if any(np.iscomplexobj(m) for m in matrices) else "real"
+        parts = [f"{self.n} dofs", f"{kind} {numbers}"]
+        if self.loss is not None:
+            parts.append("structural damping")
+        if self.basis is not None:
+            parts.append(f"in other coordinates than the {self.basis.shape[0]} dofs of its model")
+        names = [f"{name} ({len(index)})" for name, index in self.sets.items()]
+        more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+        parts.append("sets " + ", ".join(names[:NAMED]) + more if names else "no sets")
+        return f"<Structure: {'; '.join(parts)}>"
 
     @property
     def n(self) -> int:

@@ -44,7 +44,8 @@ def craig_bampton(
         Full model, dense or sparse, real symmetric or complex Hermitian (a travelling wave); held against rigid
         motion by supports or by `keep`.
     keep
-        (k,) indices of the dofs that stay physical: contact, excitation, output.
+        (k,) indices of the dofs that stay physical: contact, excitation, output. None (an empty array) leaves the lowest
+        modes of a held structure alone: modal truncation.
     n_modes
         Number of fixed-interface modes; or `ModesBelow` a frequency; or `FrequencyError`: as many as it takes.
     say

@@ -85,6 +85,10 @@ class CyclicSector:
                 "A dof has one partner; one shared by all sectors stands at the same place in both.",
             )
 
+    def __repr__(self) -> str:
+        """Return what it is in a line, without its matrices."""
+        return f"<CyclicSector: one of {self.sectors}; {self.low.size} dofs on a face; {self.structure!r}>"
+
     @property
     def pitch(self) -> float:
         """Angle of a sector in rad."""

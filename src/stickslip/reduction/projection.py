@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.arrays import IntArray, Matrix
-from stickslip.errors import input_error
+from stickslip.errors import did_you_mean, input_error
 from stickslip.model.dofs import Dofs, join_dofs, modal_dofs
 from stickslip.model.structure import Structure
 
@@ -86,15 +86,19 @@ def _dense_product(matrix: Matrix, basis: Matrix) -> Matrix:
     return product
 
 
-def kept_dofs(place: str, structure: Structure, keep: IntArray) -> IntArray:
-    """Return the dofs to keep as an index array, after checking them.
+def dof_indices(place: str, structure: Structure, keep: IntArray) -> IntArray:
+    """Return the dofs to keep as an index array.
 
     Raises
     ------
     InputError
-        If one is not in the structure or stands there twice.
+        If they are no whole numbers, or one is not in the structure.
     """
-    keep = np.asarray(keep, dtype=np.int64).reshape(-1)
+    given = np.asarray(keep)
+    if given.size and given.dtype.kind not in "iu":
+        what, remedy = _no_indices(structure, given)
+        raise input_error(f"{place}: keep", what, remedy)
+    keep = given.astype(np.int64).reshape(-1)
     outside = keep[(keep < 0) | (keep >= structure.n)]
     if outside.size:
         raise input_error(
@@ -102,6 +106,31 @@ def kept_dofs(place: str, structure: Structure, keep: IntArray) -> IntArray:
             f"dof {outside[0]} is not among the structure's {structure.n} dofs",
             "Take the indices from the structure's sets.",
         )
+    return keep
+
+
+def _no_indices(structure: Structure, given: Matrix) -> tuple[str, str]:
+    """Return what is wrong with something that is no array of indices, and the remedy."""
+    if given.dtype.kind == "U":
+        name = str(given.reshape(-1)[0])
+        if name in structure.sets:
+            return f"holds the name {name!r}", f"Give its dofs: structure.dof_set({name!r})."
+        known = did_you_mean(name, list(structure.sets)) if structure.sets else "There are no sets."
+        return f"holds the name {name!r}, which is no set", f"{known} Give structure.dof_set(name)."
+    if given.dtype.kind == "b":
+        return "is a mask", "Give indices: np.flatnonzero(mask)."
+    return f"holds {given.reshape(-1)[0]!r}, which is no index", "Give whole numbers."
+
+
+def kept_dofs(place: str, structure: Structure, keep: IntArray) -> IntArray:
+    """Return the dofs to keep as an index array, after checking them.
+
+    Raises
+    ------
+    InputError
+        If they are no whole numbers, or one is not in the structure or stands there twice.
+    """
+    keep = dof_indices(place, structure, keep)
     values, counts = np.unique(keep, return_counts=True)
     if np.any(counts > 1):
         twice = structure.dofs.labels[values[counts > 1][0]]

@@ -4,7 +4,7 @@ Every wave number is reduced on its own, so the cost is that of sectors and the 
 physical coordinates all sectors have the same kept dofs, and the matrices are block-circulant.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.craig_bampton import craig_bampton
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave
+from stickslip.reduction.projection import dof_indices
 from stickslip.reduction.turning import dof_rotation
 from stickslip.reduction.waves import to_sectors, to_waves, wave
 
@@ -42,6 +43,11 @@ class ReducedWheel:
     sector: CyclicSector
     waves: tuple[Structure, ...]
     to_global: FloatArray
+
+    def __repr__(self) -> str:
+        """Return what it is in a line, without its matrices."""
+        own = self.structure.n // self.sector.sectors
+        return f"<ReducedWheel: {self.sector.sectors} sectors of {own} coordinates; {self.structure!r}>"
 
     def expand(self, vector: Matrix) -> Matrix:
         """Return the (n_s, n) displacements of all sectors, each in its own axes, from coordinates of the wheel.
@@ -125,7 +131,8 @@ def reduced_wheel(
     n_modes
         Modes of every wave number kept beside them, and so modal coordinates of every sector.
     reduce
-        `craig_bampton` or `rubin`.
+        `craig_bampton`, `rubin`, or any function ``(wave, keep, n_modes) -> Structure`` whose first coordinates are the
+        dofs `keep` of the wave, as many coordinates in every wave.
 
     Returns
     -------
@@ -135,7 +142,8 @@ def reduced_wheel(
     Raises
     ------
     InputError
-        If a kept dof is not among the coordinates of a travelling wave.
+        If a kept dof is not among the coordinates of a travelling wave, or `reduce` returns something else than
+        described.
 
     Notes
     -----
@@ -143,10 +151,13 @@ def reduced_wheel(
     (Krack, Salles & Thouverez 2017, eq. 41); it is real, since ``A_{n_s−k}`` is the conjugate of ``A_k``.
     """
     refuse_reduced("reduced_wheel", sector)
-    keep = np.asarray(keep, dtype=np.int64)
+    keep = dof_indices("reduced_wheel", sector.structure, keep)
     place = kept_places("reduced_wheel", sector, keep)
     half = sector.sectors // 2 + 1
-    waves = tuple(reduce(travelling_wave(sector, k), place, n_modes) for k in range(half))
+    waves = tuple(
+        reduced_wave("reduced_wheel", reduce, sector, k, place, n_modes) for k in range(half)
+    )
+    refuse_unequal("reduced_wheel", dict(enumerate(waves)))
     size = waves[0].n
     turn = np.eye(size)
     if sector.axis is not None:
@@ -180,8 +191,62 @@ def refuse_reduced(who: str, sector: CyclicSector) -> None:
         )
 
 
+def reduced_wave(
+    who: str, reduce: Reduce, sector: CyclicSector, wave_number: int, place: IntArray, n_modes: int
+) -> Structure:
+    """Return a travelling wave as `reduce` leaves it, after a look at what that is.
+
+    Parameters
+    ----------
+    who
+        Function that asks, for messages.
+    reduce
+        Of a user, maybe.
+    sector, wave_number
+        What travels.
+    place
+        (k,) coordinates of the wave that have to come first.
+    n_modes
+        For `reduce`.
+
+    Raises
+    ------
+    InputError
+        If that is no structure of the same model, or its first coordinates are others.
+    """
+    moving = travelling_wave(sector, wave_number)
+    reduced = reduce(moving, place, n_modes)
+    wanted = "Return a Structure whose first coordinates are the dofs `keep`, with a `basis` that leads to the sector."
+    if not isinstance(reduced, Structure):
+        raise input_error(f"{who}: reduce", f"returned {type(reduced).__name__}", wanted)
+    shape = None if reduced.basis is None else reduced.basis.shape
+    if shape != (sector.structure.n, reduced.n):
+        problem = f"returned a structure of {reduced.n} dofs with a basis of shape {shape} for {sector.structure.n} dofs"
+        raise input_error(f"{who}: reduce", problem, wanted)
+    rows = reduced.expand(np.eye(reduced.n))[sector.independent[place]]
+    if not np.allclose(rows, np.eye(place.size, reduced.n), rtol=0, atol=1e-9):
+        problem = (
+            "returned a structure whose first coordinates are not the kept dofs in their order"
+        )
+        raise input_error(f"{who}: reduce", problem, wanted)
+    return reduced
+
+
+def refuse_unequal(who: str, waves: Mapping[int, Structure]) -> None:
+    """Refuse waves of different numbers of coordinates: harmonics and sectors could not be put together."""
+    sizes = {k: wave.n for k, wave in waves.items()}
+    if len(set(sizes.values())) > 1:
+        few, many = min(sizes, key=sizes.__getitem__), max(sizes, key=sizes.__getitem__)
+        raise input_error(
+            f"{who}: reduce",
+            f"left {sizes[few]} coordinates of wave {few} and {sizes[many]} of wave {many}",
+            "Give a number of modes, the same for all waves, instead of a frequency or an error.",
+        )
+
+
 def kept_places(who: str, sector: CyclicSector, keep: IntArray) -> IntArray:
     """Return where the kept dofs of a sector stand among the coordinates of a travelling wave."""
+    keep = dof_indices(who, sector.structure, keep)
     free = sector.independent
     lost = np.setdiff1d(keep, free)
     if lost.size:

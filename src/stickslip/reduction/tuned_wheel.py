@@ -4,7 +4,7 @@ M. Krack, L. Salles and F. Thouverez, "Vibration prediction of bladed disks coup
 Computational Methods in Engineering 24 (2017) 589-636, appendices 1 and 2.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,11 +15,15 @@ from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.craig_bampton import craig_bampton
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave
-from stickslip.reduction.reduced_wheel import kept_places, refuse_reduced
+from stickslip.reduction.reduced_wheel import (
+    Reduce,
+    kept_places,
+    reduced_wave,
+    refuse_reduced,
+    refuse_unequal,
+)
 from stickslip.reduction.relative import in_relative_coordinates
 from stickslip.reduction.waves import excited_wave, wave
-
-Reduce = Callable[[Structure, IntArray, int], Structure]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +49,14 @@ class TunedWheel:
     sectors: int
     engine_order: int
     harmonics: int
+
+    def __repr__(self) -> str:
+        """Return what it is in a line, without its matrices."""
+        waves = ", ".join(str(k) for k in sorted(self.waves))
+        return (
+            f"<TunedWheel: {self.sectors} sectors; engine order {self.engine_order}; harmonics 0 to {self.harmonics}; "
+            f"waves {waves}; {self.n} coordinates>"
+        )
 
     def of_harmonic(self, harmonic: int) -> Structure:
         """Return the structure that temporal harmonic `harmonic` (0: the mean) vibrates as.
@@ -111,7 +123,8 @@ def tuned_wheel(
     n_modes
         Number of modes of each wave beside them.
     reduce
-        `craig_bampton` or `rubin`.
+        `craig_bampton`, `rubin`, or any function ``(wave, keep, n_modes) -> Structure`` whose first coordinates are the
+        dofs `keep` of the wave, as many coordinates in every wave.
     names
         Names of the contacts.
 
@@ -125,7 +138,8 @@ def tuned_wheel(
     Raises
     ------
     InputError
-        If operators do not fit, dofs of the contacts are not kept, or gaps depend on each other in one of the waves.
+        If operators do not fit, dofs of the contacts are not kept, gaps depend on each other in one of the waves, or
+        `reduce` returns something else than described.
     """
     own, following = gaps
     n = sector.structure.n
@@ -148,11 +162,14 @@ def tuned_wheel(
         if mirror is not None and k > 0:
             waves[k] = _conjugate(mirror)
             continue
-        moving = travelling_wave(sector, k)
-        if place is not None:
-            moving = reduce(moving, place, n_modes)
+        if place is None:
+            moving = travelling_wave(sector, k)
+        else:
+            moving = reduced_wave("tuned_wheel", reduce, sector, k, place, n_modes)
         whole = own if following is None else own + wave(k, sector.sectors).phase * following
         waves[k], operator = in_relative_coordinates(moving, whole @ moving.basis, names)
+    if place is not None:
+        refuse_unequal("tuned_wheel", waves)
     return TunedWheel(waves, sector.sectors, engine_order, harmonics), operator.real  # ones alone
 
 
