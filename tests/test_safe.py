@@ -180,3 +180,33 @@ def test_wrong_input_is_named(blisk):
         ss.blade_ring(5, coupling=-1.0)
     with pytest.raises(ss.InputError, match="deviations"):
         ss.mistuned_blade_ring([0.0, -1.0, 0.0])
+
+
+def test_orders_above_the_highest_mode_are_not_judged():
+    # six blades of one mode: what the second would be, the map cannot know
+    table = ss.nodal_diameter_map(ss.blade_ring(6), 1)
+    highest = {k: table.of_wave(k)[0] for k in range(6)}
+    speed = (
+        2 * np.pi * highest[2] / 2.5
+    )  # order 2 lies a fifth below its mode, order 4 far above it
+    assert ss.safe(table, speed, (2, 4), margin=0.1).not_judged == (4,)
+    assert ss.safe(table, speed, (2, 4), margin=0.3).not_judged == (2, 4)
+    assert ss.safe(table, speed / 4, (2, 4), margin=0.1).not_judged == ()
+
+
+def test_resonances_follow_frequencies_that_grow_with_the_speed():
+    # blades that stiffen by Southwell's law f^2 = f0^2 + B (Omega / 2 pi)^2, which one tangent describes at all speeds
+    rest, growth, speed = 1.7, np.array([2.5]), 3.0
+    hertz = np.full((4, 1), np.hypot(rest, np.sqrt(growth[0]) * speed / (2 * np.pi)))
+    table = ss.NodalDiameterMap(6, np.arange(4), hertz, hertz)
+    found = ss.safe(table, speed, (1, 2, 3), growth=lambda _: growth)
+    by_order = {p.engine_order: p for p in found.points}
+    for order in (2, 3):
+        expected = 2 * np.pi * rest / np.sqrt(order**2 - growth[0])
+        assert by_order[order].speed == pytest.approx(expected, rel=1e-12)
+        assert by_order[order].margin == pytest.approx(expected / speed - 1, rel=1e-12)
+    # the first order stays below the mode at every speed
+    assert by_order[1].speed == np.inf
+    assert found.points[-1].engine_order == 1
+    with pytest.raises(ss.InputError, match="belongs to one speed"):
+        ss.safe(table, (2.0, 3.0), (1,), growth=lambda _: growth)

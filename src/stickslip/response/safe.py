@@ -5,7 +5,7 @@ Proceedings of the 17th Turbomachinery Symposium (1988) 93-101.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +32,7 @@ class Interference:
     frequency_hz
         Natural frequency.
     speed
-        At which the engine order would meet it, in rad/s.
+        At which the engine order would meet it, in rad/s; infinite where it never does.
     margin
         Relative distance of that speed from the speed range, negative below it and zero within.
     """
@@ -75,6 +75,17 @@ class Safe:
         """Points whose margin is smaller than the one asked for."""
         return tuple(p for p in self.points if abs(p.margin) <= self.allowed)
 
+    @property
+    def not_judged(self) -> tuple[int, ...]:
+        """Engine orders that reach, with the margin, above the highest computed mode of the waves that they excite.
+
+        What lies there may be near and is not among the points, unless the map holds all modes that there are.
+        """
+        top = self.speed_range[1] * (1 + self.allowed) / (2 * math.pi)
+        return tuple(
+            m for m in self.engine_orders if m * top > self.frequencies.of_wave(m).max(initial=0.0)
+        )
+
     def speed_line(
         self, speed: float, engine_orders: int | None = None
     ) -> tuple[FloatArray, FloatArray]:
@@ -101,6 +112,7 @@ def safe(
     engine_orders: Sequence[int],
     *,
     margin: float = 0.05,
+    growth: Callable[[int], FloatArray] | None = None,
 ) -> Safe:
     """Compare engine orders with the frequencies of the nodal diameters that they excite.
 
@@ -117,11 +129,16 @@ def safe(
         Positive.
     margin
         Relative distance in speed below which a point counts as a resonance.
+    growth
+        Wave number -> (n_modes,) derivatives of the squares of the natural frequencies by the square of the speed, at the one
+        operating speed: resonances are then where engine orders meet the modes along these straight lines (Southwell), as in a
+        Campbell diagram near that speed. Left out, frequencies are taken as those of the map at all speeds.
 
     Raises
     ------
     InputError
-        If numbers do not make sense, or a nodal diameter that an engine order excites is not in the map.
+        If numbers do not make sense, a nodal diameter that an engine order excites is not in the map, or `growth` comes with a
+        range of speeds.
     """
     low, high = (speed, speed) if isinstance(speed, (int, float)) else speed
     if not 0 < low <= high < math.inf:
@@ -135,7 +152,13 @@ def safe(
         )
     if not 0 <= margin < math.inf:
         raise input_error("safe: margin", f"must not be negative, got {margin}", "0.05 is 5 %.")
-    points = [p for m in engine_orders for p in _points(frequencies, int(m), low, high)]
+    if growth is not None and low != high:
+        raise input_error(
+            "safe: growth",
+            f"belongs to one speed, got a range {speed}",
+            "Give the speed of the map.",
+        )
+    points = [p for m in engine_orders for p in _points(frequencies, int(m), low, high, growth)]
     return Safe(
         frequencies, (low, high), tuple(int(m) for m in engine_orders), margin,
         tuple(sorted(points, key=lambda p: abs(p.margin))),
@@ -143,13 +166,25 @@ def safe(
 
 
 def _points(
-    frequencies: NodalDiameterMap, engine_order: int, low: float, high: float
+    frequencies: NodalDiameterMap,
+    engine_order: int,
+    low: float,
+    high: float,
+    growth: Callable[[int], FloatArray] | None,
 ) -> list[Interference]:
     wave = engine_order % frequencies.sectors
     diameter = min(wave, frequencies.sectors - wave)
+    own = frequencies.of_wave(wave)
+    slopes = np.zeros(len(own)) if growth is None else growth(wave)
     found = []
-    for mode, hertz in enumerate(frequencies.of_wave(wave)):
-        speed = 2 * math.pi * float(hertz) / engine_order
+    for mode, (hertz, slope) in enumerate(zip(own, slopes, strict=True)):
+        speed = _meeting(2 * math.pi * float(hertz), float(slope), engine_order, high)
         outside = speed / high - 1 if speed > high else min(speed / low - 1, 0.0)
         found.append(Interference(engine_order, wave, diameter, mode, float(hertz), speed, outside))
     return found
+
+
+def _meeting(omega: float, slope: float, engine_order: int, speed: float) -> float:
+    """Return where ``ω² + slope (Ω² − speed²) = (engine_order Ω)²``; infinite where the order never meets the line."""
+    rest, rise = omega**2 - slope * speed**2, engine_order**2 - slope
+    return math.sqrt(rest / rise) if rise != 0.0 and rest / rise > 0.0 else math.inf

@@ -80,6 +80,12 @@ class DiskModel:
             return structure
         return travelling_wave(replace(self.sector, structure=structure), wave_number)
 
+    def static_displacement(self, speed: float) -> FloatArray | None:
+        """Return the (nodes, 3) static displacement in m of the mesh at a speed in rad/s; None at rest and for matrices."""
+        if self.rotating is None or speed <= 0:
+            return None
+        return self.rotating.at_nodes(self.rotating.displacement(speed, tie=self._tie))
+
     @cached_property
     def skin(self) -> Skin | None:
         """The skin of the mesh by its corner nodes; None without a mesh."""

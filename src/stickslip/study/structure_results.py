@@ -61,6 +61,8 @@ class WaveModes:
         (m,) ascending.
     shapes
         (m, n, 3) complex displacements of the skin's points, the largest of length 1; n = 0 if not asked for.
+    growth
+        (m,) derivatives of ω² by Ω² at the speed; zeros for a model that no speed changes.
     seconds
         Time of the computation.
     """
@@ -68,6 +70,7 @@ class WaveModes:
     wave_number: int
     frequencies_hz: FloatArray
     shapes: ComplexArray
+    growth: FloatArray
     seconds: float
 
 

@@ -18,6 +18,13 @@ from stickslip.study.journal import Journal
 from stickslip.study.netcdf import write_dataset
 from stickslip.study.progress import Interrupted, Log, Sink, library_versions
 from stickslip.study.reference import read_reference
+from stickslip.study.static_state import StaticState, static_state
+from stickslip.study.structure_doubts import (
+    basis_doubts,
+    campbell_doubts,
+    safe_doubts,
+    static_doubts,
+)
 from stickslip.study.structure_model import DiskModel, disk_model
 from stickslip.study.structure_results import WaveBranches, WaveModes
 from stickslip.study.structure_store import (
@@ -34,18 +41,18 @@ from stickslip.study.structure_summary import (
     campbell_tables,
     modes_tables,
     safe_tables,
+    static_table,
 )
 from stickslip.study.waves import (
     follow_wave,
     interference,
     solve_wave,
+    unfollowed_orders,
+    unseen_orders,
     waves_of_campbell,
     waves_of_modes,
 )
 
-BASIS_ERROR = (
-    1e-4  # relative error of frequencies in a Campbell diagram above which a warning is given
-)
 W = TypeVar("W", WaveModes, WaveBranches)
 
 
@@ -125,10 +132,23 @@ class _Run:
             self.log.say(f"WARNING: {text}")
         return model
 
+    def static(self, model: DiskModel, rpm: float) -> StaticState | None:
+        """Find what the centrifugal load does at a speed, and tell it before the modes are computed."""
+        found = static_state(model, rpm)
+        for text in static_doubts(found):
+            self.log.say(f"WARNING: {text}")
+        return found
+
     def origin(
-        self, model: DiskModel, speed_rpm: float, *, complete: bool, doubts: tuple[str, ...] = ()
+        self,
+        model: DiskModel,
+        speed_rpm: float,
+        static: StaticState | None,
+        *,
+        complete: bool,
+        doubts: tuple[str, ...] = (),
     ) -> Origin:
-        """Return the attributes of the result; `doubts` are warnings beside those of the model."""
+        """Return the attributes of the result; `doubts` are warnings beside those of the model and its static state."""
         x, y, z = (float(v) for v in model.axis.unit)
         return Origin(
             command=self.command,
@@ -138,7 +158,7 @@ class _Run:
             versions=self.versions,
             created=self.created,
             wall_seconds=perf_counter() - self.began,
-            warnings=(*model.warnings, *doubts),
+            warnings=(*model.warnings, *static_doubts(static), *doubts),
             complete=complete,
             model_hash=self.study.content_hash(),
             sectors=model.sectors,
@@ -146,6 +166,7 @@ class _Run:
             axis_origin=model.axis.origin,
             speed_rpm=speed_rpm,
             rotation=_in_words(model, speed_rpm if self.command != "campbell" else None),
+            static=static,
         )
 
     def each(
@@ -178,16 +199,22 @@ class _Run:
         return self.study.folder / f"{self.command}.nc"
 
     def summary(
-        self, tables: tuple[TextTable, ...], model: DiskModel, doubts: tuple[str, ...] = ()
+        self,
+        tables: tuple[TextTable, ...],
+        model: DiskModel,
+        static: StaticState | None,
+        doubts: tuple[str, ...] = (),
     ) -> StructureSummary:
         """Return what the command prints at its end."""
+        warnings = (*model.warnings, *static_doubts(static), *doubts)
         files = (self.target, self.log.path)
-        return StructureSummary(tables, (*model.warnings, *doubts), self.target, files)
+        return StructureSummary((*tables, *static_table(static)), warnings, self.target, files)
 
 
 def _modes(run: _Run) -> StructureSummary:
     tables, known = run.study.tables, read_reference(run.study)
-    model, speed = run.model(), RPM * tables.rotation.speed_rpm
+    model, rpm = run.model(), tables.rotation.speed_rpm
+    static, speed = run.static(model, rpm), RPM * rpm
     numbers = waves_of_modes(tables.modes.nodal_diameters, model, speed)
     reference = None
     if known is not None:
@@ -195,14 +222,14 @@ def _modes(run: _Run) -> StructureSummary:
     shapes = tables.modes.shapes and model.skin is not None
 
     def write(waves: list[WaveModes], complete: bool) -> None:
-        origin = run.origin(model, tables.rotation.speed_rpm, complete=complete)
+        origin = run.origin(model, rpm, static, complete=complete)
         rows = None if reference is None else reference[: len(waves)]
         write_dataset(modes_dataset(waves, rows, model.skin, model.facts, origin), run.target)
 
     waves = run.each(
         numbers, lambda k: solve_wave(model, speed, k, tables.modes.number, shapes=shapes), write
     )
-    return run.summary(modes_tables(waves, reference, model.sectors), model)
+    return run.summary(modes_tables(waves, reference, model.sectors, rpm), model, static)
 
 
 def _campbell(run: _Run) -> StructureSummary:
@@ -215,17 +242,23 @@ def _campbell(run: _Run) -> StructureSummary:
             "Bring the mesh (a deck or an archive of one material) instead of matrices.",
         )
     speeds = RPM * np.linspace(table.speeds_rpm[0], table.speeds_rpm[1], table.points)
+    static = run.static(model, table.speeds_rpm[1])
     numbers = waves_of_campbell(table, model)
+    unseen = unseen_orders(numbers, model, table)
+
+    def doubts(waves: list[WaveBranches]) -> tuple[str, ...]:
+        unfollowed = unfollowed_orders(waves, model, table, speeds)
+        return (*basis_doubts(waves), *campbell_doubts(unfollowed, unseen, waves))
 
     def write(waves: list[WaveBranches], complete: bool) -> None:
-        origin = run.origin(model, float("nan"), complete=complete, doubts=_basis_doubts(waves))
-        write_dataset(
-            campbell_dataset(waves, speeds, table.engine_orders, model.facts, origin), run.target
-        )
+        origin = run.origin(model, np.nan, static, complete=complete, doubts=doubts(waves))
+        unfollowed = unfollowed_orders(waves, model, table, speeds)
+        data = campbell_dataset(waves, speeds, table.engine_orders, unfollowed, model.facts, origin)
+        write_dataset(data, run.target)
 
     waves = run.each(numbers, lambda k: follow_wave(model, k, table, speeds), write)
     tables = campbell_tables(waves, speeds, model.sectors)
-    return run.summary(tables, model, _basis_doubts(waves))
+    return run.summary(tables, model, static, doubts(waves))
 
 
 def _safe(run: _Run) -> StructureSummary:
@@ -238,28 +271,19 @@ def _safe(run: _Run) -> StructureSummary:
             "the model is a whole structure, not a sector",
             "An interference diagram needs cyclic symmetry; give the sector and the number of sectors.",
         )
-    speed = RPM * rpm
+    static, speed = run.static(model, rpm), RPM * rpm
     at = speed if model.rotating is not None else 0.0
     numbers = waves_of_modes(None, model, at)
 
     def write(waves: list[WaveModes], complete: bool) -> None:
         if complete:
             found = interference(waves, model, table, speed)
-            origin = run.origin(model, rpm, complete=True)
+            origin = run.origin(model, rpm, static, complete=True, doubts=safe_doubts(found))
             write_dataset(safe_dataset(waves, found, model.facts, origin), run.target)
 
     waves = run.each(numbers, lambda k: solve_wave(model, at, k, table.modes, shapes=False), write)
-    return run.summary(safe_tables(interference(waves, model, table, speed)), model)
-
-
-def _basis_doubts(waves: Sequence[WaveBranches]) -> tuple[str, ...]:
-    """Say where the basis of a Campbell diagram is too small for its digits."""
-    poor = [w for w in waves if not w.error <= BASIS_ERROR]
-    return tuple(
-        f"wave number {w.wave_number}: frequencies between the speeds of the basis are off by up to {w.error:.1e}, relative; "
-        "ask for more campbell.modes, or for a narrower range of speeds"
-        for w in poor
-    )
+    found = interference(waves, model, table, speed)
+    return run.summary(safe_tables(found), model, static, safe_doubts(found))
 
 
 def _progress(wave: WaveModes | WaveBranches) -> str:

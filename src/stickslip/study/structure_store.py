@@ -12,6 +12,7 @@ from stickslip.arrays import FloatArray
 from stickslip.reduction.waves import wave
 from stickslip.response.safe import Safe
 from stickslip.study.netcdf import variable
+from stickslip.study.static_state import StaticState
 from stickslip.study.structure_results import Facts, Skin, WaveBranches, WaveModes
 from stickslip.study.structure_study import Command
 
@@ -38,6 +39,8 @@ class Origin:
         At which modes and interference were computed.
     rotation
         What of the rotation was kept, in words.
+    static
+        At that speed, or at the highest of a Campbell diagram; None where nothing turns.
     """
 
     command: Command
@@ -55,17 +58,25 @@ class Origin:
     axis_origin: tuple[float, float, float]
     speed_rpm: float
     rotation: str
+    static: StaticState | None
 
     def attributes(self, facts: Facts) -> dict[str, Any]:
         """Return them as netCDF attributes: texts and numbers only."""
         own = {
             name: list(value) if isinstance(value, tuple) else value
             for name, value in vars(self).items()
+            if name != "static"
         }
+        state = self.static
+        nothing = float("nan")
         own |= {
             "versions": json.dumps(dict(self.versions)),
             "warnings": json.dumps(list(self.warnings)),
             "complete": int(self.complete),
+            "static_rpm": nothing if state is None else state.rpm,
+            "static_displacement_m": nothing if state is None else state.displacement,
+            "static_strain": nothing if state is None else state.strain,
+            "static_rotation_rad": nothing if state is None else state.rotation,
         }
         return own | {
             "mass_kg": facts.mass,
@@ -101,6 +112,7 @@ def modes_dataset(
     data = _wave_variables([w.wave_number for w in waves], origin.sectors)
     frequencies = np.array([w.frequencies_hz for w in waves])
     data["frequency_hz"] = variable("wave mode", frequencies, "Hz", "natural frequency")
+    data["growth"] = _growth(waves)
     data["seconds"] = variable("wave", [w.seconds for w in waves], "s", "time of the computation")
     if reference is not None:
         data["reference_hz"] = variable("wave mode", reference, "Hz", "frequency to compare with")
@@ -125,10 +137,11 @@ def campbell_dataset(
     waves: Sequence[WaveBranches],
     speeds: FloatArray,
     engine_orders: Sequence[int],
+    unfollowed: Sequence[tuple[int, float]],
     facts: Facts,
     origin: Origin,
 ) -> xr.Dataset:
-    """Return the dataset of ``stickslip campbell``; `speeds` in rad/s."""
+    """Return the dataset of ``stickslip campbell``; `speeds` in rad/s, of `unfollowed` engine orders in rpm."""
     data = _wave_variables([w.wave_number for w in waves], origin.sectors)
     frequencies = np.array([w.frequencies_hz for w in waves])
     which = np.repeat(np.arange(len(waves)), [len(w.modes) for w in waves])
@@ -156,6 +169,18 @@ def campbell_dataset(
         "crossing_frequency_hz": variable(
             "crossing", every("crossings_hz"), "Hz", "frequency of the crossing"
         ),
+        "unfollowed_engine_order": variable(
+            "unfollowed",
+            np.array([m for m, _ in unfollowed], dtype=np.int64),
+            "1",
+            "engine order that goes beyond the followed modes of its nodal diameter",
+        ),
+        "unfollowed_from_rpm": variable(
+            "unfollowed",
+            np.array([rpm for _, rpm in unfollowed], dtype=float),
+            "rpm",
+            "speed from which it does",
+        ),
     }
     made = _dataset(data, facts, origin, modes=frequencies.shape[-1])
     return made.assign_attrs(engine_orders=list(engine_orders))
@@ -173,6 +198,7 @@ def safe_dataset(
     orders = np.array([p.engine_order for p in pairs])
     data |= {
         "frequency_hz": variable("wave mode", frequencies, "Hz", "natural frequency"),
+        "growth": _growth(waves),
         "pair_wave": variable("pair", [numbers.index(k) for k in known], "1", "index of the wave"),
         "pair_mode": variable("pair", [p.mode for p in pairs], "1", "index of the mode"),
         "pair_engine_order": variable("pair", orders, "1", "engine order"),
@@ -183,7 +209,7 @@ def safe_dataset(
             "pair", orders * found.speed_range[0] / (2 * np.pi), "Hz", "frequency of the excitation"
         ),
         "pair_resonance_rpm": variable(
-            "pair", [p.speed / RPM for p in pairs], "rpm", "speed at which they would meet"
+            "pair", [p.speed / RPM for p in pairs], "rpm", "speed at which they meet"
         ),
         "pair_margin": variable(
             "pair", [p.margin for p in pairs], "1", "that speed over the speed, less one"
@@ -193,6 +219,12 @@ def safe_dataset(
             [int(abs(p.margin) <= found.allowed) for p in pairs],
             "1",
             "1 if the margin is within the limit",
+        ),
+        "pair_judged": variable(
+            "pair",
+            [int(m not in found.not_judged) for m in orders],
+            "1",
+            "0 if the engine order excites above the highest computed mode of its nodal diameter",
         ),
     }
     made = _dataset(data, facts, origin, modes=frequencies.shape[-1])
@@ -208,6 +240,13 @@ def _wave_variables(numbers: Sequence[int], sectors: int) -> dict[str, xr.Variab
             "wave", [kind for _, kind in named], "1", "standing, forward or backward"
         ),
     }
+
+
+def _growth(waves: Sequence[WaveModes]) -> xr.Variable:
+    grown = np.array([w.growth for w in waves])
+    return variable(
+        "wave mode", grown, "1", "derivative of the squared frequency by the squared speed"
+    )
 
 
 def wave_name(number: int, sectors: int) -> tuple[int, str]:

@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.response.safe import Safe
+from stickslip.response.safe import Interference, Safe
+from stickslip.study.static_state import StaticState
 from stickslip.study.structure_results import WaveBranches, WaveModes
 from stickslip.study.structure_store import RPM, wave_name
 
 MOST_PAIRS = 30  # of an interference table on the screen
+NEARBY = 0.2  # margin up to which the tangent of a frequency over the speed is good to a digit after the point
 
 
 @dataclass(frozen=True)
@@ -56,9 +58,9 @@ class StructureSummary:
 
 
 def modes_tables(
-    waves: Sequence[WaveModes], reference: FloatArray | None, sectors: int
+    waves: Sequence[WaveModes], reference: FloatArray | None, sectors: int, rpm: float
 ) -> tuple[TextTable, ...]:
-    """Return the natural frequencies, and their differences from the reference."""
+    """Return the natural frequencies at a speed, and their differences from the reference."""
     n = waves[0].frequencies_hz.size
     head = ("wave", "kind", *(f"{m + 1}" for m in range(n)))
     parted = any(2 * w.wave_number > sectors for w in waves)
@@ -67,7 +69,7 @@ def modes_tables(
         (*name, *(f"{f:.7g}" for f in w.frequencies_hz))
         for name, w in zip(names, waves, strict=True)
     )
-    tables = [TextTable("Natural frequencies in Hz", head, rows)]
+    tables = [TextTable(f"Natural frequencies in Hz {at_speed(rpm)}", head, rows)]
     if reference is not None:
         off = np.array([w.frequencies_hz for w in waves]) / reference - 1
         worst = np.unravel_index(np.nanargmax(np.abs(off)), off.shape)
@@ -132,15 +134,59 @@ def safe_tables(found: Safe) -> tuple[TextTable, ...]:
     rows = tuple(
         (
             f"{p.engine_order}", _label(p.wave_number, table.sectors, parted), f"{p.mode + 1}", f"{p.frequency_hz:.6g}",
-            f"{p.speed / RPM:.1f}", f"{100 * p.margin:+.2f}", "NEAR" if abs(p.margin) <= found.allowed else "",
+            *_meeting(p),
+            _verdict(p, found),
         )
         for p in shown
     )  # fmt: skip
     title = f"At {rpm:g} rpm: {near} near resonances within {100 * found.allowed:g} %"
     if len(shown) < len(found.points):
         title += f"; the nearest {len(shown)} of {len(found.points)} pairs"
-    head = ("engine order", "wave", "mode", "Hz", "resonance at rpm", "margin %", "")
+    head = (
+        "engine order",
+        "wave",
+        "mode",
+        f"Hz at {rpm:g} rpm",
+        "resonance at rpm",
+        "margin %",
+        "",
+    )
     return (TextTable(title, head, rows),)
+
+
+def _meeting(point: Interference) -> tuple[str, str]:
+    """Write the speed of a resonance and its margin; far from the speed they are extrapolated too far for more digits."""
+    rpm, percent = point.speed / RPM, 100 * point.margin
+    if not np.isfinite(rpm):
+        return "never", "-"
+    if abs(point.margin) > NEARBY:
+        return f"~{float(f'{rpm:.2g}'):.0f}", f"{percent:+.0f}"
+    return f"{rpm:.1f}", f"{percent:+.2f}"
+
+
+def _verdict(point: Interference, found: Safe) -> str:
+    if abs(point.margin) <= found.allowed:
+        return "NEAR"
+    return "order not judged" if point.engine_order in found.not_judged else "clear"
+
+
+def static_table(state: StaticState | None) -> tuple[TextTable, ...]:
+    """Return what the centrifugal load does, or nothing where nothing turns."""
+    if state is None:
+        return ()
+    head = ("rpm", "largest displacement mm", "largest strain %", "largest rotation deg")
+    cells = (
+        f"{state.rpm:g}",
+        f"{1e3 * state.displacement:.4g}",
+        f"{100 * state.strain:.3g}",
+        f"{np.degrees(state.rotation):.3g}",
+    )
+    return (TextTable("Static displacement under the centrifugal load", head, (cells,)),)
+
+
+def at_speed(rpm: float) -> str:
+    """Return a speed in words."""
+    return f"at {rpm:g} rpm" if rpm else "at rest"
 
 
 def _names(number: int, sectors: int, *, parted: bool = True) -> tuple[str, str]:

@@ -5,7 +5,7 @@ from time import perf_counter
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.model.gyroscopic import gyroscopic_modes
 from stickslip.model.modes import normal_modes
 from stickslip.reduction.waves import excited_wave
@@ -13,6 +13,7 @@ from stickslip.response.campbell import campbell
 from stickslip.response.nodal_diameters import NodalDiameterMap
 from stickslip.response.safe import Safe, safe
 from stickslip.study.speed_basis import speed_basis
+from stickslip.study.structure_doubts import unfollowed_from
 from stickslip.study.structure_model import DiskModel
 from stickslip.study.structure_results import WaveBranches, WaveModes
 from stickslip.study.structure_tables import CampbellTable, SafeTable
@@ -41,6 +42,25 @@ def _diagram(engine_order: int, model: DiskModel) -> int:
     return wave if model.rotation.coriolis else min(wave, model.sectors - wave)
 
 
+def unfollowed_orders(
+    waves: Sequence[WaveBranches], model: DiskModel, table: CampbellTable, speeds: FloatArray
+) -> list[tuple[int, float]]:
+    """Return engine orders that leave all followed modes of their wave below them, and the speed in rpm from which they do."""
+    known = {w.wave_number: w.frequencies_hz for w in waves}
+    found = []
+    for order in sorted(table.engine_orders):
+        hertz = known.get(_diagram(order, model))
+        rpm = None if hertz is None else unfollowed_from(order, hertz, speeds)
+        if rpm is not None:
+            found.append((order, rpm))
+    return found
+
+
+def unseen_orders(numbers: Sequence[int], model: DiskModel, table: CampbellTable) -> list[int]:
+    """Return engine orders whose wave is not among those that are followed."""
+    return sorted(m for m in table.engine_orders if _diagram(m, model) not in numbers)
+
+
 def solve_wave(
     model: DiskModel, speed: float, wave_number: int, n_modes: int, *, shapes: bool
 ) -> WaveModes:
@@ -62,7 +82,31 @@ def solve_wave(
     moved = np.zeros((n_modes, 0, 3), dtype=complex)
     if shapes:
         moved = _unit(model.on_skin(np.asarray(structure.expand(vectors), dtype=complex)))
-    return WaveModes(wave_number, hertz, moved, perf_counter() - began)
+    growth = _growth(model, speed, wave_number, hertz, vectors)
+    return WaveModes(wave_number, hertz, moved, growth, perf_counter() - began)
+
+
+def _growth(
+    model: DiskModel, speed: float, wave_number: int, hertz: FloatArray, vectors: Matrix
+) -> FloatArray:
+    """Return the (m,) derivatives of ω² by Ω²: of ``φᴴ (K + iωD − ω²M) φ = 0``, whose φ counts to second order only."""
+    if model.rotating is None or speed == 0:
+        return np.zeros(len(hertz))
+    x = speed**2
+    here, low, high = (model.at(np.sqrt(f * x), wave_number) for f in (1.0, 0.5, 1.5))
+
+    def form(matrix: Matrix) -> ComplexArray:
+        return np.asarray(np.sum(vectors.conj() * (matrix @ vectors), axis=0), dtype=complex)
+
+    # the stiffness has degree two in Ω², so that the central difference is exact
+    by_x = form((high.stiffness - low.stiffness) / x)
+    mass, omega = form(here.mass), 2 * np.pi * hertz
+    if not model.rotation.coriolis:
+        return np.asarray((by_x / mass).real)
+    # Coriolis terms grow with Ω; what is left of the damping dissipates, and does not count here
+    turning = 1j * (form(here.damping) - form(here.damping.conj().T)) / 2
+    by_omega = 2 * omega * mass - turning
+    return np.asarray((2 * omega * (by_x + omega * turning / (2 * x)) / by_omega).real)
 
 
 def _unit(shapes: ComplexArray) -> ComplexArray:
@@ -117,4 +161,10 @@ def interference(
     backward = np.array([known[int(d)] for d in diameters])
     forward = np.array([known.get(model.sectors - int(d), known[int(d)]) for d in diameters])
     found = NodalDiameterMap(model.sectors, diameters, backward, forward)
-    return safe(found, speed, table.engine_orders, margin=table.margin_percent / 100)
+    growth = {w.wave_number: w.growth for w in waves}
+
+    def of_wave(number: int) -> FloatArray:
+        return growth.get(number, growth.get(model.sectors - number, np.zeros(0)))
+
+    margin = table.margin_percent / 100
+    return safe(found, speed, table.engine_orders, margin=margin, growth=of_wave)
