@@ -1,5 +1,6 @@
 """Bladed disks through the command line: from a study to tables, results and a page, and what bad input is told."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,8 +18,10 @@ from stickslip.model.structure_file import save_structure
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.wheel import wheel
 from stickslip.study.example import example_text
+from stickslip.study.static_state import strain_and_rotation
 from stickslip.study.structure_model import disk_model
 from stickslip.study.structure_study import read_structure_study
+from stickslip.study.waves import solve_wave
 from validation.case_calculix_materials import our_solid, write_decks
 
 ROOT = Path(__file__).parents[1]
@@ -130,6 +133,118 @@ def test_coriolis_forces_part_the_directions(tmp_path: Path) -> None:
     assert np.all(backward > 1.005 * forward)
     # the basis of the branches holds the modes of the last speed, which modes finds without it
     np.testing.assert_allclose(np.sort(branches.frequency_hz.values[0, -1]), forward, rtol=1e-7)
+
+
+def test_engine_orders_above_the_computed_modes_are_not_called_clear(tmp_path: Path) -> None:
+    # on 8 sectors engine order 30 excites two nodal diameters, at 3000 Hz: far above two modes
+    path = write_small_wheel(tmp_path, engine_orders="[2, 30]")
+    said = done("safe", str(path))
+    assert "engine orders 30 are not judged: they excite nodal diameters 2 at 3000 Hz" in said
+    assert "raise safe.modes, now 2, to" in said
+    data = result(path, "safe")
+    order = data.pair_engine_order.values
+    np.testing.assert_array_equal(data.pair_judged.values, order != 30)
+    assert "not judged" in json.loads(data.attrs["warnings"])[0]
+    rows = [line for line in said.splitlines() if line.startswith("│") and " 30 │" in line]
+    assert len(rows) == 2
+    assert all("not judged" in row or "NEAR" in row for row in rows)
+    page = (tmp_path / "results" / "report.html").read_text(encoding="utf-8")
+    assert page.count("<td>order not judged</td>") == 2
+    # what the remedy asks for is enough
+    enough = said.split("now 2, to ")[1].split()[0]
+    more = write_small_wheel(tmp_path / "more", engine_orders="[2, 30]", modes=enough)
+    assert "not judged" not in done("safe", str(more), "--no-report")
+
+
+def test_resonances_are_the_crossings_of_the_campbell_diagram(study: Path, tmp_path: Path) -> None:
+    crossed = result(study, "campbell")
+    i = int(np.argmax(crossed.crossing_speed_rpm.values))
+    order, rpm = int(crossed.crossing_engine_order[i]), float(crossed.crossing_speed_rpm[i])
+    path = write_small_wheel(
+        tmp_path, engine_orders=f"[{order}]", speed_rpm=f"{1.04 * rpm!r}", margin_percent="5.0"
+    )
+    assert f"Hz at {1.04 * rpm:g} rpm" in done("safe", str(path), "--no-report")
+    found = result(path, "safe").isel(pair=0)
+    # a tangent over four per cent, against a frequency that is frozen at the speed
+    frozen = float(found.pair_frequency_hz) * 60 / order
+    assert abs(float(found.pair_resonance_rpm) / rpm - 1) < 0.1 * abs(frozen / rpm - 1)
+    assert float(found.pair_margin) == pytest.approx(1 / 1.04 - 1, abs=2e-4)
+    assert int(found.pair_near) == 1
+
+
+@pytest.mark.parametrize("coriolis", ["false", "true"])
+def test_growth_is_the_slope_of_the_squares(tmp_path: Path, coriolis: str) -> None:
+    path = write_small_wheel(tmp_path, coriolis=coriolis)
+    model = disk_model(read_structure_study(path), lambda _: None)
+    speed, step = 1500.0, 1e-3
+    waves = {
+        s: solve_wave(model, speed * s, 6, 2, shapes=False) for s in (1.0, 1.0 - step, 1.0 + step)
+    }
+    squares = {s: (2 * np.pi * w.frequencies_hz) ** 2 for s, w in waves.items()}
+    by_difference = (squares[1 + step] - squares[1 - step]) / (4 * step * speed**2)
+    np.testing.assert_allclose(waves[1.0].growth, by_difference, rtol=1e-5, atol=1e-5)
+
+
+def test_engine_orders_above_the_followed_modes_are_named(study: Path, tmp_path: Path) -> None:
+    path = write_small_wheel(tmp_path, engine_orders="[2, 6, 10]")
+    said = done("campbell", str(path))
+    assert "engine orders are not judged: " in said
+    assert "raise campbell.modes, now 2" in said
+    data = result(path, "campbell")
+    at = dict(
+        zip(data.unfollowed_engine_order.values, data.unfollowed_from_rpm.values, strict=True)
+    )
+    assert 10 in at
+    assert 2 not in at
+    # full modes there: the second one lies on the engine order
+    model = disk_model(read_structure_study(path), lambda _: None)
+    hertz = normal_modes(model.at(at[10] * 2 * np.pi / 60, 2), 2).frequencies_hz
+    assert hertz[1] == pytest.approx(10 * at[10] / 60, rel=2e-3)
+    assert f"EO 10 from {at[10]:.5g} rpm" in (path.parent / "results" / "report.html").read_text()
+
+
+def test_engine_orders_of_left_out_diameters_are_named(tmp_path: Path) -> None:
+    path = write_small_wheel(tmp_path, engine_orders="[2, 3]")
+    text = path.read_text().replace("[campbell]", "[campbell]\nnodal_diameters = [2]")
+    path.write_text(text)
+    said = done("campbell", str(path), "--no-report")
+    assert "engine orders 3 have no crossings here, because campbell.nodal_diameters leaves" in said
+
+
+def test_static_displacement_is_told_and_doubted_where_it_is_large(
+    study: Path, tmp_path: Path
+) -> None:
+    data = result(study, "modes")
+    assert "too large" not in data.attrs["warnings"]
+    assert data.attrs["static_rpm"] == 6000.0
+    small = data.attrs["static_displacement_m"]
+    # of the order of a freely rotating ring: rho Omega^2 r^3 / E at the tip
+    tip = 0.29
+    scale = 7850 * (6000 * 2 * np.pi / 60) ** 2 * tip**3 / 2.1e11
+    assert 0.3 * scale < small < 3 * scale
+    assert f"{1e3 * small:.4g}" in done("modes", str(study), "--no-report")
+    path = write_small_wheel(tmp_path, speed_rpm="60000.0")
+    said = done("modes", str(path))
+    assert "the static displacement at 60000 rpm is too large for linear statics" in said
+    large = result(path, "modes").attrs
+    assert large["static_displacement_m"] == pytest.approx(100 * small, rel=1e-9)
+    assert "too large for linear statics" in large["warnings"]
+    page = (tmp_path / "results" / "report.html").read_text(encoding="utf-8")
+    assert "largest static displacement" in page
+    assert "Natural frequencies in Hz at 60000 rpm" in said
+
+
+def test_strain_and_rotation_of_a_linear_field() -> None:
+    mesh = mesh_sector(
+        read_structure_study(
+            ROOT / "examples/shrouded_sector/study.toml"
+        ).tables.model.sector.library()
+    )
+    strain = 1e-3 * np.array([[2.0, 1.0, 0.0], [1.0, -5.0, 0.5], [0.0, 0.5, 1.0]])
+    turn = 1e-3 * np.cross(np.eye(3), [1.0, 2.0, -2.0])  # of length three
+    found = strain_and_rotation(mesh, mesh.points @ (strain + turn).T)
+    expected = np.abs(np.linalg.eigvalsh(strain)).max(), 3e-3
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
 def test_mass_is_density_times_volume_and_shapes_meet_at_the_cut(study: Path) -> None:
@@ -391,7 +506,7 @@ def test_inspect_says_what_is_in_a_file(tmp_path: Path) -> None:
     rows = {line[:26].strip(): line[26:].strip() for line in said.splitlines()}
     assert rows["nodes"] == "12"
     assert rows["dofs"] == "36"
-    assert rows["set FOOT"] == "4"
+    assert rows["set FOOT"] == "4 nodes"
     assert rows["rigid modes"] == "6"
     assert len(rows["frequencies (Hz)"].split(",")) == 8
     # beside the six rigid ones
@@ -529,3 +644,22 @@ def test_fresh_removes_the_files_of_its_command_only(tmp_path: Path) -> None:
     assert "--fresh, which removes this command's files of the folder and no others" in said
     done("safe", str(own), "--fresh")
     assert (tmp_path / "results" / "modes.nc").read_bytes() == kept
+
+
+def test_inspect_gives_the_whole_mass_and_names_what_sets_hold(tmp_path: Path) -> None:
+    deck = write_deck(tmp_path / "deck.inp")
+    deck.write_text(deck.read_text() + "*BOUNDARY\nFOOT, 1, 3\n")
+    rows = inspected("inspect", str(deck), "--frequencies", "0")
+    whole = 2 * 7850 * 1e-3
+    assert float(rows["mass (kg)"]) == pytest.approx(whole, rel=1e-5)
+    assert float(rows["free mass x, y, z (kg)"].split(",")[0]) < 0.9 * whole
+    assert rows["centre of mass (m)"] == "0.1, 0.05, 0.05"
+    assert rows["set TIP"] == "4 nodes"
+    model = disk_model(read_structure_study(file_study(tmp_path)), lambda _: None)
+    assert model.facts.mass == pytest.approx(whole, rel=1e-12)  # as the commands say
+    save_structure(model.structure, tmp_path / "beam.npz")
+    assert inspected("inspect", str(tmp_path / "beam.npz"))["set TIP"] == "12 dofs"
+
+
+def inspected(*words: str) -> dict[str, str]:
+    return {line[:26].strip(): line[26:].strip() for line in done(*words).splitlines()}

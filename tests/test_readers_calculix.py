@@ -20,6 +20,7 @@ from stickslip import (
     Units,
     assemble_deck,
     cyclic_sector,
+    model_summary,
     natural_frequencies,
     read_calculix_matrices,
     read_deck,
@@ -28,6 +29,7 @@ from stickslip import (
     travelling_wave,
 )
 from stickslip.model.readers.node_table import mesh_nodes
+from stickslip.model.readers.positions import doubt_about_positions
 
 DATA = Path(__file__).parent / "data" / "calculix"
 REFERENCE = Path(__file__).parent.parent.parent / "shared" / "reference" / "calculix"
@@ -499,3 +501,36 @@ def test_garbled_files_are_named_or_read(tmp_path_factory, data):
             read()
         except InputError as error:
             assert str(error).count(": ") >= 1  # noqa: PT017  # place, then problem
+
+
+def other_mesh(deck):
+    """Return the mesh with the same node numbers at other places, in a box of the same size."""
+    mesh = deck.mesh
+    return replace(mesh, points=mesh.points[np.random.default_rng(0).permutation(len(mesh.points))])
+
+
+def test_positions_of_another_mesh_are_refused():
+    """A rigid rotation about them strains the model; 30 % of the terms remain with another mesh of the sector of 24 blades."""
+    deck = read_deck(DATA / "brick_matrix.inp", units=MM)
+    with pytest.raises(
+        InputError, match="do not fit the stiffness of brick_matrix: a rigid rotation"
+    ):
+        read_calculix_matrices(DATA / "brick_matrix", units=MM, mesh=other_mesh(deck))
+    taken = read_calculix_matrices(
+        DATA / "brick_matrix", units=MM, mesh=other_mesh(deck), plausible=False
+    )
+    remarks = model_summary(taken, n_modes=0).remarks
+    assert any("probably those of another mesh" in text for text in remarks)
+
+
+@needs_reference
+def test_preload_is_no_doubt_about_positions():
+    """Stresses at 8000 rpm leave 1.4e-4 of the terms, far below the limit of 5e-3."""
+    structure = read_calculix_matrices(
+        REFERENCE / "n24_coarse_matrix_pre.sti.gz", mass=REFERENCE / "n24_coarse_matrix_free.mas.gz"
+    )
+    assert doubt_about_positions(structure) is None
+    turned = replace(
+        structure, dofs=replace(structure.dofs, position=structure.dofs.position[:, [1, 2, 0]])
+    )
+    assert doubt_about_positions(turned) is not None

@@ -1,9 +1,14 @@
 """What ``stickslip inspect`` says of a model's file, as lines of text."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
+from stickslip.model.readers.calculix_deck import Deck
 from stickslip.model.readers.open_model import model_summary, read_model
 from stickslip.model.readers.units import Units
+from stickslip.study.facts import facts_of_solid
 from stickslip.study.progress import Sink
 
 WIDTH = 26  # of the column of names
@@ -35,4 +40,8 @@ def inspect_file(path: Path, units: str, modes: int, mesh: Path | None, sink: Si
     # doubtful numbers are shown with a remark, not refused: that is what one inspects a file for
     model = read_model(path, units=system, mesh=mesh, plausible=False)
     found = model_summary(model, n_modes=modes, units=system, say=sink.say)
+    if isinstance(model, Deck):
+        materials = [model.materials[name] for name in model.cell_material]
+        facts = facts_of_solid(model.mesh, materials, 0)
+        found = replace(found, whole_mass=facts.mass, centre=np.array(facts.centre))
     return [f"{name:<{WIDTH}}{value}" for name, value in found.rows()]

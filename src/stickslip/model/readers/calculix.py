@@ -10,7 +10,7 @@ from stickslip.errors import input_error
 from stickslip.model.mesh import SolidMesh
 from stickslip.model.readers.entries import SYMMETRY, from_triangle
 from stickslip.model.readers.node_table import COMPONENTS
-from stickslip.model.readers.positions import find_nodes
+from stickslip.model.readers.positions import doubt_about_positions, find_nodes
 from stickslip.model.readers.text import CUT_SHORT, number_table, read_text, whole_numbers
 from stickslip.model.readers.units import SI, Units, check_units, in_si
 from stickslip.model.structure import Structure
@@ -72,6 +72,13 @@ def read_calculix_matrices(
     structure = in_si(raw, units)
     if plausible:
         check_units(structure, units, str(stem))
+        doubt = doubt_about_positions(structure)
+        if doubt:
+            raise input_error(
+                nodes.place,
+                f"its nodes do not fit the stiffness of {stem.name}: {doubt}",
+                "Give the deck that CalculiX ran, or plausible=False where they are right.",
+            )
     return structure
 
 

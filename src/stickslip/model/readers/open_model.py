@@ -159,7 +159,7 @@ def _deck_summary(deck: Deck, n_modes: int, units: Units, say: Say) -> ModelSumm
     remarks += [f"passed over: {text}" for text in deck.ignored]
     return replace(
         found, kind=shown.kind, cells=shown.cells, sets=shown.sets, nodes=shown.nodes,
-        box=shown.box, remarks=(*remarks, *found.remarks),
+        members=shown.members, box=shown.box, remarks=(*remarks, *found.remarks),
     )  # fmt: skip
 
 

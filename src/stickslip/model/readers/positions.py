@@ -3,12 +3,20 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+import scipy.sparse
+
 from stickslip.errors import input_error
 from stickslip.model.mesh import SolidMesh
 from stickslip.model.readers.frd import frd_nodes
 from stickslip.model.readers.node_table import NodeTable, csv_nodes, deck_nodes, mesh_nodes
 from stickslip.model.readers.units import Units
+from stickslip.model.structure import Structure
 
+BALANCED = 1e-4  # of the sum of a row's entries: rows that a rigid translation does not load
+STRAINED = 5e-3  # of the terms of a rotation; stresses of preload turn with it and leave some 1e-4
+MOST = 5000  # rows that are looked at
+FEWEST = 12  # dofs away from supports, from which positions are judged
 READERS = {".inp": deck_nodes, ".frd": frd_nodes, ".csv": csv_nodes}
 
 
@@ -39,3 +47,40 @@ def find_nodes(source: SolidMesh | Path | str, units: Units) -> NodeTable:
             f"Give a mesh, or a file {', '.join(READERS)}.",
         )
     return READERS[suffix](path)
+
+
+def doubt_about_positions(structure: Structure) -> str | None:
+    """Say why the positions are probably those of another mesh, or None where they fit the stiffness.
+
+    A rigid rotation strains nothing. Away from supports and cyclic faces, which are known by their answer to rigid
+    translations, the stiffness times that rotation vanishes; with the positions of other nodes it does not.
+
+    Parameters
+    ----------
+    structure
+        With any units; other coordinates than x, y and z are not judged.
+    """
+    dofs, position = structure.dofs, structure.dofs.position
+    if set(dofs.component) != {"x", "y", "z"} or not np.isfinite(position).all():
+        return None
+    stiffness = scipy.sparse.csr_array(structure.stiffness)
+    component = np.array(["xyz".index(c) for c in dofs.component])
+    translations = np.eye(3)[component]
+    row = np.asarray(abs(stiffness) @ np.ones(structure.n))
+    balanced = (np.abs(stiffness @ translations) <= BALANCED * row[:, None]).all(axis=1)
+    rows = np.flatnonzero(balanced)
+    if len(rows) < FEWEST:
+        return None
+    rows = rows[:: len(rows) // MOST + 1]
+    part = scipy.sparse.coo_array(stiffness[rows])
+    # about each row's own node, so that only the places of its neighbours count
+    turns = np.stack(
+        [np.cross(axis, position) for axis in np.eye(3)], axis=2
+    )  # node, component, axis
+    away = np.einsum("mc,mca->ma", part @ translations, turns[rows])
+    force = np.linalg.norm(part @ turns[np.arange(structure.n), component] - away)
+    arms = np.linalg.norm(position[part.col] - position[rows[part.row]], axis=1)
+    scale = np.linalg.norm(np.bincount(part.row, np.abs(part.data) * arms))
+    if force <= STRAINED * scale:
+        return None
+    return f"a rigid rotation about these positions strains the model ({force / scale:.0%} of the terms remain)"

@@ -12,6 +12,7 @@ from stickslip.model.factorisation import Say, silent
 from stickslip.model.mesh import SolidMesh
 from stickslip.model.modes import normal_modes
 from stickslip.model.readers.entries import SYMMETRY, asymmetry
+from stickslip.model.readers.positions import doubt_about_positions
 from stickslip.model.readers.units import SI, Units, doubt_about_units, translational_mass
 from stickslip.model.structure import Structure
 
@@ -31,11 +32,15 @@ class ModelSummary:
     components
         Name -> number of dofs of that kind.
     sets
-        Name -> number of members: dofs of matrices, nodes of a mesh.
+        Name -> number of members.
+    members
+        What the sets hold: ``dofs`` of matrices, ``nodes`` of a mesh.
     mass
         (3,) kg that move with a unit translation along x, y, z; without supported dofs.
+    whole_mass
+        kg, clamped nodes included; known where there are cells and materials.
     centre
-        (3,) centre of that mass in m.
+        (3,) centre of the whole mass in m, else of that along the first direction.
     box
         (2, 3) lowest and highest coordinates in m.
     symmetric
@@ -54,7 +59,9 @@ class ModelSummary:
     dofs: int | None = None
     components: Mapping[str, int] = field(default_factory=dict)
     sets: Mapping[str, int] = field(default_factory=dict)
+    members: str = "dofs"
     mass: FloatArray | None = None
+    whole_mass: float | None = None
     centre: FloatArray | None = None
     box: FloatArray | None = None
     symmetric: bool | None = None
@@ -69,12 +76,14 @@ class ModelSummary:
         found += [(name, str(count)) for name, count in counts.items() if count is not None]
         if self.components:
             found.append(("components", ", ".join(f"{k}: {v}" for k, v in self.components.items())))
-        found += [("set " + name, str(count)) for name, count in self.sets.items()]
+        found += [("set " + name, f"{count} {self.members}") for name, count in self.sets.items()]
         if self.box is not None:
             spans = zip("xyz", *self.box, strict=True)
             found.append(("box (m)", ", ".join(f"{k} {a:.5g} … {b:.5g}" for k, a, b in spans)))
+        if self.whole_mass is not None:
+            found.append(("mass (kg)", f"{self.whole_mass:.{DIGITS}g}"))
         for name, values in (
-            ("mass along x, y, z (kg)", self.mass),
+            ("free mass x, y, z (kg)", self.mass),
             ("centre of mass (m)", self.centre),
             ("frequencies (Hz)", self.frequencies_hz),
         ):
@@ -108,6 +117,9 @@ def structure_summary(
     doubt = doubt_about_units(structure, units)
     if doubt:
         remarks.append(f"Units: {doubt}.")
+    doubt = doubt_about_positions(structure)
+    if doubt:
+        remarks.append(f"Positions: {doubt}: they are probably those of another mesh.")
     massless = int(np.count_nonzero(structure.mass.diagonal() == 0))
     if massless:
         remarks.append(f"{massless} dofs have no mass.")
@@ -142,6 +154,7 @@ def mesh_summary(mesh: SolidMesh, kind: str = "mesh") -> ModelSummary:
         len(mesh.points),
         cells=len(mesh.cells),
         sets={name: len(members) for name, members in mesh.node_sets.items()},
+        members="nodes",
         box=np.vstack([mesh.points.min(axis=0), mesh.points.max(axis=0)]),
     )
 
