@@ -13,6 +13,7 @@ from typer.testing import CliRunner, Result
 from stickslip.cli import app
 from stickslip.model.modes import normal_modes
 from stickslip.model.readers.calculix_deck import read_deck
+from stickslip.model.readers.units import Units
 from stickslip.model.sector_mesh import mesh_sector
 from stickslip.model.structure_file import save_structure
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
@@ -663,3 +664,60 @@ def test_inspect_gives_the_whole_mass_and_names_what_sets_hold(tmp_path: Path) -
 
 def inspected(*words: str) -> dict[str, str]:
     return {line[:26].strip(): line[26:].strip() for line in done(*words).splitlines()}
+
+
+def test_a_picture_is_no_deck(tmp_path: Path) -> None:
+    picture = tmp_path / "picture.inp"
+    picture.write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")
+    assert f"{picture}: is no text: byte 9 is zero" in refused("inspect", str(picture))
+    assert "is no text" in refused("check", str(file_study(tmp_path, model="picture.inp")))
+
+
+def test_a_misspelt_keyword_of_a_material_is_named(tmp_path: Path) -> None:
+    deck = write_deck(tmp_path / "deck.inp")
+    text = deck.read_text()
+    deck.write_text(text.replace("*ELASTIC", "*ELASTICX"))
+    said = refused("inspect", str(deck))
+    assert "material 'STEEL' has no *ELASTIC. Add it to *MATERIAL, NAME=STEEL. " in said
+    assert "Not known is its *ELASTICX (deck.inp: line " in said
+    deck.write_text(text.replace("MATERIAL=STEEL", "MATERIAL=STEAL"))
+    assert "Did you mean 'STEEL'?" in refused("inspect", str(deck))
+
+
+def test_remedies_are_options_and_keys_not_arguments(tmp_path: Path) -> None:
+    deck = write_deck(tmp_path / "deck.inp")
+    deck.write_text(deck.read_text() + "*EQUATION\n2\n1, 1, 1., 2, 1, -1.\n")
+    said = refused("check", str(file_study(tmp_path)))
+    assert (
+        "*EQUATION changes the model and is not read. Let the solver write its matrices and read those."
+        in said
+    )
+    assert "ignore" not in said + refused("inspect", str(deck))
+    (tmp_path / "job.sti").write_text("1 1 1.0\n")
+    (tmp_path / "job.dof").write_text("1.1\n")
+    assert "Give --mesh (a deck .inp" in refused("inspect", str(tmp_path / "job.sti"))
+    said = refused("check", str(file_study(tmp_path, model="job.sti")))
+    assert "Give model.file.mesh (a deck .inp" in said
+
+
+@pytest.mark.parametrize("plausible", [True, False])
+def test_matrices_with_the_mesh_of_another_job(tmp_path: Path, *, plausible: bool) -> None:
+    data = ROOT / "tests" / "data" / "calculix"
+    for end in (".sti.gz", ".mas.gz", ".dof"):
+        (tmp_path / f"brick_matrix{end}").write_bytes((data / f"brick_matrix{end}").read_bytes())
+    deck = read_deck(data / "brick_matrix.inp", units=Units.mm_t_s())
+    points = 1e3 * np.random.default_rng(0).permutation(deck.mesh.points)
+    rows = [f"{n},{x},{y},{z}" for n, (x, y, z) in zip(deck.mesh.numbers, points, strict=True)]
+    (tmp_path / "other.csv").write_text("\n".join(["node,x,y,z", *rows]) + "\n")
+    words = ("--mesh", str(tmp_path / "other.csv"), "--units", "mm-t-s", "--frequencies", "0")
+    said = done("inspect", str(tmp_path / "brick_matrix.sti.gz"), *words)
+    assert "they are probably those of another mesh" in said
+    more = f'mesh = "other.csv"\nplausible = {str(plausible).lower()}'
+    study = file_study(tmp_path, more, "brick_matrix.sti.gz")
+    study.write_text(study.read_text().replace('"SI"', '"mm-t-s"'))
+    if plausible:
+        said = refused("check", str(study))
+        assert "other.csv: its nodes do not fit the stiffness of brick_matrix" in said
+        assert "or model.file.plausible = false where they are right" in said
+    else:
+        done("check", str(study))

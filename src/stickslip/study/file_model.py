@@ -17,6 +17,7 @@ from stickslip.model.readers.open_model import read_model
 from stickslip.model.readers.units import Units
 from stickslip.model.solid import Materials
 from stickslip.model.structure import Structure
+from stickslip.study.messages import of_a_study
 from stickslip.study.structure_study import StructureStudy
 from stickslip.study.structure_tables import FileModel
 
@@ -89,12 +90,7 @@ def read_file_model(study: StructureStudy, say: Callable[[str], None]) -> FileCo
         else:
             content = _from_matrices(study, table)
     except InputError as error:
-        # the readers speak of their arguments, a study has keys
-        text = str(error).replace(
-            "Give units=Units.…(), or plausible=False",
-            "Give model.file.units, or model.file.plausible = false,",
-        )
-        raise InputError(text) from None
+        raise of_a_study(error) from None
     wrong = study.tables.excess(content.sectors)
     if wrong:
         key, problem, remedy = wrong

@@ -5,10 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
+from stickslip.errors import InputError
 from stickslip.model.readers.calculix_deck import Deck
 from stickslip.model.readers.open_model import model_summary, read_model
 from stickslip.model.readers.units import Units
 from stickslip.study.facts import facts_of_solid
+from stickslip.study.messages import of_the_command_line
 from stickslip.study.progress import Sink
 
 WIDTH = 26  # of the column of names
@@ -38,7 +40,10 @@ def inspect_file(path: Path, units: str, modes: int, mesh: Path | None, sink: Si
     system = Units.named(units)
     sink.say(f"reading {path} in {system.name}")
     # doubtful numbers are shown with a remark, not refused: that is what one inspects a file for
-    model = read_model(path, units=system, mesh=mesh, plausible=False)
+    try:
+        model = read_model(path, units=system, mesh=mesh, plausible=False)
+    except InputError as error:
+        raise of_the_command_line(error) from None
     found = model_summary(model, n_modes=modes, units=system, say=sink.say)
     if isinstance(model, Deck):
         materials = [model.materials[name] for name in model.cell_material]

@@ -1,5 +1,6 @@
 """From what pydantic found to sentences that name the file, the key, the value got and a remedy."""
 
+import re
 from collections.abc import Sequence
 from typing import Any, get_args
 
@@ -69,6 +70,42 @@ def _problem(
     if kind.endswith("model_type") or kind == "model_attributes_type":
         said = "must be a table"
     return f"{said[0].lower()}{said[1:]}, got {got}", f"Give {about}."
+
+
+# what the readers say of their arguments, in the words of who has no Python before him
+_IN_STUDY = (
+    ("Give units=Units.…(), or plausible=False where", "Give model.file.units, or model.file.plausible = false, where"),
+    ("plausible=False", "model.file.plausible = false"),
+    ("mesh=…", "model.file.mesh"),
+    ("mass=…", "model.file.mass"),
+    ("nodes=…", "model.file.nodes"),
+)  # fmt: skip
+_ON_COMMAND_LINE = (
+    ("mesh=…", "--mesh"),
+    ("mass=…", "model.file.mass in a study"),
+    ("nodes=…", "model.file.nodes in a study"),
+)
+
+
+def of_a_study(error: InputError) -> InputError:
+    """Return a reader's complaint with the keys of a study in place of arguments of Python."""
+    return _reworded(error, _IN_STUDY)
+
+
+def of_the_command_line(error: InputError) -> InputError:
+    """Return a reader's complaint with options of ``stickslip inspect`` in place of arguments of Python."""
+    return _reworded(error, _ON_COMMAND_LINE)
+
+
+def _reworded(error: InputError, words: Sequence[tuple[str, str]]) -> InputError:
+    text = re.sub(r", or pass ignore=\([^)]*\) to go on without", "", str(error))
+    text = text.replace(
+        "Use read_nastran",
+        "Read it in Python, keep it with save_structure (.npz) and give that: use read_nastran",
+    )
+    for python, key in words:
+        text = text.replace(python, key)
+    return InputError(text)
 
 
 def shown(value: object) -> str:

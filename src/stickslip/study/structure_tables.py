@@ -27,7 +27,7 @@ class FileModel(Section):
 
     path: FilePath = Field(
         description="the model's file, relative to the study: a mesh with its node sets (CalculiX or Abaqus .inp, ANSYS .cdb) "
-        "or matrices (.sti, .full, .op4, .npz, .mtx and others, see 'bring your model')"
+        "or matrices (.sti, .full, .npz, .mtx and others, see 'bring your model')"
     )
     units: Literal["SI", "mm-t-s", "mm-kg-ms", "mm-kg-s", "inch-lbf-s", "foot-slug-s"] = Field(
         description="the file's unit system: SI, mm-t-s (mm, tonne, s: N, MPa), mm-kg-ms, mm-kg-s, inch-lbf-s or foot-slug-s"

@@ -7,6 +7,7 @@ over materials, supports, ties and steps without a word, and it is not there whe
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
@@ -213,9 +214,7 @@ def _materials(model: DeckModel, units: Units, plausible: bool) -> dict[str, Mat
         for what, table in (("*ELASTIC", model.elastic), ("*DENSITY", model.density)):
             if name not in table:
                 raise input_error(
-                    place,
-                    f"material {name!r} has no {what}",
-                    f"Add it. {did_you_mean(name, sorted({*model.elastic, *model.density}))}",
+                    place, f"material {name!r} has no {what}", _found_instead(model, name, what)
                 )
         modulus, ratio = model.elastic[name]
         modulus, density = units.stress * modulus, units.density * model.density[name]
@@ -223,6 +222,19 @@ def _materials(model: DeckModel, units: Units, plausible: bool) -> dict[str, Mat
             check_material(density, modulus, units, place)
         materials[name] = Material(young_modulus=modulus, poisson_ratio=ratio, density=density)
     return materials
+
+
+def _found_instead(model: DeckModel, name: str, keyword: str) -> str:
+    """Say what may have been meant where a material lacks a keyword: another material, or a keyword that was passed over."""
+    known = sorted({*model.elastic, *model.density})
+    if name not in known:
+        return f"Add it. {did_you_mean(name, known)}" if known else "Add it."
+    alike = [
+        text for text in model.ignored if get_close_matches(keyword, [text.partition(" (")[0]])
+    ]
+    return f"Add it to *MATERIAL, NAME={name}. " + (
+        f"Not known is its {alike[0]}." if alike else "It is a line of its own there."
+    )
 
 
 def _cell_materials(model: DeckModel) -> tuple[str, ...]:

@@ -26,7 +26,7 @@ def read_text(path: Path) -> str:
     """
     try:
         if path.suffix != ".gz":
-            return path.read_bytes().decode("utf-8-sig", errors="replace")  # some editors mark it
+            return _decoded(path, path.read_bytes())
         limit = TEXT_RATIO * path.stat().st_size + 10_000
         with gzip.open(path) as stream:
             content = stream.read(limit + 1)
@@ -44,7 +44,18 @@ def read_text(path: Path) -> str:
             f"unpacks to more than {TEXT_RATIO} times its size, which no table of numbers does",
             "If the file is right, unpack it and give the plain one.",
         )
-    return content.decode("utf-8-sig", errors="replace")
+    return _decoded(path, content)
+
+
+def _decoded(path: Path, content: bytes) -> str:
+    zero = content.find(b"\0")
+    if zero >= 0:
+        raise input_error(
+            str(path),
+            f"is no text: byte {zero + 1} is zero, as in pictures, archives and binary results",
+            "Give the file that the program wrote as text (ASCII or UTF-8).",
+        )
+    return content.decode("utf-8-sig", errors="replace")  # some editors mark it
 
 
 def _neighbours(path: Path) -> str:
