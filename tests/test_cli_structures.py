@@ -721,3 +721,26 @@ def test_matrices_with_the_mesh_of_another_job(tmp_path: Path, *, plausible: boo
         assert "or model.file.plausible = false where they are right" in said
     else:
         done("check", str(study))
+
+
+def test_example_for_files_takes_the_deck_of_a_sector(tmp_path: Path) -> None:
+    folder = tmp_path / "made"
+    said = done("new", str(folder), "--kind", "file")
+    path = folder / "study.toml"
+    assert f"Next: name your model's file in it, stickslip check {path}" in said
+    assert "model.file.path: there is no file" in refused("check", str(path))
+    (folder / "sector.inp").write_text(write_decks(tmp_path)["at 8000 rpm"].read_text())
+    assert "Give model.file.units" in refused("check", str(path))  # that deck is in SI
+    path.write_text(path.read_text().replace('"mm-t-s"', '"SI"'))
+    assert "pairs of dofs on the cyclic faces" in done("check", str(path))
+    # what is commented out is right as well, but for names of sets
+    lines = [
+        line.removeprefix("# ") for line in path.read_text().splitlines()
+        if not line.startswith("# ") or "=" in line.partition("#")[2].partition("#")[0] or line.startswith("# [")
+    ]  # fmt: skip
+    (folder / "frequencies.csv").write_text("nodal_diameter,mode,frequency_hz\n0,1,100.0\n")
+    path.write_text("\n".join(lines) + "\n")
+    tables = read_structure_study(path).tables
+    assert tables.model.file is not None
+    assert (tables.model.file.low_face, tables.model.file.clamped) == ("CYC_LO", ["BORE"])
+    assert tables.material is not None

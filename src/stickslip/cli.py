@@ -29,9 +29,13 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file.")]
-Kind = Literal["blades", "sector"]
+Kind = Literal["blades", "sector", "file"]
 StudyKind = Annotated[
-    Kind, typer.Option("--kind", help="blades: two blades and a damper; sector: a bladed disk.")
+    Kind,
+    typer.Option(
+        "--kind",
+        help="blades: two blades and a damper; sector: a bladed disk; file: one from a finite-element program.",
+    ),
 ]
 Fresh = Annotated[
     bool,
@@ -164,6 +168,11 @@ def new(
                 f"cannot be written ({error.strerror})",
                 "Give a folder you may write to.",
             ) from None
+        if kind == "file":
+            typer.echo(
+                f"{target} written. Next: name your model's file in it, stickslip check {target}"
+            )
+            return
         command = "run" if kind == "blades" else "modes"
         typer.echo(f"{target} written. Next: stickslip {command} {target}")
 
