@@ -744,3 +744,26 @@ def test_example_for_files_takes_the_deck_of_a_sector(tmp_path: Path) -> None:
     assert tables.model.file is not None
     assert (tables.model.file.low_face, tables.model.file.clamped) == ("CYC_LO", ["BORE"])
     assert tables.material is not None
+
+
+@pytest.mark.parametrize(
+    ("faces", "sectors", "said"),
+    [
+        (("CYC_LO", "CYC_HI"), 23, "'CYC_LO' and 'CYC_HI': are 15° apart, 23 sectors need 15.652°. Give sectors = 24, or check the axis"),
+        (("CYC_HI", "CYC_LO"), 24, "'CYC_HI' and 'CYC_LO': are swapped: 'CYC_LO' lies 15° behind 'CYC_HI' about the axis (0.0, 0.0, 1.0). Swap low_face and high_face, or"),
+    ],
+)  # fmt: skip
+def test_faces_that_do_not_match_have_the_names_of_the_study(
+    tmp_path: Path, faces: tuple[str, str], sectors: int, said: str
+) -> None:
+    low, high = faces
+    path = sector_study(tmp_path, f'sectors = {sectors}\nlow_face = "{low}"\nhigh_face = "{high}"')
+    deck = tmp_path / "speed.inp"
+    lines, kept = iter(deck.read_text().splitlines()), []
+    for line in lines:
+        if line.startswith(("*TIE", "*CYCLIC SYMMETRY MODEL")):
+            next(lines)  # a deck without a tie, so that the study names the faces
+        else:
+            kept.append(line)
+    deck.write_text("\n".join(kept) + "\n")
+    assert f"{path}: model.file: {said}" in refused("check", str(path))

@@ -1,5 +1,6 @@
 """The table [model.file]: from the files of a finite-element program to what a model is made of."""
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -114,6 +115,21 @@ def _sectors(study: StructureStudy, table: FileModel, of_deck: int | None = None
             "Give the number of sectors of the wheel, or leave the faces out.",
         )
     return sectors
+
+
+def of_the_faces(study: StructureStudy, error: InputError) -> InputError:
+    """Return a complaint about the cyclic faces with the study's keys and names of sets, where it names a file."""
+    table = study.tables.model.file
+    if table is None:
+        return error
+    text = str(error).replace("cyclic_sector: ", f"{study.path}: model.file: ", 1)
+    for role, name in ((LOW, table.low_face), (HIGH, table.high_face)):
+        text = text.replace(
+            repr(role),
+            f"the {role.removeprefix('cyclic_')} face of the tie" if name is None else repr(name),
+        )
+    text = re.sub(r"Say sectors=(\d+)", r"Give sectors = \1", text)
+    return InputError(text.replace("Swap them,", "Swap low_face and high_face,"))
 
 
 def _units(table: FileModel) -> Units:

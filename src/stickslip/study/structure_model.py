@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
-from stickslip.errors import input_error
+from stickslip.errors import InputError, input_error
 from stickslip.model.axis import Axis
 from stickslip.model.mesh import SolidMesh
 from stickslip.model.rotation import RotatingSolid, rotating_solid
@@ -15,7 +15,14 @@ from stickslip.model.sector_mesh import mesh_sector
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
 from stickslip.study.facts import facts_of_matrices, facts_of_solid
-from stickslip.study.file_model import HIGH, LOW, ROOT, FileContent, read_file_model
+from stickslip.study.file_model import (
+    HIGH,
+    LOW,
+    ROOT,
+    FileContent,
+    of_the_faces,
+    read_file_model,
+)
 from stickslip.study.structure_results import Facts, Skin
 from stickslip.study.structure_study import StructureStudy
 from stickslip.study.structure_tables import Rotation
@@ -210,7 +217,10 @@ def _finished(study: StructureStudy, content: FileContent, say: Say) -> DiskMode
     )
     sector = None
     if sectors > 1:
-        sector = cyclic_sector(structure, sectors, low=LOW, high=HIGH, axis=content.axis)
+        try:
+            sector = cyclic_sector(structure, sectors, low=LOW, high=HIGH, axis=content.axis)
+        except InputError as error:
+            raise of_the_faces(study, error) from None
         say(f"{len(sector.low)} pairs of dofs on the cyclic faces")
     return DiskModel(
         structure, rotating, content.mesh, sector, content.axis, facts, rotation, content.warnings
