@@ -8,7 +8,7 @@ import scipy.sparse
 
 from stickslip.errors import InputError, SingularError, StickslipError
 from stickslip.model import factorisation
-from stickslip.model.factorisation import factorise
+from stickslip.model.factorisation import factorise, negative_eigenvalues
 
 RNG = np.random.default_rng(5)
 needs_feral = pytest.mark.skipif(
@@ -59,7 +59,9 @@ def test_solutions_of_every_backend(backend, shift, draw):
     found = factorise(matrix, backend=backend)
     assert found.backend == backend
     check(found, matrix)
-    if backend == "feral":  # Sylvester: the signs of the pivots are those of the eigenvalues
+    if backend == "dense":
+        assert found.negative is None
+    else:  # Sylvester: the signs of the pivots are those of the eigenvalues
         negative = int(np.count_nonzero(np.linalg.eigvalsh(matrix.toarray()) < 0))
         assert found.negative == negative
         assert (negative > 0) == (shift < 0)
@@ -133,3 +135,16 @@ def test_a_weakly_held_body_is_not_singular(backend):
 def test_hopeless_matrices_are_refused(matrix):
     with pytest.raises(SingularError, match=r"singular|not finite"):
         factorise(matrix)
+
+
+@pytest.mark.parametrize("size", [90, 500])
+@pytest.mark.parametrize("phase", [0.0, 0.7])
+@pytest.mark.parametrize("square", [-1.0, 0.011, 1.3, 3.7, 5.0])
+def test_negative_eigenvalues_are_counted_without_an_optional_package(size, phase, square):
+    """Dense and SuperLU's pivots, real and complex, against all eigenvalues."""
+    matrix = 2 * np.eye(size, dtype=complex) - np.eye(size, k=1) - np.eye(size, k=-1)
+    matrix[0, -1], matrix[-1, 0] = -np.exp(-1j * phase), -np.exp(1j * phase)
+    matrix = (matrix if phase else matrix.real) - square * np.eye(size)
+    expected = np.count_nonzero(np.linalg.eigvalsh(matrix) < 0)
+    assert negative_eigenvalues(scipy.sparse.csr_array(matrix)) == expected
+    assert factorise(scipy.sparse.csr_array(matrix), backend="superlu").negative == expected

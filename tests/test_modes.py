@@ -208,6 +208,38 @@ def test_diverging_modes_have_a_negative_square():
     assert natural_frequencies(structure(M, K), 5)[0] == 0
 
 
+@pytest.mark.parametrize("phase", [0.0, 0.7])
+@pytest.mark.parametrize("shift", [None, -1e-3])
+def test_squares_far_below_the_shift_are_found(phase, shift):
+    """Three of −50 beside many near zero: without the count of pivots the modes nearest to the shift came back."""
+    n = 900
+    push = np.zeros(n)
+    push[[100, 400, 700]] = 50.0
+    K = ring(n, phase) - scipy.sparse.diags_array(push, format="csr")
+    exact = np.linalg.eigvalsh(K.toarray())[:6]
+    assert exact[2] < -40
+    found = normal_modes(structure(sparse(np.eye(n)), K), 6, shift=shift)
+    np.testing.assert_allclose(found.squares, exact, atol=1e-8)
+    assert np.all(natural_frequencies(structure(sparse(np.eye(n)), K), 3) == 0)
+
+
+def test_multipliers_are_no_diverging_motions():
+    """A dof without mass and stiffness that ties two others has a negative pivot at any shift."""
+    n = 900
+    K = scipy.sparse.lil_array((n + 1, n + 1))
+    K[:n, :n] = ring(n) + 0.1 * scipy.sparse.eye_array(n)
+    K[n, 0], K[n, 5], K[0, n], K[5, n] = 1.0, -1.0, 1.0, -1.0
+    M = sparse(np.diag(np.append(np.ones(n), 0.0)))
+    free = np.delete(np.eye(n), 5, axis=1)
+    free[5, 0] = 1.0
+    tied = free.T @ K.toarray()[:n, :n] @ free
+    exact = scipy.linalg.eigvalsh(tied, free.T @ free)[:5]
+    told = []
+    found = normal_modes(structure(M, scipy.sparse.csr_array(K)), 5, say=told.append)
+    np.testing.assert_allclose(found.squares, exact, atol=1e-10)
+    assert sum("factorising" in line for line in told) == 1
+
+
 def test_steps_are_told():
     told = []
     normal_modes(structure(sparse(np.eye(500)), ring(500)), 4, say=told.append)

@@ -1,5 +1,8 @@
 """How many modes: by a frequency, by an estimated error, and how good the estimate is."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg
@@ -9,13 +12,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stickslip.errors import InputError
+from stickslip.model.dofs import modal_dofs
 from stickslip.model.lumped import chain
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.solid import Material, assemble_solid
 from stickslip.model.structure import join
 from stickslip.reduction.craig_bampton import craig_bampton
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
-from stickslip.reduction.truncation import FrequencyError, ModesBelow, frequency_errors
+from stickslip.reduction.projection import in_coordinates
+from stickslip.reduction.truncation import (
+    FrequencyError,
+    FrequencyErrors,
+    ModesBelow,
+    enough_modes,
+    frequency_errors,
+)
 
 
 @pytest.fixture(scope="module")
@@ -147,3 +158,84 @@ def test_estimate_for_a_free_body(solid):
     true = errors.frequencies_hz[6:14] / exact[6:] - 1
     assert true.max() > 1e-4
     np.testing.assert_allclose(errors.relative[6:14], true, rtol=3e-2)
+
+
+def test_an_error_beyond_reach_is_said_early():
+    """Few kept dofs and a small error: it went on through 405 modes, each time with an eigensolution of its own."""
+    structure = assemble_solid(wedge(8, cells=(5, 3, 2)), Material())
+    told = []
+    with pytest.raises(InputError, match=r"1e-06 up to 8000 Hz is not met with 200 modes: .*Keep"):
+        craig_bampton(
+            structure,
+            structure.dof_set("tip")[:9],
+            FrequencyError(1e-6, 8000.0, most=200),
+            say=told.append,
+        )
+    steps = [int(line.split()[0]) for line in told if "asked for" in line]
+    assert len(steps) > 2
+    assert steps[-1] < 120
+    assert "modes will be needed" in told[-1]
+
+
+@pytest.mark.parametrize("rate", [1.5, 3.0])
+@pytest.mark.parametrize("most", [50, 400, 10000])
+def test_number_of_modes_is_forecast_from_the_rate(rate, most):
+    """Errors that fall by a power law: met, or refused with the number that it gives, within a factor of two."""
+    tried = []
+
+    def errors(count):
+        tried.append(count)
+        return FrequencyErrors(np.ones(1), np.array([float(count) ** -rate]))
+
+    error = 1e-5
+    needed = error ** (-1 / rate)
+    choice = FrequencyError(error, 1.0, most=most)
+    if needed <= most:
+        assert needed <= enough_modes(choice, 4, 10**6, errors, print) < 1.5 * needed
+    else:
+        with pytest.raises(InputError, match=f"about {float(f'{needed:.2g}'):.0f} modes would be"):
+            enough_modes(choice, 4, 10**6, errors, print)
+        assert max(tried) <= most
+        if needed > 2 * most:
+            assert len(tried) < 6
+
+
+def test_all_modes_there_are_may_be_taken():
+    """Beyond them is nothing to forecast."""
+    full = chain(12, mass=1.0, stiffness=1e4)
+    assert craig_bampton(full, np.array([11]), FrequencyError(1e-13, 1e3)).n == 12
+
+
+@pytest.mark.parametrize("form", [np.asarray, scipy.sparse.csr_array])
+def test_a_frequency_that_is_missing_is_told(form):
+    """Of two bodies only one moves the kept dof: no residual shows the other, 0.3 % above, whose mode is left out."""
+    one, other = chain(30, 1.0, 1e4), chain(30, 1.0, 1.006e4)
+    twins = join(a=one, b=other)
+    twins = replace(
+        twins, **{name: form(getattr(twins, name)) for name in ("mass", "damping", "stiffness")}
+    )
+    exact = natural_frequencies(twins, 4)
+    squares = scipy.linalg.eigh(one.stiffness, one.mass)
+    basis = np.zeros((60, 3))
+    basis[:30] = squares[1][:, :3]
+    small = in_coordinates(twins, basis, modal_dofs(3), {})
+    errors = frequency_errors(twins, small, 1.001 * exact[3])
+    assert np.max(errors.relative) < 1e-12  # the two that are there are exact, and yet
+    assert exact[1] / exact[0] - 1 == pytest.approx(3e-3, rel=1e-2)
+    assert errors.missing == 2
+    assert errors.worst == math.inf
+    below = frequency_errors(twins, small, 0.5 * (exact[0] + exact[1]))
+    assert below.missing == 0
+    assert below.worst < 1e-12
+
+
+def test_modes_are_added_until_none_is_missing(solid):
+    """With nothing kept of one of two bodies: every frequency below the limit is there in the end."""
+    structure, keep = solid
+    twins = join(a=structure, b=structure)
+    exact = natural_frequencies(twins, 20)
+    limit = 0.5 * (exact[11] + exact[12])
+    reduced = craig_bampton(twins, keep[:3], FrequencyError(1e-2, limit))
+    errors = frequency_errors(twins, reduced, limit)
+    assert errors.missing == 0
+    np.testing.assert_allclose(natural_frequencies(reduced, 12), exact[:12], rtol=1.05e-2)

@@ -1,7 +1,7 @@
 """Factorisations of structural matrices: one function from a matrix to the map that solves with it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 
 import numpy as np
@@ -16,6 +16,8 @@ DENSE = 400  # below this many rows dense algebra is faster than sparse
 LARGE = 3000  # below this many rows SuperLU is as fast as the optional package
 SINGULAR = 1e13  # a condition number above which nothing of a solution is known
 SYMMETRIC = 1e-10  # a matrix counts as Hermitian where it differs by less, over its largest entry
+PIVOTS = 0.01  # SuperLU leaves the diagonal for a pivot more than a hundred times as large
+COUNTED = 50_000_000  # entries of factors that are copied to see the signs of the pivots: 0.6 GB
 BACKENDS = ("auto", "dense", "superlu", "feral")
 
 Solve = Callable[[Matrix], Matrix]
@@ -32,13 +34,18 @@ class Factorisation:
         Takes (n,) or (n, k), real or complex, and returns the same shape.
     backend
         What factorised it: ``dense``, ``superlu`` or ``feral``.
-    negative
-        Number of negative eigenvalues; None where the factors do not tell.
+    count
+        Returns the number of negative eigenvalues; None where the factors do not tell.
     """
 
     solve: Solve
     backend: str
-    negative: int | None = None
+    count: Callable[[], int | None] = field(default=lambda: None)
+
+    @property
+    def negative(self) -> int | None:
+        """Number of negative eigenvalues of a Hermitian matrix; None where the factors do not tell."""
+        return self.count()
 
     def __call__(self, right: Matrix) -> Matrix:
         """Return the solution(s) for right-hand side(s) (n,) or (n, k)."""
@@ -118,7 +125,40 @@ def _dense(matrix: Matrix) -> Factorisation:
     return Factorisation(lambda b: np.asarray(scipy.linalg.lu_solve((lu, pivots), b)), "dense")
 
 
-def _superlu(matrix: Matrix) -> Factorisation:
+def negative_eigenvalues(matrix: Matrix, *, say: Say = silent) -> int | None:
+    """Return how many eigenvalues of a Hermitian matrix are negative (Sylvester's law of inertia).
+
+    Parameters
+    ----------
+    matrix
+        (n, n), dense or sparse, real symmetric or complex Hermitian.
+    say
+        Called with a sentence before a long factorisation.
+
+    Returns
+    -------
+    int or None
+        None where a pivot vanishes, or the factors are too large to be looked through.
+    """
+    chosen = _chosen(matrix, "auto")
+    if chosen == "dense":
+        whole = matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix)
+        whole = (whole + whole.conj().T) / 2  # a diagonal real to the last digit
+        blocks = scipy.linalg.ldl(whole, hermitian=True)[1]  # of one or two rows
+        beside = np.abs(np.diag(blocks, -1))
+        signs = scipy.linalg.eigvalsh_tridiagonal(np.diag(blocks).real, beside)
+        return int(np.count_nonzero(signs < 0))
+    say(f"factorising {matrix.shape[0]} equations ({chosen}) to count frequencies")
+    try:
+        if chosen == "feral":
+            return _feral(scipy.sparse.csc_array(matrix)).negative
+        # all pivots on the diagonal, so that their signs count
+        return _superlu(scipy.sparse.csc_array(matrix), threshold=0.0).negative
+    except SingularError:
+        return None
+
+
+def _superlu(matrix: Matrix, threshold: float = PIVOTS) -> Factorisation:
     """Factorise a real matrix, or a complex one as a real matrix of twice the size.
 
     The complex routines of SuperLU take eight times as long as the real ones on the doubled matrix (8361 equations of a
@@ -129,13 +169,21 @@ def _superlu(matrix: Matrix) -> Factorisation:
         lu = scipy.sparse.linalg.splu(
             _doubled(matrix) if doubled else matrix,
             permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.01,
+            diag_pivot_thresh=threshold,
             options={"SymmetricMode": True},
         )
     except RuntimeError as error:
         raise SingularError(f"factorise: {error}") from error
+
+    def count() -> int | None:
+        if lu.nnz > COUNTED:
+            return None
+        if np.array_equal(lu.perm_r, lu.perm_c):  # U = D Lᵀ
+            return int(np.count_nonzero(lu.U.diagonal() < 0)) // (2 if doubled else 1)
+        return negative_eigenvalues(matrix) if threshold > 0 else None
+
     if not doubled:
-        return Factorisation(_of_complex(lambda b: np.asarray(lu.solve(b))), "superlu")
+        return Factorisation(_of_complex(lambda b: np.asarray(lu.solve(b))), "superlu", count)
 
     def solve(right: Matrix) -> Matrix:
         b = np.asarray(right)
@@ -143,7 +191,7 @@ def _superlu(matrix: Matrix) -> Factorisation:
         parts = lu.solve(both).reshape(len(b), 2, *b.shape[1:])
         return np.asarray(parts[:, 0] + 1j * parts[:, 1])
 
-    return Factorisation(solve, "superlu")
+    return Factorisation(solve, "superlu", count)
 
 
 def _doubled(matrix: Matrix) -> Matrix:
@@ -163,7 +211,9 @@ def _feral(matrix: Matrix) -> Factorisation:
         raise missing_package("feral-solver", error, "sparse") from error
     if not np.iscomplexobj(matrix):
         solver = _factored(feral, matrix)
-        return Factorisation(_of_complex(solver.solve), "feral", solver.num_negative_eigenvalues)
+        return Factorisation(
+            _of_complex(solver.solve), "feral", lambda: solver.num_negative_eigenvalues
+        )
     real, imaginary = matrix.real, matrix.imag
     imaginary.eliminate_zeros()
     doubled = scipy.sparse.block_array([[real, -imaginary], [imaginary, real]], format="csc")
@@ -173,7 +223,7 @@ def _feral(matrix: Matrix) -> Factorisation:
         both = solver.solve(np.concatenate([np.real(right), np.imag(right)]))
         return np.asarray(both[:n] + 1j * both[n:])
 
-    return Factorisation(solve, "feral", solver.num_negative_eigenvalues // 2)
+    return Factorisation(solve, "feral", lambda: solver.num_negative_eigenvalues // 2)
 
 
 def _factored(feral: Matrix, matrix: Matrix) -> Matrix:

@@ -1,6 +1,8 @@
 """Natural frequencies and modes of dense and sparse structures, real or at a wave number."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import scipy.linalg
@@ -9,7 +11,16 @@ import scipy.sparse.csgraph
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import SingularError, input_error
-from stickslip.model.factorisation import DENSE, Say, Solve, factorise, silent
+from stickslip.model.dofs import Dofs
+from stickslip.model.factorisation import (
+    DENSE,
+    Factorisation,
+    Say,
+    Solve,
+    factorise,
+    negative_eigenvalues,
+    silent,
+)
 from stickslip.model.lanczos import lanczos
 from stickslip.model.rigid_motion import refuse_unheld
 from stickslip.model.structure import Structure
@@ -17,6 +28,7 @@ from stickslip.model.structure import Structure
 RIGID = (
     1e-14  # strain energy of a mode over the sum of its terms' magnitudes: below, it is rounding
 )
+FAR = 1e4  # so many times the mean K_ii / M_ii below zero there are no squares
 SHIFT = 1e-8  # below zero, as a fraction of the mean K_ii / M_ii: regular where a body is free
 
 
@@ -60,8 +72,8 @@ def normal_modes(
         At least one, at most the number of dofs with mass.
     shift
         In rad²/s², at most the lowest square; the matrix ``K − shift M`` is factorised. By default
-        slightly below zero, so that a free body gives no singular matrix. Modes with negative
-        squares are found where these are nearer to it than the n-th.
+        slightly below zero, so that a free body gives no singular matrix. Squares far below
+        it (diverging motions) are looked for with a lower one.
     say
         Called with a sentence before each long step.
 
@@ -72,19 +84,30 @@ def normal_modes(
     SingularError
         If ``K − shift M`` is singular: a dof has neither stiffness nor mass, or a body is free and
         the shift zero.
+
+    Notes
+    -----
+    The signs of the pivots of ``K − shift M`` count the squares below the shift, so that none is missed. SuperLU's factors
+    with more than `COUNTED` entries are not looked through: there, modes with negative squares are found where these are
+    nearer to the shift than the n-th; give one below them.
     """
     _check_count("normal_modes", structure, n)
-    if shift is None:
-        shift = -SHIFT * _mean_square(structure)
+    mean = _mean_square(structure)
     squares, shapes = [], []
     for part in connected_parts(structure.stiffness, structure.mass):
         K, M = (submatrix(m, part, part) for m in (structure.stiffness, structure.mass))
         count = min(n, int(np.count_nonzero(M.diagonal())))
         if not count:
             continue
-        solve = None if _small(K, count) else _factorised(structure, part, K - shift * M, say)
+        start, solve = -SHIFT * mean if shift is None else shift, None
+        factorised = partial(_factorised, dofs=structure.dofs.take(part), say=say)
+        if not _small(K, count):
+            solve = factorised(K - start * M)
         say(f"{count} modes of {len(part)} dofs")
-        values, vectors = lowest_modes(K, M, count, solve, shift)
+        values, vectors = lowest_modes(K, M, count, solve, start)
+        if solve is not None:
+            found = values, vectors
+            values, vectors = _with_missed(K, M, found, (start, solve), mean, factorised)
         values[_strain_share(K, vectors) < RIGID] = 0.0
         whole = np.zeros((structure.n, count), dtype=vectors.dtype)
         whole[part] = vectors
@@ -94,12 +117,41 @@ def normal_modes(
     return Modes(np.concatenate(squares)[lowest], np.hstack(shapes)[:, lowest])
 
 
-def _factorised(structure: Structure, part: IntArray, matrix: Matrix, say: Say) -> Solve:
+def _with_missed(
+    K: Matrix,
+    M: Matrix,
+    found: tuple[FloatArray, Matrix],
+    shifted: tuple[float, Factorisation],
+    mean: float,
+    factorised: Callable[[Matrix], Factorisation],
+) -> tuple[FloatArray, Matrix]:
+    """Return the modes `found` nearest to a shift, and those far below it in place of the highest ones."""
+    (values, shapes), (shift, solve) = found, shifted
+    far = solve.negative
+    if not far or far == np.count_nonzero(values < shift):
+        return found
+    # what stays negative at any shift is no motion: multipliers, without mass
+    multipliers = negative_eigenvalues(K + FAR * mean * M) or 0
+    below = far - multipliers
+    if below == np.count_nonzero(values < shift):
+        return found
+    lower, step = shift, SHIFT * mean
+    while solve.negative not in (None, multipliers) and step < FAR * mean:
+        step *= 100
+        lower = min(shift, 0.0) - step
+        solve = factorised(K - lower * M)
+    low, first = lowest_modes(K, M, min(below, values.size), solve, lower)
+    above = values >= shift
+    both = np.concatenate([low, values[above]]), np.hstack([first, shapes[:, above]])
+    return both[0][: values.size], both[1][:, : values.size]
+
+
+def _factorised(matrix: Matrix, dofs: Dofs, say: Say) -> Factorisation:
     """Factorise the matrix of a body; where it is singular, say how the body can move."""
     try:
         return factorise(matrix, say=say)
     except SingularError:
-        refuse_unheld(matrix, structure.dofs.take(part), "normal_modes")
+        refuse_unheld(matrix, dofs, "normal_modes")
         raise
 
 

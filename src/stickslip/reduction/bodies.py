@@ -131,13 +131,13 @@ def lowest_of(bodies: Sequence[Body], count: int, say: Say) -> BodyModes:
     return _sorted(found).first(count)
 
 
-def modes_up_to(bodies: Sequence[Body], limit: float, say: Say) -> BodyModes:
-    """Return all modes below `limit` (rad/s)."""
+def modes_up_to(bodies: Sequence[Body], limit: float, say: Say, most: float = np.inf) -> BodyModes:
+    """Return all modes below `limit` (rad/s); where a body has more than `most`, as many or a few more."""
     found = []
     for body in bodies:
         count = min(FIRST_GUESS, body.heavy)
         squares, shapes = _modes(body, count, say)
-        while count < body.heavy and squares[-1] <= limit**2:
+        while count < min(body.heavy, most) and squares[-1] <= limit**2:
             count = min(2 * count, body.heavy)
             squares, shapes = _modes(body, count, say)
         below = squares <= limit**2

@@ -30,6 +30,11 @@ from stickslip.reduction.truncation import (
     ModesBelow,
     enough_modes,
     errors_of,
+    frequencies_below,
+)
+
+AHEAD = (
+    1.5  # modes computed over modes needed, while their number grows: two or three steps use them
 )
 
 
@@ -60,7 +65,7 @@ def craig_bampton(
     Raises
     ------
     InputError
-        If `keep` or `n_modes` does not fit the structure.
+        If `keep` or `n_modes` does not fit the structure, or an error would take too many modes.
     SingularError
         If the stiffness with `keep` fixed is singular: a body is not held.
 
@@ -142,19 +147,23 @@ def _until_exact_enough(
     structure: Structure, keep: IntArray, bodies: list[Body], choice: FrequencyError, say: Say
 ) -> Structure:
     """Add modes until the estimated errors of the reduced frequencies suffice."""
-    modes = modes_up_to(bodies, 2 * math.pi * choice.up_to_hz, say)
-    most = sum(body.heavy for body in bodies)
+    modes = modes_up_to(bodies, 2 * math.pi * choice.up_to_hz, say, choice.most)
+    available = sum(body.heavy for body in bodies)
+    below = frequencies_below(structure, choice.up_to_hz, say)
     basis = _basis(structure, keep, bodies, modes, say=say)
-    found = (_reduced(structure, keep, basis, modes), basis)
+    found, known = (_reduced(structure, keep, basis, modes), basis), modes
 
     def errors(count: int) -> FrequencyErrors:
-        nonlocal modes, found
-        if count > modes.squares.size:
-            modes = lowest_of(bodies, count, say)
+        nonlocal known, found
+        if count > found[0].n - keep.size:
+            if count > known.squares.size:
+                ahead = max(count, min(math.ceil(AHEAD * count), choice.most))
+                known = lowest_of(bodies, ahead, say)
+            modes = known.first(count)
             static = found[1][:, : keep.size]
             basis = _basis(structure, keep, bodies, modes, static=static, say=say)
             found = (_reduced(structure, keep, basis, modes), basis)
-        return errors_of(structure, found[0], found[1], bodies, choice.up_to_hz)
+        return errors_of(structure, *found, bodies, choice.up_to_hz, below)
 
-    enough_modes(choice, modes.squares.size, most, errors)
+    enough_modes(choice, modes.squares.size, available, errors, say)
     return _on_model(structure, *found)

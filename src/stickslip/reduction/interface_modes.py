@@ -47,7 +47,8 @@ def reduce_interface(
     Raises
     ------
     InputError
-        If `interface` or `n_modes` does not fit the structure, or modal coordinates are to be replaced.
+        If `interface` or `n_modes` does not fit the structure, modal coordinates are to be replaced, or an error would
+        take too many modes.
     SingularError
         If the replaced dofs are not held when the others are fixed.
 

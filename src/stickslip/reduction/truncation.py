@@ -9,12 +9,17 @@ import scipy.sparse
 
 from stickslip.arrays import BoolArray, FloatArray, Matrix
 from stickslip.errors import input_error
-from stickslip.model.factorisation import Say, factorise, silent
+from stickslip.model.factorisation import Say, factorise, negative_eigenvalues, silent
 from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
 from stickslip.reduction.bodies import Body, loose_bodies
 
 REACH = 2.0  # frequencies that a poor reduction puts so far above the limit are looked at, too
+
+SEEN = 3  # estimates from which the rate is taken
+FIRST_ORDER = 0.1  # estimates above are a warning, not a number
+DOUBT = 2.0  # a forecast is trusted to that factor
+ROUNDING = 1e-9  # relative, of a frequency at the limit
 
 
 @dataclass(frozen=True)
@@ -51,6 +56,9 @@ class FrequencyError:
         Relative error of the natural frequencies below `up_to_hz`, as `frequency_errors` estimates it.
     up_to_hz
         Highest frequency that the reduced model is meant for.
+    most
+        Number of component modes beyond which none are added. The reduction ends with an `InputError` where they do not
+        suffice, and as soon as the errors fall too slowly for that.
 
     Raises
     ------
@@ -60,9 +68,10 @@ class FrequencyError:
 
     error: float
     up_to_hz: float
+    most: int = 400
 
     def __post_init__(self) -> None:
-        _positive("FrequencyError", error=self.error, up_to_hz=self.up_to_hz)
+        _positive("FrequencyError", error=self.error, up_to_hz=self.up_to_hz, most=self.most)
 
 
 ModeChoice = int | ModesBelow | FrequencyError
@@ -78,15 +87,20 @@ class FrequencyErrors:
         (m,) of the reduced model.
     relative
         (m,) estimated relative errors: the full model's frequency is lower by that share; zero for rigid motions.
+    missing
+        Number of frequencies of the full model below the limit that the reduced model lacks; those above the first one
+        lacked are then numbered wrongly, and their errors mean the nearest frequency. None where they could not be counted:
+        SuperLU's factors of a very large model, see `negative_eigenvalues`.
     """
 
     frequencies_hz: FloatArray
     relative: FloatArray
+    missing: int | None = None
 
     @property
     def worst(self) -> float:
-        """Largest relative error."""
-        return float(np.max(self.relative, initial=0.0))
+        """Largest relative error; infinite where frequencies are missing."""
+        return math.inf if self.missing else float(np.max(self.relative, initial=0.0))
 
 
 def frequency_errors(
@@ -121,16 +135,30 @@ def frequency_errors(
     space. To first order ``λ`` is too large by ``Σ |φ_dᴴ r|² / (λ_d − λ)`` over the modes left out. Instead of these modes
     it takes one solution ``y = K⁻¹ r``: ``t0 = rᴴ y`` and ``t1 = λ yᴴ M y`` begin the series in ``λ/λ_d``, of which
     ``t0 / (1 − t1/t0)`` is the sum where one mode dominates. The exact sum is not smaller (Cauchy-Schwarz); the ratio to
-    the true error tends to one as modes are added.
+    the true error tends to one as modes are added. A mode to which all of the reduced space is orthogonal leaves no residual:
+    the frequencies of the full model below the limit are counted by the signs of the pivots of ``K − λ M``.
     """
     _positive("frequency_errors", up_to_hz=up_to_hz)
     basis = _basis_between(structure, reduced)
     bodies = loose_bodies(structure, np.arange(structure.n), say)
-    return errors_of(structure, reduced, basis, bodies, up_to_hz)
+    return errors_of(
+        structure, reduced, basis, bodies, up_to_hz, frequencies_below(structure, up_to_hz, say)
+    )
+
+
+def frequencies_below(structure: Structure, limit_hz: float, say: Say) -> int | None:
+    """Return the number of natural frequencies below a limit, rigid motions included; None where it cannot be counted."""
+    square = (2 * math.pi * limit_hz) ** 2
+    return negative_eigenvalues(structure.stiffness - square * structure.mass, say=say)
 
 
 def errors_of(
-    structure: Structure, reduced: Structure, basis: Matrix, bodies: list[Body], up_to_hz: float
+    structure: Structure,
+    reduced: Structure,
+    basis: Matrix,
+    bodies: list[Body],
+    up_to_hz: float,
+    count: int | None,
 ) -> FrequencyErrors:
     """Return the estimated errors, given the basis and what solves with the stiffness.
 
@@ -146,6 +174,8 @@ def errors_of(
         Of the structure, free, or fixed at dofs whose unit displacements are in the reduced space.
     up_to_hz
         Frequencies up to here.
+    count
+        Number of frequencies of the structure below, if known.
     """
     modes = normal_modes(reduced, int(np.count_nonzero(reduced.mass.diagonal())))
     below: BoolArray = modes.frequencies_hz <= REACH * up_to_hz
@@ -166,30 +196,83 @@ def errors_of(
     relative[elastic] = np.maximum(too_high[elastic], 0.0) / (2 * squares[elastic])
     frequencies = modes.frequencies_hz[below]
     inside = frequencies * (1.0 - relative) <= up_to_hz
-    return FrequencyErrors(frequencies[inside], relative[inside])
+    # near the limit an estimate may be off by its own size
+    there = np.count_nonzero(frequencies * (1.0 - 2 * relative) <= (1 + ROUNDING) * up_to_hz)
+    missing = None if count is None else max(0, count - int(there))
+    return FrequencyErrors(frequencies[inside], relative[inside], missing)
 
 
 def enough_modes(
-    choice: FrequencyError, start: int, most: int, errors: Callable[[int], FrequencyErrors]
+    choice: FrequencyError,
+    start: int,
+    available: int,
+    errors: Callable[[int], FrequencyErrors],
+    say: Say,
 ) -> int:
     """Return the number of modes at which the estimated errors suffice.
 
-    The number grows by 15 to 40 % at a time: the errors fall about with its third power.
+    The number grows by 15 to 40 % at a time where a few steps will do, else by 80 %.
 
     Parameters
     ----------
     choice
         What suffices.
-    start, most
+    start, available
         Number tried first; number of modes there are.
     errors
         Estimate with a given number of modes.
+    say
+        Called with a sentence a step.
+
+    Raises
+    ------
+    InputError
+        If more than `choice.most` modes would be needed, by the measured rate at which the errors fall.
     """
-    count = min(start, most)
-    while (worst := errors(count).worst) > choice.error and count < most:
+    count = min(start, available)
+    tried: list[tuple[int, float]] = []
+    while (worst := errors(count).worst) > choice.error and count < available:
+        tried.append((count, worst))
+        needed = min(_needed(tried, choice.error), available)
+        say(_progress(count, worst, choice.error, needed))
+        if count >= choice.most or needed > DOUBT * choice.most:
+            raise _too_many(choice, count, worst, needed)
         growth = min(1.4, max(1.15, (worst / choice.error) ** (1 / 3)))
-        count = min(most, max(count + 2, math.ceil(growth * count)))
+        if math.isfinite(needed) and needed > 3 * count:
+            growth = 1.8
+        count = min(available, choice.most, max(count + 2, math.ceil(growth * count)))
     return count
+
+
+def _needed(tried: list[tuple[int, float]], error: float) -> float:
+    """Return the number of modes by a power law, the faster one of all estimates and the last two; NaN before it shows."""
+    known = [(count, worst) for count, worst in tried if worst < FIRST_ORDER]
+    if len(known) < SEEN:
+        return math.nan
+    count, worst = known[-1]
+    rates = [math.log(w / worst) / math.log(count / c) for c, w in (known[0], known[-2])]
+    return float(count * (worst / error) ** (1 / max(1.0, *rates)))
+
+
+def _progress(count: int, worst: float, error: float, needed: float) -> str:
+    known = "a frequency is missing" if math.isinf(worst) else f"estimated error {worst:.2g}"
+    ahead = "" if math.isnan(needed) else f"; about {_rounded(needed)} modes will be needed"
+    return f"{count} modes: {known}, {error:.2g} asked for{ahead}"
+
+
+def _rounded(count: float) -> int:
+    return int(float(f"{count:.2g}"))
+
+
+def _too_many(choice: FrequencyError, count: int, worst: float, needed: float) -> Exception:
+    known = "a frequency is still missing" if math.isinf(worst) else f"the estimate is {worst:.2g}"
+    ahead = "" if math.isnan(needed) else f", and about {_rounded(needed)} modes would be needed"
+    return input_error(
+        "FrequencyError",
+        f"{choice.error:.2g} up to {choice.up_to_hz:g} Hz is not met with {choice.most} modes: "
+        f"with {count} {known}{ahead}",
+        f"Keep more dofs, allow a larger error, take ModesBelow({choice.up_to_hz:g}), or raise `most`.",
+    )
 
 
 def _basis_between(structure: Structure, reduced: Structure) -> Matrix:
