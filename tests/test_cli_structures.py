@@ -767,3 +767,13 @@ def test_faces_that_do_not_match_have_the_names_of_the_study(
             kept.append(line)
     deck.write_text("\n".join(kept) + "\n")
     assert f"{path}: model.file: {said}" in refused("check", str(path))
+
+
+def test_fresh_gives_nothing_up_for_a_model_that_the_command_cannot_take(tmp_path: Path) -> None:
+    write_deck(tmp_path / "deck.inp")
+    path = with_safe(file_study(tmp_path, 'clamped = ["FOOT"]'))
+    kept = tmp_path / "results" / "safe.nc"
+    kept.parent.mkdir()
+    kept.write_text("of an earlier run")
+    assert "a whole structure" in refused("safe", str(path), "--fresh")
+    assert kept.read_text() == "of an earlier run"

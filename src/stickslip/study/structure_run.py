@@ -89,6 +89,8 @@ def run_structure(path: Path, command: Command, *, fresh: bool, sink: Sink) -> S
     prepare_folder(study.folder, fresh=False)
     # what is there is not given up for a model that cannot be built
     built = disk_model(study, sink.say) if fresh else None
+    if built is not None:
+        _check_model(study, command, built)
     prepare_folder(study.folder, fresh=fresh, own=own)
     versions = library_versions()
     mark = sha256(json.dumps([study.content_hash(command), versions]).encode()).hexdigest()
@@ -128,6 +130,7 @@ class _Run:
         """Build the model, and tell what is doubtful about it."""
         self.log.say(f"stickslip {__version__}, {self.command} of {self.study.path}")
         model = self.built or disk_model(self.study, self.log.say)
+        _check_model(self.study, self.command, model)
         for text in model.warnings:
             self.log.say(f"WARNING: {text}")
         return model
@@ -235,12 +238,6 @@ def _modes(run: _Run) -> StructureSummary:
 def _campbell(run: _Run) -> StructureSummary:
     table, model = run.study.tables.campbell, run.model()
     assert table is not None
-    if model.rotating is None:
-        raise input_error(
-            f"{run.study.path}: campbell",
-            "the model is matrices, which no speed changes",
-            "Bring the mesh (a deck or an archive of one material) instead of matrices.",
-        )
     speeds = RPM * np.linspace(table.speeds_rpm[0], table.speeds_rpm[1], table.points)
     static = run.static(model, table.speeds_rpm[1])
     numbers = waves_of_campbell(table, model)
@@ -265,12 +262,6 @@ def _safe(run: _Run) -> StructureSummary:
     table, rpm = run.study.tables.safe, _safe_rpm(run.study)
     assert table is not None
     model = run.model()
-    if model.sectors == 1:
-        raise input_error(
-            f"{run.study.path}: safe",
-            "the model is a whole structure, not a sector",
-            "An interference diagram needs cyclic symmetry; give the sector and the number of sectors.",
-        )
     static, speed = run.static(model, rpm), RPM * rpm
     at = speed if model.rotating is not None else 0.0
     numbers = waves_of_modes(None, model, at)
@@ -309,6 +300,22 @@ def _check_cheaply(study: StructureStudy, command: Command) -> None:
             f"{study.path}: safe.speed_rpm",
             f"must be above zero, got {_safe_rpm(study):g}",
             "Give the speed at which the engine orders act.",
+        )
+
+
+def _check_model(study: StructureStudy, command: Command, model: DiskModel) -> None:
+    """Refuse a model that the command can do nothing with."""
+    if command == "campbell" and model.rotating is None:
+        raise input_error(
+            f"{study.path}: campbell",
+            "the model is matrices, which no speed changes",
+            "Bring the mesh (a deck or an archive of one material) instead of matrices.",
+        )
+    if command == "safe" and model.sectors == 1:
+        raise input_error(
+            f"{study.path}: safe",
+            "the model is a whole structure, not a sector",
+            "An interference diagram needs cyclic symmetry; give the sector and the number of sectors.",
         )
 
 
