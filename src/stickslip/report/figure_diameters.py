@@ -3,7 +3,7 @@
 import numpy as np
 import plotly.graph_objects as go
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.plot import ALARM, INK, MUTED, Plot, styled
 from stickslip.report.quantities import counted, number
 from stickslip.report.wheel_result import WheelResult, colour
@@ -41,7 +41,9 @@ def _mode_lines(result: WheelResult) -> list[go.Scatter]:
 
 def _axes(figure: go.Figure, result: WheelResult) -> None:
     highest = int(result.integers("nodal_diameter").max())
-    figure.update_xaxes(title_text="nodal diameter", range=[-0.4, highest + 0.6])
+    figure.update_xaxes(
+        title_text="nodal diameter", range=[-0.04 * highest - 0.4, 1.04 * highest + 0.4]
+    )
     figure.update_xaxes(dtick=1 if highest <= 30 else None)
     figure.update_yaxes(title_text="frequency (Hz)", rangemode="tozero")
 
@@ -110,15 +112,8 @@ def safe_diagram(result: WheelResult) -> Plot:
             line={"color": MUTED, "width": 1.2, "dash": "dash"},
         )
     )  # fmt: skip
-    at = np.abs(orders - sectors * np.round(orders / sectors))
-    figure.add_trace(
-        go.Scatter(
-            x=at, y=orders * hertz, mode="markers+text" if len(orders) <= _MOST_LABELS else "markers",
-            name="engine orders asked", text=[f"EO {m}" for m in orders], textposition="bottom center",
-            textfont={"size": 11, "color": MUTED}, marker={"symbol": "square-open", "size": 8, "color": INK},
-            hovertemplate="%{text}: %{y:.6g} Hz at nodal diameter %{x}<extra></extra>",
-        )
-    )  # fmt: skip
+    unjudged = _not_judged(result)
+    figure.add_trace(_orders(orders, unjudged, sectors, hertz))
     near = result.integers("pair_near") == 1
     if near.any():
         figure.add_trace(_near(result, near))
@@ -132,9 +127,43 @@ def safe_diagram(result: WheelResult) -> Plot:
     )
     caption = (
         f"At {number(result.scalar('speed_rpm'), 5)} rpm engine order m excites at m times the speed, and only the nodal diameter "
-        f"to which the {sectors} sectors fold it (dashed zig-zag line): {verdict}."
+        f"to which the {sectors} sectors fold it (dashed zig-zag line): {verdict}. Margins are those of the speed at which "
+        "order and mode meet, with the frequency's change over the speed."
     )
+    if unjudged:
+        caption += (
+            f" <b>Not judged</b> (crossed squares): {', '.join(f'EO {m}' for m in sorted(unjudged))}, above the highest "
+            "computed mode of the nodal diameter."
+        )
     return Plot("safe", "SAFE diagram", caption, figure)
+
+
+def _not_judged(result: WheelResult) -> set[int]:
+    """Return the engine orders that excite above the computed modes."""
+    if not result.has("pair_judged"):
+        return set()
+    orders = result.integers("pair_engine_order")
+    return {int(m) for m in orders[result.integers("pair_judged") == 0]}
+
+
+def _orders(orders: IntArray, unjudged: set[int], sectors: int, hertz: float) -> go.Scatter:
+    """Mark the engine orders on the zig-zag line, their names where neither line nor modes run."""
+    folded = np.abs(orders - sectors * np.round(orders / sectors))
+    # the line rises to the right in the first half of a turn, to the left in the second
+    places = np.where(2 * (orders % sectors) < sectors, "bottom right", "top right")
+    places[2 * folded == sectors] = "middle right"
+    places[folded == 0] = "middle left"
+    few = len(orders) <= _MOST_LABELS
+    return go.Scatter(
+        x=folded, y=orders * hertz, mode="markers+text" if few else "markers",
+        name="engine orders asked", text=[f" EO {m} " for m in orders], textposition=list(places),
+        textfont={"size": 11, "color": MUTED},
+        marker={
+            "symbol": ["square-x-open" if int(m) in unjudged else "square-open" for m in orders],
+            "size": 8, "color": INK,
+        },
+        hovertemplate="%{text}: %{y:.6g} Hz at nodal diameter %{x}<extra></extra>",
+    )  # fmt: skip
 
 
 def _near(result: WheelResult, near: np.ndarray) -> go.Scatter:

@@ -80,12 +80,29 @@ def model_facts(result: WheelResult) -> str:
             f"{fixed(result.scalar('nodes'), 0)}, {fixed(result.scalar('elements'), 0)}",
         ],
         ["rotation", escape(result.text("rotation"))],
+        *_static(result),
     ]
     if result.sectors > 1:
         rows.insert(0, ["sectors", str(result.sectors)])
         wheel = result.sectors * result.scalar("mass_kg")
         rows.insert(2, ["mass of the wheel", quantity(1e3 * wheel, "g", 6)])
     return html_table([], rows, numeric=False)
+
+
+def _static(result: WheelResult) -> list[list[str]]:
+    """Return what the centrifugal load does, where something turns."""
+    displacement = result.scalar("static_displacement_m")
+    if not np.isfinite(displacement):
+        return []
+    rpm = number(result.scalar("static_rpm"), 5)
+    strain, degrees = (
+        result.scalar("static_strain"),
+        np.degrees(result.scalar("static_rotation_rad")),
+    )
+    return [
+        [f"largest static displacement at {rpm} rpm", f"{number(1e3 * displacement, 4)} mm"],
+        ["with strains and rotations up to", f"{percent(100 * strain, 3)}, {number(degrees, 3)}°"],
+    ]
 
 
 def _lengths(values: np.ndarray) -> str:
@@ -163,16 +180,37 @@ def interference(result: WheelResult) -> str:
     columns = ("pair_engine_order", "pair_wave", "pair_mode", "pair_near")
     order, wave, mode, near = (result.integers(name) for name in columns)
     own, excitation = result.floats("pair_frequency_hz"), result.floats("pair_excitation_hz")
+    judged = result.integers("pair_judged") if result.has("pair_judged") else np.ones_like(near)
+    meeting = np.full(len(margin), np.nan)
+    if result.has("pair_resonance_rpm"):
+        meeting = result.floats("pair_resonance_rpm")
     rows = []
     for i in np.argsort(np.abs(margin), kind="stable"):
-        verdict = "near resonance" if near[i] else "clear"
+        verdict = "near resonance" if near[i] else "clear" if judged[i] else "order not judged"
         rows.append(
             [f"{order[i]}", escape(names[wave[i]]), str(mode[i] + 1), number(float(own[i]), 6),
-             number(float(excitation[i]), 6), percent(100 * float(margin[i]), 3),
-             f"<b>{verdict}</b>" if near[i] else verdict]
+             number(float(excitation[i]), 6), _rpm(float(meeting[i]), float(margin[i])),
+             percent(100 * float(margin[i]), 3) if np.isfinite(margin[i]) else NONE, f"<b>{verdict}</b>" if near[i] else verdict]
         )  # fmt: skip
-    head = ["engine order", "wave", "mode", "mode (Hz)", "excitation (Hz)", "margin in speed", ""]
+    at = f"at {number(result.scalar('speed_rpm'), 5)} rpm"
+    head = [
+        "engine order",
+        "wave",
+        "mode",
+        f"mode {at} (Hz)",
+        f"excitation {at} (Hz)",
+        "resonance at (rpm)",
+        "margin in speed",
+        "",
+    ]
     return html_table(head, rows[:_SHOWN]) + _left_out(len(rows), "pairs")
+
+
+def _rpm(value: float, margin: float) -> str:
+    """Write the speed of a resonance; far from the operating speed it is extrapolated too far for many digits."""
+    if not np.isfinite(value):
+        return "never" if np.isinf(value) else NONE
+    return number(value, 6) if abs(margin) <= 0.2 else f"~{float(f'{value:.2g}'):.0f}"
 
 
 def _left_out(n: int, word: str) -> str:

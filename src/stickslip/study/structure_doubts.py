@@ -75,7 +75,7 @@ def campbell_doubts(
     """
     said = []
     if unfollowed:
-        named = ", ".join(f"{m} (from {rpm:.5g} rpm)" for m, rpm in unfollowed)
+        named = ", ".join(f"{m} (from {rpm:.4g} rpm)" for m, rpm in unfollowed)
         n_modes = waves[0].frequencies_hz.shape[1]
         said.append(
             f"above the followed modes of the nodal diameters that they excite, engine orders are not judged: {named}; other "
@@ -101,17 +101,16 @@ def unfollowed_from(order: int, hertz: FloatArray, speeds: FloatArray) -> float 
     speeds
         (s,) in rad/s, ascending.
     """
-    above = order * speeds / (2 * np.pi) - hertz.max(axis=1)
+    # squares of frequencies are nearly straight in the square of the speed
+    above = (order * speeds / (2 * np.pi)) ** 2 - hertz.max(axis=1) ** 2
     where = np.flatnonzero(above > 0)
     if not where.size:
         return None
-    first = int(where[0])
-    rpm = speeds * 60 / (2 * np.pi)
+    first, squares = int(where[0]), (speeds * 60 / (2 * np.pi)) ** 2
     if first == 0:
-        return float(rpm[0])
-    # frequencies are nearly straight between two speeds
+        return float(np.sqrt(squares[0]))
     share = above[first - 1] / (above[first - 1] - above[first])
-    return float(rpm[first - 1] + share * (rpm[first] - rpm[first - 1]))
+    return float(np.sqrt(squares[first - 1] + share * (squares[first] - squares[first - 1])))
 
 
 def in_ranges(numbers: Sequence[int] | set[int]) -> str:
