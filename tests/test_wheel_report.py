@@ -5,15 +5,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from synthetic_wheel import SECTORS, campbell_result, modes_result, safe_result, skin, write_results
+from synthetic_wheel import (
+    SECTORS,
+    campbell_result,
+    modes_result,
+    safe_result,
+    skin,
+    variable,
+    write_results,
+)
 from test_report import marks, needs_browser, open_page, page_text
 
 from stickslip.errors import InputError
 from stickslip.report.coarse_skin import coarse_skin
-from stickslip.report.figure_diameters import zigzag
+from stickslip.report.figure_campbell import campbell_diagram
+from stickslip.report.figure_diameters import safe_diagram, zigzag
 from stickslip.report.figure_shapes import mode_shapes
 from stickslip.report.wheel_page import write_wheel_report
 from stickslip.report.wheel_result import load_wheel
+from stickslip.report.wheel_tables import interference
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +115,55 @@ def test_modes_without_shapes_say_so(tmp_path: Path) -> None:
     plot = mode_shapes(load_wheel(folder)["modes"])
     assert plot.figure is None
     assert "holds no mode shapes" in plot.caption
+
+
+def test_every_line_of_a_campbell_diagram_can_be_told_without_colours(tmp_path: Path) -> None:
+    folder = write_results(tmp_path, campbell_result())
+    plot = campbell_diagram(load_wheel(folder)["campbell"])
+    assert plot.figure is not None
+    lines = [t for t in plot.figure.data if t.mode == "lines+markers+text"]
+    labels = [[text for text in line.text if text] for line in lines]
+    assert labels == [[f"ND {k}, {m}"] for k in (2, 3) for m in (1, 2, 3)]
+    symbols = {line.name: line.marker.symbol for line in lines}
+    assert len(set(symbols.values())) == 2
+    # labels at one speed stand apart by the height of a letter at least
+    top = max(max(line.y) for line in lines)
+    at = [(i, line.y[i], line.textposition) for line in lines for i, t in enumerate(line.text) if t]
+    heights = [(i, y + 0.02 * top * (1 if "top" in place else -1)) for i, y, place in at]
+    for n, (i, one) in enumerate(heights):
+        assert all(i != j or abs(one - other) > 0.04 * top for j, other in heights[:n])
+
+
+def test_orders_that_leave_the_picture_or_the_modes_are_named(tmp_path: Path) -> None:
+    data = campbell_result()
+    orders = variable("unfollowed", [6]), variable("unfollowed", [4321.0])
+    data = data.assign(unfollowed_engine_order=orders[0], unfollowed_from_rpm=orders[1])
+    highest = float(data.frequency_hz.max())
+    hidden = [m for m in (2, 3, 5, 6) if m * 200.0 > 1.06 * highest]  # at 12000 rpm
+    assert hidden
+    plot = campbell_diagram(load_wheel(write_results(tmp_path, data))["campbell"])
+    assert f"the lines of {', '.join(f'EO {m}' for m in hidden)}." in plot.caption
+    assert "EO 6 from 4321 rpm" in plot.caption
+
+
+def test_orders_that_are_not_judged_are_crossed_out(tmp_path: Path) -> None:
+    data = safe_result(0.1)
+    data["pair_judged"] = (data.pair_engine_order != 12).astype(int)
+    data["pair_resonance_rpm"] = variable("pair", np.full(data.sizes["pair"], np.inf), "rpm")
+    result = load_wheel(write_results(tmp_path, data))["safe"]
+    plot = safe_diagram(result)
+    assert plot.figure is not None
+    orders = next(t for t in plot.figure.data if t.name == "engine orders asked")
+    crossed = [
+        t.strip() for t, s in zip(orders.text, orders.marker.symbol, strict=True) if "x" in s
+    ]
+    assert crossed == ["EO 12"]
+    assert "EO 12, above the highest computed mode" in plot.caption
+    table = interference(result)
+    assert table.count("order not judged") == 3 - int(
+        (data.pair_near.values * (data.pair_engine_order.values == 12)).sum()
+    )
+    assert "never" in table
 
 
 @pytest.mark.parametrize("sectors", [8, 9])
