@@ -635,16 +635,18 @@ def test_a_material_that_no_solid_has_is_refused(
 
 
 def test_fresh_removes_the_files_of_its_command_only(tmp_path: Path) -> None:
-    own = write_small_wheel(tmp_path)
-    done("modes", str(own))
-    done("safe", str(own))
-    kept = (tmp_path / "results" / "modes.nc").read_bytes()
-    own.write_text(own.read_text().replace("density_kg_per_m3 = 7850", "density_kg_per_m3 = 7800"))
-    said = refused("safe", str(own))
+    write_deck(tmp_path / "deck.inp")
+    path = file_study(tmp_path, 'clamped = ["FOOT"]')
+    done("modes", str(path), "--no-report")
+    kept = tmp_path / "results" / "safe.nc"
+    kept.write_text("of another command")
+    path.write_text(path.read_text().replace("number = 3", "number = 2"))
+    said = refused("modes", str(path), "--no-report")
     assert "what this command left here is of another or a changed study" in said
     assert "--fresh, which removes this command's files of the folder and no others" in said
-    done("safe", str(own), "--fresh")
-    assert (tmp_path / "results" / "modes.nc").read_bytes() == kept
+    done("modes", str(path), "--fresh", "--no-report")
+    assert result(path, "modes").sizes["mode"] == 2
+    assert kept.read_text() == "of another command"
 
 
 def test_inspect_gives_the_whole_mass_and_names_what_sets_hold(tmp_path: Path) -> None:
