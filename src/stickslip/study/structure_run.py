@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from datetime import UTC, datetime
 from hashlib import sha256
 from pathlib import Path
@@ -93,8 +93,10 @@ def run_structure(path: Path, command: Command, *, fresh: bool, sink: Sink) -> S
         _check_model(study, command, built)
     prepare_folder(study.folder, fresh=fresh, own=own)
     versions = library_versions()
-    mark = sha256(json.dumps([study.content_hash(command), versions]).encode()).hexdigest()
     point = WaveBranches if command == "campbell" else WaveModes
+    # waves that were kept with other fields cannot be gone on with
+    parts = [study.content_hash(command), versions, [f.name for f in fields(point)]]
+    mark = sha256(json.dumps(parts).encode()).hexdigest()
     with Journal(study.folder / f"{command}.sqlite", mark, point) as journal:
         log = Log(study.folder / f"{command}.log", sink)
         run = _Run(study, command, versions, journal, log, built)
