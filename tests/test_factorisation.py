@@ -148,3 +148,11 @@ def test_negative_eigenvalues_are_counted_without_an_optional_package(size, phas
     expected = np.count_nonzero(np.linalg.eigvalsh(matrix) < 0)
     assert negative_eigenvalues(scipy.sparse.csr_array(matrix)) == expected
     assert factorise(scipy.sparse.csr_array(matrix), backend="superlu").negative == expected
+
+
+@pytest.mark.skipif(find_spec("feral") is not None, reason="feral is installed")
+def test_a_folder_called_feral_is_not_the_package(tmp_path, monkeypatch):
+    (tmp_path / "feral").mkdir()
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert find_spec("feral") is not None
+    assert factorise(laplacian((60, 60), 0.3)).backend == "superlu"

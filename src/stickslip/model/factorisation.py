@@ -104,9 +104,15 @@ def _chosen(matrix: Matrix, backend: str) -> str:
         return backend
     if matrix.shape[0] <= DENSE or not scipy.sparse.issparse(matrix):
         return "dense"
-    if matrix.shape[0] > LARGE and find_spec("feral") is not None and _hermitian(matrix):
+    if matrix.shape[0] > LARGE and _has_feral() and _hermitian(matrix):
         return "feral"
     return "superlu"
+
+
+def _has_feral() -> bool:
+    """Whether the package is there; a folder of its name in the working directory has no origin."""
+    spec = find_spec("feral")
+    return spec is not None and spec.origin is not None
 
 
 def _hermitian(matrix: Matrix) -> bool:
