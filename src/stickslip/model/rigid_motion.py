@@ -16,16 +16,6 @@ NAMES = tuple(
 )
 
 
-def rigid_motions(dofs: Dofs) -> FloatArray:
-    """Return orthonormal columns (n, r) that span the rigid motions of the dofs, r ≤ 6.
-
-    Dofs other than ``x y z rx ry rz``, and those of unknown position, stay at rest.
-    """
-    motions = _six_motions(dofs)[0]
-    left, values, _ = np.linalg.svd(motions, full_matrices=False)
-    return np.asarray(left[:, values > 1e-9 * max(values[0], 1e-300)])
-
-
 def refuse_unheld(stiffness: Matrix, dofs: Dofs, place: str) -> None:
     """Raise where a body can move rigidly without strain.
 

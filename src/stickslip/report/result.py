@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.report.quantities import number
 
@@ -91,11 +91,6 @@ class Result:
         if name not in self.data:
             return np.full(self.data.sizes["point"], np.nan)
         return np.asarray(self.data[name].values, dtype=np.float64)
-
-    def complexes(self, name: str) -> ComplexArray:
-        """Return a variable with a trailing (re, im) dimension as complex numbers."""
-        parts = np.asarray(self.data[name].transpose(..., "part").values, dtype=np.float64)
-        return np.asarray(parts[..., 0] + 1j * parts[..., 1])
 
     def labels(self, dimension: str) -> tuple[str, ...]:
         """Return the labels of a dimension, escaped for HTML; numbers where it has none."""

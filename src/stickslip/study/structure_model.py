@@ -225,8 +225,3 @@ def _finished(study: StructureStudy, content: FileContent, say: Say) -> DiskMode
     return DiskModel(
         structure, rotating, content.mesh, sector, content.axis, facts, rotation, content.warnings
     )
-
-
-def speeds_in(rpm: FloatArray) -> FloatArray:
-    """Return speeds in rad/s."""
-    return np.asarray(rpm) * 2 * np.pi / 60
