@@ -215,7 +215,7 @@ def test_what_the_balance_cannot_keep_or_does_not_know_is_refused():
     system, load = free_body_3d()
     high = HarmonicLoad(load.static, {**load.harmonics, 3: load.harmonics[1]})
     with pytest.raises(
-        InputError, match=r"excites harmonic 3, but only 2 are kept\. Keep 3 or more"
+        InputError, match=r"excites harmonic 3, but only 0, 1, 2 are kept\. Keep 3 or more"
     ):
         balance_of(system, high, 2)
     with pytest.raises(InputError, match="order: must be an integer from 0 on, got -1"):

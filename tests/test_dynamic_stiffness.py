@@ -18,6 +18,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded, to_complex, to_real
 from stickslip.harmonic.spectral import Modes, Poles, StateSpace
 from stickslip.harmonic.structured import real_matrix
+from stickslip.harmonic.support import harmonics_of
 from stickslip.model.lumped import lumped
 from stickslip.model.structure import Structure
 
@@ -205,7 +206,7 @@ def test_condensed_solution_and_recovery_are_the_full_solution(kind):
 def test_products_are_those_of_the_schur_complement(kind):
     structure, load = structure_of(kind, seed=5), loaded(5)
     linear = condense(structure, RETAINED, load)
-    products = at_frequency(linear, OMEGA, ORDER)
+    products = at_frequency(linear, OMEGA, harmonics_of(ORDER))
     stiffness, force = schur(structure, load, OMEGA, ORDER)
     slope = linear.condensed(OMEGA, ORDER)  # itself compared with differences above
     size = 1e-9 * np.abs(stiffness).max()
@@ -403,7 +404,7 @@ def test_slope_at_zero_frequency_is_the_damping():
 def test_products_at_one_frequency_use_the_poles():
     linear, _ = decomposed(structure_of("general"))
     got = linear.condensed(OMEGA, ORDER)
-    products = at_frequency(linear, OMEGA, ORDER)
+    products = at_frequency(linear, OMEGA, harmonics_of(ORDER))
     for h in range(ORDER + 1):
         np.testing.assert_allclose(products.block(h), got.stiffness[h], rtol=1e-11)
     assert all(isinstance(inner[0], StateSpace) for inner in products.inner)

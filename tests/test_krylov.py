@@ -20,8 +20,10 @@ from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.factors import factorise
 from stickslip.harmonic.fourier import to_complex, to_real
-from stickslip.harmonic.selection import jacobian_alert
+from stickslip.harmonic.selection.alert import jacobian_alert
+from stickslip.harmonic.selection.strategy import ErrorMeasure
 from stickslip.harmonic.structured import StructuredJacobian, real_matrix
+from stickslip.harmonic.support import harmonics_of
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.response.forced import forced_problem, forced_response
@@ -185,7 +187,10 @@ def test_products_are_those_of_the_condensed_matrices(proportional):
     linear = condense(structure, np.arange(3 * N_CONTACTS), forces)
     assert linear.diagonal is proportional
     order, n = 3, linear.n
-    condensed, products = linear.condensed(OMEGA, order), at_frequency(linear, OMEGA, order)
+    condensed, products = (
+        linear.condensed(OMEGA, order),
+        at_frequency(linear, OMEGA, harmonics_of(order)),
+    )
     rows = rng.standard_normal((2 * order + 1, n))
     q = to_complex(rows)[:, :, None]
     product, slope = products.product_and_slope(rows)
@@ -532,16 +537,16 @@ def test_alert_is_the_same():
     solution = newton(lambda v: low.linearise(v, OMEGA), x, Newton(tolerance=1e-12))
     assert solution.status.converged
     high = low.with_order(3)
-    dofs = np.arange(3 * N_CONTACTS + INNER)
+    measure = ErrorMeasure(np.arange(3 * N_CONTACTS + INNER))
     krylov = Krylov()
     solve = to_tolerance(krylov, 1e-11).solve
-    iterated = jacobian_alert(low, high, solution.x, OMEGA, dofs, solve)
+    iterated = jacobian_alert(low, high, solution.x, OMEGA, measure, solve)
     assert krylov.counts.products > 0
-    direct = jacobian_alert(low, replace(high, jacobian="dense"), solution.x, OMEGA, dofs)
+    direct = jacobian_alert(low, replace(high, jacobian="dense"), solution.x, OMEGA, measure)
     assert iterated.error == pytest.approx(direct.error, rel=1e-9)
     assert iterated.worst == direct.worst
     assert direct.error > 1e-3  # there is something to compare
-    assert jacobian_alert(low, high, solution.x, OMEGA, dofs).error == pytest.approx(
+    assert jacobian_alert(low, high, solution.x, OMEGA, measure).error == pytest.approx(
         direct.error, rel=1e-9
     )
 
@@ -549,7 +554,7 @@ def test_alert_is_the_same():
 def test_alert_without_a_solution_is_infinite():
     low, x = state("gross slip", order=1)
     high = low.with_order(3)
-    alert = jacobian_alert(low, high, x, OMEGA, np.arange(3), lambda *_: None)
+    alert = jacobian_alert(low, high, x, OMEGA, ErrorMeasure(np.arange(3)), lambda *_: None)
     assert alert.error == np.inf
 
 

@@ -7,12 +7,13 @@ import pytest
 from models import balance_of, blades_and_damper, griffin, solved
 
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
-from stickslip.harmonic import selection
+from stickslip.harmonic.selection import alert as alert_module
 from stickslip.harmonic.fourier import to_real
-from stickslip.harmonic.selection import jacobian_alert
+from stickslip.harmonic.selection.alert import jacobian_alert
+from stickslip.harmonic.selection.strategy import ErrorMeasure
 from stickslip.solve.newton import Newton, newton
 
-ALL = np.arange(4)
+ALL = ErrorMeasure(np.arange(4))
 
 
 def published(high, x, omega):
@@ -93,8 +94,10 @@ def test_small_motions_do_not_raise_the_alarm():
     low, high, x, _, omega = both(*blades_and_damper(), 161.0)
     before = np.abs(low.linear.recover(omega, low.coefficients(x))[1])
     alert = jacobian_alert(low, high, x, omega, ALL)
-    assert before[alert.worst] > 1e-3 * before[ALL].max()
-    single = [jacobian_alert(low, high, x, omega, np.array([d])).error for d in ALL]
+    assert before[alert.worst] > 1e-3 * before[ALL.dofs].max()
+    single = [
+        jacobian_alert(low, high, x, omega, ErrorMeasure(np.array([d]))).error for d in ALL.dofs
+    ]
     assert alert.error == pytest.approx(max(single), rel=1e-12)
     assert int(np.argmax(single)) == alert.worst
 
@@ -104,7 +107,7 @@ def test_step_is_exact_where_no_state_changes():
     system, load = griffin(0.1)
     low, solution = solved(system, load, 1.15, 1, 1024)
     high = low.with_order(5)
-    alert = jacobian_alert(low, high, solution.x, 1.15, np.array([0]))
+    alert = jacobian_alert(low, high, solution.x, 1.15, ErrorMeasure(np.array([0])))
     exact = newton(lambda v: high.linearise(v, 1.15), alert.start, Newton()).x
     padded = high.unknowns(low.coefficients(solution.x))
     assert np.max(np.abs(alert.start - exact)) < 0.05 * np.max(np.abs(padded - exact))
@@ -112,7 +115,7 @@ def test_step_is_exact_where_no_state_changes():
 
 def test_singular_enlarged_problem_is_an_infinite_error(monkeypatch):
     # an open damper leaves no force on the missing harmonics either: ask for the enlarged step all the same
-    monkeypatch.setattr(selection, "_silent", lambda *_: False)
+    monkeypatch.setattr(alert_module, "_silent", lambda *_: False)
     low = balance_of(*blades_and_damper(), order=1)
     high = low.with_order(3)
     # nothing touches: the free body's static part has no stiffness

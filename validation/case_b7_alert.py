@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from stickslip.harmonic.selection import jacobian_alert
+from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.response.forced import (
     ForcedPoint,
     ForcedProblem,
@@ -69,7 +69,7 @@ def two_forms(hertz: float) -> float:
     """Return how far eq. 21 of the paper, J (q + dq) = F, is from the Newton step, relative to the motion."""
     problem, low, _ = both_passages(hertz)
     x = problem.low.unknowns(low.coefficients)
-    newton = jacobian_alert(problem.low, problem.high, x, low.omega, problem.alert_dofs).start
+    newton = jacobian_alert(problem.low, problem.high, x, low.omega, problem.measure).start
     at = problem.high.linearise(problem.high.unknowns(low.coefficients), low.omega)
     # at q = 0 nothing slips or opens for want of a preload: the residual there is minus the load
     load = -problem.high.linearise(np.zeros(problem.high.size), low.omega).residual

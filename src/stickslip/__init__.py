@@ -96,6 +96,7 @@ if TYPE_CHECKING:
     from stickslip.reduction.waves import Wave, excited_wave, to_sectors, to_waves, wave
     from stickslip.reduction.wheel import wheel, wheel_shape
     from stickslip.report.page import write_report
+    from stickslip.response.accepted import accepted_points
     from stickslip.response.campbell import Campbell, Crossing, campbell
     from stickslip.response.cyclic_campbell import cyclic_campbell
     from stickslip.response.drift import Drift, drift
@@ -106,13 +107,7 @@ if TYPE_CHECKING:
     from stickslip.response.preload import preload
     from stickslip.response.rigid import RigidPoint, rigid_response
     from stickslip.response.safe import Interference, Safe, safe
-    from stickslip.response.sweep import (
-        ForcedPoint,
-        ForcedProblem,
-        Sweep,
-        accepted_points,
-        forced_problem,
-    )
+    from stickslip.response.sweep import ForcedPoint, ForcedProblem, Sweep, forced_problem
     from stickslip.response.system import System
     from stickslip.response.tracking import PeakPoint, smallest_peak, track_peak
     from stickslip.response.transient import TimeStepping, TransientResult, integrate
@@ -208,6 +203,7 @@ _MODULES = {
     "stickslip.reduction.waves": ("Wave", "excited_wave", "to_sectors", "to_waves", "wave"),
     "stickslip.reduction.wheel": ("wheel", "wheel_shape"),
     "stickslip.report.page": ("write_report",),
+    "stickslip.response.accepted": ("accepted_points",),
     "stickslip.response.campbell": ("Campbell", "Crossing", "campbell"),
     "stickslip.response.cyclic_campbell": ("cyclic_campbell",),
     "stickslip.response.drift": ("Drift", "drift"),
@@ -222,7 +218,6 @@ _MODULES = {
         "ForcedPoint",
         "ForcedProblem",
         "Sweep",
-        "accepted_points",
         "forced_problem",
     ),
     "stickslip.response.system": ("System",),

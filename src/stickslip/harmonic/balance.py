@@ -15,9 +15,17 @@ from stickslip.harmonic.aft import ContactPeriod, contact_forces
 from stickslip.harmonic.condensed_product import CondensedProduct, at_frequency
 from stickslip.harmonic.dynamic_stiffness import CondensedStiffness
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.fourier import padded, to_complex, to_real
+from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.structured import StructuredJacobian, real_matrix
+from stickslip.harmonic.support import (
+    Harmonics,
+    complex_rows,
+    harmonics_of,
+    is_full,
+    real_rows,
+    rows_of,
+)
 
 JacobianForm = Literal["auto", "dense", "structured"]
 CROSSOVER = 700  # unknowns above which products and a Krylov method cost less than an array and its LU factors
@@ -39,32 +47,32 @@ class Linearisation:
 
 @dataclass(frozen=True, eq=False)
 class _LinearPart:
-    operators: ComplexArray  # (2, H+1, n, n) dynamic stiffness and its ω-derivative
-    loads: ComplexArray  # (2, H+1, n, 1) load and its ω-derivative
-    matrix: FloatArray  # (n (2H+1), n (2H+1)) real form of the block-diagonal dynamic stiffness
+    operators: ComplexArray  # (2, n_harmonics, n, n) dynamic stiffness and its ω-derivative
+    loads: ComplexArray  # (2, n_harmonics, n, 1) load and its ω-derivative
+    matrix: FloatArray  # (n m, n m) real form of the block-diagonal dynamic stiffness
 
 
 @lru_cache(maxsize=4)
-def _linear_part(linear: DynamicStiffness, order: int, omega: float) -> _LinearPart:
+def _linear_part(linear: DynamicStiffness, harmonics: Harmonics, omega: float) -> _LinearPart:
     """Assemble the linear side at one frequency; kept, because a Newton iteration at fixed frequency asks for it at every step."""
-    part = linear.condensed(omega, order)
+    part, own = linear.condensed(omega, harmonics[-1]), list(harmonics)
     return _LinearPart(
-        np.stack([part.stiffness, part.derivative]),
-        np.stack([part.load, part.load_derivative])[..., None],
-        real_matrix(part.stiffness),
+        np.stack([part.stiffness[own], part.derivative[own]]),
+        np.stack([part.load[own], part.load_derivative[own]])[..., None],
+        real_matrix(part.stiffness[own]),
     )
 
 
 @lru_cache(maxsize=2)
-def _product(linear: CondensedStiffness, order: int, omega: float) -> CondensedProduct:
-    return at_frequency(linear, omega, order)
+def _product(linear: CondensedStiffness, harmonics: Harmonics, omega: float) -> CondensedProduct:
+    return at_frequency(linear, omega, harmonics)
 
 
 @dataclass(frozen=True, eq=False)
 class HarmonicBalance:
-    """The periodic problem of one structure, one interface and one load with harmonics 0..`order`.
+    """The periodic problem of one structure, one interface and one load with some `harmonics`.
 
-    Unknowns are ``q / displacement_scale``, equations are divided by `force_scale`, so that conditioning and steps do not depend on
+    The static term is always kept; ``m = 2 len(harmonics) - 1`` real coefficients a coordinate. Unknowns are ``q / displacement_scale``, equations are divided by `force_scale`, so that conditioning and steps do not depend on
     units. Build it with `harmonic_balance`.
     """
 
@@ -72,16 +80,26 @@ class HarmonicBalance:
     interface: Interface  # on the retained coordinates
     compiled: CompiledContacts
     rows: SparseRows
-    order: int
+    harmonics: Harmonics
     samples: int
     displacement_scale: float
     force_scale: float
     jacobian: JacobianForm = "auto"
 
     @property
+    def order(self) -> int:
+        """Highest harmonic."""
+        return self.harmonics[-1]
+
+    @property
+    def n_rows(self) -> int:
+        """Real coefficients a coordinate."""
+        return 2 * len(self.harmonics) - 1
+
+    @property
     def size(self) -> int:
         """Number of real unknowns."""
-        return self.linear.n * (2 * self.order + 1)
+        return self.linear.n * self.n_rows
 
     @property
     def structured(self) -> bool:
@@ -92,23 +110,38 @@ class HarmonicBalance:
         return large and self.order > 0
 
     def coefficients(self, x: FloatArray) -> ComplexArray:
-        """Return the (order+1, n) complex coefficients in metres of scaled unknowns `x`."""
-        return to_complex(x.reshape(2 * self.order + 1, self.linear.n)) * self.displacement_scale
+        """Return the (order+1, n) complex coefficients in metres of scaled unknowns `x`; zeros at harmonics left out."""
+        rows = x.reshape(self.n_rows, self.linear.n)
+        return complex_rows(rows, self.harmonics) * self.displacement_scale
 
     def unknowns(self, coefficients: ComplexArray) -> FloatArray:
-        """Return the scaled unknowns of complex `coefficients`, padded or cut to `order`."""
-        return to_real(padded(coefficients, self.order)).reshape(-1) / self.displacement_scale
+        """Return the scaled unknowns of complex `coefficients` (H+1, n), padded or cut to the harmonics kept."""
+        return real_rows(coefficients, self.harmonics).reshape(-1) / self.displacement_scale
 
     def contacts(self, x: FloatArray, omega: float) -> ContactPeriod:
         """Return gaps, forces and states of all contacts over one period, at the scaled unknowns `x` and `omega` (rad/s)."""
-        q = x.reshape(2 * self.order + 1, self.linear.n) * self.displacement_scale
-        return contact_forces(self.rows.gaps(q), self.compiled, self.samples, omega)
+        return contact_forces(self._gaps(x), self.compiled, self.samples, omega)
+
+    def _gaps(self, x: FloatArray) -> FloatArray:
+        """Return the (2 order + 1, 3 n_contacts) coefficients of the gaps, m; zeros at harmonics left out."""
+        kept = self.rows.gaps(x.reshape(self.n_rows, self.linear.n) * self.displacement_scale)
+        if is_full(self.harmonics):
+            return kept
+        gaps = np.zeros((2 * self.order + 1, kept.shape[1]))
+        gaps[rows_of(self.harmonics)] = kept
+        return gaps
 
     def _forces(self, x: FloatArray, omega: float) -> ContactPeriod:
-        """Return what the equations ask of the contacts: coefficients and derivatives."""
-        q = x.reshape(2 * self.order + 1, self.linear.n) * self.displacement_scale
-        gaps = self.rows.gaps(q)
-        return contact_forces(gaps, self.compiled, self.samples, omega, history=False)
+        """Return what the equations ask of the contacts: coefficients and derivatives, of the harmonics kept."""
+        period = contact_forces(self._gaps(x), self.compiled, self.samples, omega, history=False)
+        if is_full(self.harmonics):
+            return period
+        own = rows_of(self.harmonics)
+        by_omega = None if period.by_omega is None else period.by_omega[own]
+        blocks = period.blocks[:, :, own[:, None], own]
+        return replace(
+            period, coefficients=period.coefficients[own], blocks=blocks, by_omega=by_omega
+        )
 
     def linearise(self, x: FloatArray, omega: float) -> Linearisation:
         """Return residual, Jacobian and ω-derivative at scaled unknowns `x` (size,) and `omega` (rad/s)."""
@@ -135,51 +168,56 @@ class HarmonicBalance:
     def _by_matrices(
         self, x: FloatArray, omega: float, period: ContactPeriod
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return linear forces and their slope by ω (2H+1, n), and the Jacobian as an array."""
+        """Return linear forces and their slope by ω (m, n), and the Jacobian as an array."""
         factor = self.displacement_scale / self.force_scale
-        part = _linear_part(self.linear, self.order, omega)
+        part = _linear_part(self.linear, self.harmonics, omega)
         jac = factor * part.matrix
         add_contact_jacobian(
             period.blocks, self.rows.columns, self.rows.values, self.linear.n, factor, jac
         )
-        force, slope = part.operators @ self.coefficients(x)[:, :, None] - part.loads
+        q = to_complex(x.reshape(self.n_rows, self.linear.n)) * self.displacement_scale
+        force, slope = part.operators @ q[:, :, None] - part.loads
         return to_real(force[..., 0]), to_real(slope[..., 0]), jac
 
     def _by_products(
         self, own: CondensedStiffness, x: FloatArray, omega: float, period: ContactPeriod
     ) -> tuple[FloatArray, FloatArray, FloatArray | StructuredJacobian]:
         """Return the same without condensed matrices; the Jacobian by its products too if that was chosen."""
-        part = _product(own, self.order, omega)
-        q = x.reshape(2 * self.order + 1, self.linear.n) * self.displacement_scale
+        part = _product(own, self.harmonics, omega)
+        q = x.reshape(self.n_rows, self.linear.n) * self.displacement_scale
         linear, slope = part.product_and_slope(q)
         factor = self.displacement_scale / self.force_scale
         jac = StructuredJacobian(part, period.blocks, self.rows, factor)
         return linear - part.load, slope - part.load_slope, jac if self.structured else jac.dense()
 
     def linear_load(self, omega: float) -> FloatArray:
-        """Return the (2H+1, n) real coefficients of the condensed load at `omega` (rad/s)."""
+        """Return the (m, n) real coefficients of the condensed load at `omega` (rad/s)."""
         if isinstance(self.linear, CondensedStiffness):
-            return _product(self.linear, self.order, omega).load
-        return to_real(self.linear.condensed(omega, self.order).load)
+            return _product(self.linear, self.harmonics, omega).load
+        return real_rows(self.linear.condensed(omega, self.order).load, self.harmonics)
 
     def linear_block(self, omega: float, harmonic: int) -> ComplexArray:
         """Return the (n, n) condensed dynamic stiffness of a harmonic at `omega` (rad/s), to be changed at will."""
         if isinstance(self.linear, CondensedStiffness):
-            return _product(self.linear, self.order, omega).block(harmonic)
+            return _product(self.linear, self.harmonics, omega).block(harmonic)
         stiffness = self.linear.condensed(omega, self.order).stiffness
         return np.array(stiffness[harmonic], order="F")
 
     def with_order(self, order: int) -> "HarmonicBalance":
         """Return the same problem with harmonics 0..`order`."""
-        samples = _checked_samples(self.samples, order)
+        return self.with_harmonics(harmonics_of(order))
+
+    def with_harmonics(self, harmonics: Harmonics) -> "HarmonicBalance":
+        """Return the same problem with the `harmonics` of `harmonics_of`."""
+        samples = _checked_samples(self.samples, harmonics[-1])
         # rows of its own: they tell a solver which Jacobians can share a preconditioner
-        return replace(self, order=order, samples=samples, rows=replace(self.rows))
+        return replace(self, harmonics=harmonics, samples=samples, rows=replace(self.rows))
 
 
 def harmonic_balance(
     linear: DynamicStiffness,
     interface: Interface,
-    order: int,
+    order: int | Harmonics,
     samples: int,
     evaluator: Evaluator = "intervals",
     jacobian: JacobianForm = "auto",
@@ -193,7 +231,7 @@ def harmonic_balance(
     interface
         Contacts on the dofs of the whole structure.
     order
-        Highest harmonic; the static term is always kept.
+        Highest harmonic, or those that are kept; the static term is always kept.
     samples
         Samples per period of the contact forces.
     evaluator
@@ -207,7 +245,8 @@ def harmonic_balance(
         If the contacts touch dofs that are not retained, the load excites a harmonic above `order`, there are fewer than four samples a
         harmonic, or no such evaluator or form.
     """
-    _check_order(linear.load, order)
+    harmonics = harmonics_of(order, "order")
+    _check_load(linear.load, harmonics)
     if jacobian not in get_args(JacobianForm):
         raise input_error(
             "harmonic_balance: jacobian",
@@ -232,8 +271,8 @@ def harmonic_balance(
         local,
         local.compiled(evaluator),
         sparse_rows(local.gap_operator),
-        order,
-        _checked_samples(samples, order),
+        harmonics,
+        _checked_samples(samples, harmonics[-1]),
         force_scale / _typical_stiffness(stiffness, linear),
         force_scale,
         jacobian,
@@ -247,16 +286,14 @@ def _typical_stiffness(contact: FloatArray, linear: DynamicStiffness) -> float:
     return float(np.exp(np.mean(np.log(values)))) if values.size else 1.0
 
 
-def _check_order(load: HarmonicLoad, order: int) -> None:
-    if order != int(order) or order < 0:
-        raise input_error("order", f"must be an integer from 0 on, got {order!r}", "Give a count.")
-    top = max((h for h, f in load.harmonics.items() if np.any(f)), default=0)
-    if top > order:
-        raise input_error(
-            "HarmonicLoad",
-            f"excites harmonic {top}, but only {order} are kept",
-            f"Keep {top} or more.",
-        )
+def _check_load(load: HarmonicLoad, harmonics: Harmonics) -> None:
+    for h, force in load.harmonics.items():
+        if h not in harmonics and np.any(force):
+            raise input_error(
+                "HarmonicLoad",
+                f"excites harmonic {h}, but only {', '.join(map(str, harmonics))} are kept",
+                f"Keep {h} or more.",
+            )
 
 
 def _checked_samples(samples: int, order: int) -> int:

@@ -14,6 +14,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.dynamic_stiffness import CondensedStiffness
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.spectral import StateSpace
+from stickslip.harmonic.support import Harmonics
 
 Parts = tuple[FloatArray, FloatArray, FloatArray]  # K, C, M, or their products with the same rows
 Lossy = tuple[
@@ -28,22 +29,22 @@ Inner = tuple[InnerOne, ...]
 class CondensedProduct:
     """The condensed structure and its load at one frequency; build it with `at_frequency`.
 
-    Vectors are real and harmonic-major: (2 order + 1, n) rows.
+    Vectors are real and harmonic-major: (m, n) rows, the static one and two for each other harmonic of the support.
     """
 
     linear: CondensedStiffness
     omega: float
-    order: int
-    frequencies: FloatArray  # (2 order + 1, 1) h ω of each row, rad/s
+    harmonics: Harmonics
+    frequencies: FloatArray  # (m, 1) h ω of each row, rad/s
     inner: Inner
-    load: FloatArray  # (2 order + 1, n), N
-    load_slope: FloatArray  # (2 order + 1, n), by ω
+    load: FloatArray  # (m, n), N
+    load_slope: FloatArray  # (m, n), by ω
 
     def same(self, other: "CondensedProduct") -> bool:
         """Whether `other` has the same dynamic stiffness; loads may differ."""
         return (
             self.omega == other.omega
-            and self.order == other.order
+            and self.harmonics == other.harmonics
             and (self.linear.nn is other.linear.nn)
         )
 
@@ -58,7 +59,7 @@ class CondensedProduct:
         """The product with the transposed Z; itself where damping is symmetric."""
         if self.linear.ln is None:
             return self
-        return at_frequency(self.linear.transposed, self.omega, self.order)
+        return at_frequency(self.linear.transposed, self.omega, self.harmonics)
 
     def transposed_product(self, rows: FloatArray) -> FloatArray:
         """Return the rows of the product with the transpose of the real form of Z, the conjugate of the product of Zᵀ and the conjugate."""
@@ -79,7 +80,7 @@ class CondensedProduct:
         )
         slope = _slope(near, s) - _slope(back, s)
         slope -= _dynamic(_back(self.linear, turned), s)
-        return _dynamic(near, s) - _dynamic(back, s), _by_omega(slope)
+        return _dynamic(near, s) - _dynamic(back, s), _by_omega(slope, self.harmonics)
 
     def block(self, harmonic: int) -> ComplexArray:
         """Return ``Z_h``, (n, n) complex in Fortran order."""
@@ -97,14 +98,16 @@ class CondensedProduct:
         if far.shape[1] == 0:
             return out
         onto = far if self.linear.ln is None else _across(self.linear.ln, loss, s)
-        moved = _solve_one(self.inner[harmonic], onto.T)
+        moved = _solve_one(self.inner[self.harmonics.index(harmonic)], onto.T)
         # in place: for thousands of coordinates this is the largest array there is
         return np.asarray(
             scipy.linalg.blas.zgemm(-1.0, far, moved, beta=1.0, c=out, overwrite_c=True)
         )
 
 
-def at_frequency(linear: CondensedStiffness, omega: float, order: int) -> CondensedProduct:
+def at_frequency(
+    linear: CondensedStiffness, omega: float, harmonics: Harmonics
+) -> CondensedProduct:
     """Prepare the products of `linear` at one frequency.
 
     Parameters
@@ -113,37 +116,36 @@ def at_frequency(linear: CondensedStiffness, omega: float, order: int) -> Conden
         Structure and load from `condense`.
     omega
         Frequency, rad/s.
-    order
-        Highest harmonic.
+    harmonics
+        The harmonics, growing from 0.
     """
-    frequencies = omega * ((np.arange(2 * order + 1) + 1) // 2)[:, None]
-    coefficients = linear.load.coefficients(order)
+    frequencies = omega * _by_row(harmonics)
+    coefficients = linear.load.coefficients(harmonics[-1])[list(harmonics)]
     load = to_real(coefficients[:, linear.retained])
     inner_load = to_real(coefficients[:, linear.interior] @ linear.modes)
-    bare = CondensedProduct(
-        linear, omega, order, frequencies, _inner(linear, omega, order), load, np.zeros_like(load)
-    )
+    inner = _inner(linear, omega, harmonics)
+    bare = CondensedProduct(linear, omega, harmonics, frequencies, inner, load, np.zeros_like(load))
     if not np.any(inner_load):
         return bare
     return _with_inner_load(bare, inner_load)
 
 
 def _with_inner_load(bare: CondensedProduct, inner_load: FloatArray) -> CondensedProduct:
-    """Move the load of the interior, (2 order + 1, l), to the retained coordinates: ``F = F_N - D_NL D_LL⁻¹ F_L``."""
+    """Move the load of the interior, (m, l), to the retained coordinates: ``F = F_N - D_NL D_LL⁻¹ F_L``."""
     s = bare.frequencies
     moved = _solve_inner(bare.inner, inner_load)
     back = _back(bare.linear, moved)
     turned = _solve_inner(bare.inner, _slope(_inner_parts(bare.linear, moved), s))
     slope = _dynamic(_back(bare.linear, turned), s) - _slope(back, s)
     return CondensedProduct(
-        bare.linear, bare.omega, bare.order, s, bare.inner, bare.load - _dynamic(back, s), _by_omega(slope)
+        bare.linear, bare.omega, bare.harmonics, s, bare.inner, bare.load - _dynamic(back, s), _by_omega(slope, bare.harmonics)
     )  # fmt: skip
 
 
-def _inner(linear: CondensedStiffness, omega: float, order: int) -> Inner:
+def _inner(linear: CondensedStiffness, omega: float, harmonics: Harmonics) -> Inner:
     k, c, m = linear.ll
     loss = None if linear.loss is None else linear.loss[2]
-    s = omega * np.arange(order + 1)
+    s = omega * np.array(harmonics)
     if linear.diagonal:
         k, c, m = np.diagonal(k), np.diagonal(c), np.diagonal(m)
         loss = None if loss is None else np.diagonal(loss)
@@ -208,9 +210,14 @@ def _inner_parts(linear: CondensedStiffness, rows: FloatArray) -> Lossy:
     return rows @ k, rows @ (c if linear.ln is None else c.T), rows @ m, None
 
 
-def _by_omega(slope: FloatArray) -> FloatArray:
+def _by_row(harmonics: Harmonics) -> FloatArray:
+    """Return the (m, 1) harmonic of each real row."""
+    return np.repeat(np.array(harmonics, dtype=float), 2)[1:, None]
+
+
+def _by_omega(slope: FloatArray, harmonics: Harmonics) -> FloatArray:
     """Turn a derivative by the frequency ``hω`` of each row into one by ω."""
-    return np.asarray(((np.arange(slope.shape[0])[:, None] + 1) // 2) * slope)
+    return np.asarray(_by_row(harmonics) * slope)
 
 
 def _dynamic(parts: Lossy, s: FloatArray) -> FloatArray:

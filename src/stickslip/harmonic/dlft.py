@@ -24,6 +24,7 @@ from stickslip.harmonic.aft import ContactPeriod, contact_forces
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_balance
 from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.rigid_contacts import NORMAL, RigidContacts, rigid_contacts
+from stickslip.harmonic.support import harmonics_of
 
 SAMPLES_OF_OTHERS = 8  # per harmonic, least number at which contacts with stiffness are evaluated
 
@@ -77,7 +78,9 @@ class DynamicLagrangian:
     def with_order(self, order: int) -> "DynamicLagrangian":
         """Return the same problem with harmonics 0..`order`."""
         samples = _checked_samples(self.samples, order)
-        inner = replace(self.balance, order=order, samples=_samples_of_others(samples, order))
+        inner = replace(
+            self.balance, harmonics=harmonics_of(order), samples=_samples_of_others(samples, order)
+        )
         own = rigid_contacts(self.interface, self.rigid.index, inner, self.penalty)
         return replace(self, balance=inner, rigid=own, samples=samples)
 

@@ -36,7 +36,7 @@ class HarmonicFactors:
     linear
         The dynamic stiffness they were made of.
     means
-        (H+1, n_contacts, 3, 3) the contact stiffness they were made of, N/m.
+        (len(harmonics), n_contacts, 3, 3) the contact stiffness they were made of, N/m.
     factors
         Of each harmonic, in the scale of the Jacobian; harmonic 0 is real.
     """
@@ -55,7 +55,7 @@ class StructuredJacobian:
     linear
         Dynamic stiffness at the frequency.
     blocks
-        (n_contacts, P, 2H+1, 2H+1) derivatives of the contact forces by the gaps, N/m.
+        (n_contacts, P, m, m) derivatives of the contact forces by the gaps, N/m, of the same harmonics.
     rows
         Gap operator by contact.
     scale
@@ -75,7 +75,7 @@ class StructuredJacobian:
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns."""
-        size = self.linear.linear.n * (2 * self.linear.order + 1)
+        size = self.linear.linear.n * len(self.linear.frequencies)
         return size, size
 
     def matvec(self, v: FloatArray) -> FloatArray:
@@ -91,8 +91,8 @@ class StructuredJacobian:
 
     def dense(self) -> FloatArray:
         """Return the Jacobian as an array."""
-        order, n = self.linear.order, self.linear.linear.n
-        jac = self.scale * real_matrix([self.linear.block(h) for h in range(order + 1)])
+        n = self.linear.linear.n
+        jac = self.scale * real_matrix([self.linear.block(h) for h in self.linear.harmonics])
         add_contact_jacobian(self.blocks, self.rows.columns, self.rows.values, n, self.scale, jac)
         return jac
 
@@ -100,9 +100,9 @@ class StructuredJacobian:
         """Return the factors of ``Z_h + K̂ʰʰ``; None where one of the matrices is singular."""
         means = harmonic_means(self.blocks)
         factors = []
-        for h in range(self.linear.order + 1):
+        for place, h in enumerate(self.linear.harmonics):
             block = self.linear.block(h)
-            add_stiffness(means[h], self.rows.columns, self.rows.values, block)
+            add_stiffness(means[place], self.rows.columns, self.rows.values, block)
             block *= self.scale
             matrix = np.array(block.real, order="F") if h == 0 else block
             own = factorise(matrix)
@@ -120,7 +120,7 @@ class StructuredJacobian:
         if not self.linear.same(kept.linear):
             return solve, lambda v, _: self.matvec(v)
         left = less_means(self.blocks, kept.means)
-        for h in range(1, self.linear.order + 1):
+        for h in range(1, len(self.linear.harmonics)):
             left[:, :, 2 * h - 1 : 2 * h + 1, : 2 * h - 1] = 0.0
 
         def product(v: FloatArray, preconditioned: FloatArray) -> FloatArray:
@@ -150,7 +150,7 @@ class StructuredJacobian:
         return rows.reshape(-1)
 
     def _by_row(self, v: FloatArray) -> FloatArray:
-        return np.ascontiguousarray(v.reshape(2 * self.linear.order + 1, -1))
+        return np.ascontiguousarray(v.reshape(len(self.linear.frequencies), -1))
 
     def _add_contacts(
         self, blocks: FloatArray, q: FloatArray, transposed: bool, out: FloatArray
@@ -163,7 +163,7 @@ class StructuredJacobian:
 
 
 def real_matrix(blocks: list[ComplexArray] | ComplexArray) -> FloatArray:
-    """Return the harmonic-major real form of complex (n, n) `blocks`, one a harmonic from 0: (n (2H+1), n (2H+1)) in Fortran order."""
+    """Return the harmonic-major real form of complex (n, n) `blocks`, one a harmonic, the static one first, in Fortran order."""
     order, n = len(blocks) - 1, blocks[0].shape[0]
     matrix = np.zeros((n * (2 * order + 1), n * (2 * order + 1)), order="F")
     matrix[:n, :n] = blocks[0].real

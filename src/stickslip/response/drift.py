@@ -44,7 +44,7 @@ def drift(problem: ForcedProblem, point: ForcedPoint) -> Drift:
     point
         A point of the response, converged or not.
     """
-    balance = problem.balance(point.order)
+    balance = problem.balance(point.support)
     jac = balance.linearise(balance.unknowns(point.coefficients), point.omega).dense_jac()
     # balance rows and columns first: translations and rotations differ by orders of magnitude
     scale = np.sqrt(np.maximum(np.max(np.abs(jac), axis=0), np.finfo(float).tiny))

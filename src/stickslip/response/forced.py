@@ -1,15 +1,23 @@
-"""Forced response with the double-passage Jacobian Alert (Gastaldi & Berruti 2017, section 4.4).
+"""Forced response in one or two passages through the frequencies (Gastaldi & Berruti 2017, section 4.4).
 
-First passage: the branch with few harmonics, each point with the error that the missing harmonics are predicted to make. Second
+The two of the Jacobian Alert: first passage: the branch with few harmonics, each point with the error that the missing harmonics are predicted to make. Second
 passage: the frequencies where that error exceeds the threshold, solved again with many harmonics from ``q + Δq``. Last, a few points
 that resolve the resonance peak.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 
+from stickslip.arrays import FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.accepted import (
+    accepted_pairs,
+    accepted_points,
+    branch_points,
+    reached,
+    runs_of_repeats,
+)
 from stickslip.response.passages import (
     first_passage,
     follow_run,
@@ -20,17 +28,8 @@ from stickslip.response.passages import (
 )
 from stickslip.response.preload import preload
 from stickslip.response.resonance import resolve_peak
-from stickslip.response.sweep import (
-    ForcedPoint,
-    ForcedProblem,
-    Sweep,
-    accepted_pairs,
-    accepted_points,
-    branch_points,
-    forced_problem,
-    reached,
-    runs_of_repeats,
-)
+from stickslip.response.single_passage import single_passage
+from stickslip.response.sweep import ForcedPoint, ForcedProblem, Sweep, forced_problem
 from stickslip.response.system import System
 
 __all__ = [
@@ -75,13 +74,33 @@ def forced_response(
         If the static load finds no equilibrium.
     """
     problem = forced_problem(system, load, sweep)
+    static = cache(lambda: preload(system, load.static))
+    solved = [p for p in done if p.stage != "peak"]
+    before = tuple(solved)
+    if sweep.single:
+        passage = single_passage(problem, load, before)
+    else:
+        passage = _double_passage(problem, load, before, static)
+    for point in passage:
+        solved.append(point)
+        yield point
+    peak = [p for p in done if p.stage == "peak"]
+    yield from resolve_peak(problem, accepted_points(solved), peak, static)
+
+
+def _double_passage(
+    problem: ForcedProblem,
+    load: HarmonicLoad,
+    done: Sequence[ForcedPoint],
+    static: Callable[[], FloatArray],
+) -> Iterator[ForcedPoint]:
+    """Finish the response with few harmonics, then solve again what needs more."""
     low = [p for p in done if p.stage == "low"]
     yield from first_passage(problem, load, low)
     high = {p.index: p for p in done if p.stage == "high"}
     quiet = {p.index: p for p in low if p.converged and not problem.alerted(p)}
     tried = Counter(p.index for p in done if p.stage == "high")
     yield from _repeats(problem, low, quiet, high, tried)
-    static = cache(lambda: preload(system, load.static))
     branches: list[ForcedPoint] = []
     for first, last in runs_of_repeats(high):
         branch = branch_points(done, first, last)
@@ -105,8 +124,6 @@ def forced_response(
                 high[index] = postponed(problem, low[index])
             tried[index] += 1
             yield high[index]
-    accepted = accepted_points([*low, *high.values(), *branches])
-    yield from resolve_peak(problem, accepted, [p for p in done if p.stage == "peak"], static)
 
 
 def _repeats(

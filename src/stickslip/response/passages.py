@@ -10,17 +10,11 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.selection import jacobian_alert
+from stickslip.harmonic.support import Harmonics
+from stickslip.response.accepted import branch_end, reached
 from stickslip.response.preload import bonded_start, preload
 from stickslip.response.rescue import homotopies
-from stickslip.response.sweep import (
-    BRANCH_ITERATIONS,
-    ForcedPoint,
-    ForcedProblem,
-    branch_end,
-    forced_point,
-    reached,
-)
+from stickslip.response.sweep import BRANCH_ITERATIONS, ForcedPoint, ForcedProblem, forced_point
 from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to
 from stickslip.solve.newton import Solution, charged, newton
 from stickslip.solve.rescue import Homotopy, solve_robustly
@@ -66,7 +60,7 @@ def first_passage(
             gap = sweep.control.largest * sweep.control.scale if points else 0.0
             # a single frequency is left to the repeats, which know both sides; a second one in a row to the homotopies
             left = bool(points) and points[-1].converged and sweep.selection != "always_low"
-            point = _fresh_point(problem, load, points, min(reach + gap, last), left)
+            point = fresh_point(problem, load, points, min(reach + gap, last), left)
         points.append(_low_point(problem, point, len(points), began))
         yield points[-1]
 
@@ -90,12 +84,12 @@ def _grid(
         if before:
             point = step_to(problem.low, problem.branch_point(before[-1]), float(omega), following)
         if point is None or not point.solution.status.converged:
-            point = _fresh_point(problem, load, before, float(omega))
+            point = fresh_point(problem, load, before, float(omega))
         points.append(_low_point(problem, point, len(points), began))
         yield points[-1]
 
 
-def _fresh_point(
+def fresh_point(
     problem: ForcedProblem,
     load: HarmonicLoad,
     points: list[ForcedPoint],
@@ -151,7 +145,8 @@ def _starts(
     guess = balance.coefficients(bonded_start(balance, omega, problem.system))
     guess[0] = preload(problem.system, load.static)
     yield balance.unknowns(guess)
-    few = balance.with_order(max(load.harmonics, default=balance.order))
+    driven = max(load.harmonics, default=balance.order)
+    few = balance.with_harmonics(tuple(h for h in balance.harmonics if h <= max(driven, 1)))
     if few.order < balance.order:
         solution = newton(
             lambda x: few.linearise(x, omega), few.unknowns(guess), problem.sweep.newton
@@ -161,12 +156,12 @@ def _starts(
 
 
 def _low_point(problem: ForcedProblem, point: Point, index: int, began: float) -> ForcedPoint:
-    error, seconds = np.nan, 0.0
-    if point.solution.status.converged and problem.sweep.selection == "jacobian_alert":
-        alert = jacobian_alert(
-            problem.low, problem.high, point.x, point.p, problem.alert_dofs, problem.alert_solve
-        )
-        error, seconds = alert.error, alert.seconds_contact
+    error = np.nan
+    strategy = problem.strategy
+    asked: Harmonics = ()
+    if point.solution.status.converged and strategy is not None:
+        verdict = strategy.judge(problem.step(problem.low, point.x, point.p))
+        error, asked = verdict.indicator, verdict.again or ()
     made = forced_point(problem.low, point.solution, "low", index, point.p, perf_counter() - began)
     return replace(
         made,
@@ -174,7 +169,7 @@ def _low_point(problem: ForcedProblem, point: Point, index: int, began: float) -
         step=point.step,
         orientation=point.orientation,
         predicted_error=error,
-        seconds_contact=made.seconds_contact + seconds,
+        asked=np.array(asked, dtype=np.int64),
     )
 
 
@@ -203,8 +198,9 @@ def repeat(
         Points of a branch with many harmonics: where it passed the frequency, it leads to a solution.
     """
     began = perf_counter()
-    balance, omega = problem.high, point.omega
-    guesses, seconds_alert = _predicted(problem, point)
+    omega = point.omega
+    balance = problem.balance(tuple(int(h) for h in point.asked) or problem.high.harmonics)
+    guesses = _predicted(problem, point)
     near = _neighbours(point.index, others)
     beside = passing(branch, point) + [p for p in near if abs(p.index - point.index) <= 1]
     most = BRANCH_ITERATIONS if beside or static is not None else ISOLATED
@@ -216,7 +212,7 @@ def repeat(
     for neighbour in beside:
         if spent[-1].status.converged:
             break
-        detour = along_branch(problem, neighbour, omega).solution
+        detour = along_branch(problem, neighbour, omega, balance).solution
         spent.append(replace(detour, rung=max(detour.rung, Rung.SHORTER_STEP)))
     if not spent[-1].status.converged and static is not None:
         solution = solve_robustly(
@@ -229,22 +225,19 @@ def repeat(
         spent.append(solution)
     solution = charged(spent[-1], spent)
     made = forced_point(balance, solution, "high", point.index, omega, perf_counter() - began)
-    return replace(
-        made,
-        seconds_contact=made.seconds_contact + seconds_alert,
-        predicted_error=point.predicted_error,
-    )
+    return replace(made, predicted_error=point.predicted_error)
 
 
-def _predicted(problem: ForcedProblem, point: ForcedPoint) -> tuple[list[FloatArray], float]:
-    """Return q + Δq in a list, empty if q is no solution, and the seconds in contacts that it took."""
-    if not point.converged:
-        return [], 0.0
-    x = problem.low.unknowns(point.coefficients)
-    alert = jacobian_alert(
-        problem.low, problem.high, x, point.omega, problem.alert_dofs, problem.alert_solve
-    )
-    return [alert.start], alert.seconds_contact
+def _predicted(problem: ForcedProblem, point: ForcedPoint) -> list[FloatArray]:
+    """Return q + Δq in a list; empty if q is no solution, or the strategy knows no better start."""
+    strategy = problem.strategy
+    if not point.converged or strategy is None:
+        return []
+    few = problem.balance(point.support)
+    verdict = strategy.judge(problem.step(few, few.unknowns(point.coefficients), point.omega))
+    if verdict.start is None:
+        return []
+    return [problem.balance(verdict.again or problem.high.harmonics).unknowns(verdict.start)]
 
 
 def worth_a_try(index: int, forward: bool, failed: Callable[[int], bool], known: bool) -> bool:

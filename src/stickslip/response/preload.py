@@ -116,8 +116,8 @@ def bonded_start(balance: HarmonicBalance, omega: float, system: System) -> Floa
     rows = balance.rows
     springs = balance.interface.stuck_stiffness().reshape(-1, 3, 1) * np.eye(3)
     q = np.zeros((balance.order + 1, balance.linear.n), dtype=complex)
-    for h in range(balance.order + 1):
-        if h > 0 and not np.any(load[h]):
+    for place, h in enumerate(balance.harmonics):
+        if h > 0 and not np.any(load[place]):
             continue
         matrix = balance.linear_block(omega, h)
         add_stiffness(springs, rows.columns, rows.values, matrix)
@@ -127,7 +127,7 @@ def bonded_start(balance: HarmonicBalance, omega: float, system: System) -> Floa
                 raise SingularError(_unheld(matrix.real, system))
             q[0] = static
         else:
-            q[h] = np.linalg.solve(matrix, load[h])
+            q[h] = np.linalg.solve(matrix, load[place])
     return balance.unknowns(q)
 
 

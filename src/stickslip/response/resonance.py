@@ -7,7 +7,6 @@ from time import perf_counter
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.harmonic.selection import jacobian_alert
 from stickslip.response.passages import along_branch, repeat
 from stickslip.response.rescue import homotopies
 from stickslip.response.sweep import ForcedPoint, ForcedProblem, forced_point
@@ -65,9 +64,8 @@ def resolve_peak(
 
 def _on_seam(problem: ForcedProblem, known: list[ForcedPoint], top: int) -> bool:
     """Whether the highest point has few harmonics and a neighbour many: then it may be highest because it has few."""
-    if not known or known[top].order == problem.high.order:
-        return False
-    return any(p.order == problem.high.order for p in known[max(top - 1, 0) : top + 2])
+    few = known[top].harmonics.size if known else 0
+    return any(p.harmonics.size > few for p in known[max(top - 1, 0) : top + 2] if few)
 
 
 def _repeated_top(
@@ -94,7 +92,7 @@ def peak_from(problem: ForcedProblem, point: ForcedPoint) -> ForcedPoint | None:
     point
         The known peak.
     """
-    balance = problem.balance(point.order)
+    balance = problem.balance(point.support)
     following = problem.following(balance)
     middle = start_point(balance, balance.unknowns(point.coefficients), point.omega, following)
     if not middle.solution.status.converged:
@@ -136,16 +134,17 @@ def _peak_point(
     """Solve at a frequency between two points: along the branch from either of them, then by all that `solve_robustly` knows."""
     began = perf_counter()
     top = ends[0]
-    balance = problem.balance(top.order)
+    balance = problem.balance(top.support)
     solution = _between(problem, ends, omega, static)
     made = forced_point(balance, solution, "peak", index, omega, perf_counter() - began)
-    asked = problem.sweep.selection == "jacobian_alert" and balance is problem.low
-    if not asked or not made.converged:
+    strategy = problem.strategy
+    if strategy is None or not strategy.verifies or not made.converged:
         return made
-    alert = jacobian_alert(
-        problem.low, problem.high, solution.x, omega, problem.alert_dofs, problem.alert_solve
-    )
-    made = replace(made, predicted_error=alert.error)
+    if balance is not problem.low:
+        return made
+    verdict = strategy.judge(problem.step(balance, solution.x, omega))
+    asked = np.array(verdict.again or (), dtype=np.int64)
+    made = replace(made, predicted_error=verdict.indicator, asked=asked)
     if problem.alerted(made):
         made = replace(repeat(problem, made, {}, static), stage="peak")
     return replace(made, seconds_total=perf_counter() - began)
@@ -157,7 +156,7 @@ def _between(
     omega: float,
     static: Callable[[], FloatArray] | None,
 ) -> Solution:
-    balance = problem.balance(ends[0].order)
+    balance = problem.balance(ends[0].support)
     spent: list[Solution] = []
     for end in ends:
         found = along_branch(problem, end, omega, balance).solution

@@ -1,7 +1,7 @@
 """What a forced response is asked for and what it consists of."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -11,23 +11,23 @@ from stickslip.contact.compiled import Evaluator, check_evaluator
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.selection import Solve
+from stickslip.harmonic.selection import STRATEGIES, strategy_named
+from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve, Step, Strategy
+from stickslip.harmonic.support import Harmonics, harmonics_of
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, Point, StepControl
 from stickslip.solve.krylov import to_tolerance
 from stickslip.solve.newton import Newton, Solution
 from stickslip.solve.status import Rung, Status
 
-Selection = Literal["jacobian_alert", "always_low", "always_high"]
+FIXED = ("always_low", "always_high")  # the same harmonics at every frequency
+Passages = Literal["double", "single"]
 Stage = Literal["low", "high", "branch", "peak"]
 # arc length: a quarter of the size of the vibration, or `1 / points` of the range
 LARGEST_STEP = 0.25
 FAINTEST = 1e-6  # excitation over static load: below, the residual tolerance swallows the vibration
 ALERT_TOLERANCE = 1e-6  # relative residual of the alert's step where it is found by iteration
 BRANCH_ITERATIONS = 10  # of a corrector along a branch
-ALIKE = (
-    0.25  # relative difference of two vibrations below which a branch has come back to the other
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,15 +39,23 @@ class Sweep:
     omega_range
         First and last excitation frequency, rad/s, in growing order.
     low, high
-        Harmonics of the first passage and of the repeats; the static term is always kept.
+        Harmonics of the first passage and of the reference, that of the repeats: the highest of all, or a list such as (1, 3, 5).
+        The static term is always kept.
     samples
         Samples per period of the contact forces.
     evaluator
         How piecewise-linear laws are evaluated; ``events`` has no sampling error, which would put small corners and folds into branches.
     threshold
-        Predicted error (fraction) above which a frequency is repeated with `high`.
+        Predicted error (fraction) above which a frequency is repeated.
     selection
-        ``jacobian_alert``, or the same number of harmonics at every frequency.
+        Name of a strategy of `stickslip.harmonic.selection` (``jacobian_alert``, ...), one with parameters of your own, or the
+        same harmonics at every frequency (``always_low``, ``always_high``).
+    passages
+        ``double``: finish the response with few harmonics first, then repeat what needs more; ``single``: settle each of
+        the equally spaced frequencies before the next one. Strategies that foretell the harmonics of the next frequency always
+        take the single one.
+    error_harmonics
+        Harmonics over which the predicted error is taken; None: those that the load drives.
     points
         Smallest number of points of the first passage; more are taken where the response turns.
     frequencies
@@ -59,12 +67,14 @@ class Sweep:
     """
 
     omega_range: tuple[float, float]
-    low: int = 1
-    high: int = 5
+    low: int | Sequence[int] = 1
+    high: int | Sequence[int] = 5
     samples: int = 256
     evaluator: Evaluator = "events"
     threshold: float = 0.05
-    selection: Selection = "jacobian_alert"
+    selection: str | Strategy = "jacobian_alert"
+    passages: Passages = "double"
+    error_harmonics: Sequence[int] | None = None
     points: int = 40
     frequencies: int = 0
     peak_points: int = 12
@@ -79,11 +89,17 @@ class Sweep:
                 "Swap the two ends.",
             )
         check_evaluator(self.evaluator)
-        if self.selection not in get_args(Selection):
+        if isinstance(self.selection, str) and self.selection not in (*STRATEGIES, *FIXED):
             raise input_error(
                 "Sweep.selection",
-                f"{self.selection!r} is none of {', '.join(get_args(Selection))}",
+                f"{self.selection!r} is none of {', '.join((*STRATEGIES, *FIXED))}",
                 "'jacobian_alert' repeats where it matters.",
+            )
+        if self.passages not in get_args(Passages):
+            raise input_error(
+                "Sweep.passages",
+                f"{self.passages!r} is none of {', '.join(get_args(Passages))}",
+                "'double' repeats what needs more harmonics.",
             )
         if np.isnan(self.threshold):
             raise input_error("Sweep.threshold", "is not a number", "0.05 is 5 %.")
@@ -95,10 +111,40 @@ class Sweep:
                     f"must be an integer of at least {least}, got {value!r}",
                     "Give a count.",
                 )
-        if not 1 <= self.low <= self.high:
+        low, high = self.low_harmonics, self.high_harmonics
+        if len(low) < 2 or not set(low) <= set(high):  # the static term and another
             raise input_error(
-                "Sweep", f"harmonics low = {self.low}, high = {self.high}", "Give 1 <= low <= high."
+                "Sweep",
+                f"harmonics low = {self.low}, high = {self.high}",
+                "Give low at least harmonic 1, and high all of low and more.",
             )
+
+    @property
+    def low_harmonics(self) -> Harmonics:
+        """Harmonics of the first passage."""
+        return harmonics_of(self.low, "Sweep.low")
+
+    @property
+    def high_harmonics(self) -> Harmonics:
+        """Harmonics of the reference."""
+        return harmonics_of(self.high, "Sweep.high")
+
+    @property
+    def strategy(self) -> Strategy | None:
+        """How harmonics are chosen; None where they are the same at every frequency."""
+        if not isinstance(self.selection, str):
+            return self.selection
+        if self.selection in FIXED:
+            return None
+        strategy = strategy_named(self.selection)
+        # the indicators of the others are no errors
+        return strategy_named(self.selection, self.threshold) if strategy.verifies else strategy
+
+    @property
+    def single(self) -> bool:
+        """Whether each frequency is settled before the next one."""
+        strategy = self.strategy
+        return strategy is not None and (self.passages == "single" or not strategy.verifies)
 
     @property
     def control(self) -> StepControl:
@@ -110,9 +156,9 @@ class Sweep:
         )
 
     @property
-    def first_order(self) -> int:
-        """Harmonics of the first passage."""
-        return self.high if self.selection == "always_high" else self.low
+    def first_harmonics(self) -> Harmonics:
+        """Harmonics with which the first passage is made."""
+        return self.high_harmonics if self.selection == "always_high" else self.low_harmonics
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,11 +184,15 @@ class ForcedPoint:
     iterations
         Newton steps.
     predicted_error
-        Of the Jacobian Alert, as a fraction; NaN where it was not asked.
+        Indicator of the strategy: of an alert the predicted error, as a fraction; NaN where it was not asked.
     seconds_contact, seconds_linear, seconds_total
         Time in contact forces, in factorisations, and in all.
     rescue
         What it took to find the solution.
+    harmonics
+        Harmonics kept, growing from 0.
+    asked
+        Harmonics with which the strategy wants this frequency solved again; empty: none.
     """
 
     stage: Stage
@@ -159,11 +209,18 @@ class ForcedPoint:
     seconds_total: float
     orientation: float = 0.0
     rescue: Rung = Rung.FULL_STEPS
+    harmonics: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    asked: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @property
     def order(self) -> int:
-        """Harmonics kept at this point."""
+        """Highest harmonic kept at this point."""
         return int(self.coefficients.shape[0]) - 1
+
+    @property
+    def support(self) -> Harmonics:
+        """Harmonics kept, as a tuple."""
+        return tuple(int(h) for h in self.harmonics)
 
     @property
     def converged(self) -> bool:
@@ -179,21 +236,44 @@ class ForcedProblem:
     sweep: Sweep
     low: HarmonicBalance
     high: HarmonicBalance
+    others: dict[Harmonics, HarmonicBalance] = field(default_factory=dict)  # made when first needed
 
     @property
-    def alert_dofs(self) -> IntArray:
-        """Structure dofs over which the alert takes its error."""
-        chosen = self.system.alert_outputs
-        return self.system.outputs if chosen is None else self.system.outputs[chosen]
+    def strategy(self) -> Strategy | None:
+        """How harmonics are chosen; None where they are the same at every frequency."""
+        return self.sweep.strategy
+
+    @property
+    def measure(self) -> ErrorMeasure:
+        """What an error is taken of."""
+        system, chosen = self.system, self.sweep.error_harmonics
+        driven = tuple(h for h, f in sorted(self.low.linear.load.harmonics.items()) if np.any(f))
+        dofs = system.outputs if system.alert_dofs is None else system.alert_dofs
+        return ErrorMeasure(dofs, (driven or (1,)) if chosen is None else tuple(chosen))
 
     @property
     def alert_solve(self) -> Solve:
         """Solver of the alert's enlarged system: that of Newton, but exact enough for an error of a thousandth."""
         return to_tolerance(self.sweep.newton.linear, ALERT_TOLERANCE).solve
 
-    def balance(self, order: int) -> HarmonicBalance:
-        """Return the periodic problem with `order` harmonics, one of the two."""
-        return self.low if order == self.low.order else self.high
+    def balance(self, harmonics: Harmonics) -> HarmonicBalance:
+        """Return the periodic problem with these harmonics."""
+        for own in (self.low, self.high):
+            if own.harmonics == harmonics:
+                return own
+        if harmonics not in self.others:
+            self.others[harmonics] = self.high.with_harmonics(harmonics)
+        return self.others[harmonics]
+
+    def step(
+        self, balance: HarmonicBalance, x: FloatArray, omega: float, next_omega: float | None = None
+    ) -> Step:
+        """Return a scaled solution of `balance` as a strategy sees it."""
+        smallest = self.sweep.low_harmonics
+        following = omega if next_omega is None else next_omega
+        return Step(
+            balance, self.high, smallest, x, omega, following, self.measure, self.alert_solve
+        )
 
     def following(self, balance: HarmonicBalance) -> Following:
         """Return how a branch of `balance` is followed."""
@@ -209,7 +289,12 @@ class ForcedProblem:
 
     def alerted(self, point: ForcedPoint) -> bool:
         """Whether the alert asks for more harmonics at a point of the first passage."""
-        return point.converged and bool(point.predicted_error > self.sweep.threshold)
+        strategy = self.strategy
+        return (
+            strategy is not None
+            and point.converged
+            and bool(point.predicted_error > strategy.threshold)
+        )
 
     def asks_again(self, point: ForcedPoint) -> bool:
         """Whether a point of the first passage is repeated: alerted, or not found although its neighbours may lead to it."""
@@ -218,9 +303,17 @@ class ForcedProblem:
 
     def branch_point(self, point: ForcedPoint) -> Point:
         """Return a point of a branch as one that it goes on from."""
-        x = self.balance(point.order).unknowns(point.coefficients)
+        x = self.balance(point.support).unknowns(point.coefficients)
         solution = Solution(x, point.status, 0, 0.0, 0.0, 0.0)
         return Point(x, point.omega, point.tangent, point.step, solution, point.orientation)
+
+    def real_error(self, point: ForcedPoint, reference: ForcedPoint) -> float:
+        """Return the largest relative error of a point against another at its frequency (eq. 29), a fraction."""
+        linear = self.low.linear
+        motion = linear.recover(point.omega, point.coefficients)
+        exact = linear.recover(point.omega, reference.coefficients)
+        order = min(len(motion), len(exact))
+        return self.measure.change(motion[:order], exact[:order] - motion[:order])[0]
 
     def amplitude(self, point: ForcedPoint, output: int = 0) -> float:
         """First-harmonic amplitude of output number `output`, m."""
@@ -230,17 +323,16 @@ class ForcedProblem:
 
 def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedProblem:
     """Set up the forced response of `system` under `load`."""
-    top = max((h for h, f in load.harmonics.items() if np.any(f)), default=0)
-    if top > sweep.first_order:
-        raise input_error(
-            "HarmonicLoad",
-            f"excites harmonic {top}, but the first passage keeps {sweep.first_order}",
-            f"Give Sweep(low={top}, high={max(top, sweep.high)}) or more.",
-        )
-    linear = system.condensed(load, sweep.high)
-    low = harmonic_balance(
-        linear, system.interface, sweep.first_order, sweep.samples, sweep.evaluator
-    )
+    first, reference = sweep.first_harmonics, sweep.high_harmonics
+    for h, force in load.harmonics.items():
+        if h not in first and np.any(force):
+            raise input_error(
+                "HarmonicLoad",
+                f"excites harmonic {h}, but the first passage keeps {', '.join(map(str, first))}",
+                f"Give Sweep(low={h}, high={max(h, reference[-1])}) or more.",
+            )
+    linear = system.condensed(load, reference[-1])
+    low = harmonic_balance(linear, system.interface, first, sweep.samples, sweep.evaluator)
     dynamic = max(
         (float(np.max(np.abs(f), initial=0.0)) for f in load.harmonics.values()), default=0.0
     )
@@ -251,74 +343,7 @@ def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedPr
             "too faint for the tolerance of the solver",
             "Solve the stuck structure, which is linear, or raise the excitation.",
         )
-    return ForcedProblem(system, sweep, low, low.with_order(sweep.high))
-
-
-def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, ForcedPoint | None]]:
-    """Return the points that make up the response, each with the low-order point it repeats or is.
-
-    In the order of the branch: points of the first passage, their repeats in their place, and in place of a run of repeats that did not
-    all converge the branch with many harmonics, where that reached the other side. Peak points come last.
-    """
-    low = [p for p in points if p.stage == "low"]
-    high = {p.index: p for p in points if p.stage == "high"}
-    kept: list[tuple[ForcedPoint, ForcedPoint | None]] = []
-    passed = -1
-    for first, last in runs_of_repeats(high):
-        branch = branch_points(points, first, last)
-        if reached(branch, low, last):
-            kept += [(high.get(p.index, p), p) for p in low[passed + 1 : branch[0].index]]
-            kept += [(p, None) for p in branch]
-            passed = last
-    kept += [(high.get(p.index, p), p) for p in low[passed + 1 :]]
-    peak = [p for p in points if p.stage == "peak"]
-    again = {p.omega: p for p in peak if p.converged}
-    # a peak that was solved again with more harmonics takes the place of what it was
-    kept = [
-        (again.pop(p.omega) if p.omega in again and p.order < again[p.omega].order else p, low)
-        for p, low in kept
-    ]
-    return kept + [(p, None) for p in peak if again.get(p.omega) is p or not p.converged]
-
-
-def accepted_points(points: Sequence[ForcedPoint]) -> list[ForcedPoint]:
-    """Return the points that make up the response; see `accepted_pairs`."""
-    return [point for point, _ in accepted_pairs(points)]
-
-
-def runs_of_repeats(high: Mapping[int, ForcedPoint]) -> list[tuple[int, int]]:
-    """Return first and last index of each run of neighbouring repeats."""
-    runs: list[tuple[int, int]] = []
-    for index in sorted(high):
-        if runs and index == runs[-1][1] + 1:
-            runs[-1] = (runs[-1][0], index)
-        else:
-            runs.append((index, index))
-    return runs
-
-
-def branch_points(points: Sequence[ForcedPoint], first: int, last: int) -> list[ForcedPoint]:
-    """Return the points of the branch with many harmonics through the run of repeats from `first` to `last`."""
-    return [p for p in points if p.stage == "branch" and first <= p.index <= last]
-
-
-def branch_end(low: Sequence[ForcedPoint], last: int) -> float:
-    """Return the frequency at which such a branch ends: that of the next quiet point, or of the last one."""
-    return low[min(last + 1, len(low) - 1)].omega
-
-
-def reached(branch: Sequence[ForcedPoint], low: Sequence[ForcedPoint], last: int) -> bool:
-    """Whether a branch came to its end: to the frequency of the next quiet point, and to its motion.
-
-    Where the branch folds it may pass that frequency several times, on its way to the other sheets.
-    """
-    if not branch or not branch[-1].converged or branch[-1].omega != branch_end(low, last):
-        return False
-    if last + 1 >= len(low) or not low[last + 1].converged:
-        return True
-    quiet = low[last + 1].coefficients[1:]
-    here = branch[-1].coefficients[1 : len(quiet) + 1]
-    return bool(np.linalg.norm(here - quiet) <= ALIKE * np.linalg.norm(quiet))
+    return ForcedProblem(system, sweep, low, low.with_harmonics(reference))
 
 
 def forced_point(
@@ -333,4 +358,5 @@ def forced_point(
     return ForcedPoint(
         stage, index, omega, balance.coefficients(solution.x), np.zeros(0), 0.0, solution.status, solution.iterations,
         np.nan, solution.seconds_contact, solution.seconds_linear, seconds, rescue=solution.rung,
+        harmonics=np.array(balance.harmonics),
     )  # fmt: skip

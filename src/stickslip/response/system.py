@@ -29,8 +29,8 @@ class System:
         Contacts on the structure's dofs.
     outputs
         Dof indices whose motion is reported.
-    alert_outputs
-        Positions in `outputs` over which the Jacobian Alert takes its error; None: all of them.
+    alert_dofs
+        Dofs over which the predicted error of the harmonics is taken: outputs, contact dofs, chosen directions; None: the outputs.
     free
         Dofs of rigid bodies that only contacts hold; they are retained whether or not a contact touches them.
     """
@@ -38,7 +38,7 @@ class System:
     structure: Structure | TunedWheel
     interface: Interface
     outputs: IntArray
-    alert_outputs: IntArray | None = None
+    alert_dofs: IntArray | None = None
     free: IntArray | None = None
 
     def __post_init__(self) -> None:

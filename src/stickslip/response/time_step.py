@@ -225,30 +225,44 @@ def _accumulate(matrix: FloatArray, x: FloatArray, out: FloatArray) -> None:
 
 
 @njit(cache=True)
+def advance(
+    ops: StepOperators, state: StepState, work: StepWork, step: int, moved: FloatArray
+) -> bool:
+    """Take one step of `state`, with `moved` (m + k,) to write to; return whether the contacts were solved."""
+    m, k = ops.hold.shape[1], ops.hold.shape[0]
+    moved[:] = ops.drive[step]
+    _accumulate(ops.transfer, state.x, moved)
+    free = moved[m:]
+    # First guess: the contact force does not change over the step.
+    work.gap[:] = free
+    _accumulate(ops.response, state.x[m:], work.gap)
+    solved = _solve_contacts(free, ops, state, work)
+    for i in range(k):
+        state.x[m + i] = work.force[i] - ops.law[i // 3, i % 3] * work.gap[i]
+    _accumulate(ops.hold, state.x[m:], moved[:m])
+    state.x[:m] = moved[:m]
+    state.gap[:] = work.gap
+    state.force[:] = work.force
+    return bool(solved)
+
+
+@njit(cache=True)
+def write_record(record: StepRecord, state: StepState, step: int) -> None:
+    """Keep the state at the end of a step."""
+    record.motion[step] = state.x[: record.motion.shape[1]]
+    record.gap[step] = state.gap
+    record.force[step] = state.force
+
+
+@njit(cache=True)
 def run_period(ops: StepOperators, state: StepState, work: StepWork, record: StepRecord) -> int:
     """Advance `state` by one period; return the number of failed steps, or -1 if the motion overflowed."""
-    m, k = ops.hold.shape[1], ops.hold.shape[0]
-    n = record.motion.shape[1]
-    moved = np.empty(m + k)
+    moved = np.empty(ops.hold.shape[1] + ops.hold.shape[0])
     failures = 0
     for step in range(record.motion.shape[0]):
-        moved[:] = ops.drive[step]
-        _accumulate(ops.transfer, state.x, moved)
-        free = moved[m:]
-        # First guess: the contact force does not change over the step.
-        work.gap[:] = free
-        _accumulate(ops.response, state.x[m:], work.gap)
-        if not _solve_contacts(free, ops, state, work):
+        if not advance(ops, state, work, step, moved):
             failures += 1
-        for i in range(k):
-            state.x[m + i] = work.force[i] - ops.law[i // 3, i % 3] * work.gap[i]
-        _accumulate(ops.hold, state.x[m:], moved[:m])
-        state.x[:m] = moved[:m]
-        state.gap[:] = work.gap
-        state.force[:] = work.force
-        record.motion[step] = state.x[:n]
-        record.gap[step] = work.gap
-        record.force[step] = work.force
+        write_record(record, state, step)
         if not np.isfinite(np.sum(state.x)):
             return -1
     return failures

@@ -245,14 +245,12 @@ def integrate(
     """
     stepping = stepping or TimeStepping()
     start = start or rest(structure.n, laws)
-    _check(structure.n, len(laws), outputs, start)
-    law = np.array(
-        [[c.k_t, c.k_w, c.k_n, c.mu, c.preload] for c in _known(laws)], dtype=float
-    ).reshape(-1, 5)
+    check_arguments(structure.n, len(laws), outputs, start)
+    law = law_table(laws)
     operators, modes = step_operators(
         structure, gap_operator, law, load, omega, stepping.steps_per_period
     )
-    state = _initial_state(modes, gap_operator, law, start)
+    state = initial_state(modes, gap_operator, law, start)
     return _settle(structure, operators, modes, state, outputs, stepping)
 
 
@@ -296,9 +294,22 @@ def _known(laws: Sequence[ContactLaw]) -> list[ElasticCoulomb]:
     return [law for law in laws if isinstance(law, ElasticCoulomb)]
 
 
-def _initial_state(
+def law_table(laws: Sequence[ContactLaw]) -> FloatArray:
+    """Return (n_contacts, 5): k_t, k_w, k_n (N/m), mu, preload (N) of each contact.
+
+    Raises
+    ------
+    InputError
+        If a law is not elastic Coulomb.
+    """
+    rows = [[c.k_t, c.k_w, c.k_n, c.mu, c.preload] for c in _known(laws)]
+    return np.array(rows, dtype=float).reshape(-1, 5)
+
+
+def initial_state(
     modes: ModalCoordinates, gap_operator: Matrix, law: FloatArray, start: TransientStart
 ) -> StepState:
+    """Return the step's own form of a start, with its springs limited to what friction holds."""
     gap = gap_operator @ start.displacement
     normal = np.maximum(0.0, law[:, 4] - law[:, 2] * gap[2::3])
     limit = (law[:, 3] * normal)[:, None]
@@ -371,7 +382,8 @@ def _result(
     )
 
 
-def _check(n: int, n_contacts: int, outputs: IntArray, start: TransientStart) -> None:
+def check_arguments(n: int, n_contacts: int, outputs: IntArray, start: TransientStart) -> None:
+    """Refuse a start of another shape, and outputs that the structure does not have."""
     require_array("integrate: start.displacement", start.displacement, (n,))
     require_array("integrate: start.velocity", start.velocity, (n,))
     require_array("integrate: start.traction", start.traction, (n_contacts, 2))

@@ -169,7 +169,7 @@ def system_of(
         [i for i, label in enumerate(labels) if label.endswith(tables.loads.excitation_direction)]
     )
     return System(
-        joined, interface, outputs, alert_outputs=along, free=joined.dof_set("damper")
+        joined, interface, outputs, alert_dofs=outputs[along], free=joined.dof_set("damper")
     ), labels
 
 

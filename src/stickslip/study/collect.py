@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.harmonic.selection import FLOOR
+from stickslip.harmonic.support import Harmonics
 from stickslip.response.fields import Fields, Signals, fields, signals
 from stickslip.response.forced import ForcedPoint, ForcedProblem, accepted_pairs
 
@@ -70,7 +70,7 @@ class CaseResult:
         One period at the peak; None if nothing converged.
     report_output
         Position of the output whose peak counts.
-    low_order
+    low_harmonics
         Harmonics of the first passage.
     retention_shift
         Relative change of the peak amplitude and change of its frequency (Hz) with a tenth of the retention; NaN: not computed.
@@ -83,13 +83,13 @@ class CaseResult:
     peak: int
     signals: Signals | None
     report_output: int
-    low_order: int
+    low_harmonics: Harmonics
     retention_shift: tuple[float, float] = NO_SHIFT
 
     @property
     def points_low(self) -> int:
         """Number of accepted points with few harmonics."""
-        return sum(a.point.order == self.low_order for a in self.accepted)
+        return sum(a.point.support == self.low_harmonics for a in self.accepted)
 
     @property
     def peak_amplitude(self) -> float:
@@ -123,7 +123,7 @@ class CaseResult:
             float(branch[i].point.omega / HZ)
             for i in range(1, len(branch))
             if max(height[i - 1], height[i]) > JUMP * min(height[i - 1], height[i])
-            and branch[i - 1].point.order != branch[i].point.order
+            and branch[i - 1].point.support != branch[i].point.support
         ]
 
     @property
@@ -176,7 +176,14 @@ def collect(
     peak = _peak(accepted, report_output)
     period = None if peak < 0 else signals(problem, accepted[peak].point)
     return CaseResult(
-        ratio, excitation, tuple(points), accepted, peak, period, report_output, problem.sweep.low
+        ratio,
+        excitation,
+        tuple(points),
+        accepted,
+        peak,
+        period,
+        report_output,
+        problem.sweep.low_harmonics,
     )
 
 
@@ -186,19 +193,8 @@ def _accept(problem: ForcedProblem, point: ForcedPoint, low: ForcedPoint | None)
         return Accepted(point, low, found, None, float("nan"))
     if low is point:
         return Accepted(point, low, found, found, float("nan"))
-    below = fields(problem, low)
-    return Accepted(point, low, found, below, _real_error(problem, below, found))
-
-
-def _real_error(problem: ForcedProblem, low: Fields, high: Fields | None) -> float:
-    """Return the largest relative change of harmonic 1 over the outputs of the alert (Gastaldi & Berruti 2017, eq. 29), a fraction."""
-    if high is None:
-        return float("nan")
-    chosen = problem.system.alert_outputs
-    at = slice(None) if chosen is None else chosen
-    before, after = low.outputs[1, at], high.outputs[1, at]
-    relevant = np.abs(before) > FLOOR * np.abs(before).max(initial=0.0)
-    return float(np.max(np.abs(after - before)[relevant] / np.abs(before)[relevant], initial=0.0))
+    error = problem.real_error(low, point) if point.converged else float("nan")
+    return Accepted(point, low, found, fields(problem, low), error)
 
 
 def _peak(accepted: Sequence[Accepted], output: int) -> int:

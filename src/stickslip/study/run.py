@@ -123,8 +123,8 @@ def _run(run: _Run, *, verify_in_time: bool) -> RunSummary:
     files = [target, *(run.study.folder / name for name in (*MESHES, LOG))]
     return RunSummary(
         rows=tuple(row(r) for r in results),
-        low=case.sweep.low,
-        high=case.sweep.high,
+        low=case.sweep.low_harmonics[-1],
+        high=case.sweep.high_harmonics[-1],
         alerts=tuple(_alerts(case, results)),
         checks=tuple(checks),
         warnings=tuple(run.warnings),
@@ -235,7 +235,10 @@ def _warn_drift(run: _Run, problem: ForcedProblem, result: CaseResult) -> None:
 def _alerts(case: Case, results: Sequence[CaseResult]) -> list[str]:
     if case.sweep.selection != "jacobian_alert":
         return []
-    return [alert_sentence(r, 100 * case.sweep.threshold, case.sweep.high) for r in results]
+    return [
+        alert_sentence(r, 100 * case.sweep.threshold, case.sweep.high_harmonics[-1])
+        for r in results
+    ]
 
 
 def _write(
@@ -249,8 +252,8 @@ def _write(
         created=run.created,
         wall_seconds=perf_counter() - run.began,
         threshold_percent=100 * case.sweep.threshold,
-        low_order=case.sweep.low,
-        high_order=case.sweep.high,
+        low_order=case.sweep.low_harmonics[-1],
+        high_order=case.sweep.high_harmonics[-1],
         samples=case.sweep.samples,
         evaluator=case.sweep.evaluator,
         alert_explanation=" ".join(_alerts(case, results)),

@@ -213,7 +213,7 @@ def _check(case: Case, result: CaseResult, load_case: int, accepted: Accepted) -
     )
     if abs(check.difference_percent) <= LARGE:
         return check
-    order = MORE * max(case.sweep.high, point.order)
+    order = MORE * max(case.sweep.high_harmonics[-1], point.order)
     many = refined(case, result.ratio, point, order)
     if many is None:
         return replace(check, refined_order=order)

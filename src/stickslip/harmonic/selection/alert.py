@@ -1,21 +1,18 @@
-"""Which harmonics a frequency needs: the Jacobian Alert (Gastaldi & Berruti 2017, section 4)."""
+"""The prediction of the Jacobian Alert: how missing harmonics would change a solution (Gastaldi & Berruti 2017, section 4)."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
 
-from stickslip.arrays import FloatArray, IntArray
+from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve
 from stickslip.harmonic.structured import StructuredJacobian
-
-Solve = Callable[[FloatArray | StructuredJacobian, FloatArray], FloatArray | None]
 
 SILENCE = (
     1e-12  # contact forces of the missing harmonics, as a share of the load, that count as none
 )
-FLOOR = 1e-3  # outputs moving less than this share of the largest have no meaningful relative error
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,9 +22,11 @@ class Alert:
     Attributes
     ----------
     error
-        Predicted relative change of the first harmonic (eq. 22, as a fraction); infinite where the enlarged Jacobian is singular.
+        Predicted relative change (eq. 22, 23, as a fraction); infinite where the enlarged Jacobian is singular.
     worst
         Position, among the dofs asked for, of the dof with that error.
+    harmonic
+        The harmonic with that error.
     start
         Scaled unknowns ``q + Δq`` of the high-order problem.
     seconds_contact
@@ -36,6 +35,7 @@ class Alert:
 
     error: float
     worst: int
+    harmonic: int
     start: FloatArray
     seconds_contact: float
 
@@ -45,7 +45,7 @@ def jacobian_alert(
     high: HarmonicBalance,
     x: FloatArray,
     omega: float,
-    dofs: IntArray,
+    measure: ErrorMeasure,
     solve: Solve | None = None,
 ) -> Alert:
     """Predict how the missing harmonics would change a low-order solution.
@@ -61,9 +61,8 @@ def jacobian_alert(
         Scaled solution of `low`.
     omega
         Frequency, rad/s.
-    dofs
-        Structure dofs over which the largest relative change of harmonic 1 is taken; those that move less than a thousandth of the
-        largest are left out.
+    measure
+        Dofs and harmonics over which the largest relative change is taken.
     solve
         Solution of the enlarged system from its Jacobian and right side, None where there is none; by default by LU. The published method
         partitions the system by harmonics; a Krylov method with factors of each harmonic does, too.
@@ -72,21 +71,19 @@ def jacobian_alert(
     padded = high.unknowns(q)
     start = perf_counter()
     if _silent(low, high, padded, omega):
-        return Alert(0.0, 0, padded, perf_counter() - start)
+        return Alert(0.0, 0, measure.harmonics[0], padded, perf_counter() - start)
     at = high.linearise(padded, omega)
-    change = (solve or _solve_array)(at.jac, -at.residual)
+    change = (solve or solve_array)(at.jac, -at.residual)
     if change is None:
-        return Alert(np.inf, 0, padded, at.seconds_contact)
-    dq = high.coefficients(change)
-    before = np.abs(low.linear.recover(omega, q)[1, dofs])
-    moved = np.abs(low.linear.recover_change(omega, dq)[1, dofs])
-    relevant = before > FLOOR * before.max(initial=0.0)
-    error = np.where(relevant, moved / np.where(relevant, before, 1.0), 0.0)
-    worst = int(np.argmax(error))
-    return Alert(float(error[worst]), worst, padded + change, at.seconds_contact)
+        return Alert(np.inf, 0, measure.harmonics[0], padded, at.seconds_contact)
+    before = low.linear.recover(omega, q)
+    moved = low.linear.recover_change(omega, high.coefficients(change))
+    error, worst, harmonic = measure.change(before, moved)
+    return Alert(error, worst, harmonic, padded + change, at.seconds_contact)
 
 
-def _solve_array(jac: FloatArray | StructuredJacobian, right: FloatArray) -> FloatArray | None:
+def solve_array(jac: FloatArray | StructuredJacobian, right: FloatArray) -> FloatArray | None:
+    """Solve by LU factors; None where the matrix is singular."""
     try:
         return np.asarray(
             np.linalg.solve(jac if isinstance(jac, np.ndarray) else jac.dense(), right)
@@ -98,10 +95,13 @@ def _solve_array(jac: FloatArray | StructuredJacobian, right: FloatArray) -> Flo
 def _silent(low: HarmonicBalance, high: HarmonicBalance, padded: FloatArray, omega: float) -> bool:
     """Whether nothing acts on the missing harmonics, so that Δq = 0 without a factorisation.
 
-    The enlarged residual repeats the low-order one, which is zero, in its first rows; its other rows are loads and contact forces of
+    The enlarged residual repeats the low-order one, which is zero, in its rows; its other rows are loads and contact forces of
     the missing harmonics.
     """
-    if any(h > low.order for h in high.linear.load.harmonics):
+    missing = [h for h in high.harmonics if h not in low.harmonics]
+    load = high.linear.load.harmonics
+    if any(h in load and np.any(load[h]) for h in missing):
         return False
-    missing = high.contacts(padded, omega).coefficients[2 * low.order + 1 :]
-    return bool(np.max(np.abs(missing), initial=0.0) <= SILENCE * high.force_scale)
+    rows = [row for h in missing for row in (2 * h - 1, 2 * h)]
+    forces = high.contacts(padded, omega).coefficients[rows]
+    return bool(np.max(np.abs(forces), initial=0.0) <= SILENCE * high.force_scale)

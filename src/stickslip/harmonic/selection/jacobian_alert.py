@@ -1,0 +1,30 @@
+"""The Jacobian Alert as published (C. Gastaldi and T.M. Berruti, Int. J. Non-Linear Mechanics 92 (2017) 25-40, section 4)."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from stickslip.harmonic.selection.alert import jacobian_alert
+from stickslip.harmonic.selection.strategy import Step, Verdict
+
+
+@dataclass(frozen=True)
+class JacobianAlert:
+    """Repeat with all harmonics of the reference where the predicted error exceeds a threshold.
+
+    Parameters
+    ----------
+    threshold
+        Largest predicted error that is accepted, as a fraction.
+    """
+
+    verifies: ClassVar[bool] = True
+    threshold: float = 0.05
+
+    def judge(self, step: Step) -> Verdict:
+        """Predict the change that all harmonics would make."""
+        high = step.reference
+        if step.balance.harmonics == high.harmonics:
+            return Verdict(0.0, None, step.smallest)
+        alert = jacobian_alert(step.balance, high, step.x, step.omega, step.measure, step.solve)
+        again = high.harmonics if alert.error > self.threshold else None
+        return Verdict(alert.error, again, step.smallest, high.coefficients(alert.start))

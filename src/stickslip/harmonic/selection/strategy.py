@@ -1,0 +1,134 @@
+"""The seam of harmonic selection: what a strategy sees of a solved frequency, and what it says.
+
+A strategy is a frozen dataclass of its parameters with one method, `judge`. It is called once for every converged solution. What it
+answers serves both ways of going through the frequencies (Gastaldi & Berruti 2017, section 4.4): the *double passage*, in which a
+response with few harmonics is finished first and only the frequencies that need more are solved again; and the *single passage*, in
+which each frequency is settled, and the harmonics of the next one are chosen, before going on.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.structured import StructuredJacobian
+from stickslip.harmonic.support import Harmonics
+
+Solve = Callable[[FloatArray | StructuredJacobian, FloatArray], FloatArray | None]
+
+FLOOR = 1e-3  # dofs moving less than this share of the largest have no meaningful relative error
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorMeasure:
+    """The largest relative change over some dofs and harmonics (Gastaldi & Berruti 2017, eq. 22, 23 and 29).
+
+    Parameters
+    ----------
+    dofs
+        Dofs of the structure: outputs, contact dofs, chosen directions.
+    harmonics
+        Harmonics of which the change is taken: 1; 0 for the static part; those that the excitation drives.
+    """
+
+    dofs: IntArray
+    harmonics: tuple[int, ...] = (1,)
+
+    def change(self, before: ComplexArray, moved: ComplexArray) -> tuple[float, int, int]:
+        """Return the largest ``|moved| / |before|`` and the position of its dof and its harmonic.
+
+        Parameters
+        ----------
+        before, moved
+            (H+1, n_all) displacement of all dofs and its change, m. In each harmonic, dofs that move less than a thousandth of the
+            largest are left out.
+        """
+        own = np.array([h for h in self.harmonics if h < len(before)])
+        size = np.abs(before[own[:, None], self.dofs])
+        gone = np.abs(moved[own[:, None], self.dofs])
+        relevant = size > FLOOR * size.max(axis=1, initial=0.0, keepdims=True)
+        error = np.where(relevant, gone / np.where(relevant, size, 1.0), 0.0)
+        place = int(np.argmax(error))
+        row, column = divmod(place, self.dofs.size)
+        return float(error.reshape(-1)[place]), column, int(own[row])
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A converged solution at one frequency, as a strategy sees it.
+
+    Attributes
+    ----------
+    balance
+        The periodic problem with the harmonics of the solution.
+    reference
+        The same problem with the reference support ñH, beyond which no strategy goes.
+    smallest
+        Harmonics of the first passage, below which no strategy goes.
+    x
+        Scaled solution of `balance`.
+    omega, next_omega
+        Frequency of the solution and of the next step, rad/s; equal where there is no next one or it is not known.
+    measure
+        What an error is taken of.
+    solve
+        Solution of a linear system from its matrix and right side, None where there is none; None: LU factors.
+    before
+        Solution with fewer harmonics at the same frequency, where this one repeats it.
+    """
+
+    balance: HarmonicBalance
+    reference: HarmonicBalance
+    smallest: Harmonics
+    x: FloatArray
+    omega: float
+    next_omega: float
+    measure: ErrorMeasure
+    solve: Solve | None = None
+    before: "Step | None" = None
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What a strategy says of a solution.
+
+    Attributes
+    ----------
+    indicator
+        The number that was compared with the strategy's threshold: a predicted error, a share of energy, ...
+    again
+        Harmonics with which this frequency is to be solved again; None: the solution is accepted.
+    following
+        Harmonics with which the next frequency begins, in a single passage.
+    start
+        (H+1, n) coefficients from which the repeat starts, m; None: from the solution.
+    """
+
+    indicator: float
+    again: Harmonics | None
+    following: Harmonics
+    start: ComplexArray | None = None
+
+
+class Strategy(Protocol):
+    """What a passage through the frequencies needs of a strategy; frozen dataclasses implement it."""
+
+    @property
+    def threshold(self) -> float:
+        """Indicator above which more harmonics are asked for."""
+        ...
+
+    @property
+    def verifies(self) -> bool:
+        """Whether a verdict says how good the solution itself is, so that a double passage can be made of it.
+
+        Strategies that only foretell the next frequency, or raise the harmonics step by step, need a single passage.
+        """
+        ...
+
+    def judge(self, step: Step) -> Verdict:
+        """Say what a converged solution needs."""
+        ...

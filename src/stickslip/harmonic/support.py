@@ -1,0 +1,66 @@
+"""Harmonic supports: which harmonics a periodic motion keeps, and where their real coefficients stand."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.errors import input_error
+from stickslip.harmonic.fourier import padded, to_complex, to_real
+
+Harmonics = tuple[int, ...]  # growing, from 0: the static term is always kept
+
+
+def harmonics_of(chosen: int | Iterable[int], place: str = "harmonics") -> Harmonics:
+    """Return a support from the highest harmonic, or from a list of harmonics such as 1, 3, 5.
+
+    Parameters
+    ----------
+    chosen
+        Highest harmonic of all from 0 on, or the harmonics one by one; the static term is added.
+    place
+        Named in the error.
+
+    Raises
+    ------
+    InputError
+        If an entry is no integer, or is negative.
+    """
+    try:
+        given = range(chosen + 1) if isinstance(chosen, (int, np.integer)) else tuple(chosen)
+        whole = [int(h) for h in given]
+    except (TypeError, ValueError):
+        given, whole = (), [-1]
+    if any(h != w for h, w in zip(given, whole, strict=False)) or min(whole, default=-1) < 0:
+        raise input_error(
+            place,
+            f"must be the highest harmonic or a list of harmonics from 0 on, got {chosen!r}",
+            "5 keeps all up to the fifth; [1, 3, 5] keeps the odd ones and the static term.",
+        )
+    return tuple(sorted({0, *whole}))
+
+
+def is_full(harmonics: Harmonics) -> bool:
+    """Whether no harmonic up to the highest is left out."""
+    return len(harmonics) == harmonics[-1] + 1
+
+
+def rows_of(harmonics: Harmonics) -> IntArray:
+    """Return where the real coefficients of a support stand among those of all harmonics up to its highest."""
+    h = np.array(harmonics[1:], dtype=np.int64)
+    return np.concatenate([[0], np.stack([2 * h - 1, 2 * h], axis=1).reshape(-1)])
+
+
+def real_rows(coefficients: ComplexArray, harmonics: Harmonics) -> FloatArray:
+    """Return the (2 len(harmonics) - 1, ...) real rows of a support out of complex `coefficients` (H+1, ...), zeros where it has none."""
+    return to_real(padded(coefficients, harmonics[-1])[list(harmonics)])
+
+
+def complex_rows(rows: FloatArray, harmonics: Harmonics) -> ComplexArray:
+    """Return the (highest + 1, ...) complex coefficients of the real `rows` of a support; zeros at harmonics left out."""
+    kept = to_complex(rows)
+    if is_full(harmonics):
+        return kept
+    out = np.zeros((harmonics[-1] + 1, *rows.shape[1:]), dtype=complex)
+    out[list(harmonics)] = kept
+    return out
