@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from stickslip.harmonic.dlft import dynamic_lagrangian
     from stickslip.harmonic.dynamic_stiffness import condense
     from stickslip.harmonic.excitation import HarmonicLoad
+    from stickslip.harmonic.selection.jacobian_alert import JacobianAlert
     from stickslip.model.annulus import annular_sector
     from stickslip.model.axis import Axis
     from stickslip.model.beam import Beam, beam, rotating_beam
@@ -111,6 +112,7 @@ if TYPE_CHECKING:
     from stickslip.response.system import System
     from stickslip.response.tracking import PeakPoint, smallest_peak, track_peak
     from stickslip.response.transient import TimeStepping, TransientResult, integrate
+    from stickslip.response.verification import ReferenceCheck, verify_reference
     from stickslip.solve.newton import Newton, newton
     from stickslip.solve.status import Status
     from stickslip.study.run import run_study
@@ -150,6 +152,7 @@ _MODULES = {
     "stickslip.harmonic.dlft": ("dynamic_lagrangian",),
     "stickslip.harmonic.dynamic_stiffness": ("condense",),
     "stickslip.harmonic.excitation": ("HarmonicLoad",),
+    "stickslip.harmonic.selection.jacobian_alert": ("JacobianAlert",),
     "stickslip.model.annulus": ("annular_sector",),
     "stickslip.model.axis": ("Axis",),
     "stickslip.model.beam": ("Beam", "beam", "rotating_beam"),
@@ -223,6 +226,7 @@ _MODULES = {
     "stickslip.response.system": ("System",),
     "stickslip.response.tracking": ("PeakPoint", "smallest_peak", "track_peak"),
     "stickslip.response.transient": ("TimeStepping", "TransientResult", "integrate"),
+    "stickslip.response.verification": ("ReferenceCheck", "verify_reference"),
     "stickslip.solve.newton": ("Newton", "newton"),
     "stickslip.solve.status": ("Status",),
     "stickslip.study.run": ("run_study",),
@@ -237,31 +241,31 @@ __all__ = [
     "CubicSpring", "CyclicSector", "Dahl", "Deck", "Discretisation", "DiskProfile", "Dofs", "Drift",
     "ElasticCoulomb", "Fields", "FirstLoading", "FlatCurvedDamper", "ForcedPoint", "ForcedProblem",
     "FourParameter", "FrdResults", "FrequencyError", "FrequencyErrors", "GyroscopicModes",
-    "HarmonicLoad", "InputError", "Interface", "Interference", "Iwan", "Jenkins", "Material",
-    "ModelSummary", "Modes", "ModesBelow", "NastranResults", "Newton", "NodalDiameterMap",
-    "NodalField", "Pairing", "ParameterPoint", "PeakPoint", "Platform", "PolynomialSpring",
-    "Quadrature", "ReducedWheel", "RegularisedCoulomb", "RigidBody", "RigidCoulomb", "RigidPoint",
-    "RotatingSolid", "Safe", "Shroud", "Signals", "SingularError", "SolidMesh", "SpeedPolynomial",
-    "Status", "StickslipError", "Structure", "Study", "Surface", "Sweep", "System", "TimeStepping",
-    "TransientResult", "TunedWheel", "UniformBand", "UnilateralSpring", "Units", "Wave",
-    "__version__", "accepted_points", "annular_sector", "assemble_deck", "assemble_solid", "beam",
-    "blade_ring", "blisk_with_ring", "branch_in_parameter", "cached", "campbell", "chain",
-    "check_law", "compile_contacts", "condense", "contact_forces", "craig_bampton",
-    "cyclic_campbell", "cyclic_sector", "drift", "dynamic_lagrangian", "excited_wave", "fields",
-    "forced_problem", "forced_response", "frequency_errors", "gap_operator", "gyroscopic_modes",
-    "harmonic_balance", "in_relative_coordinates", "integrate", "join", "law_kernel",
-    "load_structure", "lumped", "mesh_blade_pair", "mesh_sector", "mistuned_blade_ring",
-    "modal_damping", "model_summary", "natural_frequencies", "neighbour_gaps",
-    "neighbour_interface", "newton", "nodal_diameter_map", "nodal_surface", "node_to_node",
-    "node_to_segment", "normal_modes", "paired_interface", "preload", "rayleigh_damping",
-    "read_abaqus_matrices", "read_ansys_archive", "read_ansys_full", "read_ansys_materials",
-    "read_ansys_results", "read_calculix_matrices", "read_deck", "read_frd", "read_matrix_files",
-    "read_model", "read_nastran_dmig", "read_nastran_op2", "read_nastran_op4", "read_study",
-    "reduce_interface", "reduced_wheel", "rigid_response", "rigid_surface", "rotating_beam",
-    "rotating_solid", "rubin", "run_study", "safe", "save_structure", "segment_to_segment",
-    "signals", "smallest_peak", "structural_damping", "structure_surface", "to_sectors", "to_waves",
-    "track_peak", "travelling_wave", "tuned_wheel", "wave", "wheel", "wheel_shape", "with_springs",
-    "write_deck", "write_mesh", "write_report",
+    "HarmonicLoad", "InputError", "Interface", "Interference", "Iwan", "JacobianAlert", "Jenkins",
+    "Material", "ModelSummary", "Modes", "ModesBelow", "NastranResults", "Newton",
+    "NodalDiameterMap", "NodalField", "Pairing", "ParameterPoint", "PeakPoint", "Platform",
+    "PolynomialSpring", "Quadrature", "ReducedWheel", "ReferenceCheck", "RegularisedCoulomb",
+    "RigidBody", "RigidCoulomb", "RigidPoint", "RotatingSolid", "Safe", "Shroud", "Signals",
+    "SingularError", "SolidMesh", "SpeedPolynomial", "Status", "StickslipError", "Structure",
+    "Study", "Surface", "Sweep", "System", "TimeStepping", "TransientResult", "TunedWheel",
+    "UniformBand", "UnilateralSpring", "Units", "Wave", "__version__", "accepted_points",
+    "annular_sector", "assemble_deck", "assemble_solid", "beam", "blade_ring", "blisk_with_ring",
+    "branch_in_parameter", "cached", "campbell", "chain", "check_law", "compile_contacts",
+    "condense", "contact_forces", "craig_bampton", "cyclic_campbell", "cyclic_sector", "drift",
+    "dynamic_lagrangian", "excited_wave", "fields", "forced_problem", "forced_response",
+    "frequency_errors", "gap_operator", "gyroscopic_modes", "harmonic_balance",
+    "in_relative_coordinates", "integrate", "join", "law_kernel", "load_structure", "lumped",
+    "mesh_blade_pair", "mesh_sector", "mistuned_blade_ring", "modal_damping", "model_summary",
+    "natural_frequencies", "neighbour_gaps", "neighbour_interface", "newton", "nodal_diameter_map",
+    "nodal_surface", "node_to_node", "node_to_segment", "normal_modes", "paired_interface",
+    "preload", "rayleigh_damping", "read_abaqus_matrices", "read_ansys_archive", "read_ansys_full",
+    "read_ansys_materials", "read_ansys_results", "read_calculix_matrices", "read_deck", "read_frd",
+    "read_matrix_files", "read_model", "read_nastran_dmig", "read_nastran_op2", "read_nastran_op4",
+    "read_study", "reduce_interface", "reduced_wheel", "rigid_response", "rigid_surface",
+    "rotating_beam", "rotating_solid", "rubin", "run_study", "safe", "save_structure",
+    "segment_to_segment", "signals", "smallest_peak", "structural_damping", "structure_surface",
+    "to_sectors", "to_waves", "track_peak", "travelling_wave", "tuned_wheel", "verify_reference",
+    "wave", "wheel", "wheel_shape", "with_springs", "write_deck", "write_mesh", "write_report",
 ]
 # fmt: on
 

@@ -2,14 +2,17 @@
 
 from dataclasses import dataclass
 from time import perf_counter
+from typing import Literal, get_args
 
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve
 from stickslip.harmonic.structured import StructuredJacobian
 
+Form = Literal["newton", "published"]
 SILENCE = (
     1e-12  # contact forces of the missing harmonics, as a share of the load, that count as none
 )
@@ -47,11 +50,13 @@ def jacobian_alert(
     omega: float,
     measure: ErrorMeasure,
     solve: Solve | None = None,
+    form: Form = "newton",
 ) -> Alert:
     """Predict how the missing harmonics would change a low-order solution.
 
     One Newton step in the larger space from the padded solution, ``Δq = -J̃⁻¹ r̃(q)``. Where the contact forces are homogeneous of
-    degree one this equals the published ``J̃ (q + Δq) = F`` (eq. 21); with preloads or gaps only the Newton form is right.
+    degree one this equals the published ``J̃ (q + Δq) = F`` (eq. 21), since then ``r̃ = J̃ q - F``; with preloads in contacts, gaps or
+    smooth laws only the Newton form is right.
 
     Parameters
     ----------
@@ -66,14 +71,23 @@ def jacobian_alert(
     solve
         Solution of the enlarged system from its Jacobian and right side, None where there is none; by default by LU. The published method
         partitions the system by harmonics; a Krylov method with factors of each harmonic does, too.
+    form
+        ``newton``, or ``published``: eq. 21 as it stands.
+
+    Raises
+    ------
+    InputError
+        If there is no such form.
     """
+    check_form(form)
     q = low.coefficients(x)
     padded = high.unknowns(q)
     start = perf_counter()
-    if _silent(low, high, padded, omega):
+    if form == "newton" and _silent(low, high, padded, omega):
         return Alert(0.0, 0, measure.harmonics[0], padded, perf_counter() - start)
     at = high.linearise(padded, omega)
-    change = (solve or solve_array)(at.jac, -at.residual)
+    right = -at.residual if form == "newton" else _published(high, at.jac, padded, omega)
+    change = (solve or solve_array)(at.jac, right)
     if change is None:
         return Alert(np.inf, 0, measure.harmonics[0], padded, at.seconds_contact)
     before = low.linear.recover(omega, q)
@@ -90,6 +104,25 @@ def solve_array(jac: FloatArray | StructuredJacobian, right: FloatArray) -> Floa
         )
     except np.linalg.LinAlgError:
         return None
+
+
+def check_form(form: str) -> None:
+    """Refuse a form of the prediction that does not exist."""
+    if form not in get_args(Form):
+        raise input_error(
+            "JacobianAlert: form",
+            f"{form!r} is none of {', '.join(get_args(Form))}",
+            "'newton' is right for every contact law.",
+        )
+
+
+def _published(
+    high: HarmonicBalance, jac: FloatArray | StructuredJacobian, padded: FloatArray, omega: float
+) -> FloatArray:
+    """Return ``F - J̃ q``, the right side of eq. 21 for Δq."""
+    load = high.linear_load(omega).reshape(-1) / high.force_scale
+    product = jac @ padded if isinstance(jac, np.ndarray) else jac.matvec(padded)
+    return np.asarray(load - product)
 
 
 def _silent(low: HarmonicBalance, high: HarmonicBalance, padded: FloatArray, omega: float) -> bool:

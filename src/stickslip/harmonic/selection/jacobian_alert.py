@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from stickslip.harmonic.selection.alert import jacobian_alert
+from stickslip.harmonic.selection.alert import Form, check_form, jacobian_alert
 from stickslip.harmonic.selection.strategy import Step, Verdict
 
 
@@ -15,16 +15,30 @@ class JacobianAlert:
     ----------
     threshold
         Largest predicted error that is accepted, as a fraction.
+    form
+        How the error is predicted: one ``newton`` step in the enlarged space, or eq. 21 as ``published``. They are the same where
+        contact forces are homogeneous of degree one.
+
+    Raises
+    ------
+    InputError
+        If there is no such form.
     """
 
     verifies: ClassVar[bool] = True
     threshold: float = 0.05
+    form: Form = "newton"
+
+    def __post_init__(self) -> None:
+        check_form(self.form)
 
     def judge(self, step: Step) -> Verdict:
         """Predict the change that all harmonics would make."""
         high = step.reference
         if step.balance.harmonics == high.harmonics:
             return Verdict(0.0, None, step.smallest)
-        alert = jacobian_alert(step.balance, high, step.x, step.omega, step.measure, step.solve)
+        alert = jacobian_alert(
+            step.balance, high, step.x, step.omega, step.measure, step.solve, self.form
+        )
         again = high.harmonics if alert.error > self.threshold else None
         return Verdict(alert.error, again, step.smallest, high.coefficients(alert.start))

@@ -1,0 +1,118 @@
+"""Whether the reference harmonics were enough: the alert from a solved response to twice as many (Gastaldi & Berruti 2017, section 6)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from stickslip.errors import input_error
+from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.selection.alert import Form, jacobian_alert
+from stickslip.harmonic.support import Harmonics, harmonics_of
+from stickslip.reduction.tuned_wheel import TunedWheel
+from stickslip.response.sweep import ForcedPoint, ForcedProblem
+
+SAMPLES_A_HARMONIC = 8
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceCheck:
+    """What harmonics beyond those of a solved point would change.
+
+    Attributes
+    ----------
+    omega
+        Frequency, rad/s.
+    kept, harmonics
+        Harmonics of the point, and those it was held against.
+    error
+        Predicted relative change, a fraction; infinite where the enlarged Jacobian is singular.
+    harmonic
+        The harmonic with that change.
+    dof, label
+        The dof with that change, and its name.
+    seconds_contact
+        Time of the contact evaluation.
+    """
+
+    omega: float
+    kept: Harmonics
+    harmonics: Harmonics
+    error: float
+    harmonic: int
+    dof: int
+    label: str
+    seconds_contact: float
+
+
+def verify_reference(
+    problem: ForcedProblem,
+    points: Sequence[ForcedPoint],
+    factor: int = 2,
+    form: Form = "newton",
+) -> tuple[ReferenceCheck, ...]:
+    """Predict at every solved point what all harmonics up to a multiple of the reference order would change.
+
+    One contact evaluation and one linear solution a point; nothing is iterated. Harmonics that the reference leaves out, such as
+    the even ones, are among those that it is held against.
+
+    Parameters
+    ----------
+    problem
+        The forced response (`forced_problem`).
+    points
+        Points of the response (`accepted_points`), with the reference support or fewer harmonics; those without a solution
+        are passed over.
+    factor
+        Highest harmonic of the check over that of the reference, at least 2.
+    form
+        Form of the prediction; see `jacobian_alert`.
+
+    Returns
+    -------
+    tuple of ReferenceCheck
+        One for each converged point, in their order. ``max(checks, key=lambda c: c.error)`` is the worst.
+
+    Raises
+    ------
+    InputError
+        If `factor` is below 2, or a tuned wheel has too few waves.
+    """
+    if factor != int(factor) or factor < 2:
+        raise input_error(
+            "verify_reference: factor",
+            f"must be an integer of at least 2, got {factor!r}",
+            "2 asks for twice as many harmonics as the reference has.",
+        )
+    enlarged = _enlarged(problem, int(factor))
+    return tuple(_check(problem, enlarged, point, form) for point in points if point.converged)
+
+
+def _enlarged(problem: ForcedProblem, factor: int) -> HarmonicBalance:
+    """Return the problem with all harmonics up to `factor` times the reference order, with samples enough for them."""
+    high = problem.high
+    harmonics = harmonics_of(factor * high.order)
+    linear = high.linear
+    if isinstance(problem.system.structure, TunedWheel):
+        linear = problem.system.condensed(linear.load, harmonics[-1])
+    samples = max(high.samples, SAMPLES_A_HARMONIC * harmonics[-1])
+    return replace(high, linear=linear, samples=samples).with_harmonics(harmonics)
+
+
+def _check(
+    problem: ForcedProblem, enlarged: HarmonicBalance, point: ForcedPoint, form: Form
+) -> ReferenceCheck:
+    own = problem.balance(point.support)
+    measure = problem.measure
+    alert = jacobian_alert(
+        own,
+        enlarged,
+        own.unknowns(point.coefficients),
+        point.omega,
+        measure,
+        problem.alert_solve,
+        form,
+    )
+    dof = int(measure.dofs[alert.worst])
+    return ReferenceCheck(
+        point.omega, point.support, enlarged.harmonics, alert.error, alert.harmonic, dof,
+        problem.system.structure.dofs.labels[dof], alert.seconds_contact,
+    )  # fmt: skip
