@@ -166,6 +166,23 @@ class CondensedStiffness:
         """Return the change of every dof (H+1, n_all) that a change `dq` of the retained coordinates causes."""
         return self._spread(omega, dq, np.zeros((dq.shape[0], self.interior.size), dtype=complex))
 
+    def output_rows(self, omega: float, harmonic: int, dofs: IntArray) -> ComplexArray:
+        """Return the (k, n) matrix that makes of a change of the retained coordinates in one harmonic that of `dofs` (k,)."""
+        place = np.full(self.retained.size + self.interior.size, -1)
+        place[self.retained] = np.arange(self.n)
+        rows = np.zeros((dofs.size, self.n), dtype=complex)
+        near = place[dofs] >= 0
+        rows[near, place[dofs[near]]] = 1.0
+        s = np.full((1, 1, 1), harmonic * omega)
+        read = self.modes[np.searchsorted(self.interior, dofs[~near])].T.astype(complex)
+        states = self.spectral.states if harmonic > 0 else None
+        if states is None:
+            solved = self._solve_interior(s, read[None], True)[0]
+        else:
+            solved = states.solve_transposed(1j * harmonic * omega, read)
+        rows[~near] = -(self._back(s)[0][0] @ solved).T
+        return rows
+
     def _spread(self, omega: float, q: ComplexArray, f_l: ComplexArray) -> ComplexArray:
         s = (np.arange(q.shape[0]) * omega)[:, None, None]
         d_ln, _ = self._back(s)

@@ -54,3 +54,7 @@ class DynamicStiffness(Protocol):
     def recover_change(self, omega: float, dq: ComplexArray) -> ComplexArray:
         """Return the change of every dof (H+1, n_all) that a change `dq` of the retained coordinates causes."""
         ...
+
+    def output_rows(self, omega: float, harmonic: int, dofs: IntArray) -> ComplexArray:
+        """Return the (k, n) matrix that makes of a change of the retained coordinates in one harmonic that of `dofs` (k,)."""
+        ...

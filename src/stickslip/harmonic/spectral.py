@@ -90,6 +90,11 @@ class StateSpace:
         amplitudes *= weight if right.ndim == 1 else weight[:, None]
         return np.asarray(self.forward @ amplitudes)
 
+    def solve_transposed(self, p: complex, right: ComplexArray) -> ComplexArray:
+        """Return ``D_LL⁻ᵀ right`` for `right` (l, k)."""
+        amplitudes = (self.forward.T @ right) / (1.0 - p * self.nu)[:, None]
+        return np.asarray(self.backward.T @ amplitudes)
+
 
 @dataclass(frozen=True, eq=False)
 class Poles:

@@ -74,6 +74,15 @@ class TravellingStiffness:
         all_dofs = self.retained.size + self.interior.size
         return self._spread(omega, dq, np.zeros((dq.shape[0], all_dofs), dtype=complex))
 
+    def output_rows(self, omega: float, harmonic: int, dofs: IntArray) -> ComplexArray:
+        """Return the (k, n) matrix that makes of a change of the retained coordinates in one harmonic that of `dofs` (k,)."""
+        D = self._dynamic(omega, harmonic)[0][harmonic]
+        near, far = self.retained, self.interior
+        spread = np.zeros((near.size + far.size, near.size), dtype=complex)
+        spread[near] = np.eye(near.size)
+        spread[far] = -np.linalg.solve(D[np.ix_(far, far)], D[np.ix_(far, near)])
+        return spread[dofs]
+
     def _spread(self, omega: float, q: ComplexArray, f: ComplexArray) -> ComplexArray:
         D, _ = self._dynamic(omega, q.shape[0] - 1)
         near, far = self.retained, self.interior
