@@ -44,6 +44,11 @@ if TYPE_CHECKING:
     from stickslip.harmonic.dynamic_stiffness import condense
     from stickslip.harmonic.excitation import HarmonicLoad
     from stickslip.harmonic.selection.jacobian_alert import JacobianAlert
+    from stickslip.harmonic.selection.similarity import (
+        JacobianSimilarity,
+        harmonic_block_norms,
+        jacobian_similarity,
+    )
     from stickslip.model.annulus import annular_sector
     from stickslip.model.axis import Axis
     from stickslip.model.beam import Beam, beam, rotating_beam
@@ -102,6 +107,7 @@ if TYPE_CHECKING:
     from stickslip.response.cyclic_campbell import cyclic_campbell
     from stickslip.response.drift import Drift, drift
     from stickslip.response.fields import Fields, Signals, fields, signals
+    from stickslip.response.floquet import Floquet
     from stickslip.response.forced import forced_response
     from stickslip.response.nodal_diameters import NodalDiameterMap, nodal_diameter_map
     from stickslip.response.parameter import Discretisation, ParameterPoint, branch_in_parameter
@@ -153,6 +159,11 @@ _MODULES = {
     "stickslip.harmonic.dynamic_stiffness": ("condense",),
     "stickslip.harmonic.excitation": ("HarmonicLoad",),
     "stickslip.harmonic.selection.jacobian_alert": ("JacobianAlert",),
+    "stickslip.harmonic.selection.similarity": (
+        "JacobianSimilarity",
+        "harmonic_block_norms",
+        "jacobian_similarity",
+    ),
     "stickslip.model.annulus": ("annular_sector",),
     "stickslip.model.axis": ("Axis",),
     "stickslip.model.beam": ("Beam", "beam", "rotating_beam"),
@@ -211,12 +222,14 @@ _MODULES = {
     "stickslip.response.cyclic_campbell": ("cyclic_campbell",),
     "stickslip.response.drift": ("Drift", "drift"),
     "stickslip.response.fields": ("Fields", "Signals", "fields", "signals"),
+    "stickslip.response.floquet": ("Floquet",),
     "stickslip.response.forced": ("forced_response",),
     "stickslip.response.nodal_diameters": ("NodalDiameterMap", "nodal_diameter_map"),
     "stickslip.response.parameter": ("Discretisation", "ParameterPoint", "branch_in_parameter"),
     "stickslip.response.preload": ("preload",),
     "stickslip.response.rigid": ("RigidPoint", "rigid_response"),
     "stickslip.response.safe": ("Interference", "Safe", "safe"),
+    "stickslip.response.shooting": ("ShootingResult", "shoot"),
     "stickslip.response.sweep": (
         "ForcedPoint",
         "ForcedProblem",
@@ -239,33 +252,35 @@ __all__ = [
     "Airfoil", "AnsysResults", "Axis", "Beam", "BladePair", "BladedSector", "Bonded", "BoucWen",
     "CalculixRun", "Campbell", "ComplianceForm", "ContactPoints", "CoupledCoulomb", "Crossing",
     "CubicSpring", "CyclicSector", "Dahl", "Deck", "Discretisation", "DiskProfile", "Dofs", "Drift",
-    "ElasticCoulomb", "Fields", "FirstLoading", "FlatCurvedDamper", "ForcedPoint", "ForcedProblem",
-    "FourParameter", "FrdResults", "FrequencyError", "FrequencyErrors", "GyroscopicModes",
-    "HarmonicLoad", "InputError", "Interface", "Interference", "Iwan", "JacobianAlert", "Jenkins",
-    "Material", "ModelSummary", "Modes", "ModesBelow", "NastranResults", "Newton",
-    "NodalDiameterMap", "NodalField", "Pairing", "ParameterPoint", "PeakPoint", "Platform",
-    "PolynomialSpring", "Quadrature", "ReducedWheel", "ReferenceCheck", "RegularisedCoulomb",
-    "RigidBody", "RigidCoulomb", "RigidPoint", "RotatingSolid", "Safe", "Shroud", "Signals",
-    "SingularError", "SolidMesh", "SpeedPolynomial", "Status", "StickslipError", "Structure",
-    "Study", "Surface", "Sweep", "System", "TimeStepping", "TransientResult", "TunedWheel",
-    "UniformBand", "UnilateralSpring", "Units", "Wave", "__version__", "accepted_points",
-    "annular_sector", "assemble_deck", "assemble_solid", "beam", "blade_ring", "blisk_with_ring",
-    "branch_in_parameter", "cached", "campbell", "chain", "check_law", "compile_contacts",
-    "condense", "contact_forces", "craig_bampton", "cyclic_campbell", "cyclic_sector", "drift",
-    "dynamic_lagrangian", "excited_wave", "fields", "forced_problem", "forced_response",
-    "frequency_errors", "gap_operator", "gyroscopic_modes", "harmonic_balance",
-    "in_relative_coordinates", "integrate", "join", "law_kernel", "load_structure", "lumped",
-    "mesh_blade_pair", "mesh_sector", "mistuned_blade_ring", "modal_damping", "model_summary",
-    "natural_frequencies", "neighbour_gaps", "neighbour_interface", "newton", "nodal_diameter_map",
-    "nodal_surface", "node_to_node", "node_to_segment", "normal_modes", "paired_interface",
-    "preload", "rayleigh_damping", "read_abaqus_matrices", "read_ansys_archive", "read_ansys_full",
-    "read_ansys_materials", "read_ansys_results", "read_calculix_matrices", "read_deck", "read_frd",
-    "read_matrix_files", "read_model", "read_nastran_dmig", "read_nastran_op2", "read_nastran_op4",
-    "read_study", "reduce_interface", "reduced_wheel", "rigid_response", "rigid_surface",
-    "rotating_beam", "rotating_solid", "rubin", "run_study", "safe", "save_structure",
-    "segment_to_segment", "signals", "smallest_peak", "structural_damping", "structure_surface",
-    "to_sectors", "to_waves", "track_peak", "travelling_wave", "tuned_wheel", "verify_reference",
-    "wave", "wheel", "wheel_shape", "with_springs", "write_deck", "write_mesh", "write_report",
+    "ElasticCoulomb", "Fields", "FirstLoading", "FlatCurvedDamper", "Floquet", "ForcedPoint",
+    "ForcedProblem", "FourParameter", "FrdResults", "FrequencyError", "FrequencyErrors",
+    "GyroscopicModes", "HarmonicLoad", "InputError", "Interface", "Interference", "Iwan",
+    "JacobianAlert", "JacobianSimilarity", "Jenkins", "Material", "ModelSummary", "Modes",
+    "ModesBelow", "NastranResults", "Newton", "NodalDiameterMap", "NodalField", "Pairing",
+    "ParameterPoint", "PeakPoint", "Platform", "PolynomialSpring", "Quadrature", "ReducedWheel",
+    "ReferenceCheck", "RegularisedCoulomb", "RigidBody", "RigidCoulomb", "RigidPoint",
+    "RotatingSolid", "Safe", "ShootingResult", "Shroud", "Signals", "SingularError", "SolidMesh",
+    "SpeedPolynomial", "Status", "StickslipError", "Structure", "Study", "Surface", "Sweep",
+    "System", "TimeStepping", "TransientResult", "TunedWheel", "UniformBand", "UnilateralSpring",
+    "Units", "Wave", "__version__", "accepted_points", "annular_sector", "assemble_deck",
+    "assemble_solid", "beam", "blade_ring", "blisk_with_ring", "branch_in_parameter", "cached",
+    "campbell", "chain", "check_law", "compile_contacts", "condense", "contact_forces",
+    "craig_bampton", "cyclic_campbell", "cyclic_sector", "drift", "dynamic_lagrangian",
+    "excited_wave", "fields", "forced_problem", "forced_response", "frequency_errors",
+    "gap_operator", "gyroscopic_modes", "harmonic_balance", "harmonic_block_norms",
+    "in_relative_coordinates", "integrate", "jacobian_similarity", "join", "law_kernel",
+    "load_structure", "lumped", "mesh_blade_pair", "mesh_sector", "mistuned_blade_ring",
+    "modal_damping", "model_summary", "natural_frequencies", "neighbour_gaps",
+    "neighbour_interface", "newton", "nodal_diameter_map", "nodal_surface", "node_to_node",
+    "node_to_segment", "normal_modes", "paired_interface", "preload", "rayleigh_damping",
+    "read_abaqus_matrices", "read_ansys_archive", "read_ansys_full", "read_ansys_materials",
+    "read_ansys_results", "read_calculix_matrices", "read_deck", "read_frd", "read_matrix_files",
+    "read_model", "read_nastran_dmig", "read_nastran_op2", "read_nastran_op4", "read_study",
+    "reduce_interface", "reduced_wheel", "rigid_response", "rigid_surface", "rotating_beam",
+    "rotating_solid", "rubin", "run_study", "safe", "save_structure", "segment_to_segment", "shoot",
+    "signals", "smallest_peak", "structural_damping", "structure_surface", "to_sectors", "to_waves",
+    "track_peak", "travelling_wave", "tuned_wheel", "verify_reference", "wave", "wheel",
+    "wheel_shape", "with_springs", "write_deck", "write_mesh", "write_report",
 ]
 # fmt: on
 

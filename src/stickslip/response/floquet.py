@@ -4,9 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray
 
-UNIT_TOLERANCE = 1e-6  # of 1: far above the rounding of a period, far below the damping of any structure
+UNIT_TOLERANCE = (
+    1e-6  # of 1: far above the rounding of a period, far below the damping of any structure
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +49,7 @@ class Floquet:
         return self.growth <= 1.0 + UNIT_TOLERANCE
 
     @property
-    def _neutral(self) -> FloatArray:
+    def _neutral(self) -> BoolArray:
         return np.asarray(np.abs(self.multipliers - 1.0) <= UNIT_TOLERANCE)
 
 

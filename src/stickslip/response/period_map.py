@@ -50,6 +50,25 @@ class Image:
 
 
 @dataclass(frozen=True, eq=False)
+class Derivative:
+    """One period from a state, with the derivative of where it ends by where it begins.
+
+    Parameters
+    ----------
+    image
+        The period.
+    monodromy
+        (size, size) derivative of its end; NaN if the motion overflowed.
+    grazing
+        Number of tangential springs that reached their limit without slipping, and were taken as sticking.
+    """
+
+    image: Image
+    monodromy: FloatArray
+    grazing: int
+
+
+@dataclass(frozen=True, eq=False)
 class PeriodMap:
     """The period map in coordinates whose square is an energy: modal displacement, velocity, spring force.
 
@@ -85,7 +104,7 @@ class PeriodMap:
     def state_of(self, step: StepState) -> FloatArray:
         """Return the coordinates of a state of the step."""
         motion = step.x[: 2 * self.modes.speed.size]
-        return self.scale * np.concatenate([motion, step.force[self.springs]])
+        return np.asarray(self.scale * np.concatenate([motion, step.force[self.springs]]))
 
     def image(self, state: FloatArray) -> Image:
         """March one period."""
@@ -93,21 +112,20 @@ class PeriodMap:
         failures = run_period(self.operators, step, self.work, record)
         return Image(self.state_of(step) * (np.nan if failures < 0 else 1.0), failures, record)
 
-    def derivative(self, state: FloatArray) -> tuple[Image, FloatArray]:
-        """March one period with its tangents; return also the (size, size) derivative of the map, the monodromy matrix."""
+    def derivative(self, state: FloatArray) -> Derivative:
+        """March one period with its tangents."""
         step, record = self.start_of(state), self._record()
         tangent = fresh_tangent(self._first_tangents(step), step.gap.size)
-        failures = run_tangent_period(
-            self.operators, self.linear, step, self.work, record, tangent
-        )
+        failures = run_tangent_period(self.operators, self.linear, step, self.work, record, tangent)
         lost = np.nan if failures < 0 else 1.0
         m, law = 2 * self.modes.speed.size, self.operators.law[:, :3].ravel()
         motion, beyond = tangent.state[:m], tangent.state[m:]
         forces = beyond + law[:, None] * (self.linear.gaps @ motion[: m // 2])
         matrix = np.vstack([motion, forces[self.springs]])
-        return (
+        return Derivative(
             Image(self.state_of(step) * lost, failures, record),
             lost * self.scale[:, None] * matrix / self.scale,
+            int(np.count_nonzero(tangent.grazed)),
         )
 
     def _record(self) -> StepRecord:

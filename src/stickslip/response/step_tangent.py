@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import FloatArray, IntArray
 from stickslip.response.time_step import (
     StepOperators,
     StepRecord,
@@ -22,8 +22,10 @@ from stickslip.response.time_step import (
     write_record,
 )
 
+OPEN = 0
 STUCK = 1  # the code of a contact that is closed, held both ways, and was closed before
 LANDING = 10  # and above: the gap closes within the step
+GRAZING = 1e-8  # of the limit: a spring that exceeds it by less is at its limit and does not slip
 
 
 class TangentOperators(NamedTuple):
@@ -31,6 +33,7 @@ class TangentOperators(NamedTuple):
 
     stuck: FloatArray  # (m, m + k): (motion, r) -> motion, with r unchanged over the step
     gaps: FloatArray  # (k, n): modal displacements -> gaps
+    hold: FloatArray  # (m, k): r at the end of the step -> motion
 
 
 class Tangent(NamedTuple):
@@ -38,8 +41,7 @@ class Tangent(NamedTuple):
 
     state: FloatArray  # (m + k, columns): of (motion, r)
     moved: FloatArray  # (m, columns): scratch
-    gap: FloatArray  # (k, columns): scratch
-    known: FloatArray  # (k, columns): scratch
+    grazed: IntArray  # (k,): how often a spring was at its limit without slipping
 
 
 def tangent_operators(ops: StepOperators, gaps: FloatArray) -> TangentOperators:
@@ -47,131 +49,128 @@ def tangent_operators(ops: StepOperators, gaps: FloatArray) -> TangentOperators:
     k, m = ops.hold.shape
     stuck = np.array(ops.transfer[:, :m].T)
     stuck[:, m : m + k] += ops.hold.T
-    return TangentOperators(np.ascontiguousarray(stuck), np.ascontiguousarray(gaps))
+    arrays = (stuck, gaps, ops.hold.T)
+    return TangentOperators(*(np.ascontiguousarray(array) for array in arrays))
 
 
 def fresh_tangent(state: FloatArray, k: int) -> Tangent:
     """Return `state` (m + k, columns) with its scratch arrays."""
-    columns = state.shape[1]
-    scratch = (np.zeros((rows, columns)) for rows in (len(state) - k, k, k))
-    return Tangent(np.array(state, dtype=float, order="C"), *scratch)
+    first = np.array(state, dtype=float, order="C")
+    return Tangent(first, np.zeros_like(first[: len(first) - k]), np.zeros(k, dtype=np.int64))
+
+
+@njit(cache=True)
+def _hold_grazing(c: int, before: StepState, law: FloatArray, work: StepWork, tan: Tangent) -> None:
+    """Take a spring that just reaches its limit as sticking.
+
+    A contact that stays closed and slips one way only cannot be in a periodic motion unless it slips by nothing: Newton
+    ends there exactly, and the next state is one in which it sticks.
+    """
+    if work.code[c] <= STUCK or work.code[c] >= LANDING:
+        return
+    for d in range(2):
+        row = 3 * c + d
+        trial = before.force[row] + law[d] * (work.gap[row] - before.gap[row])
+        limit = abs(law[3] * work.force[3 * c + 2])
+        slips = (work.code[c] - STUCK) // (1 if d == 0 else 3) % 3
+        if slips > 0 and abs(trial) - limit <= GRAZING * limit:
+            work.code[c] -= slips * (1 if d == 0 else 3)
+            work.slope[c, d, :] = 0.0
+            tan.grazed[row] += 1
 
 
 @njit(cache=True)
 def _given(
-    c: int, gap_before: FloatArray, law: FloatArray, work: StepWork, m: int, tan: Tangent, ops: TangentOperators
+    c: int,
+    gap_before: FloatArray,
+    law: FloatArray,
+    work: StepWork,
+    tan: Tangent,
+    ops: TangentOperators,
+    out: FloatArray,
 ) -> None:
-    """Write to ``known`` the derivative of the contact's r by what it was before the step."""
-    columns, n = tan.state.shape[1], ops.gaps.shape[1]
+    """Write to `out` (3, columns) the part of a contact's r that what was before the step decides."""
+    m = tan.moved.shape[0]
     normal, closed_by = law[4] - law[2] * work.gap[3 * c + 2], law[4] - law[2] * gap_before[2]
-    slips = work.code[c] - (LANDING if work.code[c] >= LANDING else STUCK)  # t in units, w in threes
-    for d in range(3):
-        row = tan.known[3 * c + d]
-        row[:] = 0.0
-        if work.code[c] == 0 or d == 2 or (d == 0 and slips % 3 > 0) or (d == 1 and slips > 2):
+    slips = work.code[c] - (
+        LANDING if work.code[c] >= LANDING else STUCK
+    )  # t in units, w in threes
+    for d in range(2):
+        if work.code[c] == OPEN or (d == 0 and slips % 3 > 0) or (d == 1 and slips > 2):
             continue
-        row[:] = tan.state[m + 3 * c + d]
+        out[d] = tan.state[m + 3 * c + d]
         if work.code[c] < LANDING:
             continue
-        # takes hold within the step: force = force before + share k (gap - gap before), see _contact
+        # takes hold within the step: force = force before + share k (gap - gap before), see time_step
         share = normal / (normal - closed_by)
         by_normal = -law[2] * normal / (normal - closed_by) ** 2
         travel = law[d] * (work.gap[3 * c + d] - gap_before[d])
-        for j in range(n):
+        for j in range(ops.gaps.shape[1]):
             factor = law[d] * (1.0 - share) * ops.gaps[3 * c + d, j]
             factor += travel * by_normal * ops.gaps[3 * c + 2, j]
-            for col in range(columns):
-                row[col] += factor * tan.state[j, col]
+            out[d] += factor * tan.state[j]
 
 
 @njit(cache=True)
-def _solve(matrix: FloatArray, right: FloatArray) -> None:
-    """Overwrite `right` (size, columns) with the solution; Gauss with row pivoting, of a small matrix."""
-    size, columns = right.shape
-    for j in range(size):
-        best = j
-        for i in range(j + 1, size):
-            if abs(matrix[i, j]) > abs(matrix[best, j]):
-                best = i
-        if best != j:
-            for i in range(size):
-                matrix[j, i], matrix[best, i] = matrix[best, i], matrix[j, i]
-            for col in range(columns):
-                right[j, col], right[best, col] = right[best, col], right[j, col]
-        for i in range(j + 1, size):
-            factor = matrix[i, j] / matrix[j, j]
-            if factor != 0.0:
-                for col in range(j + 1, size):
-                    matrix[i, col] -= factor * matrix[j, col]
-                for col in range(columns):
-                    right[i, col] -= factor * right[j, col]
-    for i in range(size - 1, -1, -1):
-        for j in range(i + 1, size):
-            for col in range(columns):
-                right[i, col] -= matrix[i, j] * right[j, col]
-        for col in range(columns):
-            right[i, col] /= matrix[i, i]
+def _active(before: StepState, ops: StepOperators, work: StepWork, tan: Tangent) -> IntArray:
+    """Return the contacts whose force beyond the stuck springs may change over the step."""
+    found = np.empty(work.code.size, dtype=np.int64)
+    count = 0
+    for c in range(work.code.size):
+        _hold_grazing(c, before, ops.law[c], work, tan)
+        closed_by = ops.law[c, 4] - ops.law[c, 2] * before.gap[3 * c + 2]
+        if work.code[c] != STUCK or closed_by <= 0.0:
+            found[count] = c
+            count += 1
+    return found[:count]
 
 
 @njit(cache=True)
 def _contact_changes(
-    active: FloatArray, ops: StepOperators, work: StepWork, m: int, tan: Tangent
-) -> None:
-    """Replace ``known`` of the active contacts by the change of their r over the step."""
-    size, columns = 3 * active.size, tan.state.shape[1]
-    matrix, right = np.empty((size, size)), np.zeros((size, columns))
-    where = np.empty(size, dtype=np.int64)
-    for a in range(active.size):
-        for d in range(3):
-            where[3 * a + d] = 3 * active[a] + d
+    rows: IntArray, given: FloatArray, gaps: FloatArray, ops: StepOperators, work: StepWork
+) -> FloatArray:
+    """Return the change of r over the step at active `rows`.
+
+    ``dr = slope dg + given`` in each contact, with ``dg = gaps + response dr`` over all active ones.
+    """
+    size = rows.size
+    response, slope = np.empty((size, size)), np.zeros((size, size))
     for i in range(size):
-        tan.known[where[i]] -= tan.state[m + where[i]]
-    for i in range(size):
-        right[i] = tan.gap[where[i]]
         for j in range(size):
-            response = ops.response[where[j], where[i]]
-            right[i] += response * tan.known[where[j]]
-            total = 1.0 if i == j else 0.0
-            for d in range(3):
-                total -= ops.response[3 * active[j // 3] + d, where[i]] * work.slope[active[j // 3], d, j % 3]
-            matrix[i, j] = total
-    _solve(matrix, right)
-    for a in range(active.size):
-        for d in range(3):
-            for e in range(3):
-                slope = work.slope[active[a], d, e]
-                if slope != 0.0:
-                    tan.known[3 * active[a] + d] += slope * right[3 * a + e]
+            response[i, j] = ops.response[rows[j], rows[i]]
+            if i // 3 == j // 3:
+                slope[i, j] = work.slope[rows[i] // 3, i % 3, j % 3]
+    moved = np.linalg.solve(np.eye(size) - np.dot(response, slope), gaps + np.dot(response, given))
+    return np.asarray(given + np.dot(slope, moved))
 
 
 @njit(cache=True)
 def advance_tangent(
     ops: StepOperators,
     linear: TangentOperators,
-    gap_before: FloatArray,
+    before: StepState,
     work: StepWork,
     tan: Tangent,
 ) -> None:
     """Carry the tangents over the step that `work` has just solved."""
     m, n = tan.moved.shape[0], linear.gaps.shape[1]
+    active = _active(before, ops, work, tan)
     np.dot(linear.stuck, tan.state, tan.moved)
-    active = np.empty(work.code.size, dtype=np.int64)
-    count = 0
-    for c in range(work.code.size):
-        closed_by = ops.law[c, 4] - ops.law[c, 2] * gap_before[3 * c + 2]
-        if work.code[c] != STUCK or closed_by <= 0.0:
-            active[count] = c
-            count += 1
-            _given(c, gap_before[3 * c : 3 * c + 3], ops.law[c], work, m, tan, linear)
-    if count > 0:
-        np.dot(linear.gaps, tan.moved[:n], tan.gap)
-        _contact_changes(active[:count], ops, work, m, tan)
-    for a in range(count):
-        for d in range(3):
-            i = 3 * active[a] + d
-            tan.state[m + i] += tan.known[i]
-            for row in range(m):
-                tan.moved[row] += ops.hold[i, row] * tan.known[i]
+    if active.size > 0:
+        rows = np.empty(3 * active.size, dtype=np.int64)
+        given = np.zeros((rows.size, tan.state.shape[1]))
+        for a in range(active.size):
+            c = active[a]
+            gap_before = before.gap[3 * c : 3 * c + 3]
+            for d in range(3):
+                rows[3 * a + d] = 3 * c + d
+            _given(c, gap_before, ops.law[c], work, tan, linear, given[3 * a : 3 * a + 3])
+        gaps = np.dot(linear.gaps[rows], tan.moved[:n])
+        beyond = m + rows
+        change = _contact_changes(rows, given - tan.state[beyond], gaps, ops, work)
+        for i in range(rows.size):
+            tan.state[beyond[i]] += change[i]
+        tan.moved[:] += np.dot(linear.hold[:, rows], change)
     tan.state[:m] = tan.moved
 
 
@@ -186,14 +185,15 @@ def run_tangent_period(
 ) -> int:
     """Advance `state` and its tangents by one period; return what `run_period` returns."""
     moved = np.empty(ops.hold.shape[1] + ops.hold.shape[0])
-    gap_before = np.empty(state.gap.size)
+    before = StepState(state.x.copy(), state.gap.copy(), state.force.copy())
     failures = 0
     for step in range(record.motion.shape[0]):
-        gap_before[:] = state.gap
+        before.gap[:] = state.gap
+        before.force[:] = state.force
         if not advance(ops, state, work, step, moved):
             failures += 1
         write_record(record, state, step)
         if not np.isfinite(np.sum(state.x)):
             return -1
-        advance_tangent(ops, linear, gap_before, work, tan)
+        advance_tangent(ops, linear, before, work, tan)
     return failures

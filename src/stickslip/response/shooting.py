@@ -1,0 +1,240 @@
+"""Shooting: the periodic motion that the time integration settles to, by Newton's method on the period map.
+
+The map from a state to the state one period later is that of `integrate`, step for step; its derivative, the monodromy
+matrix, comes from tangents carried along the steps. The method finds unstable motions as well as stable ones, does not
+wait for undamped vibrations of a damper to die, and gives the Floquet multipliers.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.contact.law import ContactLaw
+from stickslip.model.structure import Structure
+from stickslip.response.floquet import Floquet, floquet
+from stickslip.response.period_map import Derivative, Image, PeriodMap, period_map
+from stickslip.response.propagator import PeriodicLoad
+from stickslip.response.settling import period_harmonics
+from stickslip.response.transient import TimeStepping, TransientStart, check_arguments, rest
+
+ShootingStatus = Literal["converged", "not converged", "diverged"]
+TOLERANCE = (
+    1e-9  # of the distance to the orbit, relative to its vibration, where no stepping is given
+)
+MOST_CORRECTIONS = 40
+WARM_UP = (
+    2  # periods before the first correction: slipping contacts forget what the start got wrong
+)
+SHORTEST = 1.0 / 16.0  # part of a correction, tried before it is given up
+FALLBACK = 8  # plain periods where no part of a correction comes nearer to an orbit
+SINGULAR = 1e-9  # of the largest singular value of (1 - monodromy): below it a direction is neutral
+
+
+@dataclass(frozen=True, eq=False)
+class ShootingResult:
+    """A periodic motion and what becomes of disturbances.
+
+    Parameters
+    ----------
+    status
+        ``converged``; ``not converged``: the corrections or the periods ran out, or there is no periodic motion nearby
+        (a drift); ``diverged``: the motion overflowed, and all arrays are NaN.
+    harmonics
+        (n_h + 1, n_outputs) complex amplitudes, m.
+    floquet
+        Multipliers of the motion, and how many of them are neutral.
+    grazing
+        Number of tangential springs that reach their limit without slipping: they have just shaken down, and the
+        multipliers are those of the side on which they stick.
+    periods
+        Periods marched, those with tangents among them.
+    corrections
+        Periods marched with tangents, which cost as much as some ten or twenty others.
+    residual
+        Distance of the state after a period from that before, relative to the vibration of the orbit.
+    distance
+        Length of the last correction, relative to the same.
+    contact_failures
+        Time steps of the last period in which the contact equations were not solved to rounding.
+    final
+        State at t = 0 and at the end of every period.
+    outputs
+        (steps, n_outputs) displacements at t = T/steps, 2T/steps, ... T; m.
+    gap, contact_force
+        (steps, n_contacts, 3) gaps (m) and forces ``T_t, T_w, -N`` (N) at the same times.
+    """
+
+    status: ShootingStatus
+    harmonics: ComplexArray
+    floquet: Floquet
+    grazing: int
+    periods: int
+    corrections: int
+    residual: float
+    distance: float
+    contact_failures: int
+    final: TransientStart
+    outputs: FloatArray
+    gap: FloatArray
+    contact_force: FloatArray
+
+    @property
+    def converged(self) -> bool:
+        """Whether the motion is periodic to the tolerance."""
+        return self.status == "converged"
+
+    @property
+    def stable(self) -> bool:
+        """Whether it is periodic and no small disturbance of it grows; neutral multipliers are not judged."""
+        return self.converged and self.floquet.stable
+
+
+@dataclass(slots=True)
+class _Search:
+    """Where the search for a fixed point stands."""
+
+    state: FloatArray
+    status: ShootingStatus = "not converged"
+    periods: int = 0
+    corrections: int = 0
+    distance: float = np.inf
+    derivative: Derivative | None = None
+
+
+def shoot(
+    structure: Structure,
+    gap_operator: Matrix,
+    laws: Sequence[ContactLaw],
+    load: PeriodicLoad,
+    omega: float,
+    outputs: IntArray,
+    start: TransientStart | None = None,
+    stepping: TimeStepping | None = None,
+) -> ShootingResult:
+    """Find a periodic motion of ``M ü + C u̇ + K u + gap_operatorᵀ λ = f(t)`` with the period of the load.
+
+    Newton's method on ``P(z) = z`` for the state z at t = 0, P being one period of the steps that `integrate` takes.
+    Where contacts stick for the whole period a family of motions exists, one for each residual traction, and the
+    derivative of ``P(z) - z`` is singular: the shortest correction is taken, which leads to a member nearby. The search
+    begins with plain periods; a correction that leads away from the orbit is shortened, and if that does not help
+    replaced by plain periods.
+
+    Parameters
+    ----------
+    structure, gap_operator, laws, load, omega, outputs
+        As in `integrate`.
+    start
+        State at t = 0, best that of a harmonic balance; rest if None.
+    stepping
+        Steps of a period, most periods, number of harmonics; `tolerance` bounds the length of the last correction
+        relative to the vibration. If None, 1024 steps and 1e-9.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong shape or value, or the mass matrix is singular.
+    """
+    stepping = stepping or TimeStepping(tolerance=TOLERANCE)
+    start = start or rest(structure.n, laws)
+    check_arguments(structure.n, len(laws), outputs, start)
+    steps = stepping.steps_per_period
+    mapping, state = period_map(structure, gap_operator, laws, load, omega, start, steps)
+    search = _Search(state)
+    _march(mapping, search, WARM_UP)
+    most = stepping.max_periods
+    while (
+        search.status == "not converged"
+        and search.corrections < MOST_CORRECTIONS
+        and search.periods < most
+    ):
+        _correct(mapping, search, stepping.tolerance)
+    return _result(mapping, search, outputs, stepping)
+
+
+def _march(mapping: PeriodMap, search: _Search, periods: int) -> None:
+    """Replace the state by that some plain periods later."""
+    for _ in range(periods):
+        image = mapping.image(search.state)
+        search.periods += 1
+        if image.failures < 0:
+            search.status = "diverged"
+            return
+        search.state = image.state
+
+
+def _correct(mapping: PeriodMap, search: _Search, tolerance: float) -> None:
+    """Take one Newton correction, or plain periods where it leads away."""
+    here = search.derivative = mapping.derivative(search.state)
+    image = here.image
+    search.periods += 1
+    search.corrections += 1
+    if image.failures < 0:
+        search.status = "diverged"
+        return
+    inverse = np.linalg.pinv(np.eye(mapping.size) - here.monodromy, rcond=SINGULAR)
+    defect = image.state - search.state
+    correction = inverse @ defect
+    vibration = _vibration(mapping, image)
+    length = float(np.linalg.norm(correction))
+    search.distance = length / vibration
+    if search.distance <= tolerance and np.linalg.norm(defect) <= tolerance * vibration:
+        search.state = search.state + correction
+        search.status = "converged"
+        return
+    share = 1.0
+    while share >= SHORTEST:
+        trial = search.state + share * correction
+        after = mapping.image(trial)
+        search.periods += 1
+        # in the measure of the correction itself, in which weakly damped directions count as much as others
+        nearer = np.linalg.norm(inverse @ (after.state - trial)) <= (1.0 - share / 4) * length
+        if nearer:
+            search.state = after.state
+            return
+        share /= 2
+    _march(mapping, search, FALLBACK)
+
+
+def _vibration(mapping: PeriodMap, image: Image) -> float:
+    """Return the size of the vibration over a period in the measure of the states; that of the state where there is none."""
+    n = mapping.modes.speed.size
+    swing = mapping.scale[:n] * np.std(image.record.motion, axis=0)
+    size = float(np.sqrt(2.0) * np.linalg.norm(swing))
+    return max(size, 1e-9 * float(np.linalg.norm(image.state)), np.finfo(float).tiny)
+
+
+def _result(
+    mapping: PeriodMap, search: _Search, outputs: IntArray, stepping: TimeStepping
+) -> ShootingResult:
+    """March the period that is reported."""
+    image = mapping.image(search.state)
+    status: ShootingStatus = "diverged" if image.failures < 0 else search.status
+    known = np.nan if status == "diverged" else 1.0
+    begin = mapping.start_of(search.state)
+    n = mapping.modes.speed.size
+    modal = period_harmonics(begin.x[:n], image.record.motion, stepping.harmonics)
+    displacement, velocity = mapping.modes.physical(begin.x[: 2 * n])
+    contacts = (stepping.steps_per_period, -1, 3)
+    found = search.derivative
+    monodromy = np.full((mapping.size, mapping.size), np.nan) if found is None else found.monodromy
+    return ShootingResult(
+        status=status,
+        harmonics=np.asarray(known * (modal @ mapping.modes.basis[outputs].T)),
+        floquet=floquet(known * monodromy),
+        grazing=0 if found is None else found.grazing,
+        periods=search.periods + 1,
+        corrections=search.corrections,
+        residual=known
+        * float(np.linalg.norm(image.state - search.state) / _vibration(mapping, image)),
+        distance=known * search.distance,
+        contact_failures=image.failures,
+        final=TransientStart(
+            known * displacement, known * velocity, known * begin.force.reshape(-1, 3)[:, :2]
+        ),
+        outputs=known * (image.record.motion @ mapping.modes.basis[outputs].T),
+        gap=known * image.record.gap.reshape(contacts),
+        contact_force=known * image.record.force.reshape(contacts),
+    )
