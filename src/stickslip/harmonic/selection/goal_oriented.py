@@ -1,0 +1,90 @@
+"""Harmonics chosen one by one by what each does to the outputs: a goal-oriented estimate of the error (see `adjoint`)."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray
+from stickslip.errors import input_error
+from stickslip.harmonic.selection.adjoint import (
+    Estimate,
+    Outputs,
+    contributions,
+    estimate,
+    outputs_of,
+)
+from stickslip.harmonic.selection.strategy import Step, Verdict
+from stickslip.harmonic.support import Harmonics
+
+GOALS = 8  # outputs with the largest errors by which harmonics are chosen
+
+
+@dataclass(frozen=True)
+class GoalOriented:
+    """Repeat with the harmonics that the outputs need where the bound of their error exceeds a threshold.
+
+    Parameters
+    ----------
+    threshold
+        Largest expected error that is accepted, as a fraction.
+    margin
+        Share of the threshold that the harmonics left out of a repeat may contribute, all taken together and without cancellation.
+    """
+
+    verifies: ClassVar[bool] = True
+    threshold: float = 0.05
+    margin: float = 0.1
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.margin <= 1.0:
+            raise input_error(
+                "GoalOriented.margin", f"must lie from 0 to 1, got {self.margin}", "0.1 is usual."
+            )
+
+    def judge(self, step: Step) -> Verdict:
+        """Estimate the error of the outputs, and choose the harmonics that make it."""
+        low, high = step.balance, step.reference
+        if low.harmonics == high.harmonics:
+            return Verdict(0.0, None, step.smallest)
+        before = low.linear.recover(step.omega, low.coefficients(step.x))
+        outputs = outputs_of(step.measure, before)
+        found = estimate(low, high, step.x, step.omega, outputs, step.solve)
+        again = None
+        if found.bound > self.threshold:
+            again = self._needed(step, outputs, found)
+        return Verdict(found.bound, again, step.smallest, high.coefficients(found.start))
+
+    def _needed(self, step: Step, outputs: Outputs, found: Estimate) -> Harmonics:
+        """Return the harmonics of the repeat."""
+        low, high = step.balance, step.reference
+        if found.mean is None:
+            return high.harmonics
+        worst = np.argsort(-found.bounds, kind="stable")[:GOALS]
+        some = Outputs(outputs.harmonics[worst], outputs.dofs[worst], outputs.amplitudes[worst])
+        missing = tuple(h for h in high.harmonics if h not in low.harmonics)
+        parts = contributions(low, high, step.omega, some, found)
+        chosen = chosen_harmonics(parts, missing, self.margin * self.threshold)
+        return tuple(sorted({*low.harmonics, *chosen}))
+
+
+def chosen_harmonics(parts: ComplexArray, missing: Harmonics, allowed: float) -> Harmonics:
+    """Return the missing harmonics with the largest parts, so many that those of the others stay below a limit together.
+
+    Parameters
+    ----------
+    parts
+        (k, n_missing) relative change of each output by each missing harmonic.
+    missing
+        The harmonics.
+    allowed
+        Largest sum of the sizes of the parts of one output that may be left out. One harmonic at least is chosen.
+    """
+    size = np.abs(parts)
+    order = np.argsort(-size.max(axis=0), kind="stable")
+    left = size.sum(axis=1)
+    count = 0
+    while count < len(missing) and (count == 0 or left.max() > allowed):
+        left = size[:, order[count + 1 :]].sum(axis=1)
+        count += 1
+    return tuple(sorted(missing[i] for i in order[:count]))
