@@ -158,9 +158,7 @@ class CondensedStiffness:
         q
             (H+1, n) coefficients of the retained coordinates.
         """
-        order = q.shape[0] - 1
-        _, f_l = self._loads(order)
-        return self._spread(omega, q, f_l)
+        return self._spread(omega, q, self._loads(q.shape[0] - 1)[1])
 
     def recover_change(self, omega: float, dq: ComplexArray) -> ComplexArray:
         """Return the change of every dof (H+1, n_all) that a change `dq` of the retained coordinates causes."""
@@ -183,20 +181,29 @@ class CondensedStiffness:
         rows[~near] = -(self._back(s)[0][0] @ solved).T
         return rows
 
+    def strain_energy(self, omega: float, q: ComplexArray) -> FloatArray:
+        """Return the (H+1,) strain energy of the whole structure in each harmonic, mean over the period, J."""
+        inner = self._inside(omega, q, self._loads(q.shape[0] - 1)[1])
+        outer = np.sum(q.conj() * (q @ self.nn[0].T + 2.0 * inner @ self.nl[0].T), axis=1).real
+        # the interior's modes have unit stiffness
+        share = 0.25 + 0.25 * (np.arange(len(q)) == 0)
+        return np.asarray(share * (outer + np.sum(np.abs(inner) ** 2, axis=1)))
+
     def _spread(self, omega: float, q: ComplexArray, f_l: ComplexArray) -> ComplexArray:
-        s = (np.arange(q.shape[0]) * omega)[:, None, None]
-        d_ln, _ = self._back(s)
-        right = f_l[:, :, None] - d_ln.transpose(0, 2, 1) @ q[:, :, None]
-        states = self.spectral.states if np.any(s) else None
-        if states is None:
-            moved = self._solve_interior(s, right)[:, :, 0]
-        else:
-            each = zip(1j * s[:, 0, 0], right[:, :, 0], strict=True)
-            moved = np.array([states.solve(p, own) for p, own in each])
         out = np.empty((q.shape[0], self.retained.size + self.interior.size), dtype=complex)
         out[:, self.retained] = q
-        out[:, self.interior] = moved @ self.modes.T
+        out[:, self.interior] = self._inside(omega, q, f_l) @ self.modes.T
         return out
+
+    def _inside(self, omega: float, q: ComplexArray, f_l: ComplexArray) -> ComplexArray:
+        """Return the (H+1, n_interior) modal coordinates of the interior."""
+        s = (np.arange(q.shape[0]) * omega)[:, None, None]
+        right = f_l[:, :, None] - self._back(s)[0].transpose(0, 2, 1) @ q[:, :, None]
+        states = self.spectral.states if np.any(s) else None
+        if states is None:
+            return self._solve_interior(s, right)[:, :, 0]
+        each = zip(1j * s[:, 0, 0], right[:, :, 0], strict=True)
+        return np.array([states.solve(p, own) for p, own in each])
 
     def _loads(self, order: int) -> tuple[ComplexArray, ComplexArray]:
         f_n, f_l = self._modal_load

@@ -2,7 +2,7 @@
 
 from typing import Protocol, Self
 
-from stickslip.arrays import ComplexArray, IntArray
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.spectral import Blocks
@@ -57,4 +57,8 @@ class DynamicStiffness(Protocol):
 
     def output_rows(self, omega: float, harmonic: int, dofs: IntArray) -> ComplexArray:
         """Return the (k, n) matrix that makes of a change of the retained coordinates in one harmonic that of `dofs` (k,)."""
+        ...
+
+    def strain_energy(self, omega: float, q: ComplexArray) -> FloatArray:
+        """Return the (H+1,) strain energy of the whole structure in each harmonic, mean over the period, J."""
         ...

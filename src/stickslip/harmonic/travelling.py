@@ -83,6 +83,13 @@ class TravellingStiffness:
         spread[far] = -np.linalg.solve(D[np.ix_(far, far)], D[np.ix_(far, near)])
         return spread[dofs]
 
+    def strain_energy(self, omega: float, q: ComplexArray) -> FloatArray:
+        """Return the (H+1,) strain energy of a sector in each harmonic, mean over the period, J."""
+        x = self.recover(omega, q)
+        bent = self._matrices[0][: len(x)] @ x[:, :, None]
+        twice = np.sum(x.conj() * bent[:, :, 0], axis=1).real
+        return np.asarray((0.25 + 0.25 * (np.arange(len(x)) == 0)) * twice)
+
     def _spread(self, omega: float, q: ComplexArray, f: ComplexArray) -> ComplexArray:
         D, _ = self._dynamic(omega, q.shape[0] - 1)
         near, far = self.retained, self.interior

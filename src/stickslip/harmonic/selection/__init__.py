@@ -8,6 +8,13 @@ from stickslip.harmonic.selection.strategy import Strategy
 # file → class
 STRATEGIES = {
     "jacobian_alert": "JacobianAlert",
+    "goal_oriented": "GoalOriented",
+    "grolet": "Grolet",
+    "jaumouille": "Jaumouille",
+    "laxalde": "Laxalde",
+    "maple": "Maple",
+    "suess_jacobian": "SuessJacobian",
+    "suess_spectral": "SuessSpectral",
 }
 
 

@@ -1,0 +1,41 @@
+"""One harmonic more until the strain energy stays (V. Jaumouillé, J.-J. Sinou and B. Petitjean, J. Sound Vib. 329 (2010) 4048-4067)."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from stickslip.harmonic.selection.spectrum import raised
+from stickslip.harmonic.selection.strategy import Step, Verdict
+
+
+@dataclass(frozen=True)
+class Jaumouille:
+    """Solve every frequency with one harmonic more until the strain energy of the structure hardly changes.
+
+    ``|E(nH) - E(nH + 1)| / E(nH)`` (Gastaldi & Berruti 2017, eq. 9), the energy mean over the period. Each frequency begins with the fewest harmonics.
+
+    Parameters
+    ----------
+    threshold
+        Largest relative change of the energy that is accepted; the review gives no number.
+    """
+
+    verifies: ClassVar[bool] = False
+    threshold: float = 0.01
+
+    def judge(self, step: Step) -> Verdict:
+        """Ask for one harmonic more where there is nothing to compare with, or where the comparison fails."""
+        before = step.before
+        if before is None:
+            return Verdict(np.nan, raised(step), step.smallest)
+        was, now = strain_energy(before), strain_energy(step)
+        change = abs(was - now) / was if was > 0.0 else 0.0
+        again = raised(step) if change > self.threshold else None
+        return Verdict(change, again, step.smallest)
+
+
+def strain_energy(step: Step) -> float:
+    """Return the strain energy of the whole structure, mean over the period, J."""
+    q = step.balance.coefficients(step.x)
+    return float(step.balance.linear.strain_energy(step.omega, q).sum())

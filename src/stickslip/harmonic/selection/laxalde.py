@@ -1,0 +1,51 @@
+"""Harmonics from the contact forces that they leave out (D. Laxalde, doctoral thesis, École Centrale de Lyon, 2007)."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.harmonic.fourier import to_complex
+from stickslip.harmonic.selection.spectrum import contacts_of_reference, up_to
+from stickslip.harmonic.selection.strategy import Step, Verdict
+
+
+@dataclass(frozen=True)
+class Laxalde:
+    """Keep so many harmonics at the next frequency that the contact forces of this one would be represented.
+
+    The error of ``nH`` harmonics is the mean over the period of what they leave of the contact forces in the time domain, absolute
+    and summed over the contacts (Gastaldi & Berruti 2017, eq. 8), here relative to what the static term leaves.
+
+    Parameters
+    ----------
+    threshold
+        Largest error of the forces that is accepted, a fraction; the review gives no number.
+    """
+
+    verifies: ClassVar[bool] = False
+    threshold: float = 0.05
+
+    def judge(self, step: Step) -> Verdict:
+        """Choose the lowest order whose error is small; this frequency is not solved again."""
+        errors = left_out(step)
+        orders = list(step.reference.harmonics)
+        own = errors[orders.index(step.balance.order)]
+        enough = [h for h, e in zip(orders, errors, strict=True) if e <= self.threshold]
+        return Verdict(float(own), None, up_to(step, min(enough, default=orders[-1])))
+
+
+def left_out(step: Step) -> FloatArray:
+    """Return what the reference's harmonics up to each of them leave of the contact forces, relative to what the static term leaves."""
+    period = contacts_of_reference(step)
+    force = period.force.reshape(-1, period.force.shape[2])
+    turn = np.exp(2j * np.pi * np.arange(force.shape[1]) / force.shape[1])
+    parts = to_complex(period.coefficients)
+    left, rest = [], force
+    for h in step.reference.harmonics:
+        rest = rest - np.real(parts[h][:, None] * turn**h)
+        left.append(float(np.mean(np.abs(rest), axis=1).sum()))
+    # forces that do not vibrate are represented by the static term
+    silent = left[0] <= np.finfo(float).eps * float(np.abs(force).sum())
+    return np.zeros(len(left)) if silent else np.array(left) / left[0]

@@ -1,0 +1,66 @@
+"""The missing harmonics from the forces of the present ones (D. Süß, M. Jerschl and K. Willner, Proc. IMAC XXXIV (2016))."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from stickslip.arrays import BoolArray, FloatArray
+from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.harmonic.selection.alert import solve_array
+from stickslip.harmonic.selection.spectrum import above, padded_solution, spectral_shares
+from stickslip.harmonic.selection.strategy import Step, Verdict
+
+
+@dataclass(frozen=True)
+class SuessSpectral:
+    """Keep at the next frequency the harmonics that have a share in the energy of the solution with its missing harmonics added.
+
+    The missing harmonics alone are solved for, what they do to the present ones is left out (Gastaldi & Berruti 2017, eq. 26; in
+    Newton's form, which holds with preloads and gaps, too).
+
+    Parameters
+    ----------
+    threshold
+        Share of the square of the motion above which a harmonic is kept; the review gives no number: 1e-4 is a hundredth of
+        the amplitude.
+    frozen
+        Leave the contact forces as they are while the missing harmonics grow (eq. 14): then their stiffness is that of the structure
+        alone.
+    """
+
+    verifies: ClassVar[bool] = False
+    threshold: float = 1e-4
+    frozen: bool = False
+
+    def judge(self, step: Step) -> Verdict:
+        """Add the missing harmonics; this frequency is not solved again. The indicator is their largest share."""
+        q = padded_solution(step)
+        missing = np.array([h not in step.balance.harmonics for h in step.reference.harmonics])
+        change = self._change(step, q, missing)
+        if change is None:  # all harmonics are kept where nothing can be foretold
+            return Verdict(float("inf"), None, step.reference.harmonics)
+        shares = spectral_shares(step.reference, q + change)
+        largest = float(np.max(shares[missing], initial=0.0))
+        return Verdict(largest, None, above(step, shares, self.threshold))
+
+    def _change(self, step: Step, q: FloatArray, missing: BoolArray) -> FloatArray | None:
+        """Return the change of all scaled unknowns, zero at the present harmonics."""
+        high = step.reference
+        change = np.zeros((high.n_rows, high.linear.n))
+        at = high.linearise(q, step.omega)
+        if self.frozen:
+            right = -to_complex(at.residual.reshape(change.shape))
+            found = np.zeros_like(right)
+            scale = high.force_scale / high.displacement_scale
+            for i in np.flatnonzero(missing):
+                block = high.linear_block(step.omega, high.harmonics[i])
+                found[i] = np.linalg.solve(block, scale * right[i])
+            return to_real(found).reshape(-1)
+        rows = np.append(missing[0], np.repeat(missing[1:], 2))
+        own = np.repeat(rows, high.linear.n)
+        part = solve_array(at.dense_jac()[np.ix_(own, own)], -at.residual[own])
+        if part is None:
+            return None
+        change[rows] = part.reshape(-1, high.linear.n)
+        return change.reshape(-1)
