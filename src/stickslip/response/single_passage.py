@@ -28,7 +28,7 @@ def single_passage(
     """Go through equally spaced frequencies and let the strategy choose the harmonics of each.
 
     A frequency whose solution asks for more is solved again with what it had and what it asks for; the last solution counts. One
-    that is not found is looked for once more with the reference support.
+    that is not found is looked for once more with the reference support, and at the end once more from the frequency above.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def single_passage(
     sweep = problem.sweep
     grid = [float(w) for w in np.linspace(*sweep.omega_range, sweep.frequencies or sweep.points)]
     stored = iter(done)
-    accepted: list[ForcedPoint] = []
+    last: list[ForcedPoint] = []
     harmonics = problem.low.harmonics
     for index, (omega, following) in enumerate(zip(grid, [*grid[1:], grid[-1]], strict=True)):
         before: Step | None = None
@@ -56,6 +56,7 @@ def single_passage(
             kept = next(stored, None)
             if kept is None:
                 balance = problem.balance(harmonics)
+                accepted = [p for p in last if p.converged]
                 solution = _solution(problem, load, balance, accepted, omega, start)
                 stage: Stage = "low" if first else "high"
                 point = forced_point(balance, solution, stage, index, omega, 0.0)
@@ -72,10 +73,29 @@ def single_passage(
                 )
             if again is None:
                 break
-            harmonics, before, start, first = again, step, verdict.start, False
-        if point.converged:
-            accepted.append(point)
+            own = point.coefficients if point.converged else None
+            start = own if verdict.start is None else verdict.start
+            harmonics, before, first = again, step, False
+        last.append(point)
         harmonics = verdict.following
+    yield from _from_above(problem, last, stored)
+
+
+def _from_above(
+    problem: ForcedProblem, last: list[ForcedPoint], stored: Iterator[ForcedPoint]
+) -> Iterator[ForcedPoint]:
+    """Look for frequencies that were not found once more, along the branch from the frequency above, the last ones first."""
+    for index in reversed(range(len(last) - 1)):
+        if last[index].converged or not last[index + 1].converged:
+            continue
+        began = perf_counter()
+        point = next(stored, None)
+        if point is None:
+            omega, balance = last[index].omega, problem.high
+            solution = along_branch(problem, last[index + 1], omega, balance).solution
+            point = forced_point(balance, solution, "high", index, omega, perf_counter() - began)
+            yield point
+        last[index] = point
 
 
 def _solution(
