@@ -22,7 +22,7 @@ from stickslip.response.sweep import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.solve.newton import Newton, newton
 from strategies.cases import CASES, HZ, SelectionCase
 from strategies.random_systems import HELD_OUT, random_two_blade_system
-from strategies.truth import Truth, low_order_points, truths
+from strategies.truth import Truth, judging_problem, low_order_points, truths
 from validation.models import b6_load, blade_damper_blade
 
 THRESHOLD = 0.05
@@ -101,7 +101,9 @@ def judged(problem: ForcedProblem, truth: Truth) -> Row:
     return Row(truth.error, alert, found.error, found.bound, weak)
 
 
-def repeats(problem: ForcedProblem, name: str, found: Sequence[Truth]) -> Cost:
+def repeats(
+    problem: ForcedProblem, judge: ForcedProblem, name: str, found: Sequence[Truth]
+) -> Cost:
     """Judge all points by a strategy and solve again what it asks for."""
     strategy = strategy_named(name, THRESHOLD)
     count = rows = iterations = lost = 0
@@ -128,7 +130,7 @@ def repeats(problem: ForcedProblem, name: str, found: Sequence[Truth]) -> Cost:
         iterations += solution.iterations
         if solution.status.converged:
             made = _point(balance, point, solution.x)
-            errors.append(problem.real_error(made, reference))
+            errors.append(judge.real_error(made, reference))
         else:
             lost += 1
     return Cost(count, rows, iterations, judging, solving, tuple(errors), lost)
@@ -195,7 +197,7 @@ def measured(cases: Iterable[SelectionCase]) -> tuple[list[Row], dict[str, Cost]
         found = [t for t in truths(case, low_order_points(case)) if t.reference is not None]
         rows += [judged(problem, t) for t in found]
         for name in names:
-            costs[name].append(repeats(problem, name, found))
+            costs[name].append(repeats(problem, judging_problem(case), name, found))
     return rows, {name: _sum(each) for name, each in costs.items()}
 
 

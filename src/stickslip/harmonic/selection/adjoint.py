@@ -8,6 +8,7 @@ of that step (the trapezoidal rule on the way) to third.
 """
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 import scipy.linalg
@@ -19,24 +20,46 @@ from stickslip.harmonic.selection.strategy import FLOOR, ErrorMeasure, Solve
 from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.support import Harmonics, rows_of
 
+Goal = Literal["motion", "amplitude"]
 SILENCE = 1e-12  # residual in the missing harmonics, as a share of the load, that counts as none
 SINGULAR = 1e-15  # smallest pivot over largest below which a Jacobian has no usable factors
 
 
 @dataclass(frozen=True, eq=False)
 class Outputs:
-    """Harmonics of dofs, one after the other, whose relative changes make the error."""
+    """Harmonics of dofs, one after the other, whose relative changes ``Δy / y`` make the error.
 
-    harmonics: IntArray  # (k,)
-    dofs: IntArray  # (k,)
-    amplitudes: FloatArray  # (k,) m
+    Their real parts are, to first order, relative changes of the amplitudes, and their imaginary parts changes of the phases in rad.
+
+    Attributes
+    ----------
+    harmonics, dofs
+        (k,) what the outputs are.
+    motion
+        (k,) complex displacement, m.
+    goal
+        ``motion``: relative changes are complex; ``amplitude``: only their real parts count.
+    """
+
+    harmonics: IntArray
+    dofs: IntArray
+    motion: ComplexArray
+    goal: Goal = "motion"
 
     def relative(self, change: ComplexArray) -> ComplexArray:
-        """Return the (k,) changes over the amplitudes from a change (H+1, n_all) of all dofs."""
-        return np.asarray(change[self.harmonics, self.dofs] / self.amplitudes)
+        """Return the (k,) relative changes from a change (H+1, n_all) of all dofs."""
+        return self.counted(change[self.harmonics, self.dofs] / self.motion)
+
+    def counted(self, change: ComplexArray) -> ComplexArray:
+        """Return what of the relative changes (k, ...) counts."""
+        return change.real.astype(complex) if self.goal == "amplitude" else change
+
+    def some(self, places: IntArray) -> "Outputs":
+        """Return the outputs at these places."""
+        return Outputs(self.harmonics[places], self.dofs[places], self.motion[places], self.goal)
 
 
-def outputs_of(measure: ErrorMeasure, before: ComplexArray) -> Outputs:
+def outputs_of(measure: ErrorMeasure, before: ComplexArray, goal: Goal = "motion") -> Outputs:
     """Return the outputs of a measure that move enough to have a relative error.
 
     Parameters
@@ -45,11 +68,14 @@ def outputs_of(measure: ErrorMeasure, before: ComplexArray) -> Outputs:
         Dofs and harmonics over which the largest relative change is taken.
     before
         (H+1, n_all) displacement of all dofs, m.
+    goal
+        What of their changes counts.
     """
     own = np.array([h for h in measure.harmonics if h < len(before)], dtype=np.int64)
-    size = np.abs(before[own[:, None], measure.dofs])
+    motion = before[own[:, None], measure.dofs]
+    size = np.abs(motion)
     row, column = np.nonzero(size > FLOOR * size.max(axis=1, initial=0.0, keepdims=True))
-    return Outputs(own[row], measure.dofs[column], size[row, column])
+    return Outputs(own[row], measure.dofs[column], motion[row, column], goal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +168,16 @@ class Estimate:
         return float(np.max(self.bounds, initial=0.0))
 
     @property
+    def doubt(self) -> float:
+        """Distance between both changes of the worst output over the second one: below 1 where they tell the same story."""
+        if not np.any(self.second):
+            return 0.0
+        worst = int(np.argmax(self.bounds))
+        size = float(np.abs(self.second[worst]))
+        away = float(np.abs(self.second[worst] - self.first[worst]))
+        return away / size if np.isfinite(size) and size > 0.0 else np.inf
+
+    @property
     def bounds(self) -> FloatArray:
         """(k,) size of the second change and its distance from the first one, by which the trapezoidal rule may be wrong."""
         size = np.abs(self.second)
@@ -229,10 +265,11 @@ def contributions(
             own = _rows(high.harmonics, (h,))
             alone[own] = -found.residual.reshape(alone.shape)[own]
             change = mean.solve(alone.reshape(-1))
-            known = change is not None
-            part = _relative(high, omega, outputs, change) if known else np.full(outputs.dofs.size, np.inf)  # fmt: skip
-            parts.append(part)
-    return np.array(parts).T
+            if change is None:
+                parts.append(np.full(outputs.dofs.size, complex(np.inf)))
+            else:
+                parts.append(_relative(high, omega, outputs, change))
+    return outputs.counted(np.array(parts).T)
 
 
 def _adjoints(
@@ -244,7 +281,7 @@ def _adjoints(
     for h in np.unique(outputs.harmonics):
         mine = np.flatnonzero(outputs.harmonics == h)
         row = high.linear.output_rows(omega, int(h), outputs.dofs[mine])
-        row *= high.displacement_scale / outputs.amplitudes[mine, None]
+        row *= high.displacement_scale / outputs.motion[mine, None]
         rows = _rows(high.harmonics, (int(h),))
         gradient[rows[0]][:, mine] = row.T
         if h > 0:  # Q = C - iS

@@ -1,7 +1,7 @@
 """Harmonics chosen one by one by what each does to the outputs: a goal-oriented estimate of the error (see `adjoint`)."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, get_args
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from stickslip.arrays import ComplexArray
 from stickslip.errors import input_error
 from stickslip.harmonic.selection.adjoint import (
     Estimate,
+    Goal,
     Outputs,
     contributions,
     estimate,
@@ -18,6 +19,7 @@ from stickslip.harmonic.selection.strategy import Step, Verdict
 from stickslip.harmonic.support import Harmonics
 
 GOALS = 8  # outputs with the largest errors by which harmonics are chosen
+NOTHING = 1e-6  # relative change that is no reason to keep a harmonic
 
 
 @dataclass(frozen=True)
@@ -30,16 +32,25 @@ class GoalOriented:
         Largest expected error that is accepted, as a fraction.
     margin
         Share of the threshold that the harmonics left out of a repeat may contribute, all taken together and without cancellation.
+    goal
+        What is to be right of an output: its ``motion``, amplitude and phase as in the Jacobian Alert, or its ``amplitude`` alone.
     """
 
     verifies: ClassVar[bool] = True
     threshold: float = 0.05
-    margin: float = 0.1
+    margin: float = 0.2
+    goal: Goal = "motion"
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.margin <= 1.0:
             raise input_error(
-                "GoalOriented.margin", f"must lie from 0 to 1, got {self.margin}", "0.1 is usual."
+                "GoalOriented.margin", f"must lie from 0 to 1, got {self.margin}", "0.2 is usual."
+            )
+        if self.goal not in get_args(Goal):
+            raise input_error(
+                "GoalOriented.goal",
+                f"{self.goal!r} is none of {', '.join(get_args(Goal))}",
+                "'motion' is what the Jacobian Alert judges.",
             )
 
     def judge(self, step: Step) -> Verdict:
@@ -48,7 +59,7 @@ class GoalOriented:
         if low.harmonics == high.harmonics:
             return Verdict(0.0, None, step.smallest)
         before = low.linear.recover(step.omega, low.coefficients(step.x))
-        outputs = outputs_of(step.measure, before)
+        outputs = outputs_of(step.measure, before, self.goal)
         found = estimate(low, high, step.x, step.omega, outputs, step.solve)
         again = None
         if found.bound > self.threshold:
@@ -61,10 +72,11 @@ class GoalOriented:
         if found.mean is None:
             return high.harmonics
         worst = np.argsort(-found.bounds, kind="stable")[:GOALS]
-        some = Outputs(outputs.harmonics[worst], outputs.dofs[worst], outputs.amplitudes[worst])
         missing = tuple(h for h in high.harmonics if h not in low.harmonics)
-        parts = contributions(low, high, step.omega, some, found)
-        chosen = chosen_harmonics(parts, missing, self.margin * self.threshold)
+        parts = contributions(low, high, step.omega, outputs.some(worst), found)
+        # parts add up in a linear problem: the farther this one is from one, the fewer are left out
+        allowed = self.margin * self.threshold * max(1.0 - found.doubt, 0.0)
+        chosen = chosen_harmonics(parts, missing, max(allowed, NOTHING))
         return tuple(sorted({*low.harmonics, *chosen}))
 
 
