@@ -131,7 +131,7 @@ class HarmonicBalance:
         gaps[rows_of(self.harmonics)] = kept
         return gaps
 
-    def _forces(self, x: FloatArray, omega: float) -> ContactPeriod:
+    def forces(self, x: FloatArray, omega: float) -> ContactPeriod:
         """Return what the equations ask of the contacts: coefficients and derivatives, of the harmonics kept."""
         period = contact_forces(self._gaps(x), self.compiled, self.samples, omega, history=False)
         if is_full(self.harmonics):
@@ -143,10 +143,16 @@ class HarmonicBalance:
             period, coefficients=period.coefficients[own], blocks=blocks, by_omega=by_omega
         )
 
-    def linearise(self, x: FloatArray, omega: float) -> Linearisation:
-        """Return residual, Jacobian and ω-derivative at scaled unknowns `x` (size,) and `omega` (rad/s)."""
+    def linearise(
+        self, x: FloatArray, omega: float, period: ContactPeriod | None = None
+    ) -> Linearisation:
+        """Return residual, Jacobian and ω-derivative at scaled unknowns `x` (size,) and `omega` (rad/s).
+
+        Contacts are not evaluated where their `period` at `x` is known, from `forces`.
+        """
         start = perf_counter()
-        period = self._forces(x, omega)
+        if period is None:
+            period = self.forces(x, omega)
         seconds = perf_counter() - start
         jac: FloatArray | StructuredJacobian
         if isinstance(self.linear, CondensedStiffness) and (

@@ -118,6 +118,13 @@ class Sweep:
                 f"harmonics low = {self.low}, high = {self.high}",
                 "Give low at least harmonic 1, and high all of low and more.",
             )
+        taken = self.error_harmonics
+        if taken is not None and (len(taken) == 0 or not set(taken) <= set(low)):
+            raise input_error(
+                "Sweep.error_harmonics",
+                f"are {taken}, the first passage keeps {', '.join(map(str, low))}",
+                "A relative change needs harmonics that the first passage has; 0 is the static part.",
+            )
 
     @property
     def low_harmonics(self) -> Harmonics:

@@ -8,6 +8,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
+from stickslip.harmonic.aft import ContactPeriod
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve
 from stickslip.harmonic.structured import StructuredJacobian
@@ -83,17 +84,19 @@ def jacobian_alert(
     q = low.coefficients(x)
     padded = high.unknowns(q)
     start = perf_counter()
-    if form == "newton" and _silent(low, high, padded, omega):
-        return Alert(0.0, 0, measure.harmonics[0], padded, perf_counter() - start)
-    at = high.linearise(padded, omega)
+    period = high.forces(padded, omega)
+    seconds = perf_counter() - start
+    if form == "newton" and _silent(low, high, period):
+        return Alert(0.0, 0, measure.harmonics[0], padded, seconds)
+    at = high.linearise(padded, omega, period)
     right = -at.residual if form == "newton" else _published(high, at.jac, padded, omega)
     change = (solve or solve_array)(at.jac, right)
     if change is None:
-        return Alert(np.inf, 0, measure.harmonics[0], padded, at.seconds_contact)
-    before = low.linear.recover(omega, q)
-    moved = low.linear.recover_change(omega, high.coefficients(change))
+        return Alert(np.inf, 0, measure.harmonics[0], padded, seconds)
+    before = high.linear.recover(omega, q)
+    moved = high.linear.recover_change(omega, high.coefficients(change)[: len(q)])
     error, worst, harmonic = measure.change(before, moved)
-    return Alert(error, worst, harmonic, padded + change, at.seconds_contact)
+    return Alert(error, worst, harmonic, padded + change, seconds)
 
 
 def solve_array(jac: FloatArray | StructuredJacobian, right: FloatArray) -> FloatArray | None:
@@ -125,16 +128,16 @@ def _published(
     return np.asarray(load - product)
 
 
-def _silent(low: HarmonicBalance, high: HarmonicBalance, padded: FloatArray, omega: float) -> bool:
+def _silent(low: HarmonicBalance, high: HarmonicBalance, period: ContactPeriod) -> bool:
     """Whether nothing acts on the missing harmonics, so that Δq = 0 without a factorisation.
 
     The enlarged residual repeats the low-order one, which is zero, in its rows; its other rows are loads and contact forces of
     the missing harmonics.
     """
-    missing = [h for h in high.harmonics if h not in low.harmonics]
+    missing = [place for place, h in enumerate(high.harmonics) if h not in low.harmonics]
     load = high.linear.load.harmonics
-    if any(h in load and np.any(load[h]) for h in missing):
+    if any(high.harmonics[i] in load and np.any(load[high.harmonics[i]]) for i in missing):
         return False
-    rows = [row for h in missing for row in (2 * h - 1, 2 * h)]
-    forces = high.contacts(padded, omega).coefficients[rows]
+    rows = [row for place in missing for row in (2 * place - 1, 2 * place)]
+    forces = period.coefficients[rows]
     return bool(np.max(np.abs(forces), initial=0.0) <= SILENCE * high.force_scale)

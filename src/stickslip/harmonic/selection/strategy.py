@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.support import Harmonics
@@ -20,6 +21,8 @@ from stickslip.harmonic.support import Harmonics
 Solve = Callable[[FloatArray | StructuredJacobian, FloatArray], FloatArray | None]
 
 FLOOR = 1e-3  # dofs moving less than this share of the largest have no meaningful relative error
+# the same over all harmonics: below, a static part or a driven harmonic is what the solver left of zero
+NOISE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,10 +35,23 @@ class ErrorMeasure:
         Dofs of the structure: outputs, contact dofs, chosen directions.
     harmonics
         Harmonics of which the change is taken: 1; 0 for the static part; those that the excitation drives.
+
+    Raises
+    ------
+    InputError
+        If there are no dofs or no harmonics.
     """
 
     dofs: IntArray
     harmonics: tuple[int, ...] = (1,)
+
+    def __post_init__(self) -> None:
+        if self.dofs.size == 0 or not self.harmonics:
+            raise input_error(
+                "ErrorMeasure",
+                f"has {self.dofs.size} dofs and harmonics {self.harmonics}",
+                "Give dofs of the structure (System.outputs, System.alert_dofs) and one harmonic or more.",
+            )
 
     def change(self, before: ComplexArray, moved: ComplexArray) -> tuple[float, int, int]:
         """Return the largest ``|moved| / |before|`` and the position of its dof and its harmonic.
@@ -44,12 +60,14 @@ class ErrorMeasure:
         ----------
         before, moved
             (H+1, n_all) displacement of all dofs and its change, m. In each harmonic, dofs that move less than a thousandth of the
-            largest are left out.
+            largest are left out, and harmonics in which all move less than a millionth of the largest motion.
         """
         own = np.array([h for h in self.harmonics if h < len(before)])
         size = np.abs(before[own[:, None], self.dofs])
         gone = np.abs(moved[own[:, None], self.dofs])
-        relevant = size > FLOOR * size.max(axis=1, initial=0.0, keepdims=True)
+        largest = np.max(np.abs(before[:, self.dofs]))
+        floor = np.maximum(FLOOR * size.max(axis=1, keepdims=True), NOISE * largest)
+        relevant = size > floor
         error = np.where(relevant, gone / np.where(relevant, size, 1.0), 0.0)
         place = int(np.argmax(error))
         row, column = divmod(place, self.dofs.size)
