@@ -29,6 +29,8 @@ from stickslip.response.time_step import (
 )
 from stickslip.response.transient import TransientStart, initial_state, law_table
 
+OVERFLOW = 1e100
+
 
 @dataclass(frozen=True, eq=False)
 class Image:
@@ -109,24 +111,33 @@ class PeriodMap:
     def image(self, state: FloatArray) -> Image:
         """March one period."""
         step, record = self.start_of(state), self._record()
-        failures = run_period(self.operators, step, self.work, record)
-        return Image(self.state_of(step) * (np.nan if failures < 0 else 1.0), failures, record)
+        return self._ended(step, run_period(self.operators, step, self.work, record), record)
 
     def derivative(self, state: FloatArray) -> Derivative:
         """March one period with its tangents."""
         step, record = self.start_of(state), self._record()
         tangent = fresh_tangent(self._first_tangents(step), step.gap.size)
         failures = run_tangent_period(self.operators, self.linear, step, self.work, record, tangent)
-        lost = np.nan if failures < 0 else 1.0
+        image = self._ended(step, failures, record)
+        lost = np.nan if image.failures < 0 else 1.0
         m, law = 2 * self.modes.speed.size, self.operators.law[:, :3].ravel()
         motion, beyond = tangent.state[:m], tangent.state[m:]
         forces = beyond + law[:, None] * (self.linear.gaps @ motion[: m // 2])
         matrix = np.vstack([motion, forces[self.springs]])
         return Derivative(
-            Image(self.state_of(step) * lost, failures, record),
+            image,
             lost * self.scale[:, None] * matrix / self.scale,
             int(np.count_nonzero(tangent.grazed)),
         )
+
+    def _ended(self, step: StepState, failures: int, record: StepRecord) -> Image:
+        """Return the period that ends at `step`; all NaN if its squares would overflow."""
+        state = self.state_of(step)
+        if failures < 0 or not np.max(np.abs(state), initial=0.0) < OVERFLOW:
+            for array in (state, *record):
+                array.fill(np.nan)
+            failures = -1
+        return Image(state, failures, record)
 
     def _record(self) -> StepRecord:
         n, k = self.modes.speed.size, self.held.size

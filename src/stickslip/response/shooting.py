@@ -29,6 +29,7 @@ WARM_UP = (
     2  # periods before the first correction: slipping contacts forget what the start got wrong
 )
 SHORTEST = 1.0 / 16.0  # part of a correction, tried before it is given up
+CONTRACTION = 0.5  # a derivative is kept while a period, which costs far less, halves the distance
 FALLBACK = 8  # plain periods where no part of a correction comes nearer to an orbit
 SINGULAR = 1e-9  # of the largest singular value of (1 - monodromy): below it a direction is neutral
 
@@ -184,18 +185,39 @@ def _correct(mapping: PeriodMap, search: _Search, tolerance: float) -> None:
         search.state = search.state + correction
         search.status = "converged"
         return
-    share = 1.0
+    if not _approach(mapping, search, inverse, correction, tolerance * vibration):
+        _march(mapping, search, FALLBACK)
+
+
+def _approach(
+    mapping: PeriodMap,
+    search: _Search,
+    inverse: FloatArray,
+    correction: FloatArray,
+    close: float,
+) -> bool:
+    """Correct the state, and go on with the same derivative for as long as that pays; return whether it came nearer.
+
+    Distances are taken in the measure of the correction itself, in which weakly damped directions count as much as others.
+    """
+    length, share, nearer = float(np.linalg.norm(correction)), 1.0, False
+    state = search.state
     while share >= SHORTEST:
-        trial = search.state + share * correction
+        trial = state + share * correction
         after = mapping.image(trial)
         search.periods += 1
-        # in the measure of the correction itself, in which weakly damped directions count as much as others
-        nearer = np.linalg.norm(inverse @ (after.state - trial)) <= (1.0 - share / 4) * length
-        if nearer:
-            search.state = after.state
-            return
-        share /= 2
-    _march(mapping, search, FALLBACK)
+        following = inverse @ (after.state - trial)
+        left = float(np.linalg.norm(following))
+        if not left <= (1.0 - share / 4) * length:  # NaN where the motion overflowed
+            if nearer:
+                break
+            share /= 2
+            continue
+        search.state, nearer = after.state, True
+        if share < 1.0 or left > CONTRACTION * length or left <= close:
+            break
+        state, correction, length = trial, following, left
+    return nearer
 
 
 def _vibration(mapping: PeriodMap, image: Image) -> float:
