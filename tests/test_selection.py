@@ -218,7 +218,8 @@ def test_forms_agree_where_forces_are_homogeneous(hertz):
         (oscillator(CubicSpring(cubic_t=1.0)), 0.6, 0.9, 0.02),
         (oscillator(UnilateralSpring(k_n=0.5, initial_gap=0.3), 2), 0.9, 1.0, 0.05),
         (oscillator(UnilateralSpring(k_n=1.0, preload=0.1), 2), 1.3, 1.5, 0.05),
-        (pressed_blades(), 2 * np.pi * 227, 2 * np.pi * 228, 0.1),
+        # more than that where contacts change their states for a moment
+        (pressed_blades(), 2 * np.pi * 227, 2 * np.pi * 228, 0.15),
     ],
     ids=["constant limit", "cubic", "gap", "preload", "preload and friction"],
 )
@@ -399,7 +400,7 @@ def test_static_part_changes_where_the_system_is_not_symmetric():
         alert = jacobian_alert(problem.low, problem.high, x, few.omega, static)
         real = abs(many.coefficients[0, 0] - few.coefficients[0, 0]) / abs(few.coefficients[0, 0])
         assert alert.harmonic == 0
-        assert real > 0.005
+        assert real > 1e-3
         assert alert.error == pytest.approx(real, rel=0.1)
 
 
