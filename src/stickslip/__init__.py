@@ -43,12 +43,19 @@ if TYPE_CHECKING:
     from stickslip.harmonic.dlft import dynamic_lagrangian
     from stickslip.harmonic.dynamic_stiffness import condense
     from stickslip.harmonic.excitation import HarmonicLoad
+    from stickslip.harmonic.selection.grolet import Grolet
     from stickslip.harmonic.selection.jacobian_alert import JacobianAlert
+    from stickslip.harmonic.selection.jaumouille import Jaumouille
+    from stickslip.harmonic.selection.laxalde import Laxalde
+    from stickslip.harmonic.selection.maple import Maple
     from stickslip.harmonic.selection.similarity import (
         JacobianSimilarity,
         harmonic_block_norms,
         jacobian_similarity,
     )
+    from stickslip.harmonic.selection.strategy import ErrorMeasure, Step, Strategy, Verdict
+    from stickslip.harmonic.selection.suess_jacobian import SuessJacobian
+    from stickslip.harmonic.selection.suess_spectral import SuessSpectral
     from stickslip.model.annulus import annular_sector
     from stickslip.model.axis import Axis
     from stickslip.model.beam import Beam, beam, rotating_beam
@@ -114,6 +121,7 @@ if TYPE_CHECKING:
     from stickslip.response.preload import preload
     from stickslip.response.rigid import RigidPoint, rigid_response
     from stickslip.response.safe import Interference, Safe, safe
+    from stickslip.response.shooting import ShootingResult, shoot
     from stickslip.response.sweep import ForcedPoint, ForcedProblem, Sweep, forced_problem
     from stickslip.response.system import System
     from stickslip.response.tracking import PeakPoint, smallest_peak, track_peak
@@ -158,12 +166,19 @@ _MODULES = {
     "stickslip.harmonic.dlft": ("dynamic_lagrangian",),
     "stickslip.harmonic.dynamic_stiffness": ("condense",),
     "stickslip.harmonic.excitation": ("HarmonicLoad",),
+    "stickslip.harmonic.selection.grolet": ("Grolet",),
     "stickslip.harmonic.selection.jacobian_alert": ("JacobianAlert",),
+    "stickslip.harmonic.selection.jaumouille": ("Jaumouille",),
+    "stickslip.harmonic.selection.laxalde": ("Laxalde",),
+    "stickslip.harmonic.selection.maple": ("Maple",),
     "stickslip.harmonic.selection.similarity": (
         "JacobianSimilarity",
         "harmonic_block_norms",
         "jacobian_similarity",
     ),
+    "stickslip.harmonic.selection.strategy": ("ErrorMeasure", "Step", "Strategy", "Verdict"),
+    "stickslip.harmonic.selection.suess_jacobian": ("SuessJacobian",),
+    "stickslip.harmonic.selection.suess_spectral": ("SuessSpectral",),
     "stickslip.model.annulus": ("annular_sector",),
     "stickslip.model.axis": ("Axis",),
     "stickslip.model.beam": ("Beam", "beam", "rotating_beam"),
@@ -252,35 +267,37 @@ __all__ = [
     "Airfoil", "AnsysResults", "Axis", "Beam", "BladePair", "BladedSector", "Bonded", "BoucWen",
     "CalculixRun", "Campbell", "ComplianceForm", "ContactPoints", "CoupledCoulomb", "Crossing",
     "CubicSpring", "CyclicSector", "Dahl", "Deck", "Discretisation", "DiskProfile", "Dofs", "Drift",
-    "ElasticCoulomb", "Fields", "FirstLoading", "FlatCurvedDamper", "Floquet", "ForcedPoint",
-    "ForcedProblem", "FourParameter", "FrdResults", "FrequencyError", "FrequencyErrors",
-    "GyroscopicModes", "HarmonicLoad", "InputError", "Interface", "Interference", "Iwan",
-    "JacobianAlert", "JacobianSimilarity", "Jenkins", "Material", "ModelSummary", "Modes",
-    "ModesBelow", "NastranResults", "Newton", "NodalDiameterMap", "NodalField", "Pairing",
-    "ParameterPoint", "PeakPoint", "Platform", "PolynomialSpring", "Quadrature", "ReducedWheel",
-    "ReferenceCheck", "RegularisedCoulomb", "RigidBody", "RigidCoulomb", "RigidPoint",
-    "RotatingSolid", "Safe", "ShootingResult", "Shroud", "Signals", "SingularError", "SolidMesh",
-    "SpeedPolynomial", "Status", "StickslipError", "Structure", "Study", "Surface", "Sweep",
-    "System", "TimeStepping", "TransientResult", "TunedWheel", "UniformBand", "UnilateralSpring",
-    "Units", "Wave", "__version__", "accepted_points", "annular_sector", "assemble_deck",
-    "assemble_solid", "beam", "blade_ring", "blisk_with_ring", "branch_in_parameter", "cached",
-    "campbell", "chain", "check_law", "compile_contacts", "condense", "contact_forces",
-    "craig_bampton", "cyclic_campbell", "cyclic_sector", "drift", "dynamic_lagrangian",
-    "excited_wave", "fields", "forced_problem", "forced_response", "frequency_errors",
-    "gap_operator", "gyroscopic_modes", "harmonic_balance", "harmonic_block_norms",
-    "in_relative_coordinates", "integrate", "jacobian_similarity", "join", "law_kernel",
-    "load_structure", "lumped", "mesh_blade_pair", "mesh_sector", "mistuned_blade_ring",
-    "modal_damping", "model_summary", "natural_frequencies", "neighbour_gaps",
-    "neighbour_interface", "newton", "nodal_diameter_map", "nodal_surface", "node_to_node",
-    "node_to_segment", "normal_modes", "paired_interface", "preload", "rayleigh_damping",
-    "read_abaqus_matrices", "read_ansys_archive", "read_ansys_full", "read_ansys_materials",
-    "read_ansys_results", "read_calculix_matrices", "read_deck", "read_frd", "read_matrix_files",
-    "read_model", "read_nastran_dmig", "read_nastran_op2", "read_nastran_op4", "read_study",
-    "reduce_interface", "reduced_wheel", "rigid_response", "rigid_surface", "rotating_beam",
-    "rotating_solid", "rubin", "run_study", "safe", "save_structure", "segment_to_segment", "shoot",
-    "signals", "smallest_peak", "structural_damping", "structure_surface", "to_sectors", "to_waves",
-    "track_peak", "travelling_wave", "tuned_wheel", "verify_reference", "wave", "wheel",
-    "wheel_shape", "with_springs", "write_deck", "write_mesh", "write_report",
+    "ElasticCoulomb", "ErrorMeasure", "Fields", "FirstLoading", "FlatCurvedDamper", "Floquet",
+    "ForcedPoint", "ForcedProblem", "FourParameter", "FrdResults", "FrequencyError",
+    "FrequencyErrors", "Grolet", "GyroscopicModes", "HarmonicLoad", "InputError", "Interface",
+    "Interference", "Iwan", "JacobianAlert", "JacobianSimilarity", "Jaumouille", "Jenkins",
+    "Laxalde", "Maple", "Material", "ModelSummary", "Modes", "ModesBelow", "NastranResults",
+    "Newton", "NodalDiameterMap", "NodalField", "Pairing", "ParameterPoint", "PeakPoint",
+    "Platform", "PolynomialSpring", "Quadrature", "ReducedWheel", "ReferenceCheck",
+    "RegularisedCoulomb", "RigidBody", "RigidCoulomb", "RigidPoint", "RotatingSolid", "Safe",
+    "ShootingResult", "Shroud", "Signals", "SingularError", "SolidMesh", "SpeedPolynomial",
+    "Status", "Step", "StickslipError", "Strategy", "Structure", "Study", "SuessJacobian",
+    "SuessSpectral", "Surface", "Sweep", "System", "TimeStepping", "TransientResult", "TunedWheel",
+    "UniformBand", "UnilateralSpring", "Units", "Verdict", "Wave", "__version__", "accepted_points",
+    "annular_sector", "assemble_deck", "assemble_solid", "beam", "blade_ring", "blisk_with_ring",
+    "branch_in_parameter", "cached", "campbell", "chain", "check_law", "compile_contacts",
+    "condense", "contact_forces", "craig_bampton", "cyclic_campbell", "cyclic_sector", "drift",
+    "dynamic_lagrangian", "excited_wave", "fields", "forced_problem", "forced_response",
+    "frequency_errors", "gap_operator", "gyroscopic_modes", "harmonic_balance",
+    "harmonic_block_norms", "in_relative_coordinates", "integrate", "jacobian_similarity", "join",
+    "law_kernel", "load_structure", "lumped", "mesh_blade_pair", "mesh_sector",
+    "mistuned_blade_ring", "modal_damping", "model_summary", "natural_frequencies",
+    "neighbour_gaps", "neighbour_interface", "newton", "nodal_diameter_map", "nodal_surface",
+    "node_to_node", "node_to_segment", "normal_modes", "paired_interface", "preload",
+    "rayleigh_damping", "read_abaqus_matrices", "read_ansys_archive", "read_ansys_full",
+    "read_ansys_materials", "read_ansys_results", "read_calculix_matrices", "read_deck", "read_frd",
+    "read_matrix_files", "read_model", "read_nastran_dmig", "read_nastran_op2", "read_nastran_op4",
+    "read_study", "reduce_interface", "reduced_wheel", "rigid_response", "rigid_surface",
+    "rotating_beam", "rotating_solid", "rubin", "run_study", "safe", "save_structure",
+    "segment_to_segment", "shoot", "signals", "smallest_peak", "structural_damping",
+    "structure_surface", "to_sectors", "to_waves", "track_peak", "travelling_wave", "tuned_wheel",
+    "verify_reference", "wave", "wheel", "wheel_shape", "with_springs", "write_deck", "write_mesh",
+    "write_report",
 ]
 # fmt: on
 
