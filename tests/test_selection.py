@@ -401,7 +401,8 @@ def test_static_part_changes_where_the_system_is_not_symmetric():
         real = abs(many.coefficients[0, 0] - few.coefficients[0, 0]) / abs(few.coefficients[0, 0])
         assert alert.harmonic == 0
         assert real > 1e-3
-        assert alert.error == pytest.approx(real, rel=0.1)
+        # of second order in the change of the first harmonic, which is 1.3 % and more
+        assert alert.error == pytest.approx(real, rel=0.1, abs=2e-4)
 
 
 def test_error_over_contact_dofs_and_chosen_harmonics():
