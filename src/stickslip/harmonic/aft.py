@@ -7,6 +7,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.compiled import CompiledContacts, MarchedLaws
+from stickslip.contact.event_integrals import Events, integrated, room_for_events
 from stickslip.contact.events import exact_period
 from stickslip.contact.intervals import contact_period, contact_period_threads, prefix_sums
 from stickslip.contact.march import march_period
@@ -32,6 +33,9 @@ class ContactPeriod:
         (n_contacts, 2, samples): 0 stick, 1 slip, 2 open, for t and w.
     unsettled
         Contacts whose state did not become periodic.
+    events
+        From which the forces of more harmonics follow by `forces_between`; None where they are not known: of contacts on samples
+        or marched, and where samples were asked for.
     """
 
     coefficients: FloatArray
@@ -41,6 +45,7 @@ class ContactPeriod:
     force: FloatArray
     state: IntArray
     unsettled: int
+    events: Events | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,10 +154,37 @@ def _exact(
     """Evaluate sums of elementary contacts at exact events."""
     own = contacts.piecewise
     gap = gap if own.size == len(gap) else gap[own]
+    of_own = _of(gap_coefficients, own)
+    kept = None
+    if gap.shape[2] == 0 and not contacts.marched:
+        kept = room_for_events((len(of_own) - 1) // 2, len(contacts.elements))
     coefficients, blocks, force, state = exact_period(
-        _of(gap_coefficients, own), contacts.elements, contacts.first, gap, contacts.pairs
+        of_own, contacts.elements, contacts.first, gap, contacts.pairs, kept
     )
-    return ContactPeriod(coefficients, blocks, None, gap, force, state, 0)
+    if kept is not None:
+        kept = replace(kept, polynomials=of_own.T.reshape(own.size, 3, -1))
+    return ContactPeriod(coefficients, blocks, None, gap, force, state, 0, kept)
+
+
+def forces_between(events: Events, contacts: CompiledContacts, order: int) -> ContactPeriod:
+    """Return forces and derivatives up to `order` at a motion with fewer harmonics whose events are known, without samples.
+
+    Parameters
+    ----------
+    events
+        All events of that motion, from `ContactPeriod.events`.
+    contacts
+        The laws with which they were found.
+    order
+        Highest harmonic, at least that of the motion.
+    """
+    coefficients, blocks = integrated(
+        events, contacts.elements, contacts.first, order, contacts.pairs
+    )
+    none = np.zeros((contacts.n_contacts, 3, 0))
+    states = np.zeros((contacts.n_contacts, 2, 0), dtype=np.int64)
+    whole = ContactPeriod(coefficients, blocks, None, none, none, states, 0)
+    return whole if contacts.weights is None else _weighted(whole, contacts.weights)
 
 
 def _marched(

@@ -9,9 +9,10 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.contact.compiled import CompiledContacts, Evaluator
+from stickslip.contact.event_integrals import Events
 from stickslip.contact.interface import Interface, SparseRows, add_contact_jacobian, sparse_rows
 from stickslip.errors import input_error
-from stickslip.harmonic.aft import ContactPeriod, contact_forces
+from stickslip.harmonic.aft import ContactPeriod, contact_forces, forces_between
 from stickslip.harmonic.condensed_product import CondensedProduct, at_frequency
 from stickslip.harmonic.dynamic_stiffness import CondensedStiffness
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -39,6 +40,7 @@ class Linearisation:
     jac: FloatArray | StructuredJacobian  # (size, size)
     jac_p: FloatArray  # (size,), by the parameter ω
     seconds_contact: float
+    events: Events | None = None  # of the contacts, where all of them are known
 
     def dense_jac(self) -> FloatArray:
         """Return the Jacobian as an array."""
@@ -131,9 +133,17 @@ class HarmonicBalance:
         gaps[rows_of(self.harmonics)] = kept
         return gaps
 
-    def forces(self, x: FloatArray, omega: float) -> ContactPeriod:
-        """Return what the equations ask of the contacts: coefficients and derivatives, of the harmonics kept."""
-        period = contact_forces(self._gaps(x), self.compiled, self.samples, omega, history=False)
+    def forces(self, x: FloatArray, omega: float, events: Events | None = None) -> ContactPeriod:
+        """Return what the equations ask of the contacts: coefficients and derivatives, of the harmonics kept.
+
+        Contacts are not evaluated where the `events` of this motion are known from an evaluation with fewer harmonics
+        (`Linearisation.events`): they are integrated once more.
+        """
+        if events is None:
+            gaps = self._gaps(x)
+            period = contact_forces(gaps, self.compiled, self.samples, omega, history=False)
+        else:
+            period = forces_between(events, self.compiled, self.order)
         if is_full(self.harmonics):
             return period
         own = rows_of(self.harmonics)
@@ -169,6 +179,7 @@ class HarmonicBalance:
             jac,
             slope.reshape(-1) / self.force_scale,
             seconds,
+            period.events if period.events is not None and period.events.whole else None,
         )
 
     def _by_matrices(

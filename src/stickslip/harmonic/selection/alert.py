@@ -7,6 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.contact.event_integrals import Events
 from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod
 from stickslip.harmonic.balance import HarmonicBalance
@@ -34,7 +35,7 @@ class Alert:
     start
         Scaled unknowns ``q + Δq`` of the high-order problem.
     seconds_contact
-        Time of the one contact evaluation.
+        Time of the contact evaluation, or of the integrals between known events.
     """
 
     error: float
@@ -52,6 +53,7 @@ def jacobian_alert(
     measure: ErrorMeasure,
     solve: Solve | None = None,
     form: Form = "newton",
+    events: Events | None = None,
 ) -> Alert:
     """Predict how the missing harmonics would change a low-order solution.
 
@@ -74,6 +76,8 @@ def jacobian_alert(
         partitions the system by harmonics; a Krylov method with factors of each harmonic does, too.
     form
         ``newton``, or ``published``: eq. 21 as it stands.
+    events
+        Those of the contacts at the solution, where its evaluation left them (`Step.events`): then contacts are not evaluated again.
 
     Raises
     ------
@@ -84,7 +88,7 @@ def jacobian_alert(
     q = low.coefficients(x)
     padded = high.unknowns(q)
     start = perf_counter()
-    period = high.forces(padded, omega)
+    period = high.forces(padded, omega, events)
     seconds = perf_counter() - start
     if form == "newton" and _silent(low, high, period):
         return Alert(0.0, 0, measure.harmonics[0], padded, seconds)

@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.contact.event_integrals import Events
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.structured import StructuredJacobian
@@ -96,6 +97,9 @@ class Step:
         Solution of a linear system from its matrix and right side, None where there is none; None: LU factors.
     before
         Solution with fewer harmonics at the same frequency, where this one repeats it.
+    events
+        Where contacts change their states at the solution, where the accepted evaluation left that: with it,
+        ``reference.linearise(padded, omega, events)`` needs no evaluation of contacts.
     """
 
     balance: HarmonicBalance
@@ -107,6 +111,7 @@ class Step:
     measure: ErrorMeasure
     solve: Solve | None = None
     before: "Step | None" = None
+    events: Events | None = None
 
 
 @dataclass(frozen=True, eq=False)
