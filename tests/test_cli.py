@@ -19,10 +19,11 @@ from stickslip.cli import app
 from stickslip.errors import InputError
 from stickslip.response.forced import ForcedPoint
 from stickslip.solve.status import Status
+from stickslip.study.chooser import Chooser
 from stickslip.study.collect import Accepted, CaseResult
 from stickslip.study.example import example_text
 from stickslip.study.folder import prepare_folder
-from stickslip.study.summary import alert_sentence
+from stickslip.study.summary import choice_sentence
 
 HEAVY = ("numpy", "scipy", "numba", "xarray", "pydantic", "plotly", "gmsh", "skfem", "meshio")
 
@@ -244,7 +245,7 @@ def first_passage(index: int, hertz: float, error: float) -> ForcedPoint:
     """Return a point with a predicted error (a fraction)."""
     return ForcedPoint(
         "low", index, 2 * np.pi * hertz, np.zeros((2, 1), dtype=complex), np.zeros(2), 0.1, Status.CONVERGED,
-        3, error, 0.0, 0.0, 0.0,
+        3, error, 0.0, 0.0, 0.0, harmonics=np.arange(2), asked=np.arange(6 if error > 0.05 else 0),
     )  # fmt: skip
 
 
@@ -254,16 +255,18 @@ def told(errors: list[float]) -> str:
     branch = [replace(p, stage="branch", predicted_error=np.nan) for p in passage]
     kept = tuple(Accepted(p, None, None, None, np.nan) for p in branch)
     solved = (*passage, *branch)
-    result = CaseResult(4.0, 1.0, solved, kept, -1, None, 0, 1)
-    return alert_sentence(result, 5.0, 5)
+    result = CaseResult(4.0, 1.0, solved, kept, -1, None, 0, (0, 1))
+    alert = Chooser("jacobian_alert", False, (0, 1), tuple(range(6)), 0.05, True, ("tip1.x",))
+    return choice_sentence(result, alert)
 
 
 def test_alert_is_told_where_a_branch_took_the_place_of_the_points_it_was_asked_at() -> None:
     assert told([0.01, 0.06, 0.31, 0.02]) == (
         "F_CL/F_HE = 4: 2 of 4 points repeated with 5 harmonics, at 101.00 to 102.00 Hz, because leaving the higher harmonics out "
-        "was predicted to change the first harmonic by more than 5 % (up to 31 % at 102.00 Hz)."
+        "was predicted to change the response by more than 5 % (up to 31 % at 102.00 Hz)."
     )
     assert "no frequency needs more harmonics; the largest predicted error is 2 %" in told(
         [0.01, np.nan, 0.02]
     )
-    assert told([np.nan]) == "F_CL/F_HE = 4: the alert was not asked."
+    assert told([np.nan]) == "F_CL/F_HE = 4: jacobian_alert was not asked."
+    assert "(up to beyond all bounds at 101.00 Hz)" in told([0.01, np.inf])

@@ -107,6 +107,13 @@ def run(
     verify: Annotated[
         bool, typer.Option("--verify", help="Integrate in time at three frequencies and compare.")
     ] = False,
+    verify_harmonics: Annotated[
+        bool,
+        typer.Option(
+            "--verify-harmonics",
+            help="Predict at every frequency what twice as many harmonics would change.",
+        ),
+    ] = False,
     fresh: Fresh = False,
     report: Report = True,
 ) -> None:
@@ -115,7 +122,13 @@ def run(
         from stickslip.study.run import run_study
 
         with _screen() as sink:
-            summary = run_study(study, verify_in_time=verify, fresh=fresh, sink=sink)
+            summary = run_study(
+                study,
+                verify_in_time=verify,
+                verify_harmonics=verify_harmonics,
+                fresh=fresh,
+                sink=sink,
+            )
         files = [*summary.files]
         if report:
             files.append(_write_report(summary.result))
@@ -343,7 +356,8 @@ def _print_summary(summary: "RunSummary", files: list[Path]) -> None:
     def lines(title: str, texts: list[str]) -> None:
         _print_lines(console, title, texts)
 
-    lines("Where the Jacobian Alert asked for more harmonics", list(summary.alerts))
+    lines(f"Where {summary.chooser.name} asked for more harmonics", list(summary.choices))
+    lines("Against twice as many harmonics", list(summary.doubts))
     lines("Against time integration", [c.sentence for c in summary.checks])
     lines("Warnings", list(summary.warnings))
     if summary.failed:
@@ -363,15 +377,18 @@ def _table(summary: "RunSummary") -> Table:
         "peak mm",
         "at Hz",
         "points",
-        f"H = {summary.low}",
-        f"H = {summary.high}",
+        f"H = {summary.chooser.low_name}",
+        summary.more,
         "failed",
         "Newton",
+        "unknowns",
     )
     for name in (*names, "contact s", "linear s", "rest s"):
         table.add_column(name, justify="right")
     for r in summary.rows:
-        counts = (r.points, r.points_low, r.points_high, r.points_failed, r.newton_steps)
+        counts = (
+            r.points, r.points_low, r.points_high, r.points_failed, r.newton_steps, r.unknowns,
+        )  # fmt: skip
         table.add_row(
             f"{r.ratio:g}",
             f"{1e3 * r.peak_amplitude:.5g}",

@@ -12,16 +12,14 @@ from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.damper import ContactPoints, FlatCurvedDamper
 from stickslip.model.structure import Structure
-from stickslip.response.forced import Sweep
 from stickslip.response.preload import preload
+from stickslip.response.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.study.assembly import join_damper
 from stickslip.study.blades import ReducedBlades, reduced_blades
+from stickslip.study.error_places import AXES, OUTPUT_LABELS, dofs_of, error_labels
 from stickslip.study.journal import Journal
 from stickslip.study.schema import Study, StudyTables
-
-OUTPUT_NODES = ("tip1", "edge1", "tip2")
-AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +46,8 @@ class Case:
         Where the harmonic force acts.
     output_labels
         Names of the outputs.
+    error_labels
+        Names of the dofs over which the error of missing harmonics is taken.
     law_names
         Name of the law of each contact.
     static_gap, static_force
@@ -64,6 +64,7 @@ class Case:
     retention: float
     force_dof: int
     output_labels: tuple[str, ...]
+    error_labels: tuple[str, ...]
     law_names: tuple[str, ...]
     static_gap: FloatArray
     static_force: FloatArray
@@ -104,6 +105,7 @@ def case_of(study: Study, journal: Journal | None, say: Callable[[str], None]) -
     geometry = t.blades.library()
     try:
         damper = t.damper.library(geometry)
+        _check_places(study, damper)
         blades = reduced_blades(study, damper, journal, say)
     except InputError as error:
         text = str(error)
@@ -113,6 +115,14 @@ def case_of(study: Study, journal: Journal | None, say: Callable[[str], None]) -
             else InputError(f"{study.path}: [blades] with [damper]: {text}")
         ) from None
     return make_case(t, blades, damper)
+
+
+def _check_places(study: Study, damper: FlatCurvedDamper) -> None:
+    """Refuse unknown labels before anything is meshed."""
+    try:
+        error_labels(study.tables, damper.contact_points())
+    except InputError as error:
+        raise InputError(f"{study.path}: {error}") from None
 
 
 def make_case(tables: StudyTables, blades: ReducedBlades, damper: FlatCurvedDamper) -> Case:
@@ -134,6 +144,7 @@ def make_case(tables: StudyTables, blades: ReducedBlades, damper: FlatCurvedDamp
         retention=tables.retention.stiffness_n_per_m,
         force_dof=int(system.plain_structure.dof_set("blades.force")[axis]),
         output_labels=labels,
+        error_labels=error_labels(tables, contacts),
         law_names=tuple(tables.contact.of_side(side).law for side in contacts.side),
         static_gap=gap,
         static_force=static_contact_force(system.interface, gap),
@@ -151,8 +162,11 @@ def sweep_of(tables: StudyTables) -> Sweep:
         samples=h.samples,
         evaluator=tables.solver.evaluator,
         threshold=h.alert_threshold_percent / 100,
-        selection=h.selection,
+        selection=h.chooser,
+        passages=h.passages,
+        error_harmonics=h.alert_harmonics,
         points=tables.sweep.points,
+        frequencies=tables.sweep.frequencies or 0,
         peak_points=tables.sweep.peak_points,
     )
 
@@ -163,14 +177,10 @@ def system_of(
     """Return the system of blades and damper, without retention, and the labels of its outputs."""
     joined, interface = join_damper(tables, blades, damper)
     outputs = joined.dof_set("blades.output")
-    labels = tuple(f"{node}.{axis}" for node in OUTPUT_NODES for axis in AXES)
-    # the error of the alert is taken where the motion is: along the excitation
-    along = np.array(
-        [i for i, label in enumerate(labels) if label.endswith(tables.loads.excitation_direction)]
-    )
-    return System(
-        joined, interface, outputs, alert_dofs=outputs[along], free=joined.dof_set("damper")
-    ), labels
+    points = damper.contact_points()
+    over = dofs_of(joined, points, error_labels(tables, points))
+    system = System(joined, interface, outputs, alert_dofs=over, free=joined.dof_set("damper"))
+    return system, OUTPUT_LABELS
 
 
 def static_load(system: System, centrifugal: float) -> FloatArray:

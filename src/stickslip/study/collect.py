@@ -25,11 +25,11 @@ class Accepted:
     point
         The solution with most harmonics; not a solution where its status says so.
     low
-        The low-order point at the same frequency, or None (peak refinements, points of a branch with many harmonics).
+        The first solution at the same frequency, or None (peak refinements, points of a branch with many harmonics).
     fields, low_fields
         What they look like everywhere; None where the point did not converge.
     real_error
-        Difference between both, a fraction; NaN unless both orders were solved.
+        Difference between both, a fraction; NaN unless the point repeats the first one.
     """
 
     point: ForcedPoint
@@ -39,17 +39,18 @@ class Accepted:
     real_error: float
 
     @property
-    def predicted_error(self) -> float:
-        """Error that the alert predicted for the low-order solution, a fraction; NaN where it was not asked."""
+    def indicator(self) -> float:
+        """What the strategy said of the first solution: of an alert the predicted error, a fraction; NaN where it was not asked."""
         return (self.low or self.point).predicted_error
 
     def amplitudes(self, n_outputs: int) -> FloatArray:
         """Return the (n_outputs,) amplitudes of harmonic 1, m; NaN where the point did not converge."""
         return _amplitudes(self.fields, n_outputs)
 
-    def low_amplitudes(self, n_outputs: int) -> FloatArray:
-        """Return the same of the low-order point."""
-        return _amplitudes(self.low_fields, n_outputs)
+    def first_amplitudes(self, n_outputs: int, harmonics: Harmonics) -> FloatArray:
+        """Return the same of the first solution, NaN where that had other harmonics than these."""
+        known = self.low is not None and self.low.support == harmonics
+        return _amplitudes(self.low_fields if known else None, n_outputs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +140,11 @@ class CaseResult:
         return sum(not a.point.converged for a in self.accepted)
 
     @property
+    def unknowns(self) -> int:
+        """Unknowns of all solutions together, accepted or not: the work in harmonics, whatever chose them."""
+        return sum(unknowns(p) for p in self.solved)
+
+    @property
     def newton_steps(self) -> int:
         """Newton iterations of all points solved."""
         return sum(p.iterations for p in self.solved)
@@ -183,8 +189,13 @@ def collect(
         peak,
         period,
         report_output,
-        problem.sweep.low_harmonics,
+        problem.sweep.first_harmonics,
     )
+
+
+def unknowns(point: ForcedPoint) -> int:
+    """Return the number of real unknowns of a solution."""
+    return int(point.coefficients.shape[1] * (2 * point.harmonics.size - 1))
 
 
 def _accept(problem: ForcedProblem, point: ForcedPoint, low: ForcedPoint | None) -> Accepted:

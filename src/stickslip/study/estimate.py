@@ -3,13 +3,14 @@
 from dataclasses import dataclass
 
 from stickslip.errors import input_error
+from stickslip.response.sweep import FIXED
 from stickslip.study.schema import Study
 
 BYTES_A_NODE = 35e3  # assembly and factorisation of second-order tetrahedra, measured at 10 to 30 thousand nodes
 BASE_GB = 0.35  # interpreter and libraries
 POINTS = 1.7  # points of a branch for each one asked: more are taken where the response turns
 NEWTON_A_POINT = 10  # the example took 7, repeats and failed tries included
-REPEATED = 0.6  # share of points that the alert repeats
+REPEATED = 0.6  # share of points that a strategy solves with many harmonics
 FLOPS = 2e9  # of a Newton step: a small dense factorisation on one core, and the contacts
 SECONDS_A_NODE = 1.2e-3  # assembly, reduction and the full model's frequencies
 RETAINED = 6  # damper coordinates beside three a contact
@@ -47,16 +48,17 @@ def estimate(study: Study, nodes: int) -> Estimate:
     """Estimate memory and work of `study` on a mesh of `nodes` nodes."""
     t = study.tables
     coordinates = 9 * len(t.damper.sections_m) + RETAINED
-    points = len(t.loads.ratios) * (POINTS * t.sweep.points + t.sweep.peak_points)
-    share_high = {"jacobian_alert": REPEATED, "always_low": 0.0, "always_high": 1.0}[
-        t.harmonics.selection
-    ]
-    low, high = ((2 * h + 1) * coordinates for h in (t.harmonics.low, t.harmonics.high))
-    alerts = points if t.harmonics.selection == "jacobian_alert" else 0
-    steps_high = points * share_high * NEWTON_A_POINT + alerts
-    steps_low = points * NEWTON_A_POINT if t.harmonics.selection != "always_high" else 0
+    h = t.harmonics
+    grid = t.sweep.frequencies or (t.sweep.points if h.single else POINTS * t.sweep.points)
+    points = len(t.loads.ratios) * (grid + t.sweep.peak_points)
+    share_high = {"always_low": 0.0, "always_high": 1.0}.get(h.selection, REPEATED)
+    low, high = ((2 * len(own) - 1) * coordinates for own in (h.low_harmonics, h.high_harmonics))
+    # each strategy looks at the larger space about once a point
+    judged = points if h.selection not in FIXED else 0
+    steps_high = points * share_high * NEWTON_A_POINT + judged
+    steps_low = points * NEWTON_A_POINT if h.selection != "always_high" else 0
     seconds = (steps_low * low**3 + steps_high * high**3) * 4 / FLOPS + nodes * SECONDS_A_NODE
-    stored = points * (t.harmonics.high + 1) * 10 * coordinates * 16 / 1e9
+    stored = points * (h.high_harmonics[-1] + 1) * 10 * coordinates * 16 / 1e9
     memory = BASE_GB + nodes * BYTES_A_NODE / 1e9 + stored + 6 * high**2 * 8 / 1e9
     return Estimate(nodes, memory, round(steps_low + steps_high), seconds)
 

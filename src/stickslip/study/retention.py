@@ -38,9 +38,8 @@ def peak_shift(
 
 def _shift(case: Case, result: CaseResult) -> tuple[float, float]:
     point = first = result.accepted[result.peak].point
-    sweep = replace(
-        case.sweep, selection="always_low" if point.order == case.sweep.low else "always_high"
-    )
+    own = point.support
+    sweep = replace(case.sweep, low=own, high=own, selection="always_high")
     for share in WEAKER:
         problem = forced_problem(
             case.with_retention(share * case.retention), case.load(result.ratio), sweep

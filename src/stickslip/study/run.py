@@ -22,20 +22,28 @@ from stickslip.response.forced import (
     forced_response,
 )
 from stickslip.study.build import Case, case_of
+from stickslip.study.chooser import Chooser, chooser_of
 from stickslip.study.collect import HZ, CaseResult, collect
 from stickslip.study.folder import JOURNAL, LOG, MESHES, RESULT, prepare_folder
+from stickslip.study.harmonics_table import named
 from stickslip.study.journal import Journal
 from stickslip.study.netcdf import write_dataset
 from stickslip.study.progress import Interrupted, Log, Sink, library_versions
+from stickslip.study.reference_check import ReferenceDoubt, check_reference
 from stickslip.study.retention import peak_shift
 from stickslip.study.schema import Study, read_study
 from stickslip.study.store import Provenance, dataset
-from stickslip.study.summary import RunSummary, alert_sentence, row
+from stickslip.study.summary import RunSummary, choice_sentence, more_name, row
 from stickslip.study.verify import Check, require_integrable, verify
 
 
 def run_study(
-    path: Path, *, verify_in_time: bool = False, fresh: bool = False, sink: Sink
+    path: Path,
+    *,
+    verify_in_time: bool = False,
+    verify_harmonics: bool = False,
+    fresh: bool = False,
+    sink: Sink,
 ) -> RunSummary:
     """Run a study, going on from what an interrupted run has finished.
 
@@ -45,6 +53,8 @@ def run_study(
         The study file.
     verify_in_time
         Integrate in time at three frequencies and compare.
+    verify_harmonics
+        Predict at every frequency what twice as many harmonics would change.
     fresh
         Forget what the results folder holds.
     sink
@@ -65,7 +75,7 @@ def run_study(
     with Journal(study.folder / JOURNAL, fingerprint(study, versions), ForcedPoint) as journal:
         log = Log(study.folder / LOG, sink)
         try:
-            return _run(_Run(study, versions, journal, log), verify_in_time=verify_in_time)
+            return _run(_Run(study, versions, journal, log), verify_in_time, verify_harmonics)
         except KeyboardInterrupt:
             log.say("interrupted by the user")
             raise Interrupted(
@@ -83,12 +93,23 @@ def check_study(path: Path, sink: Sink) -> list[str]:
     case = case_of(study, None, sink.say)
     normal = -case.static_force[:, 2]
     sink.say(f"static equilibrium: normal forces {normal.min():.3g} to {normal.max():.3g} N")
+    table = study.tables.harmonics
+    for line in chooser_of(table, case.error_labels).lines(table.passages):
+        sink.say(f"harmonics: {line}")
     return case.blades.frequencies.warnings()
 
 
 def fingerprint(study: Study, versions: dict[str, str]) -> str:
     """Return a hash of all that the numbers of a run depend on."""
     return sha256(json.dumps([study.content_hash, versions], sort_keys=True).encode()).hexdigest()
+
+
+@dataclass(frozen=True, eq=False)
+class Checks:
+    """What was checked beyond the run itself: by time integration, and with more harmonics."""
+
+    in_time: Sequence[Check] = ()
+    of_harmonics: Sequence[ReferenceDoubt] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,25 +129,31 @@ class _Run:
         self.log.say(f"WARNING: {text}")
 
 
-def _run(run: _Run, *, verify_in_time: bool) -> RunSummary:
+def _run(run: _Run, verify_in_time: bool, verify_harmonics: bool) -> RunSummary:
     run.log.say(f"stickslip {__version__}, study {run.study.path}")
     case = case_of(run.study, run.journal, run.log.say)
     for text in case.blades.frequencies.warnings():
         run.warn(text)
+    table = run.study.tables.harmonics
+    chooser = chooser_of(table, case.error_labels)
+    for line in chooser.lines(table.passages):
+        run.log.say(f"harmonics: {line}")
     results: list[CaseResult] = []
     for i in range(len(case.ratios)):
         results.append(_load_case(run, case, i))
-        _write(run, case, results, [], complete=False)
+        _write(run, case, results, chooser, Checks(), complete=False)
+    doubts = _doubts(run, case, results) if verify_harmonics else []
     checks = verify(case, results, run.journal, run.log.say) if verify_in_time else []
-    _write(run, case, results, checks, complete=True)
+    _write(run, case, results, chooser, Checks(checks, doubts), complete=True)
     target = run.study.folder / RESULT
     files = [target, *(run.study.folder / name for name in (*MESHES, LOG))]
     return RunSummary(
         rows=tuple(row(r) for r in results),
-        low=case.sweep.low_harmonics[-1],
-        high=case.sweep.high_harmonics[-1],
-        alerts=tuple(_alerts(case, results)),
+        chooser=chooser,
+        more=more_name(results, chooser),
+        choices=tuple(choice_sentence(r, chooser) for r in results if chooser.decides),
         checks=tuple(checks),
+        doubts=tuple(d.sentence for d in doubts),
         warnings=tuple(run.warnings),
         result=target,
         files=tuple(f for f in files if f.exists()),
@@ -208,11 +235,13 @@ def progress(point: ForcedPoint, sweep: Sweep) -> tuple[float, str]:
     first, last = sweep.omega_range
     along = min(max((point.omega - first) / (last - first), 0.0), 1.0)
     shares = {"low": (0.0, 0.4), "high": (0.4, 0.35), "branch": (0.75, 0.2), "peak": (0.95, 0.05)}
+    if sweep.single:  # repeats come in between
+        shares |= {"low": (0.0, 0.95), "high": (0.0, 0.95)}
     begin, width = shares[point.stage]
     state = "" if point.converged else f", {point.status.advice}"
     return (
         begin + width * along,
-        f"{point.stage} {point.index + 1}: {point.omega / HZ:.2f} Hz, H = {point.order}{state}",
+        f"{point.stage} {point.index + 1}: {point.omega / HZ:.2f} Hz, H = {named(point.harmonics)}{state}",
     )
 
 
@@ -232,17 +261,24 @@ def _warn_drift(run: _Run, problem: ForcedProblem, result: CaseResult) -> None:
             return
 
 
-def _alerts(case: Case, results: Sequence[CaseResult]) -> list[str]:
-    if case.sweep.selection != "jacobian_alert":
-        return []
-    return [
-        alert_sentence(r, 100 * case.sweep.threshold, case.sweep.high_harmonics[-1])
-        for r in results
-    ]
+def _doubts(run: _Run, case: Case, results: Sequence[CaseResult]) -> list[ReferenceDoubt]:
+    limit = run.study.tables.harmonics.alert_threshold_percent / 100
+    doubts = check_reference(case, results, limit)
+    for doubt in doubts:
+        run.log.say(f"more harmonics: {doubt.sentence}")
+        if doubt.warning:
+            run.warn(doubt.warning)
+    return doubts
 
 
 def _write(
-    run: _Run, case: Case, results: Sequence[CaseResult], checks: Sequence[Check], *, complete: bool
+    run: _Run,
+    case: Case,
+    results: Sequence[CaseResult],
+    chooser: Chooser,
+    checks: Checks,
+    *,
+    complete: bool,
 ) -> None:
     provenance = Provenance(
         title=run.study.tables.title,
@@ -251,13 +287,12 @@ def _write(
         versions=run.versions,
         created=run.created,
         wall_seconds=perf_counter() - run.began,
-        threshold_percent=100 * case.sweep.threshold,
-        low_order=case.sweep.low_harmonics[-1],
-        high_order=case.sweep.high_harmonics[-1],
+        selection=chooser,
         samples=case.sweep.samples,
         evaluator=case.sweep.evaluator,
-        alert_explanation=" ".join(_alerts(case, results)),
+        alert_explanation=" ".join(choice_sentence(r, chooser) for r in results if chooser.decides),
         warnings=run.warnings,
         complete=complete,
     )
-    write_dataset(dataset(case, results, checks, provenance), run.study.folder / RESULT)
+    made = dataset(case, results, provenance, checks.in_time, checks.of_harmonics)
+    write_dataset(made, run.study.folder / RESULT)

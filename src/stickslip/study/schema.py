@@ -12,10 +12,10 @@ from pydantic import Field, ValidationError
 from stickslip.errors import InputError, input_error
 from stickslip.study.contacts import Contact
 from stickslip.study.geometry import Blades, Damper, MaterialTable
+from stickslip.study.harmonics_table import Harmonics
 from stickslip.study.messages import messages
 from stickslip.study.sections import (
     Damping,
-    Harmonics,
     Limits,
     Loads,
     Output,

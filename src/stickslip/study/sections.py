@@ -96,44 +96,17 @@ class SweepTable(Section):
         8, ge=0, le=100, description="most points added to resolve the peak, 0 to 100"
     )
 
+    frequencies: int | None = Field(
+        None,
+        ge=2,
+        le=10_000,
+        description="number of equally spaced frequencies to step through, 2 to 10000; left out: the branch is followed, with "
+        "more points where it turns (a single passage then steps through as many as points says)",
+    )
+
     @model_validator(mode="after")
     def _rises(self) -> Self:
         rising_pair(self.frequency_hz, "frequency_hz")
-        return self
-
-
-class Harmonics(Section):
-    """Harmonics kept, and how the number is chosen at each frequency."""
-
-    low: int = Field(
-        1, ge=1, le=30, description="number of harmonics of the first passage, 1 to 30"
-    )
-    high: int = Field(
-        5, ge=1, le=30, description="number of harmonics of the repeated points, 1 to 30"
-    )
-    samples: int = Field(256, ge=16, le=8192, description="time samples of a period, 16 to 8192")
-    alert_threshold_percent: Positive = Field(
-        5.0,
-        description="predicted error in percent above which a point is repeated, greater than zero",
-    )
-    selection: Literal["jacobian_alert", "always_high", "always_low"] = Field(
-        "jacobian_alert", description="jacobian_alert, always_high or always_low"
-    )
-
-    @model_validator(mode="after")
-    def _agree(self) -> Self:
-        if self.high < self.low:
-            raise custom_error(
-                f"must not be below low = {self.low}, got {self.high}",
-                "Raise it, or lower low.",
-                "high",
-            )
-        if self.samples < 8 * self.high:
-            raise custom_error(
-                f"must be at least 8 times high = {self.high}, got {self.samples}",
-                f"Give at least {8 * self.high}, better a power of two.",
-                "samples",
-            )
         return self
 
 

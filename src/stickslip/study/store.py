@@ -14,11 +14,12 @@ import xarray as xr
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.response.fields import Fields
-from stickslip.solve.status import Status
-from stickslip.study.alert_points import alert_variables
+from stickslip.study.attempts import alert_variables, attempt_variables, kept, status_flags
 from stickslip.study.build import Case
-from stickslip.study.collect import HZ, Accepted, CaseResult
+from stickslip.study.chooser import Chooser
+from stickslip.study.collect import HZ, Accepted, CaseResult, unknowns
 from stickslip.study.netcdf import variable
+from stickslip.study.reference_check import ReferenceDoubt, reference_variables
 from stickslip.study.verify import Check
 
 DIRECTIONS = ("t", "w", "n")
@@ -31,9 +32,13 @@ CASE_QUANTITIES = {
     "peak_frequency_hz": ("Hz", "frequency of the peak"),
     "peak_point": ("1", "index of the peak into point, -1 if none"),
     "points": ("1", "accepted points"),
-    "points_low": ("1", "accepted points with few harmonics"),
-    "points_high": ("1", "accepted points with many harmonics"),
+    "points_low": ("1", "accepted points with the harmonics of the first passage"),
+    "points_high": ("1", "accepted points with other harmonics"),
     "points_failed": ("1", "points that did not converge"),
+    "unknowns_solved": (
+        "1",
+        "real unknowns of all solutions together, those not accepted included",
+    ),
     "newton_steps": ("1", "Newton iterations"),
     "seconds_contact": ("s", "time in contact forces"),
     "seconds_linear": ("s", "time in linear algebra"),
@@ -50,12 +55,20 @@ CASE_QUANTITIES = {
 POINT_QUANTITIES = {
     "frequency_hz": ("Hz", "excitation frequency"),
     "case": ("1", "load case"),
-    "order": ("1", "harmonics kept"),
+    "order": ("1", "highest harmonic kept"),
+    "unknowns": ("1", "real unknowns of the accepted solution"),
     "status": ("1", "how the solver ended"),
-    "predicted_error_percent": ("percent", "error of the few harmonics that the alert predicted"),
+    "indicator": (
+        "1",
+        "what the strategy compared with its threshold at the first solution of the frequency, NaN where it was not asked",
+    ),
+    "predicted_error_percent": (
+        "percent",
+        "error of the first solution that an alert predicted, NaN where the indicator is no error",
+    ),
     "real_error_percent": (
         "percent",
-        "difference of few and many harmonics where both were solved",
+        "difference of the first and the accepted solution where the frequency was solved again",
     ),
     "newton_iterations": ("1", "Newton iterations"),
     "seconds": ("s", "time of the point"),
@@ -73,9 +86,7 @@ class Provenance:
     versions: Mapping[str, str]
     created: str
     wall_seconds: float
-    threshold_percent: float
-    low_order: int
-    high_order: int
+    selection: Chooser
     samples: int
     evaluator: str
     alert_explanation: str
@@ -91,19 +102,20 @@ class Provenance:
             "versions": json.dumps(dict(self.versions)),
             "created": self.created,
             "wall_seconds": float(self.wall_seconds),
-            "alert_threshold_percent": float(self.threshold_percent),
-            "low_order": self.low_order,
-            "high_order": self.high_order,
             "samples": self.samples,
             "evaluator": self.evaluator,
             "alert_explanation": self.alert_explanation,
             "warnings": json.dumps(list(self.warnings)),
             "complete": int(self.complete),
-        }
+        } | self.selection.attributes()
 
 
 def dataset(
-    case: Case, results: Sequence[CaseResult], checks: Sequence[Check], provenance: Provenance
+    case: Case,
+    results: Sequence[CaseResult],
+    provenance: Provenance,
+    checks: Sequence[Check] = (),
+    doubts: Sequence[ReferenceDoubt] = (),
 ) -> xr.Dataset:
     """Assemble the dataset described in the design notes.
 
@@ -113,21 +125,27 @@ def dataset(
         The model.
     results
         Finished load cases.
-    checks
-        Comparisons with time integration; empty when none were asked for.
     provenance
         Attributes.
+    checks
+        Comparisons with time integration; empty when none were asked for.
+    doubts
+        What more harmonics than the reference would change; empty when that was not asked for.
     """
-    high = provenance.high_order
+    high = provenance.selection.high[-1]
     data = (
         _case_variables(case, results)
-        | _point_variables(case, results, high)
+        | _point_variables(case, results, provenance.selection)
         | _peak_variables(case, results)
-        | alert_variables(results)
+        | attempt_variables(results, high)
         | _model_variables(case)
     )
+    if provenance.selection.is_error:
+        data |= alert_variables(results)
     if checks:
         data |= _check_variables(checks)
+    if doubts:
+        data |= reference_variables(doubts)
     coordinates = {
         "output": list(case.output_labels),
         "retained": list(case.system.retained_labels),
@@ -160,6 +178,7 @@ def _case_variables(case: Case, results: Sequence[CaseResult]) -> dict[str, xr.V
             "points_low": r.points_low,
             "points_high": len(r.accepted) - r.points_low,
             "points_failed": r.failed,
+            "unknowns_solved": r.unknowns,
             "newton_steps": r.newton_steps,
             "seconds_contact": r.seconds[0],
             "seconds_linear": r.seconds[1],
@@ -176,19 +195,17 @@ def _case_variables(case: Case, results: Sequence[CaseResult]) -> dict[str, xr.V
 
 
 def _point_variables(
-    case: Case, results: Sequence[CaseResult], high: int
+    case: Case, results: Sequence[CaseResult], selection: Chooser
 ) -> dict[str, xr.Variable]:
+    high = selection.high[-1]
     pairs = [(i, a) for i, r in enumerate(results) for a in r.accepted]
     n_out = len(case.output_labels)
-    rows = [_point_row(i, a) for i, a in pairs]
+    rows = [_point_row(i, a, is_error=selection.is_error) for i, a in pairs]
     found = {
         name: variable("point", np.array([row[name] for row in rows]), units, about)
         for name, (units, about) in POINT_QUANTITIES.items()
     }
-    found["status"].attrs |= {
-        "flag_values": np.array([int(s) for s in Status], dtype=np.int64),
-        "flag_meanings": " ".join(s.name.lower() for s in Status),
-    }
+    found["status"].attrs |= status_flags()
     n_contacts, n_retained = len(case.contacts.names), case.system.retained.size
     every = [a for _, a in pairs]
 
@@ -201,14 +218,15 @@ def _point_variables(
     energy = [np.full(n_contacts, np.nan) if a.fields is None else a.fields.energy for a in every]
     contact = "point harmonic contact direction part"
     return found | {
+        "harmonic_kept": kept([a.point for a in every], high, "point"),
         "amplitude": variable(
             "point output", [a.amplitudes(n_out) for a in every], "m", "first-harmonic amplitude"
         ),
         "amplitude_low": variable(
             "point output",
-            [a.low_amplitudes(n_out) for a in every],
+            [a.first_amplitudes(n_out, selection.low) for a in every],
             "m",
-            "first-harmonic amplitude with few harmonics",
+            "first-harmonic amplitude with the harmonics of the first passage",
         ),
         "output_displacement": variable(
             "point harmonic output part",
@@ -230,14 +248,16 @@ def _point_variables(
     }
 
 
-def _point_row(load_case: int, accepted: Accepted) -> dict[str, float | int]:
+def _point_row(load_case: int, accepted: Accepted, *, is_error: bool) -> dict[str, float | int]:
     point = accepted.point
     return {
         "frequency_hz": point.omega / HZ,
         "case": load_case,
         "order": point.order,
+        "unknowns": unknowns(point),
         "status": int(point.status),
-        "predicted_error_percent": 100 * accepted.predicted_error,
+        "indicator": accepted.indicator,
+        "predicted_error_percent": 100 * accepted.indicator if is_error else np.nan,
         "real_error_percent": 100 * accepted.real_error,
         "newton_iterations": point.iterations,
         "seconds": point.seconds_total,

@@ -1,5 +1,6 @@
-"""What a run says in words: a row a load case, and where the alert asked for more harmonics."""
+"""What a run says in words: a row a load case, and where more harmonics were asked for."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,8 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from stickslip.response.forced import ForcedPoint
+from stickslip.study.chooser import Chooser
 from stickslip.study.collect import HZ, CaseResult
+from stickslip.study.harmonics_table import named
 from stickslip.study.verify import Check
+
+NAMED = 4  # sets of harmonics that a sentence names
 
 
 @dataclass(frozen=True)
@@ -23,6 +28,7 @@ class Row:
     points_high: int
     points_failed: int
     newton_steps: int
+    unknowns: int
     seconds: tuple[float, float, float]
 
 
@@ -34,12 +40,16 @@ class RunSummary:
     ----------
     rows
         One a load case.
-    low, high
-        Orders of the two passages.
-    alerts
+    chooser
+        What chose the harmonics.
+    more
+        What points with other harmonics than those of the first passage are called.
+    choices
         Sentences on where and why more harmonics were asked for.
     checks
         Comparisons with time integration.
+    doubts
+        Sentences on what more harmonics than the study keeps would change.
     warnings
         Sentences on what the user should know.
     result
@@ -49,10 +59,11 @@ class RunSummary:
     """
 
     rows: tuple[Row, ...]
-    low: int
-    high: int
-    alerts: tuple[str, ...]
+    chooser: Chooser
+    more: str
+    choices: tuple[str, ...]
     checks: tuple[Check, ...]
+    doubts: tuple[str, ...]
     warnings: tuple[str, ...]
     result: Path
     files: tuple[Path, ...]
@@ -74,36 +85,63 @@ def row(result: CaseResult) -> Row:
         points_high=len(result.accepted) - result.points_low,
         points_failed=result.failed,
         newton_steps=result.newton_steps,
+        unknowns=result.unknowns,
         seconds=result.seconds,
     )
 
 
-def alert_sentence(result: CaseResult, threshold_percent: float, high: int) -> str:
-    """Say at which frequencies of a load case the alert asked for more harmonics, and why.
+def more_name(results: Sequence[CaseResult], chooser: Chooser) -> str:
+    """Return what points with other harmonics than those of the first passage are called."""
+    known = {chooser.low, chooser.high}
+    alike = all(a.point.support in known for r in results for a in r.accepted)
+    return f"H = {named(chooser.high)}" if alike and chooser.decides else "other H"
 
-    It was asked at the points of the first passage, whatever took their places afterwards: a repeat, or a branch with many harmonics.
+
+def choice_sentence(result: CaseResult, chooser: Chooser) -> str:
+    """Say at which frequencies of a load case more harmonics were asked for, and why.
+
+    An alert was asked at the points of the first passage, whatever took their places afterwards: a repeat, or a branch with many harmonics.
     """
     ratio = f"F_CL/F_HE = {result.ratio:g}"
     passage = [p for p in result.solved if p.stage == "low"]
-    errors = np.array([100 * p.predicted_error for p in passage])
-    if not np.any(np.isfinite(errors)):
-        return f"{ratio}: the alert was not asked."
-    over = np.array([bool(e > threshold_percent) for e in errors])
+    said = np.array([p.predicted_error for p in passage])
+    if np.all(np.isnan(said)):
+        return f"{ratio}: {chooser.name} was not asked."
+    if not chooser.is_error:
+        return f"{ratio}: {_kept(result)}."
+    over = said > chooser.threshold
+    worst = int(np.nanargmax(said))
     if not np.any(over):
         return (
-            f"{ratio}: no frequency needs more harmonics; the largest predicted error is {np.nanmax(errors):.2g} %, "
-            f"below the threshold of {threshold_percent:g} %."
+            f"{ratio}: no frequency needs more harmonics; the largest predicted error is {100 * said[worst]:.2g} %, "
+            f"below the threshold of {chooser.limit}."
         )
-    worst = int(np.nanargmax(errors))
-    where = ", ".join(
-        f"{lo:.2f}" if lo == hi else f"{lo:.2f} to {hi:.2f}" for lo, hi in _intervals(passage, over)
-    )
+    where = _listed(_intervals(passage, over))
     at = passage[worst].omega / HZ
     return (
-        f"{ratio}: {int(over.sum())} of {len(over)} points repeated with {high} harmonics, at {where} Hz, because leaving "
-        f"the higher harmonics out was predicted to change the first harmonic by more than {threshold_percent:g} % "
-        f"(up to {errors[worst]:.3g} % at {at:.2f} Hz)."
+        f"{ratio}: {int(over.sum())} of {len(over)} points repeated with {_more(result, chooser)} harmonics, at {where} Hz, because leaving "
+        f"the higher harmonics out was predicted to change the response by more than {chooser.limit} "
+        f"(up to {chooser.shown(said[worst])} at {at:.2f} Hz)."
     )
+
+
+def _more(result: CaseResult, chooser: Chooser) -> str:
+    """Return the harmonics of the repeats as text."""
+    asked = {tuple(p.asked.tolist()) for p in result.solved if p.asked.size} or {chooser.high}
+    return named(chooser.high) if asked == {chooser.high} else "more"
+
+
+def _kept(result: CaseResult) -> str:
+    """Say which harmonics were kept how often, the most frequent ones first."""
+    counts = Counter(named(a.point.harmonics) for a in result.accepted)
+    each = [f"H = {own} at {n}" for own, n in counts.most_common(NAMED)]
+    rest = sum(counts.values()) - sum(n for _, n in counts.most_common(NAMED))
+    also = f" and others at {rest}" if rest else ""
+    return f"harmonics kept: {'; '.join(each)}{also} of {len(result.accepted)} points"
+
+
+def _listed(ranges: Sequence[tuple[float, float]]) -> str:
+    return ", ".join(f"{lo:.2f}" if lo == hi else f"{lo:.2f} to {hi:.2f}" for lo, hi in ranges)
 
 
 def _intervals(points: Sequence[ForcedPoint], over: np.ndarray) -> list[tuple[float, float]]:
