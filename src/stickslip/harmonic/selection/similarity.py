@@ -88,10 +88,9 @@ def jacobian_similarity(
                 "Give balance.unknowns(coefficients).",
             )
     few, many = (_scaled(balance, v, omega, scales) for v in (x, reference))
-    try:
-        gamma = np.linalg.solve(few, many)
-    except np.linalg.LinAlgError as error:
-        raise SingularError(f"the Jacobian at {omega:.6g} rad/s is singular") from error
+    if np.linalg.cond(few, 1) > 1.0 / np.finfo(float).eps:
+        raise SingularError(f"the Jacobian at {omega:.6g} rad/s is singular: Γ does not exist")
+    gamma = np.linalg.solve(few, many)
     size = balance.size
     off = np.abs(gamma[~np.eye(size, dtype=bool)])
     trace = float(np.trace(gamma))
