@@ -317,10 +317,11 @@ class ForcedProblem:
     def real_error(self, point: ForcedPoint, reference: ForcedPoint) -> float:
         """Return the largest relative error of a point against another at its frequency (eq. 29), a fraction."""
         linear = self.low.linear
-        motion = linear.recover(point.omega, point.coefficients)
-        exact = linear.recover(point.omega, reference.coefficients)
-        order = min(len(motion), len(exact))
-        return self.measure.change(motion[:order], exact[:order] - motion[:order])[0]
+        rows = min(len(point.coefficients), len(reference.coefficients))
+        motion, exact = (
+            linear.recover(point.omega, p.coefficients[:rows]) for p in (point, reference)
+        )
+        return self.measure.change(motion, exact - motion)[0]
 
     def amplitude(self, point: ForcedPoint, output: int = 0) -> float:
         """First-harmonic amplitude of output number `output`, m."""
