@@ -180,8 +180,9 @@ class Estimate:
     @property
     def bounds(self) -> FloatArray:
         """(k,) size of the second change and its distance from the first one, by which the trapezoidal rule may be wrong."""
-        size = np.abs(self.second)
-        return np.where(np.isfinite(size), size + np.abs(self.second - self.first), np.inf)
+        if not np.all(np.isfinite(self.second)):
+            return np.full(self.second.size, np.inf)
+        return np.asarray(np.abs(self.second) + np.abs(self.second - self.first))
 
 
 def estimate(
