@@ -2,8 +2,8 @@
 
 Near needs a definition, because friction with lift-off may have several periodic motions at a frequency: folds, and contacts that stick,
 whose mean traction is not unique. (The tractions are no choice here: each support solves the same equations with the same laws.) From the
-low-order solution q, Newton's method is begun with 2ñH harmonics at q, at the solution with ñH begun at q, and at that begun at
-``q + Δq``; where none of them converges, the branches with 2ñH through the truths of the neighbouring frequencies are followed to this one. What
+low-order solution q, Newton's method is begun with 2ñH harmonics at the solution with ñH begun at q, and at q itself; where neither
+converges, at the solution with ñH begun at ``q + Δq``; where that does not, either, the branches with 2ñH through the truths of the neighbouring frequencies are followed to this one. What
 converges are candidates. The *truth* is the candidate with the smallest error measure from q: no alarm is missed where a solution within
 the threshold exists, and an alarm is false there. Where candidates lie on both sides of the threshold the point is marked: what is said of
 it depends on the sheet. Where there is no candidate the point is marked as without truth, and counted.
@@ -24,7 +24,7 @@ from stickslip.response.sweep import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.solve.newton import Newton, newton
 from strategies.cases import SelectionCase
 
-NEWTON = Newton(max_iterations=40)
+NEWTON = Newton(max_iterations=25)
 CLEAR = (
     5e-3  # error below which no other candidate is looked for: a nearer one would change no verdict
 )
@@ -104,7 +104,7 @@ def _direct(problem: ForcedProblem, middle: HarmonicBalance, point: ForcedPoint)
     omega, few, many = point.omega, problem.low, problem.high
     x = few.unknowns(point.coefficients)
     candidates: list[tuple[float, float, ForcedPoint]] = []
-    for start in ("through", "predicted", "at once"):
+    for start in ("through", "at once", "predicted"):
         high_error = np.nan
         if start == "at once":
             begin: FloatArray | None = many.unknowns(point.coefficients)
@@ -123,7 +123,7 @@ def _direct(problem: ForcedProblem, middle: HarmonicBalance, point: ForcedPoint)
             candidates.append(
                 (_error(problem, point, many, solved), high_error, _reference(many, point, solved))
             )
-        if candidates and candidates[-1][0] < CLEAR:
+        if candidates and (candidates[-1][0] < CLEAR or start == "at once"):
             break
     return _nearest(point, candidates)
 

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from stickslip.harmonic.dynamic_stiffness import condense
     from stickslip.harmonic.excitation import HarmonicLoad
     from stickslip.harmonic.selection.grolet import Grolet
+    from stickslip.harmonic.selection.guarded_alert import GuardedAlert
     from stickslip.harmonic.selection.jacobian_alert import JacobianAlert
     from stickslip.harmonic.selection.jaumouille import Jaumouille
     from stickslip.harmonic.selection.laxalde import Laxalde
@@ -167,6 +168,7 @@ _MODULES = {
     "stickslip.harmonic.dynamic_stiffness": ("condense",),
     "stickslip.harmonic.excitation": ("HarmonicLoad",),
     "stickslip.harmonic.selection.grolet": ("Grolet",),
+    "stickslip.harmonic.selection.guarded_alert": ("GuardedAlert",),
     "stickslip.harmonic.selection.jacobian_alert": ("JacobianAlert",),
     "stickslip.harmonic.selection.jaumouille": ("Jaumouille",),
     "stickslip.harmonic.selection.laxalde": ("Laxalde",),
@@ -269,7 +271,7 @@ __all__ = [
     "CubicSpring", "CyclicSector", "Dahl", "Deck", "Discretisation", "DiskProfile", "Dofs", "Drift",
     "ElasticCoulomb", "ErrorMeasure", "Fields", "FirstLoading", "FlatCurvedDamper", "Floquet",
     "ForcedPoint", "ForcedProblem", "FourParameter", "FrdResults", "FrequencyError",
-    "FrequencyErrors", "Grolet", "GyroscopicModes", "HarmonicLoad", "InputError", "Interface",
+    "FrequencyErrors", "Grolet", "GuardedAlert", "GyroscopicModes", "HarmonicLoad", "InputError", "Interface",
     "Interference", "Iwan", "JacobianAlert", "JacobianSimilarity", "Jaumouille", "Jenkins",
     "Laxalde", "Maple", "Material", "ModelSummary", "Modes", "ModesBelow", "NastranResults",
     "Newton", "NodalDiameterMap", "NodalField", "Pairing", "ParameterPoint", "PeakPoint",

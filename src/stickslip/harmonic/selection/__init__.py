@@ -8,6 +8,7 @@ from stickslip.harmonic.selection.strategy import Strategy
 # file → class
 STRATEGIES = {
     "jacobian_alert": "JacobianAlert",
+    "guarded_alert": "GuardedAlert",
     "goal_oriented": "GoalOriented",
     "grolet": "Grolet",
     "jaumouille": "Jaumouille",
