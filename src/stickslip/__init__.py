@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from stickslip.harmonic.dlft import dynamic_lagrangian
     from stickslip.harmonic.dynamic_stiffness import condense
     from stickslip.harmonic.excitation import HarmonicLoad
+    from stickslip.harmonic.selection.goal_oriented import GoalOriented
     from stickslip.harmonic.selection.grolet import Grolet
     from stickslip.harmonic.selection.guarded_alert import GuardedAlert
     from stickslip.harmonic.selection.jacobian_alert import JacobianAlert
@@ -167,6 +168,7 @@ _MODULES = {
     "stickslip.harmonic.dlft": ("dynamic_lagrangian",),
     "stickslip.harmonic.dynamic_stiffness": ("condense",),
     "stickslip.harmonic.excitation": ("HarmonicLoad",),
+    "stickslip.harmonic.selection.goal_oriented": ("GoalOriented",),
     "stickslip.harmonic.selection.grolet": ("Grolet",),
     "stickslip.harmonic.selection.guarded_alert": ("GuardedAlert",),
     "stickslip.harmonic.selection.jacobian_alert": ("JacobianAlert",),
@@ -271,7 +273,7 @@ __all__ = [
     "CubicSpring", "CyclicSector", "Dahl", "Deck", "Discretisation", "DiskProfile", "Dofs", "Drift",
     "ElasticCoulomb", "ErrorMeasure", "Fields", "FirstLoading", "FlatCurvedDamper", "Floquet",
     "ForcedPoint", "ForcedProblem", "FourParameter", "FrdResults", "FrequencyError",
-    "FrequencyErrors", "Grolet", "GuardedAlert", "GyroscopicModes", "HarmonicLoad", "InputError", "Interface",
+    "FrequencyErrors", "GoalOriented", "Grolet", "GuardedAlert", "GyroscopicModes", "HarmonicLoad", "InputError", "Interface",
     "Interference", "Iwan", "JacobianAlert", "JacobianSimilarity", "Jaumouille", "Jenkins",
     "Laxalde", "Maple", "Material", "ModelSummary", "Modes", "ModesBelow", "NastranResults",
     "Newton", "NodalDiameterMap", "NodalField", "Pairing", "ParameterPoint", "PeakPoint",
