@@ -371,7 +371,7 @@ def test_the_reference_itself_is_accepted():
     assert verdict.again is None
 
 
-@pytest.mark.parametrize("bad", [{"margin": -0.1}, {"margin": np.nan}, {"goal": "phase"}])
+@pytest.mark.parametrize("bad", [{"left_out": -0.1}, {"left_out": np.nan}, {"goal": "phase"}])
 def test_parameters_that_make_no_sense_are_refused(bad):
     with pytest.raises(InputError, match="GoalOriented"):
         GoalOriented(**bad)

@@ -30,7 +30,7 @@ class GoalOriented:
     ----------
     threshold
         Largest expected error that is accepted, as a fraction.
-    margin
+    left_out
         Share of the threshold that the harmonics left out of a repeat may contribute, all taken together and without cancellation.
     goal
         What is to be right of an output: its ``motion``, amplitude and phase as in the Jacobian Alert, or its ``amplitude`` alone.
@@ -38,13 +38,15 @@ class GoalOriented:
 
     verifies: ClassVar[bool] = True
     threshold: float = 0.05
-    margin: float = 0.2
+    left_out: float = 0.2
     goal: Goal = "motion"
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.margin <= 1.0:
+        if not 0.0 <= self.left_out <= 1.0:
             raise input_error(
-                "GoalOriented.margin", f"must lie from 0 to 1, got {self.margin}", "0.2 is usual."
+                "GoalOriented.left_out",
+                f"must lie from 0 to 1, got {self.left_out}",
+                "0.2 is usual.",
             )
         if self.goal not in get_args(Goal):
             raise input_error(
@@ -75,7 +77,7 @@ class GoalOriented:
         missing = tuple(h for h in high.harmonics if h not in low.harmonics)
         parts = contributions(low, high, step.omega, outputs.some(worst), found)
         # parts add up in a linear problem: the farther this one is from one, the fewer are left out
-        allowed = self.margin * self.threshold * max(1.0 - found.doubt, 0.0)
+        allowed = self.left_out * self.threshold * max(1.0 - found.doubt, 0.0)
         chosen = chosen_harmonics(parts, missing, max(allowed, NOTHING))
         return tuple(sorted({*low.harmonics, *chosen}))
 
