@@ -15,6 +15,7 @@ import xarray as xr
 from synthetic_result import synthetic_result, write_result
 
 from stickslip.errors import InputError
+from stickslip.report.choice import choice, flagged_ranges
 from stickslip.report.figure_mesh import edges
 from stickslip.report.figures_damper import damper_motion
 from stickslip.report.figures_error import errors
@@ -22,7 +23,7 @@ from stickslip.report.figures_response import frequency_response
 from stickslip.report.page import write_report
 from stickslip.report.quantities import number, percent, quantity, scale_for
 from stickslip.report.result import NEEDED, load_result
-from stickslip.report.summary import alert, flagged_ranges, headline
+from stickslip.report.summary import headline
 
 CHROMIUM = (
     shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -389,7 +390,7 @@ def test_the_report_knows_of_alerts_whose_points_a_branch_replaced(tmp_path: Pat
     data["alert_error_percent"] = "alert_point", np.array([1.0, 6, 250, 8, 2, 9])
     result = load_result(write_result(data, tmp_path / "r.nc"))
     assert flagged_ranges(result, result.cases[0]) == [(102, 104, 250, 103), (107, 107, 9, 107)]
-    assert "102 to 104 Hz<br>107 Hz" in alert(result)
+    assert "102 to 104 Hz<br>107 Hz" in choice(result)
     assert "4 of 6 checked points above 5 %" in headline(result)
     assert "over 100 %" in headline(result)
     assert "4 of 6 checked points lie above it" in errors(result).caption

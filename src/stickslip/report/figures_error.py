@@ -1,4 +1,4 @@
-"""Figures of the alert: predicted and real error of the low-order solution."""
+"""Figures of the strategy: predicted and real error of first solutions, or an indicator of its own."""
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,7 @@ from stickslip.report.plot import ALARM, INK, Plot, absent, log_ticks, styled
 from stickslip.report.quantities import counted, number, percent
 from stickslip.report.result import RATIO, Case, Result
 
+_SMALLEST_INDICATOR = 1e-8
 _SMALLEST_ERROR = 1e-3  # percent; below it the axis would only show rounding
 
 
@@ -21,7 +22,8 @@ def _error_traces(figure: go.Figure, result: Result) -> list[Case]:
     both = [c for c in result.cases if np.isfinite(real[result.points(c)]).any()][-COMPARED:]
 
     def add(case: Case, x: FloatArray, y: FloatArray, column: int, **style: object) -> None:
-        hover = f"{RATIO} = {case.label}<br>%{{x:.2f}} Hz: %{{y:.3g}} %<extra></extra>"
+        unit = " %" if result.is_error else ""
+        hover = f"{RATIO} = {case.label}<br>%{{x:.2f}} Hz: %{{y:.3g}}{unit}<extra></extra>"
         options = {"legendgroup": "cases", "hovertemplate": hover, **style}
         figure.add_scatter(x=x, y=y, row=1, col=column, **options)
 
@@ -75,36 +77,56 @@ def _error_caption(result: Result) -> str:
     asked = result.alert
     error = asked.error
     above = error > result.threshold
-    text = (
-        f"The alert's predicted error of the H = {result.low} solution on the output dofs; the dashed line "
-        f"is the threshold of {percent(result.threshold)}. {int(above.sum())} of "
-        f"{counted(error.size, 'checked point')} lie above it and were asked to repeat at "
-        f"H = {result.high}. "
-    )
+    if result.is_error:
+        text = (
+            f"The error that <code>{result.selection}</code> predicts of the solution with few harmonics (at least {result.low_name}); "
+            f"the dashed line is the threshold of {percent(result.threshold)}. {int(above.sum())} of "
+            f"{counted(error.size, 'checked point')} lie above it and were asked to repeat with more. "
+        )
+    else:
+        text = (
+            f"What <code>{result.selection}</code> compares with its threshold of {result.shown(result.threshold)} (dashed) at the first "
+            "solution of each frequency: no error, and not to be compared with the indicators of others. "
+        )
     worst = int(np.argmax(error))
     ratio = number(float(result.floats("load_ratio")[asked.case[worst]]))
     hz = number(float(asked.hz[worst]), 5)
-    text += f"The largest, {percent(float(error[worst]))}, is at {hz} Hz for {RATIO} = {ratio}. "
+    text += (
+        f"The largest, {result.shown(float(error[worst]))}, is at {hz} Hz for {RATIO} = {ratio}. "
+    )
     real = np.isfinite(result.floats("real_error_percent"))
     if real.any():
         text += (
-            f"Right: the real error (open circles), the difference of the two orders, where both were "
-            f"solved ({counted(int(real.sum()), 'point')}; at most {COMPARED} load cases are drawn). "
+            f"Right: the real error (open circles), the difference to the accepted solution, where a point was "
+            f"solved again ({counted(int(real.sum()), 'point')}; at most {COMPARED} load cases are drawn). "
         )
-    hidden = int((error < _SMALLEST_ERROR).sum())
+    floor = _floor(result)
+    hidden = int((error < floor).sum())
     if hidden:
-        text += f"{counted(hidden, 'point')} below {number(_SMALLEST_ERROR)} % lie under the axis."
+        text += f"{counted(hidden, 'point')} below {result.shown(floor)} lie under the axis. "
+    endless = int(np.isinf(error).sum())
+    if endless:
+        text += f"{counted(endless, 'point')} beyond all bounds are not drawn."
     return text
+
+
+def _floor(result: Result) -> float:
+    """Smallest value drawn: an error below is rounding; other indicators may be smaller."""
+    return _SMALLEST_ERROR if result.is_error else _SMALLEST_INDICATOR
 
 
 def errors(result: Result) -> Plot:
     """Predicted and real error against frequency (Gastaldi and Berruti 2017, fig. 6)."""
-    key, title = "errors", "The alert: predicted and real error against frequency"
+    key, title = "errors", "Predicted and real error against frequency"
+    if not result.is_error:
+        title = "The strategy's indicator against frequency"
     error = result.alert.error
     if not error.size:
         return absent(key, title, "no predicted error was computed")
-    some_real = np.isfinite(result.floats("real_error_percent")).any()
-    titles = ("predicted, all load cases", "predicted (line) and real (circles)")
+    some_real = result.is_error and np.isfinite(result.floats("real_error_percent")).any()
+    titles = ["predicted, all load cases", "predicted (line) and real (circles)"]
+    if not result.is_error:
+        titles = ["all load cases"]
     columns = 2 if some_real else 1
     figure = make_subplots(
         1, columns, shared_yaxes=True, horizontal_spacing=0.04, subplot_titles=titles[:columns]
@@ -112,13 +134,15 @@ def errors(result: Result) -> Plot:
     _error_traces(figure, result)
     styled(figure, 430)
     real = result.floats("real_error_percent")
-    top = float(np.concatenate([error, real[np.isfinite(real)], [result.threshold]]).max())
+    shown = np.concatenate([error, real if some_real else [], [result.threshold]])
+    floor, top = _floor(result), float(shown[np.isfinite(shown)].max())
     figure.add_hline(y=result.threshold, line={"dash": "dash", "color": ALARM, "width": 1.4})
     hz = result.floats("frequency_hz")
     figure.update_xaxes(title_text="frequency (Hz)", range=[float(hz.min()), float(hz.max())])
-    ticks = log_ticks(np.array([_SMALLEST_ERROR, top]))
-    figure.update_yaxes(type="log", range=[np.log10(_SMALLEST_ERROR), np.log10(2 * top)], **ticks)
-    figure.update_yaxes(title_text="error of the output dofs (%)", col=1)
+    ticks = log_ticks(np.array([floor, top]))
+    figure.update_yaxes(type="log", range=[np.log10(floor), np.log10(2 * top)], **ticks)
+    what = "error (%)" if result.is_error else f"indicator of {result.selection}"
+    figure.update_yaxes(title_text=what, col=1)
     return Plot(key, title, _error_caption(result), figure)
 
 
@@ -149,6 +173,8 @@ def error_scatter(result: Result) -> Plot:
     key, title = "error-scatter", "Does the prediction hold? Real against predicted error"
     predicted, real = result.floats("predicted_error_percent"), result.floats("real_error_percent")
     known = np.isfinite(predicted) & np.isfinite(real) & (predicted > 0) & (real > 0)
+    if not result.is_error:
+        return absent(key, title, f"{result.selection} predicts no error")
     if not known.any():
         return absent(key, title, "no point was solved at both orders")
     figure = _scatter(result, predicted, real, known)
@@ -170,7 +196,7 @@ def error_scatter(result: Result) -> Plot:
     figure.update_xaxes(constrain="domain")
     larger = int((real[known] > predicted[known]).sum())
     caption = (
-        f"{counted(int(known.sum()), 'point')} solved at both orders; on the dotted line the prediction is "
+        f"{counted(int(known.sum()), 'point')} solved again; on the dotted line the prediction is "
         f"exact. In {larger} of them the real error is larger than predicted. Points below the threshold of "
         f"{percent(result.threshold)} (dashed) were not solved twice, so that errors which the alert missed cannot show here."
     )

@@ -17,6 +17,7 @@ from stickslip.report.plot import (
 )
 from stickslip.report.quantities import Scale, counted, joined, number, percent, scale_for
 from stickslip.report.result import RATIO, Case, Result
+from stickslip.study.harmonics_table import named
 
 COMPARED = 3  # curves of the most nonlinear cases that stay legible in one panel
 
@@ -43,9 +44,11 @@ def peak_hz(result: Result, case: Case) -> float:
 
 def _curve(result: Result, case: Case, scale: Scale) -> go.Scatter:
     at = result.points(case)
-    order = result.integers("order")[at]
-    error = result.floats("predicted_error_percent")[at]
-    high = order > result.low
+    high = result.more[at]
+    kept = [named(np.flatnonzero(row)) for row in result.kept[at]]
+    error = result.floats("predicted_error_percent" if result.is_error else "indicator")[at]
+    said = [result.shown(float(e)) for e in error]
+    about = "predicted error" if result.is_error else "indicator"
     return go.Scatter(
         x=result.floats("frequency_hz")[at],
         y=accepted_response(result)[at] * scale.factor,
@@ -60,10 +63,10 @@ def _curve(result: Result, case: Case, scale: Scale) -> go.Scatter:
             "color": case.colour,
             "line": {"width": 1.1, "color": case.colour},
         },
-        customdata=np.stack([order, error], axis=1),
+        customdata=list(zip(kept, said, strict=True)),
         hovertemplate=(
             f"{RATIO} = {case.label}<br>%{{x:.2f}} Hz: %{{y:.4g}} {scale.unit}<br>"
-            "H = %{customdata[0]:.0f}, predicted error %{customdata[1]:.2g} %<extra></extra>"
+            f"H = %{{customdata[0]}}, {about} %{{customdata[1]}}<extra></extra>"
         ),
     )
 
@@ -115,7 +118,7 @@ def _scale_buttons(logarithmic: bool) -> list[dict[str, object]]:
 
 def _frf_caption(result: Result, scale: Scale) -> str:
     converged = result.converged
-    high = converged & (result.integers("order") > result.low)
+    high = converged & result.more
     hz = result.floats("frequency_hz")
     text = f"First harmonic of {result.output_name} divided by the amplitude of the excitation. "
     if result.peaked:
@@ -131,15 +134,15 @@ def _frf_caption(result: Result, scale: Scale) -> str:
             else f"Peak: {peaks[0]}. "
         )
     text += (
-        f"{int(high.sum())} of {counted(int(converged.sum()), 'accepted point')} stand at "
-        f"H = {result.high} (filled diamonds)"
+        f"{int(high.sum())} of {counted(int(converged.sum()), 'accepted point')} keep "
+        f"{result.more_name} (filled diamonds)"
     )
     text += (
         f", from {number(hz[high].min(), 4)} to {number(hz[high].max(), 4)} Hz; "
         if high.any()
         else "; "
     )
-    text += f"the rest needed H = {result.low} only (open circles)."
+    text += f"the rest keep H = {result.low_name} (open circles)."
     if not converged.all():
         n = counted(int((~converged).sum()), "point")
         text += f" {n} did not converge (crosses); the curve is left open there."
@@ -153,8 +156,10 @@ def frequency_response(result: Result) -> Plot:
         return absent(key, title, "no point of the run has converged yet")
     scale = _response_scale(result)
     figure = go.Figure([_curve(result, case, scale) for case in result.cases])
-    figure.add_trace(key_marker(f"accepted at H = {result.low}", "circle-open", "key", "points"))
-    figure.add_trace(key_marker(f"accepted at H = {result.high}", "diamond", "key"))
+    figure.add_trace(
+        key_marker(f"accepted with H = {result.low_name}", "circle-open", "key", "points")
+    )
+    figure.add_trace(key_marker(f"accepted with {result.more_name}", "diamond", "key"))
     if not result.converged.all():
         figure.add_trace(_failures(result, scale))
     styled(figure, 540)
@@ -178,14 +183,14 @@ def _low_caption(result: Result, cases: list[Case], low: FloatArray) -> str:
         where = number(float(result.floats("frequency_hz")[worst]), 5)
         parts.append(f"{percent(difference)} at {where} Hz for {RATIO} = {case.label}")
     return (
-        f"Solid: accepted with the alert; dashed: H = {result.low} alone. The largest difference of the "
+        f"Solid: accepted; dashed: H = {result.low_name} alone, where that was solved. The largest difference of the "
         f"low-order amplitude is {joined(parts)}."
     )
 
 
 def low_order(result: Result) -> Plot:
     """Low-order against accepted curves of the most nonlinear cases (Gastaldi and Berruti 2017, fig. 4a)."""
-    key, title = "low-order", f"What H = {result.low} alone would have given"
+    key, title = "low-order", f"What H = {result.low_name} alone would have given"
     if not result.has("amplitude_low"):
         return absent(key, title, "the low-order amplitudes are not in this result")
     low = result.response("amplitude_low")
@@ -202,7 +207,7 @@ def low_order(result: Result) -> Plot:
         only = at[np.isfinite(low[at])]
         for x, y, name, line in (
             (hz[at], accepted[at], "accepted", {"width": 2}),
-            (hz[only], low[only], f"H = {result.low} alone", {"width": 1.6, "dash": "dash"}),
+            (hz[only], low[only], f"H = {result.low_name} alone", {"width": 1.6, "dash": "dash"}),
         ):
             line_style = {**line, "color": case.colour}
             values = y * scale.factor

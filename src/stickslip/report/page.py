@@ -4,6 +4,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from stickslip.report import tables
+from stickslip.report.attempts import attempts
+from stickslip.report.choice import choice
+from stickslip.report.figure_harmonics import kept_harmonics
 from stickslip.report.figure_mesh import mesh_picture
 from stickslip.report.figures_contact import hysteresis, state_map
 from stickslip.report.figures_damper import damper, energy
@@ -12,11 +15,12 @@ from stickslip.report.figures_response import frequency_response, low_order, opt
 from stickslip.report.page_parts import figure_html, page_html, section, versions, write_page
 from stickslip.report.plot import Plot
 from stickslip.report.result import RATIO, Case, Result, load_result
-from stickslip.report.summary import alert, headline, warnings_box
+from stickslip.report.summary import headline, warnings_box
 
 _RESPONSE: tuple[Callable[[Result], Plot], ...] = (
     frequency_response,
     low_order,
+    kept_harmonics,
     errors,
     error_scatter,
     optimisation,
@@ -51,13 +55,16 @@ def _body(result: Result) -> str:
             "".join(figure_html(plot, count + k + 1, chosen) for k, plot in enumerate(group))
         )
         count += len(group)
-    checks = f"<h3>Time integration</h3>{tables.verification(result)}<h3>Retention</h3>{tables.retention(result)}"
+    checks = (
+        f"<h3>More harmonics</h3>{tables.reference(result)}"
+        f"<h3>Time integration</h3>{tables.verification(result)}<h3>Retention</h3>{tables.retention(result)}"
+    )
     sections = (
-        section("alert", "Where more harmonics were needed", alert(result)),
+        section("alert", "Where more harmonics were needed", choice(result)),
         section("response", "Forced response", drawn[0]),
         section("contact", "Contact and damper at the peak", _chooser(result, chosen) + drawn[1]),
         section("model", "Model", f"{drawn[2]}<h3>Reduction</h3>{tables.reduction(result)}"),
-        section("cases", "Load cases", tables.load_cases(result)),
+        section("cases", "Load cases", tables.load_cases(result) + attempts(result)),
         section("checks", "Checks", checks),
         section(
             "provenance",

@@ -11,7 +11,9 @@ import xarray as xr
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error
-from stickslip.report.quantities import number
+from stickslip.report.quantities import number, percent
+from stickslip.response.sweep import FIXED
+from stickslip.study.harmonics_table import named
 
 NEEDED = (
     "load_ratio",
@@ -56,11 +58,11 @@ class Case:
 
 @dataclass(frozen=True, eq=False)
 class Alert:
-    """The points at which the alert was asked, in the order of solution."""
+    """The first solutions at which the strategy was asked, in the order of solution."""
 
     case: IntArray  # index of the load case
     hz: FloatArray
-    error: FloatArray  # percent, as predicted
+    error: FloatArray  # percent, as predicted; of a strategy that predicts no error its indicator
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,31 +135,100 @@ class Result:
 
     @property
     def alert(self) -> Alert:
-        """Where the alert was asked; the accepted points that have a predicted error in files which do not say."""
+        """Where the strategy was asked; the accepted points that have a predicted error in files which do not say."""
         if "alert_error_percent" in self.data:
             return Alert(
                 self.integers("alert_case"),
                 self.floats("alert_frequency_hz"),
                 self.floats("alert_error_percent"),
             )
+        if not self.is_error and "attempt_indicator" in self.data:
+            stage = self.data["attempt_stage"]
+            first = str(stage.attrs.get("flag_meanings", "low")).split().index("low")
+            said = self.floats("attempt_indicator")
+            own = np.flatnonzero(~np.isnan(said) & (self.integers("attempt_stage") == first))
+            hz = self.floats("attempt_frequency_hz")[own]
+            return Alert(self.integers("attempt_case")[own], hz, said[own])
         error = self.floats("predicted_error_percent")
         at = np.flatnonzero(np.isfinite(error))
         return Alert(self.integers("case")[at], self.floats("frequency_hz")[at], error[at])
 
     @property
+    def selection(self) -> str:
+        """Name of the strategy, escaped."""
+        return escape(self.text("selection", "jacobian_alert"))
+
+    @property
+    def is_error(self) -> bool:
+        """Whether the strategy's indicator is the predicted error of a solution."""
+        return self.text("indicator_name", "predicted error") == "predicted error"
+
+    @property
+    def decides(self) -> bool:
+        """Whether anything chose: not with the same harmonics at every frequency."""
+        return self.selection not in FIXED
+
+    @property
     def threshold(self) -> float:
-        """Threshold of the alert in percent."""
-        return self.scalar("alert_threshold_percent", 5.0)
+        """Threshold of the strategy; in percent where it is one of an error."""
+        if self.is_error:
+            return self.scalar("alert_threshold_percent", 5.0)
+        return self.scalar("selection_threshold", float("nan"))
+
+    def shown(self, indicator: float) -> str:
+        """Write what `alert` holds: in percent where it is an error."""
+        if np.isinf(indicator):
+            return "beyond all bounds"
+        return percent(indicator) if self.is_error else number(indicator)
 
     @property
-    def low(self) -> int:
-        """Low harmonic order."""
-        return int(self.scalar("low_order", 1))
+    def low_harmonics(self) -> IntArray:
+        """Harmonics of the first passage, from 0."""
+        return self._support("low", 1)
 
     @property
-    def high(self) -> int:
-        """High harmonic order."""
-        return int(self.scalar("high_order", 5))
+    def high_harmonics(self) -> IntArray:
+        """Harmonics of the reference, from 0."""
+        return self._support("high", 5)
+
+    def _support(self, which: str, default: int) -> IntArray:
+        full = np.arange(int(self.scalar(f"{which}_order", default)) + 1)
+        return np.atleast_1d(np.asarray(self.data.attrs.get(f"{which}_harmonics", full))).astype(
+            np.int64
+        )
+
+    @property
+    def low_name(self) -> str:
+        """Harmonics of the first passage as text."""
+        return named(self.low_harmonics)
+
+    @property
+    def high_name(self) -> str:
+        """Harmonics of the reference as text."""
+        return named(self.high_harmonics)
+
+    @property
+    def kept(self) -> IntArray:
+        """(point, harmonic) 1 where the solution keeps the harmonic; all up to its order in files that do not say."""
+        if "harmonic_kept" in self.data:
+            return np.asarray(
+                self.data["harmonic_kept"].transpose("point", "harmonic").values
+            ).astype(np.int64)
+        harmonic = np.arange(int(self.high_harmonics[-1]) + 1)
+        return (harmonic <= self.integers("order")[:, None]).astype(np.int64)
+
+    @property
+    def more(self) -> npt.NDArray[np.bool_]:
+        """(point,) True where the solution keeps harmonics that the first passage does not."""
+        own = np.isin(np.arange(self.kept.shape[1]), self.low_harmonics)
+        return np.asarray((self.kept[:, ~own] > 0).any(axis=1))
+
+    @property
+    def more_name(self) -> str:
+        """What such points keep, as text: the harmonics of the reference where it is all of them."""
+        some = self.kept[self.more]
+        own = np.isin(np.arange(self.kept.shape[1]), self.high_harmonics)
+        return f"H = {self.high_name}" if bool((some == own).all()) else "more harmonics"
 
     def response(self, name: str = "amplitude") -> FloatArray:
         """(point,) amplitude of the report output divided by the excitation, m/N."""

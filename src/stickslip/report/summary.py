@@ -5,12 +5,9 @@ from html import escape
 
 import numpy as np
 
-from stickslip.arrays import FloatArray, IntArray
-from stickslip.report.figures_contact import states
 from stickslip.report.figures_response import peak_hz, peak_response
 from stickslip.report.quantities import counted, number, percent, scale_for
-from stickslip.report.result import RATIO, Case, Result
-from stickslip.report.tables import html_table
+from stickslip.report.result import RATIO, Result
 
 _LARGE_SHIFT = 0.01  # relative change of the peak worth a warning
 _LARGE_DIFFERENCE = 1.0  # percent between time integration and balance (Gastaldi and Berruti 2017: below it at H = 5)
@@ -48,8 +45,14 @@ def _shift_card(result: Result) -> str:
     )
 
 
-def _alert_card(result: Result) -> str:
+def _choice_card(result: Result) -> str:
     error = result.alert.error
+    if not result.is_error:
+        more = int(np.sum(result.more & result.converged))
+        n = int(result.converged.sum())
+        note = f"{more} of {counted(n, 'accepted point')}, chosen by {result.selection}"
+        share = f"{number(100 * more / n, 2)} %" if n else "–"
+        return _card(share, f"of points keep other harmonics than {result.low_name}", note)
     if not error.size:
         return _card("–", "asked for more harmonics", "no predicted error was computed")
     asked = int(np.sum(error > result.threshold))
@@ -61,6 +64,11 @@ def _alert_card(result: Result) -> str:
 
 def _worst_card(result: Result) -> str:
     asked = result.alert
+    if not result.is_error and result.has("unknowns_solved"):
+        work = int(result.floats("unknowns_solved").sum())
+        steps = int(result.floats("newton_steps").sum())
+        note = f"of all solutions together, in {counted(steps, 'Newton step')}"
+        return _card(number(work, 6), "unknowns solved", note)
     if not asked.error.size:
         return _card("–", "worst predicted error", "no predicted error was computed")
     at = int(np.argmax(asked.error))
@@ -68,12 +76,12 @@ def _worst_card(result: Result) -> str:
     note = f"at {number(float(asked.hz[at]), 5)} Hz, {RATIO} = {ratio}"
     largest = float(asked.error[at])
     said = "over 100 %" if largest > 100.0 else percent(largest)
-    return _card(said, f"worst predicted error at H = {result.low}", note)
+    return _card(said, f"worst predicted error with H = {result.low_name}", note)
 
 
 def headline(result: Result) -> str:
     """Return the four numbers that sum the run up."""
-    cards = (_optimum_card(result), _shift_card(result), _alert_card(result), _worst_card(result))
+    cards = (_optimum_card(result), _shift_card(result), _choice_card(result), _worst_card(result))
     return f'<div class="cards">{"".join(cards)}</div>'
 
 
@@ -150,90 +158,3 @@ def warnings_box(result: Result) -> str:
         return f'<div class="box good"><b>No warnings.</b> The run is complete and all {n} converged.</div>'
     items = "".join(f"<li>{w}</li>" for w in warnings)
     return f'<div class="box bad"><b>{counted(len(warnings), "warning")}</b><ul>{items}</ul></div>'
-
-
-def flagged_ranges(result: Result, case: Case) -> list[tuple[float, float, float, float]]:
-    """Ranges of frequency in which the alert asked for more harmonics.
-
-    Returns
-    -------
-    ranges
-        (first Hz, last Hz, largest predicted error in percent, Hz of it) of each run of neighbouring points.
-    """
-    at = np.flatnonzero(result.alert.case == case.index)
-    hz, error = result.alert.hz[at], result.alert.error[at]
-    above = np.concatenate([[False], error > result.threshold, [False]])
-    starts = np.flatnonzero(~above[:-1] & above[1:])
-    ends = np.flatnonzero(above[:-1] & ~above[1:])
-    ranges = []
-    for a, b in zip(starts, ends, strict=True):
-        worst = a + int(np.argmax(error[a:b]))
-        ranges.append(
-            (float(hz[a:b].min()), float(hz[a:b].max()), float(error[worst]), float(hz[worst]))
-        )
-    return ranges
-
-
-def _harmonic_share(result: Result, at: IntArray) -> float:
-    """Largest share of the contact forces' vibration that harmonics above the low order carry, in percent."""
-    if not at.size or not result.has("contact_force"):
-        return float("nan")
-    force = result.data["contact_force"].isel(point=at)
-    parts = np.asarray(force.transpose("point", "harmonic", "contact", "direction", "part").values)
-    power: FloatArray = np.nansum(np.square(parts, dtype=np.float64), axis=(2, 3, 4))
-    moving = power[:, 1:].sum(axis=1)
-    share = np.sqrt(power[:, result.low + 1 :].sum(axis=1) / np.where(moving > 0, moving, 1.0))
-    return float(100 * share.max())
-
-
-def _why(result: Result, case: Case) -> str:
-    """Say what the contact does at the peak of a case and what the higher harmonics carry."""
-    reasons = []
-    if result.has("peak_state") and result.peak(case) >= 0:
-        state = states(result, case)
-        slipping, open_ = (state == 1).any(axis=(1, 2)), (state == 2).any(axis=(1, 2))
-        n = len(state)
-        if slipping.any() or open_.any():
-            reasons.append(
-                f"at the peak {int(slipping.sum())} of {n} contacts slip, {int(open_.sum())} lift off"
-            )
-        else:
-            reasons.append("at the peak all contacts stick: the system is linear")
-    mine = result.integers("case") == case.index
-    high = np.flatnonzero(mine & result.converged & (result.integers("order") > result.low))
-    share = _harmonic_share(result, high)
-    if np.isfinite(share):
-        above = result.low + 1
-        reasons.append(
-            f"harmonics {above} to {result.high} carry up to {number(share, 2)} % of the contact force"
-        )
-    return "; ".join(reasons) or "–"
-
-
-def alert(result: Result) -> str:
-    """Where the alert asked for more harmonics, and why, in plain words."""
-    if not result.alert.error.size:
-        return "<p>No predicted error was computed: the alert did not run.</p>"
-    rows = []
-    for case in result.cases:
-        ranges = flagged_ranges(result, case)
-        where = "<br>".join(
-            f"{number(a, 5)} Hz" if a == b else f"{number(a, 5)} to {number(b, 5)} Hz"
-            for a, b, _, _ in ranges
-        )
-        worst = max(ranges, key=lambda r: r[2]) if ranges else None
-        peak = f"{percent(worst[2])} at {number(worst[3], 5)} Hz" if worst else "–"
-        rows.append([case.label, where or "nowhere", peak, _why(result, case)])
-    text = (
-        f"<p>Each point is first solved with harmonics 0 to {result.low}. One Newton step with harmonics 0 to "
-        f"{result.high} then predicts how far the output would move; where that exceeds "
-        f"{percent(result.threshold)}, the point is solved again with harmonics 0 to {result.high}. A contact that "
-        "slips or lifts off makes forces at multiples of the excitation frequency, which the first pass cannot see."
-        "</p>"
-    )
-    stored = escape(result.text("alert_explanation"))
-    log = (
-        f"<details><summary>As the run put it</summary><p>{stored}</p></details>" if stored else ""
-    )
-    head = [RATIO, f"H = {result.high} asked for", "largest predicted error", "why"]
-    return text + html_table(head, rows, numeric=False) + log

@@ -65,10 +65,17 @@ def load_cases(result: Result) -> str:
     """One row a load case: peak, points, work."""
     scale = scale_for(np.array([peak_response(result, c) for c in result.cases]), "m/N")
     head = [
-        RATIO, "excitation", "peak", f"peak / force ({scale.unit})", "at (Hz)", "points", f"at H = {result.low}",
-        f"at H = {result.high}", "failed", "Newton steps", "contact (s)", "linear (s)", "rest (s)",
+        RATIO, "excitation", "peak", f"peak / force ({scale.unit})", "at (Hz)", "points", f"with H = {result.low_name}",
+        f"with {result.more_name}", "failed", "Newton steps", "unknowns solved", "contact (s)", "linear (s)", "rest (s)",
     ]  # fmt: skip
-    counts = ("points", "points_low", "points_high", "points_failed", "newton_steps")
+    counts = (
+        "points",
+        "points_low",
+        "points_high",
+        "points_failed",
+        "newton_steps",
+        "unknowns_solved",
+    )
     clocks = ("seconds_contact", "seconds_linear", "seconds_rest")
     rows = []
     for case in result.cases:
@@ -97,6 +104,22 @@ def _work_sentence(result: Result) -> str:
     words = {"contact": "the contact laws", "linear": "linear algebra", "rest": "the rest"}
     shares = [f"{number(100 * s / total, 2)} % in {words[name]}" for name, s in spent.items()]
     return f"<p>The solver took {quantity(total, 's')}: {', '.join(shares)}.</p>"
+
+
+def reference(result: Result) -> str:
+    """Say what twice as many harmonics would change."""
+    names = ("reference_worst_percent", "reference_worst_hz", "reference_above")
+    if not result.has(*names):
+        return "<p>Whether more harmonics are needed was not asked for in this run (option <code>--verify-harmonics</code>).</p>"
+    rows = []
+    for case in result.cases:
+        worst, hz, above = (float(result.floats(name)[case.index]) for name in names)
+        size = "beyond all bounds" if np.isinf(worst) else percent(worst)
+        rows.append([case.label, size, fixed(hz, 2), fixed(above, 0)])
+    head = [RATIO, "largest predicted change", "at (Hz)", "points above the threshold"]
+    text = f"<p>What twice as many harmonics as {result.high_name} are predicted to change at the accepted points.</p>"
+    said = (f"<li>{escape(str(s))}</li>" for s in result.data["reference_sentence"].values)
+    return text + html_table(head, rows) + f"<ul>{''.join(said)}</ul>"
 
 
 def verification(result: Result) -> str:
@@ -177,7 +200,7 @@ def provenance(result: Result, versions: dict[str, str]) -> str:
         *[[escape(name), escape(version)] for name, version in versions.items()],
         ["wall time", quantity(result.scalar("wall_seconds", float("nan")), "s")],
         ["samples per period", fixed(result.scalar("samples", float("nan")), 0)],
-        ["harmonic orders", f"{result.low} and {result.high}"],
+        ["harmonics", f"{result.low_name} and {result.high_name}, chosen by {result.selection}"],
     ]
     study = escape(result.text("study_toml"))
     text = html_table([], rows, numeric=False)
