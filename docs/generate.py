@@ -5,6 +5,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from alert_numbers import alert_tables
 from sector_drawing import draw_sector
 
 import stickslip
@@ -30,6 +31,8 @@ def write_all(folder: Path) -> None:
     (folder / "structure_study.md").write_text(structure_study(), encoding="utf-8")
     (folder / "validation.md").write_text(validation(), encoding="utf-8")
     (folder / "api.md").write_text(api(), encoding="utf-8")
+    for name, table in alert_tables().items():
+        (folder / name).write_text(table, encoding="utf-8")
     draw_sector(folder / "sector.svg")
 
 
