@@ -89,7 +89,7 @@ def pairs(
 ) -> list[Pair]:
     """Solve equally spaced frequencies with few harmonics and with many, whatever the alert says."""
     sweep = ss.Sweep(
-        omega_range=omega_range, low=low, high=high, threshold=-1.0, frequencies=count, peak_points=0
+        omega_range=omega_range, low=low, high=high, selection=ss.JacobianAlert(threshold=-1.0), frequencies=count, peak_points=0
     )  # fmt: skip
     points = list(ss.forced_response(*case, sweep))
     problem = ss.forced_problem(*case, sweep)
@@ -186,7 +186,7 @@ def reference() -> str:
     """Return what ten harmonics would change of a response with the alert from one to five."""
     case = blades()
     shared = {"omega_range": (159 * HERTZ, 164 * HERTZ), "frequencies": 11, "peak_points": 0}
-    sweep = ss.Sweep(**shared)
+    sweep = ss.Sweep(selection="jacobian_alert", **shared)
     points = ss.accepted_points(list(ss.forced_response(*case, sweep)))
     problem = ss.forced_problem(*case, sweep)
     ten = list(ss.forced_response(*case, ss.Sweep(low=10, high=10, selection="always_low", **shared)))  # fmt: skip
