@@ -96,7 +96,7 @@ def judged(problem: ForcedProblem, truth: Truth) -> Row:
     outputs = outputs_of(problem.measure, low.linear.recover(point.omega, point.coefficients))
     x = low.unknowns(point.coefficients)
     found = estimate(low, problem.high, x, point.omega, outputs, problem.alert_solve)
-    alert = float(np.max(np.abs(found.first), initial=0.0))
+    alert = float(np.max(np.abs(found.changes[0]), initial=0.0))
     weak = weakly_nonlinear(problem, truth)
     return Row(truth.error, alert, found.error, found.bound, weak)
 
