@@ -114,7 +114,7 @@ def test_parts_are_derivatives_of_the_solution(retained):
     at = high.linearise(full, omega)
     rng = np.random.default_rng(1)
     push = rng.standard_normal(high.size) * 1e-2
-    found = adjoint.Estimate(np.zeros(2), np.zeros(2), full, push, factored(at.dense_jac(), None))
+    found = adjoint.Estimate((np.zeros(2), np.zeros(2)), full, push, factored(at.dense_jac(), None))
     parts = contributions(low, high, omega, outputs, found)
     rows = push.reshape(high.n_rows, -1)
     step = 1e-4
@@ -178,17 +178,19 @@ def test_parts_add_up_to_the_step_by_the_mean_jacobian(hertz):
     outputs, found = estimated(low, high, x, omega)
     padded = high.unknowns(low.coefficients(x))
     at = high.linearise(padded, omega)
-    first = np.linalg.solve(at.jac, -at.residual)
-    mean = 0.5 * (at.jac + high.linearise(padded + first, omega).jac)
-    second = np.linalg.solve(mean, -at.residual)
-    recovered = low.linear.recover_change(omega, high.coefficients(second))[1, :4]
     before = low.linear.recover(omega, low.coefficients(x))[1, :4]
+    mean = at.jac
+    for change in found.changes:
+        step = np.linalg.solve(mean, -at.residual)
+        moved = low.linear.recover_change(omega, high.coefficients(step))[1, :4]
+        assert np.allclose(change, moved / before, rtol=0, atol=1e-10)
+        mean = 0.5 * (at.jac + high.linearise(padded + step, omega).jac)
+    assert np.allclose(found.start, padded + step, rtol=0, atol=1e-10 * np.abs(step).max())
     parts = contributions(low, high, omega, outputs, found)
     # the residual in the harmonics that are kept is Newton's tolerance
-    assert np.allclose(parts.sum(axis=1), recovered / before, rtol=0, atol=1e-8)
-    assert np.allclose(found.start, padded + second, rtol=0, atol=1e-10 * np.abs(second).max())
-    moved = low.linear.recover_change(omega, high.coefficients(first))[1, :4]
-    assert np.allclose(found.first, moved / before, rtol=0, atol=1e-12)
+    assert np.allclose(parts.sum(axis=1), moved / before, rtol=0, atol=1e-8)
+    doubtful = abs(found.changes[1] - found.changes[0]).max() > 0.3 * abs(found.changes[1]).max()
+    assert (len(found.changes) == 3) == doubtful
 
 
 def test_a_jacobian_by_its_products_gives_the_same_parts():
@@ -216,7 +218,7 @@ def test_amplitude_and_motion():
     low, high, x = pair(*blades_and_damper(), omega)
     outputs, motion = estimated(low, high, x, omega)
     real_outputs, amplitude = estimated(low, high, x, omega, goal="amplitude")
-    assert np.allclose(amplitude.second, motion.second.real)
+    assert np.allclose(amplitude.changes[-1], motion.changes[-1].real)
     parts = contributions(low, high, omega, real_outputs, amplitude)
     assert np.allclose(parts, contributions(low, high, omega, outputs, motion).real)
     # what the amplitudes truly do, with all harmonics of the reference

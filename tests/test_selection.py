@@ -130,7 +130,7 @@ def test_step_is_exact_where_no_state_changes():
 
 def test_singular_enlarged_problem_is_an_infinite_error(monkeypatch):
     # an open damper leaves no force on the missing harmonics either: ask for the enlarged step all the same
-    monkeypatch.setattr(alert_module, "_silent", lambda *_: False)
+    monkeypatch.setattr(alert_module, "silent", lambda *_: False)
     low = balance_of(*blades_and_damper(), order=1)
     high = low.with_order(3)
     # nothing touches: the free body's static part has no stiffness
@@ -178,7 +178,7 @@ def both_orders(system, load, first, last, count, *, low=1, high=5):
         omega_range=(first, last),
         low=low,
         high=high,
-        threshold=-1.0,
+        selection=JacobianAlert(threshold=-1.0),  # repeat whatever it says
         frequencies=count,
         peak_points=0,
     )
@@ -409,7 +409,11 @@ def test_error_over_contact_dofs_and_chosen_harmonics():
     system, load = blades_and_damper()
     chosen = replace(system, alert_dofs=np.array(system.interface.coordinates()))
     sweep = Sweep(
-        omega_range=(1005.0, 1006.0), error_harmonics=(0, 1), frequencies=2, peak_points=0
+        omega_range=(1005.0, 1006.0),
+        selection="jacobian_alert",
+        error_harmonics=(0, 1),
+        frequencies=2,
+        peak_points=0,
     )
     measure = forced_problem(chosen, load, sweep).measure
     assert measure.dofs.tolist() == [0, 1, 2, 3, 4, 5]

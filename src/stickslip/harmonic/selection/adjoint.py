@@ -14,15 +14,18 @@ import numpy as np
 import scipy.linalg
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.contact.event_integrals import Events
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
-from stickslip.harmonic.selection.strategy import FLOOR, ErrorMeasure, Solve
+from stickslip.harmonic.selection.alert import silent
+from stickslip.harmonic.selection.strategy import FLOOR, NOISE, ErrorMeasure, Solve
 from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.support import Harmonics, rows_of
 
 Goal = Literal["motion", "amplitude"]
-SILENCE = 1e-12  # residual in the missing harmonics, as a share of the load, that counts as none
 SINGULAR = 1e-15  # smallest pivot over largest below which a Jacobian has no usable factors
+DOUBTFUL = 0.3  # distance of two changes over the later one above which a third one is asked for
+MOST = 3  # evaluations with all harmonics
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +77,9 @@ def outputs_of(measure: ErrorMeasure, before: ComplexArray, goal: Goal = "motion
     own = np.array([h for h in measure.harmonics if h < len(before)], dtype=np.int64)
     motion = before[own[:, None], measure.dofs]
     size = np.abs(motion)
-    row, column = np.nonzero(size > FLOOR * size.max(axis=1, initial=0.0, keepdims=True))
+    largest = float(np.max(np.abs(before[:, measure.dofs])))
+    floor = np.maximum(FLOOR * size.max(axis=1, initial=0.0, keepdims=True), NOISE * largest)
+    row, column = np.nonzero(size > floor)
     return Outputs(own[row], measure.dofs[column], motion[row, column], goal)
 
 
@@ -135,24 +140,21 @@ def mean_jacobian(
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """How the missing harmonics change the outputs, relative to their amplitudes; all infinite where a Jacobian is singular.
+    """How the missing harmonics change the outputs, relative to their amplitudes; infinite where a Jacobian is singular.
 
     Attributes
     ----------
-    first
-        (k,) complex changes by the Jacobian at the solution: those of the Jacobian Alert.
-    second
-        (k,) complex changes by the mean Jacobian.
+    changes
+        (k,) complex changes of the outputs: by the Jacobian at the solution, which is what the Jacobian Alert predicts, and by mean Jacobians.
     start
-        Scaled unknowns of the reference at the end of the second step.
+        Scaled unknowns of the reference at the end of the last step.
     residual
         Scaled residual r̃ of the padded solution.
     mean
-        The mean Jacobian; None where nothing acts on the missing harmonics, or where it is singular.
+        The last mean Jacobian; None where nothing acts on the missing harmonics, or where it is singular.
     """
 
-    first: ComplexArray
-    second: ComplexArray
+    changes: tuple[ComplexArray, ...]
     start: FloatArray
     residual: FloatArray
     mean: Factored | None
@@ -160,29 +162,27 @@ class Estimate:
     @property
     def error(self) -> float:
         """Largest estimated relative error."""
-        return float(np.max(np.abs(self.second), initial=0.0))
+        return float(np.max(np.abs(self.changes[-1]), initial=0.0))
+
+    @property
+    def errors(self) -> FloatArray:
+        """(k,) largest relative error that is to be expected of each output: that of the last estimate or that of the alert."""
+        return np.maximum(np.abs(self.changes[0]), np.abs(self.changes[-1]))
 
     @property
     def bound(self) -> float:
         """Largest relative error that is to be expected; never below the prediction of the Jacobian Alert."""
-        return float(np.max(self.bounds, initial=0.0))
+        return float(np.max(self.errors, initial=0.0))
 
     @property
     def doubt(self) -> float:
-        """Distance between both changes of the worst output over the second one: below 1 where they tell the same story."""
-        if not np.any(self.second):
-            return 0.0
-        worst = int(np.argmax(self.bounds))
-        size = float(np.abs(self.second[worst]))
-        away = float(np.abs(self.second[worst] - self.first[worst]))
-        return away / size if np.isfinite(size) and size > 0.0 else np.inf
+        """Largest distance of the last two changes over the largest change: far below 1 where they say the same."""
+        return _doubt(*self.changes[-2:]) if np.all(np.isfinite(self.changes)) else np.inf
 
-    @property
-    def bounds(self) -> FloatArray:
-        """(k,) size of the second change and its distance from the first one, by which the trapezoidal rule may be wrong."""
-        if not np.all(np.isfinite(self.second)):
-            return np.full(self.second.size, np.inf)
-        return np.asarray(np.abs(self.second) + np.abs(self.second - self.first))
+
+def _doubt(before: ComplexArray, after: ComplexArray) -> float:
+    size = float(np.max(np.abs(after), initial=0.0))
+    return float(np.max(np.abs(after - before))) / size if size > 0.0 else 0.0
 
 
 def estimate(
@@ -192,10 +192,12 @@ def estimate(
     omega: float,
     outputs: Outputs,
     solve: Solve | None = None,
+    events: Events | None = None,
 ) -> Estimate:
     """Estimate the error that the missing harmonics make in the outputs of a low-order solution.
 
-    Two evaluations of the problem with all harmonics, at the padded solution and one Newton step from there.
+    Two evaluations of the problem with all harmonics, at the padded solution and one Newton step from there; a third one, at the end of the
+    second step, where the first two steps differ by more than `DOUBTFUL`.
 
     Parameters
     ----------
@@ -209,33 +211,36 @@ def estimate(
         What the error is taken of.
     solve
         For Jacobians known by their products: solution of a system from its matrix and right side; None: LU.
+    events
+        Those of the contacts at the solution, where its evaluation left them (`Step.events`).
     """
     padded = high.unknowns(low.coefficients(x))
-    unknown = np.full(outputs.dofs.size, complex(np.inf))
-    at = high.linearise(padded, omega)
-    residual = at.residual
-    acting = residual.reshape(high.n_rows, -1)[_rows(high.harmonics, _missing(low, high))]
-    if np.max(np.abs(acting), initial=0.0) <= SILENCE:
-        nothing = np.zeros_like(unknown)
-        return Estimate(nothing, nothing, padded, residual, None)
-    first = factored(at.jac, solve).solve(-residual)
-    if first is None:
-        return Estimate(unknown, unknown, padded, residual, None)
-    changed = _relative(high, omega, outputs, first)
-    beyond = high.linearise(padded + first, omega)
-    mean = factored(mean_jacobian(at.jac, beyond.jac), solve)
-    second = mean.solve(-residual)
-    if second is None:
-        return Estimate(changed, unknown, padded, residual, None)
-    return Estimate(
-        changed, _relative(high, omega, outputs, second), padded + second, residual, mean
-    )
+    period = high.forces(padded, omega, events)
+    if silent(low, high, period):
+        nothing = np.zeros(outputs.dofs.size, dtype=complex)
+        return Estimate((nothing, nothing), padded, np.zeros(high.size), None)
+    at = high.linearise(padded, omega, period)
+    jac: FloatArray | StructuredJacobian = at.jac
+    changes: list[ComplexArray] = []
+    start = padded
+    while True:
+        mean = factored(jac, solve)
+        change = mean.solve(-at.residual)
+        if change is None or not np.all(np.isfinite(change)):
+            changes.append(np.full(outputs.dofs.size, complex(np.inf)))
+            return Estimate(tuple(changes), start, at.residual, None)
+        start = padded + change
+        changes.append(_relative(high, omega, outputs, change))
+        clear = len(changes) > 1 and _doubt(*changes[-2:]) <= DOUBTFUL
+        if clear or len(changes) == MOST:
+            return Estimate(tuple(changes), start, at.residual, mean)
+        jac = mean_jacobian(at.jac, high.linearise(start, omega).jac)
 
 
 def contributions(
     low: HarmonicBalance, high: HarmonicBalance, omega: float, outputs: Outputs, found: Estimate
 ) -> ComplexArray:
-    """Return the (k, n_missing) parts of the missing harmonics in the changes `found.second` of the outputs.
+    """Return the (k, n_missing) parts of the missing harmonics in the last changes of an estimate.
 
     By two transposed solves an output (one for the static part) with the factors that the estimate has. A Jacobian
     that is known by its products is solved for each missing harmonic's residual instead, which gives the same numbers.
@@ -296,7 +301,8 @@ def _relative(
     high: HarmonicBalance, omega: float, outputs: Outputs, change: FloatArray
 ) -> ComplexArray:
     """Return the relative changes of the outputs by a change of the scaled unknowns."""
-    return outputs.relative(high.linear.recover_change(omega, high.coefficients(change)))
+    own = high.coefficients(change)[: int(np.max(outputs.harmonics, initial=0)) + 1]
+    return outputs.relative(high.linear.recover_change(omega, own))
 
 
 def _missing(low: HarmonicBalance, high: HarmonicBalance) -> Harmonics:

@@ -90,7 +90,7 @@ def jacobian_alert(
     start = perf_counter()
     period = high.forces(padded, omega, events)
     seconds = perf_counter() - start
-    if form == "newton" and _silent(low, high, period):
+    if form == "newton" and silent(low, high, period):
         return Alert(0.0, 0, measure.harmonics[0], padded, seconds)
     at = high.linearise(padded, omega, period)
     right = -at.residual if form == "newton" else _published(high, at.jac, padded, omega)
@@ -132,7 +132,7 @@ def _published(
     return np.asarray(load - product)
 
 
-def _silent(low: HarmonicBalance, high: HarmonicBalance, period: ContactPeriod) -> bool:
+def silent(low: HarmonicBalance, high: HarmonicBalance, period: ContactPeriod) -> bool:
     """Whether nothing acts on the missing harmonics, so that Δq = 0 without a factorisation.
 
     The enlarged residual repeats the low-order one, which is zero, in its rows; its other rows are loads and contact forces of

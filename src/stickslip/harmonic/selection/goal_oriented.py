@@ -62,7 +62,7 @@ class GoalOriented:
             return Verdict(0.0, None, step.smallest)
         before = low.linear.recover(step.omega, low.coefficients(step.x))
         outputs = outputs_of(step.measure, before, self.goal)
-        found = estimate(low, high, step.x, step.omega, outputs, step.solve)
+        found = estimate(low, high, step.x, step.omega, outputs, step.solve, step.events)
         again = None
         if found.bound > self.threshold:
             again = self._needed(step, outputs, found)
@@ -73,7 +73,7 @@ class GoalOriented:
         low, high = step.balance, step.reference
         if found.mean is None:
             return high.harmonics
-        worst = np.argsort(-found.bounds, kind="stable")[:GOALS]
+        worst = np.argsort(-found.errors, kind="stable")[:GOALS]
         missing = tuple(h for h in high.harmonics if h not in low.harmonics)
         parts = contributions(low, high, step.omega, outputs.some(worst), found)
         # parts add up in a linear problem: the farther this one is from one, the fewer are left out
