@@ -45,7 +45,7 @@ def single_passage(
     sweep = problem.sweep
     grid = [float(w) for w in np.linspace(*sweep.omega_range, sweep.frequencies or sweep.points)]
     stored = iter(done)
-    last: list[ForcedPoint] = []
+    tried: list[ForcedPoint] = []
     harmonics = problem.low.harmonics
     for index, (omega, following) in enumerate(zip(grid, [*grid[1:], grid[-1]], strict=True)):
         before: Step | None = None
@@ -56,8 +56,7 @@ def single_passage(
             kept = next(stored, None)
             if kept is None:
                 balance = problem.balance(harmonics)
-                accepted = [p for p in last if p.converged]
-                solution = _solution(problem, load, balance, accepted, omega, start)
+                solution = _solution(problem, load, balance, tried, omega, start)
                 stage: Stage = "low" if first else "high"
                 point = forced_point(balance, solution, stage, index, omega, 0.0)
             else:
@@ -71,20 +70,20 @@ def single_passage(
                     asked=np.array(again or (), dtype=np.int64),
                     seconds_total=perf_counter() - began,
                 )
+            tried.append(point)
             if again is None:
                 break
-            own = point.coefficients if point.converged else None
-            start = own if verdict.start is None else verdict.start
+            start = verdict.start
             harmonics, before, first = again, step, False
-        last.append(point)
         harmonics = verdict.following
-    yield from _from_above(problem, last, stored)
+    yield from _from_above(problem, tried, stored)
 
 
 def _from_above(
-    problem: ForcedProblem, last: list[ForcedPoint], stored: Iterator[ForcedPoint]
+    problem: ForcedProblem, tried: Sequence[ForcedPoint], stored: Iterator[ForcedPoint]
 ) -> Iterator[ForcedPoint]:
     """Look for frequencies that were not found once more, along the branch from the frequency above, the last ones first."""
+    last = {p.index: p for p in tried}
     for index in reversed(range(len(last) - 1)):
         if last[index].converged or not last[index + 1].converged:
             continue
@@ -102,25 +101,40 @@ def _solution(
     problem: ForcedProblem,
     load: HarmonicLoad,
     balance: HarmonicBalance,
-    accepted: Sequence[ForcedPoint],
+    tried: Sequence[ForcedPoint],
     omega: float,
     start: ComplexArray | None,
 ) -> Solution:
-    """Solve from a given start or from the last frequency; then along the branch from there; then as without one."""
+    """Solve from a given start, or what was found so far; then along the branch from there; then as without one."""
     quick = replace(problem.sweep.newton, max_iterations=BRANCH_ITERATIONS)
-    if start is None and accepted:
-        start = accepted[-1].coefficients
-    spent = []
-    if start is not None:
-        x = balance.unknowns(start)
+    near = _nearest(tried, balance.harmonics, omega)
+    guesses = [] if start is None else [balance.unknowns(start)]
+    guesses += [balance.unknowns(p.coefficients) for p in near]
+    spent: list[Solution] = []
+    if guesses:
+        # the smallest residual decides: contact states may have changed since, or with the harmonics
+        sizes = [float(np.linalg.norm(balance.linearise(x, omega).residual)) for x in guesses]
+        x = guesses[int(np.argmin(sizes))]
         spent.append(newton(lambda v: balance.linearise(v, omega), x, quick))
-    if not (spent and spent[-1].status.converged) and accepted:
-        spent.append(along_branch(problem, accepted[-1], omega, balance).solution)
+    for point in near:
+        if spent[-1].status.converged:
+            break
+        if point.omega != omega:
+            spent.append(along_branch(problem, point, omega, balance).solution)
     if not (spent and spent[-1].status.converged):
         # the first passage's way to a solution without a branch, with these harmonics
         own = replace(problem, low=balance)
-        spent.append(fresh_point(own, load, list(accepted), omega).solution)
+        found = [p for p in tried if p.converged]
+        spent.append(fresh_point(own, load, found, omega).solution)
     return charged(spent[-1], spent)
+
+
+def _nearest(tried: Sequence[ForcedPoint], harmonics: Harmonics, omega: float) -> list[ForcedPoint]:
+    """Return the last solutions with the same harmonics, at all, and at another frequency."""
+    found = [p for p in tried if p.converged]
+    alike = [p for p in found if p.support == harmonics]
+    elsewhere = [p for p in found if p.omega != omega]
+    return list({id(p): p for p in (*alike[-1:], *found[-1:], *elsewhere[-1:])}.values())
 
 
 def _judged(
