@@ -8,11 +8,12 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.contact.compiled import Evaluator, check_evaluator
+from stickslip.contact.event_integrals import Events
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
-from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve, Step, Strategy
+from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve, Step, Strategy, Verdict
 from stickslip.harmonic.support import Harmonics, harmonics_of
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, Point, StepControl
@@ -48,7 +49,7 @@ class Sweep:
     threshold
         Predicted error (fraction) above which a frequency is repeated.
     selection
-        Name of a strategy of `stickslip.harmonic.selection` (``jacobian_alert``, ...), one with parameters of your own, or the
+        Name of a strategy of `stickslip.harmonic.selection` (``guarded_alert``, the published ``jacobian_alert``, ...), one with parameters of your own, or the
         same harmonics at every frequency (``always_low``, ``always_high``).
     passages
         ``double``: finish the response with few harmonics first, then repeat what needs more; ``single``: settle each of
@@ -72,7 +73,7 @@ class Sweep:
     samples: int = 256
     evaluator: Evaluator = "events"
     threshold: float = 0.05
-    selection: str | Strategy = "jacobian_alert"
+    selection: str | Strategy = "guarded_alert"
     passages: Passages = "double"
     error_harmonics: Sequence[int] | None = None
     points: int = 40
@@ -93,7 +94,7 @@ class Sweep:
             raise input_error(
                 "Sweep.selection",
                 f"{self.selection!r} is none of {', '.join((*STRATEGIES, *FIXED))}",
-                "'jacobian_alert' repeats where it matters.",
+                "'guarded_alert' repeats where it matters.",
             )
         if self.passages not in get_args(Passages):
             raise input_error(
@@ -244,6 +245,7 @@ class ForcedProblem:
     low: HarmonicBalance
     high: HarmonicBalance
     others: dict[Harmonics, HarmonicBalance] = field(default_factory=dict)  # made when first needed
+    verdicts: dict[int, Verdict] = field(default_factory=dict)  # of a first passage in this process
 
     @property
     def strategy(self) -> Strategy | None:
@@ -273,13 +275,26 @@ class ForcedProblem:
         return self.others[harmonics]
 
     def step(
-        self, balance: HarmonicBalance, x: FloatArray, omega: float, next_omega: float | None = None
+        self,
+        balance: HarmonicBalance,
+        x: FloatArray,
+        omega: float,
+        next_omega: float | None = None,
+        left: Events | None = None,
     ) -> Step:
-        """Return a scaled solution of `balance` as a strategy sees it."""
+        """Return a scaled solution of `balance` as a strategy sees it, with the events that its evaluation `left`."""
         smallest = self.sweep.low_harmonics
         following = omega if next_omega is None else next_omega
         return Step(
-            balance, self.high, smallest, x, omega, following, self.measure, self.alert_solve
+            balance,
+            self.high,
+            smallest,
+            x,
+            omega,
+            following,
+            self.measure,
+            self.alert_solve,
+            left=left,
         )
 
     def following(self, balance: HarmonicBalance) -> Following:
