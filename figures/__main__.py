@@ -1,0 +1,38 @@
+"""Draw the figures into docs/images and write docs/seed_figures.md: ``python -m figures``."""
+
+import sys
+from pathlib import Path
+from time import process_time
+
+from figures.draw import draw_all
+from figures.evidence import Plan, gather
+from figures.model import GLUED, two_blades
+from figures.page import page
+from figures.solve import PATIENCE, STEPS
+from figures.statements import statements
+
+DOCS = Path(__file__).parent.parent / "docs"
+
+
+def say(line: str) -> None:
+    """Print a line of progress with the CPU time so far."""
+
+
+def main() -> int:
+    """Compute, draw and write."""
+    say("meshing and reducing both models")
+    evidence = gather(two_blades(), two_blades(GLUED), Plan(), say)
+    rows = statements(evidence)
+    say("pictures")
+    for file in draw_all(evidence, DOCS / "images"):
+        say(f"{file.name}, {file.stat().st_size / 1000:.0f} kB")
+    glued = ", ".join(f"`{key} = {value}`" for key, value in GLUED.items())
+    text = page(evidence, rows, glued, (STEPS, PATIENCE, process_time()))
+    (DOCS / "seed_figures.md").write_text(text, encoding="utf-8")
+    for row in rows:
+        say(f"{row.place}: {row.claim}: {row.verdict}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
