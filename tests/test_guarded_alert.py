@@ -4,8 +4,12 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.harmonic.selection import strategy_named
+from stickslip.harmonic.selection import guarded_alert, strategy_named
+from stickslip.harmonic.selection.guarded_alert import doubled, truncated
 from stickslip.response.sweep import forced_problem
+from strategies.cases import SelectionCase, friction_ring
+from strategies.random_systems import random_two_blade_system
+from strategies.truth import low_order_points, truths
 from validation.models import b6_load, blade_damper_blade
 
 HZ = 2 * np.pi
@@ -54,3 +58,117 @@ def test_no_false_alarm_on_the_rows_of_literature(hertz, true):
     verdict = judged(hertz)
     assert verdict.again is None
     assert 0.9 * true <= verdict.indicator <= 0.05
+
+
+def solved(case):
+    """Solve a case with one harmonic; return its problem and the converged points."""
+    points = [p for p in low_order_points(case) if p.converged]
+    return forced_problem(case.system, case.load, case.sweep()), points
+
+
+def step_of(problem, point):
+    return problem.step(problem.low, problem.low.unknowns(point.coefficients), point.omega)
+
+
+def test_full_stick_costs_no_factorisation(monkeypatch):
+    """At 150 Hz nothing of B6 slips: neither a factorisation nor a second look."""
+
+    def never(*_):
+        raise AssertionError("was called")
+
+    monkeypatch.setattr(guarded_alert, "factored", never)
+    monkeypatch.setattr(guarded_alert, "doubled", never)
+    verdict = judged(150)
+    assert verdict.indicator == 0.0
+    assert verdict.again is None
+
+
+@pytest.mark.parametrize("number", [31, 48])
+def test_random_systems_have_no_missed_alarm_where_the_published_rule_has(number):
+    case = random_two_blade_system(number)
+    problem, points = solved(case)
+    found = truths(case, points)
+    said = {
+        name: [strategy_named(name, 0.05).judge(step_of(problem, t.low)).indicator for t in found]
+        for name in ("jacobian_alert", "guarded_alert")
+    }
+    errors = np.array([t.error for t in found])
+    wrong = errors > 0.05
+    assert np.any(wrong & (np.array(said["jacobian_alert"]) <= 0.05))
+    assert not np.any(wrong & (np.array(said["guarded_alert"]) <= 0.05))
+
+
+@pytest.mark.parametrize("number", [2, 5, 12, 20, 29])
+@pytest.mark.parametrize("threshold", [0.01, 0.05])
+def test_never_silent_where_the_published_rule_alarms(number, threshold):
+    problem, points = solved(random_two_blade_system(number))
+    for point in points:
+        step = step_of(problem, point)
+        published = strategy_named("jacobian_alert", threshold).judge(step)
+        guarded = strategy_named("guarded_alert", threshold).judge(step)
+        assert guarded.again is not None or published.again is None
+        if published.again is not None:
+            assert guarded.indicator == pytest.approx(published.indicator)
+        assert (guarded.again is None) == (guarded.indicator <= threshold)
+
+
+def test_repeat_from_the_start_of_the_second_look_converges_at_once():
+    """At 163 Hz the iterate that raised the alarm is nearer to the solution than ``q + Δq``."""
+    system, load = blade_damper_blade(), b6_load()
+    case = SelectionCase("b6", "B6", system, load, (HZ * 162.0, HZ * 163.0), 3)
+    problem, points = solved(case)
+    point = points[-1]
+    high = problem.high
+    norms = []
+    for name in ("jacobian_alert", "guarded_alert"):
+        verdict = strategy_named(name, 0.05).judge(step_of(problem, point))
+        at = high.linearise(high.unknowns(verdict.start), point.omega)
+        norms.append(np.linalg.norm(at.residual))
+    assert norms[1] < 0.5 * norms[0]
+
+
+def test_left_out_harmonics_act_as_in_a_plain_block_elimination():
+    """The same from the whole Jacobian as an array, whose diagonal blocks are replaced by their nearest complex numbers."""
+    problem, points = solved(random_two_blade_system(29))
+    point = max(points, key=lambda p: np.abs(p.coefficients[1]).max())
+    high, beyond = problem.high, doubled(problem.high)
+    assert beyond.order == 10
+    q = high.coefficients(high.unknowns(point.coefficients))
+    x = beyond.unknowns(q)
+    ours = truncated(high, beyond, beyond.forces(x, point.omega), point.omega)
+    at = beyond.linearise(x, point.omega)
+    jac, n, m = at.dense_jac(), beyond.linear.n, high.size
+    moved = np.zeros(beyond.size - m)
+    for place in range(0, moved.size, 2 * n):
+        rows = slice(m + place, m + place + 2 * n)
+        (a, b), (c, d) = jac[rows, rows].reshape(2, n, 2, n).transpose(0, 2, 1, 3)
+        real, cross = 0.5 * (a + d), 0.5 * (b - c)
+        block = np.block([[real, cross], [-cross, real]])
+        moved[place : place + 2 * n] = -np.linalg.solve(block, at.residual[rows])
+    assert np.linalg.norm(ours) > 1e-6
+    assert ours == pytest.approx(jac[:m, m:] @ moved, rel=1e-8, abs=1e-12)
+
+
+def test_wheel_without_waves_beyond_its_reference_is_held_against_the_reference():
+    case = friction_ring()
+    problem = forced_problem(case.system, case.load, case.sweep(high=10))
+    assert doubled(problem.high).order == 10
+    points = [p for p in low_order_points(case) if p.converged]
+    alarms = [
+        strategy_named("guarded_alert", 0.05).judge(step_of(problem, p)).again for p in points
+    ]
+    assert None in alarms
+    assert problem.high.harmonics in alarms
+
+
+def test_reference_itself_is_accepted():
+    problem, points = solved(random_two_blade_system(2))
+    high, point = problem.high, points[0]
+    step = problem.step(high, high.unknowns(point.coefficients), point.omega)
+    assert strategy_named("guarded_alert").judge(step).again is None
+
+
+@pytest.mark.parametrize("bad", [{"quick": 1.5}, {"quick": -0.1}, {"steps": -1}])
+def test_parameters_are_checked(bad):
+    with pytest.raises(ss.InputError, match="GuardedAlert"):
+        ss.GuardedAlert(**bad)
