@@ -8,6 +8,7 @@ of that step (the trapezoidal rule on the way) to third.
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -176,13 +177,15 @@ class Estimate:
 
     @property
     def doubt(self) -> float:
-        """Largest distance of the last two changes over the largest change: far below 1 where they say the same."""
-        return _doubt(*self.changes[-2:]) if np.all(np.isfinite(self.changes)) else np.inf
+        """Largest distance of two successive changes over the last change: far below 1 where all say the same."""
+        if self.mean is None:
+            return 0.0 if self.bound == 0.0 else np.inf
+        return max(_away(one, other, self.changes[-1]) for one, other in pairwise(self.changes))
 
 
-def _doubt(before: ComplexArray, after: ComplexArray) -> float:
-    size = float(np.max(np.abs(after), initial=0.0))
-    return float(np.max(np.abs(after - before))) / size if size > 0.0 else 0.0
+def _away(one: ComplexArray, other: ComplexArray, scale: ComplexArray) -> float:
+    size = float(np.max(np.abs(scale), initial=0.0))
+    return float(np.max(np.abs(other - one))) / size if size > 0.0 else 0.0
 
 
 def estimate(
@@ -231,7 +234,7 @@ def estimate(
             return Estimate(tuple(changes), start, at.residual, None)
         start = padded + change
         changes.append(_relative(high, omega, outputs, change))
-        clear = len(changes) > 1 and _doubt(*changes[-2:]) <= DOUBTFUL
+        clear = len(changes) > 1 and _away(*changes[-2:], changes[-1]) <= DOUBTFUL
         if clear or len(changes) == MOST:
             return Estimate(tuple(changes), start, at.residual, mean)
         jac = mean_jacobian(at.jac, high.linearise(start, omega).jac)
