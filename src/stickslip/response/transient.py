@@ -3,7 +3,8 @@
 The linear part, with every contact stuck, is propagated exactly over a step by a matrix exponential, whatever the damping
 matrix and however stiff the modes; so are the periodic loads. What is left of the contact force, its departure from the
 stuck springs, is interpolated linearly over the step (first-order hold) and solved for implicitly. A contact that sticks
-or flies freely is then integrated without error; the switches between states leave an error of second order in the step.
+is then integrated without error. One that slips or is open is not: its departure is curved, and the line in its place acts
+like a mass ``k h²/12`` too little on the spring; the switches between states add another error of second order in the step.
 """
 
 from collections.abc import Sequence
