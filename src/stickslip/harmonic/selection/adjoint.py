@@ -234,7 +234,7 @@ def estimate(
             return Estimate(tuple(changes), start, at.residual, None)
         start = padded + change
         changes.append(_relative(high, omega, outputs, change))
-        clear = len(changes) > 1 and _away(*changes[-2:], changes[-1]) <= DOUBTFUL
+        clear = len(changes) > 1 and _away(changes[-2], changes[-1], changes[-1]) <= DOUBTFUL
         if clear or len(changes) == MOST:
             return Estimate(tuple(changes), start, at.residual, mean)
         jac = mean_jacobian(at.jac, high.linearise(start, omega).jac)
