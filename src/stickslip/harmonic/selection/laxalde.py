@@ -1,4 +1,4 @@
-"""Harmonics from the contact forces that they leave out (D. Laxalde, doctoral thesis, École Centrale de Lyon, 2007)."""
+"""Harmonics from the contact forces that they leave out (D. Laxalde, as reviewed by Gastaldi & Berruti 2017, section 3)."""
 
 from dataclasses import dataclass
 from typing import ClassVar
