@@ -68,7 +68,7 @@ def _why(result: Result, case: Case) -> str:
     share = _harmonic_share(result, high)
     if np.isfinite(share):
         reasons.append(
-            f"other harmonics than {result.low_name} carry up to {number(share, 2)} % of the contact force"
+            f"harmonics beyond H = {result.low_name} carry up to {number(share, 2)} % of the contact force"
         )
     return "; ".join(reasons) or "–"
 
@@ -106,15 +106,15 @@ def _alert_text(result: Result) -> str:
         else "Each point is first solved"
     )
     return (
-        f"<p>{first} with harmonics {result.low_name}. <code>{result.selection}</code> then predicts how far the motion{where} would "
-        f"change with harmonics up to {result.high_name}; where that exceeds {result.shown(result.threshold)}, the point is solved again "
+        f"<p>{first} with H = {result.low_name}. <code>{result.selection}</code> then predicts how far the motion{where} would "
+        f"change with H = {result.high_name}; where that exceeds {result.shown(result.threshold)}, the point is solved again "
         f"with more harmonics. {_REASON}</p>"
     )
 
 
 def _other_text(result: Result) -> str:
     return (
-        f"<p><code>{result.selection}</code> chooses among harmonics {result.high_name}, never fewer than {result.low_name}, one frequency "
+        f"<p><code>{result.selection}</code> chooses among the harmonics of H = {result.high_name}, never fewer than H = {result.low_name}, one frequency "
         f"after the other: it compares an indicator of its own, which is no error, with {result.shown(result.threshold)}. How good the "
         f"solution is, it does not say; <code>--verify-harmonics</code> does. {_REASON}</p>"
     )

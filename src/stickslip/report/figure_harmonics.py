@@ -10,6 +10,7 @@ from stickslip.report.quantities import counted
 from stickslip.report.result import RATIO, Case, Result
 
 SHOWN = 12  # load cases that stay legible below one another
+EDGE = 0.01  # of the frequency range, so that marks at its ends are whole
 ROW, LINE = 46, 13  # height of a panel and of each of its harmonics, pixels
 
 
@@ -38,7 +39,8 @@ def kept_harmonics(result: Result) -> Plot:
     figure.update_yaxes(tickvals=ticks, range=[0.3, highest + 0.9])
     figure.update_yaxes(title_text="harmonic", row=(len(cases) + 1) // 2, col=1)
     hz = result.floats("frequency_hz")
-    figure.update_xaxes(range=[float(hz.min()), float(hz.max())])
+    aside = EDGE * float(hz.max() - hz.min())
+    figure.update_xaxes(range=[float(hz.min()) - aside, float(hz.max()) + aside])
     figure.update_xaxes(title_text="frequency (Hz)", row=len(cases), col=1)
     return Plot(key, title, _caption(result, cases), figure)
 

@@ -79,7 +79,7 @@ def _error_caption(result: Result) -> str:
     above = error > result.threshold
     if result.is_error:
         text = (
-            f"The error that <code>{result.selection}</code> predicts of the solution with few harmonics (at least {result.low_name}); "
+            f"The error that <code>{result.selection}</code> predicts of the solution with few harmonics (H = {result.low_name} at least); "
             f"the dashed line is the threshold of {percent(result.threshold)}. {int(above.sum())} of "
             f"{counted(error.size, 'checked point')} lie above it and were asked to repeat with more. "
         )

@@ -177,7 +177,9 @@ def _load_case(run: _Run, case: Case, i: int) -> CaseResult:
             f"F_CL/F_HE = {result.ratio:g}: {result.failed} points did not converge; the peak is the largest of the others, "
             "and a larger one may stand among them"
         )
-    if result.jumps_hz:
+    on_a_grid = case.sweep.single or case.sweep.frequencies > 0
+    # between given frequencies any growth is possible: only steps of a branch are short enough to tell a jump
+    if result.jumps_hz and not on_a_grid:
         places = ", ".join(f"{f:.2f}" for f in result.jumps_hz)
         run.warn(
             f"F_CL/F_HE = {result.ratio:g}: the response jumps at {places} Hz, where solutions with few and with many "
