@@ -18,15 +18,9 @@ from stickslip.response.accepted import (
     reached,
     runs_of_repeats,
 )
-from stickslip.response.passages import (
-    first_passage,
-    follow_run,
-    passing,
-    postponed,
-    repeat,
-    worth_a_try,
-)
+from stickslip.response.passages import first_passage, follow_run
 from stickslip.response.preload import preload
+from stickslip.response.repeats import passing, postponed, repeat, worth_a_try
 from stickslip.response.resonance import resolve_peak
 from stickslip.response.single_passage import single_passage
 from stickslip.response.sweep import ForcedPoint, ForcedProblem, Sweep, forced_problem

@@ -1,24 +1,23 @@
 """The two passages of the Jacobian Alert: a branch with few harmonics, then the frequencies that need more."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from itertools import pairwise
 from time import perf_counter
 
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.balance import HarmonicBalance, Linearisation
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.accepted import branch_end, reached
 from stickslip.response.preload import bonded_start, preload
 from stickslip.response.rescue import homotopies
-from stickslip.response.sweep import BRANCH_ITERATIONS, ForcedPoint, ForcedProblem, forced_point
+from stickslip.response.sweep import ForcedPoint, ForcedProblem, forced_point
+from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to
 from stickslip.solve.newton import Solution, charged, newton
 from stickslip.solve.rescue import Homotopy, solve_robustly
-from stickslip.solve.status import Rung, Status
 
 LOOP = 3  # multiples of `Sweep.points` after which a branch that gains no frequency is left
 BRANCH_SEEDS = 4  # points from which a branch with many harmonics is begun
@@ -26,12 +25,6 @@ BRANCH_LENGTH = 5  # multiples of `Sweep.points` after which such a branch is gi
 STALLS = 1.5  # multiples of `Sweep.points` after which it is given up if it gains no frequency
 BACKWARD = 0.1  # share of the range by which it may fall back behind the start of the range
 DETOUR = 30  # most points on the way from a neighbour to a repeat that fails
-ISOLATED = 5  # iterations of a repeat beside none that is accepted: it converges soon or not at all
-NEIGHBOURS = 1  # points on each side from which a repeat that fails is tried
-PATIENCE = (
-    4  # repeats that fail one after the other before most of the following are left to the branch
-)
-GLANCE = 8  # each such repeat in a row of failures is tried all the same
 
 
 def first_passage(
@@ -46,6 +39,7 @@ def first_passage(
         yield from _grid(problem, load, points)
         return
     first, last = sweep.omega_range
+    latest = Latest(problem.low)
     while not points or points[-1].omega < last or not points[-1].converged:
         began = perf_counter()
         reach = max((p.omega for p in points), default=first)
@@ -54,14 +48,14 @@ def first_passage(
         point = None
         if points and not _lost(problem, points):
             following = problem.following(problem.low)
-            point = advance(problem.low, problem.branch_point(points[-1]), last, following)
+            point = advance(latest, problem.branch_point(points[-1]), last, following)
         if point is None or not point.solution.status.converged or point.p < first:
             # the branch starts here, or is lost: take it up (again) a little further on
             gap = sweep.control.largest * sweep.control.scale if points else 0.0
             # a single frequency is left to the repeats, which know both sides; a second one in a row to the homotopies
             left = bool(points) and points[-1].converged and sweep.selection != "always_low"
             point = fresh_point(problem, load, points, min(reach + gap, last), left)
-        points.append(_low_point(problem, point, len(points), began))
+        points.append(_low_point(problem, point, len(points), began, latest))
         yield points[-1]
 
 
@@ -77,15 +71,16 @@ def _grid(
     """Step through equally spaced frequencies."""
     sweep = problem.sweep
     following = problem.following(problem.low)
+    latest = Latest(problem.low)
     for omega in np.linspace(*sweep.omega_range, sweep.frequencies)[len(points) :]:
         began = perf_counter()
         before = [p for p in points if p.converged]
         point = None
         if before:
-            point = step_to(problem.low, problem.branch_point(before[-1]), float(omega), following)
+            point = step_to(latest, problem.branch_point(before[-1]), float(omega), following)
         if point is None or not point.solution.status.converged:
             point = fresh_point(problem, load, before, float(omega))
-        points.append(_low_point(problem, point, len(points), began))
+        points.append(_low_point(problem, point, len(points), began, latest))
         yield points[-1]
 
 
@@ -155,13 +150,18 @@ def _starts(
             yield balance.unknowns(few.coefficients(solution.x))
 
 
-def _low_point(problem: ForcedProblem, point: Point, index: int, began: float) -> ForcedPoint:
+def _low_point(
+    problem: ForcedProblem, point: Point, index: int, began: float, latest: Latest
+) -> ForcedPoint:
     error = np.nan
-    strategy = problem.strategy
     asked: Harmonics = ()
-    if point.solution.status.converged and strategy is not None:
-        verdict = strategy.judge(problem.step(problem.low, point.x, point.p))
+    if point.solution.status.converged and problem.strategy is not None:
+        known = latest.known(point.x, point.p)
+        left = known.events if isinstance(known, Linearisation) else None
+        verdict = problem.strategy.judge(problem.step(problem.low, point.x, point.p, left=left))
         error, asked = verdict.indicator, verdict.again or ()
+        if asked:
+            problem.verdicts[index] = verdict
     made = forced_point(problem.low, point.solution, "low", index, point.p, perf_counter() - began)
     return replace(
         made,
@@ -171,119 +171,6 @@ def _low_point(problem: ForcedProblem, point: Point, index: int, began: float) -
         predicted_error=error,
         asked=np.array(asked, dtype=np.int64),
     )
-
-
-def repeat(
-    problem: ForcedProblem,
-    point: ForcedPoint,
-    others: Mapping[int, ForcedPoint],
-    static: Callable[[], FloatArray] | None = None,
-    branch: Sequence[ForcedPoint] = (),
-) -> ForcedPoint:
-    """Solve a frequency with more harmonics: from the best of q + Δq, q and its neighbours, or along the branch from a neighbour.
-
-    A neighbour whose own neighbours failed is as far as the branch led: no detour begins farther away than the next point.
-
-    Parameters
-    ----------
-    problem
-        The forced response.
-    point
-        Point of the first passage.
-    others
-        Accepted points by index: repeats, and points of the first passage that need none.
-    static
-        Gives the (n_retained,) static equilibrium, m, for what `solve_robustly` tries if all else fails; None: that is not tried.
-    branch
-        Points of a branch with many harmonics: where it passed the frequency, it leads to a solution.
-    """
-    began = perf_counter()
-    omega = point.omega
-    balance = problem.balance(tuple(int(h) for h in point.asked) or problem.high.harmonics)
-    guesses = _predicted(problem, point)
-    near = _neighbours(point.index, others)
-    beside = passing(branch, point) + [p for p in near if abs(p.index - point.index) <= 1]
-    most = BRANCH_ITERATIONS if beside or static is not None else ISOLATED
-    quick = replace(problem.sweep.newton, max_iterations=most)
-    guesses += [balance.unknowns(p.coefficients) for p in [point, *near]]
-    # the smallest residual decides: q + Δq where states hardly change, a neighbour where they do
-    start = min(guesses, key=lambda x: float(np.linalg.norm(balance.linearise(x, omega).residual)))
-    spent = [newton(lambda v: balance.linearise(v, omega), start, quick)]
-    for neighbour in beside:
-        if spent[-1].status.converged:
-            break
-        detour = along_branch(problem, neighbour, omega, balance).solution
-        spent.append(replace(detour, rung=max(detour.rung, Rung.SHORTER_STEP)))
-    if not spent[-1].status.converged and static is not None:
-        solution = solve_robustly(
-            lambda v: balance.linearise(v, omega),
-            [start],
-            problem.sweep.newton,
-            homotopies(balance, omega, static()),
-            problem.following(balance).weights,
-        )
-        spent.append(solution)
-    solution = charged(spent[-1], spent)
-    made = forced_point(balance, solution, "high", point.index, omega, perf_counter() - began)
-    return replace(made, predicted_error=point.predicted_error)
-
-
-def _predicted(problem: ForcedProblem, point: ForcedPoint) -> list[FloatArray]:
-    """Return q + Δq in a list; empty if q is no solution, or the strategy knows no better start."""
-    strategy = problem.strategy
-    if not point.converged or strategy is None:
-        return []
-    few = problem.balance(point.support)
-    verdict = strategy.judge(problem.step(few, few.unknowns(point.coefficients), point.omega))
-    if verdict.start is None:
-        return []
-    return [problem.balance(verdict.again or problem.high.harmonics).unknowns(verdict.start)]
-
-
-def worth_a_try(index: int, forward: bool, failed: Callable[[int], bool], known: bool) -> bool:
-    """Whether a repeat is tried now, or left to the branch with many harmonics and to the homotopy.
-
-    A few repeats that fail in a row show that the solution with few harmonics says little about that with many. Then only some are
-    tried on the way forward, and on the way back those beside an accepted one.
-
-    Parameters
-    ----------
-    index
-        Of the point of the first passage.
-    forward
-        Whether this is the first attempt.
-    failed
-        Whether the repeat of an index failed.
-    known
-        Whether a neighbour is accepted.
-    """
-    if known:
-        return True
-    row = all(failed(i) for i in range(index - PATIENCE, index))
-    return forward and (not row or index % GLANCE == 0)
-
-
-def postponed(problem: ForcedProblem, point: ForcedPoint) -> ForcedPoint:
-    """Return a repeat that was given no iterations: for `follow_run` or a homotopy to find."""
-    x = problem.high.unknowns(point.coefficients)
-    none = Solution(x, Status.TOO_MANY_ITERATIONS, 0, np.nan, 0.0, 0.0)
-    made = forced_point(problem.high, none, "high", point.index, point.omega, 0.0)
-    return replace(made, predicted_error=point.predicted_error)
-
-
-def passing(branch: Sequence[ForcedPoint], point: ForcedPoint) -> list[ForcedPoint]:
-    """Return the two points of a branch between which it went across the frequency of `point`, on the sheet nearest to its motion."""
-    ends = [
-        sorted((a, b), key=lambda p: abs(p.omega - point.omega))
-        for a, b in pairwise(p for p in branch if p.converged)
-        if a.index == b.index and (a.omega - point.omega) * (b.omega - point.omega) <= 0.0
-    ]
-    low = point.coefficients[1:]
-
-    def away(pair: list[ForcedPoint]) -> float:
-        return float(np.linalg.norm(pair[0].coefficients[1 : len(low) + 1] - low))
-
-    return min(ends, key=away, default=[])
 
 
 def follow_run(
@@ -364,10 +251,3 @@ def along_branch(
     if not start.solution.status.converged:
         return start
     return step_to(balance, start, omega, following)
-
-
-def _neighbours(index: int, others: Mapping[int, ForcedPoint]) -> list[ForcedPoint]:
-    """Return the accepted points nearest in index, from both sides."""
-    below = sorted((i for i in others if i < index), reverse=True)[:NEIGHBOURS]
-    above = sorted(i for i in others if i > index)[:NEIGHBOURS]
-    return [others[i] for i in sorted([*below, *above], key=lambda i: abs(i - index))]

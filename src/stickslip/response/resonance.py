@@ -7,7 +7,8 @@ from time import perf_counter
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.response.passages import along_branch, repeat
+from stickslip.response.passages import along_branch
+from stickslip.response.repeats import repeat
 from stickslip.response.rescue import homotopies
 from stickslip.response.sweep import ForcedPoint, ForcedProblem, forced_point
 from stickslip.solve.continuation import start_point, step_to

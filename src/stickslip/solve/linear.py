@@ -1,5 +1,6 @@
 """The linear systems of Newton and continuation: what a solver of them is, and the dense one."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -146,16 +147,40 @@ def solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
     return solve_signed(matrix, right)[0]
 
 
+def factorised(
+    linear: LinearSolver, jac: Jacobian
+) -> Callable[[FloatArray], FloatArray | None] | None:
+    """Return the solution of ``jac x = right`` by right side; None if `jac` is singular.
+
+    An array is factorised once, and overwritten; a Jacobian known by its products is solved by `linear` for each right side.
+    """
+    if isinstance(jac, Bordered) and isinstance(jac.jac, np.ndarray):
+        jac = bordered_array(jac.jac, jac.column, jac.row, jac.corner)
+    if not isinstance(jac, np.ndarray):
+        return lambda right: solve_with(linear, jac, right)
+    lu, pivots = _factors(jac)
+    if lu is None:
+        return None
+    return lambda right: np.asarray(scipy.linalg.lapack.dgetrs(lu, pivots, right)[0])
+
+
+def _factors(matrix: FloatArray) -> tuple[FloatArray | None, FloatArray]:
+    """Return LU factors and pivots; None if the matrix is singular to working precision. `matrix` is overwritten."""
+    lu, pivots, info = scipy.linalg.lapack.dgetrf(matrix, overwrite_a=True)
+    size = np.abs(np.diagonal(lu))
+    if info != 0 or not np.all(np.isfinite(size)) or size.min() <= SINGULAR * size.max():
+        return None, pivots
+    return lu, pivots
+
+
 def solve_signed(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray | None, float]:
     """Solve a dense system by LU and return the sign of its determinant too (0 if singular). `matrix` is overwritten."""
-    lu, pivots, info = scipy.linalg.lapack.dgetrf(matrix, overwrite_a=True)
-    pivot = np.diagonal(lu)
-    size = np.abs(pivot)
-    if info != 0 or not np.all(np.isfinite(size)) or size.min() <= SINGULAR * size.max():
+    lu, pivots = _factors(matrix)
+    if lu is None:
         return None, 0.0
     solution, _ = scipy.linalg.lapack.dgetrs(lu, pivots, right)
     swaps = np.count_nonzero(pivots != np.arange(pivots.size))
-    flips = swaps + np.count_nonzero(pivot < 0.0)
+    flips = swaps + np.count_nonzero(np.diagonal(lu) < 0.0)
     return np.asarray(solution, dtype=float), 1.0 if flips % 2 == 0 else -1.0
 
 

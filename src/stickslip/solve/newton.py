@@ -79,7 +79,10 @@ def charged(solution: Solution, spent: Sequence[Solution]) -> Solution:
 
 
 def newton(
-    evaluate: Callable[[FloatArray], Evaluation], x: FloatArray, options: Newton
+    evaluate: Callable[[FloatArray], Evaluation],
+    x: FloatArray,
+    options: Newton,
+    globalisation: Globalisation | None = None,
 ) -> Solution:
     """Solve ``residual(x) = 0``.
 
@@ -91,6 +94,8 @@ def newton(
         (n,) start.
     options
         Tolerance, limits, globalisation and linear solver.
+    globalisation
+        A new one in place of that of the options, such as `NaturalLevel` for a start that is known to be near.
 
     Returns
     -------
@@ -99,7 +104,7 @@ def newton(
         a step was ever refused.
     """
     work = Work(evaluate, options.linear)
-    globalisation = GLOBALISATIONS[options.globalisation]()
+    globalisation = globalisation or GLOBALISATIONS[options.globalisation]()
     now = work.at(x)
     best = (now.x, now.norm)
     iterations = 0

@@ -8,6 +8,7 @@ which each frequency is settled, and the harmonics of the next one are chosen, b
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -97,9 +98,8 @@ class Step:
         Solution of a linear system from its matrix and right side, None where there is none; None: LU factors.
     before
         Solution with fewer harmonics at the same frequency, where this one repeats it.
-    events
-        Where contacts change their states at the solution, where the accepted evaluation left that: with it,
-        ``reference.linearise(padded, omega, events)`` needs no evaluation of contacts.
+    left
+        Events that the accepted evaluation left, see `events`.
     """
 
     balance: HarmonicBalance
@@ -111,7 +111,18 @@ class Step:
     measure: ErrorMeasure
     solve: Solve | None = None
     before: "Step | None" = None
-    events: Events | None = None
+    left: Events | None = None
+
+    @cached_property
+    def events(self) -> Events | None:
+        """Where contacts change their states at the solution; None where that is not known: contacts that are marched or on samples.
+
+        With them, ``reference.forces(padded, omega, events)`` is the forces of more harmonics and evaluates no contact.
+        """
+        if self.left is not None:
+            return self.left
+        found = self.balance.forces(self.x, self.omega).events
+        return found if found is not None and found.whole else None
 
 
 @dataclass(frozen=True, eq=False)

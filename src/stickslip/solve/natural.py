@@ -1,0 +1,49 @@
+"""Newton steps, shortened until the next correction would be smaller: a test that does not depend on the scales of the equations."""
+
+from functools import partial
+
+import numpy as np
+
+from stickslip.solve.iterate import Iterate, Work
+from stickslip.solve.linear import factorised
+from stickslip.solve.status import Status
+
+MIN_STEP = 1.0 / 32.0  # shortest share of a Newton step; it is taken, across a kink
+GAIN = 0.25  # part of the share by which the next correction has to be smaller
+PATIENCE = 3  # shortest steps in a row, none of which helped, before the search is given up
+
+
+class NaturalLevel:
+    """Damped Newton steps with the natural monotonicity test (Deuflhard 2004, section 3.3).
+
+    A step is measured by the correction that the same factors give at its end, and not by the residual there. A contact that changes its
+    state raises the residual by the stiffness of the contact times the motion, however near the solution is; a correction is the
+    distance to the solution itself. It costs a back substitution a trial. Where even the shortest step fails the test it ends beyond
+    a kink, whose far side has a Jacobian of its own, and is taken; after a few of these in a row there is no going on.
+
+    For starts near a solution. From far away, or where the Jacobian is nearly singular, the other globalisations come through more often.
+    """
+
+    def __init__(self) -> None:
+        self._failed = 0
+
+    def advance(self, work: Work, now: Iterate) -> Iterate | Status:
+        """Return the next iterate, or why there is none."""
+        solve = factorised(work.linear, now.at.jac)
+        step = None if solve is None else work.timed(partial(solve, -now.at.residual))
+        if solve is None or step is None:
+            return Status.SINGULAR
+        size, share = float(np.linalg.norm(step)), 1.0
+        while True:
+            trial = work.at(now.x + share * step)
+            finite = np.isfinite(trial.norm)
+            left = work.timed(partial(solve, trial.at.residual)) if finite else None
+            if left is not None and np.linalg.norm(left) <= (1.0 - GAIN * share) * size:
+                self._failed = 0
+                return trial
+            work.rejected += 1
+            if share <= MIN_STEP:
+                break
+            share *= 0.5
+        self._failed += 1
+        return Status.STALLED if left is None or self._failed > PATIENCE else trial
