@@ -20,6 +20,8 @@ def _error_traces(figure: go.Figure, result: Result) -> list[Case]:
     hz, asked = result.floats("frequency_hz"), result.alert
     real = result.floats("real_error_percent")
     both = [c for c in result.cases if np.isfinite(real[result.points(c)]).any()][-COMPARED:]
+    if not result.is_error:
+        both = []
 
     def add(case: Case, x: FloatArray, y: FloatArray, column: int, **style: object) -> None:
         unit = " %" if result.is_error else ""
