@@ -36,6 +36,9 @@ from stickslip.harmonic.travelling import condense_waves
 from stickslip.model.structure import Structure
 from stickslip.response.forced import Sweep, accepted_points, forced_problem, forced_response
 from stickslip.solve.newton import Newton
+from strategies.cases import SelectionCase
+from strategies.compare import compared
+from strategies.page import page
 
 HZ = 2 * np.pi
 ORDER = 5
@@ -100,6 +103,13 @@ def slopes(function, rows, size=1e-10):
         aside = aside.reshape(rows.shape)
         columns.append((function(rows + aside) - function(rows - aside)).reshape(-1) / (2 * size))
     return np.array(columns).T
+
+
+@cache
+def jacobian():
+    """Of all rows, at the solution with harmonics 1 and 3, by differences."""
+    step = step_at(harmonics=(0, 1, 3))
+    return slopes(lambda r: residual(r, step.omega), rows_of_step(step))
 
 
 def rows_of_step(step):
@@ -190,8 +200,7 @@ def test_grolet_foretells_along_the_tangent():
     rows, size = rows_of_step(step), 1e-4
     by_omega = residual(rows, step.omega + size) - residual(rows, step.omega - size)
     right = -by_omega.reshape(-1) / (2 * size) * (step.next_omega - step.omega)
-    jac = slopes(lambda r: residual(r, step.omega), rows)
-    ahead = rows + np.linalg.solve(jac, right).reshape(rows.shape)
+    ahead = rows + np.linalg.solve(jacobian(), right).reshape(rows.shape)
     expected = {h: share_by_hand(ahead, h) for h in range(ORDER + 1)}
     for threshold in (1e-6, 1e-5, 1e-4, 1e-3, 1e-2):
         verdict = Grolet(threshold=threshold).judge(step)
@@ -217,7 +226,7 @@ def test_suess_adds_the_missing_harmonics_alone(frozen):
             at = 6 * (2 * h - 1)
             jac[at : at + 12, at : at + 12] = np.block([[z, c], [-c, z]])
     else:
-        jac = slopes(lambda r: residual(r, step.omega), rows)
+        jac = jacobian()
     r = residual(rows, step.omega).reshape(-1)
     more = rows.copy()
     more[missing] = np.linalg.solve(jac[np.ix_(own, own)], -r[own]).reshape(-1, 6)
@@ -465,3 +474,41 @@ def test_example_of_an_own_strategy():
         exact = abs(0.1 / (1.5 - omega**2 + 0.02j * omega))
         assert amplitude == pytest.approx(exact, abs=6e-5)
     assert [kept for *_, kept in rows] == ["0, 1"] * 8 + ["0, 1, 3"] * 5
+
+
+# ---- the comparison of all -----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def comparison():
+    system, load = griffin(0.03)
+    hertz = (HZ * SUPERHARMONIC[0], HZ * SUPERHARMONIC[1])
+    return compared(SelectionCase("mass", "a mass", system, load, hertz, 7, samples=SAMPLES))
+
+
+def test_comparison_counts_what_a_sweep_shows(comparison):
+    system, load = griffin(0.03)
+    judge = forced_problem(
+        system, load,
+        Sweep(omega_range=comparison.case.omega_range, high=10, samples=SAMPLES, selection="always_low"),
+    )  # fmt: skip
+    _, exact = response(system, load, SUPERHARMONIC, 7, "always_high", high=10)
+    for selection in ("always_low", "jaumouille", "jacobian_alert", "always_high"):
+        outcome = comparison.of(selection)
+        _, points = response(system, load, SUPERHARMONIC, 7, selection, passages="double")
+        last = {p.omega: p for p in points}  # repeats come last
+        pairs = [(last[r.omega], r) for r in exact]
+        found = np.array([judge.real_error(p, r) for p, r in pairs])
+        top = int(np.argmax([abs(r.coefficients[1, 0]) for r in exact]))
+        assert outcome.missed == int(np.sum(found > 0.05))
+        assert outcome.at_peak == pytest.approx(found[top], rel=1e-3, abs=1e-9)
+        assert outcome.unknowns == sum(2 * p.harmonics.size - 1 for p in points)
+        assert outcome.iterations == sum(p.iterations for p in points)
+        assert outcome.lost == 0
+
+
+def test_page_has_a_row_for_every_strategy(comparison):
+    text = page([comparison], "## Findings")
+    for outcome in comparison.outcomes:
+        assert f"| `{outcome.entry.selection}`" in text
+    assert set(STRATEGIES) <= {o.entry.selection for o in comparison.outcomes}
