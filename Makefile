@@ -16,7 +16,7 @@ LOCK_FLAGS := --quiet --generate-hashes --strip-extras \
 # Two test workers on two cores: a threaded BLAS under each would only make them wait for each other.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help install run test readers test-readers sparse test-sparse lint docs bench bench-rival validate lock clean
+.PHONY: help install run test readers test-readers sparse test-sparse lint docs figures bench bench-rival validate strategies lock clean
 .DELETE_ON_ERROR:
 
 help:  ## list the targets
@@ -73,6 +73,9 @@ docs: $(DOCS_INSTALLED)  ## build the documentation; any warning is an error
 	$(ONE_THREAD) $(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
 	@echo "Open docs/_build/html/index.html in a browser."
 
+figures: $(DOCS_INSTALLED)  ## draw the figures of Gastaldi & Berruti (2017) for the own two blades; writes docs/seed_figures.md (some minutes)
+	$(ONE_THREAD) $(BIN)/python -m figures
+
 bench: $(INSTALLED)  ## run every benchmark; writes benchmarks/out/results.json
 	$(ONE_THREAD) $(BIN)/python -m benchmarks
 
@@ -82,6 +85,9 @@ bench-rival: .venv-rival/.installed  ## install pyHarm-os, which the chain bench
 	$(PYTHON) -m venv .venv-rival
 	.venv-rival/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r benchmarks/requirements.lock
 	@touch $@
+
+strategies: $(DOCS_INSTALLED)  ## compare all ways of choosing harmonics; writes docs/strategies.md and its figure (some ten minutes)
+	$(ONE_THREAD) $(BIN)/python -m strategies compare
 
 validate: $(INSTALLED)  ## compare with closed forms, other codes and the literature
 	$(ONE_THREAD) $(BIN)/python -m validation
