@@ -54,6 +54,11 @@ class CompiledContacts:
     first: IntArray
     marched: tuple[MarchedLaws, ...]
 
+    @property
+    def keeps_events(self) -> bool:
+        """Whether an evaluation without samples tells when every contact changes its state."""
+        return self.evaluator == "events" and not self.marched
+
 
 def check_evaluator(evaluator: str) -> None:
     """Raise `InputError` unless there is such an evaluator."""

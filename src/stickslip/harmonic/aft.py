@@ -101,7 +101,7 @@ def contact_forces(
             f"gap coefficients of shape {gap_coefficients.shape} for {contacts.n_contacts} contacts",
             "Give 2 H + 1 rows, and columns t, w, n of each contact.",
         )
-    if not history and contacts.evaluator == "events" and not contacts.marched:
+    if not history and contacts.keeps_events:
         samples = 0
     tables = _tables((m - 1) // 2, samples)
     # one row a gap, so that an evaluator runs along it
@@ -156,7 +156,7 @@ def _exact(
     gap = gap if own.size == len(gap) else gap[own]
     of_own = _of(gap_coefficients, own)
     kept = None
-    if gap.shape[2] == 0 and not contacts.marched:
+    if gap.shape[2] == 0 and contacts.keeps_events:
         kept = room_for_events((len(of_own) - 1) // 2, len(contacts.elements))
     coefficients, blocks, force, state = exact_period(
         of_own, contacts.elements, contacts.first, gap, contacts.pairs, kept

@@ -54,7 +54,7 @@ def first_passage(
             gap = sweep.control.largest * sweep.control.scale if points else 0.0
             # a single frequency is left to the repeats, which know both sides; a second one in a row to the homotopies
             left = bool(points) and points[-1].converged and sweep.selection != "always_low"
-            point = fresh_point(problem, load, points, min(reach + gap, last), left)
+            point = fresh_point(problem, load, points, min(reach + gap, last), left, latest)
         points.append(_low_point(problem, point, len(points), began, latest))
         yield points[-1]
 
@@ -79,7 +79,7 @@ def _grid(
         if before:
             point = step_to(latest, problem.branch_point(before[-1]), float(omega), following)
         if point is None or not point.solution.status.converged:
-            point = fresh_point(problem, load, before, float(omega))
+            point = fresh_point(problem, load, before, float(omega), latest=latest)
         points.append(_low_point(problem, point, len(points), began, latest))
         yield points[-1]
 
@@ -90,11 +90,12 @@ def fresh_point(
     points: list[ForcedPoint],
     omega: float,
     quickly: bool = False,
+    latest: Latest | None = None,
 ) -> Point:
     """Solve without a branch that leads here.
 
     From the last solution; from the static equilibrium plus the bonded vibration; from a solution with few harmonics. Then, unless it is
-    to go quickly, by all that `solve_robustly` knows.
+    to go quickly, by all that `solve_robustly` knows. The evaluation at the solution is left in `latest`.
     """
     balance = problem.low
     following = problem.following(balance)
@@ -111,7 +112,7 @@ def fresh_point(
     if not solution.status.converged:
         upward = np.append(np.zeros(balance.size), 1.0)
         return Point(solution.x, omega, upward, following.control.first, solution, 0.0)
-    return replace(start_point(balance, solution.x, omega, following), solution=solution)
+    return replace(start_point(latest or balance, solution.x, omega, following), solution=solution)
 
 
 def _from_starts(

@@ -119,7 +119,7 @@ class Step:
 
         With them, ``reference.forces(padded, omega, events)`` is the forces of more harmonics and evaluates no contact.
         """
-        if self.left is not None:
+        if self.left is not None or not self.balance.compiled.keeps_events:
             return self.left
         found = self.balance.forces(self.x, self.omega).events
         return found if found is not None and found.whole else None
