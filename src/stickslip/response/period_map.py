@@ -15,6 +15,7 @@ from stickslip.model.structure import Structure
 from stickslip.response.propagator import ModalCoordinates, PeriodicLoad, step_operators
 from stickslip.response.step_tangent import (
     TangentOperators,
+    equal_steps,
     fresh_tangent,
     run_tangent_period,
     tangent_operators,
@@ -117,10 +118,13 @@ class PeriodMap:
         """March one period with its tangents."""
         step, record = self.start_of(state), self._record()
         tangent = fresh_tangent(self._first_tangents(step), step.gap.size)
-        failures = run_tangent_period(self.operators, self.linear, step, self.work, record, tangent)
+        m, law = 2 * self.modes.speed.size, self.operators.law[:, :3].ravel()
+        equal = equal_steps(m, step.gap.size)
+        failures = run_tangent_period(
+            self.operators, self.linear, step, self.work, record, tangent, equal
+        )
         image = self._ended(step, failures, record)
         lost = np.nan if image.failures < 0 else 1.0
-        m, law = 2 * self.modes.speed.size, self.operators.law[:, :3].ravel()
         motion, beyond = tangent.state[:m], tangent.state[m:]
         forces = beyond + law[:, None] * (self.linear.gaps @ motion[: m // 2])
         matrix = np.vstack([motion, forces[self.springs]])

@@ -53,7 +53,7 @@ class ShootingResult:
     periods
         Periods marched, those with tangents among them.
     corrections
-        Periods marched with tangents, which cost as much as some ten or twenty others.
+        Periods marched with tangents, each of which costs as much as some six others.
     residual
         Distance of the state after a period from that before, relative to the vibration of the orbit.
     distance

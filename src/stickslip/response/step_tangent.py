@@ -19,12 +19,14 @@ from stickslip.response.time_step import (
     StepState,
     StepWork,
     advance,
+    step_workspace,
     write_record,
 )
 
 OPEN = 0
 STUCK = 1  # the code of a contact that is closed, held both ways, and was closed before
 LANDING = 10  # and above: the gap closes within the step
+SINGLY = 3  # steps in one set of contact states up to which their matrix is not worth its making
 GRAZING = 1e-8  # of the limit: a spring that exceeds it by less is at its limit and does not slip
 
 
@@ -44,6 +46,13 @@ class Tangent(NamedTuple):
     grazed: IntArray  # (k,): how often a spring was at its limit without slipping
 
 
+class EqualSteps(NamedTuple):
+    """Room for steps that wait for others in the same contact states."""
+
+    work: StepWork  # their contact states and slopes
+    power: Tangent  # (m + k) columns
+
+
 def tangent_operators(ops: StepOperators, gaps: FloatArray) -> TangentOperators:
     """Return the matrices that the tangents need; `gaps` (k, n) turns modal displacements into gaps."""
     k, m = ops.hold.shape
@@ -57,6 +66,11 @@ def fresh_tangent(state: FloatArray, k: int) -> Tangent:
     """Return `state` (m + k, columns) with its scratch arrays."""
     first = np.array(state, dtype=float, order="C")
     return Tangent(first, np.zeros_like(first[: len(first) - k]), np.zeros(k, dtype=np.int64))
+
+
+def equal_steps(m: int, k: int) -> EqualSteps:
+    """Return fresh room for `m` coordinates of motion and `k` gaps."""
+    return EqualSteps(step_workspace(k), fresh_tangent(np.eye(m + k), k))
 
 
 @njit(cache=True)
@@ -112,12 +126,11 @@ def _given(
 
 
 @njit(cache=True)
-def _active(before: StepState, ops: StepOperators, work: StepWork, tan: Tangent) -> IntArray:
+def _active(before: StepState, ops: StepOperators, work: StepWork) -> IntArray:
     """Return the contacts whose force beyond the stuck springs may change over the step."""
     found = np.empty(work.code.size, dtype=np.int64)
     count = 0
     for c in range(work.code.size):
-        _hold_grazing(c, before, ops.law[c], work, tan)
         closed_by = ops.law[c, 4] - ops.law[c, 2] * before.gap[3 * c + 2]
         if work.code[c] != STUCK or closed_by <= 0.0:
             found[count] = c
@@ -154,7 +167,7 @@ def advance_tangent(
 ) -> None:
     """Carry the tangents over the step that `work` has just solved."""
     m, n = tan.moved.shape[0], linear.gaps.shape[1]
-    active = _active(before, ops, work, tan)
+    active = _active(before, ops, work)
     np.dot(linear.stuck, tan.state, tan.moved)
     if active.size > 0:
         rows = np.empty(3 * active.size, dtype=np.int64)
@@ -175,6 +188,44 @@ def advance_tangent(
 
 
 @njit(cache=True)
+def _by_itself(before: StepState, ops: StepOperators, work: StepWork, tan: Tangent) -> bool:
+    """Settle what grazes; return whether the step's derivative depends on more than the contact states."""
+    alone = False
+    for c in range(work.code.size):
+        _hold_grazing(c, before, ops.law[c], work, tan)
+        closed_by = ops.law[c, 4] - ops.law[c, 2] * before.gap[3 * c + 2]
+        alone = alone or work.code[c] >= LANDING or (work.code[c] == STUCK and closed_by <= 0.0)
+    return alone
+
+
+@njit(cache=True)
+def _advance_equal_steps(
+    count: int,
+    ops: StepOperators,
+    linear: TangentOperators,
+    before: StepState,
+    work: StepWork,
+    tan: Tangent,
+    power: Tangent,
+) -> None:
+    """Carry the tangents over `count` steps in the same contact states: by squares of their common matrix."""
+    if count <= SINGLY:
+        for _ in range(count):
+            advance_tangent(ops, linear, before, work, tan)
+        return
+    power.state[:] = np.eye(power.state.shape[0])
+    advance_tangent(ops, linear, before, work, power)
+    matrix = power.state.copy()
+    while True:
+        if count % 2 == 1:
+            tan.state[:] = np.dot(matrix, tan.state)
+        count //= 2
+        if count == 0:
+            return
+        matrix = np.dot(matrix, matrix)
+
+
+@njit(cache=True)
 def run_tangent_period(
     ops: StepOperators,
     linear: TangentOperators,
@@ -182,11 +233,12 @@ def run_tangent_period(
     work: StepWork,
     record: StepRecord,
     tan: Tangent,
+    equal: EqualSteps,
 ) -> int:
     """Advance `state` and its tangents by one period; return what `run_period` returns."""
     moved = np.empty(ops.hold.shape[1] + ops.hold.shape[0])
     before = StepState(state.x.copy(), state.gap.copy(), state.force.copy())
-    failures = 0
+    failures, waiting = 0, 0
     for step in range(record.motion.shape[0]):
         before.gap[:] = state.gap
         before.force[:] = state.force
@@ -195,5 +247,16 @@ def run_tangent_period(
         write_record(record, state, step)
         if not np.isfinite(np.sum(state.x)):
             return -1
-        advance_tangent(ops, linear, before, work, tan)
+        alone = _by_itself(before, ops, work, tan)
+        if alone or np.any(work.code != equal.work.code):
+            _advance_equal_steps(waiting, ops, linear, before, equal.work, tan, equal.power)
+            waiting = 0
+        if alone:
+            advance_tangent(ops, linear, before, work, tan)
+            continue
+        if waiting == 0:
+            equal.work.code[:] = work.code
+            equal.work.slope[:] = work.slope
+        waiting += 1
+    _advance_equal_steps(waiting, ops, linear, before, equal.work, tan, equal.power)
     return failures
