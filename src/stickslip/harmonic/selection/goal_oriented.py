@@ -1,6 +1,6 @@
 """Harmonics chosen one by one by what each does to the outputs: a goal-oriented estimate of the error (see `adjoint`)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, get_args
 
 import numpy as np
@@ -15,6 +15,7 @@ from stickslip.harmonic.selection.adjoint import (
     estimate,
     outputs_of,
 )
+from stickslip.harmonic.selection.guarded_alert import GuardedAlert
 from stickslip.harmonic.selection.strategy import Step, Verdict
 from stickslip.harmonic.support import Harmonics
 
@@ -34,12 +35,15 @@ class GoalOriented:
         Share of the threshold that the harmonics left out of a repeat may contribute, all taken together and without cancellation.
     goal
         What is to be right of an output: its ``motion``, amplitude and phase as in the Jacobian Alert, or its ``amplitude`` alone.
+    guarded
+        Whether `GuardedAlert` is asked where the bound is below the threshold. What it alarms at is repeated with all harmonics.
     """
 
     verifies: ClassVar[bool] = True
     threshold: float = 0.05
     left_out: float = 0.2
     goal: Goal = "motion"
+    guarded: bool = True
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.left_out <= 1.0:
@@ -64,9 +68,14 @@ class GoalOriented:
         outputs = outputs_of(step.measure, before, self.goal)
         found = estimate(low, high, step.x, step.omega, outputs, step.solve, step.events)
         again = None
+        start = high.coefficients(found.start)
         if found.bound > self.threshold:
             again = self._needed(step, outputs, found)
-        return Verdict(found.bound, again, step.smallest, high.coefficients(found.start))
+        elif self.guarded and found.bound > 0.0:
+            doubted = GuardedAlert(threshold=self.threshold).judge(step)
+            if doubted.again is not None:
+                return replace(doubted, indicator=max(doubted.indicator, found.bound))
+        return Verdict(found.bound, again, step.smallest, start)
 
     def _needed(self, step: Step, outputs: Outputs, found: Estimate) -> Harmonics:
         """Return the harmonics of the repeat."""
