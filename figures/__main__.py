@@ -16,6 +16,7 @@ DOCS = Path(__file__).parent.parent / "docs"
 
 def say(line: str) -> None:
     """Print a line of progress with the CPU time so far."""
+    print(f"{process_time():6.0f} s  {line}", flush=True)
 
 
 def main() -> int:

@@ -171,7 +171,7 @@ def errors_by_frequency(evidence: Evidence) -> Figure:
     plan = evidence.plan
     figure, axes = plt.subplots(1, 3, figsize=(13, 4.0), layout="constrained")
     for axis, ratio, letter in zip(
-        axes, (plan.weak, plan.seed_weak, plan.strong), "abc", strict=True
+        axes, (plan.weak, plan.paper_weak, plan.strong), "abc", strict=True
     ):
         found = evidence.pairs[ratio]
         hertz = [p.hertz for p in found]

@@ -25,7 +25,7 @@ class Plan:
         F_CL/F_HE of the errors (fig. 6, 7a), largest first; at those below `periodic` no periodic motion is known to exist.
     weak, strong
         Two of them, of fig. 4, 5 and 6.
-    seed_weak
+    paper_weak
         The weak ratio of the paper.
     all_ratios, timing_ratios
         Of the optimisation curves (fig. 9) and of the timing (fig. 7b).
@@ -46,7 +46,7 @@ class Plan:
     ratios: tuple[float, ...] = (250.0, 100.0, 50.0, 20.0, 10.0, 7.0, 5.0, 4.0)
     weak: float = 50.0
     strong: float = 5.0
-    seed_weak: float = 20.0
+    paper_weak: float = 20.0
     periodic: float = 4.0
     all_ratios: tuple[float, ...] = (250.0, 100.0, 50.0, 20.0, 10.0, 5.0, 4.0, 3.0)
     timing_ratios: tuple[float, ...] = (250.0, 100.0, 50.0, 20.0, 10.0, 5.0, 4.0, 3.0)
@@ -57,7 +57,7 @@ class Plan:
     markers: int = 9
     marker_hertz: tuple[float, float] = (-6.0, 3.0)
     glued_ratios: tuple[float, float] = (23.4, 11.7)
-    glued_more: tuple[float, ...] = (5.0, 3.0, 2.0)
+    glued_more: tuple[float, ...] = (5.0, 2.0)
 
 
 class Marker(NamedTuple):

@@ -13,11 +13,12 @@ from stickslip.arrays import IntArray
 from stickslip.study.build import Case, case_of
 from validation.case_two_blades import coarse_example
 
-# Angles and contact lines of a damper whose flat side does not slip; its L2 lies nearer to the apex, on the shallower underside.
+# Angles and contact lines of a damper whose flat side does not slip: it rests on L1 and R alone, within both friction cones.
 GLUED = {
-    "flat_angle_deg": "30.0",
-    "curved_angle_deg": "45.0",
-    "flat_distances_m": "[0.002, 0.022]",
+    "flat_angle_deg": "50.0",
+    "curved_angle_deg": "70.0",
+    "flat_distances_m": "[0.008, 0.023]",
+    "curved_distance_m": "0.01",
 }
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from figures.evidence import Evidence
 from figures.statements import Statement
 
-HEAD = """# The figures of the seed paper
+HEAD = """# The figures of Gastaldi and Berruti
 
 Gastaldi & Berruti {{cite}}`gastaldi2017` show the Jacobian Alert on two blades with a damper. `make figures` draws the counterparts of their figures for this
 package's own two blades and compares every statement that they make about them with what comes out. The numbers on this page, and
@@ -101,7 +101,7 @@ def table(rows: Sequence[Statement]) -> str:
     for row in rows:
         verdict = row.verdict if row.holds else f"**{row.verdict}**"
         why = "" if row.holds else row.why
-        cells = (row.place, row.claim, row.seed, row.own, verdict, why)
+        cells = (row.place, row.claim, row.number, row.own, verdict, why)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n"
 

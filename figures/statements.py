@@ -34,7 +34,7 @@ class Statement:
         Figure or section of the paper.
     claim
         What the paper says.
-    seed
+    number
         Its number.
     own
         What this package finds.
@@ -48,7 +48,7 @@ class Statement:
 
     place: str
     claim: str
-    seed: str
+    number: str
     own: str
     holds: bool | None
     by: str = ""
@@ -353,7 +353,7 @@ def _of_errors(e: Evidence) -> list[Statement]:
             f"{len(stuck)} frequencies in full stick: at most {percent(noise, 2)}", bool(noise < 1e-6),
             "", "What is left is the tolerance of the solver.",
         ),
-        _weak_row(e, e.plan.seed_weak), _weak_row(e, e.plan.weak),
+        _weak_row(e, e.plan.paper_weak), _weak_row(e, e.plan.weak),
         _strong_row(e),
         Statement(
             "Fig. 6, 7a", "Where the predicted error is below 5 % the actual one is, too", "always",
