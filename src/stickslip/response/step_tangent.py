@@ -27,7 +27,7 @@ OPEN = 0
 STUCK = 1  # the code of a contact that is closed, held both ways, and was closed before
 LANDING = 10  # and above: the gap closes within the step
 SINGLY = 3  # steps in one set of contact states up to which their matrix is not worth its making
-GRAZING = 1e-8  # of the limit: a spring that exceeds it by less is at its limit and does not slip
+GRAZING = 1e-8  # of the limit: a spring that is nearer to it has reached it and does not slip
 
 
 class TangentOperators(NamedTuple):
@@ -80,17 +80,17 @@ def _hold_grazing(c: int, before: StepState, law: FloatArray, work: StepWork, ta
     A contact that stays closed and slips one way only cannot be in a periodic motion unless it slips by nothing: Newton
     ends there exactly, and the next state is one in which it sticks.
     """
-    if work.code[c] <= STUCK or work.code[c] >= LANDING:
+    if work.code[c] < STUCK or work.code[c] >= LANDING:
         return
     for d in range(2):
-        row = 3 * c + d
+        row, unit = 3 * c + d, 1 if d == 0 else 3
         trial = before.force[row] + law[d] * (work.gap[row] - before.gap[row])
         limit = abs(law[3] * work.force[3 * c + 2])
-        slips = (work.code[c] - STUCK) // (1 if d == 0 else 3) % 3
-        if slips > 0 and abs(trial) - limit <= GRAZING * limit:
-            work.code[c] -= slips * (1 if d == 0 else 3)
-            work.slope[c, d, :] = 0.0
-            tan.grazed[row] += 1
+        if law[d] == 0.0 or abs(abs(trial) - limit) > GRAZING * limit:
+            continue
+        work.code[c] -= (work.code[c] - STUCK) // unit % 3 * unit
+        work.slope[c, d, :] = 0.0
+        tan.grazed[row] += 1
 
 
 @njit(cache=True)
