@@ -48,8 +48,8 @@ def draw(found: Sequence[Comparison], path: Path = FIGURE) -> None:
         _panel(axes[0, column], comparison, "unknowns")
         _panel(axes[1, column], comparison, "seconds")
         axes[0, column].set_title(comparison.case.name.replace("_", " "))
-        axes[0, column].set_xlabel("harmonic-unknowns, % of all harmonics everywhere")
-        axes[1, column].set_xlabel("CPU time, % of all harmonics everywhere")
+        axes[0, column].set_xlabel("harmonic-unknowns, % of always_high")
+        axes[1, column].set_xlabel("CPU time, % of always_high")
     for row in axes:
         row[0].set_ylabel("error at resonance, %")
     handles, labels = axes[0, 0].get_legend_handles_labels()
