@@ -1,6 +1,7 @@
 """Newton steps, shortened until the next correction would be smaller: a test that does not depend on the scales of the equations."""
 
 from functools import partial
+from time import perf_counter
 
 import numpy as np
 
@@ -29,7 +30,9 @@ class NaturalLevel:
 
     def advance(self, work: Work, now: Iterate) -> Iterate | Status:
         """Return the next iterate, or why there is none."""
+        began = perf_counter()
         solve = factorised(work.linear, now.at.jac)
+        work.seconds_linear += perf_counter() - began
         step = None if solve is None else work.timed(partial(solve, -now.at.residual))
         if solve is None or step is None:
             return Status.SINGULAR

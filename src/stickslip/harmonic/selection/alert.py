@@ -88,6 +88,9 @@ def jacobian_alert(
     q = low.coefficients(x)
     padded = high.unknowns(q)
     start = perf_counter()
+    stuck = events is not None and events.none
+    if form == "newton" and stuck and not drives_missing(low, high):
+        return Alert(0.0, 0, measure.harmonics[0], padded, 0.0)
     period = high.forces(padded, omega, events)
     seconds = perf_counter() - start
     if form == "newton" and silent(low, high, period):
@@ -132,16 +135,23 @@ def _published(
     return np.asarray(load - product)
 
 
+def drives_missing(low: HarmonicBalance, high: HarmonicBalance) -> bool:
+    """Whether the load acts on a harmonic that `low` leaves out."""
+    return any(
+        h in high.harmonics and h not in low.harmonics and bool(np.any(force))
+        for h, force in high.linear.load.harmonics.items()
+    )
+
+
 def silent(low: HarmonicBalance, high: HarmonicBalance, period: ContactPeriod) -> bool:
     """Whether nothing acts on the missing harmonics, so that Δq = 0 without a factorisation.
 
     The enlarged residual repeats the low-order one, which is zero, in its rows; its other rows are loads and contact forces of
     the missing harmonics.
     """
-    missing = [place for place, h in enumerate(high.harmonics) if h not in low.harmonics]
-    load = high.linear.load.harmonics
-    if any(high.harmonics[i] in load and np.any(load[high.harmonics[i]]) for i in missing):
+    if drives_missing(low, high):
         return False
+    missing = [place for place, h in enumerate(high.harmonics) if h not in low.harmonics]
     rows = [row for place in missing for row in (2 * place - 1, 2 * place)]
     forces = period.coefficients[rows]
     return bool(np.max(np.abs(forces), initial=0.0) <= SILENCE * high.force_scale)
