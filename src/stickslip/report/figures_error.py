@@ -87,7 +87,7 @@ def _error_caption(result: Result) -> str:
         )
     else:
         text = (
-            f"What <code>{result.selection}</code> compares with its threshold of {result.shown(result.threshold)} (dashed) at the first "
+            f"What <code>{result.selection}</code> compares with its threshold of {result.shown(result.threshold)} (dashed) at the accepted "
             "solution of each frequency: no error, and not to be compared with the indicators of others. "
         )
     worst = int(np.argmax(error))
@@ -97,7 +97,7 @@ def _error_caption(result: Result) -> str:
         f"The largest, {result.shown(float(error[worst]))}, is at {hz} Hz for {RATIO} = {ratio}. "
     )
     real = np.isfinite(result.floats("real_error_percent"))
-    if real.any():
+    if real.any() and result.is_error:
         text += (
             f"Right: the real error (open circles), the difference to the accepted solution, where a point was "
             f"solved again ({counted(int(real.sum()), 'point')}; at most {COMPARED} load cases are drawn). "

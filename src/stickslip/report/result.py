@@ -58,7 +58,7 @@ class Case:
 
 @dataclass(frozen=True, eq=False)
 class Alert:
-    """The first solutions at which the strategy was asked, in the order of solution."""
+    """The solutions about which the strategy was asked, one a frequency: the first one by an alert, else the accepted one."""
 
     case: IntArray  # index of the load case
     hz: FloatArray
@@ -142,15 +142,8 @@ class Result:
                 self.floats("alert_frequency_hz"),
                 self.floats("alert_error_percent"),
             )
-        if not self.is_error and "attempt_indicator" in self.data:
-            stage = self.data["attempt_stage"]
-            first = str(stage.attrs.get("flag_meanings", "low")).split().index("low")
-            said = self.floats("attempt_indicator")
-            own = np.flatnonzero(~np.isnan(said) & (self.integers("attempt_stage") == first))
-            hz = self.floats("attempt_frequency_hz")[own]
-            return Alert(self.integers("attempt_case")[own], hz, said[own])
-        error = self.floats("predicted_error_percent")
-        at = np.flatnonzero(np.isfinite(error))
+        error = self.floats("predicted_error_percent" if self.is_error else "indicator")
+        at = np.flatnonzero(~np.isnan(error))
         return Alert(self.integers("case")[at], self.floats("frequency_hz")[at], error[at])
 
     @property

@@ -52,7 +52,7 @@ def _choice_card(result: Result) -> str:
         n = int(result.converged.sum())
         note = f"{more} of {counted(n, 'accepted point')}, chosen by {result.selection}"
         share = f"{number(100 * more / n, 2)} %" if n else "–"
-        return _card(share, f"of points keep other harmonics than {result.low_name}", note)
+        return _card(share, f"of points keep other harmonics than H = {result.low_name}", note)
     if not error.size:
         return _card("–", "asked for more harmonics", "no predicted error was computed")
     asked = int(np.sum(error > result.threshold))

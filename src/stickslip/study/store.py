@@ -60,7 +60,7 @@ POINT_QUANTITIES = {
     "status": ("1", "how the solver ended"),
     "indicator": (
         "1",
-        "what the strategy compared with its threshold at the first solution of the frequency, NaN where it was not asked",
+        "what the strategy compared with its threshold: of an error at the first solution of the frequency, else at the accepted one",
     ),
     "predicted_error_percent": (
         "percent",
@@ -256,7 +256,7 @@ def _point_row(load_case: int, accepted: Accepted, *, is_error: bool) -> dict[st
         "order": point.order,
         "unknowns": unknowns(point),
         "status": int(point.status),
-        "indicator": accepted.indicator,
+        "indicator": accepted.indicator if is_error else point.predicted_error,
         "predicted_error_percent": 100 * accepted.indicator if is_error else np.nan,
         "real_error_percent": 100 * accepted.real_error,
         "newton_iterations": point.iterations,

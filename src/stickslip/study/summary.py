@@ -105,10 +105,10 @@ def choice_sentence(result: CaseResult, chooser: Chooser) -> str:
     ratio = f"F_CL/F_HE = {result.ratio:g}"
     passage = [p for p in result.solved if p.stage == "low"]
     said = np.array([p.predicted_error for p in passage])
-    if np.all(np.isnan(said)):
-        return f"{ratio}: {chooser.name} was not asked."
     if not chooser.is_error:
         return f"{ratio}: {_kept(result)}."
+    if np.all(np.isnan(said)):
+        return f"{ratio}: {chooser.name} was not asked."
     over = said > chooser.threshold
     worst = int(np.nanargmax(said))
     if not np.any(over):
