@@ -10,6 +10,7 @@ from strategies.compare import FEW, FLOOR, MANY, THRESHOLD, Comparison
 DOCS = Path(__file__).parent.parent / "docs"
 PAGE = DOCS / "strategies.md"
 ALARMS = DOCS / "strategies_alarms.md"
+SMALLEST = 1e-5  # error below which digits are those of the solver
 
 BEFORE = """# All strategies on the same cases
 
@@ -26,13 +27,15 @@ What is accepted is held against the solution with harmonics 0 to 10, followed a
 
 CAPTION = (
     "*Error at resonance against harmonic-unknowns solved (above) and CPU time (below), both relative to all harmonics everywhere. "
-    f"The line is the threshold of 5 %; errors below {FLOOR:.2%} are drawn there.*"
+    f"The line is the threshold of 5 %; errors below {100 * FLOOR:g} % are drawn there.*"
 )
 
 
 def percent(value: float) -> str:
     """Return a fraction in per cent with three digits; – where there is none."""
-    return "–" if not np.isfinite(value) else f"{100 * value:.3g} %"
+    if not np.isfinite(value):
+        return "–"
+    return f"{100 * value:.3g} %" if value >= SMALLEST else f"< {100 * SMALLEST:g} %"
 
 
 def table(comparison: Comparison) -> list[str]:
@@ -45,9 +48,9 @@ def table(comparison: Comparison) -> list[str]:
     for o in comparison.outcomes:
         cells = [
             f"`{o.entry.selection}`" + (", single" if o.entry.passages == "single" else ""),
-            f"{o.unknowns / many.unknowns:.0%}",
-            f"{o.iterations / many.iterations:.0%}",
-            f"{o.seconds / many.seconds:.0%}",
+            f"{100 * o.unknowns / many.unknowns:.0f} %",
+            f"{100 * o.iterations / many.iterations:.0f} %",
+            f"{100 * o.seconds / many.seconds:.0f} %",
             percent(o.at_peak),
             percent(o.largest),
             *(str(n) for n in (o.missed, o.false, o.lost, o.turns)),
@@ -62,7 +65,7 @@ def heading(comparison: Comparison) -> list[str]:
     few = comparison.of(FEW)
     title = case.title[0].upper() + case.title[1:]
     n = case.system.retained.size
-    text = f"{case.frequencies} frequencies, {n} retained coordinates; one harmonic is more than {THRESHOLD:.0%} off at {few.missed} of them."
+    text = f"{case.frequencies} frequencies, {n} retained coordinates; one harmonic is more than {100 * THRESHOLD:g} % off at {few.missed} of them."
     if comparison.unjudged:
         text += f" At {comparison.unjudged} frequencies the judge found no solution; they are in no count of errors."
     return [f"## {title}", "", text, ""]
