@@ -37,7 +37,7 @@ def test_a_drawn_system_converges(number):
     assert all(p.converged for p in points)
     problem = forced_problem(drawn.system, drawn.load, drawn.sweep)
     for p in points:
-        balance = problem.balance(p.order)
+        balance = problem.balance(p.support)
         norm = residual_norm(balance, balance.unknowns(p.coefficients), p.omega)
         # once more through metres and back: rounding
         assert norm <= 1.1 * drawn.sweep.newton.tolerance
