@@ -9,8 +9,8 @@ prediction above the threshold is an alarm as it was; one below it has to prove 
    are there: ``Δq₂ = -J̃⁻¹ (r̃(q + Δq) + K̃ₓ Δqₓ)``. The harmonics x beyond the reference are solved one by one,
    ``Δqₓ = -(Z + K)ₓₓ⁻¹ rₓ``. A residual that fell, and a small ``|Δq₁| + 2 |Δq₂|``, prove the prediction.
 3. Newton's method goes on from there with twice the harmonics of the reference, and stops as soon as the answer is clear: the change
-   so far with what is left of it at the rate ``θ = |Δqₖ₊₁| / |Δqₖ|``, that is ``|q_k - q| + θ/(1-θ) |Δqₖ|``, is below the
-   threshold, or the change is above it. What does not contract is an alarm.
+   so far with what is left of it at the rate ``θ = |Δqₖ₊₁| / |Δqₖ|`` of two such steps, that is ``|q_k - q| + θ/(1-θ) |Δqₖ|``,
+   is below the threshold (after one step: as in 2), or the change is above it. What does not contract is an alarm.
 """
 
 from dataclasses import dataclass, replace
@@ -102,7 +102,7 @@ class GuardedAlert:
             bound = predicted + DOUBT * _error(step, high, chord)
             if bound <= self.quick * self.threshold:
                 return bound, high.coefficients(start)
-        return self._followed(step, beyond, wide, period, predicted)
+        return self._followed(step, beyond, wide, period)
 
     def _followed(
         self,
@@ -110,11 +110,10 @@ class GuardedAlert:
         beyond: HarmonicBalance,
         x: FloatArray,
         period: ContactPeriod,
-        predicted: float,
     ) -> tuple[float, ComplexArray]:
         """Go on by Newton's method until the answer is clear; see `_doubted`."""
         begin = beyond.unknowns(step.balance.coefficients(step.x))
-        before, best = predicted, (np.inf, x)
+        before, best = np.nan, (np.inf, x)
         for k in range(self.steps):
             at = beyond.linearise(x, step.omega, period if k == 0 else None)
             norm = float(np.linalg.norm(at.residual))
@@ -127,12 +126,23 @@ class GuardedAlert:
             moved, size = _error(step, beyond, x - begin), _error(step, beyond, change)
             if moved > self.threshold:
                 return moved, beyond.coefficients(x)
-            rate = size / before if before > 0.0 else np.inf
-            bound = moved + size * rate / (1.0 - rate) if rate < 1.0 else np.inf
-            if bound <= self.threshold:
+            bound = moved + _left(size, before)
+            # the first step has none of its kind to be compared with
+            limit = self.threshold if k > 0 else self.quick * self.threshold
+            if bound <= limit:
                 return bound, beyond.coefficients(x)
             before = size
         return np.inf, beyond.coefficients(best[1])
+
+
+def _left(size: float, before: float) -> float:
+    """Return how far a sequence still goes after a step: a geometric series, or for the first one the doubt in it."""
+    if np.isnan(before):
+        return DOUBT * size
+    if size >= before:
+        return np.inf if size > 0.0 else 0.0
+    rate = size / before
+    return size * rate / (1.0 - rate)
 
 
 def _error(step: Step, balance: HarmonicBalance, change: FloatArray) -> float:
