@@ -173,7 +173,7 @@ def run() -> list[dict[str, Any]]:
     begin = equilibrium(system, load)
     interface = system.interface
     arguments = (system.plain_structure, interface.gap_operator, interface.laws, load, 1000.0)
-    few = TimeStepping(steps_per_period=64, max_periods=2)
+    few = TimeStepping(steps_per_period=64, max_periods=8)  # with tangents too
     integrate(*arguments, system.outputs, begin, few)
     shoot(*arguments, system.outputs, begin, few)
     return [record for ratio in RATIOS for record in records(ratio)]
