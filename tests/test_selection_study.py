@@ -29,6 +29,11 @@ from stickslip.study.schema import json_schema, read_study
 # a damper that slips around the peak, at few frequencies
 SLIPPING = {"ratios": "[20]", "frequency_hz": "[177.6, 179.2]", "points": "4", "peak_points": "0"}
 ALONE = tuple(name for name in STRATEGIES if not strategy_named(name).verifies)
+# one of those that go through the frequencies alone in every run of the tests, the others with the long ones
+JOURNEYS = [
+    pytest.param(name, marks=pytest.mark.validation) if name in ALONE[1:] else name
+    for name in SELECTIONS
+]
 
 
 def write_study(folder: Path, harmonics: str = "", sweep: str = "frequencies = 2") -> Path:
@@ -102,7 +107,7 @@ def test_editors_are_offered_every_strategy() -> None:
     assert all(name in key["description"] for name in SELECTIONS)
 
 
-@pytest.mark.parametrize("name", SELECTIONS)
+@pytest.mark.parametrize("name", JOURNEYS)
 def test_every_strategy_from_a_file_to_result_and_page(tmp_path: Path, name: str) -> None:
     study = write_study(tmp_path, f'selection = "{name}"\nhigh = 3')
     data, said = run(study)
@@ -141,7 +146,11 @@ def test_every_strategy_from_a_file_to_result_and_page(tmp_path: Path, name: str
     ("harmonics", "after"),
     [
         ('selection = "maple"\nhigh = 4', 2),
-        ('selection = "jacobian_alert"\npassages = "single"\nhigh = 3', 2),
+        pytest.param(
+            'selection = "jacobian_alert"\npassages = "single"\nhigh = 3',
+            2,
+            marks=pytest.mark.validation,
+        ),
         ('selection = "jacobian_alert"\nlow = [1]\nhigh = [1, 3, 5]', 3),
     ],
     ids=["single passage", "alert in a single passage", "list of harmonics"],
@@ -159,6 +168,7 @@ def test_resumed_run_gives_the_same_bits(tmp_path: Path, harmonics: str, after: 
             np.testing.assert_array_equal(again[key].values, whole[key].values, err_msg=str(key))
 
 
+@pytest.mark.validation
 def test_odd_harmonics_alone_are_solved_and_shown(tmp_path: Path) -> None:
     study = write_study(tmp_path, 'selection = "always_high"\nhigh = [1, 3, 5]')
     data, said = run(study, "--verify-harmonics")
