@@ -15,6 +15,7 @@ from small_study import write_small_study
 from typer.testing import CliRunner, Result
 
 import stickslip
+from stickslip import cli
 from stickslip.cli import app
 from stickslip.errors import InputError
 from stickslip.response.forced import ForcedPoint
@@ -26,6 +27,15 @@ from stickslip.study.folder import prepare_folder
 from stickslip.study.summary import choice_sentence
 
 HEAVY = ("numpy", "scipy", "numba", "xarray", "pydantic", "plotly", "gmsh", "skfem", "meshio")
+
+
+@pytest.mark.parametrize("said", [{}, {"OMP_NUM_THREADS": "4"}, {"OPENBLAS_NUM_THREADS": "2"}])
+def test_a_run_gives_blas_one_thread_unless_told_otherwise(monkeypatch, said):
+    environment = dict(said)
+    monkeypatch.setattr(cli.os, "environ", environment)
+    cli._one_blas_thread()
+    one = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+    assert environment == (said or one)
 
 
 def invoke(*words: str) -> Result:
