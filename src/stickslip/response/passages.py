@@ -9,6 +9,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.selection.strategy import judged
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.accepted import branch_end, reached
 from stickslip.response.preload import bonded_start, preload
@@ -159,7 +160,7 @@ def _low_point(
     if point.solution.status.converged and problem.strategy is not None:
         known = latest.known(point.x, point.p)
         left = known.events if isinstance(known, Linearisation) else None
-        verdict = problem.strategy.judge(problem.step(problem.low, point.x, point.p, left=left))
+        verdict = judged(problem.strategy, problem.step(problem.low, point.x, point.p, left=left))
         error, asked = verdict.indicator, verdict.again or ()
         if asked:
             problem.verdicts[index] = verdict

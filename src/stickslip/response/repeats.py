@@ -9,6 +9,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation
+from stickslip.harmonic.selection.strategy import judged
 from stickslip.response.passages import along_branch
 from stickslip.response.rescue import homotopies
 from stickslip.response.sweep import ForcedPoint, ForcedProblem, forced_point
@@ -136,7 +137,7 @@ def _predicted(problem: ForcedProblem, point: ForcedPoint) -> list[FloatArray]:
     verdict = problem.verdicts.get(point.index) if point.stage == "low" else None
     if verdict is None:
         few = problem.balance(point.support)
-        verdict = strategy.judge(problem.step(few, few.unknowns(point.coefficients), point.omega))
+        verdict = judged(strategy, problem.step(few, few.unknowns(point.coefficients), point.omega))
     if verdict.start is None:
         return []
     return [problem.balance(verdict.again or problem.high.harmonics).unknowns(verdict.start)]

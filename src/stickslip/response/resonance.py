@@ -7,6 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.harmonic.selection.strategy import judged
 from stickslip.response.passages import along_branch
 from stickslip.response.repeats import repeat
 from stickslip.response.rescue import homotopies
@@ -143,7 +144,7 @@ def _peak_point(
         return made
     if balance is not problem.low:
         return made
-    verdict = strategy.judge(problem.step(balance, solution.x, omega))
+    verdict = judged(strategy, problem.step(balance, solution.x, omega))
     asked = np.array(verdict.again or (), dtype=np.int64)
     made = replace(made, predicted_error=verdict.indicator, asked=asked)
     if problem.alerted(made):

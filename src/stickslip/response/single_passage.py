@@ -9,7 +9,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.selection.strategy import Step, Verdict
+from stickslip.harmonic.selection.strategy import Step, Verdict, judged
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.passages import along_branch, fresh_point
 from stickslip.response.sweep import (
@@ -150,7 +150,7 @@ def _judged(
     balance = problem.balance(point.support)
     x = balance.unknowns(point.coefficients)
     step = replace(problem.step(balance, x, point.omega, following), before=before)
-    return step, problem.strategy.judge(step)
+    return step, judged(problem.strategy, step)
 
 
 def _more(had: Harmonics, asked: Harmonics | None) -> Harmonics | None:

@@ -13,7 +13,14 @@ from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
-from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve, Step, Strategy, Verdict
+from stickslip.harmonic.selection.strategy import (
+    ErrorMeasure,
+    Solve,
+    Step,
+    Strategy,
+    Verdict,
+    check_strategy,
+)
 from stickslip.harmonic.support import Harmonics, harmonics_of
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, Point, StepControl
@@ -96,6 +103,8 @@ class Sweep:
                 f"{self.selection!r} is none of {', '.join((*STRATEGIES, *FIXED))}",
                 "'guarded_alert' repeats where it matters.",
             )
+        if not isinstance(self.selection, str):
+            check_strategy(self.selection)
         if self.passages not in get_args(Passages):
             raise input_error(
                 "Sweep.passages",

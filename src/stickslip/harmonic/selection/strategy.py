@@ -166,3 +166,57 @@ class Strategy(Protocol):
     def judge(self, step: Step) -> Verdict:
         """Say what a converged solution needs."""
         ...
+
+
+def check_strategy(strategy: object) -> None:
+    """Refuse what cannot be asked, before any long computation.
+
+    Raises
+    ------
+    InputError
+        If it has no `judge`, no number as `threshold`, or does not say whether it `verifies`; or is a class.
+    """
+    name = strategy.__name__ if isinstance(strategy, type) else type(strategy).__name__
+    if isinstance(strategy, type):
+        raise input_error("Sweep.selection", f"is the class {name}", f"Make one: {name}().")
+    if not callable(getattr(strategy, "judge", None)):
+        raise input_error(
+            "Sweep.selection",
+            f"is a {name}, which has no method judge",
+            "Give a name or a Strategy.",
+        )
+    threshold = getattr(strategy, "threshold", None)
+    if not isinstance(threshold, (int, float)) or np.isnan(threshold):
+        raise input_error(
+            f"{name}.threshold",
+            f"is {threshold!r}",
+            "Give it the indicator above which more harmonics are asked for, as a number.",
+        )
+    if not isinstance(getattr(strategy, "verifies", None), bool):
+        raise input_error(
+            f"{name}.verifies",
+            "is neither True nor False",
+            "True: a verdict says how good the solution itself is.",
+        )
+
+
+def judged(strategy: Strategy, step: Step) -> Verdict:
+    """Return what a strategy says of a solution, if it can be done.
+
+    Raises
+    ------
+    InputError
+        If it returns something else than a verdict, or asks for harmonics that the reference does not have.
+    """
+    verdict: object = strategy.judge(step)
+    place = f"{type(strategy).__name__}.judge"
+    if not isinstance(verdict, Verdict):
+        raise input_error(place, f"returned a {type(verdict).__name__}", "Return a Verdict.")
+    beyond = {*(verdict.again or ()), *verdict.following} - set(step.reference.harmonics)
+    if beyond:
+        raise input_error(
+            place,
+            f"asks for harmonics {', '.join(map(str, sorted(beyond)))}, which the reference does not have",
+            "Keep to step.reference.harmonics, or raise Sweep.high.",
+        )
+    return verdict
