@@ -24,6 +24,10 @@ from stickslip.study.chooser import Chooser
 from stickslip.study.collect import Accepted, CaseResult
 from stickslip.study.example import example_text
 from stickslip.study.folder import prepare_folder
+from stickslip.study.journal import Journal
+from stickslip.study.progress import library_versions
+from stickslip.study.run import fingerprint
+from stickslip.study.schema import read_study
 from stickslip.study.summary import choice_sentence
 
 HEAVY = ("numpy", "scipy", "numba", "xarray", "pydantic", "plotly", "gmsh", "skfem", "meshio")
@@ -146,14 +150,44 @@ def test_fresh_removes_what_a_run_writes_and_nothing_else(tmp_path: Path) -> Non
     assert [p.name for p in folder.iterdir()] == ["notes.txt"]
 
 
+def leave_journal(path: Path) -> None:
+    """Leave what a run of this study leaves when it is stopped."""
+    study = read_study(path)
+    prepare_folder(study.folder, fresh=False)
+    mark = fingerprint(study, library_versions())
+    with Journal(study.folder / "journal.sqlite", mark, ForcedPoint) as journal:
+        journal.put("blades", {"n": 1})
+
+
 def test_results_of_another_study_are_not_mixed(tmp_path: Path) -> None:
-    path = write_small_study(tmp_path, airfoil_size_m="1e-5")
-    assert "limits" in refused("run", str(path))  # stops after the journal is made
-    write_small_study(tmp_path, airfoil_size_m="1e-5", centrifugal_n="440.0")
+    path = write_small_study(tmp_path)
+    leave_journal(path)
+    write_small_study(tmp_path, centrifugal_n="440.0")
     assert "what this command left here is of another or a changed study" in refused(
         "run", str(path)
     )
-    assert "limits" in refused("run", str(path), "--fresh")
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("alert_over", '["tip3.x"]', "harmonics.alert_over: 'tip3.x' is neither an output"),
+        ("airfoil_size_m", "1e-5", "limits.memory_gb: the run is estimated at"),
+        ("sections_m", "[-0.2, 0.0, 0.016]", "non-matching node sets"),
+    ],
+)
+def test_what_needs_no_mesh_is_refused_before_the_folder_is_touched(
+    tmp_path: Path, key: str, value: str, said: str
+) -> None:
+    path = write_small_study(tmp_path, **{key: value})
+    assert said in refused("run", str(path))
+    assert not (tmp_path / "results").exists()
+    leave_journal(path)
+    kept = tmp_path / "results" / "result.nc"
+    kept.write_text("of an earlier run")
+    assert said in refused("run", str(path), "--fresh")
+    assert kept.read_text() == "of an earlier run"
+    assert kept.with_name("journal.sqlite").is_file()
 
 
 def planar_friction(path: Path, *sides: str) -> Path:
@@ -207,11 +241,10 @@ def test_time_integration_of_other_laws_is_refused_before_anything_is_done(
 
 
 def test_results_of_another_law_or_evaluator_are_not_mixed(tmp_path: Path) -> None:
-    path = write_small_study(tmp_path, airfoil_size_m="1e-5")
-    assert "limits" in refused("run", str(path))  # stops after the journal is made
+    leave_journal(write_small_study(tmp_path))
     for changed in (
-        write_small_study(tmp_path, airfoil_size_m="1e-5", evaluator='"march"'),
-        planar_friction(write_small_study(tmp_path, airfoil_size_m="1e-5"), "curved"),
+        write_small_study(tmp_path, evaluator='"march"'),
+        planar_friction(write_small_study(tmp_path), "curved"),
     ):
         assert "what this command left here is of another or a changed study" in refused(
             "run", str(changed)

@@ -80,14 +80,26 @@ def test_objects_that_would_need_pickle_are_refused() -> None:
 
 def test_folder_of_another_study_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
-    with Journal(path, "a", ForcedPoint):
-        pass
+    with Journal(path, "a", ForcedPoint) as journal:
+        journal.put("model", {"n": 1})
     with pytest.raises(InputError) as caught:
         Journal(path, "b", ForcedPoint)
     assert str(caught.value) == (
         f"{tmp_path}: what this command left here is of another or a changed study, or of another version of stickslip or its libraries. "
         "Start over with --fresh, which removes this command's files of the folder and no others, or name another folder under [output]."
     )
+
+
+def test_journal_in_which_nothing_was_computed_binds_nobody(tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    with Journal(path, "a", ForcedPoint):
+        pass
+    with Journal(path, "b", ForcedPoint) as journal:
+        assert journal.count == 0
+        journal.add(2, point(0))
+        assert journal.count == 1
+    with pytest.raises(InputError, match="of another or a changed study"):
+        Journal(path, "a", ForcedPoint)
 
 
 def test_second_run_in_the_same_folder_is_refused(tmp_path: Path) -> None:

@@ -42,7 +42,7 @@ def mesh_blade_pair(geometry: BladePair, contacts: ContactPoints) -> SolidMesh:
     StickslipError
         If gmsh cannot be loaded.
     """
-    _check_on_undersides(geometry, contacts)
+    check_on_undersides(geometry, contacts)
     offset = np.array([geometry.pitch, 0.0, 0.0])
     on_second = np.array([side == "curved" for side in contacts.side])
     targets = contacts.position - on_second[:, None] * offset
@@ -64,8 +64,14 @@ def mesh_blade_pair(geometry: BladePair, contacts: ContactPoints) -> SolidMesh:
     return SolidMesh(np.vstack([points, points + offset]), np.vstack([cells, cells + n]), sets)
 
 
-def _check_on_undersides(geometry: BladePair, contacts: ContactPoints) -> None:
-    """Refuse contact points that are off the platforms' underside faces."""
+def check_on_undersides(geometry: BladePair, contacts: ContactPoints) -> None:
+    """Refuse contact points that are off the platforms' underside faces.
+
+    Raises
+    ------
+    InputError
+        Naming each of them.
+    """
     edge = geometry.platform_height - geometry.platform_edge
     misses = []
     for name, side, (x, y, z) in zip(contacts.names, contacts.side, contacts.position, strict=True):

@@ -10,6 +10,7 @@ from stickslip.contact.interface import Interface
 from stickslip.errors import InputError
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.model.blade_mesh import check_on_undersides
 from stickslip.model.damper import ContactPoints, FlatCurvedDamper
 from stickslip.model.structure import Structure
 from stickslip.response.preload import preload
@@ -18,6 +19,7 @@ from stickslip.response.system import System
 from stickslip.study.assembly import join_damper
 from stickslip.study.blades import ReducedBlades, reduced_blades
 from stickslip.study.error_places import AXES, OUTPUT_LABELS, dofs_of, error_labels
+from stickslip.study.estimate import check_limits, estimate
 from stickslip.study.journal import Journal
 from stickslip.study.schema import Study, StudyTables
 
@@ -101,28 +103,51 @@ def case_of(study: Study, journal: Journal | None, say: Callable[[str], None]) -
     SingularError
         If the centrifugal load does not press the damper into an equilibrium.
     """
-    t = study.tables
-    geometry = t.blades.library()
+    damper = _checked_damper(study)
     try:
-        damper = t.damper.library(geometry)
-        _check_places(study, damper)
         blades = reduced_blades(study, damper, journal, say)
     except InputError as error:
-        text = str(error)
-        raise (
-            error
-            if str(study.path) in text
-            else InputError(f"{study.path}: [blades] with [damper]: {text}")
-        ) from None
-    return make_case(t, blades, damper)
+        raise _of_the_parts(study, error) from None
+    return make_case(study.tables, blades, damper)
 
 
-def _check_places(study: Study, damper: FlatCurvedDamper) -> None:
-    """Refuse unknown labels before anything is meshed."""
+def check_before_meshing(study: Study) -> None:
+    """Refuse whatever can be refused without a mesh, before the results folder is touched.
+
+    Raises
+    ------
+    InputError
+        If damper and blades do not fit, labels or the sweep are wrong, or the estimated cost exceeds the study's limits.
+    """
+    _checked_damper(study)
+    try:
+        sweep_of(study.tables)
+    except InputError as error:
+        raise InputError(f"{study.path}: {error}") from None
+    check_limits(study, estimate(study, round(study.tables.blades.nodes())))
+
+
+def _checked_damper(study: Study) -> FlatCurvedDamper:
+    """Return the damper of a study whose labels are known."""
+    try:
+        geometry = study.tables.blades.library()
+        damper = study.tables.damper.library(geometry)
+        check_on_undersides(geometry, damper.contact_points())
+    except InputError as error:
+        raise _of_the_parts(study, error) from None
     try:
         error_labels(study.tables, damper.contact_points())
     except InputError as error:
         raise InputError(f"{study.path}: {error}") from None
+    return damper
+
+
+def _of_the_parts(study: Study, error: InputError) -> InputError:
+    """Return a complaint about blades and damper that names the study."""
+    text = str(error)
+    if str(study.path) in text:
+        return error
+    return InputError(f"{study.path}: [blades] with [damper]: {text}")
 
 
 def make_case(tables: StudyTables, blades: ReducedBlades, damper: FlatCurvedDamper) -> Case:

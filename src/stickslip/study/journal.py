@@ -35,7 +35,7 @@ class Journal:
     path
         The file; created when it does not exist.
     fingerprint
-        What the stored numbers depend on. A journal of another fingerprint is refused.
+        What the stored numbers depend on. A journal of another fingerprint is refused, unless nothing is in it.
     point_type
         Dataclass of the points, of arrays, numbers, strings, enumerations and None.
 
@@ -82,6 +82,9 @@ class Journal:
         self._db.close()
 
     def _check(self, fingerprint: str) -> None:
+        if not self.count and self._db.execute("select 1 from record").fetchone() is None:
+            # a start that ended before anything was computed binds nobody
+            self._db.execute("delete from meta")
         self._db.execute("insert or ignore into meta values ('fingerprint', ?)", (fingerprint,))
         (found,) = self._db.execute("select value from meta where key = 'fingerprint'").fetchone()
         if found != fingerprint:
@@ -91,6 +94,12 @@ class Journal:
                 "what this command left here is of another or a changed study, or of another version of stickslip or its libraries",
                 "Start over with --fresh, which removes this command's files of the folder and no others, or name another folder under [output].",
             )
+
+    @property
+    def count(self) -> int:
+        """Number of finished points, of all load cases."""
+        (n,) = self._db.execute("select count(*) from point").fetchone()
+        return int(n)
 
     def add(self, load_case: int, point: object) -> None:
         """Store a finished point; it is on the disk when this returns."""

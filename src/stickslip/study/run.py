@@ -21,7 +21,7 @@ from stickslip.response.forced import (
     forced_problem,
     forced_response,
 )
-from stickslip.study.build import Case, case_of
+from stickslip.study.build import Case, case_of, check_before_meshing
 from stickslip.study.chooser import Chooser, chooser_of
 from stickslip.study.collect import HZ, CaseResult, collect
 from stickslip.study.folder import JOURNAL, LOG, MESHES, RESULT, prepare_folder
@@ -70,6 +70,8 @@ def run_study(
     study = read_study(path)
     if verify_in_time:
         require_integrable(study)
+    # what is there is not given up for a study that cannot be run
+    check_before_meshing(study)
     prepare_folder(study.folder, fresh=fresh)
     versions = library_versions()
     with Journal(study.folder / JOURNAL, fingerprint(study, versions), ForcedPoint) as journal:
@@ -131,6 +133,9 @@ class _Run:
 
 def _run(run: _Run, verify_in_time: bool, verify_harmonics: bool) -> RunSummary:
     run.log.say(f"stickslip {__version__}, study {run.study.path}")
+    kept = run.journal.count
+    if kept:
+        run.log.say(f"{kept} points are taken from the earlier start")
     case = case_of(run.study, run.journal, run.log.say)
     for text in case.blades.frequencies.warnings():
         run.warn(text)
@@ -218,7 +223,7 @@ def _points(run: _Run, case: Case, i: int) -> list[ForcedPoint]:
     if run.journal.get(finished) is not None:
         return done
     if done:
-        run.log.say(f"{len(done)} points of load case {i + 1} are already there")
+        run.log.say(f"load case {i + 1} goes on after {len(done)} points of the earlier start")
     points = list(done)
     try:
         for point in forced_response(case.system, load, case.sweep, done=done):
