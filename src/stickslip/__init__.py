@@ -113,6 +113,7 @@ if TYPE_CHECKING:
     from stickslip.report.page import write_report
     from stickslip.response.accepted import accepted_points
     from stickslip.response.campbell import Campbell, Crossing, campbell
+    from stickslip.response.contributions import HarmonicContributions, harmonic_contributions
     from stickslip.response.cyclic_campbell import cyclic_campbell
     from stickslip.response.drift import Drift, drift
     from stickslip.response.fields import Fields, Signals, fields, signals
@@ -127,7 +128,13 @@ if TYPE_CHECKING:
     from stickslip.response.sweep import ForcedPoint, ForcedProblem, Sweep, forced_problem
     from stickslip.response.system import System
     from stickslip.response.tracking import PeakPoint, smallest_peak, track_peak
-    from stickslip.response.transient import TimeStepping, TransientResult, integrate
+    from stickslip.response.transient import (
+        TimeStepping,
+        TransientResult,
+        TransientStart,
+        integrate,
+        start_from_harmonics,
+    )
     from stickslip.response.verification import ReferenceCheck, verify_reference
     from stickslip.solve.newton import Newton, newton
     from stickslip.solve.status import Status
@@ -238,6 +245,7 @@ _MODULES = {
     "stickslip.report.page": ("write_report",),
     "stickslip.response.accepted": ("accepted_points",),
     "stickslip.response.campbell": ("Campbell", "Crossing", "campbell"),
+    "stickslip.response.contributions": ("HarmonicContributions", "harmonic_contributions"),
     "stickslip.response.cyclic_campbell": ("cyclic_campbell",),
     "stickslip.response.drift": ("Drift", "drift"),
     "stickslip.response.fields": ("Fields", "Signals", "fields", "signals"),
@@ -257,7 +265,13 @@ _MODULES = {
     ),
     "stickslip.response.system": ("System",),
     "stickslip.response.tracking": ("PeakPoint", "smallest_peak", "track_peak"),
-    "stickslip.response.transient": ("TimeStepping", "TransientResult", "integrate"),
+    "stickslip.response.transient": (
+        "TimeStepping",
+        "TransientResult",
+        "TransientStart",
+        "integrate",
+        "start_from_harmonics",
+    ),
     "stickslip.response.verification": ("ReferenceCheck", "verify_reference"),
     "stickslip.solve.newton": ("Newton", "newton"),
     "stickslip.solve.status": ("Status",),
@@ -273,7 +287,7 @@ __all__ = [
     "CubicSpring", "CyclicSector", "Dahl", "Deck", "Discretisation", "DiskProfile", "Dofs", "Drift",
     "ElasticCoulomb", "ErrorMeasure", "Fields", "FirstLoading", "FlatCurvedDamper", "Floquet",
     "ForcedPoint", "ForcedProblem", "FourParameter", "FrdResults", "FrequencyError",
-    "FrequencyErrors", "GoalOriented", "Grolet", "GuardedAlert", "GyroscopicModes", "HarmonicLoad", "InputError", "Interface",
+    "FrequencyErrors", "GoalOriented", "Grolet", "GuardedAlert", "GyroscopicModes", "HarmonicContributions", "HarmonicLoad", "InputError", "Interface",
     "Interference", "Iwan", "JacobianAlert", "JacobianSimilarity", "Jaumouille", "Jenkins",
     "Laxalde", "Maple", "Material", "ModelSummary", "Modes", "ModesBelow", "NastranResults",
     "Newton", "NodalDiameterMap", "NodalField", "Pairing", "ParameterPoint", "PeakPoint",
@@ -281,14 +295,15 @@ __all__ = [
     "RegularisedCoulomb", "RigidBody", "RigidCoulomb", "RigidPoint", "RotatingSolid", "Safe",
     "ShootingResult", "Shroud", "Signals", "SingularError", "SolidMesh", "SpeedPolynomial",
     "Status", "Step", "StickslipError", "Strategy", "Structure", "Study", "SuessJacobian",
-    "SuessSpectral", "Surface", "Sweep", "System", "TimeStepping", "TransientResult", "TunedWheel",
+    "SuessSpectral", "Surface", "Sweep", "System", "TimeStepping", "TransientResult",
+    "TransientStart", "TunedWheel",
     "UniformBand", "UnilateralSpring", "Units", "Verdict", "Wave", "__version__", "accepted_points",
     "annular_sector", "assemble_deck", "assemble_solid", "beam", "blade_ring", "blisk_with_ring",
     "branch_in_parameter", "cached", "campbell", "chain", "check_law", "compile_contacts",
     "condense", "contact_forces", "craig_bampton", "cyclic_campbell", "cyclic_sector", "drift",
     "dynamic_lagrangian", "excited_wave", "fields", "forced_problem", "forced_response",
     "frequency_errors", "gap_operator", "gyroscopic_modes", "harmonic_balance",
-    "harmonic_block_norms", "in_relative_coordinates", "integrate", "jacobian_similarity", "join",
+    "harmonic_block_norms", "harmonic_contributions", "in_relative_coordinates", "integrate", "jacobian_similarity", "join",
     "law_kernel", "load_structure", "lumped", "mesh_blade_pair", "mesh_sector",
     "mistuned_blade_ring", "modal_damping", "model_summary", "natural_frequencies",
     "neighbour_gaps", "neighbour_interface", "newton", "nodal_diameter_map", "nodal_surface",
@@ -298,7 +313,8 @@ __all__ = [
     "read_matrix_files", "read_model", "read_nastran_dmig", "read_nastran_op2", "read_nastran_op4",
     "read_study", "reduce_interface", "reduced_wheel", "rigid_response", "rigid_surface",
     "rotating_beam", "rotating_solid", "rubin", "run_study", "safe", "save_structure",
-    "segment_to_segment", "shoot", "signals", "smallest_peak", "structural_damping",
+    "segment_to_segment", "shoot", "signals", "smallest_peak", "start_from_harmonics",
+    "structural_damping",
     "structure_surface", "to_sectors", "to_waves", "track_peak", "travelling_wave", "tuned_wheel",
     "verify_reference", "wave", "wheel", "wheel_shape", "with_springs", "write_deck", "write_mesh",
     "write_report",

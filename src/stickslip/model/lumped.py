@@ -29,7 +29,7 @@ def lumped(
     damping
         (n, n) symmetric, in N s/m; None for no damping.
     names
-        n different names; each becomes a set of one dof.
+        n different names; each becomes a set of one dof (``structure.sets[name]``). Labels of dofs stay ``node0.x``, ``node1.x``, ...
 
     Returns
     -------

@@ -13,6 +13,7 @@ from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.contact.law import ContactLaw
 from stickslip.model.structure import Structure
 from stickslip.response.propagator import ModalCoordinates, PeriodicLoad, step_operators
+from stickslip.response.settling import overflowed
 from stickslip.response.step_tangent import (
     TangentOperators,
     equal_steps,
@@ -29,8 +30,6 @@ from stickslip.response.time_step import (
     step_workspace,
 )
 from stickslip.response.transient import TransientStart, initial_state, law_table
-
-OVERFLOW = 1e100
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +136,7 @@ class PeriodMap:
     def _ended(self, step: StepState, failures: int, record: StepRecord) -> Image:
         """Return the period that ends at `step`; all NaN if its squares would overflow."""
         state = self.state_of(step)
-        if failures < 0 or not np.max(np.abs(state), initial=0.0) < OVERFLOW:
+        if failures < 0 or overflowed(state, record.motion):
             for array in (state, *record):
                 array.fill(np.nan)
             failures = -1
@@ -169,8 +168,8 @@ def period_map(
     steps: int,
 ) -> tuple[PeriodMap, FloatArray]:
     """Return the period map with `steps` steps a period, and the coordinates of `start`."""
-    law = law_table(laws)
-    operators, modes = step_operators(structure, gap_operator, law, load, omega, steps)
+    law = law_table(laws, "shoot")
+    operators, modes = step_operators(structure, gap_operator, law, load, omega, steps, "shoot")
     begin = initial_state(modes, gap_operator, law, start)
     tangential = np.flatnonzero(np.arange(begin.gap.size) % 3 < 2)
     springs = tangential[law[:, :3].ravel()[tangential] > 0.0]

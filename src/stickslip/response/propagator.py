@@ -82,6 +82,7 @@ def step_operators(
     load: PeriodicLoad,
     omega: float,
     steps: int,
+    caller: str = "integrate",
 ) -> tuple[StepOperators, ModalCoordinates]:
     """Return the matrices of one of `steps` time steps in a period, and the coordinates they act on.
 
@@ -89,15 +90,17 @@ def step_operators(
     ----------
     law
         (n_contacts, 5): k_t, k_w, k_n (N/m), mu, preload (N) of each contact; the rest as in `integrate`.
+    caller
+        Public function that errors name.
     """
     if structure.loss is not None:
         raise input_error(
-            "integrate: structure",
+            f"{caller}: structure",
             "has structural damping, which is defined for vibration at one frequency and not in time",
             "Use viscous damping: modal_damping with half the loss factor has the same effect at resonance.",
         )
     gap_operator = _dense(gap_operator)
-    _check(structure.n, gap_operator, law, load, omega)
+    _check(structure.n, gap_operator, law, load, omega, caller)
     springs = law[:, :3].reshape(-1, 1)
     stuck = _dense(structure.stiffness) + gap_operator.T @ (springs * gap_operator)
     modes = _coordinates(structure, stuck, omega)
@@ -164,11 +167,16 @@ def _clock(orders: list[int], steps: int) -> FloatArray:
 
 
 def _check(
-    n: int, gap_operator: FloatArray, law: FloatArray, load: PeriodicLoad, omega: float
+    n: int,
+    gap_operator: FloatArray,
+    law: FloatArray,
+    load: PeriodicLoad,
+    omega: float,
+    caller: str,
 ) -> None:
-    require_array("integrate: gap_operator", gap_operator, (3 * len(law), n))
-    require_array("integrate: load.static", load.static, (n,))
+    require_array(f"{caller}: gap_operator", gap_operator, (3 * len(law), n))
+    require_array(f"{caller}: load.static", load.static, (n,))
     for order, amplitude in load.harmonics.items():
-        require_array(f"integrate: load.harmonics[{order}]", amplitude, (n,))
+        require_array(f"{caller}: load.harmonics[{order}]", amplitude, (n,))
     if not (np.isfinite(omega) and omega > 0.0):
-        raise input_error("integrate: omega", f"must be positive, got {omega}", "It is in rad/s.")
+        raise input_error(f"{caller}: omega", f"must be positive, got {omega}", "It is in rad/s.")

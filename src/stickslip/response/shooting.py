@@ -17,7 +17,7 @@ from stickslip.model.structure import Structure
 from stickslip.response.floquet import Floquet, floquet
 from stickslip.response.period_map import Derivative, Image, PeriodMap, period_map
 from stickslip.response.propagator import PeriodicLoad
-from stickslip.response.settling import period_harmonics
+from stickslip.response.settling import period_harmonics, remaining_change
 from stickslip.response.transient import TimeStepping, TransientStart, check_arguments, rest
 
 ShootingStatus = Literal["converged", "not converged", "diverged"]
@@ -31,6 +31,8 @@ WARM_UP = (
 SHORTEST = 1.0 / 16.0  # part of a correction, tried before it is given up
 CONTRACTION = 0.5  # a derivative is kept while a period, which costs far less, halves the distance
 FALLBACK = 8  # plain periods where no part of a correction comes nearer to an orbit
+ANEW = 8  # corrections of a search begun anew: from where the plain periods near an orbit four are enough
+RESERVE = 2 * ANEW  # periods left for them
 SINGULAR = 1e-9  # of the largest singular value of (1 - monodromy): below it a direction is neutral
 
 
@@ -41,8 +43,9 @@ class ShootingResult:
     Parameters
     ----------
     status
-        ``converged``; ``not converged``: the corrections or the periods ran out, or there is no periodic motion nearby
-        (a drift); ``diverged``: the motion overflowed, and all arrays are NaN.
+        ``converged``; ``not converged``: the periods ran out, or the plain periods settled and the corrections from there
+        did not, or there is no periodic motion nearby (a drift); ``diverged``: the motion overflowed, and all arrays are
+        NaN.
     harmonics
         (n_h + 1, n_outputs) complex amplitudes, m.
     floquet
@@ -121,38 +124,93 @@ def shoot(
     Where contacts stick for the whole period a family of motions exists, one for each residual traction, and the
     derivative of ``P(z) - z`` is singular: the shortest correction is taken, which leads to a member nearby. The search
     begins with plain periods; a correction that leads away from the orbit is shortened, and if that does not help
-    replaced by plain periods.
+    replaced by plain periods. Where forty corrections do not converge, the motion is marched on from the start in ever
+    longer blocks, as `integrate` would, with a short search after each of them, until it settles or the periods run out.
 
     Parameters
     ----------
     structure, gap_operator, laws, load, omega, outputs
-        As in `integrate`.
+        As in `integrate`: all laws are `ElasticCoulomb`, and a `HarmonicLoad` is a load.
     start
-        State at t = 0, best that of a harmonic balance; rest if None.
+        State at t = 0, best that of a harmonic balance (`start_from_harmonics`); rest if None.
     stepping
-        Steps of a period, most periods, number of harmonics; `tolerance` bounds the length of the last correction
+        Steps of a period, most periods in all, number of harmonics; `tolerance` bounds the length of the last correction
         relative to the vibration. If None, 1024 steps and 1e-9.
 
     Raises
     ------
     InputError
-        If an argument has a wrong shape or value, or the mass matrix is singular.
+        If an argument has a wrong shape or value, a law is not elastic Coulomb, or the mass matrix is singular.
     """
     stepping = stepping or TimeStepping(tolerance=TOLERANCE)
-    start = start or rest(structure.n, laws)
-    check_arguments(structure.n, len(laws), outputs, start)
+    start = start or rest(structure.n, laws, "shoot")
+    check_arguments(structure.n, len(laws), outputs, start, "shoot")
     steps = stepping.steps_per_period
     mapping, state = period_map(structure, gap_operator, laws, load, omega, start, steps)
     search = _Search(state)
     _march(mapping, search, WARM_UP)
-    most = stepping.max_periods
+    warm = search.state
+    _search(mapping, search, stepping, MOST_CORRECTIONS)
+    if search.status == "not converged":
+        _march_and_search(mapping, search, stepping, warm)
+    return _result(mapping, search, outputs, stepping)
+
+
+def _search(mapping: PeriodMap, search: _Search, stepping: TimeStepping, corrections: int) -> None:
+    """Correct the state until it converges, or the corrections or all periods have run out."""
+    last = search.corrections + corrections
     while (
         search.status == "not converged"
-        and search.corrections < MOST_CORRECTIONS
-        and search.periods < most
+        and search.corrections < last
+        and search.periods < stepping.max_periods
     ):
-        _correct(mapping, search, stepping.tolerance)
-    return _result(mapping, search, outputs, stepping)
+        if not _correct(mapping, search, stepping.tolerance):
+            _march(mapping, search, FALLBACK)
+
+
+def _march_and_search(
+    mapping: PeriodMap, search: _Search, stepping: TimeStepping, warm: FloatArray
+) -> None:
+    """March on from `warm` in blocks, each twice as long as the last, with a search begun anew after each.
+
+    The march does not take over what a search that failed has left: it comes to every orbit that `integrate` comes to, in
+    as many periods.
+    """
+    changes: list[float] = []
+    block, settled = FALLBACK, False
+    while search.status == "not converged" and not settled:
+        room = stepping.max_periods - search.periods - RESERVE
+        if room <= 0:
+            return
+        search.state = warm
+        settled = _settle(mapping, search, min(block, room), changes, stepping.tolerance)
+        warm, block = search.state, 2 * block
+        last = search.corrections + ANEW
+        while search.status == "not converged" and search.corrections < last:
+            if not _correct(mapping, search, stepping.tolerance):
+                break
+
+
+def _settle(
+    mapping: PeriodMap,
+    search: _Search,
+    periods: int,
+    changes: list[float],
+    tolerance: float,
+) -> bool:
+    """March plain periods; return whether the state has settled, by the measure that `integrate` has of the first harmonic."""
+    for _ in range(periods):
+        image = mapping.image(search.state)
+        search.periods += 1
+        if image.failures < 0:
+            search.status = "diverged"
+            return False
+        change = float(np.linalg.norm(image.state - search.state))
+        changes.append(change / _vibration(mapping, image))
+        search.state = image.state
+        if remaining_change(changes) < tolerance:
+            return True
+    return False
 
 
 def _march(mapping: PeriodMap, search: _Search, periods: int) -> None:
@@ -166,15 +224,15 @@ def _march(mapping: PeriodMap, search: _Search, periods: int) -> None:
         search.state = image.state
 
 
-def _correct(mapping: PeriodMap, search: _Search, tolerance: float) -> None:
-    """Take one Newton correction, or plain periods where it leads away."""
+def _correct(mapping: PeriodMap, search: _Search, tolerance: float) -> bool:
+    """Take one Newton correction; return whether the state is nearer to an orbit or nothing can bring it there."""
     here = search.derivative = mapping.derivative(search.state)
     image = here.image
     search.periods += 1
     search.corrections += 1
     if image.failures < 0:
         search.status = "diverged"
-        return
+        return True
     inverse = np.linalg.pinv(np.eye(mapping.size) - here.monodromy, rcond=SINGULAR)
     defect = image.state - search.state
     correction = inverse @ defect
@@ -184,9 +242,8 @@ def _correct(mapping: PeriodMap, search: _Search, tolerance: float) -> None:
     if search.distance <= tolerance and np.linalg.norm(defect) <= tolerance * vibration:
         search.state = search.state + correction
         search.status = "converged"
-        return
-    if not _approach(mapping, search, inverse, correction, tolerance * vibration):
-        _march(mapping, search, FALLBACK)
+        return True
+    return _approach(mapping, search, inverse, correction, tolerance * vibration)
 
 
 def _approach(

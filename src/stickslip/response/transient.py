@@ -23,7 +23,7 @@ from stickslip.response.propagator import (
     require_array,
     step_operators,
 )
-from stickslip.response.settling import Progress, Status, period_harmonics
+from stickslip.response.settling import Progress, Status, overflowed, period_harmonics
 from stickslip.response.time_step import (
     StepOperators,
     StepRecord,
@@ -183,16 +183,20 @@ class RefinedResult:
     fine: TransientResult
 
 
-def rest(n: int, laws: Sequence[ContactLaw]) -> TransientStart:
+def rest(n: int, laws: Sequence[ContactLaw], caller: str = "integrate") -> TransientStart:
     """Return zero displacement and velocity of `n` coordinates, with the residual traction of each law."""
-    held = [(law.residual_traction or 0.0) * law.mu * max(law.preload, 0.0) for law in _known(laws)]
+    known = _known(laws, caller)
+    held = [(law.residual_traction or 0.0) * law.mu * max(law.preload, 0.0) for law in known]
     return TransientStart(np.zeros(n), np.zeros(n), np.tile(held, (2, 1)).T)
 
 
 def start_from_harmonics(
     coefficients: ComplexArray, omega: float, traction: FloatArray
 ) -> TransientStart:
-    """Return the state at t = 0 of a motion ``Re Σ X_h e^{ihωt}``.
+    """Return the state at t = 0 of a motion ``Re Σ X_h e^{ihωt}``, such as that of a harmonic balance.
+
+    With the balance's `problem` and `point`: ``problem.low.linear.recover(point.omega, point.coefficients)`` are the
+    amplitudes of all dofs, and ``signals(problem, point).force[:, :2, 0]`` the tractions.
 
     Parameters
     ----------
@@ -283,19 +287,19 @@ def integrate_refined(
     return RefinedResult(finer + share * difference, error + scatter, coarse, fine)
 
 
-def _known(laws: Sequence[ContactLaw]) -> list[ElasticCoulomb]:
+def _known(laws: Sequence[ContactLaw], caller: str) -> list[ElasticCoulomb]:
     """Return the laws if the integration has a step of its own for each of them."""
     for law in laws:
         if not isinstance(law, ElasticCoulomb):
             raise input_error(
-                "integrate: laws",
+                f"{caller}: laws",
                 f"got {type(law).__name__}",
                 "The time integration judges ElasticCoulomb contacts only.",
             )
     return [law for law in laws if isinstance(law, ElasticCoulomb)]
 
 
-def law_table(laws: Sequence[ContactLaw]) -> FloatArray:
+def law_table(laws: Sequence[ContactLaw], caller: str = "integrate") -> FloatArray:
     """Return (n_contacts, 5): k_t, k_w, k_n (N/m), mu, preload (N) of each contact.
 
     Raises
@@ -303,7 +307,7 @@ def law_table(laws: Sequence[ContactLaw]) -> FloatArray:
     InputError
         If a law is not elastic Coulomb.
     """
-    rows = [[c.k_t, c.k_w, c.k_n, c.mu, c.preload] for c in _known(laws)]
+    rows = [[c.k_t, c.k_w, c.k_n, c.mu, c.preload] for c in _known(laws, caller)]
     return np.array(rows, dtype=float).reshape(-1, 5)
 
 
@@ -338,8 +342,10 @@ def _settle(
     while now.periods < stepping.max_periods and now.status == "unsettled":
         began = state.x[:n].copy()
         failed = run_period(operators, state, work, record)
-        if failed < 0:
+        if failed < 0 or overflowed(state.x, record.motion):
             now.periods, now.status = now.periods + 1, "diverged"
+            for array in (*state, *record):  # infinities are no numbers to go on with
+                array.fill(np.nan)
             break
         modal = period_harmonics(began, record.motion, stepping.harmonics)
         now.take_in(
@@ -356,9 +362,8 @@ def _result(
     outputs: IntArray,
     now: Progress,
 ) -> TransientResult:
-    known = (
-        np.nan if now.status == "diverged" else 1.0
-    )  # a number that overflowed later was none before
+    # a number that overflowed later was none before
+    known = np.nan if now.status == "diverged" else 1.0
     motion = record.motion @ modes.basis.T
     displacement, velocity = modes.physical(state.x[: 2 * structure.n])
     contacts = (len(motion), -1, 3)
@@ -372,23 +377,23 @@ def _result(
         remaining=known * now.remaining,
         contact_failures=now.failures,
         drift=known * now.drift,
-        swing=known * np.ptp(motion, axis=0) / 2,
+        swing=np.ptp(motion, axis=0) / 2,
         labels=structure.dofs.labels,
-        final=TransientStart(
-            known * displacement, known * velocity, known * state.force.reshape(-1, 3)[:, :2]
-        ),
-        outputs=known * motion[:, outputs],
-        gap=known * record.gap.reshape(contacts),
-        contact_force=known * record.force.reshape(contacts),
+        final=TransientStart(displacement, velocity, state.force.reshape(-1, 3)[:, :2]),
+        outputs=motion[:, outputs],
+        gap=record.gap.reshape(contacts),
+        contact_force=record.force.reshape(contacts),
     )
 
 
-def check_arguments(n: int, n_contacts: int, outputs: IntArray, start: TransientStart) -> None:
+def check_arguments(
+    n: int, n_contacts: int, outputs: IntArray, start: TransientStart, caller: str = "integrate"
+) -> None:
     """Refuse a start of another shape, and outputs that the structure does not have."""
-    require_array("integrate: start.displacement", start.displacement, (n,))
-    require_array("integrate: start.velocity", start.velocity, (n,))
-    require_array("integrate: start.traction", start.traction, (n_contacts, 2))
+    require_array(f"{caller}: start.displacement", start.displacement, (n,))
+    require_array(f"{caller}: start.velocity", start.velocity, (n,))
+    require_array(f"{caller}: start.traction", start.traction, (n_contacts, 2))
     if len(outputs) == 0 or np.min(outputs) < 0 or np.max(outputs) >= n:
         raise input_error(
-            "integrate: outputs", f"got {outputs} for {n} dofs", f"Give indices from 0 to {n - 1}."
+            f"{caller}: outputs", f"got {outputs} for {n} dofs", f"Give indices from 0 to {n - 1}."
         )
