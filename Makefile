@@ -16,7 +16,7 @@ LOCK_FLAGS := --quiet --generate-hashes --strip-extras \
 # Two test workers on two cores: a threaded BLAS under each would only make them wait for each other.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help install run test readers test-readers sparse test-sparse lint docs figures bench bench-rival validate strategies lock clean
+.PHONY: help install run test readers test-readers sparse test-sparse lint docs figures bench bench-rival validate strategies alarms lock clean
 .DELETE_ON_ERROR:
 
 help:  ## list the targets
@@ -88,6 +88,9 @@ bench-rival: .venv-rival/.installed  ## install pyHarm-os, which the chain bench
 
 strategies: $(DOCS_INSTALLED)  ## compare all ways of choosing harmonics; writes docs/strategies.md and its figure (some ten minutes)
 	$(ONE_THREAD) $(BIN)/python -m strategies compare
+
+alarms: $(INSTALLED)  ## count missed and false alarms of the strategies that verify; writes docs/strategies_alarms.md (some three quarters of an hour)
+	$(ONE_THREAD) $(BIN)/python -m strategies alarms
 
 validate: $(INSTALLED)  ## compare with closed forms, other codes and the literature
 	$(ONE_THREAD) $(BIN)/python -m validation

@@ -8,6 +8,7 @@ its unit (``"<= 2"``), whether it ``holds``, and a ``note`` on what was measured
     python -m benchmarks forced     # only modules whose name contains the word; nothing is written
 """
 
+import argparse
 import importlib
 import json
 import sys
@@ -47,9 +48,26 @@ def table(records: list[dict[str, Any]]) -> Table:
     return out
 
 
+def word_of(arguments: list[str]) -> str:
+    """Return the word asked for; end with a message where no module's name contains it."""
+    names = sorted(path.stem for path in HERE.glob("bench_*.py"))
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks",
+        description="Run every benchmark and write benchmarks/out/results.json, or only some of them, and write nothing.",
+        epilog="modules: " + ", ".join(names),
+    )
+    parser.add_argument(
+        "word", nargs="?", default="", help="run only modules whose name contains the word"
+    )
+    word: str = parser.parse_args(arguments).word
+    if not any(word in name for name in names):
+        parser.error(f"no module's name contains {word!r}; there are {', '.join(names)}")
+    return word
+
+
 def main() -> int:
     """Run, print and write; a missed goal is a result, not a failure."""
-    word = sys.argv[1] if len(sys.argv) > 1 else ""
+    word = word_of(sys.argv[1:])
     records = collect(word)
     # redirected output has no width of its own; 80 columns would fold every row
     console = Console(width=None if sys.stdout.isatty() else 180)

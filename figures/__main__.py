@@ -1,10 +1,10 @@
 """Draw the figures into docs/images and write docs/seed_figures.md: ``python -m figures``."""
 
+import argparse
 import sys
 from pathlib import Path
 from time import process_time
 
-from figures.draw import draw_all
 from figures.evidence import Plan, gather
 from figures.model import GLUED, two_blades
 from figures.page import page
@@ -21,6 +21,18 @@ def say(line: str) -> None:
 
 def main() -> int:
     """Compute, draw and write."""
+    argparse.ArgumentParser(
+        prog="python -m figures",
+        description="Draw the counterparts of the figures of Gastaldi & Berruti (2017) for the two blades into docs/images, "
+        "and write docs/seed_figures.md. Takes some five minutes; needs matplotlib, which `make figures` installs.",
+    ).parse_args()
+    try:
+        from figures.draw import draw_all  # matplotlib belongs to what builds the documentation
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.split(".")[0] != "matplotlib":
+            raise
+        print("The figures need matplotlib: `make figures` (or `make docs`) installs it and runs this.")
+        return 1
     say("meshing and reducing both models")
     evidence = gather(two_blades(), two_blades(GLUED), Plan(), say)
     rows = statements(evidence)

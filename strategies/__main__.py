@@ -1,6 +1,7 @@
 """``python -m strategies alarms | compare``: count missed and false alarms; compare all strategies and write ``docs/strategies.md``."""
 
 import argparse
+import sys
 
 from strategies import alarms, compare, page
 from strategies.random_systems import SYSTEMS
@@ -8,17 +9,32 @@ from strategies.random_systems import SYSTEMS
 
 def main() -> None:
     """Run what is asked for."""
-    parser = argparse.ArgumentParser(prog="python -m strategies", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="python -m strategies",
+        description="Compare all ways of choosing harmonics. How sharp their estimates are: python -m strategies.effectivity --help.",
+    )
     commands = parser.add_subparsers(dest="command", required=True)
-    counted = commands.add_parser("alarms", help="missed and false alarms")
+    counted = commands.add_parser(
+        "alarms",
+        help="count missed and false alarms of the strategies that verify, on the four cases, benchmark B6 and random systems; "
+        "writes docs/strategies_alarms.md (some three quarters of an hour; fewer systems, less time)",
+    )
     counted.add_argument("--systems", type=int, default=SYSTEMS, help="random systems of each set")
-    commands.add_parser("compare", help="cost and error of all strategies on four cases")
+    commands.add_parser(
+        "compare",
+        help="cost and error of all strategies on four cases; writes docs/strategies.md, which takes in the alarms, "
+        "and its figure (some ten minutes; needs matplotlib, which `make strategies` installs)",
+    )
     given = parser.parse_args()
     if given.command == "alarms":
         alarms.run(given.systems)
     else:
-        from strategies import figure  # matplotlib belongs to what builds the documentation
-
+        try:
+            from strategies import figure  # matplotlib belongs to what builds the documentation
+        except ModuleNotFoundError as error:
+            if error.name is None or error.name.split(".")[0] != "matplotlib":
+                raise
+            sys.exit("The comparison needs matplotlib: `make strategies` installs it and runs this.")
         found = compare.run()
         page.write(found)
         figure.draw(found)

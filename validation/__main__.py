@@ -11,6 +11,7 @@ A case is a module ``validation/case_*.py`` with a function ``run()`` that retur
 The exit code is 1 when a comparison does not hold.
 """
 
+import argparse
 import importlib
 import json
 import sys
@@ -70,9 +71,26 @@ def table(records: list[dict[str, Any]]) -> Table:
     return out
 
 
+def word_of(arguments: list[str]) -> str:
+    """Return the word asked for; end with a message where no module's name contains it."""
+    names = sorted(path.stem for path in HERE.glob("case_*.py"))
+    parser = argparse.ArgumentParser(
+        prog="python -m validation",
+        description="Run every comparison and write validation/out/results.json, or only some of them, and write nothing.",
+        epilog="modules: " + ", ".join(names),
+    )
+    parser.add_argument(
+        "word", nargs="?", default="", help="run only modules whose name contains the word"
+    )
+    word: str = parser.parse_args(arguments).word
+    if not any(word in name for name in names):
+        parser.error(f"no module's name contains {word!r}; there are {', '.join(names)}")
+    return word
+
+
 def main() -> int:
     """Run, print and write; 1 when a comparison does not hold."""
-    word = sys.argv[1] if len(sys.argv) > 1 else ""
+    word = word_of(sys.argv[1:])
     records = collect(word)
     # redirected output has no width of its own; 80 columns would fold every row
     console = Console(width=None if sys.stdout.isatty() else 180)
