@@ -15,7 +15,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
 from stickslip.response.floquet import Floquet, floquet
 from stickslip.response.period_map import PeriodMap, period_map
-from stickslip.response.shooting import ShootingResult, shoot
+from stickslip.response.shooting import MOST_CORRECTIONS, ShootingResult, shoot
 from stickslip.response.transient import TimeStepping, TransientStart, integrate, rest
 
 GRIFFIN_GAP = np.array([[1.0], [0.0], [0.0]])
@@ -257,6 +257,38 @@ def test_a_steady_slide_has_no_periodic_motion() -> None:
     assert not result.stable
     # one period of sliding at (3 - 1)/5
     assert result.residual > 1e-3
+
+
+def test_where_corrections_fail_plain_periods_lead_to_what_integration_settles_to() -> None:
+    # Sliding along a wall it presses on, the mass slips and lifts off: from rest forty corrections lead nowhere.
+    structure = structure_of(np.diag([1.78465]), np.diag([0.0344092]), np.diag([0.392219]))
+    law = ElasticCoulomb(k_t=2.28457, k_w=0.0, k_n=4.51649, mu=0.209297, preload=0.811530)
+    gap = np.array([[1.0], [0.0], [-1.0]])
+    load = load_of(1, {1: [-0.122024 - 0.0229987j]}, [-0.213991])
+    arguments = (structure, gap, [law], load, 0.730239, np.array([0]))
+    settled = integrate(*arguments, stepping=TimeStepping(256, tolerance=1e-8))
+    result = shoot(*arguments, stepping=TimeStepping(256, tolerance=1e-10))
+    assert settled.settled
+    assert result.corrections > MOST_CORRECTIONS
+    assert result.stable
+    size = np.max(np.abs(settled.harmonics[1]))
+    np.testing.assert_allclose(result.harmonics, settled.harmonics, rtol=0, atol=1e-7 * size)
+    # it counts as settled while 1e-8 is left to come; a search that is patient is no longer than that
+    assert result.periods < settled.periods
+
+
+@pytest.mark.parametrize("place", [0.0, 0.4])
+def test_a_spring_without_friction_holds_nothing_whether_its_gap_moves_or_not(place: float) -> None:
+    # Its force is zero: two multipliers of the structure alone, and none of 1 for a traction that would be kept.
+    structure = structure_of(np.eye(1), 0.1 * np.eye(1), np.eye(1))
+    law = ElasticCoulomb(k_t=2.0, k_w=1.0, k_n=3.0, mu=0.0, preload=0.5)
+    gap = np.array([[place], [0.0], [0.0]])
+    arguments = (structure, gap, [law], load_of(1, {1: [0.3]}), 1.2, np.array([0]))
+    result = shoot(*arguments, stepping=TimeStepping(1024, tolerance=1e-10))
+    assert (result.floquet.neutral, result.grazing, result.stable) == (0, 0, True)
+    free = linear_multipliers(structure, structure.stiffness, 1.2)
+    # 1024 steps: the spring that slips is a mass k h²/12 too little, 1e-6 of the structure's
+    assert nearest(result.floquet.multipliers, np.concatenate([free, [0.0, 0.0]])) < 2e-5
 
 
 def test_a_motion_that_overflows_is_reported_and_gives_no_number() -> None:

@@ -354,6 +354,25 @@ def test_a_motion_that_overflows_is_reported_and_gives_no_number() -> None:
     assert not result.settled
 
 
+@pytest.mark.parametrize("growth", [0.3, 1.0, 30.0])
+def test_a_motion_that_grows_slowly_is_stopped_before_its_sums_overflow(growth: float) -> None:
+    # Its numbers pass through a period in which each is finite and their sums are not; the tests raise every warning.
+    structure = structure_of(np.eye(2), -growth * np.eye(2), np.array([[2.0, -1.0], [-1.0, 2.0]]))
+    law = ElasticCoulomb(k_t=0.5, k_w=0.0, k_n=0.3, mu=0.5, preload=0.2)
+    gap = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
+    load, stepping = load_of(2, {1: [1.0, 0.5]}), TimeStepping(steps_per_period=32)
+    with np.errstate(over="raise", invalid="raise"):
+        result = integrate(structure, gap, [law], load, 1.3, np.arange(2), None, stepping)
+    assert result.status == "diverged"
+    assert result.periods < stepping.max_periods
+    for array in (result.harmonics, result.average, result.outputs, result.gap, result.swing):
+        assert np.all(np.isnan(array))
+    for array in (result.final.displacement, result.final.velocity, result.final.traction):
+        assert np.all(np.isnan(array))
+    assert np.all(np.isnan(result.contact_force))
+    assert result.drifting == ()
+
+
 def test_contact_equations_without_a_solution_are_counted_as_failed() -> None:
     structure = structure_of(np.eye(1), np.zeros((1, 1)), np.eye(1))
     gap = np.array([[0.0], [0.0], [1.0]])

@@ -12,6 +12,12 @@ Status = Literal["settled", "unsettled", "diverged"]
 LONGEST_MEMORY = (
     1e4  # periods; a decay slower than this (damping ratio 1.6e-5) is not credited to any structure
 )
+OVERFLOW = 1e100  # far above every motion, and its square is still a number
+
+
+def overflowed(*arrays: FloatArray) -> bool:
+    """Return whether a number is NaN or so large that what is computed from it may overflow."""
+    return any(not np.max(np.abs(array), initial=0.0) < OVERFLOW for array in arrays)
 
 
 def last_third(n: int) -> int:

@@ -54,7 +54,7 @@ class ShootingResult:
         Number of tangential springs that reach their limit without slipping: they have just shaken down, and the
         multipliers are those of the side on which they stick.
     periods
-        Periods marched, those with tangents among them.
+        Periods marched, those with tangents among them; a search that is under way may go beyond the most by a few.
     corrections
         Periods marched with tangents, each of which costs as much as some six others.
     residual
@@ -185,10 +185,15 @@ def _march_and_search(
         search.state = warm
         settled = _settle(mapping, search, min(block, room), changes, stepping.tolerance)
         warm, block = search.state, 2 * block
-        last = search.corrections + ANEW
-        while search.status == "not converged" and search.corrections < last:
-            if not _correct(mapping, search, stepping.tolerance):
-                break
+        _search_anew(mapping, search, stepping.tolerance)
+
+
+def _search_anew(mapping: PeriodMap, search: _Search, tolerance: float) -> None:
+    """Take some corrections; leave it to the march where one does not come nearer."""
+    last = search.corrections + ANEW
+    while search.status == "not converged" and search.corrections < last:
+        if not _correct(mapping, search, tolerance):
+            return
 
 
 def _settle(
@@ -198,7 +203,7 @@ def _settle(
     changes: list[float],
     tolerance: float,
 ) -> bool:
-    """March plain periods; return whether the state has settled, by the measure that `integrate` has of the first harmonic."""
+    """March plain periods; return whether the state has settled, as `integrate` judges the first harmonic."""
     for _ in range(periods):
         image = mapping.image(search.state)
         search.periods += 1
@@ -225,7 +230,7 @@ def _march(mapping: PeriodMap, search: _Search, periods: int) -> None:
 
 
 def _correct(mapping: PeriodMap, search: _Search, tolerance: float) -> bool:
-    """Take one Newton correction; return whether the state is nearer to an orbit or nothing can bring it there."""
+    """Take one Newton correction; return whether it came nearer to an orbit, True too where that is settled."""
     here = search.derivative = mapping.derivative(search.state)
     image = here.image
     search.periods += 1

@@ -86,11 +86,28 @@ def _hold_grazing(c: int, before: StepState, law: FloatArray, work: StepWork, ta
         row, unit = 3 * c + d, 1 if d == 0 else 3
         trial = before.force[row] + law[d] * (work.gap[row] - before.gap[row])
         limit = abs(law[3] * work.force[3 * c + 2])
-        if law[d] == 0.0 or abs(abs(trial) - limit) > GRAZING * limit:
+        if law[d] == 0.0 or limit == 0.0 or abs(abs(trial) - limit) > GRAZING * limit:
             continue
         work.code[c] -= (work.code[c] - STUCK) // unit % 3 * unit
         work.slope[c, d, :] = 0.0
         tan.grazed[row] += 1
+
+
+@njit(cache=True)
+def _let_slide(c: int, law: FloatArray, work: StepWork) -> None:
+    """Take a spring without friction as slipping where its gap did not move, so that it seemed to stick.
+
+    Its force is zero wherever the gap goes: it keeps no traction, and neither does it just reach its limit.
+    """
+    if work.code[c] == OPEN or law[3] > 0.0:
+        return
+    slips = work.code[c] - (LANDING if work.code[c] >= LANDING else STUCK)
+    for d in range(2):
+        unit = 1 if d == 0 else 3
+        if slips // unit % 3 == 0:
+            work.code[c] += unit
+            work.slope[c, d, :] = 0.0
+            work.slope[c, d, d] = -law[d]
 
 
 @njit(cache=True)
@@ -189,9 +206,10 @@ def advance_tangent(
 
 @njit(cache=True)
 def _by_itself(before: StepState, ops: StepOperators, work: StepWork, tan: Tangent) -> bool:
-    """Settle what grazes; return whether the step's derivative depends on more than the contact states."""
+    """Settle what grazes or has no friction; return whether the step's derivative depends on more than the contact states."""
     alone = False
     for c in range(work.code.size):
+        _let_slide(c, ops.law[c], work)
         _hold_grazing(c, before, ops.law[c], work, tan)
         closed_by = ops.law[c, 4] - ops.law[c, 2] * before.gap[3 * c + 2]
         alone = alone or work.code[c] >= LANDING or (work.code[c] == STUCK and closed_by <= 0.0)
