@@ -218,7 +218,10 @@ def test_what_the_balance_cannot_keep_or_does_not_know_is_refused():
         InputError, match=r"excites harmonic 3, but only 0, 1, 2 are kept\. Keep 3 or more"
     ):
         balance_of(system, high, 2)
-    with pytest.raises(InputError, match="order: must be an integer from 0 on, got -1"):
+    with pytest.raises(
+        InputError,
+        match="order: must be the highest harmonic or a list of harmonics from 0 on, got -1",
+    ):
         balance_of(system, load, -1)
     linear = condense(system.structure, system.retained, load)
     with pytest.raises(InputError, match="'exact' is none of intervals, march, events"):

@@ -70,6 +70,44 @@ def step_of(problem, point):
     return problem.step(problem.low, problem.low.unknowns(point.coefficients), point.omega)
 
 
+@pytest.mark.parametrize(("number", "hertz"), [(2010, 60.927), (2021, 61.431)])
+def test_outputs_that_stand_still_while_the_contacts_move_on_are_no_proof(number, hertz):
+    """Two Newton steps shrink in the outputs, the residual and the whole step grow: true errors are 6.3 and 5.2 %."""
+    problem, points = solved(random_two_blade_system(number))
+    point = min(points, key=lambda p: abs(p.omega - HZ * hertz))
+    assert point.omega == pytest.approx(HZ * hertz, rel=1e-5)
+    step = step_of(problem, point)
+    assert strategy_named("jacobian_alert", 0.05).judge(step).again is None
+    assert strategy_named("guarded_alert", 0.05).judge(step).again is not None
+
+
+@pytest.mark.parametrize("name", ["guarded_alert", "goal_oriented"])
+def test_harmonics_that_a_reference_leaves_out_are_seen(name):
+    """A quadratic spring drives the even harmonics alone: at 1 rad/s they change the amplitude by 8 %."""
+    spring = ss.Interface(
+        ("spring",), (ss.PolynomialSpring(along_t=(0.1, 0.25)),), np.eye(3)[:, :1]
+    )
+    mass = ss.lumped(np.eye(1), np.eye(1), 0.03 * np.eye(1))
+    system = ss.System(mass, spring, np.array([0]))
+    load = ss.HarmonicLoad(np.zeros(1), {1: np.array([0.1 + 0j])})
+    sweep = ss.Sweep(
+        omega_range=(0.4, 1.2), high=(1, 3, 5), selection=name, frequencies=9, peak_points=0
+    )
+    first = [p for p in ss.forced_response(system, load, sweep) if p.stage == "low"]
+    said = {round(p.omega, 1): p.predicted_error for p in first}
+    assert said[1.0] > 0.05
+    assert said[1.1] == pytest.approx(0.0218, rel=0.05)  # against harmonics 0 to 12
+    published = ss.Sweep(
+        omega_range=(0.4, 1.2),
+        high=(1, 3, 5),
+        selection="jacobian_alert",
+        frequencies=9,
+        peak_points=0,
+    )
+    silent = list(ss.forced_response(system, load, published))
+    assert max(p.predicted_error for p in silent) < 1e-9
+
+
 def test_full_stick_costs_no_factorisation(monkeypatch):
     """At 150 Hz nothing of B6 slips: neither a factorisation nor a second look."""
 

@@ -290,8 +290,7 @@ def harmonic_balance(
         sparse_rows(local.gap_operator),
         harmonics,
         _checked_samples(samples, harmonics[-1]),
-        # a power of two: unknowns of stored coefficients are those that were solved, to the last bit
-        float(2.0 ** np.round(np.log2(force_scale / _typical_stiffness(stiffness, linear)))),
+        force_scale / _typical_stiffness(stiffness, linear),
         force_scale,
         jacobian,
     )

@@ -107,12 +107,17 @@ def _double_passage(
         if begin is not None and all(tried[i] <= LAST_TRY for i in range(first + 1, last + 1)):
             yield from follow_run(problem, begin, last, low, branch, high)
         branches += branch
+
+    def failed(index: int) -> bool:
+        return index in high and not high[index].converged
+
     # last, from where the branch passed a frequency or from new neighbours; for what is left then, a homotopy
     for most, last_way in ((LAST_TRY, None), (LAST_TRY + 1, static)):
         for index in [i for i in _unsolved(low, high, branches) if tried[i] <= most]:
             known = quiet | {i: p for i, p in high.items() if p.converged}
-            led = index - 1 in known or index + 1 in known or passing(branches, low[index])
-            if led or last_way is not None:
+            led = index - 1 in known or index + 1 in known or bool(passing(branches, low[index]))
+            # homotopies cost seconds each: in a long row that found nothing only some are tried
+            if led or (last_way is not None and worth_a_try(index, True, failed, led)):
                 high[index] = repeat(problem, low[index], known, last_way, branches)
             else:
                 high[index] = postponed(problem, low[index])

@@ -157,13 +157,13 @@ def _low_point(
 ) -> ForcedPoint:
     error = np.nan
     asked: Harmonics = ()
+    start = np.zeros((0, 0), dtype=complex)
     if point.solution.status.converged and problem.strategy is not None:
         known = latest.known(point.x, point.p)
         left = known.events if isinstance(known, Linearisation) else None
         verdict = judged(problem.strategy, problem.step(problem.low, point.x, point.p, left=left))
         error, asked = verdict.indicator, verdict.again or ()
-        if asked:
-            problem.verdicts[index] = verdict
+        start = verdict.start if asked and verdict.start is not None else start
     made = forced_point(problem.low, point.solution, "low", index, point.p, perf_counter() - began)
     return replace(
         made,
@@ -172,6 +172,7 @@ def _low_point(
         orientation=point.orientation,
         predicted_error=error,
         asked=np.array(asked, dtype=np.int64),
+        start=start,
     )
 
 

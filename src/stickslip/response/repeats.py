@@ -134,10 +134,11 @@ def _predicted(problem: ForcedProblem, point: ForcedPoint) -> list[FloatArray]:
     strategy = problem.strategy
     if not point.converged or strategy is None:
         return []
-    verdict = problem.verdicts.get(point.index) if point.stage == "low" else None
-    if verdict is None:
-        few = problem.balance(point.support)
-        verdict = judged(strategy, problem.step(few, few.unknowns(point.coefficients), point.omega))
+    if point.start.size:
+        asked = tuple(int(h) for h in point.asked)
+        return [problem.balance(asked).unknowns(point.start)]
+    few = problem.balance(point.support)
+    verdict = judged(strategy, problem.step(few, few.unknowns(point.coefficients), point.omega))
     if verdict.start is None:
         return []
     return [problem.balance(verdict.again or problem.high.harmonics).unknowns(verdict.start)]

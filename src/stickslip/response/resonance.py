@@ -147,6 +147,8 @@ def _peak_point(
     verdict = judged(strategy, problem.step(balance, solution.x, omega))
     asked = np.array(verdict.again or (), dtype=np.int64)
     made = replace(made, predicted_error=verdict.indicator, asked=asked)
+    if asked.size and verdict.start is not None:
+        made = replace(made, start=verdict.start)
     if problem.alerted(made):
         made = replace(repeat(problem, made, {}, static), stage="peak")
     return replace(made, seconds_total=perf_counter() - began)

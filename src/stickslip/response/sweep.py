@@ -18,7 +18,6 @@ from stickslip.harmonic.selection.strategy import (
     Solve,
     Step,
     Strategy,
-    Verdict,
     check_strategy,
 )
 from stickslip.harmonic.support import Harmonics, harmonics_of
@@ -210,6 +209,8 @@ class ForcedPoint:
         Harmonics kept, growing from 0.
     asked
         Harmonics with which the strategy wants this frequency solved again; empty: none.
+    start
+        (H+1, n_retained) coefficients from which it is solved again, m; empty: the strategy has none, or asks for nothing.
     """
 
     stage: Stage
@@ -228,6 +229,7 @@ class ForcedPoint:
     rescue: Rung = Rung.FULL_STEPS
     harmonics: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     asked: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    start: ComplexArray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
 
     @property
     def order(self) -> int:
@@ -254,7 +256,6 @@ class ForcedProblem:
     low: HarmonicBalance
     high: HarmonicBalance
     others: dict[Harmonics, HarmonicBalance] = field(default_factory=dict)  # made when first needed
-    verdicts: dict[int, Verdict] = field(default_factory=dict)  # of a first passage in this process
 
     @property
     def strategy(self) -> Strategy | None:

@@ -17,7 +17,7 @@ import numpy as np
 
 from stickslip.errors import input_error
 
-FORMAT = 3  # raised whenever the tables or the archives change
+FORMAT = 4  # raised whenever the tables or the archives change
 TABLES = """
 create table if not exists meta (key text primary key, value text not null);
 create table if not exists point (

@@ -17,7 +17,7 @@ from stickslip.harmonic.selection.adjoint import (
 )
 from stickslip.harmonic.selection.guarded_alert import GuardedAlert
 from stickslip.harmonic.selection.strategy import Step, Verdict
-from stickslip.harmonic.support import Harmonics
+from stickslip.harmonic.support import Harmonics, is_full
 
 GOALS = 8  # outputs with the largest errors by which harmonics are chosen
 NOTHING = 1e-6  # relative change that is no reason to keep a harmonic
@@ -71,7 +71,7 @@ class GoalOriented:
         start = high.coefficients(found.start)
         if found.bound > self.threshold:
             again = self._needed(step, outputs, found)
-        elif self.guarded and found.bound > 0.0:
+        elif self.guarded and (found.bound > 0.0 or not is_full(high.harmonics)):
             doubted = GuardedAlert(threshold=self.threshold).judge(step)
             if doubted.again is not None:
                 return replace(doubted, indicator=max(doubted.indicator, found.bound))

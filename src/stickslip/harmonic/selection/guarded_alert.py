@@ -28,7 +28,7 @@ from stickslip.harmonic.selection.adjoint import Factored, factored
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import Step, Verdict
 from stickslip.harmonic.structured import StructuredJacobian
-from stickslip.harmonic.support import harmonics_of, rows_of
+from stickslip.harmonic.support import harmonics_of, is_full, rows_of
 from stickslip.harmonic.travelling import TravellingStiffness
 
 SAMPLES_A_HARMONIC = 8
@@ -78,6 +78,12 @@ class GuardedAlert:
         alert = jacobian_alert(
             step.balance, high, step.x, step.omega, step.measure, solve, events=step.events
         )
+        if not kept and not is_full(high.harmonics):
+            # silent on harmonics that the reference has; what acts on those left out?
+            alert = jacobian_alert(
+                step.balance, doubled(high), step.x, step.omega, step.measure, step.solve, events=step.events
+            )  # fmt: skip
+            return self._verdict(step, alert.error, doubled(high).coefficients(alert.start))
         if not kept or alert.error > self.threshold:
             return self._verdict(step, alert.error, high.coefficients(alert.start))
         bound, start = self._doubted(step, *kept[0], alert.error, alert.start)
@@ -102,7 +108,7 @@ class GuardedAlert:
             bound = predicted + DOUBT * _error(step, high, chord)
             if bound <= self.quick * self.threshold:
                 return bound, high.coefficients(start)
-        return self._followed(step, beyond, wide, period)
+        return self._followed(step, beyond, wide, period, residual)
 
     def _followed(
         self,
@@ -110,10 +116,12 @@ class GuardedAlert:
         beyond: HarmonicBalance,
         x: FloatArray,
         period: ContactPeriod,
+        residual: float,
     ) -> tuple[float, ComplexArray]:
         """Go on by Newton's method until the answer is clear; see `_doubted`."""
         begin = beyond.unknowns(step.balance.coefficients(step.x))
-        before, best = np.nan, (np.inf, x)
+        first = float(np.hypot(residual, _unbalanced(step, beyond, begin)))
+        before, whole, best = np.nan, np.inf, (np.inf, x)
         for k in range(self.steps):
             at = beyond.linearise(x, step.omega, period if k == 0 else None)
             norm = float(np.linalg.norm(at.residual))
@@ -129,10 +137,21 @@ class GuardedAlert:
             bound = moved + _left(size, before)
             # the first step has none of its kind to be compared with
             limit = self.threshold if k > 0 else self.quick * self.threshold
-            if bound <= limit:
+            # outputs may stand still while contacts are on their way elsewhere
+            length = float(np.linalg.norm(change))
+            if bound <= limit and norm < first and length < whole:
                 return bound, beyond.coefficients(x)
-            before = size
+            before, whole = size, length
         return np.inf, beyond.coefficients(best[1])
+
+
+def _unbalanced(step: Step, beyond: HarmonicBalance, begin: FloatArray) -> float:
+    """Return the scaled residual that a solution leaves on the harmonics beyond the reference."""
+    period = beyond.forces(begin, step.omega, step.events)
+    force = np.zeros((beyond.n_rows, beyond.linear.n))
+    beyond.rows.add_forces(period.coefficients, force)
+    force[rows_of(step.reference.harmonics)] = 0.0
+    return float(np.linalg.norm(force)) / beyond.force_scale
 
 
 def _left(size: float, before: float) -> float:
