@@ -26,6 +26,7 @@ from stickslip.study.example import example_text
 from stickslip.study.folder import prepare_folder
 from stickslip.study.journal import Journal
 from stickslip.study.progress import library_versions
+from stickslip.study.reference_check import ReferenceDoubt
 from stickslip.study.run import fingerprint
 from stickslip.study.schema import read_study
 from stickslip.study.summary import choice_sentence
@@ -306,10 +307,32 @@ def told(errors: list[float]) -> str:
 def test_alert_is_told_where_a_branch_took_the_place_of_the_points_it_was_asked_at() -> None:
     assert told([0.01, 0.06, 0.31, 0.02]) == (
         "F_CL/F_HE = 4: 2 of 4 points repeated with 5 harmonics, at 101.00 to 102.00 Hz, because leaving the higher harmonics out "
-        "was predicted to change the response by more than 5 % (up to 31 % at 102.00 Hz)."
+        "was predicted to change the response by more than 5 % (largest: 31 % at 102.00 Hz)."
     )
     assert "no frequency needs more harmonics; the largest predicted error is 2 %" in told(
         [0.01, np.nan, 0.02]
     )
+    assert "(largest: over 100 % at 101.00 Hz)" in told([0.01, 11.3])
     assert told([np.nan]) == "F_CL/F_HE = 4: jacobian_alert was not asked."
-    assert "(up to beyond all bounds at 101.00 Hz)" in told([0.01, np.inf])
+    assert "(largest: over 100 % at 101.00 Hz)" in told([0.01, np.inf])
+
+
+@pytest.mark.parametrize(
+    ("harmonics", "high", "advice"),
+    [
+        (10, (0, 1, 2, 3, 4, 5), "Raise harmonics.high, for instance to 10, and compare; a solution then has 21 unknowns"),
+        (10, (0, 1, 3, 5), "harmonics.high leaves out 2, 4: keep them, and compare; a solution then has 11 unknowns"),
+        (40, tuple(range(21)), "Raise harmonics.high, for instance to 30, and compare; a solution then has 61 unknowns"),
+        (60, tuple(range(31)), "No study keeps more than 30 harmonics"),
+    ],
+)  # fmt: skip
+def test_advice_names_the_harmonics_that_a_study_can_keep(
+    harmonics: int, high: tuple[int, ...], advice: str
+) -> None:
+    errors = np.array([0.01, np.nan, 2.0])
+    doubt = ReferenceDoubt(4.0, harmonics, high, 0.05, errors, 178.0, "5", "tip1.x")
+    assert "the largest change is over 100 % of tip1.x at 178.00 Hz" in doubt.sentence
+    assert "1 of 2 solutions" in doubt.sentence
+    assert "complex amplitude, phase included" in doubt.sentence
+    assert advice in doubt.warning
+    assert replace(doubt, errors=errors[:2]).warning == ""

@@ -379,7 +379,17 @@ def test_flagged_ranges_are_runs_of_neighbouring_points(tmp_path: Path) -> None:
     error = np.array([0, 6, 0, 0, 7, 9, 8, 0, 0, 0, np.nan, np.nan, np.nan])
     data["frequency_hz"][:], data["predicted_error_percent"][:] = hz, error
     result = load_result(write_result(data, tmp_path / "r.nc"))
-    assert flagged_ranges(result, result.cases[0]) == [(101, 101, 6, 101), (104, 106, 9, 105)]
+    assert flagged_ranges(result, result.cases[0]) == [(101, 101), (104, 106)]
+
+
+def test_largest_error_is_told_where_none_is_above_the_threshold(tmp_path: Path) -> None:
+    data = synthetic_result(ratios=(5,), n=4)
+    data["frequency_hz"][:], data["predicted_error_percent"][:] = (
+        np.arange(100, 104),
+        [0, 1.2, 1, 0],
+    )
+    page = choice(load_result(write_result(data, tmp_path / "r.nc")))
+    assert "<td>nowhere</td><td>1.2 % at 101 Hz</td>" in page
 
 
 def test_the_report_knows_of_alerts_whose_points_a_branch_replaced(tmp_path: Path) -> None:
@@ -389,10 +399,11 @@ def test_the_report_knows_of_alerts_whose_points_a_branch_replaced(tmp_path: Pat
     data["alert_frequency_hz"] = "alert_point", np.array([100.0, 102, 103, 104, 105, 107])
     data["alert_error_percent"] = "alert_point", np.array([1.0, 6, 250, 8, 2, 9])
     result = load_result(write_result(data, tmp_path / "r.nc"))
-    assert flagged_ranges(result, result.cases[0]) == [(102, 104, 250, 103), (107, 107, 9, 107)]
+    assert flagged_ranges(result, result.cases[0]) == [(102, 104), (107, 107)]
     assert "102 to 104 Hz<br>107 Hz" in choice(result)
     assert "4 of 6 checked points above 5 %" in headline(result)
     assert "over 100 %" in headline(result)
+    assert "over 100 % at 103 Hz" in choice(result)
     assert "4 of 6 checked points lie above it" in errors(result).caption
 
 

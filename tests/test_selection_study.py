@@ -128,6 +128,10 @@ def test_every_strategy_from_a_file_to_result_and_page(tmp_path: Path, name: str
     assert ("alert_error_percent" in data) == (name not in (*ALONE, *FIXED))
     if alone:
         assert not np.any(np.isfinite(data.predicted_error_percent.values))
+    everywhere = (
+        data.sizes["point"] * data.sizes["retained"] * 7
+    )  # three harmonics and the static term
+    cost = f"{int(data.attempt_unknowns.sum())} unknowns were solved in all; H = 3 everywhere would be about"
     if name not in FIXED:
         assert f"Where {name} asked for more harmonics" in said
     result = load_result(tmp_path / "results/result.nc")
@@ -139,6 +143,8 @@ def test_every_strategy_from_a_file_to_result_and_page(tmp_path: Path, name: str
     assert (errors(result).figure is None) == (name in FIXED)
     page = choice(result) + headline(result)
     assert name in page
+    for told in (said, page):
+        assert (cost in told) == (f" = {everywhere} (an estimate" in told) == (name not in FIXED)
     assert ("predicted error" in page) == (name not in (*ALONE, *FIXED))
 
 
@@ -179,14 +185,22 @@ def test_odd_harmonics_alone_are_solved_and_shown(tmp_path: Path) -> None:
     assert np.all(np.isfinite(error))
     assert float(data.reference_worst_percent[0]) == np.max(error)
     assert f"against 10 harmonics, {int(np.sum(error > 5))} of {error.size} solutions" in said
-    assert ("Raise harmonics.high" in said) == bool(np.any(error > 5))
+    assert ("harmonics.high leaves out 2, 4: keep them" in said) == bool(np.any(error > 5))
     full, _ = run(write_study(tmp_path / "full", 'selection = "always_high"\nhigh = 5'))
     # what they change at all, the check must have foretold within its order of magnitude
     change = np.abs(full.amplitude.values[:, 0] / data.amplitude.values[:, 0] - 1)
     assert 100 * change.max() < 3 * error.max()
 
 
-@pytest.mark.parametrize("over", ['"outputs"', '"contacts"', '["tip1.x", "L1.1.z", "damper.x"]'])
+@pytest.mark.parametrize(
+    "over",
+    [
+        '"outputs"',
+        '"contacts"',
+        '["tip1.x", "L1.1.z", "damper.x"]',
+        '["tip1.x", "damper.z", "damper.rx"]',
+    ],
+)
 def test_error_is_taken_where_the_study_says(tmp_path: Path, over: str) -> None:
     study = write_study(tmp_path, f"alert_over = {over}\nalert_harmonics = [0, 1]")
     ended = invoke("check", str(study))
@@ -195,6 +209,9 @@ def test_error_is_taken_where_the_study_says(tmp_path: Path, over: str) -> None:
     line = next(x for x in ended.output.splitlines() if "its error is that of" in x)
     assert "harmonic 0, 1 over" in line
     assert line.count(",") == count  # one more than between the labels: that of the harmonics
+    mixed = "WARNING: harmonics.alert_over mixes rotations (damper.rx) with displacements (tip1.x, damper.z)"
+    assert (mixed in ended.output) == ("damper.rx" in over)
+    assert ("WARNING" in ended.output) == ("damper.rx" in over)
     case = build.case_of(read_study(study), None, lambda _: None)
     labels = np.array(case.system.structure.dofs.labels)
     assert case.system.alert_dofs is not None
@@ -224,6 +241,13 @@ REFUSED = {
     "threshold of nothing": (
         'selection = "always_low"\nstrategy_threshold = 0.1',
         "harmonics.strategy_threshold: has no meaning for selection = 'always_low', got 0.1. Remove it: nothing is decided.",
+    ),
+    "threshold below nothing": (
+        "alert_threshold_percent = -5",
+        (
+            "harmonics.alert_threshold_percent: must be greater than 0, got -5. Give a percentage greater than zero: "
+            "frequencies whose predicted error is larger get more harmonics (for selections that predict an error)."
+        ),
     ),
     "harmonics of no kind": (
         "low = 0",

@@ -126,7 +126,7 @@ def run(
         bool,
         typer.Option(
             "--verify-harmonics",
-            help="Predict at every frequency what twice as many harmonics would change.",
+            help="Predict at every frequency what twice as many harmonics would change, in amplitude and phase.",
         ),
     ] = False,
     fresh: Fresh = False,

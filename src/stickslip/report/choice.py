@@ -10,31 +10,26 @@ from stickslip.report.figures_contact import states
 from stickslip.report.quantities import number
 from stickslip.report.result import RATIO, Case, Result
 from stickslip.report.tables import html_table
+from stickslip.study.chooser import cost_sentence
 from stickslip.study.harmonics_table import named
 
 NAMED = 4  # sets of harmonics that a cell names
 
 
-def flagged_ranges(result: Result, case: Case) -> list[tuple[float, float, float, float]]:
+def flagged_ranges(result: Result, case: Case) -> list[tuple[float, float]]:
     """Ranges of frequency in which the alert asked for more harmonics.
 
     Returns
     -------
     ranges
-        (first Hz, last Hz, largest predicted error in percent, Hz of it) of each run of neighbouring points.
+        (first Hz, last Hz) of each run of neighbouring points.
     """
     at = np.flatnonzero(result.alert.case == case.index)
     hz, error = result.alert.hz[at], result.alert.error[at]
     above = np.concatenate([[False], error > result.threshold, [False]])
     starts = np.flatnonzero(~above[:-1] & above[1:])
     ends = np.flatnonzero(above[:-1] & ~above[1:])
-    ranges = []
-    for a, b in zip(starts, ends, strict=True):
-        worst = a + int(np.argmax(error[a:b]))
-        ranges.append(
-            (float(hz[a:b].min()), float(hz[a:b].max()), float(error[worst]), float(hz[worst]))
-        )
-    return ranges
+    return [(float(hz[a:b].min()), float(hz[a:b].max())) for a, b in zip(starts, ends, strict=True)]
 
 
 def _harmonic_share(result: Result, at: IntArray) -> float:
@@ -87,7 +82,16 @@ def choice(result: Result) -> str:
     log = (
         f"<details><summary>As the run put it</summary><p>{stored}</p></details>" if stored else ""
     )
-    return text + html_table(head, rows, numeric=False) + log
+    return text + html_table(head, rows, numeric=False) + _cost(result) + log
+
+
+def _cost(result: Result) -> str:
+    """Say what choosing has cost beside the harmonics of the reference everywhere."""
+    if not result.has("unknowns_solved", "retained_displacement"):
+        return ""
+    solved, each = int(result.floats("unknowns_solved").sum()), result.data.sizes["retained"]
+    each *= 2 * len(result.high_harmonics) - 1
+    return f"<p>{cost_sentence(solved, result.converged.size, each, result.high_name)}</p>"
 
 
 _REASON = (
@@ -126,12 +130,20 @@ def _alert_rows(result: Result) -> tuple[list[list[str]], list[str]]:
         ranges = flagged_ranges(result, case)
         where = "<br>".join(
             f"{number(a, 5)} Hz" if a == b else f"{number(a, 5)} to {number(b, 5)} Hz"
-            for a, b, _, _ in ranges
+            for a, b in ranges
         )
-        worst = max(ranges, key=lambda r: r[2]) if ranges else None
-        peak = f"{result.shown(worst[2])} at {number(worst[3], 5)} Hz" if worst else "–"
+        peak = _largest(result, case)
         rows.append([case.label, where or "nowhere", peak, _why(result, case)])
     return rows, [RATIO, f"{result.more_name} asked for", "largest predicted error", "why"]
+
+
+def _largest(result: Result, case: Case) -> str:
+    """Say how large the predicted error of a case is at most, and where."""
+    own = np.flatnonzero(result.alert.case == case.index)
+    if not own.size:
+        return "–"
+    worst = own[int(np.argmax(result.alert.error[own]))]
+    return f"{result.shown(float(result.alert.error[worst]))} at {number(float(result.alert.hz[worst]), 5)} Hz"
 
 
 def _other_rows(result: Result) -> tuple[list[list[str]], list[str]]:

@@ -71,6 +71,11 @@ def percent(value: float, digits: int = 2) -> str:
     return f"{number(value, digits)} %" if math.isfinite(value) else NONE
 
 
+def predicted(error: float) -> str:
+    """Write a predicted change in percent: a linear prediction beyond the motion itself has no digits worth telling."""
+    return "over 100 %" if error > 100.0 else percent(error)
+
+
 def joined(words: list[str]) -> str:
     """Join words as a sentence does."""
     if len(words) < 2:

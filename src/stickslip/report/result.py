@@ -11,7 +11,7 @@ import xarray as xr
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error
-from stickslip.report.quantities import number, percent
+from stickslip.report.quantities import number, predicted
 from stickslip.response.sweep import FIXED
 from stickslip.study.harmonics_table import named
 
@@ -170,9 +170,9 @@ class Result:
 
     def shown(self, indicator: float) -> str:
         """Write what `alert` holds: in percent where it is an error."""
-        if np.isinf(indicator):
-            return "beyond all bounds"
-        return percent(indicator) if self.is_error else number(indicator)
+        if self.is_error:
+            return predicted(indicator)
+        return "beyond all bounds" if np.isinf(indicator) else number(indicator)
 
     @property
     def low_harmonics(self) -> IntArray:

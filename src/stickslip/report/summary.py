@@ -6,7 +6,7 @@ from html import escape
 import numpy as np
 
 from stickslip.report.figures_response import peak_hz, peak_response
-from stickslip.report.quantities import counted, number, percent, scale_for
+from stickslip.report.quantities import counted, number, percent, predicted, scale_for
 from stickslip.report.result import RATIO, Result
 
 _LARGE_SHIFT = 0.01  # relative change of the peak worth a warning
@@ -75,8 +75,7 @@ def _worst_card(result: Result) -> str:
     ratio = number(float(result.floats("load_ratio")[asked.case[at]]), 4)
     note = f"at {number(float(asked.hz[at]), 5)} Hz, {RATIO} = {ratio}"
     largest = float(asked.error[at])
-    said = "over 100 %" if largest > 100.0 else percent(largest)
-    return _card(said, f"worst predicted error with H = {result.low_name}", note)
+    return _card(predicted(largest), f"worst predicted error with H = {result.low_name}", note)
 
 
 def headline(result: Result) -> str:

@@ -6,7 +6,7 @@ from html import escape
 import numpy as np
 
 from stickslip.report.figures_response import peak_hz, peak_response
-from stickslip.report.quantities import NONE, fixed, number, percent, quantity, scale_for
+from stickslip.report.quantities import NONE, fixed, number, percent, predicted, quantity, scale_for
 from stickslip.report.result import RATIO, Result
 
 
@@ -114,10 +114,9 @@ def reference(result: Result) -> str:
     rows = []
     for case in result.cases:
         worst, hz, above = (float(result.floats(name)[case.index]) for name in names)
-        size = "beyond all bounds" if np.isinf(worst) else percent(worst)
-        rows.append([case.label, size, fixed(hz, 2), fixed(above, 0)])
+        rows.append([case.label, predicted(worst), fixed(hz, 2), fixed(above, 0)])
     head = [RATIO, "largest predicted change", "at (Hz)", "points above the threshold"]
-    text = f"<p>What twice as many harmonics as {result.high_name} are predicted to change at the accepted points.</p>"
+    text = f"<p>What twice as many harmonics as {result.high_name} are predicted to change at the accepted points: the change of the complex amplitude, phase included, over its size.</p>"
     said = (f"<li>{escape(str(s))}</li>" for s in result.data["reference_sentence"].values)
     return text + html_table(head, rows) + f"<ul>{''.join(said)}</ul>"
 

@@ -11,6 +11,11 @@ from stickslip.study.harmonics_table import Harmonics as HarmonicsTable
 from stickslip.study.harmonics_table import named
 
 
+def error_text(error: float) -> str:
+    """Return a predicted error (a fraction) as text: a linear prediction beyond the motion itself has no digits worth telling."""
+    return "over 100 %" if error > 1.0 else f"{100 * error:.2g} %"
+
+
 @dataclass(frozen=True)
 class Chooser:
     """How the harmonics of a run were chosen.
@@ -64,9 +69,9 @@ class Chooser:
 
     def shown(self, indicator: float) -> str:
         """Return a value of the indicator as text."""
-        if np.isinf(indicator):
-            return "beyond all bounds"
-        return f"{100 * indicator:.3g} %" if self.is_error else f"{indicator:.3g}"
+        if self.is_error:
+            return error_text(indicator)
+        return "beyond all bounds" if np.isinf(indicator) else f"{indicator:.3g}"
 
     def attributes(self) -> dict[str, Any]:
         """Return it as attributes of a netCDF file."""
@@ -114,6 +119,27 @@ class Chooser:
                 'passage: passages = "double" and alert_threshold_percent are not used'
             )
         return said
+
+
+def cost_sentence(solved: int, points: int, each: int, high: str) -> str:
+    """Say what choosing has cost beside the harmonics of the reference at every frequency.
+
+    Parameters
+    ----------
+    solved
+        Unknowns of all solutions together, those not accepted included.
+    points
+        Accepted points.
+    each
+        Unknowns of a solution with the reference's harmonics.
+    high
+        Those as text.
+    """
+    everywhere = points * each
+    return (
+        f"{solved} unknowns were solved in all; H = {high} everywhere would be about {points} points × {each} unknowns = {everywhere} "
+        f"(an estimate: as many points, each solved once), so that choosing took {100 * solved / everywhere:.0f} % of it."
+    )
 
 
 def chooser_of(table: HarmonicsTable, over: Sequence[str]) -> Chooser:

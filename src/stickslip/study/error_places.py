@@ -11,7 +11,8 @@ from stickslip.study.schema import StudyTables
 AXES = ("x", "y", "z")
 OUTPUT_NODES = ("tip1", "edge1", "tip2")
 OUTPUT_LABELS = tuple(f"{node}.{axis}" for node in OUTPUT_NODES for axis in AXES)
-DAMPER_LABELS = tuple(f"damper.{c}" for c in (*AXES, "rx", "ry", "rz"))
+ROTATIONS = ("rx", "ry", "rz")
+DAMPER_LABELS = tuple(f"damper.{c}" for c in (*AXES, *ROTATIONS))
 
 
 def contact_labels(points: ContactPoints) -> tuple[str, ...]:
@@ -45,6 +46,19 @@ def error_labels(tables: StudyTables, points: ContactPoints) -> tuple[str, ...]:
                 did_you_mean(label, known),
             )
     return tuple(dict.fromkeys(over))
+
+
+def mixed_places(labels: tuple[str, ...]) -> list[str]:
+    """Return a warning where an error is taken over rotations and displacements together."""
+    rotations = [label for label in labels if label.rpartition(".")[2] in ROTATIONS]
+    others = [label for label in labels if label not in rotations]
+    if not rotations or not others:
+        return []
+    text = (
+        f"harmonics.alert_over mixes rotations ({', '.join(rotations)}) with displacements ({', '.join(others)}): dofs that move less "
+        "than a thousandth of the largest are left out, and here radians are held against metres. Name one kind only."
+    )
+    return [text]
 
 
 def dofs_of(joined: Structure, points: ContactPoints, labels: tuple[str, ...]) -> IntArray:

@@ -48,8 +48,8 @@ class Harmonics(Section):
     )
     alert_threshold_percent: Positive = Field(
         5.0,
-        description="predicted error in percent above which a frequency gets more harmonics, greater than zero; "
-        "for selections that predict an error",
+        description="a percentage greater than zero: frequencies whose predicted error is larger get more harmonics "
+        "(for selections that predict an error)",
     )
     strategy_threshold: Positive | None = Field(
         None,

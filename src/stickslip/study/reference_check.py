@@ -7,11 +7,13 @@ import numpy as np
 import xarray as xr
 
 from stickslip.arrays import FloatArray
+from stickslip.harmonic.support import Harmonics
 from stickslip.response.forced import forced_problem
 from stickslip.response.verification import verify_reference
 from stickslip.study.build import Case
+from stickslip.study.chooser import error_text
 from stickslip.study.collect import HZ, CaseResult
-from stickslip.study.harmonics_table import named
+from stickslip.study.harmonics_table import HIGHEST, named
 from stickslip.study.netcdf import variable
 
 FACTOR = 2  # times the highest harmonic of the reference
@@ -27,6 +29,8 @@ class ReferenceDoubt:
         F_CL/F_HE.
     harmonics
         Highest harmonic against which the solutions are held.
+    high
+        Harmonics that the study keeps at most.
     limit
         Predicted change that is tolerated, a fraction.
     errors
@@ -41,6 +45,7 @@ class ReferenceDoubt:
 
     ratio: float
     harmonics: int
+    high: Harmonics
     limit: float
     errors: FloatArray
     frequency_hz: float = float("nan")
@@ -68,10 +73,10 @@ class ReferenceDoubt:
         ratio = f"F_CL/F_HE = {self.ratio:g}"
         if not self.known:
             return f"{ratio}: no solution that could be checked."
-        size = "beyond all bounds" if np.isinf(self.worst) else f"{100 * self.worst:.3g} %"
+        size = error_text(self.worst)
         return (
             f"{ratio}: against {self.harmonics} harmonics, {self.above} of {self.known} solutions are predicted to change by more than "
-            f"{100 * self.limit:g} %; the largest change is {size} of {self.label} at {self.frequency_hz:.2f} Hz, solved with H = {self.kept}."
+            f"{100 * self.limit:g} % of their complex amplitude, phase included; the largest change is {size} of {self.label} at {self.frequency_hz:.2f} Hz, solved with H = {self.kept}."
         )
 
     @property
@@ -81,7 +86,27 @@ class ReferenceDoubt:
             return ""
         return (
             f"F_CL/F_HE = {self.ratio:g}: at {self.above} of {self.known} frequencies more harmonics than the study keeps are predicted to "
-            f"change the response by more than {100 * self.limit:g} %. Raise harmonics.high, for instance to {self.harmonics}, and compare."
+            f"change the response, in amplitude or phase, by more than {100 * self.limit:g} %. {self.advice}"
+        )
+
+    @property
+    def advice(self) -> str:
+        """Which harmonics to keep instead, and what that costs."""
+        left_out = [h for h in range(1, self.high[-1]) if h not in self.high]
+        more = self.high[-1] if left_out else min(self.harmonics, HIGHEST)
+        if left_out:
+            told = (
+                f"harmonics.high leaves out {', '.join(map(str, left_out))}: keep them, and compare"
+            )
+        elif more > self.high[-1]:
+            told = f"Raise harmonics.high, for instance to {more}, and compare"
+        else:
+            return (
+                f"No study keeps more than {HIGHEST} harmonics: judge the result with that in mind."
+            )
+        return (
+            f"{told}; a solution then has {2 * more + 1} unknowns a coordinate instead of {2 * len(self.high) - 1}, and its cost "
+            "grows at least as much."
         )
 
 
@@ -106,14 +131,16 @@ def _doubt(case: Case, result: CaseResult, limit: float) -> ReferenceDoubt:
     solved = np.array([a.point.converged for a in result.accepted], dtype=bool)
     errors = np.full(solved.size, np.nan)
     errors[solved] = [c.error for c in checks]
-    highest = FACTOR * case.sweep.high_harmonics[-1]
+    high = case.sweep.high_harmonics
+    highest = FACTOR * high[-1]
     if not checks:
-        return ReferenceDoubt(result.ratio, highest, limit, errors)
+        return ReferenceDoubt(result.ratio, highest, high, limit, errors)
     worst = max(checks, key=lambda c: c.error)
     place = problem.measure.dofs.tolist().index(worst.dof)
     return ReferenceDoubt(
         result.ratio,
         highest,
+        high,
         limit,
         errors,
         float(worst.omega / HZ),
@@ -129,7 +156,7 @@ def reference_variables(doubts: Sequence[ReferenceDoubt]) -> dict[str, xr.Variab
             "point",
             100 * np.concatenate([d.errors for d in doubts]),
             "percent",
-            "change that twice as many harmonics are predicted to make, NaN without a solution",
+            "change of the complex amplitude that twice as many harmonics are predicted to make, NaN without a solution",
         ),
         "reference_worst_percent": variable(
             "load_case", [100 * d.worst for d in doubts], "percent", "largest such change"

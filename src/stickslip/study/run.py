@@ -22,8 +22,9 @@ from stickslip.response.forced import (
     forced_response,
 )
 from stickslip.study.build import Case, case_of, check_before_meshing
-from stickslip.study.chooser import Chooser, chooser_of
+from stickslip.study.chooser import Chooser, chooser_of, cost_sentence
 from stickslip.study.collect import HZ, CaseResult, collect
+from stickslip.study.error_places import mixed_places
 from stickslip.study.folder import JOURNAL, LOG, MESHES, RESULT, prepare_folder
 from stickslip.study.harmonics_table import named
 from stickslip.study.journal import Journal
@@ -98,7 +99,7 @@ def check_study(path: Path, sink: Sink) -> list[str]:
     table = study.tables.harmonics
     for line in chooser_of(table, case.error_labels).lines(table.passages):
         sink.say(f"harmonics: {line}")
-    return case.blades.frequencies.warnings()
+    return [*case.blades.frequencies.warnings(), *mixed_places(case.error_labels)]
 
 
 def fingerprint(study: Study, versions: dict[str, str]) -> str:
@@ -137,7 +138,7 @@ def _run(run: _Run, verify_in_time: bool, verify_harmonics: bool) -> RunSummary:
     if kept:
         run.log.say(f"{kept} points are taken from the earlier start")
     case = case_of(run.study, run.journal, run.log.say)
-    for text in case.blades.frequencies.warnings():
+    for text in (*case.blades.frequencies.warnings(), *mixed_places(case.error_labels)):
         run.warn(text)
     table = run.study.tables.harmonics
     chooser = chooser_of(table, case.error_labels)
@@ -156,13 +157,25 @@ def _run(run: _Run, verify_in_time: bool, verify_harmonics: bool) -> RunSummary:
         rows=tuple(row(r) for r in results),
         chooser=chooser,
         more=more_name(results, chooser),
-        choices=tuple(choice_sentence(r, chooser) for r in results if chooser.decides),
+        choices=_choices(case, results, chooser),
         checks=tuple(checks),
         doubts=tuple(d.sentence for d in doubts),
         warnings=tuple(run.warnings),
         result=target,
         files=tuple(f for f in files if f.exists()),
     )
+
+
+def _choices(case: Case, results: Sequence[CaseResult], chooser: Chooser) -> tuple[str, ...]:
+    """Say where more harmonics were asked for, and what choosing cost."""
+    if not chooser.decides:
+        return ()
+    solved, points = sum(r.unknowns for r in results), sum(len(r.accepted) for r in results)
+    each = case.system.retained.size * (2 * len(chooser.high) - 1)
+    told = [choice_sentence(r, chooser) for r in results]
+    if points:
+        told.append(cost_sentence(solved, points, each, named(chooser.high)))
+    return tuple(told)
 
 
 def _load_case(run: _Run, case: Case, i: int) -> CaseResult:

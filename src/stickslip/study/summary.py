@@ -113,7 +113,7 @@ def choice_sentence(result: CaseResult, chooser: Chooser) -> str:
     worst = int(np.nanargmax(said))
     if not np.any(over):
         return (
-            f"{ratio}: no frequency needs more harmonics; the largest predicted error is {100 * said[worst]:.2g} %, "
+            f"{ratio}: no frequency needs more harmonics; the largest predicted error is {chooser.shown(said[worst])}, "
             f"below the threshold of {chooser.limit}."
         )
     where = _listed(_intervals(passage, over))
@@ -121,7 +121,7 @@ def choice_sentence(result: CaseResult, chooser: Chooser) -> str:
     return (
         f"{ratio}: {int(over.sum())} of {len(over)} points repeated with {_more(result, chooser)} harmonics, at {where} Hz, because leaving "
         f"the higher harmonics out was predicted to change the response by more than {chooser.limit} "
-        f"(up to {chooser.shown(said[worst])} at {at:.2f} Hz)."
+        f"(largest: {chooser.shown(said[worst])} at {at:.2f} Hz)."
     )
 
 
