@@ -31,7 +31,9 @@ def main() -> int:
     except ModuleNotFoundError as error:
         if error.name is None or error.name.split(".")[0] != "matplotlib":
             raise
-        print("The figures need matplotlib: `make figures` (or `make docs`) installs it and runs this.")
+        print(
+            "The figures need matplotlib: `make figures` (or `make docs`) installs it and runs this."
+        )
         return 1
     say("meshing and reducing both models")
     evidence = gather(two_blades(), two_blades(GLUED), Plan(), say)

@@ -496,7 +496,7 @@ def _of_times(e: Evidence) -> list[Statement]:
         Statement(
             "Fig. 7b", "At high ratios the alert has the error and the time of one harmonic", "the three left-most points",
             f"ratios {', '.join(f'{t.ratio:g}' for t in same)}: time {', '.join(f'{c:.2f}' for c in cost)} times that of one harmonic, error the same within {percent(max((abs(t.error('alert') - t.error('low')) for t in same), default=np.nan), 2)}",
-            bool(same) and max(cost) < 1.1, f"largest {max(cost, default=np.nan):.2f} times", "Where contacts slip, one factorisation of the large system a frequency is not free beside a passage with 33 · 3 unknowns. Where all stick (250) the verdict needs none: runs of a few tenths of a second on a busy machine scatter by more than a tenth ({doc}`theory/alert_cost` measured 0.89 to 1.07 times there).",
+            bool(same) and max(cost) < 1.1, f"largest {max(cost, default=np.nan):.2f} times", "Where contacts slip, one factorisation of the large system a frequency is not free beside a passage with 33 · 3 unknowns. Where all stick (250) the verdict needs none: runs of a few tenths of a second on a busy machine scatter by more than a tenth, and since these runs nothing is integrated there either ({doc}`theory/alert_cost` measured 0.89 to 1.07 times there).",
         ),
         Statement(
             "Fig. 7b", "From some ratio on one harmonic is more than 5 % off, and there the alert asks for five", "from point four on",

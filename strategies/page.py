@@ -18,6 +18,8 @@ Made by `make strategies`, in one process. Every strategy goes through the same 
 
 What is accepted is held against the solution with harmonics 0 to 10, followed as a branch; where it is more than 5 % away from that, also against the solution with as many harmonics that Newton's method finds from it, and the smaller error counts. Errors are those of the first harmonic over all outputs (eq. 29 of {cite:t}`gastaldi2017`).
 
+Each strategy is timed once through the 49 frequencies of the two-blade cases, on the coarse mesh (elements twice as large as in the example). The same blades at the same ratio have other numbers elsewhere: {doc}`theory/alert_cost` times 20 frequencies from 165 to 184 Hz on the example's own mesh, {doc}`seed_figures` 20 from 160.25 to 184 Hz on the coarse one and takes errors of the peak's amplitude against time integration, {doc}`theory/shooting` errors in amplitude and phase against it; here errors are against harmonics 0 to 10, in amplitude and phase.
+
 * *Unknowns*: harmonic-unknowns solved, retained coordinates times real coefficients, summed over all solves, repeats and failures included. *Newton* and *CPU*: iterations and processor time. All three relative to `always_high`.
 * *At resonance*: error at the frequency where the judge has its largest amplitude; *largest*: over all frequencies.
 * *Missed*: accepted solutions with an error above 5 %. *False*: accepted solutions with more harmonics than 0 and 1, where these two would have been within 5 %. For `always_high` that is the number of frequencies at which it wastes them.

@@ -51,7 +51,8 @@ def verify_reference(
 ) -> tuple[ReferenceCheck, ...]:
     """Predict at every solved point what all harmonics up to a multiple of the reference order would change.
 
-    One contact evaluation and one linear solution a point; nothing is iterated. Harmonics that the reference leaves out, such as
+    One contact evaluation and one linear solution a point; nothing is iterated. It is a warning and no bound: one Newton step, which
+    keeps the contact states of the point, in amplitude and phase; mostly early, and at times too small. Harmonics that the reference leaves out, such as
     the even ones, are among those that it is held against.
 
     Parameters
