@@ -384,10 +384,8 @@ def test_flagged_ranges_are_runs_of_neighbouring_points(tmp_path: Path) -> None:
 
 def test_largest_error_is_told_where_none_is_above_the_threshold(tmp_path: Path) -> None:
     data = synthetic_result(ratios=(5,), n=4)
-    data["frequency_hz"][:], data["predicted_error_percent"][:] = (
-        np.arange(100, 104),
-        [0, 1.2, 1, 0],
-    )
+    data["frequency_hz"][:4] = np.arange(100.0, 104.0)
+    data["predicted_error_percent"][:] = [0.1, 1.2, 1, 0.1, np.nan, np.nan, np.nan]
     page = choice(load_result(write_result(data, tmp_path / "r.nc")))
     assert "<td>nowhere</td><td>1.2 % at 101 Hz</td>" in page
 
