@@ -15,7 +15,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
 from stickslip.response.floquet import Floquet, floquet
 from stickslip.response.period_map import PeriodMap, period_map
-from stickslip.response.shooting import MOST_CORRECTIONS, ShootingResult, shoot
+from stickslip.response.shooting import MOST_CORRECTIONS, RESERVE, ShootingResult, shoot
 from stickslip.response.transient import TimeStepping, TransientStart, integrate, rest
 
 GRIFFIN_GAP = np.array([[1.0], [0.0], [0.0]])
@@ -247,13 +247,16 @@ def test_of_a_family_the_member_at_the_start_is_kept() -> None:
     np.testing.assert_allclose(result.final.traction, start.traction, atol=1e-9)
 
 
-def test_a_steady_slide_has_no_periodic_motion() -> None:
+@pytest.mark.parametrize("most", [60, 1000])
+def test_a_steady_slide_has_no_periodic_motion(most: int) -> None:
     structure = structure_of(np.eye(1), 5.0 * np.eye(1), np.zeros((1, 1)))
     law = ElasticCoulomb(k_t=1e4, k_w=0.0, k_n=0.0, mu=0.5, preload=2.0)
     load = load_of(1, {1: [0.5]}, [3.0])
-    stepping = TimeStepping(steps_per_period=64, max_periods=60)
+    stepping = TimeStepping(steps_per_period=64, max_periods=most)
     result = shoot(structure, GRIFFIN_GAP, [law], load, 10.0, np.array([0]), None, stepping)
     assert result.status == "not converged"
+    # the periods are used and kept to: the last correction tries five lengths, marches eight periods, one is reported
+    assert most - RESERVE <= result.periods < most + 1 + 5 + 8 + 1
     assert not result.stable
     # one period of sliding at (3 - 1)/5
     assert result.residual > 1e-3

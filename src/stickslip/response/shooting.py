@@ -54,7 +54,7 @@ class ShootingResult:
         Number of tangential springs that reach their limit without slipping: they have just shaken down, and the
         multipliers are those of the side on which they stick.
     periods
-        Periods marched, those with tangents among them; a search that is under way may go beyond the most by a few.
+        Periods marched, those with tangents among them; a correction that is under way may go beyond the most by a few.
     corrections
         Periods marched with tangents, each of which costs as much as some six others.
     residual
@@ -185,14 +185,18 @@ def _march_and_search(
         search.state = warm
         settled = _settle(mapping, search, min(block, room), changes, stepping.tolerance)
         warm, block = search.state, 2 * block
-        _search_anew(mapping, search, stepping.tolerance)
+        _search_anew(mapping, search, stepping)
 
 
-def _search_anew(mapping: PeriodMap, search: _Search, tolerance: float) -> None:
+def _search_anew(mapping: PeriodMap, search: _Search, stepping: TimeStepping) -> None:
     """Take some corrections; leave it to the march where one does not come nearer."""
     last = search.corrections + ANEW
-    while search.status == "not converged" and search.corrections < last:
-        if not _correct(mapping, search, tolerance):
+    while (
+        search.status == "not converged"
+        and search.corrections < last
+        and search.periods < stepping.max_periods
+    ):
+        if not _correct(mapping, search, stepping.tolerance):
             return
 
 
