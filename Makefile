@@ -89,7 +89,7 @@ bench-rival: .venv-rival/.installed  ## install pyHarm-os, which the chain bench
 strategies: $(DOCS_INSTALLED)  ## compare all ways of choosing harmonics; writes docs/strategies.md and its figure (some ten minutes)
 	$(ONE_THREAD) $(BIN)/python -m strategies compare
 
-alarms: $(INSTALLED)  ## count missed and false alarms of the strategies that verify; writes docs/strategies_alarms.md (some three quarters of an hour)
+alarms: $(INSTALLED)  ## count missed and false alarms of the strategies that verify; writes docs/strategies_alarms.md (ten to twenty minutes)
 	$(ONE_THREAD) $(BIN)/python -m strategies alarms
 
 validate: $(INSTALLED)  ## compare with closed forms, other codes and the literature

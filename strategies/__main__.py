@@ -17,7 +17,7 @@ def main() -> None:
     counted = commands.add_parser(
         "alarms",
         help="count missed and false alarms of the strategies that verify, on the four cases, benchmark B6 and random systems; "
-        "writes docs/strategies_alarms.md (some three quarters of an hour; fewer systems, less time)",
+        "writes docs/strategies_alarms.md (ten to twenty minutes, about a second a random system)",
     )
     counted.add_argument("--systems", type=int, default=SYSTEMS, help="random systems of each set")
     commands.add_parser(
