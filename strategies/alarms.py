@@ -1,6 +1,6 @@
 """False and missed alarms of the strategies that verify, and how predicted and true errors go together.
 
-``python -m strategies alarms`` solves the four cases, literature benchmark B6 and two sets of random systems with one harmonic, asks every
+``python -m strategies alarms`` solves the four cases, literature benchmark B6 and three sets of random systems with one harmonic, asks every
 strategy about each solution, and holds what they say against the truth of `strategies.truth`. It writes ``docs/strategies_alarms.md``.
 """
 
@@ -14,7 +14,7 @@ from stickslip.arrays import FloatArray
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
 from stickslip.response.sweep import forced_problem
 from strategies.cases import CASES, HZ, SelectionCase
-from strategies.random_systems import HELD_OUT, SYSTEMS, random_two_blade_system
+from strategies.random_systems import HELD_OUT, SYSTEMS, THIRD, random_two_blade_system
 from strategies.truth import low_order_points, truths
 from validation.models import b6_load, blade_damper_blade
 
@@ -108,12 +108,12 @@ def _b6() -> Iterator[SelectionCase]:
 
 
 def sources(systems: int = SYSTEMS) -> Iterator[Source]:
-    """Yield the four cases, B6, and two sets of `systems` random ones."""
+    """Yield the four cases, B6, and three sets of `systems` random ones."""
     for made in CASES.values():
         case = made()
         yield measured(case.title, [case])
     yield measured("literature benchmark B6, 150 to 235 Hz, factors 1 and 1.5", _b6())
-    for first, what in ((0, "random systems"), (HELD_OUT, "held out")):
+    for first, what in ((0, "random systems"), (HELD_OUT, "held out"), (THIRD, "third set")):
         numbers = range(first, first + systems)
         title = f"{what} {first} to {first + systems - 1}"
         yield measured(title, (random_two_blade_system(n) for n in numbers))

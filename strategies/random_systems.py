@@ -44,6 +44,7 @@ Random = np.random.Generator
 STREAM = 20261121  # beside the number of the system: other numbers would be other systems
 SYSTEMS = 200
 HELD_OUT = 1000  # number of the first system of a second set, on which no rule was tried before it was fixed
+THIRD = 2000  # the first of a set that was counted by somebody else, before the rule was tightened for the last time
 FREQUENCIES = 12
 GRID = 2000  # frequencies at which the linear responses are compared
 DRAWS = 200  # before a number is given up

@@ -73,7 +73,7 @@ class GoalOriented:
             again = self._needed(step, outputs, found)
         elif self.guarded and (found.bound > 0.0 or not is_full(high.harmonics)):
             doubted = GuardedAlert(threshold=self.threshold).judge(step)
-            if doubted.again is not None:
+            if doubted.again is not None or not is_full(high.harmonics):
                 return replace(doubted, indicator=max(doubted.indicator, found.bound))
         return Verdict(found.bound, again, step.smallest, start)
 
