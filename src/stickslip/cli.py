@@ -1,6 +1,5 @@
 """The commands. Everything heavy is imported inside them, so that ``--help`` is quick."""
 
-import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -101,20 +100,6 @@ def common(
         raise typer.Exit
 
 
-BLAS_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-
-
-def _one_blas_thread() -> None:
-    """Give BLAS one thread, before NumPy is loaded, unless the user said how many.
-
-    The matrices of a run have a few hundred rows: more threads wait for each other, and where other programs want the cores they
-    take ten times as long.
-    """
-    if not any(name in os.environ for name in BLAS_THREADS):
-        for name in BLAS_THREADS[1:]:
-            os.environ[name] = "1"
-
-
 @app.command()
 def run(
     study: StudyFile,
@@ -134,7 +119,9 @@ def run(
 ) -> None:
     """Run a study of two blades and a damper; an interrupted run goes on where it stopped."""
     with _errors_as_text():
-        _one_blas_thread()
+        from stickslip.study.threads import one_blas_thread
+
+        one_blas_thread()
         from stickslip.study.run import run_study
 
         with _screen() as sink:
