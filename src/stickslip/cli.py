@@ -355,22 +355,17 @@ def _print_lines(console: Console, title: str, texts: list[str]) -> None:
 def _print_summary(summary: "RunSummary", files: list[Path]) -> None:
     console = _console()
     console.print(_table(summary))
-
-    def lines(title: str, texts: list[str]) -> None:
-        _print_lines(console, title, texts)
-
-    lines(f"Where {summary.chooser.name} asked for more harmonics", list(summary.choices))
-    lines("Against twice as many harmonics", list(summary.doubts))
-    lines("Against time integration", [c.sentence for c in summary.checks])
-    lines("Warnings", list(summary.warnings))
+    asked = f"Where {summary.chooser.name} asked for more harmonics"
+    _print_lines(console, asked, list(summary.choices))
+    _print_lines(console, "Against twice as many harmonics", list(summary.doubts))
+    _print_lines(console, "Against time integration", [c.sentence for c in summary.checks])
+    _print_lines(console, "Warnings", list(summary.warnings))
     if summary.failed:
-        lines(
-            "Not converged",
-            [
-                f"{summary.failed} of the points: marked in the result and in the report, not filled in"
-            ],
+        told = (
+            f"{summary.failed} of the points: marked in the result and in the report, not filled in"
         )
-    lines("Files", [str(f) for f in files])
+        _print_lines(console, "Not converged", [told])
+    _print_lines(console, "Files", [str(f) for f in files])
 
 
 def _table(summary: "RunSummary") -> Table:
