@@ -15,11 +15,11 @@ from small_study import write_small_study
 from typer.testing import CliRunner, Result
 
 import stickslip
-from stickslip import cli
 from stickslip.cli import app
 from stickslip.errors import InputError
 from stickslip.response.forced import ForcedPoint
 from stickslip.solve.status import Status
+from stickslip.study import threads
 from stickslip.study.chooser import Chooser
 from stickslip.study.collect import Accepted, CaseResult
 from stickslip.study.example import example_text
@@ -37,8 +37,8 @@ HEAVY = ("numpy", "scipy", "numba", "xarray", "pydantic", "plotly", "gmsh", "skf
 @pytest.mark.parametrize("said", [{}, {"OMP_NUM_THREADS": "4"}, {"OPENBLAS_NUM_THREADS": "2"}])
 def test_a_run_gives_blas_one_thread_unless_told_otherwise(monkeypatch, said):
     environment = dict(said)
-    monkeypatch.setattr(cli.os, "environ", environment)
-    cli._one_blas_thread()
+    monkeypatch.setattr(threads.os, "environ", environment)
+    threads.one_blas_thread()
     one = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
     assert environment == (said or one)
 
