@@ -74,26 +74,26 @@ docs: $(DOCS_INSTALLED)  ## build the documentation; any warning is an error
 	@echo "Open docs/_build/html/index.html in a browser."
 
 figures: $(DOCS_INSTALLED)  ## draw the figures of Gastaldi & Berruti (2017) for the own two blades; writes docs/seed_figures.md (some minutes)
-	$(ONE_THREAD) $(BIN)/python -m figures
+	$(ONE_THREAD) $(BIN)/python -m evidence.figures
 
-bench: $(INSTALLED)  ## run every benchmark; writes benchmarks/out/results.json
-	$(ONE_THREAD) $(BIN)/python -m benchmarks
+bench: $(INSTALLED)  ## run every benchmark; writes evidence/benchmarks/out/results.json
+	$(ONE_THREAD) $(BIN)/python -m evidence.benchmarks
 
 bench-rival: .venv-rival/.installed  ## install pyHarm-os, which the chain benchmark is timed against, into .venv-rival
 
-.venv-rival/.installed: benchmarks/requirements.lock $(INSTALLED)
+.venv-rival/.installed: evidence/benchmarks/requirements.lock $(INSTALLED)
 	$(PYTHON) -m venv .venv-rival
-	.venv-rival/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r benchmarks/requirements.lock
+	.venv-rival/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r evidence/benchmarks/requirements.lock
 	@touch $@
 
 strategies: $(DOCS_INSTALLED)  ## compare all ways of choosing harmonics; writes docs/strategies.md and its figure (some ten minutes)
-	$(ONE_THREAD) $(BIN)/python -m strategies compare
+	$(ONE_THREAD) $(BIN)/python -m evidence.strategies compare
 
 alarms: $(INSTALLED)  ## count missed and false alarms of the strategies that verify; writes docs/strategies_alarms.md (ten to twenty minutes)
-	$(ONE_THREAD) $(BIN)/python -m strategies alarms
+	$(ONE_THREAD) $(BIN)/python -m evidence.strategies alarms
 
 validate: $(INSTALLED)  ## compare with closed forms, other codes and the literature
-	$(ONE_THREAD) $(BIN)/python -m validation
+	$(ONE_THREAD) $(BIN)/python -m evidence.validation
 	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) -m validation
 
 lock: $(INSTALLED)  ## resolve the newest versions and write both lock files
@@ -103,7 +103,7 @@ lock: $(INSTALLED)  ## resolve the newest versions and write both lock files
 	CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra docs \
 		-c requirements.lock -o docs/requirements.lock pyproject.toml
 	CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra bench \
-		-o benchmarks/requirements.lock pyproject.toml
+		-o evidence/benchmarks/requirements.lock pyproject.toml
 	CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra readers --extra readers-test \
 		-c requirements.lock -c docs/requirements.lock -o readers-requirements.lock pyproject.toml
 	CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra sparse \
@@ -111,5 +111,5 @@ lock: $(INSTALLED)  ## resolve the newest versions and write both lock files
 
 clean:  ## remove everything that the other targets made, .venv included
 	rm -rf $(VENV) .venv-rival .coverage* htmlcov .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache \
-		docs/_build docs/auto_examples docs/generated benchmarks/out validation/out examples/*/results
-	find src tests benchmarks validation docs examples -name __pycache__ -type d -prune -exec rm -rf {} +
+		docs/_build docs/auto_examples docs/generated evidence/benchmarks/out evidence/validation/out examples/*/results
+	find src tests evidence docs examples -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -7,7 +7,7 @@ import scipy.sparse
 
 from stickslip.model.axis import Axis
 from stickslip.model.dofs import Dofs, nodal_dofs
-from stickslip.model.mesh import SolidMesh
+from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector
 

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from stickslip.model.mesh import SolidMesh
+from stickslip.model.mesh.solid_mesh import SolidMesh
 
 # a 2 x 2 x 2 cell of a fine grid: VTK's places of the nodes, written out (0, 1, 2 = low, middle, high)
 HEX20 = [

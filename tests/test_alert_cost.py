@@ -13,7 +13,7 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic import balance as balance_module
 from stickslip.harmonic.aft import contact_forces, forces_between
 from stickslip.harmonic.selection.jacobian_alert import JacobianAlert
-from stickslip.response.forced import Sweep, forced_response
+from stickslip.response.forced.response import Sweep, forced_response
 from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton import Newton, newton
 from stickslip.solve.status import Status

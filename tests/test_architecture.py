@@ -159,7 +159,9 @@ def test_nomenclature_gives_one_row_to_each_name():
     assert len(names) == len(set(names)), sorted({name for name in names if names.count(name) > 1})
 
 
-@pytest.mark.parametrize("pattern", ["benchmarks/bench_*.py", "validation/case_*.py"])
+@pytest.mark.parametrize(
+    "pattern", ["evidence/benchmarks/bench_*.py", "evidence/validation/case_*.py"]
+)
 def test_modules_found_by_name_can_be_run(pattern):
     for path in ROOT.glob(pattern):
         run = next((node for node in functions(path) if node.name == "run"), None)

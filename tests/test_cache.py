@@ -10,7 +10,7 @@ from cyclic_models import random_sector, wedge
 
 from stickslip.errors import InputError
 from stickslip.model.axis import Axis
-from stickslip.model.solid import Material, assemble_solid
+from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.reduction.cache import cached
 from stickslip.reduction.craig_bampton import craig_bampton
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave

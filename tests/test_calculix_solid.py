@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 import scipy.sparse.linalg
 
-from stickslip.model.readers.calculix import read_calculix_matrices
-from validation.calculix_stored import (
+from evidence.validation.calculix_stored import (
     CASES,
     lowest_frequencies,
     plain_tie,
     static_difference,
     stored_sector,
 )
-from validation.reference_data import COMPLETE
+from evidence.validation.reference_data import COMPLETE
+from stickslip.model.readers.calculix import read_calculix_matrices
 
 FOLDER = COMPLETE / "calculix"
 

@@ -17,7 +17,7 @@ from typer.testing import CliRunner, Result
 import stickslip
 from stickslip.cli import app
 from stickslip.errors import InputError
-from stickslip.response.forced import ForcedPoint
+from stickslip.response.forced.response import ForcedPoint
 from stickslip.solve.status import Status
 from stickslip.study import threads
 from stickslip.study.chooser import Chooser

@@ -10,11 +10,12 @@ import xarray as xr
 from small_wheel import wheel_text, write_small_wheel
 from typer.testing import CliRunner, Result
 
+from evidence.validation.case_calculix_materials import our_solid, write_decks
 from stickslip.cli import app
+from stickslip.model.mesh.sector_mesh import mesh_sector
 from stickslip.model.modes import normal_modes
 from stickslip.model.readers.calculix_deck import read_deck
 from stickslip.model.readers.units import Units
-from stickslip.model.sector_mesh import mesh_sector
 from stickslip.model.structure_file import save_structure
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.wheel import wheel
@@ -24,7 +25,6 @@ from stickslip.study.structure_model import disk_model
 from stickslip.study.structure_results import WaveModes
 from stickslip.study.structure_study import read_structure_study
 from stickslip.study.waves import solve_wave
-from validation.case_calculix_materials import our_solid, write_decks
 
 ROOT = Path(__file__).parents[1]
 
@@ -113,7 +113,7 @@ def test_basis_that_is_too_small_is_told(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # two modes and none to spare, over a range in which the shapes change
-    monkeypatch.setattr("stickslip.study.speed_basis.SPARE", 0)
+    monkeypatch.setattr("stickslip.reduction.speed_basis.SPARE", 0)
     monkeypatch.setattr("stickslip.study.structure_doubts.BASIS_ERROR", 1e-9)
     path = write_small_wheel(tmp_path, engine_orders="[2]")
     assert "wave number 2: frequencies between the speeds of the basis are off" in done(

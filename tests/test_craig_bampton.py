@@ -8,12 +8,12 @@ import pytest
 import scipy.sparse
 
 from stickslip.errors import InputError, SingularError
-from stickslip.model.blade_mesh import mesh_blade_pair
-from stickslip.model.blade_pair import BladePair
-from stickslip.model.damper import FlatCurvedDamper, gap_operator
+from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.lumped import chain, lumped
+from stickslip.model.mesh.blade_mesh import mesh_blade_pair
+from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.modes import natural_frequencies, with_springs
-from stickslip.model.solid import Material, assemble_solid
+from stickslip.model.rigid.damper import FlatCurvedDamper, gap_operator
 from stickslip.model.structure import Structure, join
 from stickslip.reduction.craig_bampton import craig_bampton
 

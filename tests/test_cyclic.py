@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from stickslip.errors import InputError
 from stickslip.model.axis import Axis
 from stickslip.model.dofs import Dofs
-from stickslip.model.solid import Material, assemble_solid
+from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
 from stickslip.reduction.turning import dof_rotation

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import scipy.sparse
 
+from evidence.validation.reference_data import COMPLETE
 from stickslip.model.dofs import Dofs
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
-from validation.reference_data import COMPLETE
 
 FOLDER = COMPLETE / "calculix"
 SECTORS = 24

@@ -9,7 +9,7 @@ import scipy.sparse
 from cyclic_models import random_sector, wedge
 
 from stickslip.errors import InputError
-from stickslip.model.solid import Material, assemble_solid
+from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.reduction.craig_bampton import craig_bampton
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.relative import in_relative_coordinates

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.model.blade_mesh import mesh_blade_pair
-from stickslip.model.blade_pair import BladePair
-from stickslip.model.damper import FlatCurvedDamper, gap_operator
-from stickslip.model.rigid_body import RigidBody
-from stickslip.model.solid import assemble_solid
+from stickslip.model.fe.solid import assemble_solid
+from stickslip.model.mesh.blade_mesh import mesh_blade_pair
+from stickslip.model.mesh.blade_pair import BladePair
+from stickslip.model.rigid.body import RigidBody
+from stickslip.model.rigid.damper import FlatCurvedDamper, gap_operator
 from stickslip.reduction.craig_bampton import craig_bampton
 from stickslip.response.preload import preload
 from stickslip.study.build import static_contact_force, static_load, system_of

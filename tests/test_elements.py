@@ -8,9 +8,9 @@ from solid_models import KINDS, box, plain_matrices, rigid_motions, without_sets
 
 from stickslip.errors import InputError
 from stickslip.model.annulus import annular_sector
-from stickslip.model.elements import Quadrature, shape_functions
-from stickslip.model.mesh import SolidMesh, write_mesh
-from stickslip.model.solid import Material, assemble_solid
+from stickslip.model.fe.elements import Quadrature, shape_functions
+from stickslip.model.fe.solid import Material, assemble_solid
+from stickslip.model.mesh.solid_mesh import SolidMesh, write_mesh
 
 STEEL = Material(young_modulus=210e9, poisson_ratio=0.3, density=7850.0)
 SIZE = (0.03, 0.02, 0.04)

@@ -7,8 +7,8 @@ import pytest
 import scipy.sparse
 
 from stickslip.errors import InputError, SingularError, StickslipError
-from stickslip.model import factorisation
-from stickslip.model.factorisation import factorise, negative_eigenvalues
+from stickslip.model.fe import factorisation
+from stickslip.model.fe.factorisation import factorise, negative_eigenvalues
 
 RNG = np.random.default_rng(5)
 needs_feral = pytest.mark.skipif(

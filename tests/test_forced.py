@@ -9,8 +9,8 @@ from models import blades_and_damper, griffin, lifting
 
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response import passages
-from stickslip.response.forced import (
+from stickslip.response.forced import passages
+from stickslip.response.forced.response import (
     Sweep,
     accepted_pairs,
     accepted_points,

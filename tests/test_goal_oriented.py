@@ -23,7 +23,12 @@ from stickslip.harmonic.selection.goal_oriented import GoalOriented, chosen_harm
 from stickslip.harmonic.selection.guarded_alert import GuardedAlert
 from stickslip.harmonic.selection.strategy import ErrorMeasure, Step
 from stickslip.harmonic.travelling import condense_waves
-from stickslip.response.forced import Sweep, accepted_points, forced_problem, forced_response
+from stickslip.response.forced.response import (
+    Sweep,
+    accepted_points,
+    forced_problem,
+    forced_response,
+)
 from stickslip.solve.krylov import Krylov
 from stickslip.solve.newton import Newton, newton
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from evidence.strategies.cases import SelectionCase, friction_ring
+from evidence.strategies.random_systems import random_two_blade_system
+from evidence.strategies.truth import low_order_points, truths
+from evidence.validation.models import b6_load, blade_damper_blade
 from stickslip.harmonic.selection import guarded_alert, strategy_named
 from stickslip.harmonic.selection.guarded_alert import doubled, truncated
-from stickslip.response.sweep import forced_problem
-from strategies.cases import SelectionCase, friction_ring
-from strategies.random_systems import random_two_blade_system
-from strategies.truth import low_order_points, truths
-from validation.models import b6_load, blade_damper_blade
+from stickslip.response.forced.sweep import forced_problem
 
 HZ = 2 * np.pi
 

@@ -6,8 +6,8 @@ import scipy.linalg
 from cyclic_models import wedge
 
 from stickslip.errors import InputError, SingularError
+from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.modes import natural_frequencies
-from stickslip.model.solid import Material, assemble_solid
 from stickslip.reduction.craig_bampton import craig_bampton
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.interface_modes import reduce_interface

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.response.forced import ForcedPoint
+from stickslip.response.forced.response import ForcedPoint
 from stickslip.solve.status import Status
 from stickslip.study.journal import Journal, decode, encode
 
@@ -125,7 +125,7 @@ KILLED = """
 import os, signal, sys
 sys.path.insert(0, sys.argv[2])
 from pathlib import Path
-from stickslip.response.forced import ForcedPoint
+from stickslip.response.forced.response import ForcedPoint
 from stickslip.study.journal import Journal
 from test_journal import point
 with Journal(Path(sys.argv[1]), "a", ForcedPoint) as journal:

@@ -35,11 +35,11 @@ from stickslip.contact.segmentation import clip
 from stickslip.contact.surface import Surface, nodal_surface, rigid_surface, structure_surface
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.damper import FlatCurvedDamper, gap_operator
 from stickslip.model.damping import rayleigh_damping
 from stickslip.model.modes import natural_frequencies
-from stickslip.response.forced import accepted_points, forced_problem, forced_response
-from stickslip.response.sweep import Sweep
+from stickslip.model.rigid.damper import FlatCurvedDamper, gap_operator
+from stickslip.response.forced.response import accepted_points, forced_problem, forced_response
+from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 
 EVEN = np.linspace(0.0, 1.0, 5)

@@ -26,9 +26,9 @@ from stickslip.harmonic.structured import StructuredJacobian, real_matrix
 from stickslip.harmonic.support import harmonics_of
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.response.forced import forced_problem, forced_response
+from stickslip.response.forced.response import forced_problem, forced_response
+from stickslip.response.forced.sweep import Sweep
 from stickslip.response.preload import bonded_start
-from stickslip.response.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
 from stickslip.solve.krylov import YOUNG, Automatic, Krylov, to_tolerance

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from models import OPEN, SLIP, basis
 
 import stickslip as ss
+from evidence.validation import case_b1_iwan, case_b1_planar
 from stickslip.contact.compiled import compile_contacts
 from stickslip.contact.law import PAIRS, PiecewiseLinear
 from stickslip.contact.laws import LAWS
 from stickslip.errors import InputError
 from stickslip.harmonic.aft import contact_forces
-from validation import case_b1_iwan, case_b1_planar
 
 stiff = st.floats(-1, 1).map(lambda e: 10**e)
 some = st.floats(-1, 1)

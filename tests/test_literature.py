@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from validation import (
+from evidence.validation import (
     case_b1_jenkins,
     case_b3_blade_with_damper,
     case_b6_blade_damper_blade,
     case_b7_alert,
     case_b8_residual_traction,
 )
-from validation.models import blade_damper_blade
+from evidence.validation.models import blade_damper_blade
 
 
 @pytest.mark.parametrize("row", case_b1_jenkins.TABLE, ids=lambda row: f"A/xc={row[0]}")

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError, StickslipError
-from stickslip.model.blade_mesh import mesh_blade_pair
-from stickslip.model.blade_pair import BladePair
-from stickslip.model.damper import FlatCurvedDamper
-from stickslip.model.mesh import write_mesh
+from stickslip.model.mesh.blade_mesh import mesh_blade_pair
+from stickslip.model.mesh.blade_pair import BladePair
+from stickslip.model.mesh.solid_mesh import write_mesh
+from stickslip.model.rigid.damper import FlatCurvedDamper
 
 COARSE = {"airfoil_size": 0.02, "platform_size": 0.012, "foot_size": 0.02}
 
@@ -179,7 +179,7 @@ def test_missing_gmsh_or_library_is_explained(monkeypatch):
 
 def test_importing_the_models_loads_no_mesher():
     code = (
-        "import sys, stickslip.model.mesh, stickslip.model.solid; "
+        "import sys, stickslip.model.mesh.solid_mesh, stickslip.model.fe.solid; "
         "sys.exit(bool({'gmsh', 'skfem', 'meshio'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

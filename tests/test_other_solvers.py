@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from validation import case_chain_small, case_nlvib, case_tmdsimpy
-from validation.reference_data import COMPLETE, contact2d, has_complete, nlvib
+from evidence.validation import case_chain_small, case_nlvib, case_tmdsimpy
+from evidence.validation.reference_data import COMPLETE, contact2d, has_complete, nlvib
 
 
 @pytest.fixture

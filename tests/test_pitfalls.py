@@ -21,8 +21,8 @@ from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
 from stickslip.response.drift import drift
-from stickslip.response.forced import Sweep, forced_problem
-from stickslip.response.sweep import forced_point
+from stickslip.response.forced.response import Sweep, forced_problem
+from stickslip.response.forced.sweep import forced_point
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
 from stickslip.solve.newton import Newton, newton

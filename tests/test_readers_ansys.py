@@ -27,7 +27,7 @@ from stickslip import (
     read_ansys_materials,
     read_ansys_results,
 )
-from stickslip.model.elements import Quadrature
+from stickslip.model.fe.elements import Quadrature
 from stickslip.model.readers.ansys_nodes import read_ansys_nodes, rotations
 from stickslip.model.readers.ansys_records import Records
 from stickslip.model.readers.units import Units

@@ -13,8 +13,8 @@ from stickslip.contact.laws.bonded import Bonded
 from stickslip.contact.neighbours import neighbour_interface
 from stickslip.errors import InputError
 from stickslip.model.axis import Axis
+from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.modes import with_springs
-from stickslip.model.solid import Material, assemble_solid
 from stickslip.reduction.craig_bampton import craig_bampton
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.reduced_wheel import reduced_wheel

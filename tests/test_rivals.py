@@ -21,6 +21,9 @@ from models import (
     twin,
 )
 
+from evidence.strategies.cases import SelectionCase
+from evidence.strategies.compare import compared
+from evidence.strategies.page import page
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
@@ -34,11 +37,13 @@ from stickslip.harmonic.selection.suess_spectral import SuessSpectral
 from stickslip.harmonic.support import harmonics_of
 from stickslip.harmonic.travelling import condense_waves
 from stickslip.model.structure import Structure
-from stickslip.response.forced import Sweep, accepted_points, forced_problem, forced_response
+from stickslip.response.forced.response import (
+    Sweep,
+    accepted_points,
+    forced_problem,
+    forced_response,
+)
 from stickslip.solve.newton import Newton
-from strategies.cases import SelectionCase
-from strategies.compare import compared
-from strategies.page import page
 
 HZ = 2 * np.pi
 ORDER = 5

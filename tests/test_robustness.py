@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.robustness_systems import draw
-from stickslip.response.forced import accepted_points, forced_problem, forced_response
+from evidence.benchmarks.robustness_systems import draw
+from stickslip.response.forced.rescue import growing_load, homotopies, with_friction
+from stickslip.response.forced.response import accepted_points, forced_problem, forced_response
 from stickslip.response.preload import preload
-from stickslip.response.rescue import growing_load, homotopies, with_friction
 from stickslip.solve.newton import Newton, newton
 from stickslip.solve.rescue import solve_robustly
 from stickslip.solve.status import Rung, Status

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from validation import case_b9_friction_ring
+from evidence.validation import case_b9_friction_ring
 
 # benchmark B9: Laxalde et al. 2007, frequencies in Hz by nodal diameter, without the ring
 LAXALDE = {

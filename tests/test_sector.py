@@ -10,12 +10,12 @@ from stickslip.errors import InputError, StickslipError
 from stickslip.model.annulus import annular_sector
 from stickslip.model.axis import Axis
 from stickslip.model.deck import CalculixRun, write_deck
+from stickslip.model.fe.solid import Material, assemble_solid
+from stickslip.model.mesh.sector import BladedSector
+from stickslip.model.mesh.sector_mesh import mesh_sector
+from stickslip.model.mesh.sector_parts import Airfoil, DiskProfile, Platform, Shroud
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.readers.calculix_deck import read_deck
-from stickslip.model.sector import BladedSector
-from stickslip.model.sector_mesh import mesh_sector
-from stickslip.model.sector_parts import Airfoil, DiskProfile, Platform, Shroud
-from stickslip.model.solid import Material, assemble_solid
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 
 COARSE = {"disk_size": 0.025, "platform_size": 0.015, "airfoil_size": 0.020}

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from figures.evidence import Plan, gather
-from figures.model import Model, with_values
-from figures.page import page, table
-from figures.statements import Statement, statements
+from evidence.figures.evidence import Plan, gather
+from evidence.figures.model import Model, with_values
+from evidence.figures.page import page, table
+from evidence.figures.statements import Statement, statements
+from evidence.validation.models import b6_load, blade_damper_blade
 from stickslip import Sweep
 from stickslip.study.example import example_text
-from validation.models import b6_load, blade_damper_blade
 
 RATIO = 6.0  # 120 N on the damper, 20 N on the blade
 BELOW = "Where the predicted error is below 5 % the actual one is, too"

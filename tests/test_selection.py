@@ -23,7 +23,12 @@ from stickslip.harmonic.selection.jacobian_alert import JacobianAlert
 from stickslip.harmonic.selection.strategy import ErrorMeasure
 from stickslip.model.lumped import chain
 from stickslip.model.structure import Structure
-from stickslip.response.forced import Sweep, accepted_points, forced_problem, forced_response
+from stickslip.response.forced.response import (
+    Sweep,
+    accepted_points,
+    forced_problem,
+    forced_response,
+)
 from stickslip.response.system import System
 from stickslip.solve.krylov import Automatic, to_tolerance
 from stickslip.solve.newton import Newton, newton

@@ -17,7 +17,7 @@ from stickslip.report.figure_harmonics import kept_harmonics
 from stickslip.report.figures_error import errors
 from stickslip.report.result import load_result
 from stickslip.report.summary import headline
-from stickslip.response.sweep import FIXED, Sweep
+from stickslip.response.forced.sweep import FIXED, Sweep
 from stickslip.study import build
 from stickslip.study import run as run_module
 from stickslip.study.blades import ReducedBlades, reduced_blades

@@ -13,10 +13,10 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
-from stickslip.response.floquet import Floquet, floquet
-from stickslip.response.period_map import PeriodMap, period_map
-from stickslip.response.shooting import MOST_CORRECTIONS, RESERVE, ShootingResult, shoot
-from stickslip.response.transient import TimeStepping, TransientStart, integrate, rest
+from stickslip.response.time.floquet import Floquet, floquet
+from stickslip.response.time.period_map import PeriodMap, period_map
+from stickslip.response.time.shooting import MOST_CORRECTIONS, RESERVE, ShootingResult, shoot
+from stickslip.response.time.transient import TimeStepping, TransientStart, integrate, rest
 
 GRIFFIN_GAP = np.array([[1.0], [0.0], [0.0]])
 GRIFFIN_LAW = ElasticCoulomb(k_t=0.5, k_w=0.0, k_n=0.0, mu=0.5, preload=0.2)

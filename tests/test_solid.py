@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.model.blade_mesh import mesh_blade_pair
-from stickslip.model.blade_pair import BladePair
-from stickslip.model.damper import FlatCurvedDamper
 from stickslip.model.damping import rayleigh_damping
+from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.lumped import lumped
-from stickslip.model.mesh import SolidMesh
+from stickslip.model.mesh.blade_mesh import mesh_blade_pair
+from stickslip.model.mesh.blade_pair import BladePair
+from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.modes import natural_frequencies
-from stickslip.model.solid import Material, assemble_solid
+from stickslip.model.rigid.damper import FlatCurvedDamper
 
 STEEL = Material(young_modulus=210e9, poisson_ratio=0.3, density=7850.0)
 CUBE_TETS = [(0, 1, 3, 7), (0, 5, 1, 7), (0, 3, 2, 7), (0, 2, 6, 7), (0, 4, 5, 7), (0, 6, 4, 7)]

@@ -9,7 +9,7 @@ from models import griffin
 from stickslip.errors import InputError
 from stickslip.harmonic.selection.jacobian_alert import JacobianAlert
 from stickslip.harmonic.selection.strategy import Verdict
-from stickslip.response.forced import Sweep, forced_response
+from stickslip.response.forced.response import Sweep, forced_response
 
 RANGE = (0.9, 1.3)
 

@@ -7,7 +7,7 @@ import scipy.sparse
 from stickslip.errors import InputError
 from stickslip.model.dofs import Dofs, modal_dofs, nodal_dofs
 from stickslip.model.lumped import chain, lumped
-from stickslip.model.rigid_body import RigidBody
+from stickslip.model.rigid.body import RigidBody
 from stickslip.model.structure import Structure, join
 from stickslip.reduction.craig_bampton import craig_bampton
 

@@ -12,7 +12,7 @@ from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_real
 from stickslip.harmonic.support import complex_rows, harmonics_of, is_full, real_rows, rows_of
-from stickslip.response.forced import Sweep, forced_response
+from stickslip.response.forced.response import Sweep, forced_response
 from stickslip.solve.newton import Newton, newton
 
 SUPPORTS = [(0, 1), (0, 1, 3), (0, 2, 3), (0, 1, 2, 3), (0, 1, 5)]

@@ -7,10 +7,10 @@ from transient_models import GRIFFIN_EXACT, load_of, structure_of, stuck_motion,
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response import time_step
-from stickslip.response.propagator import step_operators
-from stickslip.response.settling import LONGEST_MEMORY, remaining_change
-from stickslip.response.transient import (
+from stickslip.response.time import time_step
+from stickslip.response.time.propagator import step_operators
+from stickslip.response.time.settling import LONGEST_MEMORY, remaining_change
+from stickslip.response.time.transient import (
     TimeStepping,
     TransientResult,
     TransientStart,

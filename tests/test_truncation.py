@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from stickslip.errors import InputError
 from stickslip.model.dofs import modal_dofs
+from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.lumped import chain
 from stickslip.model.modes import natural_frequencies
-from stickslip.model.solid import Material, assemble_solid
 from stickslip.model.structure import join
 from stickslip.reduction.craig_bampton import craig_bampton
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave

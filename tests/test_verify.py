@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from small_study import write_small_study
 
-from stickslip.response.forced import forced_problem, forced_response
+from stickslip.response.forced.response import forced_problem, forced_response
 from stickslip.study.build import Case, case_of
 from stickslip.study.collect import CaseResult, collect
 from stickslip.study.journal import Journal

@@ -7,7 +7,7 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.response.transient import TransientStart, start_from_harmonics
+from stickslip.response.time.transient import TransientStart, start_from_harmonics
 
 # Exact event-driven |X1| of the oscillator with a friction damper (after Griffin 1980): m = 1, k = 1, c = 0.02,
 # k_d = 0.5, f_c = 0.1, force 0.1 cos Wt; piecewise-linear propagation with root finding of every switch.

@@ -60,17 +60,21 @@ if TYPE_CHECKING:
     from stickslip.harmonic.selection.suess_spectral import SuessSpectral
     from stickslip.model.annulus import annular_sector
     from stickslip.model.axis import Axis
-    from stickslip.model.beam import Beam, beam, rotating_beam
-    from stickslip.model.blade_mesh import mesh_blade_pair
-    from stickslip.model.blade_pair import BladePair
-    from stickslip.model.damper import ContactPoints, FlatCurvedDamper, gap_operator
     from stickslip.model.damping import modal_damping, rayleigh_damping, structural_damping
     from stickslip.model.deck import CalculixRun, write_deck
     from stickslip.model.dofs import Dofs
-    from stickslip.model.elements import Quadrature
+    from stickslip.model.fe.beam import Beam, beam, rotating_beam
+    from stickslip.model.fe.elements import Quadrature
+    from stickslip.model.fe.rotation import RotatingSolid, SpeedPolynomial, rotating_solid
+    from stickslip.model.fe.solid import Material, assemble_solid
     from stickslip.model.gyroscopic import GyroscopicModes, gyroscopic_modes
     from stickslip.model.lumped import chain, lumped
-    from stickslip.model.mesh import SolidMesh, write_mesh
+    from stickslip.model.mesh.blade_mesh import mesh_blade_pair
+    from stickslip.model.mesh.blade_pair import BladePair
+    from stickslip.model.mesh.sector import BladedSector
+    from stickslip.model.mesh.sector_mesh import mesh_sector
+    from stickslip.model.mesh.sector_parts import Airfoil, DiskProfile, Platform, Shroud
+    from stickslip.model.mesh.solid_mesh import SolidMesh, write_mesh
     from stickslip.model.modes import Modes, natural_frequencies, normal_modes, with_springs
     from stickslip.model.readers.abaqus import read_abaqus_matrices
     from stickslip.model.readers.ansys import read_ansys_full
@@ -85,12 +89,8 @@ if TYPE_CHECKING:
     from stickslip.model.readers.open_model import model_summary, read_model
     from stickslip.model.readers.summary import ModelSummary
     from stickslip.model.readers.units import Units
-    from stickslip.model.rigid_body import RigidBody
-    from stickslip.model.rotation import RotatingSolid, SpeedPolynomial, rotating_solid
-    from stickslip.model.sector import BladedSector
-    from stickslip.model.sector_mesh import mesh_sector
-    from stickslip.model.sector_parts import Airfoil, DiskProfile, Platform, Shroud
-    from stickslip.model.solid import Material, assemble_solid
+    from stickslip.model.rigid.body import RigidBody
+    from stickslip.model.rigid.damper import ContactPoints, FlatCurvedDamper, gap_operator
     from stickslip.model.structure import Structure, join
     from stickslip.model.structure_file import load_structure, save_structure
     from stickslip.reduction.cache import cached
@@ -111,30 +111,30 @@ if TYPE_CHECKING:
     from stickslip.reduction.waves import Wave, excited_wave, to_sectors, to_waves, wave
     from stickslip.reduction.wheel import wheel, wheel_shape
     from stickslip.report.page import write_report
-    from stickslip.response.accepted import accepted_points
-    from stickslip.response.campbell import Campbell, Crossing, campbell
     from stickslip.response.contributions import HarmonicContributions, harmonic_contributions
-    from stickslip.response.cyclic_campbell import cyclic_campbell
     from stickslip.response.drift import Drift, drift
     from stickslip.response.fields import Fields, Signals, fields, signals
-    from stickslip.response.floquet import Floquet
-    from stickslip.response.forced import forced_response
-    from stickslip.response.nodal_diameters import NodalDiameterMap, nodal_diameter_map
+    from stickslip.response.forced.accepted import accepted_points
+    from stickslip.response.forced.response import forced_response
+    from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, Sweep, forced_problem
     from stickslip.response.parameter import Discretisation, ParameterPoint, branch_in_parameter
     from stickslip.response.preload import preload
     from stickslip.response.rigid import RigidPoint, rigid_response
-    from stickslip.response.safe import Interference, Safe, safe
-    from stickslip.response.shooting import ShootingResult, shoot
-    from stickslip.response.sweep import ForcedPoint, ForcedProblem, Sweep, forced_problem
+    from stickslip.response.rotating.campbell import Campbell, Crossing, campbell
+    from stickslip.response.rotating.cyclic_campbell import cyclic_campbell
+    from stickslip.response.rotating.nodal_diameters import NodalDiameterMap, nodal_diameter_map
+    from stickslip.response.rotating.safe import Interference, Safe, safe
     from stickslip.response.system import System
-    from stickslip.response.tracking import PeakPoint, smallest_peak, track_peak
-    from stickslip.response.transient import (
+    from stickslip.response.time.floquet import Floquet
+    from stickslip.response.time.shooting import ShootingResult, shoot
+    from stickslip.response.time.transient import (
         TimeStepping,
         TransientResult,
         TransientStart,
         integrate,
         start_from_harmonics,
     )
+    from stickslip.response.tracking import PeakPoint, smallest_peak, track_peak
     from stickslip.response.verification import ReferenceCheck, verify_reference
     from stickslip.solve.newton import Newton, newton
     from stickslip.solve.status import Status
@@ -192,17 +192,17 @@ _MODULES = {
     "stickslip.harmonic.selection.suess_spectral": ("SuessSpectral",),
     "stickslip.model.annulus": ("annular_sector",),
     "stickslip.model.axis": ("Axis",),
-    "stickslip.model.beam": ("Beam", "beam", "rotating_beam"),
-    "stickslip.model.blade_mesh": ("mesh_blade_pair",),
-    "stickslip.model.blade_pair": ("BladePair",),
-    "stickslip.model.damper": ("ContactPoints", "FlatCurvedDamper", "gap_operator"),
+    "stickslip.model.fe.beam": ("Beam", "beam", "rotating_beam"),
+    "stickslip.model.mesh.blade_mesh": ("mesh_blade_pair",),
+    "stickslip.model.mesh.blade_pair": ("BladePair",),
+    "stickslip.model.rigid.damper": ("ContactPoints", "FlatCurvedDamper", "gap_operator"),
     "stickslip.model.damping": ("modal_damping", "rayleigh_damping", "structural_damping"),
     "stickslip.model.deck": ("CalculixRun", "write_deck"),
     "stickslip.model.dofs": ("Dofs",),
-    "stickslip.model.elements": ("Quadrature",),
+    "stickslip.model.fe.elements": ("Quadrature",),
     "stickslip.model.gyroscopic": ("GyroscopicModes", "gyroscopic_modes"),
     "stickslip.model.lumped": ("chain", "lumped"),
-    "stickslip.model.mesh": ("SolidMesh", "write_mesh"),
+    "stickslip.model.mesh.solid_mesh": ("SolidMesh", "write_mesh"),
     "stickslip.model.modes": ("Modes", "natural_frequencies", "normal_modes", "with_springs"),
     "stickslip.model.readers.abaqus": ("read_abaqus_matrices",),
     "stickslip.model.readers.ansys": ("read_ansys_full",),
@@ -217,12 +217,12 @@ _MODULES = {
     "stickslip.model.readers.open_model": ("model_summary", "read_model"),
     "stickslip.model.readers.summary": ("ModelSummary",),
     "stickslip.model.readers.units": ("Units",),
-    "stickslip.model.rigid_body": ("RigidBody",),
-    "stickslip.model.rotation": ("RotatingSolid", "SpeedPolynomial", "rotating_solid"),
-    "stickslip.model.sector": ("BladedSector",),
-    "stickslip.model.sector_mesh": ("mesh_sector",),
-    "stickslip.model.sector_parts": ("Airfoil", "DiskProfile", "Platform", "Shroud"),
-    "stickslip.model.solid": ("Material", "assemble_solid"),
+    "stickslip.model.rigid.body": ("RigidBody",),
+    "stickslip.model.fe.rotation": ("RotatingSolid", "SpeedPolynomial", "rotating_solid"),
+    "stickslip.model.mesh.sector": ("BladedSector",),
+    "stickslip.model.mesh.sector_mesh": ("mesh_sector",),
+    "stickslip.model.mesh.sector_parts": ("Airfoil", "DiskProfile", "Platform", "Shroud"),
+    "stickslip.model.fe.solid": ("Material", "assemble_solid"),
     "stickslip.model.structure": ("Structure", "join"),
     "stickslip.model.structure_file": ("load_structure", "save_structure"),
     "stickslip.reduction.cache": ("cached",),
@@ -243,21 +243,21 @@ _MODULES = {
     "stickslip.reduction.waves": ("Wave", "excited_wave", "to_sectors", "to_waves", "wave"),
     "stickslip.reduction.wheel": ("wheel", "wheel_shape"),
     "stickslip.report.page": ("write_report",),
-    "stickslip.response.accepted": ("accepted_points",),
-    "stickslip.response.campbell": ("Campbell", "Crossing", "campbell"),
+    "stickslip.response.forced.accepted": ("accepted_points",),
+    "stickslip.response.rotating.campbell": ("Campbell", "Crossing", "campbell"),
     "stickslip.response.contributions": ("HarmonicContributions", "harmonic_contributions"),
-    "stickslip.response.cyclic_campbell": ("cyclic_campbell",),
+    "stickslip.response.rotating.cyclic_campbell": ("cyclic_campbell",),
     "stickslip.response.drift": ("Drift", "drift"),
     "stickslip.response.fields": ("Fields", "Signals", "fields", "signals"),
-    "stickslip.response.floquet": ("Floquet",),
-    "stickslip.response.forced": ("forced_response",),
-    "stickslip.response.nodal_diameters": ("NodalDiameterMap", "nodal_diameter_map"),
+    "stickslip.response.time.floquet": ("Floquet",),
+    "stickslip.response.forced.response": ("forced_response",),
+    "stickslip.response.rotating.nodal_diameters": ("NodalDiameterMap", "nodal_diameter_map"),
     "stickslip.response.parameter": ("Discretisation", "ParameterPoint", "branch_in_parameter"),
     "stickslip.response.preload": ("preload",),
     "stickslip.response.rigid": ("RigidPoint", "rigid_response"),
-    "stickslip.response.safe": ("Interference", "Safe", "safe"),
-    "stickslip.response.shooting": ("ShootingResult", "shoot"),
-    "stickslip.response.sweep": (
+    "stickslip.response.rotating.safe": ("Interference", "Safe", "safe"),
+    "stickslip.response.time.shooting": ("ShootingResult", "shoot"),
+    "stickslip.response.forced.sweep": (
         "ForcedPoint",
         "ForcedProblem",
         "Sweep",
@@ -265,7 +265,7 @@ _MODULES = {
     ),
     "stickslip.response.system": ("System",),
     "stickslip.response.tracking": ("PeakPoint", "smallest_peak", "track_peak"),
-    "stickslip.response.transient": (
+    "stickslip.response.time.transient": (
         "TimeStepping",
         "TransientResult",
         "TransientStart",

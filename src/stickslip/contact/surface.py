@@ -17,7 +17,7 @@ from stickslip.contact.facets import (
     normals,
 )
 from stickslip.errors import input_error
-from stickslip.model.rigid_body import RigidBody
+from stickslip.model.rigid.body import RigidBody
 from stickslip.model.structure import Structure
 
 SMOOTH = np.cos(

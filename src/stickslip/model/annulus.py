@@ -6,7 +6,7 @@ import numpy as np
 
 from stickslip.arrays import IntArray
 from stickslip.errors import input_error
-from stickslip.model.mesh import SolidMesh
+from stickslip.model.mesh.solid_mesh import SolidMesh
 
 # grid steps (radius, angle, axis) of a 20-node hexahedron's nodes within its 2 x 2 x 2 cell, VTK order
 CORNERS = [(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)]

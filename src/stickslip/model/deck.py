@@ -12,8 +12,8 @@ import numpy as np
 from stickslip.arrays import IntArray
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
-from stickslip.model.mesh import SolidMesh
-from stickslip.model.solid import Material
+from stickslip.model.fe.solid import Material
+from stickslip.model.mesh.solid_mesh import SolidMesh
 
 ELEMENT_TYPES = {4: "C3D4", 8: "C3D8", 10: "C3D10", 20: "C3D20"}
 ON_A_LINE = 10  # numbers; CalculiX takes 16 at most

@@ -10,7 +10,7 @@ import scipy.linalg
 
 from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.errors import input_error
-from stickslip.model.factorisation import DENSE, factorise
+from stickslip.model.fe.factorisation import DENSE, factorise
 from stickslip.model.modes import connected_parts, lowest_modes, normal_modes
 from stickslip.model.structure import Structure
 

@@ -12,7 +12,7 @@ import scipy.sparse.csgraph
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import SingularError, input_error
 from stickslip.model.dofs import Dofs
-from stickslip.model.factorisation import (
+from stickslip.model.fe.factorisation import (
     DENSE,
     Factorisation,
     Say,
@@ -21,8 +21,8 @@ from stickslip.model.factorisation import (
     negative_eigenvalues,
     silent,
 )
-from stickslip.model.lanczos import lanczos
-from stickslip.model.rigid_motion import refuse_unheld
+from stickslip.model.fe.lanczos import lanczos
+from stickslip.model.rigid.motion import refuse_unheld
 from stickslip.model.structure import Structure
 
 RIGID = (

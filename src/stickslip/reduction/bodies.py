@@ -12,9 +12,9 @@ import scipy.sparse
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import SingularError
-from stickslip.model.factorisation import Say, Solve, factorise
+from stickslip.model.fe.factorisation import Say, Solve, factorise
 from stickslip.model.modes import SHIFT, connected_parts, lowest_modes, submatrix
-from stickslip.model.rigid_motion import refuse_unheld
+from stickslip.model.rigid.motion import refuse_unheld
 from stickslip.model.structure import Structure
 from stickslip.reduction.projection import BLOCK
 

@@ -14,7 +14,7 @@ import stickslip
 from stickslip.arrays import Matrix
 from stickslip.errors import InputError, input_error
 from stickslip.model.dofs import Dofs
-from stickslip.model.factorisation import Say, silent
+from stickslip.model.fe.factorisation import Say, silent
 from stickslip.model.structure import Structure
 from stickslip.model.structure_file import load_structure, save_structure
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import input_error
-from stickslip.model.factorisation import Say, silent
+from stickslip.model.fe.factorisation import Say, silent
 from stickslip.model.structure import Structure
 from stickslip.reduction.bodies import (
     Body,

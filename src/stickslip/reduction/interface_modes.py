@@ -10,7 +10,7 @@ import numpy as np
 
 from stickslip.arrays import IntArray
 from stickslip.errors import input_error
-from stickslip.model.factorisation import Say, silent
+from stickslip.model.fe.factorisation import Say, silent
 from stickslip.model.modes import submatrix
 from stickslip.model.structure import Structure
 from stickslip.reduction.bodies import Body, bodies_fixed_at, loose_bodies

@@ -13,7 +13,7 @@ import scipy.linalg
 
 from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import SingularError, input_error
-from stickslip.model.factorisation import Say, Solve, factorise, silent
+from stickslip.model.fe.factorisation import Say, Solve, factorise, silent
 from stickslip.model.modes import submatrix
 from stickslip.model.structure import Structure
 from stickslip.reduction.bodies import Body, BodyModes, loose_bodies, lowest_of, modes_up_to

@@ -9,7 +9,7 @@ import scipy.sparse
 
 from stickslip.arrays import BoolArray, FloatArray, Matrix
 from stickslip.errors import input_error
-from stickslip.model.factorisation import Say, factorise, negative_eigenvalues, silent
+from stickslip.model.fe.factorisation import Say, factorise, negative_eigenvalues, silent
 from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
 from stickslip.reduction.bodies import Body, loose_bodies

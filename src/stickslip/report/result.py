@@ -12,7 +12,7 @@ import xarray as xr
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.report.quantities import number, predicted
-from stickslip.response.sweep import FIXED
+from stickslip.response.forced.sweep import FIXED
 from stickslip.study.harmonics_table import named
 
 NEEDED = (

@@ -5,7 +5,7 @@ import numpy as np
 from stickslip.contact.interface import Interface
 from stickslip.contact.law import ContactLaw
 from stickslip.errors import input_error
-from stickslip.model.damper import ContactPoints, FlatCurvedDamper, gap_operator
+from stickslip.model.rigid.damper import ContactPoints, FlatCurvedDamper, gap_operator
 from stickslip.model.structure import Structure, join
 from stickslip.study.schema import StudyTables
 

@@ -7,13 +7,13 @@ from typing import Any, Self
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.model.blade_mesh import mesh_blade_pair
-from stickslip.model.damper import FlatCurvedDamper
 from stickslip.model.damping import rayleigh_damping
 from stickslip.model.dofs import Dofs
-from stickslip.model.mesh import SolidMesh, write_mesh
+from stickslip.model.fe.solid import assemble_solid
+from stickslip.model.mesh.blade_mesh import mesh_blade_pair
+from stickslip.model.mesh.solid_mesh import SolidMesh, write_mesh
 from stickslip.model.modes import natural_frequencies, with_springs
-from stickslip.model.solid import assemble_solid
+from stickslip.model.rigid.damper import FlatCurvedDamper
 from stickslip.model.structure import Structure
 from stickslip.reduction.craig_bampton import craig_bampton
 from stickslip.study.assembly import join_damper

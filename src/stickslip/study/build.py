@@ -10,11 +10,11 @@ from stickslip.contact.interface import Interface
 from stickslip.errors import InputError
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.blade_mesh import check_on_undersides
-from stickslip.model.damper import ContactPoints, FlatCurvedDamper
+from stickslip.model.mesh.blade_mesh import check_on_undersides
+from stickslip.model.rigid.damper import ContactPoints, FlatCurvedDamper
 from stickslip.model.structure import Structure
+from stickslip.response.forced.sweep import Sweep
 from stickslip.response.preload import preload
-from stickslip.response.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.study.assembly import join_damper
 from stickslip.study.blades import ReducedBlades, reduced_blades

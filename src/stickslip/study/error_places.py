@@ -4,7 +4,7 @@ import numpy as np
 
 from stickslip.arrays import IntArray
 from stickslip.errors import did_you_mean, input_error
-from stickslip.model.damper import ContactPoints
+from stickslip.model.rigid.damper import ContactPoints
 from stickslip.model.structure import Structure
 from stickslip.study.schema import StudyTables
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from stickslip.errors import input_error
-from stickslip.response.sweep import FIXED
+from stickslip.response.forced.sweep import FIXED
 from stickslip.study.schema import Study
 
 BYTES_A_NODE = 35e3  # assembly and factorisation of second-order tetrahedra, measured at 10 to 30 thousand nodes

@@ -3,9 +3,9 @@
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.model.elements import chunks, gradients, shape_functions
-from stickslip.model.mesh import SolidMesh
-from stickslip.model.solid import Material, Materials
+from stickslip.model.fe.elements import chunks, gradients, shape_functions
+from stickslip.model.fe.solid import Material, Materials
+from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.structure import Structure
 from stickslip.study.structure_results import Facts
 

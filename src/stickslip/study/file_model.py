@@ -10,13 +10,13 @@ import numpy as np
 from stickslip.arrays import BoolArray, IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.axis import Axis
-from stickslip.model.elements import EXACT, Quadrature
-from stickslip.model.mesh import SolidMesh
+from stickslip.model.fe.elements import EXACT, Quadrature
+from stickslip.model.fe.solid import Materials
+from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.readers.ansys_archive import read_ansys_archive, read_ansys_materials
 from stickslip.model.readers.calculix_deck import Deck, read_deck
 from stickslip.model.readers.open_model import read_model
 from stickslip.model.readers.units import Units
-from stickslip.model.solid import Materials
 from stickslip.model.structure import Structure
 from stickslip.study.messages import of_a_study
 from stickslip.study.structure_study import StructureStudy

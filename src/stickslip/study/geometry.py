@@ -7,10 +7,10 @@ from typing import Annotated, Any, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from stickslip.errors import InputError
-from stickslip.model.blade_pair import BladePair
-from stickslip.model.damper import FlatCurvedDamper
+from stickslip.model.fe.solid import Material
+from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.readers.units import MODULI, SOLIDS
-from stickslip.model.solid import Material
+from stickslip.model.rigid.damper import FlatCurvedDamper
 from stickslip.study.messages import custom_error, library_error
 from stickslip.study.sections import Positive, Section
 

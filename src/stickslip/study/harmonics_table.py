@@ -11,7 +11,7 @@ from stickslip.harmonic.selection import STRATEGIES, strategy_named
 from stickslip.harmonic.selection.strategy import Strategy
 from stickslip.harmonic.support import Harmonics as Support
 from stickslip.harmonic.support import harmonics_of
-from stickslip.response.sweep import FIXED, Passages, Sweep
+from stickslip.response.forced.sweep import FIXED, Passages, Sweep
 from stickslip.study.messages import custom_error, library_error, shown
 from stickslip.study.sections import Positive, Section
 

@@ -8,7 +8,7 @@ import xarray as xr
 
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.support import Harmonics
-from stickslip.response.forced import forced_problem
+from stickslip.response.forced.response import forced_problem
 from stickslip.response.verification import verify_reference
 from stickslip.study.build import Case
 from stickslip.study.chooser import error_text

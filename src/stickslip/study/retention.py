@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from stickslip.response.forced import forced_problem
-from stickslip.response.resonance import peak_from
+from stickslip.response.forced.resonance import peak_from
+from stickslip.response.forced.response import forced_problem
 from stickslip.study.build import Case
 from stickslip.study.collect import HZ, NO_SHIFT, CaseResult
 from stickslip.study.journal import Journal

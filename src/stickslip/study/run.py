@@ -14,7 +14,7 @@ import numpy as np
 from stickslip import __version__
 from stickslip.errors import SingularError
 from stickslip.response.drift import drift
-from stickslip.response.forced import (
+from stickslip.response.forced.response import (
     ForcedPoint,
     ForcedProblem,
     Sweep,

@@ -6,8 +6,8 @@ from pydantic import BaseModel, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from stickslip.errors import InputError
-from stickslip.model.sector import BladedSector
-from stickslip.model.sector_parts import Airfoil, DiskProfile, Platform, Shroud
+from stickslip.model.mesh.sector import BladedSector
+from stickslip.model.mesh.sector_parts import Airfoil, DiskProfile, Platform, Shroud
 from stickslip.study.geometry import NODES_A_CUBE, Length, arguments
 from stickslip.study.messages import custom_error, library_error
 from stickslip.study.sections import Section

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.model.elements import chunks, gradients, shape_functions
-from stickslip.model.mesh import SolidMesh
+from stickslip.model.fe.elements import chunks, gradients, shape_functions
+from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.study.structure_model import DiskModel
 
 MOST_STRAIN = 0.01  # several times the yield strain of alloys for disks and blades

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.response.safe import Safe
+from stickslip.response.rotating.safe import Safe
 from stickslip.study.static_state import MOST_DISPLACEMENT, MOST_ROTATION, MOST_STRAIN, StaticState
 from stickslip.study.structure_results import WaveBranches
 

@@ -10,7 +10,7 @@ import xarray as xr
 
 from stickslip.arrays import FloatArray
 from stickslip.reduction.waves import wave
-from stickslip.response.safe import Safe
+from stickslip.response.rotating.safe import Safe
 from stickslip.study.netcdf import variable
 from stickslip.study.static_state import StaticState
 from stickslip.study.structure_results import Facts, Skin, WaveBranches, WaveModes

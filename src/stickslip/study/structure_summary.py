@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.response.safe import Interference, Safe
+from stickslip.response.rotating.safe import Interference, Safe
 from stickslip.study.static_state import StaticState
 from stickslip.study.structure_results import WaveBranches, WaveModes
 from stickslip.study.structure_store import RPM, wave_name

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stickslip.response.forced import ForcedPoint
+from stickslip.response.forced.response import ForcedPoint
 from stickslip.study.chooser import Chooser
 from stickslip.study.collect import HZ, CaseResult
 from stickslip.study.harmonics_table import named

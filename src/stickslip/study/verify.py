@@ -8,9 +8,9 @@ import numpy as np
 from stickslip.contact.law import SLIP
 from stickslip.errors import InputError
 from stickslip.response.fields import signals
-from stickslip.response.forced import ForcedPoint, ForcedProblem, forced_problem
-from stickslip.response.propagator import PeriodicLoad
-from stickslip.response.transient import (
+from stickslip.response.forced.response import ForcedPoint, ForcedProblem, forced_problem
+from stickslip.response.time.propagator import PeriodicLoad
+from stickslip.response.time.transient import (
     TimeStepping,
     TransientResult,
     integrate,

@@ -8,11 +8,11 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.model.gyroscopic import gyroscopic_modes
 from stickslip.model.modes import normal_modes
+from stickslip.reduction.speed_basis import speed_basis
 from stickslip.reduction.waves import excited_wave
-from stickslip.response.campbell import campbell
-from stickslip.response.nodal_diameters import NodalDiameterMap
-from stickslip.response.safe import Safe, safe
-from stickslip.study.speed_basis import speed_basis
+from stickslip.response.rotating.campbell import campbell
+from stickslip.response.rotating.nodal_diameters import NodalDiameterMap
+from stickslip.response.rotating.safe import Safe, safe
 from stickslip.study.structure_doubts import unfollowed_from
 from stickslip.study.structure_model import DiskModel
 from stickslip.study.structure_results import WaveBranches, WaveModes

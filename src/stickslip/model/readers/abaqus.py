@@ -7,7 +7,7 @@ import scipy.sparse
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
-from stickslip.model.mesh import SolidMesh
+from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.readers.entries import from_triangle
 from stickslip.model.readers.node_table import COMPONENTS
 from stickslip.model.readers.positions import find_nodes

@@ -6,7 +6,8 @@ import numpy as np
 
 from stickslip.arrays import IntArray
 from stickslip.errors import input_error
-from stickslip.model.mesh import SolidMesh
+from stickslip.model.fe.solid import Material
+from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.readers.ansys_blocks import (
     CUT_SHORT,
     NUMBER,
@@ -16,7 +17,6 @@ from stickslip.model.readers.ansys_blocks import (
     read_blocks,
 )
 from stickslip.model.readers.units import Units, check_material
-from stickslip.model.solid import Material
 
 NODES_OF_SOLID = {
     185: (8, 4),

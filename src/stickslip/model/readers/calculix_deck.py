@@ -18,13 +18,13 @@ from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import did_you_mean, input_error
 from stickslip.model.axis import Axis
 from stickslip.model.dofs import nodal_dofs
-from stickslip.model.elements import Quadrature
-from stickslip.model.mesh import SolidMesh
+from stickslip.model.fe.elements import Quadrature
+from stickslip.model.fe.solid import Material, integrate, node_dofs
+from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.readers.deck_model import DeckModel, interpret
 from stickslip.model.readers.keywords import keyword_blocks
 from stickslip.model.readers.node_table import block_nodes
 from stickslip.model.readers.units import SI, Units, check_material
-from stickslip.model.solid import Material, integrate, node_dofs
 from stickslip.model.structure import Structure
 
 PAIRED = 1e-3  # of a face's size: how far a turned face may lie from the other

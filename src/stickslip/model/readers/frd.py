@@ -9,7 +9,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import InputError, input_error
-from stickslip.model.mesh import SolidMesh
+from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.readers.node_table import NodeTable, node_table
 from stickslip.model.readers.text import CUT_SHORT, SHOWN, read_text
 from stickslip.model.readers.units import SI, Units

@@ -11,7 +11,7 @@ import numpy as np
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import did_you_mean, input_error
 from stickslip.model.dofs import Dofs
-from stickslip.model.mesh import SolidMesh
+from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.readers.keywords import Block, keyword_blocks, members, unique_in_order
 from stickslip.model.readers.text import SHOWN, read_text, whole_numbers
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from stickslip.errors import InputError, input_error
-from stickslip.model.factorisation import Say, silent
-from stickslip.model.mesh import SolidMesh
+from stickslip.model.fe.factorisation import Say, silent
+from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.readers.abaqus import read_abaqus_matrices
 from stickslip.model.readers.ansys import read_ansys_full
 from stickslip.model.readers.ansys_archive import read_ansys_archive

@@ -7,7 +7,7 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.errors import input_error
-from stickslip.model.mesh import SolidMesh
+from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.readers.frd import frd_nodes
 from stickslip.model.readers.node_table import NodeTable, csv_nodes, deck_nodes, mesh_nodes
 from stickslip.model.readers.units import Units

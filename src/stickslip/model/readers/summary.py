@@ -8,8 +8,8 @@ import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import StickslipError
-from stickslip.model.factorisation import Say, silent
-from stickslip.model.mesh import SolidMesh
+from stickslip.model.fe.factorisation import Say, silent
+from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.modes import normal_modes
 from stickslip.model.readers.entries import SYMMETRY, asymmetry
 from stickslip.model.readers.positions import doubt_about_positions

@@ -1,0 +1,1 @@
+"""What backs the claims: benchmarks, validation, strategies compared, figures, and the models they share."""

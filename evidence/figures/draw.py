@@ -1,0 +1,298 @@
+"""The pictures."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+
+from evidence.figures.evidence import Evidence, Marker, Peaks
+from evidence.figures.solve import STEPS, Curve, Pair, time_signal
+from stickslip import signals
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+LOW, HIGH, TIME, ALERT = "black", "#c1272d", "#1f5fa8", "#2c8a3d"
+THRESHOLD = 5.0  # percent
+SMALLEST = 1e-4  # percent: errors below are drawn there
+DPI = 80
+MICRO = 1e6
+
+
+def draw_all(evidence: Evidence, folder: Path) -> list[Path]:
+    """Draw every picture into a folder and return the files."""
+    pictures: dict[str, Callable[[Evidence], Figure]] = {
+        "seed_fig1": block_norms,
+        "seed_fig4": forced_responses,
+        "seed_fig5": time_and_cycles,
+        "seed_fig6": errors_by_frequency,
+        "seed_fig7": errors_and_times,
+        "seed_fig9": optimisation,
+        "seed_fig10": glued_responses,
+        "seed_fig11": glued_cycles,
+    }
+    files = []
+    for name, draw in pictures.items():
+        figure = draw(evidence)
+        files.append(folder / f"{name}.png")
+        figure.savefig(files[-1], dpi=DPI, metadata={"Software": None})
+        plt.close(figure)
+    return files
+
+
+def block_norms(evidence: Evidence) -> Figure:
+    """Draw fig. 1: how strongly harmonics are coupled."""
+    found = evidence.norms
+    figure, axes = plt.subplots(1, 3, figsize=(12, 4.0), layout="constrained")
+    titles = ("a) J, full stick", "b) J, weak coupling", "c) ΔJ, strong coupling")
+    for axis, matrix, title in zip(
+        axes, (found.stuck, found.weak, found.missing), titles, strict=True
+    ):
+        shown = np.log10(np.where(matrix > 0.0, np.maximum(matrix, 1e-4), np.nan))
+        image = axis.imshow(shown, cmap="viridis", vmin=-4, vmax=0.5)
+        for (row, column), value in np.ndenumerate(matrix):
+            if value > 0.0:
+                text = f"{value:.2g}" if value >= 1e-4 else "<1e-4"
+                colour = "white" if value < 0.1 else "black"
+                axis.text(column, row, text, ha="center", va="center", fontsize=7, color=colour)
+        axis.set(title=title, xlabel="harmonic of motion", ylabel="harmonic of force")
+    figure.colorbar(image, ax=axes, label="log₁₀ of the largest singular value", shrink=0.85)
+    return figure
+
+
+def forced_responses(evidence: Evidence) -> Figure:
+    """Draw fig. 4: responses, motions in time, and what the alert chooses, at the weak and the strong ratio."""
+    plan = evidence.plan
+    figure, rows = plt.subplots(2, 2, figsize=(11, 7.4), layout="constrained")
+    for row, ratio, markers in zip(
+        rows, (plan.strong, plan.weak), (evidence.markers, evidence.weak_markers), strict=True
+    ):
+        peaks = next(p for p in evidence.peaks if p.ratio == ratio)
+        _both(row[0], peaks)
+        _markers(row[0], markers)
+        _both(row[1], peaks)
+        _alert(row[1], peaks.alert)
+        centre = peaks.high.hertz[np.argmax(peaks.high.amplitudes)]
+        for axis, letter in zip(row, "ab", strict=True):
+            axis.set(
+                xlim=(max(centre - 14, 160), min(centre + 7, 184)),
+                title=f"{letter}) $F_{{CL}}/F_{{HE}}$ = {ratio:g}",
+                xlabel="frequency, Hz", ylabel="tip amplitude, µm",
+            )  # fmt: skip
+            axis.legend(fontsize=8)
+            axis.grid(alpha=0.3)
+    return figure
+
+
+def _both(axis: Axes, peaks: Peaks) -> None:
+    for name, colour, style in (("low", LOW, "--"), ("high", HIGH, "-")):
+        response: Curve = getattr(peaks, name)
+        label = f"H = {response.points[0].order}"
+        hertz, height = response.line
+        axis.plot(hertz, MICRO * height, style, color=colour, lw=1.3, label=label)
+        for hertz in response.lost:
+            axis.axvline(hertz, color=colour, lw=0.6, ls=":")
+
+
+def _markers(axis: Axes, markers: list[Marker]) -> None:
+    for found, face, label in (
+        (True, TIME, "time integration"),
+        (False, "none", "the same, not periodic"),
+    ):
+        some = [m.orbit for m in markers if m.orbit.found == found]
+        if some:
+            axis.plot(
+                [o.hertz for o in some], [MICRO * o.amplitude for o in some], "o", ms=5,
+                color=TIME, mfc=face, label=label,
+            )  # fmt: skip
+
+
+def _alert(axis: Axes, response: Curve) -> None:
+    few = min(p.order for p in response.points)
+    for many, marker in ((False, "o"), (True, "D")):
+        chosen = [i for i, p in enumerate(response.points) if (p.order > few) == many]
+        if chosen:
+            axis.plot(
+                response.hertz[chosen], MICRO * response.amplitudes[chosen], marker, ms=4,
+                color=ALERT, mfc=ALERT if many else "none",
+                label=f"alert: H = {response.points[chosen[0]].order}",
+            )  # fmt: skip
+
+
+def time_and_cycles(evidence: Evidence) -> Figure:
+    """Draw fig. 5: the damper's rotation and the cycles of three contact points at the peak."""
+    pair, orbit = evidence.at_peak, evidence.at_peak_orbit
+    figure, axes = plt.subplots(2, 2, figsize=(10.5, 7.2), layout="constrained")
+    axis = axes[0, 0]
+    phase = np.arange(1, STEPS + 1) / STEPS
+    for point, colour, style in ((pair.low, LOW, "--"), (pair.high, HIGH, "-")):
+        turned = time_signal(pair.problem, point, evidence.model.rotation, STEPS)
+        axis.plot(phase, 1e3 * turned, style, color=colour, label=f"H = {point.order}")
+    axis.plot(phase, 1e3 * orbit.rotation, ":", color=TIME, lw=2, label="time integration")
+    axis.set(
+        title=f"a) {pair.hertz:.2f} Hz, $F_{{CL}}/F_{{HE}}$ = {pair.ratio:g}",
+        xlabel="time / period", ylabel="damper rotation, mrad",
+    )  # fmt: skip
+    axis.legend(fontsize=8)
+    axis.grid(alpha=0.3)
+    names = evidence.model.system.interface.names
+    middle = [i for i, name in enumerate(names) if name.endswith(".2")][:3]
+    for axis, contact, letter in zip(axes.flat[1:], middle, "bcd", strict=False):
+        _cycles(axis, pair, contact)
+        axis.plot(
+            MICRO * _closed(orbit.gap[:, contact, 0]), _closed(orbit.force[:, contact, 0]), ":",
+            color=TIME, lw=2, label="time integration",
+        )  # fmt: skip
+        axis.set_title(f"{letter}) contact point {names[contact]}")
+        axis.legend(fontsize=8)
+    return figure
+
+
+def _closed(values: np.ndarray) -> np.ndarray:
+    return np.append(values, values[:1])
+
+
+def _cycles(axis: Axes, pair: Pair, contact: int) -> None:
+    for point, colour, style in ((pair.low, LOW, "--"), (pair.high, HIGH, "-")):
+        found = signals(pair.problem, point)
+        axis.plot(
+            MICRO * _closed(found.gap[contact, 0]), _closed(found.force[contact, 0]), style,
+            color=colour, lw=1.3, label=f"H = {point.order}",
+        )  # fmt: skip
+    axis.set(xlabel="tangential displacement, µm", ylabel="tangential force, N")
+    axis.grid(alpha=0.3)
+
+
+def errors_by_frequency(evidence: Evidence) -> Figure:
+    """Draw fig. 6: predicted and actual error against frequency."""
+    plan = evidence.plan
+    figure, axes = plt.subplots(1, 3, figsize=(13, 4.0), layout="constrained")
+    for axis, ratio, letter in zip(
+        axes, (plan.weak, plan.paper_weak, plan.strong), "abc", strict=True
+    ):
+        found = evidence.pairs[ratio]
+        hertz = [p.hertz for p in found]
+        for name, colour, style in (("predicted", ALERT, "-"), ("real", HIGH, "--")):
+            values = 100 * np.array([getattr(p, name) for p in found])
+            axis.plot(hertz, np.maximum(values, SMALLEST), style, color=colour, label=name)
+        axis.axhline(THRESHOLD, color="grey", lw=0.8)
+        for lost in evidence.unsolved[ratio]:
+            axis.axvline(lost, color="grey", lw=0.6, ls=":")
+        axis.set(
+            yscale="log", title=f"{letter}) $F_{{CL}}/F_{{HE}}$ = {ratio:g}",
+            xlabel="frequency, Hz", ylabel=f"error, % (at least {SMALLEST:g})",
+        )  # fmt: skip
+        axis.legend(fontsize=8)
+        axis.grid(alpha=0.3)
+    return figure
+
+
+def errors_and_times(evidence: Evidence) -> Figure:
+    """Draw fig. 7: a) actual against predicted error; b) error at resonance against CPU time."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(12, 5.2), layout="constrained")
+    colours = mpl.colormaps["plasma"](np.linspace(0.0, 0.9, len(evidence.pairs)))
+    for (ratio, found), colour in zip(evidence.pairs.items(), colours, strict=True):
+        some = [p for p in found if p.predicted > 0.0]
+        x, y = (
+            np.maximum([100 * getattr(p, name) for p in some], SMALLEST)
+            for name in ("predicted", "real")
+        )
+        left.plot(x, y, "o", ms=4, color=colour, alpha=0.8, label=f"{ratio:g}")
+    ends = np.array([SMALLEST, 1e3])
+    left.plot(ends, ends, "k-", lw=0.8)
+    left.axvline(THRESHOLD, color="grey", lw=0.8)
+    left.axhline(THRESHOLD, color="grey", lw=0.8)
+    left.set(
+        xscale="log", yscale="log", xlim=ends, ylim=ends, aspect="equal",
+        title="a) every frequency that slips", xlabel="predicted error, %", ylabel="actual error, %",
+    )  # fmt: skip
+    left.legend(title="$F_{CL}/F_{HE}$", fontsize=7, loc="lower right")
+    left.grid(alpha=0.3)
+    _times(right, evidence)
+    return figure
+
+
+def _times(axis: Axes, evidence: Evidence) -> None:
+    for name, colour, style, label in (
+        ("low", LOW, "--o", "H = 1"), ("high", HIGH, "-s", "H = 5"), ("alert", ALERT, "-D", "alert"),
+    ):  # fmt: skip
+        x = [getattr(t, name).seconds for t in evidence.timing]
+        y = [max(100 * abs(t.error(name)), 1e-2) for t in evidence.timing]
+        axis.plot(x, y, style, color=colour, ms=5, lw=1.0, label=label, mfc="none")
+        full = [i for i, t in enumerate(evidence.timing) if t.periodic]
+        axis.plot([x[i] for i in full], [y[i] for i in full], style[-1], color=colour, ms=5)
+        for t, a, b in zip(evidence.timing, x, y, strict=True):
+            axis.annotate(
+                f"{t.ratio:g}", (a, b), fontsize=7, xytext=(3, 3), textcoords="offset points"
+            )
+    axis.axhline(THRESHOLD, color="grey", lw=0.8)
+    axis.set(
+        xscale="log", yscale="log", title="b) numbers: $F_{CL}/F_{HE}$; hollow: no periodic reference",
+        xlabel=f"CPU time of {evidence.plan.timing_frequencies} frequencies, s",
+        ylabel="error at resonance against time integration, %",
+    )  # fmt: skip
+    axis.legend(fontsize=8)
+    axis.grid(alpha=0.3, which="both")
+
+
+def optimisation(evidence: Evidence) -> Figure:
+    """Draw fig. 9: amplitude and frequency of the peak against the ratio."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.4), layout="constrained")
+    ratios = [p.ratio for p in evidence.peaks]
+    static = evidence.plan.ratios[0]
+    largest = next(p for p in evidence.peaks if p.ratio == static)
+    unit = static * largest.high.amplitudes.max()
+    for name, colour, style, label in (
+        ("low", LOW, "--o", "H = 1"), ("high", HIGH, "-s", "H = 5"), ("alert", ALERT, ":D", "alert"),
+    ):  # fmt: skip
+        curves: list[Curve] = [getattr(p, name) for p in evidence.peaks]
+        per_force = [r * c.amplitudes.max() / unit for r, c in zip(ratios, curves, strict=True)]
+        left.plot(ratios, per_force, style, color=colour, ms=4, lw=1.0, label=label)
+        hertz = [c.hertz[np.argmax(c.amplitudes)] for c in curves]
+        right.plot(ratios, hertz, style, color=colour, ms=4, lw=1.0, label=label)
+    judged = [(p.ratio, p.orbit) for p in evidence.peaks if p.orbit is not None]
+    left.plot(
+        [r for r, _ in judged], [r * o.amplitude / unit for r, o in judged], "x", color=TIME,
+        ms=8, label="time integration at the peak of H = 5",
+    )  # fmt: skip
+    left.set(yscale="log", ylabel="peak amplitude for a unit of force, stuck = 1")
+    right.set(ylabel="frequency of the peak, Hz")
+    for axis in (left, right):
+        axis.set(xscale="log", xlabel="$F_{CL}/F_{HE}$")
+        axis.legend(fontsize=8)
+        axis.grid(alpha=0.3, which="both")
+    return figure
+
+
+def glued_responses(evidence: Evidence) -> Figure:
+    """Draw fig. 10: responses with the damper whose flat side does not slip."""
+    figure, axes = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
+    shown = [p for p in evidence.glued if p.ratio in evidence.plan.glued_ratios]
+    for axis, peaks, letter in zip(axes, shown, "ab", strict=True):
+        _both(axis, peaks)
+        _alert(axis, peaks.alert)
+        centre = peaks.high.hertz[np.argmax(peaks.high.amplitudes)]
+        axis.set(
+            xlim=(centre - 12, centre + 10), title=f"{letter}) $F_{{CL}}/F_{{HE}}$ = {peaks.ratio:g}",
+            xlabel="frequency, Hz", ylabel="tip amplitude, µm",
+        )  # fmt: skip
+        axis.legend(fontsize=8)
+        axis.grid(alpha=0.3)
+    return figure
+
+
+def glued_cycles(evidence: Evidence) -> Figure:
+    """Draw fig. 11: cycles of three contact points at the peak of the second damper."""
+    ratio = evidence.plan.glued_ratios[-1]
+    pair = max(evidence.glued_pairs[ratio], key=lambda p: p.problem.amplitude(p.high))
+    names = evidence.glued_model.system.interface.names
+    middle = [i for i, name in enumerate(names) if name.endswith(".2")][:3]
+    figure, axes = plt.subplots(1, 3, figsize=(12, 3.8), layout="constrained")
+    for axis, contact in zip(axes, middle, strict=False):
+        _cycles(axis, pair, contact)
+        axis.set_title(f"{names[contact]}, {pair.hertz:.2f} Hz")
+        axis.legend(fontsize=8)
+    return figure

@@ -1,0 +1,1 @@
+"""Finite elements: solids, beams, prestress, rotation, and what solves with their matrices."""

@@ -1,0 +1,293 @@
+"""Straight uniform beams, slender or with shear, at rest or turning about an axis across them.
+
+Bending is in one plane. With shear the elements interpolate deflection and rotation of the section by the solutions of the static
+equations, so that they do not lock: Z. Friedman and J. B. Kosmatka, "An improved two-node Timoshenko beam finite element", Computers &
+Structures 47 (1993) 473-481. Rotation: D. H. Hodges and M. J. Rutkowski, "Free-vibration analysis of rotating beams by a variable-order
+finite-element method", AIAA Journal 19 (1981) 1459-1466.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.errors import input_error
+from stickslip.model.dofs import Dofs
+from stickslip.model.fe.solid import Material
+from stickslip.model.structure import Structure
+
+End = Literal["clamped", "pinned", "sliding", "free"]
+Direction = Literal["y", "z"]
+# deflection, rotation, axial displacement held; an end that slides moves across the beam
+HELD = {
+    "clamped": (True, True, True),
+    "pinned": (True, False, True),
+    "sliding": (False, True, True),
+    "free": (False, False, False),
+}
+POINTS, WEIGHTS = (
+    0.5 * (a + b) for a, b in zip(np.polynomial.legendre.leggauss(4), (1.0, 0.0), strict=True)
+)
+
+
+@dataclass(frozen=True)
+class Beam:
+    """A uniform straight beam.
+
+    Parameters
+    ----------
+    length
+        In m.
+    area
+        Of the section, m².
+    second_moment
+        Of area, for the bending considered, m⁴.
+    material
+        Linear elastic.
+    shear_coefficient
+        κ of the shear stiffness ``κ G A``; it makes a Timoshenko beam, with rotary inertia. None: Euler-Bernoulli, without.
+    ends
+        First and last: ``clamped``, ``pinned``, ``sliding`` or ``free``.
+
+    Raises
+    ------
+    InputError
+        If a size is not positive or an end unknown.
+    """
+
+    length: float
+    area: float
+    second_moment: float
+    material: Material
+    shear_coefficient: float | None = None
+    ends: tuple[End, End] = ("clamped", "free")
+
+    def __post_init__(self) -> None:
+        for name in ("length", "area", "second_moment", "shear_coefficient"):
+            value = getattr(self, name)
+            if value is not None and not 0 < value < math.inf:
+                raise input_error(f"Beam.{name}", f"must be positive, got {value}", "SI units.")
+        given: Sequence[str] = self.ends
+        if len(given) != 2 or any(end not in get_args(End) for end in given):
+            raise input_error(
+                "Beam.ends", f"got {self.ends}", f"Two of {', '.join(get_args(End))}."
+            )
+
+
+def beam(shape: Beam, elements: int, *, bending: Direction = "z", axial: bool = False) -> Structure:
+    """Return the finite-element model of a beam along x.
+
+    Parameters
+    ----------
+    shape
+        The beam.
+    elements
+        Number of equal elements.
+    bending
+        Direction of the deflection; the rotation is about the other one (``ry`` is minus the slope of z).
+    axial
+        Whether the beam stretches too.
+
+    Returns
+    -------
+    Structure
+        Dense. Sets ``deflection``, ``rotation`` and ``axial`` hold the free dofs along the beam, ``tip`` the deflection of the last
+        node, if free.
+
+    Raises
+    ------
+    InputError
+        If there is no element.
+    """
+    return rotating_beam(shape, elements, 0.0, bending=bending, axial=axial)
+
+
+def rotating_beam(
+    shape: Beam,
+    elements: int,
+    speed: float,
+    *,
+    hub_radius: float = 0.0,
+    bending: Direction = "z",
+    axial: bool = False,
+    coriolis: bool = False,
+) -> Structure:
+    """Return the model of a beam that sticks out of a hub turning about z, in the rotating frame.
+
+    The centrifugal tension stiffens bending; spin softening ``- Ω² M`` takes off from what moves in the plane of rotation, deflections in
+    y (lag) and stretching, not from deflections in z (flap).
+
+    Parameters
+    ----------
+    shape
+        The beam, clamped at the hub and free at its tip.
+    elements
+        Number of equal elements.
+    speed
+        In rad/s.
+    hub_radius
+        Distance of the clamped end from the axis, m.
+    bending
+        ``z``: flap, along the axis of rotation; ``y``: lag, in the plane of rotation.
+    axial
+        Whether the beam stretches too.
+    coriolis
+        Add Coriolis terms to the damping: they couple lag with stretching.
+
+    Raises
+    ------
+    InputError
+        If the beam turns and is not clamped and free, the hub's radius is negative, or Coriolis terms are asked for without axial motion.
+    """
+    if elements < 1 or bending not in get_args(Direction):
+        raise input_error(
+            "beam", f"got {elements} elements and bending {bending!r}", "One or more, y or z."
+        )
+    if not 0 <= hub_radius < math.inf or not math.isfinite(speed):
+        raise input_error(
+            "rotating_beam", f"got hub radius {hub_radius} and speed {speed}", "In m and rad/s."
+        )
+    if speed and tuple(shape.ends) != ("clamped", "free"):
+        raise input_error(
+            "rotating_beam: ends",
+            f"got {shape.ends}: the tension depends on how both ends are held",
+            "A turning beam is clamped at the hub and free at the tip.",
+        )
+    if coriolis and not axial:
+        raise input_error(
+            "rotating_beam: coriolis",
+            "acts between deflection and stretching, and the beam does not stretch",
+            "Give axial=True.",
+        )
+    size = shape.length / elements
+    starts = size * np.arange(elements)
+    blocks = [_element(shape, size, start, speed, hub_radius, bending) for start in starts]
+    n = 3 * (elements + 1)
+    mass, damping, stiffness = np.zeros((3, n, n))
+    for i, (m, c, k) in enumerate(blocks):
+        here = np.s_[3 * i : 3 * i + 6, 3 * i : 3 * i + 6]
+        mass[here] += m
+        stiffness[here] += k
+        if coriolis:
+            damping[here] += c
+    kept = _free(shape, elements, axial)
+    square = np.ix_(kept, kept)
+    dofs = _dofs(shape, elements, hub_radius, bending).take(kept)
+    return Structure(mass[square], damping[square], stiffness[square], dofs, _sets(dofs, bending, elements))  # fmt: skip
+
+
+def _element(
+    shape: Beam, size: float, start: float, speed: float, hub_radius: float, bending: Direction
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return (6, 6) mass, Coriolis and stiffness matrices for deflection, rotation and axial displacement of two nodes."""
+    E, rho = shape.material.young_modulus, shape.material.density
+    EI, EA, rA = E * shape.second_moment, E * shape.area, rho * shape.area
+    shear, rI = math.inf, 0.0
+    if shape.shear_coefficient is not None:
+        shear = shape.shear_coefficient * 0.5 * E / (1 + shape.material.poisson_ratio) * shape.area
+        rI = rho * shape.second_moment
+    x = start + size * POINTS
+    L = shape.length
+    tension = rA * speed**2 * (hub_radius * (L - x) + 0.5 * (L**2 - x**2))
+    w, slope, theta, curvature, strain = _shapes(size, 12 * EI / (shear * size**2))
+    u, stretch = _axial_shapes(size)
+    if bending == "z":  # a positive rotation about y lowers what lies along x
+        flip = np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
+        w, slope, theta, curvature, strain = (
+            a * flip for a in (w, slope, theta, curvature, strain)
+        )
+    weight = size * WEIGHTS
+
+    def integral(left: FloatArray, right: FloatArray, factor: float | FloatArray) -> FloatArray:
+        return np.asarray(np.einsum("q,qi,qj->ij", weight * factor, left, right))
+
+    mass = integral(w, w, rA) + integral(theta, theta, rI) + integral(u, u, rA)
+    elastic = integral(curvature, curvature, EI) + integral(stretch, stretch, EA)
+    if math.isfinite(shear):
+        elastic += integral(strain, strain, shear)
+    # fibres of a section that tilts out of the plane of rotation leave their radius, those of one that turns within it do not
+    softening = integral(u, u, rA) + (
+        integral(w, w, rA) if bending == "y" else integral(theta, theta, rI)
+    )
+    coriolis = np.zeros((6, 6))
+    if bending == "y":
+        across = integral(w, u, 2 * speed * rA)
+        coriolis = across - across.T
+    return mass, coriolis, elastic + integral(slope, slope, tension) - speed**2 * softening
+
+
+def _shapes(size: float, flexibility: float) -> tuple[FloatArray, ...]:
+    """Return deflection, its slope, rotation, its slope and shear strain at the quadrature points, (4, 6) each.
+
+    `flexibility` is ``12 EI / (κ G A size²)``, 0 for the cubic Hermite polynomials.
+    """
+    x, f = POINTS, flexibility
+    one = np.ones_like(x)
+    w = [
+        2 * x**3 - 3 * x**2 - f * x + 1 + f,
+        size * (x**3 - (2 + f / 2) * x**2 + (1 + f / 2) * x),
+        -2 * x**3 + 3 * x**2 + f * x,
+        size * (x**3 - (1 - f / 2) * x**2 - f / 2 * x),
+    ]
+    slope = [
+        (6 * x**2 - 6 * x - f) / size,
+        3 * x**2 - (4 + f) * x + 1 + f / 2,
+        (-6 * x**2 + 6 * x + f) / size,
+        3 * x**2 - (2 - f) * x - f / 2,
+    ]
+    theta = [
+        6 * (x**2 - x) / size,
+        3 * x**2 - (4 + f) * x + 1 + f,
+        -6 * (x**2 - x) / size,
+        3 * x**2 - (2 - f) * x,
+    ]
+    curvature = [
+        6 * (2 * x - 1) / size**2,
+        (6 * x - 4 - f) / size,
+        -6 * (2 * x - 1) / size**2,
+        (6 * x - 2 + f) / size,
+    ]
+    strain = [-f / size * one, -f / 2 * one, f / size * one, -f / 2 * one]
+    return tuple(_placed(values, (0, 1, 3, 4)) / (1 + f) for values in (w, slope, theta, curvature, strain))  # fmt: skip
+
+
+def _axial_shapes(size: float) -> tuple[FloatArray, FloatArray]:
+    """Return axial displacement and strain at the quadrature points, (4, 6) each."""
+    one = np.ones_like(POINTS)
+    return _placed([1 - POINTS, POINTS], (2, 5)), _placed([-one / size, one / size], (2, 5))
+
+
+def _placed(values: Sequence[FloatArray], columns: tuple[int, ...]) -> FloatArray:
+    out = np.zeros((POINTS.size, 6))
+    out[:, columns] = np.array(values).T
+    return out
+
+
+def _free(shape: Beam, elements: int, axial: bool) -> IntArray:
+    """Return the dofs that supports leave, in node order."""
+    held = np.zeros((elements + 1, 3), dtype=bool)
+    held[0], held[-1] = (HELD[end] for end in shape.ends)
+    if not axial:
+        held[:, 2] = True
+    return np.flatnonzero(~held.reshape(-1))
+
+
+def _dofs(shape: Beam, elements: int, hub_radius: float, bending: Direction) -> Dofs:
+    points = np.zeros((elements + 1, 3))
+    points[:, 0] = hub_radius + np.linspace(0.0, shape.length, elements + 1)
+    names = ("y", "rz", "x") if bending == "y" else ("z", "ry", "x")
+    return Dofs(
+        np.repeat(np.arange(elements + 1), 3), names * (elements + 1), np.repeat(points, 3, axis=0)
+    )
+
+
+def _sets(dofs: Dofs, bending: Direction, elements: int) -> dict[str, IntArray]:
+    component = np.array(dofs.component)
+    turning = "rz" if bending == "y" else "ry"
+    names = {"deflection": bending, "rotation": turning, "axial": "x"}
+    sets = {name: np.flatnonzero(component == kind) for name, kind in names.items()}
+    sets["tip"] = np.flatnonzero((component == bending) & (dofs.node == elements))
+    return {name: index for name, index in sets.items() if index.size}

@@ -1,0 +1,222 @@
+"""Isoparametric cells: shape functions, quadrature, Jacobians, and where their node blocks go.
+
+scikit-fem, which knows the shape functions and quadrature rules, is imported only when they are asked for.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
+from stickslip.errors import input_error, missing_package
+from stickslip.model.mesh.solid_mesh import SolidMesh
+
+CHUNK = 200_000  # cells x quadrature points x nodes worked on at once: 20 to 100 MB
+TET_PLACES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+HEX_PLACES = np.array(
+    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]],
+    dtype=float,
+)
+TET_EDGES = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]
+HEX_EDGES = [
+    *[(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6)],
+    *[(6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)],
+]
+
+
+@dataclass(frozen=True)
+class Quadrature:
+    """Polynomial degrees that the quadrature rules integrate exactly on a straight-edged cell.
+
+    Degrees on tetrahedra: 2 has 4 points, 4 has 11. On hexahedra degree d has a Gauss rule of ⌈(d + 1) / 2⌉ points a
+    direction: 3 is the 2 x 2 x 2 rule, 4 and 5 the 3 x 3 x 3 rule.
+
+    Parameters
+    ----------
+    stiffness
+        Of the stiffness and all that belongs to strain energy.
+    mass
+        Of the mass and all that belongs to inertia.
+    """
+
+    stiffness: int = 4
+    mass: int = 4
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "mass"):
+            if not 1 <= getattr(self, name) <= 12:
+                raise input_error(
+                    f"Quadrature.{name}",
+                    f"must be a degree from 1 to 12, got {getattr(self, name)}",
+                    "4 integrates straight-edged second-order cells exactly.",
+                )
+
+    @classmethod
+    def calculix(cls) -> "Quadrature":
+        """Return the choice of CalculiX for C3D10 cells: its 4-point rule for stiffness and mass.
+
+        Its mass is therefore not the exactly integrated consistent mass.
+        """
+        return cls(stiffness=2, mass=2)
+
+
+EXACT = Quadrature()
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """Shape functions at the q points of a quadrature rule on the reference cell.
+
+    Parameters
+    ----------
+    values
+        (q, k).
+    slopes
+        (q, k, 3) derivatives by the reference coordinates.
+    weights
+        (q,) which sum to the volume of the reference cell.
+    """
+
+    values: FloatArray
+    slopes: FloatArray
+    weights: FloatArray
+
+
+def reference_places(width: int) -> FloatArray:
+    """Return the (k, 3) places of the nodes of a cell with `width` nodes in VTK order."""
+    places, edges = (TET_PLACES, TET_EDGES) if width in (4, 10) else (HEX_PLACES, HEX_EDGES)
+    if width == len(places):
+        return places
+    return np.vstack([places, places[np.array(edges)].mean(axis=1)])
+
+
+def library() -> Any:
+    """Return the module of scikit-fem; a `StickslipError` says how to install it."""
+    try:
+        import skfem
+    except ModuleNotFoundError as error:
+        raise missing_package("scikit-fem", error, "fe") from error
+    return skfem
+
+
+def library_element(width: int) -> tuple[Any, IntArray]:
+    """Return scikit-fem's element with `width` nodes, and the (k,) VTK node at each of its own places."""
+    skfem = library()
+    element = {
+        4: skfem.ElementTetP1,
+        10: skfem.ElementTetP2,
+        8: skfem.ElementHex1,
+        20: skfem.ElementHexS2,
+    }[width]()
+    distance = np.abs(element.doflocs[:, None] - reference_places(width)).sum(axis=2)
+    return element, np.asarray(distance.argmin(axis=1), dtype=np.int64)
+
+
+def shape_functions(width: int, degree: int) -> Shape:
+    """Return the shape functions of cells with `width` nodes (VTK order) at a rule of `degree`."""
+    element, order = library_element(width)
+    places, weights = library().quadrature.get_quadrature(element, degree)
+    values = np.empty((len(weights), width))
+    slopes = np.empty((len(weights), width, 3))
+    for theirs, ours in enumerate(order):
+        phi, gradient = element.lbasis(places, theirs)
+        values[:, ours], slopes[:, ours] = phi, np.broadcast_to(gradient, places.shape).T
+    return Shape(values, slopes, np.asarray(weights))
+
+
+def chunks(mesh: SolidMesh, shape: Shape) -> Iterator[slice]:
+    """Cut the cells into pieces whose arrays stay small."""
+    step = max(1, CHUNK // shape.values.size)
+    for start in range(0, len(mesh.cells), step):
+        yield slice(start, min(start + step, len(mesh.cells)))
+
+
+def gradients(mesh: SolidMesh, shape: Shape, piece: slice) -> tuple[FloatArray, FloatArray]:
+    """Return gradients (m, q, k, 3) of the shape functions in space, and weights (m, q) in m³."""
+    jacobian = _jacobians(mesh, shape, piece)
+    slopes = np.matmul(shape.slopes, np.linalg.inv(jacobian))
+    return slopes, np.linalg.det(jacobian) * shape.weights
+
+
+def _jacobians(mesh: SolidMesh, shape: Shape, piece: slice) -> FloatArray:
+    """Return (m, q, 3, 3) derivatives of positions (third axis) by reference coordinates (last axis)."""
+    corners = mesh.points[mesh.cells[piece]]
+    return np.asarray(np.einsum("qkr,mkx->mqxr", shape.slopes, corners, optimize=True))
+
+
+def check_jacobians(mesh: SolidMesh, shape: Shape) -> None:
+    """Refuse cells that are inside out or flat at a quadrature point; the message names them."""
+    bad: list[int] = []
+    for piece in chunks(mesh, shape):
+        jacobian = _jacobians(mesh, shape, piece)
+        # relative to a cube with the cell's edges, so that small cells are not taken for flat ones
+        size = np.linalg.norm(jacobian, axis=(2, 3)) ** 3
+        flat = np.linalg.det(jacobian) <= 1e-12 * size
+        bad.extend(piece.start + np.flatnonzero(flat.any(axis=1)))
+    if not bad:
+        return
+    named = []
+    for cell in bad[:5]:
+        x, y, z = mesh.points[mesh.cells[cell]].mean(axis=0)
+        nodes = ", ".join(str(mesh.numbers[node]) for node in mesh.cells[cell][:4])
+        named.append(
+            f"cell {mesh.cell_numbers[cell]} (nodes {nodes}, ...) near ({x:.6g}, {y:.6g}, {z:.6g}) m"
+        )
+    more = f" and {len(bad) - 5} more" if len(bad) > 5 else ""
+    raise input_error(
+        "mesh",
+        f"{len(bad)} of {len(mesh.cells)} cells have a zero or negative Jacobian: "
+        + "; ".join(named)
+        + more,
+        "Check the node order (VTK's) if all of them do; else move mid-side nodes to the middle of their edges "
+        "(gmsh: Mesh.SecondOrderLinear = 1) or mesh finer where the surface is curved.",
+    )
+
+
+class NodeBlocks:
+    """Adds blocks of node pairs of cells up to sparse matrices over the nodes that are kept.
+
+    Parameters
+    ----------
+    mesh
+        Gives the pairs.
+    kept
+        (n,) whether a node's rows and columns are wanted.
+    """
+
+    def __init__(self, mesh: SolidMesh, kept: BoolArray) -> None:
+        self.n = int(kept.sum())
+        new = np.where(kept, np.cumsum(kept) - 1, -1)[mesh.cells]
+        rows, columns = new[:, :, None], new[:, None, :]
+        outside = self.n**2  # one place for all that is dropped
+        pair = np.where((rows < 0) | (columns < 0), outside, rows * self.n + columns)
+        pairs, place = np.unique(pair.ravel(), return_inverse=True)
+        self._place = place.astype(np.int32).reshape(len(mesh.cells), -1)
+        self._size = int(np.searchsorted(pairs, outside))
+        self._columns = (pairs[: self._size] % self.n).astype(np.int32)
+        counts = np.bincount(pairs[: self._size] // self.n, minlength=self.n)
+        self._starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+
+    def zeros(self, entries: int) -> FloatArray:
+        """Return an empty store for `entries` numbers a pair."""
+        return np.zeros((self._size + 1, entries))
+
+    def add(self, store: FloatArray, piece: slice, values: FloatArray) -> None:
+        """Add the numbers (m, k, k, entries) of a piece of the cells to `store`."""
+        place = self._place[piece].ravel()
+        starts = np.arange(len(place) + 1, dtype=np.int32)
+        gather = scipy.sparse.csc_array(
+            (np.ones(len(place)), place, starts), shape=(len(store), len(place))
+        )
+        store += gather @ values.reshape(len(place), -1)
+
+    def matrix(self, store: FloatArray) -> Matrix:
+        """Return the (3n, 3n) CSR matrix of a store of 3 x 3 blocks; a single number stands on a block's diagonal."""
+        numbers = store[: self._size]
+        blocks = numbers[:, :, None] * np.eye(3) if store.shape[1] == 1 else numbers
+        blocks = blocks.reshape(-1, 3, 3)
+        shape = (3 * self.n, 3 * self.n)
+        return scipy.sparse.bsr_array((blocks, self._columns, self._starts), shape=shape).tocsr()

@@ -1,0 +1,159 @@
+"""Block Lanczos iteration for the lowest modes of large structures.
+
+R. G. Grimes, J. G. Lewis and H. D. Simon, "A shifted block Lanczos algorithm for solving sparse symmetric generalized
+eigenproblems", SIAM Journal on Matrix Analysis and Applications 15 (1994) 228-272; here with full reorthogonalisation and
+one shift.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from stickslip.arrays import FloatArray, Matrix
+from stickslip.errors import input_error
+from stickslip.model.fe.factorisation import Solve
+
+BLOCK = 8  # vectors solved for together
+CONVERGED = 1e-10  # residual of a mode over its eigenvalue; the frequency's error is its square
+PROBE = 2  # new directions that look for equal frequencies beyond the eight
+STEPS = 5  # with them
+KNOWN = 1e-10  # a change of an eigenvalue above which they have found one
+ROUNDING = 1e-14  # the same over the largest eigenvalue: nothing below can be reached
+NOTHING = (
+    1e-24,
+    1e-12,
+)  # squared length over the largest, at first and once normalised: only rounding
+
+
+def lanczos(
+    mass: Matrix, n: int, solve: Solve, shift: float, kind: type
+) -> tuple[FloatArray, Matrix]:
+    """Return the `n` eigenvalues of ``K φ = λ M φ`` nearest to `shift`, and M-orthonormal vectors.
+
+    Parameters
+    ----------
+    mass
+        (size, size), positive semidefinite.
+    n
+        At most the rank of the mass.
+    solve
+        Solves with ``K − shift M``.
+    shift
+        Between eigenvalues.
+    kind
+        `float` or `complex`.
+
+    Raises
+    ------
+    InputError
+        If the rank of the mass is below `n`.
+
+    Notes
+    -----
+    The Krylov space of ``(K − shift M)⁻¹ M``, which is self-adjoint in the mass, is built from blocks; its image at the
+    start keeps out what has no mass. A Krylov space holds no more vectors of one eigenvalue than a block has. So new directions
+    have their say once all has converged, until they bring nothing new.
+    """
+    size = mass.shape[0]
+    random = np.random.default_rng(0)  # the same in every run
+
+    def operate(block: Matrix) -> Matrix:
+        return solve(mass @ block)
+
+    def fresh(count: int) -> Matrix:
+        block = operate(random.standard_normal((size, count)).astype(kind))
+        length = np.sqrt(np.sum((block.conj() * (mass @ block)).real, axis=0))
+        return block / np.where(length > 0, length, 1.0)
+
+    basis = np.empty((size, min(size, 2 * n + 12 * BLOCK)), dtype=kind, order="F")
+    projected: Matrix = np.zeros((0, 0), dtype=kind)
+    known, turn = basis[:, :0], np.zeros((0, 0))
+    largest: FloatArray = np.zeros(0)
+    block = _orthonormal(mass, fresh(min(BLOCK, size)), known, fresh)
+    before, pause = largest, 0
+    while block.shape[1]:
+        basis, known = _appended(basis, len(projected), block)
+        image = operate(block)
+        column = known.conj().T @ (mass @ image)
+        image -= known @ column
+        projected = _bordered(projected, column)
+        block = _orthonormal(mass, image, known, fresh)
+        pause -= 1
+        if (len(projected) < n or pause > 0) and block.shape[1]:
+            continue
+        largest, turn = _largest(projected, n)
+        rest = np.linalg.norm((block.conj().T @ (mass @ image)) @ turn[-image.shape[1] :], axis=0)
+        found = before.size and np.any(abs(largest - before) > KNOWN * abs(largest))
+        if np.all(rest <= np.maximum(CONVERGED * abs(largest), ROUNDING * abs(largest[0]))):
+            if before.size and not found:
+                break
+            before, pause = largest, STEPS
+            block = _orthonormal(mass, _without(mass, fresh(min(PROBE, size)), known), known, fresh)
+        elif found and block.shape[1] < BLOCK:  # there may be many more
+            more = _without(mass, fresh(BLOCK - block.shape[1]), known)
+            block = _orthonormal(mass, np.hstack([block, more]), known, fresh)
+    rank = int(np.count_nonzero(abs(largest) > ROUNDING * np.max(abs(largest), initial=0.0)))
+    if rank < n:
+        raise input_error(
+            "normal_modes",
+            f"{n} asked of {size} dofs whose mass has the rank {rank}",
+            "Ask for at most as many.",
+        )
+    return shift + 1.0 / largest, known @ turn
+
+
+def _largest(projected: Matrix, n: int) -> tuple[FloatArray, Matrix]:
+    """Return the `n` eigenvalues of largest magnitude, and their vectors."""
+    values, vectors = np.linalg.eigh(projected, UPLO="U")
+    chosen = np.argsort(-abs(values))[:n]
+    return values[chosen], vectors[:, chosen]
+
+
+def _without(mass: Matrix, block: Matrix, known: Matrix) -> Matrix:
+    """Return `block` without its share in the M-orthonormal `known`."""
+    return block - known @ (known.conj().T @ (mass @ block))
+
+
+def _appended(basis: Matrix, count: int, block: Matrix) -> tuple[Matrix, Matrix]:
+    """Return the basis with `block` after its first `count` columns, enlarged where needed, and its used part."""
+    end = count + block.shape[1]
+    if end > basis.shape[1]:
+        larger = np.empty((len(basis), 2 * end), dtype=basis.dtype, order="F")
+        larger[:, :count] = basis[:, :count]
+        basis = larger
+    basis[:, count:end] = block
+    return basis, basis[:, :end]
+
+
+def _bordered(projected: Matrix, column: Matrix) -> Matrix:
+    """Return the projected operator with new columns; only its upper triangle is used."""
+    old, end = len(projected), len(column)
+    larger = np.zeros((end, end), dtype=column.dtype)
+    larger[:old, :old] = projected
+    larger[:, old:] = column
+    return larger
+
+
+def _orthonormal(
+    mass: Matrix, image: Matrix, known: Matrix, fresh: Callable[[int], Matrix]
+) -> Matrix:
+    """Return M-orthonormal columns of `image`, which was made M-orthogonal to `known` once.
+
+    That left rounding errors of the size of what was removed, hence once more. Columns of nothing
+    but such errors give way to new directions, as long as there are any.
+    """
+    block, added = image, False
+    for again in (False, True, True):
+        heavy = mass @ block
+        reference = np.max(np.sum((block.conj() * heavy).real, axis=0), initial=0.0)
+        if again:
+            block = block - known @ (known.conj().T @ heavy)
+            heavy = mass @ block
+        squares, turn = np.linalg.eigh(block.conj().T @ heavy)
+        weak = squares <= NOTHING[again] * reference
+        block = (block @ turn[:, ~weak]) / np.sqrt(squares[~weak])
+        if np.any(weak) and not again:
+            block, added = np.hstack([block, fresh(int(np.count_nonzero(weak)))]), True
+        elif again and not added:
+            break
+    return block

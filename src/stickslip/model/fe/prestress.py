@@ -1,0 +1,139 @@
+"""Strain energy of a loaded elastic solid to second order: what a static displacement adds to the stiffness.
+
+St. Venant-Kirchhoff's law, total Lagrangian: Green strain, second Piola-Kirchhoff stress ``λ tr(E) I + 2 G E``.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import FloatArray, Matrix
+from stickslip.model.fe.elements import NodeBlocks, Shape, chunks, gradients
+from stickslip.model.fe.solid import Materials, lame_constants
+from stickslip.model.mesh.solid_mesh import SolidMesh
+
+PAIRS = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)]  # rows of a strain vector, shears doubled
+
+
+@dataclass(frozen=True, eq=False)
+class PrestressTerms:
+    """Parts of the tangent stiffness at a displacement u; the stiffness at rest is not among them.
+
+    Parameters
+    ----------
+    linear
+        (n, n) initial-displacement terms linear in u.
+    quadratic
+        (n, n) those quadratic in u.
+    geometric
+        (n, n) stress stiffness: linear in u where the stress is that of linear elasticity.
+    """
+
+    linear: Matrix
+    quadratic: Matrix
+    geometric: Matrix
+
+
+def prestress_terms(
+    mesh: SolidMesh,
+    material: Materials,
+    shape: Shape,
+    places: NodeBlocks,
+    displacement: FloatArray,
+    *,
+    green: bool = False,
+) -> PrestressTerms:
+    """Integrate the terms that a static displacement adds to the stiffness.
+
+    Parameters
+    ----------
+    mesh, material, shape, places
+        What is integrated, where, and where it goes.
+    displacement
+        (nodes, 3) in metres.
+    green
+        Take the stress of the Green strain; else that of the small strain, which is linear in the displacement.
+    """
+    lame = lame_constants(mesh, material)
+    stores = [places.zeros(9), places.zeros(9), places.zeros(1)]
+    for piece in chunks(mesh, shape):
+        slopes, volume = gradients(mesh, shape, piece)
+        turn = displacement_gradients(mesh, slopes, piece, displacement)
+        small = _strain_operator(np.broadcast_to(np.eye(3), turn.shape), slopes)
+        large = _strain_operator(turn, slopes)
+        m, q, k, _ = slopes.shape
+        stressed = (volume[:, :, None, None] * (_elasticity(lame[piece]) @ large)).reshape(
+            m, 6 * q, 3 * k
+        )
+        mixed = small.reshape(m, 6 * q, 3 * k).transpose(0, 2, 1) @ stressed
+        square = large.reshape(m, 6 * q, 3 * k).transpose(0, 2, 1) @ stressed
+        stress = volume[:, :, None, None] * second_stress(lame[piece], turn, green)
+        pulled = np.matmul(slopes, stress).transpose(0, 2, 1, 3).reshape(m, k, 3 * q)
+        geometric = pulled @ slopes.transpose(0, 1, 3, 2).reshape(m, 3 * q, k)
+        places.add(stores[0], piece, _blocks(mixed + mixed.transpose(0, 2, 1)))
+        places.add(stores[1], piece, _blocks(square))
+        places.add(stores[2], piece, geometric[..., None])
+    return PrestressTerms(*(places.matrix(store) for store in stores))
+
+
+def internal_force(
+    mesh: SolidMesh, material: Materials, shape: Shape, displacement: FloatArray
+) -> FloatArray:
+    """Return the (nodes, 3) forces in N that hold the solid at a finite displacement (nodes, 3)."""
+    force, lame = np.zeros_like(mesh.points), lame_constants(mesh, material)
+    for piece in chunks(mesh, shape):
+        slopes, volume = gradients(mesh, shape, piece)
+        turn = displacement_gradients(mesh, slopes, piece, displacement)
+        first = (np.eye(3) + turn) @ second_stress(lame[piece], turn, green=True)
+        pull = np.einsum("mqac,mqkc,mq->mka", first, slopes, volume, optimize=True)
+        nodes = mesh.cells[piece].ravel()
+        for axis in range(3):
+            force[:, axis] += np.bincount(nodes, pull[..., axis].ravel(), minlength=len(force))
+    return force
+
+
+def displacement_gradients(
+    mesh: SolidMesh, slopes: FloatArray, piece: slice, displacement: FloatArray
+) -> FloatArray:
+    """Return (m, q, 3, 3) gradients ``∂u_a / ∂x_b`` of a displacement (nodes, 3) in a piece of the cells."""
+    moved = displacement[mesh.cells[piece]].transpose(0, 2, 1)
+    return np.asarray(moved[:, None] @ slopes)
+
+
+def second_stress(lame: FloatArray, turn: FloatArray, green: bool) -> FloatArray:
+    """Return the (m, q, 3, 3) stress in Pa of displacement gradients: of their Green or their small strain.
+
+    `lame` holds Lamé's constants (m, 2).
+    """
+    strain = (turn + np.swapaxes(turn, -1, -2)) / 2
+    if green:
+        strain = strain + np.swapaxes(turn, -1, -2) @ turn / 2
+    first, second = lame.T[:, :, None, None, None]
+    trace = np.trace(strain, axis1=-2, axis2=-1)[..., None, None]
+    return np.asarray(first * trace * np.eye(3) + 2 * second * strain)
+
+
+def _strain_operator(turn: FloatArray, slopes: FloatArray) -> FloatArray:
+    """Return (m, q, 6, 3k): ``sym(turnᵀ ∇v)`` of the k nodes' displacements v, shears doubled."""
+    product = np.einsum("mqac,mqkd->mqcdka", turn, slopes)
+    rows = [
+        product[:, :, c, d] if c == d else product[:, :, c, d] + product[:, :, d, c]
+        for c, d in PAIRS
+    ]
+    stacked = np.stack(rows, axis=2)
+    return stacked.reshape(*stacked.shape[:3], -1)
+
+
+def _elasticity(lame: FloatArray) -> FloatArray:
+    """Return (m, 1, 6, 6) matrices from strain vectors to stress vectors."""
+    first, second = lame.T[:, :, None, None]
+    volume = np.zeros((6, 6))
+    volume[:3, :3] = 1.0
+    law = first * volume + second * np.diag([2.0] * 3 + [1.0] * 3)
+    return np.asarray(law[:, None])
+
+
+def _blocks(matrix: FloatArray) -> FloatArray:
+    """Return (m, 3k, 3k) as (m, k, k, 9) blocks of node pairs."""
+    m, k = len(matrix), matrix.shape[1] // 3
+    return matrix.reshape(m, k, 3, k, 3).transpose(0, 1, 3, 2, 4).reshape(m, k, k, 9)

@@ -1,0 +1,345 @@
+"""Elastic solids that rotate: centrifugal load, its static displacement, and the matrices of small vibrations about it.
+
+In axes that turn with the solid, ``M ü + (C + 2 Ω G) u̇ + K(Ω) u = f``.
+"""
+
+import hashlib
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
+from stickslip.errors import SingularError, StickslipError, did_you_mean, input_error
+from stickslip.model.axis import Axis
+from stickslip.model.fe.elements import EXACT, NodeBlocks, Quadrature, Shape, shape_functions
+from stickslip.model.fe.factorisation import factorise
+from stickslip.model.fe.prestress import PrestressTerms, internal_force, prestress_terms
+from stickslip.model.fe.solid import Materials, integrate, node_dofs, support
+from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.structure import Structure
+
+Tangent = Literal["consistent", "textbook", "nonlinear"]
+TANGENTS = ("consistent", "textbook", "nonlinear")
+Z_AXIS = Axis()
+NEWTON_STEPS = 25
+BALANCED = 1e-10  # residual of the nonlinear statics as a fraction of the centrifugal load
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedPolynomial:
+    """A stiffness that is a polynomial of the speed: ``rest + Ω² square + Ω⁴ fourth``.
+
+    Parameters
+    ----------
+    rest, square, fourth
+        (n, n) CSR matrices in N/m, N s²/m, N s⁴/m; `fourth` is None where there is none.
+    """
+
+    rest: Matrix
+    square: Matrix
+    fourth: Matrix | None = None
+
+    def at(self, speed: float) -> Matrix:
+        """Return the stiffness in N/m at `speed` in rad/s."""
+        stiffness = self.rest + speed**2 * self.square
+        if self.fourth is not None:
+            stiffness = stiffness + speed**4 * self.fourth
+        return scipy.sparse.csr_array(stiffness)
+
+
+@dataclass(frozen=True, eq=False)
+class RotatingSolid:
+    """An elastic solid about an axis of rotation; `rotating_solid` makes one.
+
+    Parameters
+    ----------
+    structure
+        The solid at rest.
+    mesh, material, axis, quadrature
+        What it was made of.
+    moving
+        (n,) place of each dof among the x, y, z of all nodes, node-major.
+    nodal_mass
+        (nodes, nodes) ``∫ ρ N_i N_j`` in kg.
+    centrifugal
+        (n,) centrifugal load at 1 rad/s, in N s².
+    """
+
+    structure: Structure
+    mesh: SolidMesh
+    material: Materials
+    axis: Axis
+    quadrature: Quadrature
+    moving: IntArray
+    nodal_mass: Matrix
+    centrifugal: FloatArray
+    _displacements: dict[str, FloatArray] = field(default_factory=dict, init=False, repr=False)
+    _polynomials: dict[tuple[str, str], SpeedPolynomial] = field(
+        default_factory=dict, init=False, repr=False
+    )
+
+    @cached_property
+    def spin_softening(self) -> Matrix:
+        """(n, n) S in kg; rotation takes ``Ω² S`` off the stiffness."""
+        perpendicular = -self.axis.cross @ self.axis.cross
+        return self._of_mass(perpendicular)
+
+    @cached_property
+    def coriolis(self) -> Matrix:
+        """(n, n) skew G in kg; rotation adds ``2 Ω G`` to the damping."""
+        return self._of_mass(self.axis.cross)
+
+    def _of_mass(self, block: FloatArray) -> Matrix:
+        """Return the matrix with a share of `block` (3, 3) for each pair of nodes."""
+        return self._of_dofs(scipy.sparse.kron(self.nodal_mass, block, format="csr"))
+
+    @property
+    def free(self) -> BoolArray:
+        """(nodes,) which nodes can move."""
+        free = np.zeros(len(self.mesh.points), dtype=bool)
+        free[self.moving // 3] = True
+        return free
+
+    def at_nodes(self, vector: FloatArray) -> FloatArray:
+        """Return a vector (n,) as (nodes, 3), with zeros where nodes are held."""
+        full = np.zeros(self.mesh.points.size, dtype=vector.dtype)
+        full[self.moving] = vector
+        return full.reshape(-1, 3)
+
+    def _of_dofs(self, matrix: Matrix) -> Matrix:
+        """Return a matrix of the x, y, z of all nodes, or of all free nodes, without the components that are held."""
+        index = self.moving
+        if matrix.shape[0] < self.mesh.points.size:
+            index = np.searchsorted(node_dofs(np.flatnonzero(self.free)), index)
+        whole = len(index) == matrix.shape[0]
+        return matrix if whole else scipy.sparse.csr_array(matrix[index][:, index])
+
+    def centrifugal_load(self, speed: float) -> FloatArray:
+        """Return the (n,) load in N at `speed` in rad/s, on the undeformed solid."""
+        return speed**2 * self.centrifugal
+
+    def displacement(
+        self, speed: float, *, tie: Matrix | None = None, nonlinear: bool = False
+    ) -> FloatArray:
+        """Return the static displacement under the centrifugal load.
+
+        Parameters
+        ----------
+        speed
+            In rad/s.
+        tie
+            (n, m) sparse: displacements ``tie @ q`` are admissible (a cyclic sector's tie at wave number 0); None: all.
+        nonlinear
+            Find the equilibrium at finite displacement (St. Venant-Kirchhoff, load on the deformed solid) by Newton's
+            method; else solve ``K u = f`` as linear elasticity and as the solvers' linear static step does.
+
+        Returns
+        -------
+        FloatArray
+            (n,) in metres.
+
+        Raises
+        ------
+        SingularError
+            If nothing holds the solid.
+        StickslipError
+            If Newton's method finds no equilibrium.
+        """
+        _check_speed(speed)
+        linear = speed**2 * self._unit_displacement(tie)
+        return self._equilibrium(speed, tie, linear)[0] if nonlinear else linear
+
+    def polynomial(
+        self, tie: Matrix | None = None, *, tangent: Tangent = "consistent"
+    ) -> SpeedPolynomial:
+        """Return the stiffness as a polynomial of the speed, exact where the static displacement is linear.
+
+        Parameters
+        ----------
+        tie
+            As in `displacement`. Nothing is computed twice for the same tie.
+        tangent
+            As in `at_speed`; ``"nonlinear"`` has no polynomial.
+        """
+        if tangent not in TANGENTS[:2]:
+            raise input_error(
+                "RotatingSolid.polynomial",
+                f"tangent {tangent!r} is no polynomial of the speed",
+                "Use 'consistent' or 'textbook', or at_speed.",
+            )
+        key = (_content(tie), tangent)
+        if key not in self._polynomials:
+            self._polynomials[key] = self._assemble_polynomial(tie, tangent)
+        return self._polynomials[key]
+
+    def at_speed(
+        self,
+        speed: float,
+        *,
+        tie: Matrix | None = None,
+        tangent: Tangent = "consistent",
+        coriolis: bool = False,
+    ) -> Structure:
+        """Return the structure of small vibrations about the state of steady rotation.
+
+        Parameters
+        ----------
+        speed
+            In rad/s; its sign matters to the Coriolis matrix alone.
+        tie
+            As in `displacement`: used for the static displacement; the structure itself stays untied.
+        tangent
+            ``"consistent"``: the tangent ``K_L(u0) + K_G(σ) − Ω² S`` at the linear static displacement u0, with
+            initial-displacement terms. ``"textbook"``: ``K + K_G(σ) − Ω² S`` without them, which is off by the order
+            of the static strain. ``"nonlinear"``: the exact tangent at the equilibrium at finite displacement.
+        coriolis
+            Add ``2 Ω G`` to the damping.
+        """
+        _check_speed(speed)
+        if tangent not in TANGENTS:
+            raise input_error(
+                "RotatingSolid.at_speed",
+                f"there is no tangent {tangent!r}",
+                did_you_mean(tangent, list(TANGENTS)),
+            )
+        if tangent == "nonlinear":
+            start = speed**2 * self._unit_displacement(tie)
+            stiffness = self._equilibrium(speed, tie, start)[1]
+        else:
+            stiffness = self.polynomial(tie, tangent=tangent).at(speed)
+        damping = self.structure.damping
+        if coriolis:
+            damping = scipy.sparse.csr_array(damping + 2 * speed * self.coriolis)
+        return replace(self.structure, stiffness=stiffness, damping=damping)
+
+    @cached_property
+    def _places(self) -> NodeBlocks:
+        return NodeBlocks(self.mesh, self.free)
+
+    @cached_property
+    def _shape(self) -> Shape:
+        return shape_functions(self.mesh.cells.shape[1], self.quadrature.stiffness)
+
+    def _terms(self, displacement: FloatArray, green: bool = False) -> PrestressTerms:
+        where = self.at_nodes(displacement)
+        terms = prestress_terms(
+            self.mesh, self.material, self._shape, self._places, where, green=green
+        )
+        parts = (terms.linear, terms.quadratic, terms.geometric)
+        return PrestressTerms(*(self._of_dofs(part) for part in parts))
+
+    def _unit_displacement(self, tie: Matrix | None) -> FloatArray:
+        """Return the linear static displacement (n,) at 1 rad/s, in m s²."""
+        key = _content(tie)
+        if tie is not None and tie.shape[0] != self.structure.n:
+            raise input_error(
+                "RotatingSolid: tie",
+                f"has {tie.shape[0]} rows for {self.structure.n} dofs",
+                "Use the tie of a sector made of this solid's structure.",
+            )
+        if key not in self._displacements:
+            self._displacements[key] = _solve(self.structure.stiffness, self.centrifugal, tie)
+        return self._displacements[key]
+
+    def _equilibrium(
+        self, speed: float, tie: Matrix | None, start: FloatArray
+    ) -> tuple[FloatArray, Matrix]:
+        """Return displacement (n,) and tangent (n, n) of the equilibrium at finite displacement."""
+        displacement, S = start, self.spin_softening
+        goal = BALANCED * np.linalg.norm(_on_tie(self.centrifugal_load(speed), tie))
+        for _ in range(NEWTON_STEPS):
+            where = self.at_nodes(displacement)
+            inner = internal_force(self.mesh, self.material, self._shape, where)
+            inner = inner.ravel()[self.moving]
+            outer = speed**2 * (self.centrifugal + S @ displacement)
+            terms = self._terms(displacement, green=True)
+            stiffness = self.structure.stiffness + terms.linear + terms.quadratic + terms.geometric
+            stiffness = scipy.sparse.csr_array(stiffness - speed**2 * S)
+            if np.linalg.norm(_on_tie(outer - inner, tie)) <= goal:
+                return displacement, stiffness
+            displacement = displacement + _solve(stiffness, outer - inner, tie)
+        raise StickslipError(
+            f"RotatingSolid: Newton's method found no equilibrium at {speed:g} rad/s in {NEWTON_STEPS} steps. "
+            "The solid may be unstable at this speed: try a lower one, and look at displacement(speed)."
+        )
+
+    def _assemble_polynomial(self, tie: Matrix | None, tangent: Tangent) -> SpeedPolynomial:
+        terms = self._terms(self._unit_displacement(tie))
+        square = terms.geometric - self.spin_softening
+        if tangent == "textbook":
+            return SpeedPolynomial(self.structure.stiffness, square)
+        return SpeedPolynomial(self.structure.stiffness, square + terms.linear, terms.quadratic)
+
+
+def rotating_solid(
+    mesh: SolidMesh,
+    material: Materials,
+    axis: Axis = Z_AXIS,
+    *,
+    clamped: tuple[str, ...] = ("root",),
+    held: BoolArray | None = None,
+    quadrature: Quadrature = EXACT,
+) -> RotatingSolid:
+    """Assemble a solid that rotates about an axis, and its supports with it.
+
+    Parameters
+    ----------
+    mesh, material, clamped, held, quadrature
+        As in `assemble_solid`.
+    axis
+        Axis of rotation.
+
+    Returns
+    -------
+    RotatingSolid
+        Matrices at rest, load, Coriolis matrix and spin softening at once; what depends on the static displacement
+        when it is asked for.
+
+    Raises
+    ------
+    InputError
+        As `assemble_solid` does.
+    """
+    mass, stiffness = integrate(mesh, material, quadrature)
+    structure, moving = support(mesh, mass, stiffness, clamped, held)
+    # positions are interpolated like displacements, so the mass matrix integrates the load exactly
+    load = (mass @ axis.arm(mesh.points).ravel())[moving]
+    nodal_mass = scipy.sparse.csr_array(mass[::3][:, ::3])
+    return RotatingSolid(structure, mesh, material, axis, quadrature, moving, nodal_mass, load)
+
+
+def _content(tie: Matrix | None) -> str:
+    """Return a name that two ties share only if they are equal; sectors make theirs anew each time."""
+    if tie is None:
+        return ""
+    tie = scipy.sparse.csr_array(tie)
+    digest = hashlib.sha256(repr(tie.shape).encode())
+    for part in (tie.indptr, tie.indices, tie.data):
+        digest.update(np.ascontiguousarray(part).tobytes())
+    return digest.hexdigest()
+
+
+def _solve(stiffness: Matrix, load: FloatArray, tie: Matrix | None) -> FloatArray:
+    inner = stiffness if tie is None else scipy.sparse.csr_array(tie.T @ stiffness @ tie)
+    try:
+        solve = factorise(inner)
+    except SingularError as error:
+        raise SingularError(
+            f"RotatingSolid: the static displacement under the centrifugal load is not determined ({error}). "
+            "Clamp nodes that hold the solid, also along the axis and around it."
+        ) from error
+    found = solve(_on_tie(load, tie))
+    return np.asarray(found if tie is None else tie @ found)
+
+
+def _on_tie(force: FloatArray, tie: Matrix | None) -> FloatArray:
+    return force if tie is None else np.asarray(tie.T @ force)
+
+
+def _check_speed(speed: float) -> None:
+    if not math.isfinite(speed):
+        raise input_error("speed", f"must be a number in rad/s, got {speed}", "Give rad/s.")

@@ -1,0 +1,319 @@
+"""Linear elastic solids: consistent mass and stiffness of tetrahedra and hexahedra.
+
+scikit-fem is imported only when a solid is assembled.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
+from stickslip.errors import did_you_mean, input_error
+from stickslip.model.dofs import nodal_dofs
+from stickslip.model.fe.elements import (
+    EXACT,
+    HEX_EDGES,
+    TET_EDGES,
+    Quadrature,
+    check_jacobians,
+    library,
+    library_element,
+    shape_functions,
+)
+from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.structure import Structure
+
+CUT_FACES = ("cyclic_low", "cyclic_high")  # these sets may lose nodes to a clamp
+
+
+@dataclass(frozen=True, kw_only=True)
+class Material:
+    """An isotropic elastic material.
+
+    Parameters
+    ----------
+    young_modulus
+        In Pa.
+    poisson_ratio
+        Between 0 (included) and 1/2.
+    density
+        In kg/m³.
+    """
+
+    young_modulus: float = 210e9
+    poisson_ratio: float = 0.3
+    density: float = 7850.0
+
+    def __post_init__(self) -> None:
+        for name in ("young_modulus", "density"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise input_error(
+                    f"Material.{name}", f"must be positive, got {value}", "Use SI units."
+                )
+        if not 0 <= self.poisson_ratio < 0.5:
+            raise input_error(
+                "Material.poisson_ratio",
+                f"must be at least 0 and below 1/2, got {self.poisson_ratio}",
+                "Steel has about 0.3.",
+            )
+
+    @property
+    def lame(self) -> tuple[float, float]:
+        """Lamé's constants λ and G in Pa."""
+        e, nu = self.young_modulus, self.poisson_ratio
+        return e * nu / ((1 + nu) * (1 - 2 * nu)), e / (2 * (1 + nu))
+
+
+Materials = Material | Sequence[Material]  # one for all cells, or one for each
+
+
+def assemble_solid(
+    mesh: SolidMesh,
+    material: Materials,
+    *,
+    clamped: tuple[str, ...] = ("root",),
+    held: BoolArray | None = None,
+    quadrature: Quadrature = EXACT,
+) -> Structure:
+    """Assemble mass and stiffness, with the nodes of the sets `clamped` removed.
+
+    Parameters
+    ----------
+    mesh
+        Any mesh; one without ``root`` stays free unless `clamped` names other sets.
+    material
+        Its material, or a list of m materials, one for each cell.
+    clamped
+        Names of node sets whose nodes do not move.
+    held
+        (nodes, 3) components x, y, z that are supported besides.
+    quadrature
+        The rules; the default integrates straight-edged cells exactly.
+
+    Returns
+    -------
+    Structure
+        Sparse, undamped; `Dofs.node` holds the mesh's node numbers. Each other node set becomes a set of dofs,
+        node-major (x, y, z) without the components that are held; ``cyclic_low`` and ``cyclic_high`` lose their clamped nodes.
+
+    Raises
+    ------
+    InputError
+        If the mesh has nodes without elements or cells inside out, neighbours that do not share their mid-side nodes,
+        `clamped` names an unknown set, or a set has clamped nodes.
+    """
+    mass, stiffness = integrate(mesh, material, quadrature)
+    return support(mesh, mass, stiffness, clamped, held)[0]
+
+
+def _clamped_nodes(mesh: SolidMesh, clamped: tuple[str, ...]) -> BoolArray:
+    """Return which nodes (n,) belong to the node sets named `clamped`; ``root`` need not be there."""
+    held = np.zeros(len(mesh.points), dtype=bool)
+    for name in clamped:
+        if name in mesh.node_sets:
+            held[mesh.node_sets[name]] = True
+        elif name != "root":
+            raise input_error(
+                "clamped",
+                f"there is no node set {name!r}",
+                did_you_mean(name, list(mesh.node_sets)),
+            )
+    return held
+
+
+def support(
+    mesh: SolidMesh,
+    mass: Matrix,
+    stiffness: Matrix,
+    clamped: tuple[str, ...],
+    held: BoolArray | None,
+) -> tuple[Structure, IntArray]:
+    """Take supported components out of the matrices of a free body.
+
+    Returns
+    -------
+    tuple[Structure, IntArray]
+        The structure, and the place (n,) of each of its dofs among those of the free body.
+    """
+    still = _clamped_nodes(mesh, clamped)
+    fixed = np.repeat(still[:, None], 3, axis=1)
+    if held is not None:
+        if held.shape != fixed.shape:
+            raise input_error(
+                "held",
+                f"has shape {held.shape} for {len(still)} nodes",
+                "Give x, y, z of each node.",
+            )
+        fixed = fixed | held
+    moving = np.flatnonzero(~fixed.ravel())
+    new = np.full(fixed.size, -1)
+    new[moving] = np.arange(len(moving))
+    sets = {}
+    for name, members in mesh.node_sets.items():
+        if name in clamped:
+            continue
+        if still[members].any() and name not in CUT_FACES:
+            raise input_error(
+                f"mesh: node set {name!r}",
+                f"holds clamped nodes, e.g. {mesh.numbers[members[still[members]][0]]}",
+                f"Take them out of {' or '.join(repr(c) for c in clamped)} or out of the set.",
+            )
+        index = new[node_dofs(members)]
+        sets[name] = index[index >= 0]
+    mass, stiffness = mass[moving][:, moving], stiffness[moving][:, moving]
+    damping = scipy.sparse.csr_array(mass.shape)
+    table = nodal_dofs(mesh.points, mesh.numbers).take(moving)
+    return Structure(mass, damping, stiffness, table, sets), moving
+
+
+def node_dofs(nodes: IntArray) -> IntArray:
+    """Return the x, y, z dofs of `nodes` (node-major)."""
+    return np.asarray((3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel(), dtype=np.int64)
+
+
+def integrate(
+    mesh: SolidMesh, material: Materials, quadrature: Quadrature
+) -> tuple[Matrix, Matrix]:
+    """Return mass and stiffness of the free body, dofs node-major in the mesh's own order."""
+    check_nodes(mesh)
+    for degree in {quadrature.stiffness, quadrature.mass}:
+        check_jacobians(mesh, shape_functions(mesh.cells.shape[1], degree))
+    check_shared(mesh)
+    if isinstance(material, Material):
+        return _integrate(mesh, material, quadrature)
+    n = 3 * len(mesh.points)
+    mass, stiffness = scipy.sparse.csr_array((n, n)), scipy.sparse.csr_array((n, n))
+    known = list(dict.fromkeys(material))
+    which = np.array([known.index(m) for m in _of_cells(mesh, material)])
+    for index, one in enumerate(known):
+        cells = mesh.cells[which == index]
+        nodes, local = np.unique(cells, return_inverse=True)
+        part = SolidMesh(mesh.points[nodes], local.reshape(cells.shape), {})
+        rows = node_dofs(nodes)
+        place = scipy.sparse.csr_array(
+            (np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(n, len(rows))
+        )
+        M, K = _integrate(part, one, quadrature)
+        mass, stiffness = mass + place @ M @ place.T, stiffness + place @ K @ place.T
+    return scipy.sparse.csr_array(mass), scipy.sparse.csr_array(stiffness)
+
+
+def lame_constants(mesh: SolidMesh, material: Materials) -> FloatArray:
+    """Return Lamé's constants λ and G of each cell, (m, 2), in Pa."""
+    if isinstance(material, Material):
+        return np.tile(material.lame, (len(mesh.cells), 1))
+    return np.array([one.lame for one in _of_cells(mesh, material)])
+
+
+def _of_cells(mesh: SolidMesh, material: Sequence[Material]) -> Sequence[Material]:
+    if len(material) != len(mesh.cells):
+        raise input_error(
+            "material",
+            f"is a list of {len(material)} for {len(mesh.cells)} cells",
+            "Give one material, or one for each cell.",
+        )
+    return material
+
+
+def _integrate(
+    mesh: SolidMesh, material: Material, quadrature: Quadrature
+) -> tuple[Matrix, Matrix]:
+    """Integrate a body of one material.
+
+    Both matrices are put together from scalar integrals, ``∫ φ_p φ_q`` and ``∫ ∂_a φ_p ∂_b φ_q``:
+    ``K_ab = λ D_ab + G D_ba + G δ_ab Σ_c D_cc``. That costs a fraction of the vector-valued form.
+    """
+    bases, theirs = _bases(mesh, quadrature)
+
+    def assemble(integrand: Callable[..., FloatArray], degree: int) -> Matrix:
+        form = library().BilinearForm(integrand)
+        matrix = scipy.sparse.csr_array(form.assemble(bases[degree]))
+        return matrix[theirs][:, theirs]
+
+    gram = assemble(lambda u, v, _: u * v, quadrature.mass)
+    D = {}
+    for a in range(3):
+        for b in range(a, 3):
+            D[a, b] = assemble(
+                lambda u, v, _, a=a, b=b: v.grad[a] * u.grad[b], quadrature.stiffness
+            )
+            D[b, a] = D[a, b].T
+    first, second = material.lame
+    trace = second * (D[0, 0] + D[1, 1] + D[2, 2])
+    blocks = [
+        (first * D[a, b] + second * D[b, a] + (trace if a == b else 0 * trace), a, b)
+        for a in range(3)
+        for b in range(3)
+    ]
+    mass = scipy.sparse.kron(material.density * gram, np.eye(3), format="csr")
+    stiffness = sum(scipy.sparse.kron(block, _unit(a, b), format="csr") for block, a, b in blocks)
+    return mass, scipy.sparse.csr_array((stiffness + stiffness.T) / 2)
+
+
+def check_nodes(mesh: SolidMesh) -> None:
+    """Refuse nodes that belong to no cell."""
+    orphans = np.setdiff1d(np.arange(len(mesh.points)), mesh.cells)
+    if orphans.size:
+        raise input_error(
+            "mesh",
+            f"{orphans.size} nodes belong to no element, e.g. {mesh.numbers[orphans[0]]}",
+            "Remove them.",
+        )
+
+
+def _bases(mesh: SolidMesh, quadrature: Quadrature) -> tuple[dict[int, Any], IntArray]:
+    """Return scikit-fem's basis for each degree, and its dof of each of our nodes (n,)."""
+    skfem = library()
+    width = mesh.cells.shape[1]
+    element, order = library_element(width)
+    # the geometry has the shape functions of the displacement: affine on linear tetrahedra alone
+    grid = (skfem.MeshTet1 if width in (4, 10) else skfem.MeshHex1)(
+        np.ascontiguousarray(mesh.points.T),
+        np.ascontiguousarray(mesh.cells[:, order].T),
+        elem=type(element),
+        affine=width == 4,
+    )
+    degrees = {quadrature.stiffness, quadrature.mass}
+    bases = {degree: skfem.Basis(grid, element, intorder=degree) for degree in degrees}
+    # scikit-fem renumbers mid-side nodes: go from its dofs back to our nodes
+    theirs = np.empty(len(mesh.points), dtype=np.int64)
+    theirs[mesh.cells[:, order].T] = bases[quadrature.mass].element_dofs
+    return bases, theirs
+
+
+def check_shared(mesh: SolidMesh) -> None:
+    """Refuse edges of the same two corners with different mid-side nodes, and corners that are mid-side nodes."""
+    width = mesh.cells.shape[1]
+    corners = 4 if width in (4, 10) else 8
+    if width == corners:
+        return
+    edges = TET_EDGES if corners == 4 else HEX_EDGES
+    ends = np.sort(mesh.cells[:, np.array(edges)].reshape(-1, 2), axis=1)
+    middle = mesh.cells[:, corners:].ravel()
+    key = ends[:, 0] * len(mesh.points) + ends[:, 1]
+    _, first, edge = np.unique(key, return_index=True, return_inverse=True)
+    is_corner = np.zeros(len(mesh.points), dtype=bool)
+    is_corner[mesh.cells[:, :corners]] = True
+    # of all edges that a node is the middle of, the last one stays here: the others differ from it
+    owner = np.zeros(len(mesh.points), dtype=np.int64)
+    owner[middle] = edge
+    wrong = (middle[first][edge] != middle) | is_corner[middle] | (owner[middle] != edge)
+    if wrong.any():
+        cell, place = divmod(int(np.flatnonzero(wrong)[0]), len(edges))
+        raise input_error(
+            "mesh",
+            "neighbours do not share their mid-side nodes, or one has a node that is a corner or the middle of another edge: "
+            f"node {mesh.numbers[mesh.cells[cell, corners + place]]} of cell {mesh.cell_numbers[cell]}",
+            "Merge coincident nodes, and use cells of one order, their nodes in VTK's order.",
+        )
+
+
+def _unit(a: int, b: int) -> FloatArray:
+    unit = np.zeros((3, 3))
+    unit[a, b] = 1.0
+    return unit

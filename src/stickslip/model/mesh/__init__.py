@@ -1,0 +1,1 @@
+"""Meshes: shapes that gmsh meshes, and meshes of any source."""

@@ -1,0 +1,246 @@
+"""Geometry of one sector of a bladed disk.
+
+Rotation axis z, sector centred on +x, right-hand rule; the cyclic faces lie in the planes at plus and minus half the
+pitch. The mesher is in `model.sector_mesh`.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stickslip.arrays import BoolArray, FloatArray
+from stickslip.errors import InputError, input_error
+from stickslip.model.mesh.sector_parts import Airfoil, DiskProfile, Platform, Shroud
+
+
+@dataclass(frozen=True, kw_only=True)
+class BladedSector:
+    """One of `sectors` equal sectors of a bladed disk; the defaults are a steel wheel with 24 blades.
+
+    Parameters
+    ----------
+    sectors
+        How many make the wheel, at least 3.
+    disk
+        Cross-section of the disk.
+    platform
+        What carries the airfoil; None sets the airfoil on the rim.
+    airfoil
+        The blade.
+    shroud
+        None for blades that do not touch each other.
+    disk_size, platform_size, airfoil_size
+        Element sizes in metres, outward; a shroud has that of the platform.
+
+    Raises
+    ------
+    InputError
+        If the parts do not fit together, or reach into the neighbours.
+    """
+
+    sectors: int = 24
+    disk: DiskProfile = field(default_factory=DiskProfile)
+    platform: Platform | None = field(default_factory=Platform)
+    airfoil: Airfoil = field(default_factory=Airfoil)
+    shroud: Shroud | None = None
+    disk_size: float = 0.012
+    platform_size: float = 0.008
+    airfoil_size: float = 0.010
+
+    def __post_init__(self) -> None:
+        if self.sectors < 3 or self.sectors % 1:
+            raise _bad(
+                "sectors", f"must be a whole number from 3 on, got {self.sectors}", "Try 24."
+            )
+        for name in ("disk_size", "platform_size", "airfoil_size"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise _bad(name, f"must be positive and finite, got {value}", "Give metres.")
+        self._check_platform()
+        self._check_base()
+        self._check_neighbours()
+        self._check_shroud()
+
+    @property
+    def pitch(self) -> float:
+        """Angle of a sector in rad."""
+        return 2 * math.pi / self.sectors
+
+    @property
+    def base_radius(self) -> float:
+        """Radius at which the airfoil starts, in metres."""
+        return self.disk.rim_radius if self.platform is None else self.platform.top_radius
+
+    @property
+    def tip_radius(self) -> float:
+        """Radius of the plane in which the airfoil ends, in metres."""
+        return self.base_radius + self.airfoil.airfoil_length
+
+    @property
+    def platform_angle(self) -> float:
+        """Angle from one side face of the platform to the other, in rad; needs a platform."""
+        assert self.platform is not None
+        return self.pitch - self.platform.gap / self.platform.top_radius
+
+    @property
+    def shroud_radius(self) -> float:
+        """Radius of the shroud's middle, in metres; needs a shroud."""
+        assert self.shroud is not None
+        return self.base_radius + self.shroud.span * self.airfoil.airfoil_length
+
+    @property
+    def shroud_angle(self) -> float:
+        """Angle from one contact face of the shroud to the other, in rad; needs a shroud."""
+        assert self.shroud is not None
+        return self.pitch - self.shroud.gap / self.shroud_radius
+
+    def platform_outline(self) -> FloatArray:
+        """Return the (8, 2) corners (x, y) of neck and platform, +y side from the bottom up, then the other side down."""
+        assert self.platform is not None
+        p, slope = self.platform, math.tan(self.platform_angle / 2)
+        lower = p.top_radius - p.thickness
+        neck = p.neck_width / 2
+        meets = lower - (lower * slope - neck) * math.tan(p.underside_angle)
+        side = np.array(
+            [
+                [self._sunk(neck), neck],
+                [meets, neck],
+                [lower, lower * slope],
+                [p.top_radius, p.top_radius * slope],
+            ]
+        )
+        return np.vstack([side, side[::-1] * [1, -1]])
+
+    def airfoil_sections(self) -> list[FloatArray]:
+        """Return the sections (2 `SECTION_POINTS`, 3) through which the airfoil is lofted, from the base outward."""
+        sections = []
+        for span in (0.0, 0.5, 1.0):
+            outline = self.airfoil.section(span)
+            x = self.base_radius + span * self.airfoil.airfoil_length
+            if span == 0.0 and self.platform is None:
+                x = self._sunk(np.abs(outline[:, 0]).max())
+            sections.append(np.column_stack([np.full(len(outline), x), outline]))
+        return sections
+
+    def _sunk(self, half_width: float) -> float:
+        """Return the x at which something `half_width` wide to either side is inside the rim."""
+        rim = self.disk.rim_radius
+        return math.sqrt(max(rim**2 - half_width**2, 0.0)) - 0.1 * self.disk.rim_height
+
+    def _check_platform(self) -> None:
+        p, rim = self.platform, self.disk.rim_radius
+        if p is None:
+            return
+        if p.depth > self.disk.rim_width:
+            raise _bad(
+                "platform.depth",
+                f"{p.depth} m exceeds the rim's width {self.disk.rim_width} m",
+                "Make the rim wider or the platform less deep.",
+            )
+        room = 2 * (p.top_radius - p.thickness) * math.tan(self.platform_angle / 2)
+        if p.neck_width >= min(room, 2 * rim * math.sin(self.pitch / 2)):
+            raise _bad(
+                "platform.neck_width",
+                f"{p.neck_width} m reaches into the neighbours (the platform is {room:.6g} m wide)",
+                "Make the neck narrower or take fewer sectors.",
+            )
+        meets = self.platform_outline()[1]
+        if np.hypot(*meets) <= rim:
+            raise _bad(
+                "platform.top_radius",
+                f"{p.top_radius} m: the underside meets the neck at {meets[0]:.6g} m, inside the rim "
+                f"of radius {rim} m",
+                "Raise the platform, make it thinner, or its underside flatter.",
+            )
+
+    def _check_base(self) -> None:
+        y, z = np.abs(self.airfoil.section(0.0)).max(axis=0)
+        if self.platform is None:
+            name, half = "rim", self.disk.rim_radius * math.sin(self.pitch / 2)
+            depth, sunk = self.disk.rim_width, self._sunk(y)
+        else:
+            name, half = "platform", self.platform.top_radius * math.tan(self.platform_angle / 2)
+            depth, sunk = self.platform.depth, self._sunk(self.platform.neck_width / 2)
+        if y >= half or z >= depth / 2:
+            raise _bad(
+                "airfoil.hub_chord",
+                f"the hub section ({2 * y:.6g} m around, {2 * z:.6g} m along the axis) overhangs the {name} "
+                f"({2 * half:.6g} m, {depth:.6g} m)",
+                "Make the section smaller, or turn it by the stagger.",
+            )
+        if sunk <= self.disk.rim_radius - self.disk.rim_height:
+            raise _bad(
+                "disk.rim_height",
+                f"{self.disk.rim_height} m is too low for what the curved rim carries",
+                "Make the rim higher or what it carries narrower.",
+            )
+
+    def _check_neighbours(self) -> None:
+        for span in np.linspace(0.0, 1.0, 9):
+            outline = self.airfoil.section(float(span))
+            radius = self.base_radius + float(span) * self.airfoil.airfoil_length
+            arc = np.column_stack([radius * np.arctan2(outline[:, 0], radius), outline[:, 1]])
+            if np.any(_inside(arc + np.array([radius * self.pitch, 0.0]), arc)):
+                raise _bad(
+                    "airfoil",
+                    f"at {span:.3g} of its length the airfoil reaches into the neighbour's",
+                    "Take fewer sectors, or less stagger, chord, camber or thickness.",
+                )
+
+    def _check_shroud(self) -> None:
+        s = self.shroud
+        if s is None:
+            return
+        inner = self.shroud_radius - s.thickness / 2
+        if inner <= self.base_radius:
+            raise _bad(
+                "shroud.span", f"{s.span} puts the shroud into the blade's foot", "Move it outward."
+            )
+        if s.gap >= self.shroud_radius * self.pitch:
+            raise _bad("shroud.gap", f"{s.gap} m leaves no shroud", "Make the gap smaller.")
+        if s.span < 1 and inner + s.thickness >= self.tip_radius:
+            raise _bad(
+                "shroud.span",
+                f"{s.span} lets the shroud end at the tip",
+                "Use 1, or move it inward.",
+            )
+        outline = self.airfoil.section(s.span)
+        y, z = outline.T
+        ahead = _turned_y(self.shroud_radius, y, -self.shroud_angle / 2) - z * math.tan(
+            s.face_angle
+        )
+        behind = _turned_y(self.shroud_radius, y, self.shroud_angle / 2) - z * math.tan(
+            s.face_angle
+        )
+        if np.any(ahead >= 0) or np.any(behind <= 0):
+            raise _bad(
+                "shroud.face_angle",
+                f"at {math.degrees(s.face_angle):.6g} degrees the contact faces cut through the airfoil",
+                "Incline them towards the chord, or take fewer sectors.",
+            )
+        if s.span == 1.0 and np.hypot(self.tip_radius, np.abs(y).max()) >= inner + s.thickness:
+            raise _bad(
+                "shroud.thickness",
+                f"{s.thickness} m: the corners of the plane tip stick out of the round shroud",
+                "Make the shroud thicker or the tip's chord smaller.",
+            )
+
+
+def _turned_y(radius: float, y: FloatArray, angle: float) -> FloatArray:
+    """Return y of the points (radius, y) after a turn by `angle`."""
+    return radius * math.sin(angle) + y * math.cos(angle)
+
+
+def _inside(points: FloatArray, polygon: FloatArray) -> BoolArray:
+    """Tell which `points` (n, 2) lie inside the `polygon` (p, 2), by counting crossings."""
+    x, y = points[:, :1], points[:, 1:]
+    (x0, y0), (x1, y1) = polygon.T, np.roll(polygon, -1, axis=0).T
+    spans = (y0 > y) != (y1 > y)
+    rise = np.where(y1 == y0, 1.0, y1 - y0)
+    crossed = spans & (x < x0 + (y - y0) / rise * (x1 - x0))
+    return np.asarray(crossed.sum(axis=1) % 2 == 1)
+
+
+def _bad(name: str, problem: str, remedy: str) -> InputError:
+    return input_error(f"BladedSector.{name}", problem, remedy)

@@ -1,0 +1,225 @@
+r"""The rigid underplatform damper with an asymmetric flat-curved cross-section.
+
+The damper is a prism along y that sits between two platforms and is pressed outward (+z) against
+their undersides. Its flat side touches the left blade along the lines L1 (near the apex) and L2
+(near the base), its curved side touches the right blade along the line R::
+
+             apex
+         L1  /--\  R
+            /    \
+           /      )
+      L2  /________)
+
+Both sides are described from the apex, the point where the two underside planes meet. Geometry of
+this family of dampers: Gola & Gastaldi, "Understanding complexities in underplatform damper
+mechanics", ASME Turbo Expo 2014.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.errors import input_error
+from stickslip.model.rigid.body import RigidBody
+
+CURVED_SEGMENTS = 24
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPoints:
+    """Contact points on a damper.
+
+    Parameters
+    ----------
+    names
+        n names such as ``L1.1`` (line and section).
+    side
+        n words ``flat`` (touches the left blade) or ``curved`` (touches the right blade).
+    position
+        (n, 3) positions in metres.
+    frame
+        (n, 3, 3) frames; columns t, w, n: two tangents and the outward normal of the damper,
+        which points into the blade.
+    """
+
+    names: tuple[str, ...]
+    side: tuple[str, ...]
+    position: FloatArray
+    frame: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def on_line(self, line: str) -> IntArray:
+        """Return the indices of the points of ``L1``, ``L2`` or ``R``, in order of y."""
+        return np.array([i for i, name in enumerate(self.names) if name.split(".")[0] == line])
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlatCurvedDamper:
+    """A rigid damper with one flat and one curved side.
+
+    Parameters
+    ----------
+    apex
+        (x, z) in metres of the point where the two contact planes meet.
+    flat_angle, curved_angle
+        Inclination in rad of the contact plane on either side, measured from the circumferential
+        direction x: the underside angle of the platform it touches.
+    flat_distances
+        Distances in metres of L1 and L2 from the apex along the flat side.
+    curved_distance
+        Distance in metres of R from the apex along the right platform's underside.
+    curved_radius
+        Radius in metres of the curved side.
+    sections
+        Axial positions y in metres of the sections that hold one point of each line, increasing.
+    mass
+        In kg.
+    inertia
+        About x, y, z through the centre of mass, in kg m².
+    centre
+        Centre of mass in metres: offset (x, y, z) from the apex at y = 0.
+    """
+
+    apex: tuple[float, float] = (0.028, 0.1065)
+    flat_angle: float = math.radians(45)
+    curved_angle: float = math.radians(45)
+    flat_distances: tuple[float, float] = (0.002, 0.029)
+    curved_distance: float = 0.0045
+    curved_radius: float = 0.05
+    sections: tuple[float, ...] = (-0.016, 0.0, 0.016)
+    mass: float = 0.12
+    inertia: tuple[float, float, float] = (1.89e-5, 9.45e-6, 2.26e-5)
+    centre: tuple[float, float, float] = (-0.0014, 0.0, -0.0134)
+
+    def __post_init__(self) -> None:
+        for name in ("flat_angle", "curved_angle"):
+            if not 0 < getattr(self, name) < math.pi / 2:
+                raise input_error(
+                    f"FlatCurvedDamper.{name}",
+                    f"must lie between 0 and pi/2 rad, got {getattr(self, name)}",
+                    "It is measured from the circumferential direction.",
+                )
+        for name in ("curved_distance", "curved_radius"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise input_error(
+                    f"FlatCurvedDamper.{name}",
+                    f"must be positive, got {getattr(self, name)}",
+                    "Give metres.",
+                )
+        first, second = self.flat_distances
+        if not 0 < first < second < math.inf:
+            raise input_error(
+                "FlatCurvedDamper.flat_distances",
+                f"need 0 < L1 < L2 (metres from the apex), got {self.flat_distances}",
+                "L1 is the line nearer to the apex.",
+            )
+        if not self.sections or not np.all(np.diff(self.sections) > 0):
+            raise input_error(
+                "FlatCurvedDamper.sections",
+                f"need at least one axial position, in increasing order, got {self.sections}",
+                "Give metres.",
+            )
+        self.body()  # checks mass, inertia and centre
+
+    @property
+    def flat_normal(self) -> FloatArray:
+        """Outward normal (3,) of the flat side: into the left blade."""
+        return np.array([-math.sin(self.flat_angle), 0.0, math.cos(self.flat_angle)])
+
+    @property
+    def curved_normal(self) -> FloatArray:
+        """Outward normal (3,) of the curved side at R: into the right blade."""
+        return np.array([math.sin(self.curved_angle), 0.0, math.cos(self.curved_angle)])
+
+    @property
+    def centre_of_mass(self) -> FloatArray:
+        """Centre of mass (3,) in metres, in the coordinates of the blades."""
+        return np.array([self.apex[0], 0.0, self.apex[1]]) + self.centre
+
+    def body(self) -> RigidBody:
+        """Return the damper as a rigid body."""
+        x, y, z = (float(c) for c in self.centre_of_mass)
+        return RigidBody(mass=self.mass, inertia=self.inertia, centre=(x, y, z))
+
+    def contact_points(self) -> ContactPoints:
+        """Return the points in the order L1, L2, R, each line in order of y.
+
+        The tangent t points towards the apex on both sides, so w = +y on the flat side and −y on
+        the curved one.
+        """
+        flat_t = _cross([0.0, 1.0, 0.0], self.flat_normal)
+        curved_t = _cross([0.0, -1.0, 0.0], self.curved_normal)
+        flat = np.column_stack([flat_t, [0.0, 1.0, 0.0], self.flat_normal])
+        curved = np.column_stack([curved_t, [0.0, -1.0, 0.0], self.curved_normal])
+        lines = (
+            ("L1", "flat", self.flat_distances[0], flat),
+            ("L2", "flat", self.flat_distances[1], flat),
+            ("R", "curved", self.curved_distance, curved),
+        )
+        names, sides, positions, frames = [], [], [], []
+        for line, side, distance, frame in lines:
+            for i, y in enumerate(self.sections):
+                names.append(f"{line}.{i + 1}")
+                sides.append(side)
+                positions.append(self._apex_at(y) - distance * frame[:, 0])
+                frames.append(frame)
+        return ContactPoints(tuple(names), tuple(sides), np.array(positions), np.array(frames))
+
+    def outline(self) -> FloatArray:
+        """Return the section's polygon (k, 2) in x and z, metres, from L1 clockwise.
+
+        Cut off level at L1, then the arc that touches the right platform at R, the base level with
+        L2, and the flat side from L2 to L1. It is for pictures and for estimating mass: contact
+        uses the points only.
+        """
+        corner = self.contact_points()
+        first, second, right = corner.position[:: len(self.sections)][:, [0, 2]]
+        centre = right - self.curved_radius * self.curved_normal[[0, 2]]
+        # the arc holds R even if R lies above L1 or below L2; it ends at the circle's top or bottom
+        heights = np.array([max(first[1], right[1]), min(second[1], right[1])])
+        ends = np.arcsin(np.clip((heights - centre[1]) / self.curved_radius, -1.0, 1.0))
+        angle = np.linspace(ends[0], ends[1], CURVED_SEGMENTS + 1)
+        arc = centre + self.curved_radius * np.column_stack([np.cos(angle), np.sin(angle)])
+        inside = (arc - first) @ self.flat_normal[[0, 2]] < 0.0
+        return np.vstack([first, arc[inside], second])
+
+    def _apex_at(self, y: float) -> FloatArray:
+        return np.array([self.apex[0], y, self.apex[1]])
+
+
+def _cross(a: list[float], b: FloatArray) -> FloatArray:
+    return np.array(np.cross(np.array(a), b))
+
+
+def gap_operator(
+    points: ContactPoints, blade_dofs: IntArray, damper_dofs: IntArray, n: int, body: RigidBody
+) -> FloatArray:
+    """Return the (3 p, n) operator to the gaps ``frameᵀ (u_blade − u_damper)``.
+
+    Rows t, w, n of each point in turn; a positive third row opens the contact.
+
+    Parameters
+    ----------
+    points
+        The p contact points.
+    blade_dofs
+        (p, 3) dof indices x, y, z of the blade's node at each point.
+    damper_dofs
+        (6,) dof indices of `body`.
+    n
+        Number of dofs of the whole structure.
+    body
+        The damper's rigid body: it moves the points of the damper.
+    """
+    motion = body.displacement_operator(points.position)
+    operator = np.zeros((len(points), 3, n))
+    to_frame = points.frame.transpose(0, 2, 1)
+    rows = np.arange(len(points))[:, None]
+    for axis in range(3):
+        operator[rows, axis, blade_dofs] = to_frame[:, axis]
+    operator[:, :, damper_dofs] -= to_frame @ motion
+    return operator.reshape(-1, n)

@@ -1,0 +1,1 @@
+"""The forced response: branches, repeats with more harmonics, peaks."""

@@ -1,0 +1,81 @@
+"""Which of all the points that were solved make up the response."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from stickslip.response.forced.sweep import ForcedPoint
+
+# relative difference of two vibrations below which a branch has come back to the other
+ALIKE = 0.25
+
+
+def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, ForcedPoint | None]]:
+    """Return the points that make up the response, each with the low-order point it repeats or is.
+
+    In the order of the branch: points of the first passage, their repeats in their place, and in place of a run of repeats that did not
+    all converge the branch with many harmonics, where that reached the other side. Peak points come last.
+    """
+    low = [p for p in points if p.stage == "low"]
+    high = {p.index: p for p in points if p.stage == "high"}
+    kept: list[tuple[ForcedPoint, ForcedPoint | None]] = []
+    passed = -1
+    for first, last in runs_of_repeats(high):
+        branch = branch_points(points, first, last)
+        if reached(branch, low, last):
+            kept += [(high.get(p.index, p), p) for p in low[passed + 1 : branch[0].index]]
+            kept += [(p, None) for p in branch]
+            passed = last
+    kept += [(high.get(p.index, p), p) for p in low[passed + 1 :]]
+    peak = [p for p in points if p.stage == "peak"]
+    again = {p.omega: p for p in peak if p.converged}
+    # a peak that was solved again with more harmonics takes the place of what it was
+    kept = [
+        (again.pop(p.omega) if p.omega in again and _fewer(p, again[p.omega]) else p, low)
+        for p, low in kept
+    ]
+    return kept + [(p, None) for p in peak if again.get(p.omega) is p or not p.converged]
+
+
+def _fewer(one: ForcedPoint, other: ForcedPoint) -> bool:
+    return one.harmonics.size < other.harmonics.size
+
+
+def accepted_points(points: Sequence[ForcedPoint]) -> list[ForcedPoint]:
+    """Return the points that make up the response; see `accepted_pairs`."""
+    return [point for point, _ in accepted_pairs(points)]
+
+
+def runs_of_repeats(high: Mapping[int, ForcedPoint]) -> list[tuple[int, int]]:
+    """Return first and last index of each run of neighbouring repeats."""
+    runs: list[tuple[int, int]] = []
+    for index in sorted(high):
+        if runs and index == runs[-1][1] + 1:
+            runs[-1] = (runs[-1][0], index)
+        else:
+            runs.append((index, index))
+    return runs
+
+
+def branch_points(points: Sequence[ForcedPoint], first: int, last: int) -> list[ForcedPoint]:
+    """Return the points of the branch with many harmonics through the run of repeats from `first` to `last`."""
+    return [p for p in points if p.stage == "branch" and first <= p.index <= last]
+
+
+def branch_end(low: Sequence[ForcedPoint], last: int) -> float:
+    """Return the frequency at which such a branch ends: that of the next quiet point, or of the last one."""
+    return low[min(last + 1, len(low) - 1)].omega
+
+
+def reached(branch: Sequence[ForcedPoint], low: Sequence[ForcedPoint], last: int) -> bool:
+    """Whether a branch came to its end: to the frequency of the next quiet point, and to its motion.
+
+    Where the branch folds it may pass that frequency several times, on its way to the other sheets.
+    """
+    if not branch or not branch[-1].converged or branch[-1].omega != branch_end(low, last):
+        return False
+    if last + 1 >= len(low) or not low[last + 1].converged:
+        return True
+    quiet = low[last + 1].coefficients[1:]
+    here = branch[-1].coefficients[1 : len(quiet) + 1]
+    return bool(np.linalg.norm(here - quiet) <= ALIKE * np.linalg.norm(quiet))

@@ -1,0 +1,256 @@
+"""The two passages of the Jacobian Alert: a branch with few harmonics, then the frequencies that need more."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.harmonic.balance import HarmonicBalance, Linearisation
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.selection.strategy import judged
+from stickslip.harmonic.support import Harmonics
+from stickslip.response.forced.accepted import branch_end, reached
+from stickslip.response.forced.rescue import homotopies
+from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, forced_point
+from stickslip.response.preload import bonded_start, preload
+from stickslip.solve.branch import Latest
+from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to
+from stickslip.solve.newton import Solution, charged, newton
+from stickslip.solve.rescue import Homotopy, solve_robustly
+
+LOOP = 3  # multiples of `Sweep.points` after which a branch that gains no frequency is left
+BRANCH_SEEDS = 4  # points from which a branch with many harmonics is begun
+BRANCH_LENGTH = 5  # multiples of `Sweep.points` after which such a branch is given up
+STALLS = 1.5  # multiples of `Sweep.points` after which it is given up if it gains no frequency
+BACKWARD = 0.1  # share of the range by which it may fall back behind the start of the range
+DETOUR = 30  # most points on the way from a neighbour to a repeat that fails
+
+
+def first_passage(
+    problem: ForcedProblem, load: HarmonicLoad, points: list[ForcedPoint]
+) -> Iterator[ForcedPoint]:
+    """Continue the first passage after `points`, which may be empty, and append to them.
+
+    Each new point depends on `points` alone, so that a run taken up again goes on as it would have.
+    """
+    sweep = problem.sweep
+    if sweep.frequencies:
+        yield from _grid(problem, load, points)
+        return
+    first, last = sweep.omega_range
+    latest = Latest(problem.low)
+    while not points or points[-1].omega < last or not points[-1].converged:
+        began = perf_counter()
+        reach = max((p.omega for p in points), default=first)
+        if points and not points[-1].converged and reach == last:
+            return
+        point = None
+        if points and not _lost(problem, points):
+            following = problem.following(problem.low)
+            point = advance(latest, problem.branch_point(points[-1]), last, following)
+        if point is None or not point.solution.status.converged or point.p < first:
+            # the branch starts here, or is lost: take it up (again) a little further on
+            gap = sweep.control.largest * sweep.control.scale if points else 0.0
+            # a single frequency is left to the repeats, which know both sides; a second one in a row to the homotopies
+            left = bool(points) and points[-1].converged and sweep.selection != "always_low"
+            point = fresh_point(problem, load, points, min(reach + gap, last), left, latest)
+        points.append(_low_point(problem, point, len(points), began, latest))
+        yield points[-1]
+
+
+def _lost(problem: ForcedProblem, points: list[ForcedPoint]) -> bool:
+    """Whether the branch ended or runs in circles."""
+    farthest = int(np.argmax([p.omega for p in points]))
+    return not points[-1].converged or len(points) - farthest > LOOP * problem.sweep.points
+
+
+def _grid(
+    problem: ForcedProblem, load: HarmonicLoad, points: list[ForcedPoint]
+) -> Iterator[ForcedPoint]:
+    """Step through equally spaced frequencies."""
+    sweep = problem.sweep
+    following = problem.following(problem.low)
+    latest = Latest(problem.low)
+    for omega in np.linspace(*sweep.omega_range, sweep.frequencies)[len(points) :]:
+        began = perf_counter()
+        before = [p for p in points if p.converged]
+        point = None
+        if before:
+            point = step_to(latest, problem.branch_point(before[-1]), float(omega), following)
+        if point is None or not point.solution.status.converged:
+            point = fresh_point(problem, load, before, float(omega), latest=latest)
+        points.append(_low_point(problem, point, len(points), began, latest))
+        yield points[-1]
+
+
+def fresh_point(
+    problem: ForcedProblem,
+    load: HarmonicLoad,
+    points: list[ForcedPoint],
+    omega: float,
+    quickly: bool = False,
+    latest: Latest | None = None,
+) -> Point:
+    """Solve without a branch that leads here.
+
+    From the last solution; from the static equilibrium plus the bonded vibration; from a solution with few harmonics. Then, unless it is
+    to go quickly, by all that `solve_robustly` knows. The evaluation at the solution is left in `latest`.
+    """
+    balance = problem.low
+    following = problem.following(balance)
+    if quickly:
+        solution = _from_starts(problem, load, points, omega)
+    else:
+        solution = solve_robustly(
+            lambda x: balance.linearise(x, omega),
+            _starts(problem, load, points, omega),
+            problem.sweep.newton,
+            _ways(problem, load, omega),
+            following.weights,
+        )
+    if not solution.status.converged:
+        upward = np.append(np.zeros(balance.size), 1.0)
+        return Point(solution.x, omega, upward, following.control.first, solution, 0.0)
+    return replace(start_point(latest or balance, solution.x, omega, following), solution=solution)
+
+
+def _from_starts(
+    problem: ForcedProblem, load: HarmonicLoad, points: list[ForcedPoint], omega: float
+) -> Solution:
+    """Return where Newton's method ends from the first start that converges, or from the last one."""
+    spent: list[Solution] = []
+    for start in _starts(problem, load, points, omega):
+        spent.append(newton(lambda x: problem.low.linearise(x, omega), start, problem.sweep.newton))
+        if spent[-1].status.converged:
+            break
+    return charged(spent[-1], spent)
+
+
+def _ways(problem: ForcedProblem, load: HarmonicLoad, omega: float) -> Iterator[Homotopy]:
+    yield from homotopies(problem.low, omega, preload(problem.system, load.static))
+
+
+def _starts(
+    problem: ForcedProblem, load: HarmonicLoad, points: list[ForcedPoint], omega: float
+) -> Iterator[FloatArray]:
+    """Yield scaled unknowns of the first passage to start Newton from."""
+    balance = problem.low
+    if points and points[-1].converged:
+        yield balance.unknowns(points[-1].coefficients)
+    guess = balance.coefficients(bonded_start(balance, omega, problem.system))
+    guess[0] = preload(problem.system, load.static)
+    yield balance.unknowns(guess)
+    driven = max(load.harmonics, default=balance.order)
+    few = balance.with_harmonics(tuple(h for h in balance.harmonics if h <= max(driven, 1)))
+    if few.order < balance.order:
+        solution = newton(
+            lambda x: few.linearise(x, omega), few.unknowns(guess), problem.sweep.newton
+        )
+        if solution.status.converged:
+            yield balance.unknowns(few.coefficients(solution.x))
+
+
+def _low_point(
+    problem: ForcedProblem, point: Point, index: int, began: float, latest: Latest
+) -> ForcedPoint:
+    error = np.nan
+    asked: Harmonics = ()
+    start = np.zeros((0, 0), dtype=complex)
+    if point.solution.status.converged and problem.strategy is not None:
+        known = latest.known(point.x, point.p)
+        left = known.events if isinstance(known, Linearisation) else None
+        verdict = judged(problem.strategy, problem.step(problem.low, point.x, point.p, left=left))
+        error, asked = verdict.indicator, verdict.again or ()
+        start = verdict.start if asked and verdict.start is not None else start
+    made = forced_point(problem.low, point.solution, "low", index, point.p, perf_counter() - began)
+    return replace(
+        made,
+        tangent=point.tangent,
+        step=point.step,
+        orientation=point.orientation,
+        predicted_error=error,
+        asked=np.array(asked, dtype=np.int64),
+        start=start,
+    )
+
+
+def follow_run(
+    problem: ForcedProblem,
+    first: int,
+    last: int,
+    low: list[ForcedPoint],
+    branch: list[ForcedPoint],
+    high: Mapping[int, ForcedPoint],
+) -> Iterator[ForcedPoint]:
+    """Follow the branch with many harmonics through a run of repeats that did not all converge, and append to `branch`.
+
+    Where the two orders differ much the branch may fold: then some frequencies have no solution near the low-order one, and only the
+    branch itself leads through.
+    """
+    end = branch_end(low, last)
+    begin, stop = problem.sweep.omega_range
+    margin = BACKWARD * (stop - begin)
+    balance = problem.high
+    following = problem.following(balance)
+    while len(branch) <= BRANCH_LENGTH * problem.sweep.points:
+        began = perf_counter()
+        if not branch:
+            point = _branch_start(problem, low, high, first)
+            if point is None:
+                return
+        elif (
+            reached(branch, low, last)
+            or not branch[-1].converged
+            or len(branch) - int(np.argmax([p.omega for p in branch]))
+            > problem.sweep.points * STALLS
+            or not begin - margin < branch[-1].omega < stop + margin
+        ):
+            return
+        else:
+            # another sheet at the frequency of the end: on, until the branch comes back to it
+            upward = branch[-1].tangent[-1] > 0.0
+            beyond = stop + 2 * margin if upward else begin - 2 * margin
+            goal = beyond if branch[-1].omega == end else end
+            point = advance(balance, problem.branch_point(branch[-1]), goal, following)
+        made = forced_point(
+            balance, point.solution, "branch", first, point.p, perf_counter() - began
+        )
+        branch.append(
+            replace(made, tangent=point.tangent, step=point.step, orientation=point.orientation)
+        )
+        yield branch[-1]
+
+
+def _branch_start(
+    problem: ForcedProblem,
+    low: list[ForcedPoint],
+    high: Mapping[int, ForcedPoint],
+    first: int,
+) -> Point | None:
+    """Solve with many harmonics at an accepted point before index `first`, so that the whole run is passed."""
+    balance = problem.high
+    following = replace(problem.following(balance), newton=problem.sweep.newton)
+    usable = [high.get(p.index, p) for p in low[:first] if p.converged]
+    usable = [p for p in usable if p.converged and (p.stage == "high" or not problem.alerted(p))]
+    for seed in sorted(usable, key=lambda p: -p.index)[:BRANCH_SEEDS]:
+        point = start_point(balance, balance.unknowns(seed.coefficients), seed.omega, following)
+        if point.solution.status.converged:
+            # a first passage that was coming back from a fold goes on downward
+            tangent = low[seed.index].tangent
+            return reversed_point(point) if tangent.size > 0 and tangent[-1] < 0.0 else point
+    return None
+
+
+def along_branch(
+    problem: ForcedProblem, point: ForcedPoint, omega: float, balance: HarmonicBalance | None = None
+) -> Point:
+    """Go from an accepted point to another frequency on the branch with many harmonics, or on that of `balance`."""
+    balance = problem.high if balance is None else balance
+    following = problem.following(balance)
+    following = replace(following, control=replace(following.control, max_points=DETOUR))
+    start = start_point(balance, balance.unknowns(point.coefficients), point.omega, following)
+    if not start.solution.status.converged:
+        return start
+    return step_to(balance, start, omega, following)

@@ -1,0 +1,197 @@
+"""The second passage of the Jacobian Alert: one frequency solved again with more harmonics."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from time import perf_counter
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.harmonic.balance import HarmonicBalance, Linearisation
+from stickslip.harmonic.selection.strategy import judged
+from stickslip.response.forced.passages import along_branch
+from stickslip.response.forced.rescue import homotopies
+from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, forced_point
+from stickslip.solve.linear import factorised
+from stickslip.solve.natural import NaturalLevel
+from stickslip.solve.newton import Newton, Solution, charged, newton
+from stickslip.solve.rescue import solve_robustly
+from stickslip.solve.status import Rung, Status
+
+PATIENT = 16  # iterations of a repeat from one start
+ISOLATED = 5  # iterations of a repeat beside none that is accepted: it converges soon or not at all
+NEIGHBOURS = 1  # points on each side from which a repeat that fails is tried
+PATIENCE = (
+    4  # repeats that fail one after the other before most of the following are left to the branch
+)
+GLANCE = 8  # each such repeat in a row of failures is tried all the same
+
+
+def repeat(
+    problem: ForcedProblem,
+    point: ForcedPoint,
+    others: Mapping[int, ForcedPoint],
+    static: Callable[[], FloatArray] | None = None,
+    branch: Sequence[ForcedPoint] = (),
+) -> ForcedPoint:
+    """Solve a frequency with more harmonics: from the best of q + Δq, q and its neighbours, or along the branch from a neighbour.
+
+    A neighbour whose own neighbours failed is as far as the branch led: no detour begins farther away than the next point.
+
+    Parameters
+    ----------
+    problem
+        The forced response.
+    point
+        Point of the first passage.
+    others
+        Accepted points by index: repeats, and points of the first passage that need none.
+    static
+        Gives the (n_retained,) static equilibrium, m, for what `solve_robustly` tries if all else fails; None: that is not tried.
+    branch
+        Points of a branch with many harmonics: where it passed the frequency, it leads to a solution.
+    """
+    began = perf_counter()
+    omega = point.omega
+    balance = problem.balance(tuple(int(h) for h in point.asked) or problem.high.harmonics)
+    near = _neighbours(point.index, others)
+    beside = passing(branch, point) + [p for p in near if abs(p.index - point.index) <= 1]
+    alone = not beside and static is None
+    q = balance.unknowns(point.coefficients)
+    starts = [*_predicted(problem, point), *(balance.unknowns(p.coefficients) for p in near)]
+    most = ISOLATED if alone else PATIENT
+    options = replace(problem.sweep.newton, max_iterations=most)
+    spent: list[Solution] = []
+    nearest, *further = _nearest_first(balance, omega, q, starts, options)
+    # from q itself contacts change one by one, which leads to a solution from farther away than the measure tells
+    second = [start for start in further if start[1] is q] or further[:1]
+    for start in [nearest] if alone else [nearest, *second]:
+        spent.append(_from_start(balance, omega, start, options))
+        if spent[-1].status.converged:
+            break
+    for neighbour in beside:
+        if spent[-1].status.converged:
+            break
+        detour = along_branch(problem, neighbour, omega, balance).solution
+        spent.append(replace(detour, rung=max(detour.rung, Rung.SHORTER_STEP)))
+    if not spent[-1].status.converged and static is not None:
+        solution = solve_robustly(
+            lambda v: balance.linearise(v, omega),
+            [nearest[1]],
+            problem.sweep.newton,
+            homotopies(balance, omega, static()),
+            problem.following(balance).weights,
+        )
+        spent.append(solution)
+    solution = charged(spent[-1], spent)
+    made = forced_point(balance, solution, "high", point.index, omega, perf_counter() - began)
+    return replace(made, predicted_error=point.predicted_error)
+
+
+def _nearest_first(
+    balance: HarmonicBalance,
+    omega: float,
+    q: FloatArray,
+    others: Sequence[FloatArray],
+    options: Newton,
+) -> list[tuple[Linearisation, FloatArray]]:
+    """Sort starts by the Newton correction that the Jacobian at the padded low-order solution `q` foretells from each.
+
+    The residual is no measure: a contact that has changed its state adds its stiffness times the motion to it, however near the
+    solution is. Where there is no correction, the residual decides after all.
+    """
+    starts = [(balance.linearise(x, omega), x) for x in (q, *others)]
+    jac = starts[0][0].jac
+    solve = factorised(options.linear, jac.copy(order="F") if isinstance(jac, np.ndarray) else jac)
+
+    def away(start: tuple[Linearisation, FloatArray]) -> float:
+        residual = start[0].residual
+        step = None if solve is None else solve(residual)
+        size = float(np.linalg.norm(residual if step is None else step))
+        return size if np.isfinite(size) else np.inf
+
+    return sorted(starts, key=away)
+
+
+def _from_start(
+    balance: HarmonicBalance,
+    omega: float,
+    start: tuple[Linearisation, FloatArray],
+    options: Newton,
+) -> Solution:
+    """Solve from a start that is evaluated already."""
+    first, begin = start
+
+    def evaluate(x: FloatArray) -> Linearisation:
+        return first if x is begin else balance.linearise(x, omega)
+
+    return newton(evaluate, begin, options, NaturalLevel())
+
+
+def _predicted(problem: ForcedProblem, point: ForcedPoint) -> list[FloatArray]:
+    """Return q + Δq in a list; empty if q is no solution, or the strategy knows no better start."""
+    strategy = problem.strategy
+    if not point.converged or strategy is None:
+        return []
+    if point.start.size:
+        asked = tuple(int(h) for h in point.asked)
+        return [problem.balance(asked).unknowns(point.start)]
+    few = problem.balance(point.support)
+    verdict = judged(strategy, problem.step(few, few.unknowns(point.coefficients), point.omega))
+    if verdict.start is None:
+        return []
+    return [problem.balance(verdict.again or problem.high.harmonics).unknowns(verdict.start)]
+
+
+def worth_a_try(index: int, forward: bool, failed: Callable[[int], bool], known: bool) -> bool:
+    """Whether a repeat is tried now, or left to the branch with many harmonics and to the homotopy.
+
+    A few repeats that fail in a row show that the solution with few harmonics says little about that with many. Then only some are
+    tried on the way forward, and on the way back those beside an accepted one.
+
+    Parameters
+    ----------
+    index
+        Of the point of the first passage.
+    forward
+        Whether this is the first attempt.
+    failed
+        Whether the repeat of an index failed.
+    known
+        Whether a neighbour is accepted.
+    """
+    if known:
+        return True
+    row = all(failed(i) for i in range(index - PATIENCE, index))
+    return forward and (not row or index % GLANCE == 0)
+
+
+def postponed(problem: ForcedProblem, point: ForcedPoint) -> ForcedPoint:
+    """Return a repeat that was given no iterations: for `follow_run` or a homotopy to find."""
+    x = problem.high.unknowns(point.coefficients)
+    none = Solution(x, Status.TOO_MANY_ITERATIONS, 0, np.nan, 0.0, 0.0)
+    made = forced_point(problem.high, none, "high", point.index, point.omega, 0.0)
+    return replace(made, predicted_error=point.predicted_error)
+
+
+def passing(branch: Sequence[ForcedPoint], point: ForcedPoint) -> list[ForcedPoint]:
+    """Return the two points of a branch between which it went across the frequency of `point`, on the sheet nearest to its motion."""
+    ends = [
+        sorted((a, b), key=lambda p: abs(p.omega - point.omega))
+        for a, b in pairwise(p for p in branch if p.converged)
+        if a.index == b.index and (a.omega - point.omega) * (b.omega - point.omega) <= 0.0
+    ]
+    low = point.coefficients[1:]
+
+    def away(pair: list[ForcedPoint]) -> float:
+        return float(np.linalg.norm(pair[0].coefficients[1 : len(low) + 1] - low))
+
+    return min(ends, key=away, default=[])
+
+
+def _neighbours(index: int, others: Mapping[int, ForcedPoint]) -> list[ForcedPoint]:
+    """Return the accepted points nearest in index, from both sides."""
+    below = sorted((i for i in others if i < index), reverse=True)[:NEIGHBOURS]
+    above = sorted(i for i in others if i > index)[:NEIGHBOURS]
+    return [others[i] for i in sorted([*below, *above], key=lambda i: abs(i - index))]

@@ -1,0 +1,159 @@
+"""The single passage: the harmonics of each frequency are settled before the next one (Gastaldi & Berruti 2017, section 4.4)."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray
+from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.selection.strategy import Step, Verdict, judged
+from stickslip.harmonic.support import Harmonics
+from stickslip.response.forced.passages import along_branch, fresh_point
+from stickslip.response.forced.sweep import (
+    BRANCH_ITERATIONS,
+    ForcedPoint,
+    ForcedProblem,
+    Stage,
+    forced_point,
+)
+from stickslip.solve.newton import Solution, charged, newton
+
+
+def single_passage(
+    problem: ForcedProblem, load: HarmonicLoad, done: Sequence[ForcedPoint]
+) -> Iterator[ForcedPoint]:
+    """Go through equally spaced frequencies and let the strategy choose the harmonics of each.
+
+    A frequency whose solution asks for more is solved again with what it had and what it asks for; the last solution counts. One
+    that is not found is looked for once more with the reference support, and at the end once more from the frequency above.
+
+    Parameters
+    ----------
+    problem, load
+        The forced response.
+    done
+        Points of an interrupted run, in the order in which they came.
+
+    Yields
+    ------
+    ForcedPoint
+        Points not in `done`: the first solution of a frequency as ``low``, further ones as ``high``.
+    """
+    sweep = problem.sweep
+    grid = [float(w) for w in np.linspace(*sweep.omega_range, sweep.frequencies or sweep.points)]
+    stored = iter(done)
+    tried: list[ForcedPoint] = []
+    harmonics = problem.low.harmonics
+    for index, (omega, following) in enumerate(zip(grid, [*grid[1:], grid[-1]], strict=True)):
+        before: Step | None = None
+        start: ComplexArray | None = None
+        first = True
+        while True:
+            began = perf_counter()
+            kept = next(stored, None)
+            if kept is None:
+                balance = problem.balance(harmonics)
+                solution = _solution(problem, load, balance, tried, omega, start)
+                stage: Stage = "low" if first else "high"
+                point = forced_point(balance, solution, stage, index, omega, 0.0)
+            else:
+                point = kept
+            step, verdict = _judged(problem, point, following, before)
+            again = _more(harmonics, verdict.again)
+            if kept is None:
+                yield replace(
+                    point,
+                    predicted_error=verdict.indicator,
+                    asked=np.array(again or (), dtype=np.int64),
+                    seconds_total=perf_counter() - began,
+                )
+            tried.append(point)
+            if again is None:
+                break
+            start = verdict.start
+            harmonics, before, first = again, step, False
+        harmonics = verdict.following
+    yield from _from_above(problem, tried, stored)
+
+
+def _from_above(
+    problem: ForcedProblem, tried: Sequence[ForcedPoint], stored: Iterator[ForcedPoint]
+) -> Iterator[ForcedPoint]:
+    """Look for frequencies that were not found once more, along the branch from the frequency above, the last ones first."""
+    last = {p.index: p for p in tried}
+    for index in reversed(range(len(last) - 1)):
+        if last[index].converged or not last[index + 1].converged:
+            continue
+        began = perf_counter()
+        point = next(stored, None)
+        if point is None:
+            omega, balance = last[index].omega, problem.high
+            solution = along_branch(problem, last[index + 1], omega, balance).solution
+            point = forced_point(balance, solution, "high", index, omega, perf_counter() - began)
+            yield point
+        last[index] = point
+
+
+def _solution(
+    problem: ForcedProblem,
+    load: HarmonicLoad,
+    balance: HarmonicBalance,
+    tried: Sequence[ForcedPoint],
+    omega: float,
+    start: ComplexArray | None,
+) -> Solution:
+    """Solve from a given start, or what was found so far; then along the branch from there; then as without one."""
+    quick = replace(problem.sweep.newton, max_iterations=BRANCH_ITERATIONS)
+    near = _nearest(tried, balance.harmonics, omega)
+    guesses = [] if start is None else [balance.unknowns(start)]
+    guesses += [balance.unknowns(p.coefficients) for p in near]
+    spent: list[Solution] = []
+    if guesses:
+        # the smallest residual decides: contact states may have changed since, or with the harmonics
+        sizes = [float(np.linalg.norm(balance.linearise(x, omega).residual)) for x in guesses]
+        x = guesses[int(np.argmin(sizes))]
+        spent.append(newton(lambda v: balance.linearise(v, omega), x, quick))
+    for point in near:
+        if spent[-1].status.converged:
+            break
+        if point.omega != omega:
+            spent.append(along_branch(problem, point, omega, balance).solution)
+    if not (spent and spent[-1].status.converged):
+        # the first passage's way to a solution without a branch, with these harmonics
+        own = replace(problem, low=balance)
+        found = [p for p in tried if p.converged]
+        spent.append(fresh_point(own, load, found, omega).solution)
+    return charged(spent[-1], spent)
+
+
+def _nearest(tried: Sequence[ForcedPoint], harmonics: Harmonics, omega: float) -> list[ForcedPoint]:
+    """Return the last solutions with the same harmonics, at all, and at another frequency."""
+    found = [p for p in tried if p.converged]
+    alike = [p for p in found if p.support == harmonics]
+    elsewhere = [p for p in found if p.omega != omega]
+    return list({id(p): p for p in (*alike[-1:], *found[-1:], *elsewhere[-1:])}.values())
+
+
+def _judged(
+    problem: ForcedProblem, point: ForcedPoint, following: float, before: Step | None
+) -> tuple[Step | None, Verdict]:
+    """Return the solution as the strategy saw it, and what it said."""
+    reference = problem.high.harmonics
+    if not point.converged:
+        # one that is not found may be so because its harmonics are too few
+        return None, Verdict(np.nan, reference, problem.sweep.low_harmonics)
+    if problem.strategy is None:
+        return None, Verdict(np.nan, None, point.support)
+    balance = problem.balance(point.support)
+    x = balance.unknowns(point.coefficients)
+    step = replace(problem.step(balance, x, point.omega, following), before=before)
+    return step, judged(problem.strategy, step)
+
+
+def _more(had: Harmonics, asked: Harmonics | None) -> Harmonics | None:
+    """Return the harmonics of a repeat, None if it would have no more than there were: that ends every quarrel."""
+    wanted = tuple(sorted({*had, *(asked or ())}))
+    return None if wanted == had else wanted

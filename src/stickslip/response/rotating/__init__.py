@@ -1,0 +1,1 @@
+"""Frequencies over the speed: Campbell, nodal diameters, interference."""

@@ -1,0 +1,190 @@
+"""SAFE diagram: which engine orders meet a natural frequency of the nodal diameter that they excite.
+
+M. P. Singh, J. J. Vargo, D. M. Schiffer and J. D. Dello, "SAFE diagram: a design and reliability tool for turbine blading",
+Proceedings of the 17th Turbomachinery Symposium (1988) 93-101.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.errors import input_error
+from stickslip.response.rotating.nodal_diameters import NodalDiameterMap
+
+
+@dataclass(frozen=True)
+class Interference:
+    """One engine order and one mode of the nodal diameter that it excites.
+
+    Parameters
+    ----------
+    engine_order
+        Oscillations per revolution.
+    wave_number
+        Engine order modulo the number of sectors: the wave that it excites in the rotating frame.
+    nodal_diameter
+        Of that wave.
+    mode
+        Column of the map, from 0.
+    frequency_hz
+        Natural frequency.
+    speed
+        At which the engine order would meet it, in rad/s; infinite where it never does.
+    margin
+        Relative distance of that speed from the speed range, negative below it and zero within.
+    """
+
+    engine_order: int
+    wave_number: int
+    nodal_diameter: int
+    mode: int
+    frequency_hz: float
+    speed: float
+    margin: float
+
+
+@dataclass(frozen=True, eq=False)
+class Safe:
+    """SAFE (interference) diagram; build it with `safe`.
+
+    Parameters
+    ----------
+    frequencies
+        Frequencies by nodal diameter.
+    speed_range
+        Lowest and highest speed, rad/s.
+    engine_orders
+        Considered.
+    allowed
+        Margin asked for.
+    points
+        Every pair of engine order and mode, the closest first.
+    """
+
+    frequencies: NodalDiameterMap
+    speed_range: tuple[float, float]
+    engine_orders: tuple[int, ...]
+    allowed: float
+    points: tuple[Interference, ...]
+
+    @property
+    def resonances(self) -> tuple[Interference, ...]:
+        """Points whose margin is smaller than the one asked for."""
+        return tuple(p for p in self.points if abs(p.margin) <= self.allowed)
+
+    @property
+    def not_judged(self) -> tuple[int, ...]:
+        """Engine orders that reach, with the margin, above the highest computed mode of the waves that they excite.
+
+        What lies there may be near and is not among the points, unless the map holds all modes that there are.
+        """
+        top = self.speed_range[1] * (1 + self.allowed) / (2 * math.pi)
+        return tuple(
+            m for m in self.engine_orders if m * top > self.frequencies.of_wave(m).max(initial=0.0)
+        )
+
+    def speed_line(
+        self, speed: float, engine_orders: int | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the zigzag that a speed draws: nodal diameters and frequencies in Hz of engine orders 0, 1, 2, ...
+
+        Parameters
+        ----------
+        speed
+            In rad/s.
+        engine_orders
+            How far; to the highest one considered if not given. The line turns at n_s / 2 nodal diameters and at none.
+        """
+        last = max(self.engine_orders) if engine_orders is None else engine_orders
+        half = 0.5 * self.frequencies.sectors
+        corners = half * np.arange(math.ceil(last / half))
+        orders = np.union1d(np.arange(last + 1), corners)
+        wave = orders % self.frequencies.sectors
+        return np.minimum(wave, self.frequencies.sectors - wave), orders * speed / (2 * np.pi)
+
+
+def safe(
+    frequencies: NodalDiameterMap,
+    speed: float | tuple[float, float],
+    engine_orders: Sequence[int],
+    *,
+    margin: float = 0.05,
+    growth: Callable[[int], FloatArray] | None = None,
+) -> Safe:
+    """Compare engine orders with the frequencies of the nodal diameters that they excite.
+
+    On a wheel of n_s equal sectors engine order m works on wave number ``m mod n_s`` alone, so that crossing a natural frequency is not
+    enough for a resonance: the shape must fit as well.
+
+    Parameters
+    ----------
+    frequencies
+        From `nodal_diameter_map`, at a speed within the range.
+    speed
+        Operating speed in rad/s, or the lowest and the highest.
+    engine_orders
+        Positive.
+    margin
+        Relative distance in speed below which a point counts as a resonance.
+    growth
+        Wave number -> (n_modes,) derivatives of the squares of the natural frequencies by the square of the speed, at the one
+        operating speed: resonances are then where engine orders meet the modes along these straight lines (Southwell), as in a
+        Campbell diagram near that speed. Left out, frequencies are taken as those of the map at all speeds.
+
+    Raises
+    ------
+    InputError
+        If numbers do not make sense, a nodal diameter that an engine order excites is not in the map, or `growth` comes with a
+        range of speeds.
+    """
+    low, high = (speed, speed) if isinstance(speed, (int, float)) else speed
+    if not 0 < low <= high < math.inf:
+        raise input_error("safe: speed", f"needs 0 < lowest <= highest, got {speed}", "Give rad/s.")
+    wrong = [m for m in engine_orders if m < 1 or m != int(m)]
+    if wrong or not len(engine_orders):
+        raise input_error(
+            "safe: engine_orders",
+            f"must be positive whole numbers, got {list(engine_orders)[:6]}",
+            "Give the counts of vanes, struts and burners, and their multiples.",
+        )
+    if not 0 <= margin < math.inf:
+        raise input_error("safe: margin", f"must not be negative, got {margin}", "0.05 is 5 %.")
+    if growth is not None and low != high:
+        raise input_error(
+            "safe: growth",
+            f"belongs to one speed, got a range {speed}",
+            "Give the speed of the map.",
+        )
+    points = [p for m in engine_orders for p in _points(frequencies, int(m), low, high, growth)]
+    return Safe(
+        frequencies, (low, high), tuple(int(m) for m in engine_orders), margin,
+        tuple(sorted(points, key=lambda p: abs(p.margin))),
+    )  # fmt: skip
+
+
+def _points(
+    frequencies: NodalDiameterMap,
+    engine_order: int,
+    low: float,
+    high: float,
+    growth: Callable[[int], FloatArray] | None,
+) -> list[Interference]:
+    wave = engine_order % frequencies.sectors
+    diameter = min(wave, frequencies.sectors - wave)
+    own = frequencies.of_wave(wave)
+    slopes = np.zeros(len(own)) if growth is None else growth(wave)
+    found = []
+    for mode, (hertz, slope) in enumerate(zip(own, slopes, strict=True)):
+        speed = _meeting(2 * math.pi * float(hertz), float(slope), engine_order, high)
+        outside = speed / high - 1 if speed > high else min(speed / low - 1, 0.0)
+        found.append(Interference(engine_order, wave, diameter, mode, float(hertz), speed, outside))
+    return found
+
+
+def _meeting(omega: float, slope: float, engine_order: int, speed: float) -> float:
+    """Return where ``ω² + slope (Ω² − speed²) = (engine_order Ω)²``; infinite where the order never meets the line."""
+    rest, rise = omega**2 - slope * speed**2, engine_order**2 - slope
+    return math.sqrt(rest / rise) if rise != 0.0 and rest / rise > 0.0 else math.inf
