@@ -13,7 +13,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.response.system import System
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 
 STICK, SLIP, OPEN = 0, 1, 2
 SAMPLES = 64

@@ -12,9 +12,9 @@ from stickslip.errors import InputError
 from stickslip.model.axis import Axis
 from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.reduction.cache import cached
-from stickslip.reduction.craig_bampton import craig_bampton
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
-from stickslip.reduction.rubin import rubin
+from stickslip.reduction.fixed_interface import craig_bampton
+from stickslip.reduction.free_interface import rubin
 from stickslip.reduction.truncation import ModesBelow
 
 MATRICES = ("mass", "damping", "stiffness", "basis")

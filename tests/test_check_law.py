@@ -6,8 +6,8 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from stickslip.contact.check_law import check_law
 from stickslip.contact.law import law_kernel
+from stickslip.contact.law_check import check_law
 from stickslip.contact.laws.coupled_coulomb import CoupledCoulomb
 from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb

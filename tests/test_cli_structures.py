@@ -18,7 +18,7 @@ from stickslip.model.readers.calculix_deck import read_deck
 from stickslip.model.readers.units import Units
 from stickslip.model.structure_file import save_structure
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
-from stickslip.reduction.wheel import wheel
+from stickslip.reduction.full_wheel import wheel
 from stickslip.study.example import example_text
 from stickslip.study.static_state import strain_and_rotation
 from stickslip.study.structure_model import disk_model

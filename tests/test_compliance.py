@@ -9,7 +9,7 @@ from test_dlft import rubbing
 
 from stickslip.errors import SingularError
 from stickslip.harmonic.compliance import ComplianceForm
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 
 
 def held():

@@ -14,7 +14,7 @@ from stickslip.solve.continuation import (
     step_to,
     trace,
 )
-from stickslip.solve.newton import Newton
+from stickslip.solve.newton_method import Newton
 from stickslip.solve.status import Status
 
 NEWTON = Newton(tolerance=1e-12)

@@ -17,9 +17,9 @@ from stickslip.model.dofs import Dofs
 from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
+from stickslip.reduction.full_wheel import wheel, wheel_shape
 from stickslip.reduction.turning import dof_rotation
 from stickslip.reduction.waves import Wave, excited_wave, to_sectors, to_waves, wave
-from stickslip.reduction.wheel import wheel, wheel_shape
 
 TILTED = Axis((0.3, -0.4, 0.8), (0.1, 0.2, -0.3))
 

@@ -11,8 +11,8 @@ from stickslip.model.mesh.blade_mesh import mesh_blade_pair
 from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.rigid.damper import FlatCurvedDamper, gap_operator
-from stickslip.reduction.craig_bampton import craig_bampton
-from stickslip.response.preload import preload
+from stickslip.reduction.fixed_interface import craig_bampton
+from stickslip.response.equilibrium import preload
 from stickslip.study.build import static_contact_force, static_load, system_of
 from stickslip.study.example import example_text
 from stickslip.study.schema import read_study

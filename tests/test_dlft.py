@@ -17,10 +17,10 @@ from stickslip.harmonic.dlft import dynamic_lagrangian
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex
-from stickslip.model.lumped import lumped
+from stickslip.model.matrices import lumped
 from stickslip.model.structure import Structure
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 
 TWO_MASSES = lumped(
     np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]]), np.array([[0.04, -0.02], [-0.02, 0.02]])

@@ -19,7 +19,7 @@ from stickslip.harmonic.fourier import padded, to_complex, to_real
 from stickslip.harmonic.spectral import Modes, Poles, StateSpace
 from stickslip.harmonic.structured import real_matrix
 from stickslip.harmonic.support import harmonics_of
-from stickslip.model.lumped import lumped
+from stickslip.model.matrices import lumped
 from stickslip.model.structure import Structure
 
 RETAINED = np.array([1, 4, 5])

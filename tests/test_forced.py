@@ -17,7 +17,7 @@ from stickslip.response.forced.response import (
     forced_problem,
     forced_response,
 )
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 
 HZ = 2 * np.pi
 SHORT = Sweep(omega_range=(155 * HZ, 166 * HZ), samples=64, points=12, peak_points=3)

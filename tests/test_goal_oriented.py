@@ -30,7 +30,7 @@ from stickslip.response.forced.response import (
     forced_response,
 )
 from stickslip.solve.krylov import Krylov
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 
 HZ = 2 * np.pi
 BLADES = ErrorMeasure(np.arange(4))

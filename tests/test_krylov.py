@@ -26,14 +26,14 @@ from stickslip.harmonic.structured import StructuredJacobian, real_matrix
 from stickslip.harmonic.support import harmonics_of
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
+from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.response import forced_problem, forced_response
 from stickslip.response.forced.sweep import Sweep
-from stickslip.response.preload import bonded_start
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
 from stickslip.solve.krylov import YOUNG, Automatic, Krylov, to_tolerance
 from stickslip.solve.linear import Bordered, Dense
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 from stickslip.solve.status import Status
 
 N_CONTACTS, INNER = 6, 5

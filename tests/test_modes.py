@@ -14,7 +14,7 @@ from stickslip.errors import InputError, SingularError
 from stickslip.model.dofs import Dofs, nodal_dofs
 from stickslip.model.fe.factorisation import factorise
 from stickslip.model.fe.lanczos import lanczos
-from stickslip.model.lumped import chain
+from stickslip.model.matrices import chain
 from stickslip.model.modes import Modes, lowest_modes, natural_frequencies, normal_modes
 from stickslip.model.rigid.motion import refuse_unheld
 from stickslip.model.structure import Structure, join

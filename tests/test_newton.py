@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from stickslip.solve.linear import solve_dense
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 from stickslip.solve.status import Status
 
 

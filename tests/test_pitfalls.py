@@ -20,12 +20,12 @@ from stickslip.errors import InputError
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
-from stickslip.response.drift import drift
 from stickslip.response.forced.response import Sweep, forced_problem
 from stickslip.response.forced.sweep import forced_point
+from stickslip.response.free_motion import drift
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 from stickslip.solve.status import Status
 
 SLIDER = ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=0.0, mu=1.0, preload=1.0)

@@ -10,7 +10,7 @@ from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import SingularError
 from stickslip.model.structure import Structure
-from stickslip.response.preload import preload
+from stickslip.response.equilibrium import preload
 from stickslip.response.system import System
 
 K_N, LOAD = 2e6, 100.0

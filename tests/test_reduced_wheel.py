@@ -15,11 +15,11 @@ from stickslip.errors import InputError
 from stickslip.model.axis import Axis
 from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.modes import with_springs
-from stickslip.reduction.craig_bampton import craig_bampton
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
-from stickslip.reduction.reduced_wheel import reduced_wheel
+from stickslip.reduction.fixed_interface import craig_bampton
+from stickslip.reduction.full_wheel import wheel, wheel_shape
 from stickslip.reduction.waves import excited_wave
-from stickslip.reduction.wheel import wheel, wheel_shape
+from stickslip.reduction.whole_wheel import reduced_wheel
 
 TILTED = Axis((0.3, -0.4, 0.8), (0.1, 0.2, -0.3))
 

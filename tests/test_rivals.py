@@ -43,7 +43,7 @@ from stickslip.response.forced.response import (
     forced_problem,
     forced_response,
 )
-from stickslip.solve.newton import Newton
+from stickslip.solve.newton_method import Newton
 
 HZ = 2 * np.pi
 ORDER = 5

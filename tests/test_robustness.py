@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from evidence.benchmarks.robustness_systems import draw
+from stickslip.response.equilibrium import preload
 from stickslip.response.forced.rescue import growing_load, homotopies, with_friction
 from stickslip.response.forced.response import accepted_points, forced_problem, forced_response
-from stickslip.response.preload import preload
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 from stickslip.solve.rescue import solve_robustly
 from stickslip.solve.status import Rung, Status
 

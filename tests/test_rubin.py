@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from stickslip.errors import InputError, SingularError
 from stickslip.model.axis import Axis
 from stickslip.model.fe.solid import Material, assemble_solid
-from stickslip.model.lumped import chain, lumped
+from stickslip.model.matrices import chain, lumped
 from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.structure import Structure, join
-from stickslip.reduction.craig_bampton import craig_bampton
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
-from stickslip.reduction.rubin import rubin
+from stickslip.reduction.fixed_interface import craig_bampton
+from stickslip.reduction.free_interface import rubin
 from stickslip.reduction.truncation import FrequencyError, ModesBelow, frequency_errors
 
 

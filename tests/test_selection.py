@@ -21,7 +21,7 @@ from stickslip.harmonic.selection import alert as alert_module
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.jacobian_alert import JacobianAlert
 from stickslip.harmonic.selection.strategy import ErrorMeasure
-from stickslip.model.lumped import chain
+from stickslip.model.matrices import chain
 from stickslip.model.structure import Structure
 from stickslip.response.forced.response import (
     Sweep,
@@ -31,7 +31,7 @@ from stickslip.response.forced.response import (
 )
 from stickslip.response.system import System
 from stickslip.solve.krylov import Automatic, to_tolerance
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 
 ALL = ErrorMeasure(np.arange(4))
 

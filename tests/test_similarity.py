@@ -14,7 +14,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection.similarity import harmonic_block_norms, jacobian_similarity
 from stickslip.model.structure import Structure
 from stickslip.response.system import System
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 
 
 def two_solutions(system, load, hertz, samples=256):

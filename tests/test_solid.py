@@ -8,7 +8,7 @@ import pytest
 from stickslip.errors import InputError
 from stickslip.model.damping import rayleigh_damping
 from stickslip.model.fe.solid import Material, assemble_solid
-from stickslip.model.lumped import lumped
+from stickslip.model.matrices import lumped
 from stickslip.model.mesh.blade_mesh import mesh_blade_pair
 from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.solid_mesh import SolidMesh

@@ -11,7 +11,7 @@ from stickslip.errors import InputError
 from stickslip.solve.kink import Kinks
 from stickslip.solve.levenberg_marquardt import damped_step
 from stickslip.solve.linear import Bordered, Dense, bordered_array, times, transposed_times
-from stickslip.solve.newton import GLOBALISATIONS, Newton, newton
+from stickslip.solve.newton_method import GLOBALISATIONS, Newton, newton
 from stickslip.solve.rescue import ByDifference, Homotopy, solve_robustly
 from stickslip.solve.status import Rung, Status
 

@@ -11,7 +11,7 @@ from stickslip.solve.branch import Following, StepControl, reversed_point
 from stickslip.solve.continuation import advance, start_point, trace
 from stickslip.solve.events import FOLD, Event, located
 from stickslip.solve.linear import Dense
-from stickslip.solve.newton import Newton
+from stickslip.solve.newton_method import Newton
 from stickslip.solve.status import Rung, Status
 
 TOLERANCE = 1e-12

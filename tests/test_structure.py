@@ -6,10 +6,10 @@ import scipy.sparse
 
 from stickslip.errors import InputError
 from stickslip.model.dofs import Dofs, modal_dofs, nodal_dofs
-from stickslip.model.lumped import chain, lumped
+from stickslip.model.matrices import chain, lumped
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.structure import Structure, join
-from stickslip.reduction.craig_bampton import craig_bampton
+from stickslip.reduction.fixed_interface import craig_bampton
 
 
 def test_labels_name_part_node_and_component():

@@ -13,7 +13,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_real
 from stickslip.harmonic.support import complex_rows, harmonics_of, is_full, real_rows, rows_of
 from stickslip.response.forced.response import Sweep, forced_response
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 
 SUPPORTS = [(0, 1), (0, 1, 3), (0, 2, 3), (0, 1, 2, 3), (0, 1, 5)]
 some_harmonics = st.sets(st.integers(1, 7), min_size=1, max_size=5).map(harmonics_of)

@@ -14,7 +14,7 @@ from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import AtFrequency, law_field, load_level
 from stickslip.harmonic.peak import PeakProblem
-from stickslip.model.lumped import lumped
+from stickslip.model.matrices import lumped
 from stickslip.response.parameter import (
     Discretisation,
     branch_in_parameter,
@@ -23,7 +23,7 @@ from stickslip.response.parameter import (
 )
 from stickslip.response.system import System
 from stickslip.response.tracking import smallest_peak, track_peak
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 
 NONE = np.zeros(0, dtype=np.int64)
 FINE = Newton(tolerance=1e-12, max_iterations=60)

@@ -24,10 +24,10 @@ from stickslip.contact.interface import Interface
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.lumped import chain
+from stickslip.model.matrices import chain
 from stickslip.response.forced.response import ForcedPoint, Sweep, forced_problem, forced_response
 from stickslip.response.system import System
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]

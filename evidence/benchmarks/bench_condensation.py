@@ -15,7 +15,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.dynamic_stiffness import CondensedStiffness, condense
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.lumped import lumped
+from stickslip.model.matrices import lumped
 from stickslip.model.structure import Structure
 
 RETAINED = 33  # as the two blades and their damper

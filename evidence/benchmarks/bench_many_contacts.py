@@ -27,12 +27,12 @@ from stickslip.contact.threads import thread_shares
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.balance import CROSSOVER, HarmonicBalance, harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import condense
+from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
-from stickslip.response.preload import bonded_start
 from stickslip.solve.krylov import Automatic, Krylov
 from stickslip.solve.linear import Dense
-from stickslip.solve.newton import Newton, Solution, newton
+from stickslip.solve.newton_method import Newton, Solution, newton
 
 ORDER, SAMPLES = 5, 128
 OMEGA = 2 * np.pi * 1600.0  # 10 % below the first resonance of the stuck plates

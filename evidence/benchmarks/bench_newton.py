@@ -10,7 +10,7 @@ import scipy.linalg
 from evidence.benchmarks.two_blades import two_blades
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import condense
-from stickslip.response.preload import bonded_start, preload
+from stickslip.response.equilibrium import bonded_start, preload
 from stickslip.solve.linear import solve_dense
 
 ROUNDS = 201

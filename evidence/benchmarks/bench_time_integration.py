@@ -20,8 +20,8 @@ import numpy as np
 from evidence.benchmarks.two_blades import twenty_steps, two_blades
 from stickslip.arrays import ComplexArray, IntArray
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.equilibrium import preload
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, accepted_points
-from stickslip.response.preload import preload
 from stickslip.response.system import System
 from stickslip.response.time.period_map import period_map
 from stickslip.response.time.settling import period_harmonics

@@ -18,7 +18,7 @@ from stickslip.model.damping import rayleigh_damping
 from stickslip.model.dofs import Dofs
 from stickslip.model.fe.solid import Material
 from stickslip.model.structure import Structure
-from stickslip.reduction.craig_bampton import craig_bampton
+from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.response.system import System
 
 LENGTH, WIDTH, THICKNESS = 0.2, 0.12, 0.008  # m, each plate

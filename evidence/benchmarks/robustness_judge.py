@@ -21,7 +21,7 @@ from stickslip.response.time.transient import (
     integrate_refined,
     start_from_harmonics,
 )
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 
 ORDERS = (9, 15, 25)
 SAMPLES = 1024

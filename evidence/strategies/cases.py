@@ -14,10 +14,10 @@ from stickslip.contact.interface import Interface
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.damping import modal_damping
-from stickslip.model.lumped import lumped
+from stickslip.model.matrices import lumped
 from stickslip.model.structure import Structure
 from stickslip.reduction.lumped_disks import blisk_with_ring
-from stickslip.reduction.tuned_wheel import tuned_wheel
+from stickslip.reduction.tuned import tuned_wheel
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.study.build import Case

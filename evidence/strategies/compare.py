@@ -17,7 +17,7 @@ from stickslip.harmonic.selection import STRATEGIES, strategy_named
 from stickslip.response.forced.accepted import accepted_points
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, Passages, forced_point
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 
 THRESHOLD = 0.05
 LONG = 1.0  # s of CPU time after which a run is not timed again; the fastest counts

@@ -23,7 +23,7 @@ from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
 from stickslip.harmonic.selection.adjoint import estimate, outputs_of
 from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, forced_problem
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 
 THRESHOLD = 0.05
 WEAK = (5e-4, 5e-2)  # true errors of weakly nonlinear points

@@ -36,7 +36,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.damping import modal_damping
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.response.preload import preload
+from stickslip.response.equilibrium import preload
 from stickslip.response.system import System
 from stickslip.study.build import static_contact_force
 

@@ -22,7 +22,7 @@ from stickslip.response.forced.accepted import accepted_points
 from stickslip.response.forced.passages import along_branch
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, forced_problem
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 
 NEWTON = Newton(max_iterations=25)
 CLEAR = (

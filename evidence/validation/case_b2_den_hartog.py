@@ -14,8 +14,8 @@ from evidence.validation.compare import Record, record
 from evidence.validation.rigid import RigidMotion, Rubbing, extrapolated, growing
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.lumped import lumped
-from stickslip.solve.newton import Newton, newton
+from stickslip.model.matrices import lumped
+from stickslip.solve.newton_method import Newton, newton
 
 SOURCE = "literature benchmark B2"
 CASE = "B2 Den Hartog"

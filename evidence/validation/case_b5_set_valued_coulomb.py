@@ -11,7 +11,7 @@ import numpy as np
 from evidence.validation.compare import Record, record
 from evidence.validation.rigid import RigidMotion, Rubbing, extrapolated, growing
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.lumped import lumped
+from stickslip.model.matrices import lumped
 
 SOURCE = "literature benchmark B5"
 CASE = "B5 set-valued Coulomb friction"

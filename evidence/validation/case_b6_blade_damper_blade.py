@@ -20,8 +20,8 @@ from evidence.validation.models import (
     solve,
 )
 from stickslip.arrays import FloatArray
+from stickslip.response.equilibrium import preload
 from stickslip.response.forced.response import Sweep, forced_problem
-from stickslip.response.preload import preload
 from stickslip.response.system import System
 from stickslip.response.time.transient import TimeStepping
 

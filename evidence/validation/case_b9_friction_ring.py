@@ -17,10 +17,10 @@ from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.damping import modal_damping
 from stickslip.model.structure import Structure
+from stickslip.reduction.full_wheel import wheel
 from stickslip.reduction.lumped_disks import blisk_with_ring
-from stickslip.reduction.wheel import wheel
 from stickslip.response.rotating.nodal_diameters import nodal_diameter_map
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 
 SOURCE = "literature benchmark B9"
 CASE = "B9 blisk with friction ring"

@@ -8,7 +8,7 @@ import numpy as np
 
 from evidence.validation.compare import Record, bound
 from evidence.validation.reference_data import NlvibCase, has_complete, nlvib
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 
 NAMES = ("a_duffing", "b_two_dof_unilateral", "d_three_dof_mixed", "g_chain20_jenkins")
 DISTURBANCE = 1e-6  # of the largest entry, random; near the folds of case b, 1e-4 already lands on the other branch

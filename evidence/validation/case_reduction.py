@@ -10,11 +10,11 @@ import numpy as np
 from scipy import linalg, optimize
 
 from evidence.validation.compare import Record, bound, record
-from stickslip.model.lumped import chain
+from stickslip.model.matrices import chain
 from stickslip.model.modes import with_springs
 from stickslip.model.structure import Structure
-from stickslip.reduction.craig_bampton import craig_bampton
-from stickslip.reduction.rubin import rubin
+from stickslip.reduction.fixed_interface import craig_bampton
+from stickslip.reduction.free_interface import rubin
 from stickslip.reduction.truncation import frequency_errors
 
 CASE = "reduced chain"

@@ -20,8 +20,8 @@ from evidence.validation.models import (
 )
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response.fields import signals
 from stickslip.response.forced.response import Sweep, forced_problem
+from stickslip.response.recovery import signals
 from stickslip.response.system import System
 from stickslip.response.time.period_map import period_map
 from stickslip.response.time.shooting import ShootingResult, shoot

@@ -14,8 +14,8 @@ from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
+from stickslip.response.equilibrium import bonded_start, preload
 from stickslip.response.forced.response import ForcedPoint, Sweep, forced_response
-from stickslip.response.preload import bonded_start, preload
 from stickslip.response.system import System
 from stickslip.response.time.transient import (
     RefinedResult,
@@ -24,7 +24,7 @@ from stickslip.response.time.transient import (
     integrate_refined,
     start_from_harmonics,
 )
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 
 COS30, SIN30 = np.cos(np.pi / 6), 0.5
 

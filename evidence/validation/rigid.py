@@ -12,7 +12,7 @@ from stickslip.harmonic.dlft import DynamicLagrangian, dynamic_lagrangian
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 
 SAMPLES = 128  # a harmonic: the sampling error stays well below that of the missing harmonics
 

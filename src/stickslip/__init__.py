@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from stickslip.contact.check_law import check_law
     from stickslip.contact.compiled import compile_contacts
     from stickslip.contact.interface import Interface
     from stickslip.contact.law import law_kernel
+    from stickslip.contact.law_check import check_law
     from stickslip.contact.laws.bonded import Bonded
     from stickslip.contact.laws.bouc_wen import BoucWen
     from stickslip.contact.laws.coupled_coulomb import CoupledCoulomb
@@ -68,7 +68,7 @@ if TYPE_CHECKING:
     from stickslip.model.fe.rotation import RotatingSolid, SpeedPolynomial, rotating_solid
     from stickslip.model.fe.solid import Material, assemble_solid
     from stickslip.model.gyroscopic import GyroscopicModes, gyroscopic_modes
-    from stickslip.model.lumped import chain, lumped
+    from stickslip.model.matrices import chain, lumped
     from stickslip.model.mesh.blade_mesh import mesh_blade_pair
     from stickslip.model.mesh.blade_pair import BladePair
     from stickslip.model.mesh.sector import BladedSector
@@ -94,31 +94,31 @@ if TYPE_CHECKING:
     from stickslip.model.structure import Structure, join
     from stickslip.model.structure_file import load_structure, save_structure
     from stickslip.reduction.cache import cached
-    from stickslip.reduction.craig_bampton import craig_bampton
     from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
+    from stickslip.reduction.fixed_interface import craig_bampton
+    from stickslip.reduction.free_interface import rubin
+    from stickslip.reduction.full_wheel import wheel, wheel_shape
     from stickslip.reduction.interface_modes import reduce_interface
     from stickslip.reduction.lumped_disks import blade_ring, blisk_with_ring, mistuned_blade_ring
-    from stickslip.reduction.reduced_wheel import ReducedWheel, reduced_wheel
     from stickslip.reduction.relative import in_relative_coordinates
-    from stickslip.reduction.rubin import rubin
     from stickslip.reduction.truncation import (
         FrequencyError,
         FrequencyErrors,
         ModesBelow,
         frequency_errors,
     )
-    from stickslip.reduction.tuned_wheel import TunedWheel, tuned_wheel
+    from stickslip.reduction.tuned import TunedWheel, tuned_wheel
     from stickslip.reduction.waves import Wave, excited_wave, to_sectors, to_waves, wave
-    from stickslip.reduction.wheel import wheel, wheel_shape
+    from stickslip.reduction.whole_wheel import ReducedWheel, reduced_wheel
     from stickslip.report.page import write_report
     from stickslip.response.contributions import HarmonicContributions, harmonic_contributions
-    from stickslip.response.drift import Drift, drift
-    from stickslip.response.fields import Fields, Signals, fields, signals
+    from stickslip.response.equilibrium import preload
     from stickslip.response.forced.accepted import accepted_points
     from stickslip.response.forced.response import forced_response
     from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, Sweep, forced_problem
+    from stickslip.response.free_motion import Drift, drift
     from stickslip.response.parameter import Discretisation, ParameterPoint, branch_in_parameter
-    from stickslip.response.preload import preload
+    from stickslip.response.recovery import Fields, Signals, fields, signals
     from stickslip.response.rigid import RigidPoint, rigid_response
     from stickslip.response.rotating.campbell import Campbell, Crossing, campbell
     from stickslip.response.rotating.cyclic_campbell import cyclic_campbell
@@ -136,13 +136,13 @@ if TYPE_CHECKING:
     )
     from stickslip.response.tracking import PeakPoint, smallest_peak, track_peak
     from stickslip.response.verification import ReferenceCheck, verify_reference
-    from stickslip.solve.newton import Newton, newton
+    from stickslip.solve.newton_method import Newton, newton
     from stickslip.solve.status import Status
     from stickslip.study.run import run_study
     from stickslip.study.schema import Study, read_study
 
 _MODULES = {
-    "stickslip.contact.check_law": ("check_law",),
+    "stickslip.contact.law_check": ("check_law",),
     "stickslip.contact.compiled": ("compile_contacts",),
     "stickslip.contact.interface": ("Interface",),
     "stickslip.contact.law": ("law_kernel",),
@@ -201,7 +201,7 @@ _MODULES = {
     "stickslip.model.dofs": ("Dofs",),
     "stickslip.model.fe.elements": ("Quadrature",),
     "stickslip.model.gyroscopic": ("GyroscopicModes", "gyroscopic_modes"),
-    "stickslip.model.lumped": ("chain", "lumped"),
+    "stickslip.model.matrices": ("chain", "lumped"),
     "stickslip.model.mesh.solid_mesh": ("SolidMesh", "write_mesh"),
     "stickslip.model.modes": ("Modes", "natural_frequencies", "normal_modes", "with_springs"),
     "stickslip.model.readers.abaqus": ("read_abaqus_matrices",),
@@ -226,34 +226,34 @@ _MODULES = {
     "stickslip.model.structure": ("Structure", "join"),
     "stickslip.model.structure_file": ("load_structure", "save_structure"),
     "stickslip.reduction.cache": ("cached",),
-    "stickslip.reduction.craig_bampton": ("craig_bampton",),
+    "stickslip.reduction.fixed_interface": ("craig_bampton",),
     "stickslip.reduction.cyclic": ("CyclicSector", "cyclic_sector", "travelling_wave"),
     "stickslip.reduction.interface_modes": ("reduce_interface",),
     "stickslip.reduction.lumped_disks": ("blade_ring", "blisk_with_ring", "mistuned_blade_ring"),
-    "stickslip.reduction.reduced_wheel": ("ReducedWheel", "reduced_wheel"),
+    "stickslip.reduction.whole_wheel": ("ReducedWheel", "reduced_wheel"),
     "stickslip.reduction.relative": ("in_relative_coordinates",),
-    "stickslip.reduction.rubin": ("rubin",),
+    "stickslip.reduction.free_interface": ("rubin",),
     "stickslip.reduction.truncation": (
         "FrequencyError",
         "FrequencyErrors",
         "ModesBelow",
         "frequency_errors",
     ),
-    "stickslip.reduction.tuned_wheel": ("TunedWheel", "tuned_wheel"),
+    "stickslip.reduction.tuned": ("TunedWheel", "tuned_wheel"),
     "stickslip.reduction.waves": ("Wave", "excited_wave", "to_sectors", "to_waves", "wave"),
-    "stickslip.reduction.wheel": ("wheel", "wheel_shape"),
+    "stickslip.reduction.full_wheel": ("wheel", "wheel_shape"),
     "stickslip.report.page": ("write_report",),
     "stickslip.response.forced.accepted": ("accepted_points",),
     "stickslip.response.rotating.campbell": ("Campbell", "Crossing", "campbell"),
     "stickslip.response.contributions": ("HarmonicContributions", "harmonic_contributions"),
     "stickslip.response.rotating.cyclic_campbell": ("cyclic_campbell",),
-    "stickslip.response.drift": ("Drift", "drift"),
-    "stickslip.response.fields": ("Fields", "Signals", "fields", "signals"),
+    "stickslip.response.free_motion": ("Drift", "drift"),
+    "stickslip.response.recovery": ("Fields", "Signals", "fields", "signals"),
     "stickslip.response.time.floquet": ("Floquet",),
     "stickslip.response.forced.response": ("forced_response",),
     "stickslip.response.rotating.nodal_diameters": ("NodalDiameterMap", "nodal_diameter_map"),
     "stickslip.response.parameter": ("Discretisation", "ParameterPoint", "branch_in_parameter"),
-    "stickslip.response.preload": ("preload",),
+    "stickslip.response.equilibrium": ("preload",),
     "stickslip.response.rigid": ("RigidPoint", "rigid_response"),
     "stickslip.response.rotating.safe": ("Interference", "Safe", "safe"),
     "stickslip.response.time.shooting": ("ShootingResult", "shoot"),
@@ -273,7 +273,7 @@ _MODULES = {
         "start_from_harmonics",
     ),
     "stickslip.response.verification": ("ReferenceCheck", "verify_reference"),
-    "stickslip.solve.newton": ("Newton", "newton"),
+    "stickslip.solve.newton_method": ("Newton", "newton"),
     "stickslip.solve.status": ("Status",),
     "stickslip.study.run": ("run_study",),
     "stickslip.study.schema": ("Study", "read_study"),

@@ -10,7 +10,7 @@ from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector
-from stickslip.reduction.wheel import wheel
+from stickslip.reduction.full_wheel import wheel
 
 
 def blade_ring(

@@ -13,7 +13,7 @@ from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import AtFrequency, Family, law_field, load_level, rebuilt
-from stickslip.response.preload import bonded_start, preload
+from stickslip.response.equilibrium import bonded_start, preload
 from stickslip.response.system import System
 from stickslip.solve.continuation import (
     Following,
@@ -23,7 +23,7 @@ from stickslip.solve.continuation import (
     start_point,
     trace,
 )
-from stickslip.solve.newton import Newton, newton
+from stickslip.solve.newton_method import Newton, newton
 from stickslip.solve.status import Status
 
 Build = Callable[[float], tuple[System, HarmonicLoad]]

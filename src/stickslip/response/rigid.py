@@ -13,7 +13,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.parameter import LARGEST, Discretisation
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, Point, StepControl, start_point, trace
-from stickslip.solve.newton import newton
+from stickslip.solve.newton_method import newton
 from stickslip.solve.status import Status
 
 

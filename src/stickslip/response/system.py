@@ -14,7 +14,7 @@ from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.travelling import condense_waves
 from stickslip.model.modes import with_springs
 from stickslip.model.structure import Structure
-from stickslip.reduction.tuned_wheel import TunedWheel
+from stickslip.reduction.tuned import TunedWheel
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ from stickslip.response.parameter import (
 )
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, Point, StepControl, start_point, trace
-from stickslip.solve.newton import Newton, Solution, newton
+from stickslip.solve.newton_method import Newton, Solution, newton
 from stickslip.solve.status import Status
 
 SWEEP_POINTS = 40  # at least, of the one sweep that finds the first peak

@@ -8,7 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.solve.linear import Jacobian
-from stickslip.solve.newton import Newton, Solution
+from stickslip.solve.newton_method import Newton, Solution
 
 Parametrisation = Literal["arc_length", "natural", "local"]
 Predictor = Literal["tangent", "secant"]

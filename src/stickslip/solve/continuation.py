@@ -21,7 +21,7 @@ from stickslip.solve.branch import (
     tangent_at,
 )
 from stickslip.solve.events import FOLD, Event, between, located, with_tangent
-from stickslip.solve.newton import Solution, charged, newton
+from stickslip.solve.newton_method import Solution, charged, newton
 from stickslip.solve.status import Rung
 from stickslip.solve.steps import SHARP_TURN, next_step, no_step, round_corner, take_step
 

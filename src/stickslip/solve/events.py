@@ -8,7 +8,7 @@ import scipy.optimize
 
 from stickslip.arrays import FloatArray
 from stickslip.solve.branch import Following, Point, Problem, measure_at, tangent_at
-from stickslip.solve.newton import Solution, charged, newton
+from stickslip.solve.newton_method import Solution, charged, newton
 from stickslip.solve.steps import across
 
 

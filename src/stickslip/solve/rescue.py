@@ -10,7 +10,7 @@ from stickslip.solve.branch import ParameterEvaluation, Problem
 from stickslip.solve.continuation import Following, Point, StepControl, start_point, trace
 from stickslip.solve.iterate import Evaluation
 from stickslip.solve.linear import Jacobian
-from stickslip.solve.newton import GLOBALISATIONS, Newton, Solution, charged, newton
+from stickslip.solve.newton_method import GLOBALISATIONS, Newton, Solution, charged, newton
 from stickslip.solve.status import Rung, Status
 
 Evaluate = Callable[[FloatArray], Evaluation]

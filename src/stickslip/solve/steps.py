@@ -16,7 +16,7 @@ from stickslip.solve.branch import (
     tangent_at,
 )
 from stickslip.solve.linear import Bordered
-from stickslip.solve.newton import newton
+from stickslip.solve.newton_method import newton
 from stickslip.solve.status import Status
 
 SHARP_TURN = (

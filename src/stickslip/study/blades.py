@@ -15,7 +15,7 @@ from stickslip.model.mesh.solid_mesh import SolidMesh, write_mesh
 from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.rigid.damper import FlatCurvedDamper
 from stickslip.model.structure import Structure
-from stickslip.reduction.craig_bampton import craig_bampton
+from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.study.assembly import join_damper
 from stickslip.study.estimate import check_limits, estimate
 from stickslip.study.folder import MESHES

@@ -13,8 +13,8 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.mesh.blade_mesh import check_on_undersides
 from stickslip.model.rigid.damper import ContactPoints, FlatCurvedDamper
 from stickslip.model.structure import Structure
+from stickslip.response.equilibrium import preload
 from stickslip.response.forced.sweep import Sweep
-from stickslip.response.preload import preload
 from stickslip.response.system import System
 from stickslip.study.assembly import join_damper
 from stickslip.study.blades import ReducedBlades, reduced_blades

@@ -8,8 +8,8 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.support import Harmonics
-from stickslip.response.fields import Fields, Signals, fields, signals
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, accepted_pairs
+from stickslip.response.recovery import Fields, Signals, fields, signals
 
 HZ = 2 * np.pi
 NO_SHIFT = (float("nan"), float("nan"))

@@ -13,7 +13,7 @@ import numpy as np
 
 from stickslip import __version__
 from stickslip.errors import SingularError
-from stickslip.response.drift import drift
+from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.response import (
     ForcedPoint,
     ForcedProblem,
@@ -21,7 +21,7 @@ from stickslip.response.forced.response import (
     forced_problem,
     forced_response,
 )
-from stickslip.response.preload import bonded_start
+from stickslip.response.free_motion import drift
 from stickslip.study.build import Case, case_of, check_before_meshing
 from stickslip.study.chooser import Chooser, chooser_of, cost_sentence
 from stickslip.study.collect import HZ, CaseResult, collect

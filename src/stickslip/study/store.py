@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from stickslip.arrays import ComplexArray, FloatArray
-from stickslip.response.fields import Fields
+from stickslip.response.recovery import Fields
 from stickslip.study.attempts import alert_variables, attempt_variables, kept, status_flags
 from stickslip.study.build import Case
 from stickslip.study.chooser import Chooser

@@ -7,8 +7,8 @@ import numpy as np
 
 from stickslip.contact.law import SLIP
 from stickslip.errors import InputError
-from stickslip.response.fields import signals
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, forced_problem
+from stickslip.response.recovery import signals
 from stickslip.response.time.propagator import PeriodicLoad
 from stickslip.response.time.transient import (
     TimeStepping,
@@ -16,7 +16,7 @@ from stickslip.response.time.transient import (
     integrate,
     start_from_harmonics,
 )
-from stickslip.solve.newton import newton
+from stickslip.solve.newton_method import newton
 from stickslip.study.build import Case
 from stickslip.study.collect import HZ, Accepted, CaseResult
 from stickslip.study.journal import Journal

@@ -11,13 +11,13 @@ from stickslip.harmonic.balance import HarmonicBalance, Linearisation
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection.strategy import judged
 from stickslip.harmonic.support import Harmonics
+from stickslip.response.equilibrium import bonded_start, preload
 from stickslip.response.forced.accepted import branch_end, reached
 from stickslip.response.forced.rescue import homotopies
 from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, forced_point
-from stickslip.response.preload import bonded_start, preload
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to
-from stickslip.solve.newton import Solution, charged, newton
+from stickslip.solve.newton_method import Solution, charged, newton
 from stickslip.solve.rescue import Homotopy, solve_robustly
 
 LOOP = 3  # multiples of `Sweep.points` after which a branch that gains no frequency is left

@@ -15,7 +15,7 @@ from stickslip.response.forced.rescue import homotopies
 from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, forced_point
 from stickslip.solve.linear import factorised
 from stickslip.solve.natural import NaturalLevel
-from stickslip.solve.newton import Newton, Solution, charged, newton
+from stickslip.solve.newton_method import Newton, Solution, charged, newton
 from stickslip.solve.rescue import solve_robustly
 from stickslip.solve.status import Rung, Status
 

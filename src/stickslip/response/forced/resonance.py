@@ -13,7 +13,7 @@ from stickslip.response.forced.repeats import repeat
 from stickslip.response.forced.rescue import homotopies
 from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, forced_point
 from stickslip.solve.continuation import start_point, step_to
-from stickslip.solve.newton import Solution, charged
+from stickslip.solve.newton_method import Solution, charged
 from stickslip.solve.rescue import solve_robustly
 from stickslip.solve.status import Rung
 

@@ -11,6 +11,7 @@ from functools import cache
 
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.equilibrium import preload
 from stickslip.response.forced.accepted import (
     accepted_pairs,
     accepted_points,
@@ -23,7 +24,6 @@ from stickslip.response.forced.repeats import passing, postponed, repeat, worth_
 from stickslip.response.forced.resonance import resolve_peak
 from stickslip.response.forced.single_passage import single_passage
 from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, Sweep, forced_problem
-from stickslip.response.preload import preload
 from stickslip.response.system import System
 
 __all__ = [

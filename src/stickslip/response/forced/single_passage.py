@@ -19,7 +19,7 @@ from stickslip.response.forced.sweep import (
     Stage,
     forced_point,
 )
-from stickslip.solve.newton import Solution, charged, newton
+from stickslip.solve.newton_method import Solution, charged, newton
 
 
 def single_passage(

@@ -24,7 +24,7 @@ from stickslip.harmonic.support import Harmonics, harmonics_of
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, Point, StepControl
 from stickslip.solve.krylov import to_tolerance
-from stickslip.solve.newton import Newton, Solution
+from stickslip.solve.newton_method import Newton, Solution
 from stickslip.solve.status import Rung, Status
 
 FIXED = ("always_low", "always_high")  # the same harmonics at every frequency

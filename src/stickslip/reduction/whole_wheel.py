@@ -13,8 +13,8 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.reduction.craig_bampton import craig_bampton
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave
+from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.reduction.projection import dof_indices
 from stickslip.reduction.turning import dof_rotation
 from stickslip.reduction.waves import to_sectors, to_waves, wave

@@ -15,7 +15,7 @@ from stickslip.harmonic.fourier import to_complex
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, StepControl, reversed_point, start_point, trace
 from stickslip.solve.linear import solve_dense
-from stickslip.solve.newton import Newton, Solution, newton
+from stickslip.solve.newton_method import Newton, Solution, newton
 from stickslip.solve.status import Status
 
 HOLDING = StepControl(scale=1.0, first=0.05, largest=0.5, smallest=1e-5)

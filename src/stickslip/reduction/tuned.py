@@ -13,17 +13,17 @@ from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.reduction.craig_bampton import craig_bampton
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave
-from stickslip.reduction.reduced_wheel import (
+from stickslip.reduction.fixed_interface import craig_bampton
+from stickslip.reduction.relative import in_relative_coordinates
+from stickslip.reduction.waves import excited_wave, wave
+from stickslip.reduction.whole_wheel import (
     Reduce,
     kept_places,
     reduced_wave,
     refuse_reduced,
     refuse_unequal,
 )
-from stickslip.reduction.relative import in_relative_coordinates
-from stickslip.reduction.waves import excited_wave, wave
 
 
 @dataclass(frozen=True, eq=False)
