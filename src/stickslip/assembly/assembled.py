@@ -1,0 +1,122 @@
+"""A model as solvers and results see it."""
+
+from dataclasses import dataclass
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.system import System
+
+
+@dataclass(frozen=True, eq=False)
+class ContactTable:
+    """What results say of each contact point.
+
+    Parameters
+    ----------
+    names
+        Of the points: ``contact.point``, or the point's own name where the surface has names.
+    groups
+        Name of the model's contact that each belongs to.
+    laws
+        Names of their laws.
+    position
+        (p, 3) in m; NaN for contacts of single dofs.
+    frame
+        (p, 3, 3) columns t, w, n.
+    area
+        (p,) in m²; NaN where there are no facets.
+    """
+
+    names: tuple[str, ...]
+    groups: tuple[str, ...]
+    laws: tuple[str, ...]
+    position: FloatArray
+    frame: FloatArray
+    area: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """The skin of the parts, for pictures.
+
+    Parameters
+    ----------
+    points
+        (n, 3) in m.
+    triangles
+        (k, 3) points of each triangle.
+    cut
+        (k,) 1 where the triangle lies on a cyclic face, which is inside the wheel.
+    """
+
+    points: FloatArray
+    triangles: IntArray
+    cut: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Frequencies:
+    """Natural frequencies in Hz of the full and the reduced model, contacts open (free rigid bodies left out) and stuck.
+
+    Of a wheel: those of the wave that harmonic 1 travels as.
+    """
+
+    free_full: FloatArray
+    free_reduced: FloatArray
+    stuck_full: FloatArray
+    stuck_reduced: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Assembled:
+    """A model reduced, its contacts paired and placed under the static load: arrays only, picklable.
+
+    Parameters
+    ----------
+    system, bare
+        With and without the retention.
+    load
+        On the system's coordinates, N.
+    contacts
+        Tables of the contact points, in the order of the interface.
+    output_labels
+        Of `System.outputs`.
+    peak_output
+        Position of the output whose peak counts.
+    error_labels
+        Of `System.alert_dofs`.
+    retention
+        N/m.
+    excitation
+        Amplitude by which responses are divided: the largest harmonic force, N; NaN for none.
+    static_gap, static_force
+        (p, 3) gaps (m) and contact forces (N) under the static loads alone.
+    frequencies
+        How well the reduced model stands for the full one.
+    skin
+        None where no part has a mesh.
+    sectors, engine_order
+        Of the wheel; 1 and None for a single structure.
+    counts
+        ``nodes``, ``dofs``, ``reduced``, ``retained``.
+    warnings
+        What the user should know.
+    """
+
+    system: System
+    bare: System
+    load: HarmonicLoad
+    contacts: ContactTable
+    output_labels: tuple[str, ...]
+    peak_output: int
+    error_labels: tuple[str, ...]
+    retention: float
+    excitation: float
+    static_gap: FloatArray
+    static_force: FloatArray
+    frequencies: Frequencies
+    skin: Skin | None
+    sectors: int
+    engine_order: int | None
+    counts: dict[str, int]
+    warnings: tuple[str, ...] = ()

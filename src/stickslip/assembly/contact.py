@@ -1,0 +1,66 @@
+"""Contacts between named surfaces."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from stickslip.contact.law import ContactLaw
+
+GROUND = "ground"
+NEXT = "next."  # prefix of a surface of the neighbouring sector, in the sense of rotation
+PairingKind = Literal["node_to_node", "node_to_segment", "segment_to_segment"]
+Share = Literal["interface", "point", "area"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Contact:
+    """Two surfaces that may stick, slip and lift off.
+
+    Parameters
+    ----------
+    between
+        The first surface gives the points and the normal, ``part.surface``; the second is ``part.surface``, ``next.part.surface``
+        (of the neighbouring sector) or ``ground``. The gap is ``frameᵀ (u_second - u_first)``, with n out of the first body.
+    law
+        Its parameters hold for what `share` says.
+    share
+        ``interface``: stiffnesses and forces of the law are those of the whole interface, shared among its points; ``point``: of
+        each point; ``area``: per square metre.
+    pairing
+        How points find their partners.
+    tangent
+        Direction whose part in the contact plane is t; None: that of the surface's own frames, or any where the law does not tell
+        its tangents apart.
+    acts
+        For surfaces of single dofs, which have no normal: the direction of the contact that their relative motion is.
+    tolerance
+        Distance of partners node to node, reach of a segment, m; None: the pairing's own.
+    gap
+        Clearance at rest, m.
+    preload
+        Normal force at rest of what `share` says, N or Pa.
+    """
+
+    between: tuple[str, str]
+    law: ContactLaw
+    share: Share = "point"
+    pairing: PairingKind = "node_to_node"
+    tangent: tuple[float, float, float] | None = None
+    acts: Literal["tangential", "normal"] | None = None
+    tolerance: float | None = None
+    gap: float = 0.0
+    preload: float = 0.0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Join:
+    """Two surfaces tied to each other for good: the first follows the second.
+
+    Parameters
+    ----------
+    between, pairing, tolerance
+        As of a `Contact`.
+    """
+
+    between: tuple[str, str]
+    pairing: PairingKind = "node_to_segment"
+    tolerance: float | None = None

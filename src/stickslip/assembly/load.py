@@ -1,0 +1,53 @@
+"""Loads on a model, and where its motion is reported."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Load:
+    """A static or harmonic force.
+
+    Parameters
+    ----------
+    on
+        ``part`` (a rigid body: at its centre of mass), ``part.set`` (shared equally among its nodes), or a dof ``part.node12.x``.
+    newton
+        The whole force, or its amplitude, N.
+    direction
+        Unit vector in global axes (of the sector, on a wheel); None where `on` is a single dof.
+    harmonic
+        0: static; h: ``Re(newton e^{i(h ω t + phase)})``.
+    phase
+        In rad.
+    engine_order
+        m of a wheel's excitation: harmonic h travels as the wave ``h m``; None for a single structure.
+    """
+
+    on: str
+    newton: float
+    direction: tuple[float, float, float] | None = None
+    harmonic: int = 1
+    phase: float = 0.0
+    engine_order: int | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Output:
+    """A point whose motion is reported.
+
+    Parameters
+    ----------
+    name
+        Its labels are ``name.x`` and so on.
+    on
+        ``part.set`` (its first node), a dof ``part.node12.x``, or a part together with `near`.
+    near
+        (3,) place in m; the nearest node of the part `on` is taken.
+    directions
+        Of x, y, z, rx, ry, rz; those that the point has, if empty.
+    """
+
+    name: str
+    on: str
+    near: tuple[float, float, float] | None = None
+    directions: tuple[str, ...] = ()

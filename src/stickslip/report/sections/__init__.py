@@ -1,0 +1,1 @@
+"""What the page says of each analysis, one file each."""

@@ -1,0 +1,143 @@
+"""The seam of analyses: a question, its table, its jobs, its solution record by record, its dataset."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import xarray as xr
+
+from stickslip.assembly.model import Model
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """One member of the family that [vary] spans.
+
+    Parameters
+    ----------
+    index
+        Its position.
+    label
+        What is varied, as text; empty for a study without [vary].
+    values
+        Varied key -> its value here.
+    settings
+        Tables of the study with the varied keys in place: ``harmonics``, ``solver``, ``limits``, and one for each analysis
+        asked for, by name.
+    build
+        Makes the model; called in the runner's process and only where a job is not sealed yet.
+    digest
+        Hash of all that the model depends on: its tables and the content of its files.
+    home
+        Folder that names of files are relative to.
+    """
+
+    index: int
+    label: str
+    values: Mapping[str, Any]
+    settings: Any
+    build: Callable[[], Model]
+    digest: str
+    home: Path
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """One case of one analysis, picklable: solved anywhere, it appends records to its own journal and seals one file.
+
+    Parameters
+    ----------
+    analysis
+        Name of the analysis.
+    case
+        Position of the case.
+    label
+        What is said of it while it runs.
+    inputs
+        All that `Analysis.solve` needs; made by `Analysis.inputs`.
+    """
+
+    analysis: str
+    case: int
+    label: str
+    inputs: Any
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """What a sealed job holds.
+
+    Parameters
+    ----------
+    case
+        The case.
+    records
+        In the order in which they came.
+    notes
+        Named arrays, numbers and texts that the job put down beside its records (`Notes.put`).
+    """
+
+    case: Case
+    records: Sequence[Any]
+    notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+
+class Notes(Protocol):
+    """Where a job puts down what is no record, and finds it after an interruption: the journal."""
+
+    def put(self, name: str, values: Mapping[str, Any]) -> None:
+        """Store named arrays, numbers and texts."""
+        ...
+
+    def get(self, name: str) -> dict[str, Any] | None:
+        """Return what was stored under `name`, or None."""
+        ...
+
+
+class Analysis(Protocol):
+    """A question that a study may ask. Its module defines one instance; `ANALYSES` lists them.
+
+    Attributes
+    ----------
+    name
+        Key of its table in the study file, its node in the result, its section of the page.
+    table
+        pydantic section of the study file.
+    record
+        Dataclass of what `solve` yields: arrays, numbers, texts, enumerations and None.
+    """
+
+    name: str
+    table: type[Any]
+    record: type[Any]
+
+    def key(self, case: Case) -> str:
+        """Return all that the numbers of a case depend on, as text: tables and files, not titles or folders."""
+        ...
+
+    def inputs(self, case: Case, model: Model) -> Any:
+        """Return what `solve` needs, refusing what cannot be answered; raises InputError before any long computation."""
+        ...
+
+    def solve(self, inputs: Any, done: Sequence[Any], notes: Notes) -> Iterator[Any]:
+        """Yield the records that are not in `done`, as they are found; a generator that tells progress by `logging`."""
+        ...
+
+    def dataset(self, solved: Sequence[Solved]) -> xr.Dataset:
+        """Return the node of the result from all cases sealed or begun so far."""
+        ...
+
+    def summary(self, data: xr.Dataset) -> "tuple[TextTable, ...]":
+        """Return what the terminal prints of a dataset."""
+        ...
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """A table as text: its heading, the names of its columns, its cells, and lines below it."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    lines: tuple[str, ...] = ()

@@ -1,0 +1,1 @@
+"""The study file: its tables, and what is wrong with one."""
