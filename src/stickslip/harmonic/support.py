@@ -40,6 +40,14 @@ def harmonics_of(chosen: int | Iterable[int], place: str = "harmonics") -> Harmo
     return tuple(sorted({0, *whole}))
 
 
+def named(harmonics: Iterable[int]) -> str:
+    """Return a support as text: ``5`` where it holds all up to the fifth, else ``1, 3, 5``."""
+    own = [int(h) for h in harmonics if h > 0]
+    if own == list(range(1, len(own) + 1)):
+        return str(len(own))
+    return ", ".join(map(str, own))
+
+
 def is_full(harmonics: Harmonics) -> bool:
     """Whether no harmonic up to the highest is left out."""
     return len(harmonics) == harmonics[-1] + 1

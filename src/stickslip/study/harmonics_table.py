@@ -1,6 +1,5 @@
 """The table [harmonics] of a study file: which harmonics are kept, and what chooses them at each frequency."""
 
-from collections.abc import Iterable
 from dataclasses import fields
 from typing import Annotated, Any, Literal, Self
 
@@ -10,7 +9,7 @@ from stickslip.errors import InputError, did_you_mean
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
 from stickslip.harmonic.selection.strategy import Strategy
 from stickslip.harmonic.support import Harmonics as Support
-from stickslip.harmonic.support import harmonics_of
+from stickslip.harmonic.support import harmonics_of, named  # noqa: F401
 from stickslip.response.forced.sweep import FIXED, Passages, Sweep
 from stickslip.study.messages import custom_error, library_error, shown
 from stickslip.study.sections import Positive, Section
@@ -156,14 +155,6 @@ class Harmonics(Section):
         """Whether each frequency is settled before the next one."""
         strategy = self.strategy
         return strategy is not None and (self.passages == "single" or not strategy.verifies)
-
-
-def named(harmonics: Iterable[int]) -> str:
-    """Return a support as text: ``5`` where it holds all up to the fifth, else ``1, 3, 5``."""
-    own = [int(h) for h in harmonics if h > 0]
-    if own == list(range(1, len(own) + 1)):
-        return str(len(own))
-    return ", ".join(map(str, own))
 
 
 def _harmonic(given: Any, least: int) -> bool:
