@@ -1,20 +1,15 @@
 """The error types, and the shape of their messages: place, what is wrong, value got, remedy."""
 
+from collections.abc import Iterable, Mapping
+from string import Template
+
 
 class StickslipError(Exception):
     """Any error that this package raises on purpose."""
 
 
 class InputError(StickslipError):
-    """Bad input: a study file, a model or an argument that cannot be used."""
-
-
-class SingularError(StickslipError):
-    """A linear system has no unique solution; the message names the coordinate."""
-
-
-def input_error(place: str, problem: str, remedy: str) -> InputError:
-    """Build an `InputError` in the one form that messages have.
+    """Bad input: a study file, a model or an argument that cannot be used.
 
     Parameters
     ----------
@@ -23,9 +18,69 @@ def input_error(place: str, problem: str, remedy: str) -> InputError:
     problem
         What is wrong and the value got, e.g. ``must be positive, got -0.1``.
     remedy
-        What to do about it.
+        What to do about it. ``$name`` in it stands for an argument that callers know by names of their own.
+    words
+        How each of these arguments is called here: ``{"mesh": "mesh=…"}``.
+    others
+        Further errors of the same input, each told on a line of its own.
     """
-    return InputError(f"{place}: {problem}. {remedy}")
+
+    def __init__(
+        self,
+        place: str,
+        problem: str,
+        remedy: str,
+        words: Mapping[str, str] | None = None,
+        others: "tuple[InputError, ...]" = (),
+    ) -> None:
+        super().__init__(place, problem, remedy, words, others)  # what pickle makes it anew from
+        self.place, self.problem, self.words, self.others = (
+            place,
+            problem,
+            dict(words or {}),
+            others,
+        )
+        self._advice = remedy
+
+    @property
+    def remedy(self) -> str:
+        """What to do about it, arguments by their names."""
+        return Template(self._advice).safe_substitute(self.words) if self.words else self._advice
+
+    def __str__(self) -> str:
+        own = f"{self.place}: {self.problem}. {self.remedy}"
+        return "\n".join([own, *map(str, self.others)])
+
+    def at(self, place: str) -> "InputError":
+        """Return the same error at another place."""
+        return InputError(place, self.problem, self._advice, self.words, self.others)
+
+    def inside(self, place: str) -> "InputError":
+        """Return the same errors with `place` before the places they have."""
+        others = tuple(other.inside(place) for other in self.others)
+        return InputError(f"{place}: {self.place}", self.problem, self._advice, self.words, others)
+
+    def called(self, words: Mapping[str, str]) -> "InputError":
+        """Return the same errors with the arguments under other names."""
+        others = tuple(other.called(words) for other in self.others)
+        own = {name: words.get(name, word) for name, word in self.words.items()}
+        return InputError(self.place, self.problem, self._advice, own, others)
+
+
+class SingularError(StickslipError):
+    """A linear system has no unique solution; the message names the coordinate."""
+
+
+def input_error(place: str, problem: str, remedy: str, **words: str) -> InputError:
+    """Build an `InputError`; `words` are the names of the arguments that the remedy calls ``$name``."""
+    return InputError(place, problem, remedy, words)
+
+
+def together(errors: Iterable[InputError]) -> InputError:
+    """Return one error that tells of all `errors`, a line each; there is at least one."""
+    first, *rest = errors
+    others = (*first.others, *rest)
+    return InputError(*first.args[:-1], others)
 
 
 def did_you_mean(word: str, known: list[str]) -> str:

@@ -123,7 +123,7 @@ def check_before_meshing(study: Study) -> None:
     try:
         sweep_of(study.tables)
     except InputError as error:
-        raise InputError(f"{study.path}: {error}") from None
+        raise error.inside(str(study.path)) from None
     check_limits(study, estimate(study, round(study.tables.blades.nodes())))
 
 
@@ -138,16 +138,15 @@ def _checked_damper(study: Study) -> FlatCurvedDamper:
     try:
         error_labels(study.tables, damper.contact_points())
     except InputError as error:
-        raise InputError(f"{study.path}: {error}") from None
+        raise error.inside(str(study.path)) from None
     return damper
 
 
 def _of_the_parts(study: Study, error: InputError) -> InputError:
     """Return a complaint about blades and damper that names the study."""
-    text = str(error)
-    if str(study.path) in text:
+    if str(study.path) in error.place:
         return error
-    return InputError(f"{study.path}: [blades] with [damper]: {text}")
+    return error.inside(f"{study.path}: [blades] with [damper]")
 
 
 def make_case(tables: StudyTables, blades: ReducedBlades, damper: FlatCurvedDamper) -> Case:

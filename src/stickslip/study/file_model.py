@@ -1,6 +1,5 @@
 """The table [model.file]: from the files of a finite-element program to what a model is made of."""
 
-import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -118,18 +117,26 @@ def _sectors(study: StructureStudy, table: FileModel, of_deck: int | None = None
 
 
 def of_the_faces(study: StructureStudy, error: InputError) -> InputError:
-    """Return a complaint about the cyclic faces with the study's keys and names of sets, where it names a file."""
-    table = study.tables.model.file
-    if table is None:
+    """Return a complaint about the cyclic faces with the study's keys, where it names a file."""
+    if study.tables.model.file is None:
         return error
-    text = str(error).replace("cyclic_sector: ", f"{study.path}: model.file: ", 1)
-    for role, name in ((LOW, table.low_face), (HIGH, table.high_face)):
-        text = text.replace(
-            repr(role),
-            f"the {role.removeprefix('cyclic_')} face of the tie" if name is None else repr(name),
-        )
-    text = re.sub(r"Say sectors=(\d+)", r"Give sectors = \1", text)
-    return InputError(text.replace("Swap them,", "Swap low_face and high_face,"))
+    words = {"swap": "Swap low_face and high_face"}
+    for key, word in error.words.items():
+        if key == "sectors":
+            words[key] = word.replace("=", " = ")
+    return error.called(words).at(
+        error.place.replace("cyclic_sector", f"{study.path}: model.file", 1)
+    )
+
+
+def faces_of(study: StructureStudy, sets: Mapping[str, IntArray]) -> tuple[str, str]:
+    """Return the names of the sets that hold the cyclic faces."""
+    table = study.tables.model.file
+    if table is None or table.low_face is None or table.high_face is None:
+        return LOW, HIGH
+    return _known(study, "low_face", table.low_face, sets), _known(
+        study, "high_face", table.high_face, sets
+    )
 
 
 def _units(table: FileModel) -> Units:

@@ -1,13 +1,12 @@
 """From what pydantic found to sentences that name the file, the key, the value got and a remedy."""
 
-import re
 from collections.abc import Sequence
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from stickslip.errors import InputError, did_you_mean
+from stickslip.errors import InputError, did_you_mean, input_error, together
 
 LONGEST_VALUE = 60  # characters of a value that a message shows
 
@@ -20,19 +19,17 @@ def custom_error(problem: str, remedy: str, key: str = "") -> PydanticCustomErro
 
 def library_error(section: type[BaseModel], error: InputError) -> PydanticCustomError:
     """Return a dataclass's complaint about ``Class.field`` with the section's key for that field."""
-    place, _, rest = str(error).partition(": ")
-    problem, _, remedy = rest.partition(". ")
-    field = place.rpartition(".")[2]
+    field = error.place.rpartition(".")[2]
     keys = [k for k in section.model_fields if k == field or k.startswith(field + "_")]
-    return custom_error(problem, remedy, keys[0] if len(keys) == 1 else "")
+    return custom_error(error.problem, error.remedy, keys[0] if len(keys) == 1 else "")
 
 
-def messages(place: str, model: type[BaseModel], error: ValidationError) -> list[str]:
-    """Return one line for each problem: ``FILE: table.key: problem, got VALUE. REMEDY``."""
-    return [_message(place, model, details) for details in error.errors(include_url=False)]
+def told(place: str, model: type[BaseModel], error: ValidationError) -> InputError:
+    """Return one error that tells each problem: ``FILE: table.key: problem, got VALUE. REMEDY``."""
+    return together(_told(place, model, details) for details in error.errors(include_url=False))
 
 
-def _message(place: str, model: type[BaseModel], details: ErrorDetails) -> str:
+def _told(place: str, model: type[BaseModel], details: ErrorDetails) -> InputError:
     path = [str(p) for p in details["loc"]]
     context: dict[str, Any] = details.get("ctx", {})
     if details["type"] == "stickslip":
@@ -42,7 +39,7 @@ def _message(place: str, model: type[BaseModel], details: ErrorDetails) -> str:
     else:
         where = ".".join(path)
         problem, remedy = _problem(model, path, details, context)
-    return f"{place}: {where}: {problem}. {remedy}".replace(": :", ":")
+    return input_error(f"{place}: {where}" if where else place, problem, remedy)
 
 
 def _problem(
@@ -72,40 +69,26 @@ def _problem(
     return f"{said[0].lower()}{said[1:]}, got {got}", f"Give {about}."
 
 
-# what the readers say of their arguments, in the words of who has no Python before him
-_IN_STUDY = (
-    ("Give units=Units.…(), or plausible=False where", "Give model.file.units, or model.file.plausible = false, where"),
-    ("plausible=False", "model.file.plausible = false"),
-    ("mesh=…", "model.file.mesh"),
-    ("mass=…", "model.file.mass"),
-    ("nodes=…", "model.file.nodes"),
-)  # fmt: skip
-_ON_COMMAND_LINE = (
-    ("mesh=…", "--mesh"),
-    ("mass=…", "model.file.mass in a study"),
-    ("nodes=…", "model.file.nodes in a study"),
-)
+# the readers' arguments, in the words of who has no Python before him
+_KEPT = "Read it in Python, keep it with save_structure (.npz) and give that: use"
+_IN_STUDY = {
+    "units": "model.file.units", "plausible": "model.file.plausible = false", "mesh": "model.file.mesh",
+    "mass": "model.file.mass", "nodes": "model.file.nodes", "ignore": "", "use": _KEPT,
+}  # fmt: skip
+_ON_COMMAND_LINE = {
+    "mesh": "--mesh", "mass": "model.file.mass in a study", "nodes": "model.file.nodes in a study",
+    "ignore": "", "use": _KEPT,
+}  # fmt: skip
 
 
 def of_a_study(error: InputError) -> InputError:
     """Return a reader's complaint with the keys of a study in place of arguments of Python."""
-    return _reworded(error, _IN_STUDY)
+    return error.called(_IN_STUDY)
 
 
 def of_the_command_line(error: InputError) -> InputError:
     """Return a reader's complaint with options of ``stickslip inspect`` in place of arguments of Python."""
-    return _reworded(error, _ON_COMMAND_LINE)
-
-
-def _reworded(error: InputError, words: Sequence[tuple[str, str]]) -> InputError:
-    text = re.sub(r", or pass ignore=\([^)]*\) to go on without", "", str(error))
-    text = text.replace(
-        "Use read_nastran",
-        "Read it in Python, keep it with save_structure (.npz) and give that: use read_nastran",
-    )
-    for python, key in words:
-        text = text.replace(python, key)
-    return InputError(text)
+    return error.called(_ON_COMMAND_LINE)
 
 
 def shown(value: object) -> str:

@@ -9,11 +9,11 @@ from typing import Any, Literal, get_args
 
 from pydantic import Field, ValidationError
 
-from stickslip.errors import InputError, input_error
+from stickslip.errors import input_error
 from stickslip.study.contacts import Contact
 from stickslip.study.geometry import Blades, Damper, MaterialTable
 from stickslip.study.harmonics_table import Harmonics
-from stickslip.study.messages import messages
+from stickslip.study.messages import told
 from stickslip.study.sections import (
     Damping,
     Limits,
@@ -101,7 +101,7 @@ def read_study(path: Path) -> Study:
     try:
         tables = StudyTables.model_validate(raw, context={"study": path})
     except ValidationError as error:
-        raise InputError("\n".join(messages(str(path), StudyTables, error))) from None
+        raise told(str(path), StudyTables, error) from None
     return Study(path, text, tables, path.resolve().parent / tables.output.folder)
 
 

@@ -204,9 +204,7 @@ class SectorTable(Section):
 
 def _nested_error(section: type[BaseModel], error: InputError) -> PydanticCustomError:
     """Return the geometry's complaint about ``BladedSector.part.field`` with the key of that field."""
-    place, _, rest = str(error).partition(": ")
-    problem, _, remedy = rest.partition(". ")
-    _, *names = place.split(".")
+    _, *names = error.place.split(".")
     tables: dict[str, type[BaseModel]] = {
         "disk": DiskTable, "platform": PlatformTable, "airfoil": AirfoilTable, "shroud": ShroudTable
     }  # fmt: skip
@@ -217,4 +215,4 @@ def _nested_error(section: type[BaseModel], error: InputError) -> PydanticCustom
             break
         key.append(name if name in fields else fields[0])
         model = tables.get(name, model)
-    return custom_error(problem, remedy, ".".join(key))
+    return custom_error(error.problem, error.remedy, ".".join(key))

@@ -20,6 +20,7 @@ from stickslip.study.file_model import (
     LOW,
     ROOT,
     FileContent,
+    faces_of,
     of_the_faces,
     read_file_model,
 )
@@ -217,8 +218,9 @@ def _finished(study: StructureStudy, content: FileContent, say: Say) -> DiskMode
     )
     sector = None
     if sectors > 1:
+        low, high = faces_of(study, structure.sets)
         try:
-            sector = cyclic_sector(structure, sectors, low=LOW, high=HIGH, axis=content.axis)
+            sector = cyclic_sector(structure, sectors, low=low, high=high, axis=content.axis)
         except InputError as error:
             raise of_the_faces(study, error) from None
         say(f"{len(sector.low)} pairs of dofs on the cyclic faces")

@@ -8,9 +8,9 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from stickslip.errors import InputError, input_error
+from stickslip.errors import input_error
 from stickslip.study.geometry import MaterialTable
-from stickslip.study.messages import custom_error, messages
+from stickslip.study.messages import custom_error, told
 from stickslip.study.schema import SCHEMA_VERSION, check_version, read_toml
 from stickslip.study.sections import Output, Section
 from stickslip.study.sector_table import SectorTable
@@ -158,7 +158,7 @@ def read_structure_study(path: Path) -> StructureStudy:
     try:
         tables = StructureTables.model_validate(raw, context={"study": path})
     except ValidationError as error:
-        raise InputError("\n".join(messages(str(path), StructureTables, error))) from None
+        raise told(str(path), StructureTables, error) from None
     study = StructureStudy(path, text, tables, path.resolve().parent / tables.output.folder)
     _require_files(study)
     return study

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from stickslip.contact.law import SLIP
-from stickslip.errors import InputError
+from stickslip.errors import input_error, together
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.response.recovery import signals
 from stickslip.response.time.propagator import PeriodicLoad
@@ -117,14 +117,17 @@ def require_integrable(study: Study) -> None:
         Naming every side of the damper that has such a law.
     """
     sides = {"flat": study.tables.contact.flat, "curved": study.tables.contact.curved}
-    lines = [
-        f"{study.path}: contact.{name}.law: --verify integrates in time, which knows {INTEGRABLE} alone, got {side.law!r}. "
-        f"Run without --verify, or give the law {INTEGRABLE}."
+    wrong = [
+        input_error(
+            f"{study.path}: contact.{name}.law",
+            f"--verify integrates in time, which knows {INTEGRABLE} alone, got {side.law!r}",
+            f"Run without --verify, or give the law {INTEGRABLE}.",
+        )
         for name, side in sides.items()
         if side.law != INTEGRABLE
     ]
-    if lines:
-        raise InputError("\n".join(lines))
+    if wrong:
+        raise together(wrong)
 
 
 def verify(

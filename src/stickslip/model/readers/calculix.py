@@ -12,7 +12,7 @@ from stickslip.model.readers.entries import SYMMETRY, from_triangle
 from stickslip.model.readers.node_table import COMPONENTS
 from stickslip.model.readers.positions import doubt_about_positions, find_nodes
 from stickslip.model.readers.text import CUT_SHORT, number_table, read_text, whole_numbers
-from stickslip.model.readers.units import SI, Units, check_units, in_si
+from stickslip.model.readers.units import ARGUMENTS, SI, Units, check_units, in_si
 from stickslip.model.structure import Structure
 
 LONGEST = 16  # digits of a node number: no program numbers further
@@ -77,7 +77,8 @@ def read_calculix_matrices(
             raise input_error(
                 nodes.place,
                 f"its nodes do not fit the stiffness of {stem.name}: {doubt}",
-                "Give the deck that CalculiX ran, or plausible=False where they are right.",
+                "Give the deck that CalculiX ran, or $plausible where they are right.",
+                **ARGUMENTS,
             )
     return structure
 
@@ -98,7 +99,8 @@ def _find(stem: Path, suffix: str) -> Path:
         str(plain),
         f"the {SUFFIXES[suffix]} is not there",
         "Run CalculiX with *FREQUENCY, SOLVER=MATRIXSTORAGE"
-        + (", or give mass=… of the job that has it." if suffix == ".mas" else "."),
+        + (", or give $mass of the job that has it." if suffix == ".mas" else "."),
+        mass="mass=…",
     )
 
 
@@ -109,7 +111,8 @@ def _deck(stem: Path) -> Path:
     raise input_error(
         str(stem),
         "positions of the nodes are not in the matrices, and no deck of the same name is beside them",
-        "Give mesh=… (a deck .inp, results .frd, a CSV of nodes, or a mesh).",
+        "Give $mesh (a deck .inp, results .frd, a CSV of nodes, or a mesh).",
+        mesh="mesh=…",
     )
 
 

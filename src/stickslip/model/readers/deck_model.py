@@ -119,7 +119,8 @@ def _unread(block: Block, problem: str) -> InputError:
     return input_error(
         block.place,
         problem,
-        f"Let the solver write its matrices and read those, or pass ignore=({block.keyword!r},) to go on without.",
+        "Let the solver write its matrices and read those$ignore.",
+        ignore=f", or pass ignore=({block.keyword!r},) to go on without",
     )
 
 

@@ -92,6 +92,7 @@ def read_model(
             str(path),
             f"no reader for files {suffix!r}" if suffix else "a file without suffix",
             _OTHERS.get(suffix, f"Files that are read: {READS}."),
+            use="Use",
         )
     if not path.is_file():
         read_text(path)  # its message names the file that may be meant
@@ -184,10 +185,10 @@ def _mtx(files: _Files) -> Structure:
     partner = re.sub("STIF", "MASS", files.path.name)
     mass = files.mass or files.path.with_name(partner)
     if mass == files.path or not mass.is_file():
-        raise _lacks(files.path, "mass=…, the matrix of the mass")
+        raise _lacks(files.path, "$mass, the matrix of the mass")
     nodes = files.nodes or files.mesh
     if nodes is None:
-        raise _lacks(files.path, "nodes=…, a deck or a CSV file with the positions of the nodes")
+        raise _lacks(files.path, "$nodes, a deck or a CSV file with the positions of the nodes")
     return read_abaqus_matrices(
         files.path, mass, damping=files.damping, nodes=nodes, units=files.units,
         plausible=files.plausible,
@@ -196,11 +197,11 @@ def _mtx(files: _Files) -> Structure:
 
 def _neutral(files: _Files) -> Structure:
     if files.nodes is None:
-        raise _lacks(files.path, "nodes=…, a CSV file node, component, x, y, z with one line a dof")
+        raise _lacks(files.path, "$nodes, a CSV file node, component, x, y, z with one line a dof")
     # HDF5 may hold all matrices in one file
     mass = files.mass or (files.path if files.path.suffix.lower() in (".h5", ".hdf5") else None)
     if mass is None:
-        raise _lacks(files.path, "mass=…, the matrix of the mass")
+        raise _lacks(files.path, "$mass, the matrix of the mass")
     return read_matrix_files(
         files.path, mass, nodes=files.nodes, damping=files.damping, units=files.units,
         plausible=files.plausible,
@@ -208,7 +209,13 @@ def _neutral(files: _Files) -> Structure:
 
 
 def _lacks(path: Path, what: str) -> InputError:
-    return input_error(str(path), "is one matrix, not a whole model", f"Give {what}.")
+    return input_error(
+        str(path),
+        "is one matrix, not a whole model",
+        f"Give {what}.",
+        mass="mass=…",
+        nodes="nodes=…",
+    )
 
 
 _READERS: dict[str, Callable[[_Files], Model]] = {
@@ -229,8 +236,8 @@ _READERS: dict[str, Callable[[_Files], Model]] = {
     ".hdf5": _neutral,
 }
 _OTHERS = {
-    ".op4": "Use read_nastran_op4, which asks for the names of the matrices in it.",
-    ".pch": "Use read_nastran_dmig, which asks for the names of the matrices in it.",
-    ".bdf": "Use read_nastran_dmig, which asks for the names of the matrices in it.",
-    ".dat": "Use read_nastran_dmig for bulk data; results of CalculiX are in its .frd file.",
+    ".op4": "$use read_nastran_op4, which asks for the names of the matrices in it.",
+    ".pch": "$use read_nastran_dmig, which asks for the names of the matrices in it.",
+    ".bdf": "$use read_nastran_dmig, which asks for the names of the matrices in it.",
+    ".dat": "$use read_nastran_dmig for bulk data; results of CalculiX are in its .frd file.",
 }

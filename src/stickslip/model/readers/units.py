@@ -19,6 +19,8 @@ USUAL = 100.0  # kg/m³: most parts in their bounding box have more
 SOLIDS = (500.0, 25_000.0)  # kg/m³: from light plastics to heavy metals
 MODULI = (1e7, 2e12)  # Pa: from rubber-like to diamond
 SIZES = (1e-4, 50.0)  # m
+ARGUMENTS = {"units": "units=Units.…()", "plausible": "plausible=False"}  # of all readers
+WRONG_UNITS = "Give $units, or $plausible where the numbers are right."
 
 
 @dataclass(frozen=True)
@@ -222,9 +224,7 @@ def check_units(structure: Structure, units: Units, place: str) -> None:
     """
     doubt = doubt_about_units(structure, units)
     if doubt:
-        raise input_error(
-            place, doubt, "Give units=Units.…(), or plausible=False where the numbers are right."
-        )
+        raise input_error(place, doubt, WRONG_UNITS, **ARGUMENTS)
 
 
 def check_material(density: float, young_modulus: float, units: Units, place: str) -> None:
@@ -255,7 +255,8 @@ def _material_error(
         place,
         f"in {units.name} the density is {density:.4g} kg/m³ and Young's modulus {young_modulus:.4g} Pa"
         + (f"; that looks like {' or '.join(likely)}" if likely else ""),
-        "Give units=Units.…(), or plausible=False where the numbers are right.",
+        WRONG_UNITS,
+        **ARGUMENTS,
     )
 
 
