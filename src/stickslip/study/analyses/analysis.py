@@ -31,6 +31,8 @@ class Case:
         Hash of all that the model depends on: its tables and the content of its files.
     home
         Folder that names of files are relative to.
+    checks
+        Further checks that this run asks for, of those that the analysis names in `Analysis.checks`.
     """
 
     index: int
@@ -40,6 +42,7 @@ class Case:
     build: Callable[[], Model]
     digest: str
     home: Path
+    checks: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,18 +51,12 @@ class Job:
 
     Parameters
     ----------
-    analysis
-        Name of the analysis.
-    case
-        Position of the case.
     label
         What is said of it while it runs.
     inputs
         All that `Analysis.solve` needs; made by `Analysis.inputs`.
     """
 
-    analysis: str
-    case: int
     label: str
     inputs: Any
 
@@ -106,14 +103,18 @@ class Analysis(Protocol):
         pydantic section of the study file.
     record
         Dataclass of what `solve` yields: arrays, numbers, texts, enumerations and None.
+    checks
+        Names of checks that a run may ask for beside the answer (``verify``). A sealed job that has not had them is opened again:
+        `solve` then finds all its records in `done`, and puts what the checks found into the notes.
     """
 
     name: str
     table: type[Any]
     record: type[Any]
+    checks: tuple[str, ...]
 
     def key(self, case: Case) -> str:
-        """Return all that the numbers of a case depend on, as text: tables and files, not titles or folders."""
+        """Return all that the records of a case depend on beside its model, as text: tables and files, not titles or checks."""
         ...
 
     def inputs(self, case: Case, model: Model) -> Any:
@@ -121,11 +122,22 @@ class Analysis(Protocol):
         ...
 
     def solve(self, inputs: Any, done: Sequence[Any], notes: Notes) -> Iterator[Any]:
-        """Yield the records that are not in `done`, as they are found; a generator that tells progress by `logging`."""
+        """Yield the records that are not in `done`, as they are found; a generator.
+
+        What `dataset` needs beside the records goes into `notes`: it has no model. Progress is told by `keep.progress.advance`.
+        """
         ...
 
     def dataset(self, solved: Sequence[Solved]) -> xr.Dataset:
-        """Return the node of the result from all cases sealed or begun so far."""
+        """Return the node of the result from all cases sealed so far.
+
+        Variables of a case have the leading dimension ``case``; the runner adds ``case_label`` and ``vary_value``. Attributes:
+        ``warnings``, a JSON list of sentences for terminal and page; ``failed``, how many points have no solution (0 if left out).
+        """
+        ...
+
+    def check(self, case: Case, model: Model) -> tuple[str, ...]:
+        """Return what ``stickslip check`` says of a case beyond its static state and natural frequencies: choices and estimates."""
         ...
 
     def summary(self, data: xr.Dataset) -> "tuple[TextTable, ...]":

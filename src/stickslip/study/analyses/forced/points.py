@@ -1,0 +1,208 @@
+"""The points of one case, put in order: what was accepted, its fields, its peak, its counts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.harmonic.support import Harmonics
+from stickslip.response.forced.response import ForcedPoint, ForcedProblem, accepted_pairs
+from stickslip.response.recovery import Fields, fields
+from stickslip.units import HZ
+
+JUMP = 2.0  # ratio of neighbouring amplitudes that no step of a branch makes
+FLANK = 0.7  # share of the peak amplitude at which frequencies beside a peak are taken
+
+
+@dataclass(frozen=True, eq=False)
+class Accepted:
+    """A frequency of the response, with the solution that stands for it.
+
+    Parameters
+    ----------
+    point
+        The solution with most harmonics; not a solution where its status says so.
+    low
+        The first solution at the same frequency, or None (peak refinements, points of a branch with many harmonics).
+    fields, low_fields
+        What they look like everywhere; None where the point did not converge.
+    real_error
+        Difference between both, a fraction; NaN unless the point repeats the first one.
+    """
+
+    point: ForcedPoint
+    low: ForcedPoint | None
+    fields: Fields | None
+    low_fields: Fields | None
+    real_error: float
+
+    @property
+    def indicator(self) -> float:
+        """What the strategy said of the first solution: of an alert the predicted error, a fraction; NaN where it was not asked."""
+        return (self.low or self.point).predicted_error
+
+    def amplitudes(self, n_outputs: int) -> FloatArray:
+        """Return the (n_outputs,) amplitudes of harmonic 1, m; NaN where the point did not converge."""
+        return _amplitudes(self.fields, n_outputs)
+
+    def first_amplitudes(self, n_outputs: int, harmonics: Harmonics) -> FloatArray:
+        """Return the same of the first solution, NaN where that had other harmonics than these."""
+        known = self.low is not None and self.low.support == harmonics
+        return _amplitudes(self.low_fields if known else None, n_outputs)
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """The finished response of a case.
+
+    Parameters
+    ----------
+    solved
+        Every point that was solved, accepted or not, in the order of solution.
+    accepted
+        One entry a frequency, along the branch, peak refinements last.
+    peak
+        Position of the largest amplitude of the report output in `accepted`, -1 if nothing converged.
+    output
+        Position of the output whose peak counts.
+    low_harmonics
+        Harmonics of the first passage.
+    """
+
+    solved: tuple[ForcedPoint, ...]
+    accepted: tuple[Accepted, ...]
+    peak: int
+    output: int
+    low_harmonics: Harmonics
+
+    @property
+    def top(self) -> Accepted | None:
+        """The peak; None if nothing converged."""
+        return None if self.peak < 0 else self.accepted[self.peak]
+
+    def amplitude(self, accepted: Accepted) -> float:
+        """Return the amplitude of the report output, m; NaN where the point did not converge."""
+        return float(accepted.amplitudes(self.output + 1)[self.output])
+
+    @property
+    def peak_amplitude(self) -> float:
+        """Largest amplitude of the report output, m; NaN if nothing converged."""
+        return float("nan") if self.top is None else self.amplitude(self.top)
+
+    @property
+    def peak_hz(self) -> float:
+        """Frequency of the peak, Hz."""
+        return float("nan") if self.top is None else self.top.point.omega / HZ
+
+    @property
+    def points_low(self) -> int:
+        """Number of accepted points with few harmonics."""
+        return sum(a.point.support == self.low_harmonics for a in self.accepted)
+
+    @property
+    def peak_at_end(self) -> bool:
+        """Whether the largest amplitude stands at an end of the frequency range."""
+        omega = [a.point.omega for a in self.accepted]
+        return self.top is not None and self.top.point.omega in (min(omega), max(omega))
+
+    @property
+    def jumps_hz(self) -> list[float]:
+        """Frequencies at which neighbours of the response differ more than `JUMP` times, in Hz.
+
+        Steps of the branch are far smaller: there, accepted points with few and with many harmonics stand on different solutions.
+        """
+        branch = [a for a in self.accepted if a.point.stage != "peak" and a.point.converged]
+        height = [self.amplitude(a) for a in branch]
+        return [
+            float(branch[i].point.omega / HZ)
+            for i in range(1, len(branch))
+            if max(height[i - 1], height[i]) > JUMP * min(height[i - 1], height[i])
+            and branch[i - 1].point.support != branch[i].point.support
+        ]
+
+    def folded_hz(self, direction: int = 1) -> tuple[float, float] | None:
+        """Return the lowest and the highest frequency (Hz) between which the response runs backwards somewhere, None if it does not.
+
+        Parameters
+        ----------
+        direction
+            1 where frequencies were asked for upwards, -1 downwards.
+        """
+        hz = [a.point.omega / HZ for a in self.accepted if a.point.stage != "peak"]
+        back = [sorted(pair) for pair in pairwise(hz) if direction * (pair[1] - pair[0]) < 0]
+        return (min(b for b, _ in back), max(a for _, a in back)) if back else None
+
+    @property
+    def failed(self) -> int:
+        """Number of accepted points that did not converge."""
+        return sum(not a.point.converged for a in self.accepted)
+
+    @property
+    def unknowns(self) -> int:
+        """Unknowns of all solutions together, accepted or not: the work in harmonics, whatever chose them."""
+        return sum(unknowns(p) for p in self.solved)
+
+    @property
+    def newton_steps(self) -> int:
+        """Newton iterations of all points solved."""
+        return sum(p.iterations for p in self.solved)
+
+    @property
+    def seconds(self) -> tuple[float, float, float]:
+        """Seconds in contact, linear algebra and the rest, over all points solved."""
+        contact = sum(p.seconds_contact for p in self.solved)
+        linear = sum(p.seconds_linear for p in self.solved)
+        return contact, linear, sum(p.seconds_total for p in self.solved) - contact - linear
+
+    @property
+    def flanks(self) -> tuple[Accepted, ...]:
+        """On either side of the peak the point whose amplitude is nearest to a share of the peak's."""
+        if self.top is None:
+            return ()
+        here, wanted = self.top.point.omega, FLANK * self.peak_amplitude
+        sides = (
+            [a for a in self.accepted if a.fields and side * (a.point.omega - here) > 0]
+            for side in (-1, 1)
+        )
+        return tuple(min(s, key=lambda a: abs(self.amplitude(a) - wanted)) for s in sides if s)
+
+
+def collect(problem: ForcedProblem, points: Sequence[ForcedPoint], output: int) -> Response:
+    """Put the points of a case in order and recover what they look like.
+
+    Parameters
+    ----------
+    problem
+        What was solved.
+    points
+        All points in the order of solution.
+    output
+        Position of the output whose peak counts.
+    """
+    accepted = tuple(_accept(problem, point, low) for point, low in accepted_pairs(points))
+    amplitude = np.array([a.amplitudes(output + 1)[output] for a in accepted])
+    peak = int(np.nanargmax(amplitude)) if np.any(np.isfinite(amplitude)) else -1
+    return Response(tuple(points), accepted, peak, output, problem.sweep.first_harmonics)
+
+
+def unknowns(point: ForcedPoint) -> int:
+    """Return the number of real unknowns of a solution."""
+    return int(point.coefficients.shape[1] * (2 * point.harmonics.size - 1))
+
+
+def _accept(problem: ForcedProblem, point: ForcedPoint, low: ForcedPoint | None) -> Accepted:
+    found = fields(problem, point) if point.converged else None
+    if low is None or not low.converged:
+        return Accepted(point, low, found, None, float("nan"))
+    if low is point:
+        return Accepted(point, low, found, found, float("nan"))
+    error = problem.real_error(low, point) if point.converged else float("nan")
+    return Accepted(point, low, found, fields(problem, low), error)
+
+
+def _amplitudes(found: Fields | None, n_outputs: int) -> FloatArray:
+    if found is None:
+        return np.full(n_outputs, np.nan)
+    return np.abs(found.outputs[1, :n_outputs])
