@@ -16,9 +16,9 @@ HERTZ = 2 * np.pi
 class Pair:
     """A frequency solved with few harmonics and with many."""
 
-    problem: ss.ForcedProblem
-    few: ss.ForcedPoint
-    many: ss.ForcedPoint
+    problem: ss.response.ForcedProblem
+    few: ss.response.ForcedPoint
+    many: ss.response.ForcedPoint
 
     def predicted(self, form: str = "newton", harmonics: tuple[int, ...] | None = None) -> float:
         """Return the predicted error in percent."""
@@ -38,7 +38,7 @@ def oscillator(law: object, row: int = 0, third: float = 0.0) -> Case:
     """Return one mass (m = k = 1, c = 0.02) under a force of 0.1, and one of `third` at thrice the frequency."""
     gap = np.zeros((3, 1))
     gap[row] = 1.0
-    structure = ss.lumped(np.eye(1), np.eye(1), 0.02 * np.eye(1))
+    structure = ss.model.lumped(np.eye(1), np.eye(1), 0.02 * np.eye(1))
     forces = {1: np.array([0.1 + 0j])} | ({3: np.array([1j * third])} if third else {})
     system = ss.System(structure, ss.Interface(("c",), (law,), gap), outputs=np.array([0]))
     return system, ss.HarmonicLoad(np.zeros(1), forces)
@@ -50,7 +50,7 @@ def blades(preload: float = 0.0) -> Case:
     for a, b, k in ((0, 1, 3e5), (2, 3, 3e5), (0, 2, 7e5), (1, 3, 7e5), (4, 5, 3e5)):
         stiffness[[a, b], [a, b]] += k
         stiffness[[a, b], [b, a]] -= k
-    structure = ss.lumped(
+    structure = ss.model.lumped(
         np.array([1.0, 1, 1, 1, 0.1, 0.1]), stiffness, np.diag([20.0, 20, 20, 20, 0, 0])
     )
     cos, sin = np.cos(np.pi / 6), np.sin(np.pi / 6)
@@ -76,7 +76,7 @@ def row_of_masses() -> Case:
     force[-1] = 12.0
     names = tuple(f"element{i}" for i in range(6))
     interface = ss.Interface(names, (ss.Jenkins(k_t=2e3, limit=10.0),) * 6, gap)
-    system = ss.System(ss.chain(20, 1.0, 1e4, 2e-3), interface, outputs=np.array([19]))
+    system = ss.System(ss.model.chain(20, 1.0, 1e4, 2e-3), interface, outputs=np.array([19]))
     return system, ss.HarmonicLoad(np.zeros(20), {1: force})
 
 
@@ -89,10 +89,10 @@ def pairs(
 ) -> list[Pair]:
     """Solve equally spaced frequencies with few harmonics and with many, whatever the alert says."""
     sweep = ss.Sweep(
-        omega_range=omega_range, low=low, high=high, selection=ss.JacobianAlert(threshold=-1.0), frequencies=count, peak_points=0
+        omega_range=omega_range, low=low, high=high, selection=ss.harmonic.JacobianAlert(threshold=-1.0), frequencies=count, peak_points=0
     )  # fmt: skip
     points = list(ss.forced_response(*case, sweep))
-    problem = ss.forced_problem(*case, sweep)
+    problem = ss.response.forced_problem(*case, sweep)
     again = {p.index: p for p in points if p.stage == "high" and p.converged}
     few = [p for p in points if p.stage == "low" and p.converged and p.index in again]
     return [Pair(problem, p, again[p.index]) for p in few]
@@ -187,12 +187,12 @@ def reference() -> str:
     case = blades()
     shared = {"omega_range": (159 * HERTZ, 164 * HERTZ), "frequencies": 11, "peak_points": 0}
     sweep = ss.Sweep(selection="jacobian_alert", **shared)
-    points = ss.accepted_points(list(ss.forced_response(*case, sweep)))
-    problem = ss.forced_problem(*case, sweep)
+    points = ss.response.accepted_points(list(ss.forced_response(*case, sweep)))
+    problem = ss.response.forced_problem(*case, sweep)
     ten = list(ss.forced_response(*case, ss.Sweep(low=10, high=10, selection="always_low", **shared)))  # fmt: skip
     exact = {p.omega: p for p in ten}
     rows = []
-    for check, point in zip(ss.verify_reference(problem, points), points, strict=True):
+    for check, point in zip(ss.response.verify_reference(problem, points), points, strict=True):
         real = 100 * problem.real_error(point, exact[point.omega])
         rows.append(
             (hertz(check.omega), str(check.kept[-1]), number(100 * check.error), number(real), check.label)

@@ -10,17 +10,16 @@ from sector_drawing import draw_sector
 
 import stickslip
 
-RESULTS = Path(__file__).parent.parent / "validation" / "out" / "results.json"
-LAYERS = [
-    "model",
-    "reduction",
-    "contact",
-    "harmonic",
-    "solve",
-    "response",
-    "study",
-    "report",
-    "errors",
+RESULTS = Path(__file__).parent.parent / "evidence" / "validation" / "out" / "results.json"
+PACKAGES = [
+    "stickslip",
+    "stickslip.model",
+    "stickslip.assembly",
+    "stickslip.contact",
+    "stickslip.reduction",
+    "stickslip.harmonic",
+    "stickslip.solve",
+    "stickslip.response",
 ]
 
 
@@ -110,23 +109,23 @@ def _number(value: object) -> str:
 
 
 def api() -> str:
-    """Return one heading a layer with the public names that live in it."""
-    tree = ast.parse(Path(stickslip.__file__).read_text(encoding="utf-8"))
-    modules: dict[str, list[tuple[str, str]]] = {}
-    for node in ast.walk(tree):
-        if (
-            isinstance(node, ast.ImportFrom)
-            and node.module
-            and node.module.startswith("stickslip.")
-        ):
-            layer = node.module.split(".")[1]
-            modules.setdefault(layer, []).extend((alias.name, node.module) for alias in node.names)
+    """Return one heading a package with its public names, as its stub lists them."""
+    root = Path(stickslip.__file__).parent
     lines = []
-    for layer in LAYERS:
-        if layer not in modules:
-            continue
-        lines += [f"## {layer}", ""]
-        for name, _ in sorted(modules[layer]):
+    for package in PACKAGES:
+        stub = root.joinpath(*package.split(".")[1:], "__init__.pyi")
+        lines += [f"## {package}", ""]
+        for name in sorted(_names(stub)):
             kind = "autoclass" if name[0].isupper() else "autofunction"
-            lines += ["```{eval-rst}", f".. {kind}:: stickslip.{name}", "```", ""]
+            lines += ["```{eval-rst}", f".. {kind}:: {package}.{name}", "```", ""]
     return "\n".join(lines)
+
+
+def _names(stub: Path) -> list[str]:
+    tree = ast.parse(stub.read_text(encoding="utf-8"))
+    return [
+        alias.name
+        for node in tree.body
+        if isinstance(node, ast.ImportFrom) and node.module  # packages have headings of their own
+        for alias in node.names
+    ]

@@ -10,7 +10,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from stickslip import Axis, BladedSector, Shroud
+from stickslip import BladedSector
+from stickslip.model import Axis, Shroud
 
 MM = 1e3
 SETS = {"cyclic": "tab:blue", "platform": "tab:red", "shroud": "tab:orange", "root": "black"}

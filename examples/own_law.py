@@ -50,7 +50,7 @@ class RateJenkins:
     limit: float  # N
     per_velocity: float  # s/m
 
-    kernel = ss.law_kernel(step)
+    kernel = ss.contact.law_kernel(step)
     pairs = 5  # neither tangent feels the other; 7: they do; 9: the normal force feels them, too
 
     def parameters(self):
@@ -65,11 +65,11 @@ class RateJenkins:
 
 # Are the derivatives right? An error names the first entry that is not.
 
-ss.check_law(RateJenkins(k_t=2e4, limit=5.0, per_velocity=2.0), size=1e-3, rate=0.1)
+ss.contact.check_law(RateJenkins(k_t=2e4, limit=5.0, per_velocity=2.0), size=1e-3, rate=0.1)
 
 # Two masses, the second held by the friction element, shaken through their first resonance.
 
-structure = ss.lumped(
+structure = ss.model.lumped(
     mass=np.array([1.0, 0.5]),
     stiffness=np.array([[3e4, -1e4], [-1e4, 1e4]]),
     damping=np.array([[3.0, -1.0], [-1.0, 1.0]]),
@@ -91,10 +91,10 @@ def peak(law):
     """Largest first harmonic of the tip, m."""
     contact = ss.Interface(("friction",), (law,), friction)
     system = ss.System(structure, contact, outputs=structure.sets["tip"])
-    problem = ss.forced_problem(system, shaker, sweep)
-    points = ss.accepted_points(list(ss.forced_response(system, shaker, sweep)))
+    problem = ss.response.forced_problem(system, shaker, sweep)
+    points = ss.response.accepted_points(list(ss.forced_response(system, shaker, sweep)))
     assert all(point.converged for point in points)
-    return max(abs(ss.fields(problem, point).outputs[1, 0]) for point in points)
+    return max(abs(ss.response.fields(problem, point).outputs[1, 0]) for point in points)
 
 
 built_in = peak(ss.Jenkins(k_t=4e3, limit=0.6))

@@ -34,25 +34,27 @@ class Unbalanced:
         left = {h: np.abs(forces[2 * h - 1 : 2 * h + 1]).max() / drive for h in missing}
         loud = [h for h in missing if left[h] > self.threshold]
         again = tuple(sorted({*have, *loud})) if loud else None
-        return ss.Verdict(max(left.values(), default=0.0), again, following=step.smallest)
+        return ss.harmonic.Verdict(max(left.values(), default=0.0), again, following=step.smallest)
 
 
 # A mass with a friction damper of a constant limit, shaken below its resonance: it sticks, then it slips.
 
 one = np.ones((1, 1))
-structure = ss.lumped(mass=one, stiffness=one, damping=0.02 * one, names=("blade",))
+structure = ss.model.lumped(mass=one, stiffness=one, damping=0.02 * one, names=("blade",))
 friction = ss.Interface(
     ("damper",), (ss.Jenkins(k_t=0.5, limit=0.035),), np.array([[1.0], [0.0], [0.0]])
 )
 system = ss.System(structure, friction, outputs=np.array([0]))
 shaker = ss.HarmonicLoad(np.zeros(1), {1: np.array([0.1 + 0j])})
 sweep = ss.Sweep(omega_range=(0.1, 0.7), frequencies=13, peak_points=0, selection=Unbalanced())
-problem = ss.forced_problem(system, shaker, sweep)
+problem = ss.response.forced_problem(system, shaker, sweep)
 solved = list(ss.forced_response(system, shaker, sweep))
-points = ss.accepted_points(solved)
+points = ss.response.accepted_points(solved)
 for point in points:
     kept = ", ".join(str(h) for h in point.support)
-    blade = abs(ss.fields(problem, point).outputs[1, 0])  # point.coefficients: retained coordinates
+    blade = abs(
+        ss.response.fields(problem, point).outputs[1, 0]
+    )  # point.coefficients: retained coordinates
     print(f"{point.omega:.3f} rad/s: {blade:.4f} m with harmonics {kept}")
 unknowns = sum(system.retained.size * (2 * len(point.support) - 1) for point in solved)
 print(f"{unknowns} unknowns solved at {len(points)} frequencies")

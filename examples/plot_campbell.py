@@ -18,17 +18,17 @@ import stickslip as ss
 
 titanium = ss.Material(young_modulus=114e9, poisson_ratio=0.33, density=4430.0)
 width, thickness, length, hub = 0.054, 0.008, 0.35, 0.25
-flap = ss.Beam(length, width * thickness, width * thickness**3 / 12, titanium)
-lag = ss.Beam(
+flap = ss.model.Beam(length, width * thickness, width * thickness**3 / 12, titanium)
+lag = ss.model.Beam(
     length, width * thickness, thickness * width**3 / 12, titanium, shear_coefficient=5 / 6
 )
 
 
 def blade(speed: float) -> ss.Structure:
     """Flap beside lag with stretching, at a speed in rad/s."""
-    return ss.join(
-        flap=ss.rotating_beam(flap, 20, speed, hub_radius=hub),
-        lag=ss.rotating_beam(
+    return ss.model.join(
+        flap=ss.model.rotating_beam(flap, 20, speed, hub_radius=hub),
+        lag=ss.model.rotating_beam(
             lag, 20, speed, hub_radius=hub, bending="y", axial=True, coriolis=True
         ),
     )
@@ -36,7 +36,7 @@ def blade(speed: float) -> ss.Structure:
 
 rpm = 2 * np.pi / 60
 speeds = np.linspace(0.0, 9000.0, 19) * rpm
-diagram = ss.campbell(blade, speeds, 4, engine_orders=(1, 2, 3, 4, 6, 8), coriolis=True)
+diagram = ss.response.campbell(blade, speeds, 4, engine_orders=(1, 2, 3, 4, 6, 8), coriolis=True)
 for crossing in diagram.crossings:
     print(
         f"order {crossing.engine_order} meets mode {crossing.mode + 1} at {crossing.speed / rpm:.1f} rpm, "
@@ -69,10 +69,10 @@ axes.legend()
 # A blisk of 24 blades (Laxalde et al. 2007), each three masses on springs. At one speed the engine orders 0, 1, 2, ... lie on a
 # line that turns at twelve nodal diameters: order 22 has the shape of two. A resonance needs a mode *on* the line.
 
-wheel = ss.blisk_with_ring(24, ring=None)
-map_ = ss.nodal_diameter_map(wheel, 3)
+wheel = ss.reduction.blisk_with_ring(24, ring=None)
+map_ = ss.response.nodal_diameter_map(wheel, 3)
 low, high = 1650 * rpm, 1780 * rpm
-found = ss.safe(map_, (low, high), engine_orders=range(1, 25), margin=0.0)
+found = ss.response.safe(map_, (low, high), engine_orders=range(1, 25), margin=0.0)
 for near in found.resonances:
     print(
         f"order {near.engine_order} meets family {near.mode + 1} with {near.nodal_diameter} nodal diameters at "

@@ -21,7 +21,7 @@ stiffness = np.diag([3e5] * 4 + [0.0, 0.0])
 for a, b, k in ((0, 1, 3e5), (2, 3, 3e5), (0, 2, 7e5), (1, 3, 7e5), (4, 5, 3e5)):
     stiffness[[a, b], [a, b]] += k
     stiffness[[a, b], [b, a]] -= k
-structure = ss.lumped(
+structure = ss.model.lumped(
     np.array([1.0, 1, 1, 1, 0.1, 0.1]), stiffness, np.diag([20.0, 20, 20, 20, 0, 0])
 )
 cos, sin = np.cos(np.pi / 6), np.sin(np.pi / 6)
@@ -42,13 +42,13 @@ def solved(hertz, mu):
     system = ss.System(structure, interface, outputs=np.arange(4), free=np.array([4, 5]))
     sweep = ss.Sweep(
         omega_range=(2 * np.pi * (hertz - 1.0), 2 * np.pi * hertz),
-        selection=ss.JacobianAlert(threshold=-1.0),  # repeat whatever it says
+        selection=ss.harmonic.JacobianAlert(threshold=-1.0),  # repeat whatever it says
         frequencies=5,
         peak_points=0,
     )
     points = list(ss.forced_response(system, load, sweep))
     low, high = (next(p for p in points[::-1] if p.stage == s) for s in ("low", "high"))
-    return ss.forced_problem(system, load, sweep), low, high
+    return ss.response.forced_problem(system, load, sweep), low, high
 
 
 # %%
@@ -70,14 +70,14 @@ for name, (hertz, mu) in cases.items():
     problem, low, high = solved(hertz, mu)
     balance = problem.high
     x, exact = (balance.unknowns(p.coefficients) for p in (low, high))
-    pictures[f"$J$, {name}: {hertz:g} Hz, $\\mu$ = {mu:g}"] = ss.harmonic_block_norms(
+    pictures[f"$J$, {name}: {hertz:g} Hz, $\\mu$ = {mu:g}"] = ss.harmonic.harmonic_block_norms(
         balance, x, low.omega
     )
     if name in {"weak", "strong"}:
-        pictures[f"$\\Delta J$, {name}"] = ss.harmonic_block_norms(
+        pictures[f"$\\Delta J$, {name}"] = ss.harmonic.harmonic_block_norms(
             balance, x, low.omega, "missing", low.support
         )
-    alike = ss.jacobian_similarity(balance, x, exact, low.omega)
+    alike = ss.harmonic.jacobian_similarity(balance, x, exact, low.omega)
     rows.append((name, 100 * low.predicted_error, 100 * problem.real_error(low, high), alike))
 
 figure, axes = plt.subplots(2, 3, figsize=(13, 8.2), layout="constrained")

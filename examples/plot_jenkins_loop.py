@@ -24,7 +24,7 @@ def period(amplitude, samples):
     """Evaluate the contact under ``g_t = amplitude cos(tau)``."""
     gap = np.zeros((3, 3))  # rows 1, cos, sin; columns t, w, n
     gap[1, 0] = amplitude
-    return ss.contact_forces(gap, ss.compile_contacts([law]), samples)
+    return ss.harmonic.contact_forces(gap, ss.contact.compile_contacts([law]), samples)
 
 
 # %%

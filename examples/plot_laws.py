@@ -28,7 +28,7 @@ examples = {
     ),
     "dahl": ss.Dahl(k_t=2.0, limit=1.0, k_n=1.0),
     "bouc_wen": ss.BoucWen(k_t=2.0, beta=1.5, gamma=0.5, alpha=0.1, exponent=2.0, k_n=1.0),
-    "iwan": ss.Iwan(k_t=2.0, limit=1.0, k_n=1.0, population=ss.UniformBand(n_sliders=30)),
+    "iwan": ss.Iwan(k_t=2.0, limit=1.0, k_n=1.0, population=ss.contact.UniformBand(n_sliders=30)),
 }
 assert list(examples) == list(LAWS)
 
@@ -42,7 +42,7 @@ def period(law, size, *, along):
         gap[1, 0], gap[2, 1] = size, 0.6 * size  # an ellipse in the contact plane
         if hasattr(law, "preload"):
             gap[2, 2] = 0.5  # relieved on the way back
-    return ss.contact_forces(gap, ss.compile_contacts([law]), 1024)
+    return ss.harmonic.contact_forces(gap, ss.contact.compile_contacts([law]), 1024)
 
 
 # %%

@@ -46,7 +46,9 @@ def interface_side(points, offset, n_dofs, *, upward):
     quads = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1)
     quads = quads.reshape(-1, 4)
     dofs = offset + 3 * nodes[:, None] + np.arange(3)
-    return ss.nodal_surface(points[nodes], dofs, n_dofs, quads if upward else quads[:, ::-1])
+    return ss.contact.nodal_surface(
+        points[nodes], dofs, n_dofs, quads if upward else quads[:, ::-1]
+    )
 
 
 lower, K_lower, push_lower = block((4, 4), np.linspace(-1.0, 0.0, 4))
@@ -79,7 +81,10 @@ figure, axes = plt.subplots(1, 2, figsize=(9, 4), sharey=True, layout="constrain
 errors = {}
 for ax, (name, way) in zip(
     axes,
-    {"node to segment": ss.node_to_segment, "segment to segment": ss.segment_to_segment}.items(),
+    {
+        "node to segment": ss.contact.node_to_segment,
+        "segment to segment": ss.contact.segment_to_segment,
+    }.items(),
     strict=True,
 ):
     pairing = way(side_a, side_b)
@@ -112,7 +117,7 @@ for name, way in {
     "node to segment, coarse side": (side_a, side_b),
     "node to segment, fine side": (side_b, side_a),
 }.items():
-    pairing = ss.node_to_segment(*way)
+    pairing = ss.contact.node_to_segment(*way)
     largest = []
     for value in stiffnesses:
         per_area = value

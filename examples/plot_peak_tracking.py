@@ -20,12 +20,12 @@ def blade(limit: float) -> ss.System:
     rows = np.array([[1.0], [0.0], [0.0]])  # the damper acts along t alone
     contact = ss.Interface(("damper",), (ss.Jenkins(k_t=0.5, limit=limit),), rows)
     one = np.eye(1)
-    return ss.System(ss.lumped(one, one, 0.02 * one), contact, outputs=np.array([0]))
+    return ss.System(ss.model.lumped(one, one, 0.02 * one), contact, outputs=np.array([0]))
 
 
 load = ss.HarmonicLoad(np.zeros(1), {1: np.array([0.1 + 0j])})
 omega_range = (0.8, 1.4)
-how = ss.Discretisation(order=5)
+how = ss.response.Discretisation(order=5)
 
 # %%
 # Peaks for thirty limits, by both conditions: where the response has a horizontal tangent, and where the blade lags the
@@ -34,11 +34,15 @@ how = ss.Discretisation(order=5)
 limits = np.geomspace(2.0, 0.02, 30)
 peaks = {
     condition: list(
-        ss.track_peak(blade(2.0), load, "limit", limits, omega_range, condition, discretisation=how)
+        ss.response.track_peak(
+            blade(2.0), load, "limit", limits, omega_range, condition, discretisation=how
+        )
     )
     for condition in ("horizontal_tangent", "phase_quadrature")
 }
-best = ss.smallest_peak(blade(0.1), load, "limit", (0.1, 0.2), omega_range, discretisation=how)
+best = ss.response.smallest_peak(
+    blade(0.1), load, "limit", (0.1, 0.2), omega_range, discretisation=how
+)
 print(
     f"smallest peak: {best.amplitude:.5f} at {best.omega:.5f} rad/s with a limit of {best.value:.6f}"
 )

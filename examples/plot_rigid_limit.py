@@ -14,11 +14,11 @@ import numpy as np
 import stickslip as ss
 
 omega, exact = 1.5, 26.786093
-structure = ss.lumped(
+structure = ss.model.lumped(
     np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]]), np.array([[0.04, -0.02], [-0.02, 0.02]])
 )
 load = ss.HarmonicLoad(np.zeros(2), {1: np.array([20.0 + 0j, 0.0])})
-linear = ss.condense(structure, retained=np.array([1]), load=load)
+linear = ss.harmonic.condense(structure, retained=np.array([1]), load=load)
 gap = np.zeros((3, 2))  # rows t, w, n; columns the two masses
 gap[0, 1] = 1.0
 rigid = ss.RigidCoulomb(mu=0.9, preload=9.0)
@@ -28,10 +28,10 @@ def amplitude(problem, start=None):
     """Solve from rest or from a first harmonic; return that of the rubbing mass."""
     guess = np.zeros((2, 1), dtype=complex)
     guess[1] = 0.0 if start is None else start
-    found = ss.newton(
+    found = ss.solve.newton(
         lambda x: problem.linearise(x, omega),
         problem.unknowns(guess),
-        ss.Newton(max_iterations=200, tolerance=1e-10),
+        ss.solve.Newton(max_iterations=200, tolerance=1e-10),
     )
     if not found.status.converged:
         raise RuntimeError(found.status.advice)
@@ -41,7 +41,7 @@ def amplitude(problem, start=None):
 def rubbing(order, samples, penalty=None):
     """Return the periodic problem with the rigid contact."""
     interface = ss.Interface(("rub",), (rigid,), gap)
-    return ss.dynamic_lagrangian(linear, interface, order, samples, penalty)
+    return ss.harmonic.dynamic_lagrangian(linear, interface, order, samples, penalty)
 
 
 # %%
@@ -80,7 +80,9 @@ stiffnesses = np.logspace(0, 6, 25)
 differences, start = [], limit
 for k in stiffnesses:
     interface = ss.Interface(("rub",), (rigid.softened(k),), gap)
-    start = amplitude(ss.harmonic_balance(linear, interface, order, samples, "events"), start)
+    start = amplitude(
+        ss.harmonic.harmonic_balance(linear, interface, order, samples, "events"), start
+    )
     differences.append(abs(abs(start) / exact - 1.0))
 
 figure, axes = plt.subplots(layout="constrained")

@@ -15,12 +15,12 @@ import stickslip as ss
 
 wheel = ss.BladedSector(
     sectors=24,
-    shroud=ss.Shroud(gap=0.0004),  # 0.4 mm: the shrouds do not touch
+    shroud=ss.model.Shroud(gap=0.0004),  # 0.4 mm: the shrouds do not touch
     disk_size=0.020,
     platform_size=0.012,
     airfoil_size=0.015,
 )
-mesh = ss.mesh_sector(wheel)
+mesh = ss.model.mesh_sector(wheel)
 print(f"{len(mesh.points)} nodes, {len(mesh.cells)} second-order tetrahedra")
 
 
@@ -63,12 +63,12 @@ figure.legend(loc="upper center", ncols=len(paint))
 # Frequencies come from the travelling waves of one sector. Rotation stiffens the blades: the centrifugal load is solved
 # first, and the tangent at that state gives the frequencies at speed.
 
-solid = ss.rotating_solid(mesh, ss.Material(), quadrature=ss.Quadrature.calculix())
-sector = ss.cyclic_sector(solid.structure, wheel.sectors)
+solid = ss.model.rotating_solid(mesh, ss.Material(), quadrature=ss.model.Quadrature.calculix())
+sector = ss.reduction.cyclic_sector(solid.structure, wheel.sectors)
 speed = 8000 * 2 * np.pi / 60
-turning = ss.cyclic_sector(solid.at_speed(speed, tie=sector.tie), wheel.sectors)
-at_rest = ss.nodal_diameter_map(sector, 5, shapes=True)
-at_speed = ss.nodal_diameter_map(turning, 5)
+turning = ss.reduction.cyclic_sector(solid.at_speed(speed, tie=sector.tie), wheel.sectors)
+at_rest = ss.response.nodal_diameter_map(sector, 5, shapes=True)
+at_speed = ss.response.nodal_diameter_map(turning, 5)
 
 figure, axes = plt.subplots(layout="constrained")
 rest = axes.plot(at_rest.nodal_diameters, at_rest.frequencies_hz, "o-", color="tab:blue")
@@ -83,11 +83,11 @@ axes.set(xlabel="nodal diameter", ylabel="natural frequency, Hz", title="Nodal-d
 
 nodal_diameter, family = 2, 2
 row = at_rest.row(nodal_diameter)
-motion = ss.wheel_shape(sector, nodal_diameter, at_rest.shapes[row][:, family]).real
+motion = ss.reduction.wheel_shape(sector, nodal_diameter, at_rest.shapes[row][:, family]).real
 field = np.zeros((wheel.sectors, *mesh.points.shape))
 field[:, solid.free] = motion.reshape(wheel.sectors, -1, 3)
 field = field.reshape(-1, 3) / np.abs(field).max()
-axis = ss.Axis()
+axis = ss.model.Axis()
 points = np.concatenate([axis.turned(mesh.points, n * wheel.pitch) for n in range(wheel.sectors)])
 inside = [np.isin(skin, mesh.node_sets[f"cyclic_{side}"]).all(axis=1) for side in ("low", "high")]
 outer = skin[~(inside[0] | inside[1])]

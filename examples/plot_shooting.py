@@ -15,7 +15,9 @@ import stickslip as ss
 # A blade of 0.1 kg, tuned to 50 Hz, and a damper of constant pressure: no normal stiffness, a preload of 20 N,
 # friction 0.3. The time integration, and with it `shoot`, knows `ElasticCoulomb` contacts only.
 
-blade = ss.lumped(np.array([0.1]), np.array([[1e4]]), damping=np.array([[0.2]]), names=("blade",))
+blade = ss.model.lumped(
+    np.array([0.1]), np.array([[1e4]]), damping=np.array([[0.2]]), names=("blade",)
+)
 law = ss.ElasticCoulomb(k_t=5e3, k_w=0.0, k_n=0.0, mu=0.3, preload=20.0)
 damper = ss.Interface(("damper",), (law,), np.array([[1.0], [0.0], [0.0]]))  # gaps t, w, n
 system = ss.System(blade, damper, outputs=blade.sets["blade"])
@@ -31,23 +33,25 @@ def shaker(force):
 
 load = shaker(4.0)
 sweep = ss.Sweep(omega_range=(250.0, 450.0), frequencies=41, selection="always_high")
-problem = ss.forced_problem(system, load, sweep)
-points = ss.accepted_points(list(ss.forced_response(system, load, sweep)))
-peak = max(points, key=lambda point: abs(ss.fields(problem, point).outputs[1, 0]))
-balance = ss.fields(problem, peak).outputs[1, 0]
+problem = ss.response.forced_problem(system, load, sweep)
+points = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))
+peak = max(points, key=lambda point: abs(ss.response.fields(problem, point).outputs[1, 0]))
+balance = ss.response.fields(problem, peak).outputs[1, 0]
 
 # %%
 # Its state at t = 0 is where shooting begins: displacements of all dofs, and the forces in the contacts' tangential
 # springs. (Without a start it begins at rest, which needs more periods and, where several motions exist, may find another.)
 
 motion = problem.low.linear.recover(peak.omega, peak.coefficients)  # (harmonics, all dofs)
-traction = ss.signals(problem, peak).force[:, :2, 0]  # t and w of each contact, first sample
-start = ss.start_from_harmonics(motion, peak.omega, traction)
+traction = ss.response.signals(problem, peak).force[
+    :, :2, 0
+]  # t and w of each contact, first sample
+start = ss.response.start_from_harmonics(motion, peak.omega, traction)
 
 
 def shot(load, omega, start=None):
     """Shoot with the blade and its damper."""
-    return ss.shoot(
+    return ss.response.shoot(
         system.structure, damper.gap_operator, damper.laws, load, omega, system.outputs, start
     )
 

@@ -23,13 +23,13 @@ SPEED = 2 * math.pi * 50  # rad/s
 geometry = ss.BladedSector(
     sectors=SECTORS,
     platform=None,
-    shroud=ss.Shroud(span=0.95, face_angle=math.radians(-30)),
+    shroud=ss.model.Shroud(span=0.95, face_angle=math.radians(-30)),
     disk_size=0.03,
     platform_size=0.008,
     airfoil_size=0.015,
 )
-solid = ss.rotating_solid(ss.mesh_sector(geometry), ss.Material())
-at_rest = ss.cyclic_sector(solid.structure, SECTORS)
+solid = ss.model.rotating_solid(ss.model.mesh_sector(geometry), ss.Material())
+at_rest = ss.reduction.cyclic_sector(solid.structure, SECTORS)
 structure = solid.at_speed(SPEED, tie=at_rest.tie)
 
 # %%
@@ -47,7 +47,7 @@ sets = {
     "right": high[corners].ravel(),
     "point": tip,
 }
-sector = ss.cyclic_sector(replace(structure, sets=sets), SECTORS)
+sector = ss.reduction.cyclic_sector(replace(structure, sets=sets), SECTORS)
 
 # %%
 # All blades do the same, one after the other, so one sector is enough. Harmonic h of the vibration travels with the wave number h m; each of these waves is reduced and
@@ -56,13 +56,13 @@ sector = ss.cyclic_sector(replace(structure, sets=sets), SECTORS)
 
 def reduced(wave, keep, n_modes):
     """Reduce a travelling wave and damp it."""
-    return ss.rayleigh_damping(ss.craig_bampton(wave, keep, n_modes), 0.001, (200.0, 1000.0))
+    return ss.model.rayleigh_damping(ss.craig_bampton(wave, keep, n_modes), 0.001, (200.0, 1000.0))
 
 
-gaps = ss.neighbour_gaps(sector.structure, SECTORS, low="left", high="right")
+gaps = ss.contact.neighbour_gaps(sector.structure, SECTORS, low="left", high="right")
 keep = np.concatenate([sets[name] for name in ("left", "right", "point")])
 names = tuple(f"shroud.{i + 1}" for i in range(len(corners)))
-wheel, operator = ss.tuned_wheel(
+wheel, operator = ss.reduction.tuned_wheel(
     sector, ENGINE_ORDER, HARMONICS, gaps, keep=keep, n_modes=6, reduce=reduced, names=names
 )
 law = ss.ElasticCoulomb(k_t=2e4, k_w=2e4, k_n=4e4, mu=0.3)
@@ -82,7 +82,8 @@ print(f"the blades move by up to {1e3 * np.abs(steady).max():.2f} mm; normal for
 wave = wheel.of_harmonic(1)
 springs = np.tile([law.k_t, law.k_w, law.k_n], len(names))
 free, stuck = (
-    ss.natural_frequencies(s, 1)[0] for s in (wave, ss.with_springs(wave, operator, springs))
+    ss.model.natural_frequencies(s, 1)[0]
+    for s in (wave, ss.model.with_springs(wave, operator, springs))
 )
 print(f"engine order {ENGINE_ORDER}: {free:.1f} Hz free, {stuck:.1f} Hz stuck")
 
@@ -101,11 +102,11 @@ def response(newton):
     sweep = ss.Sweep(
         omega_range=(2 * math.pi * 200, 2 * math.pi * 330), low=1, high=HARMONICS, points=20
     )
-    problem = ss.forced_problem(system, load, sweep)
+    problem = ss.response.forced_problem(system, load, sweep)
     rows = []
-    for point in ss.accepted_points(list(ss.forced_response(system, load, sweep))):
+    for point in ss.response.accepted_points(list(ss.forced_response(system, load, sweep))):
         if point.converged:
-            moved = wheel.expand(ss.fields(problem, point).outputs[1], 1)
+            moved = wheel.expand(ss.response.fields(problem, point).outputs[1], 1)
             hertz = point.omega / (2 * math.pi)
             rows.append((hertz, abs(moved[tip[1]]) / newton, point.order))
     return np.array(sorted(rows)).T

@@ -8,7 +8,7 @@ import scipy.optimize
 import stickslip as ss
 
 UNIT = ss.Material(young_modulus=1.0, poisson_ratio=0.0, density=1.0)
-SLENDER = ss.Beam(length=1.0, area=1.0, second_moment=1.0, material=UNIT)
+SLENDER = ss.model.Beam(length=1.0, area=1.0, second_moment=1.0, material=UNIT)
 # rows of benchmark B11 (Hodges and Rutkowski 1981; Wright et al. 1982): hub radius, speed, flap 1 and 2, lag 1
 ROTATING = [
     (0, 0, 3.516015, 22.034491, 3.516015),
@@ -38,30 +38,34 @@ FAR_HUB = {1: 4.085336, 2: 5.439948, 3: 7.133713, 4: 8.966379, 5: 10.861596, 10:
 
 
 def omega(structure, n):
-    return 2 * np.pi * ss.natural_frequencies(structure, n)
+    return 2 * np.pi * ss.model.natural_frequencies(structure, n)
 
 
 @pytest.mark.parametrize(("hub", "speed", "flap_1", "flap_2", "lag_1"), ROTATING)
 def test_rotating_cantilever_to_the_printed_digits(hub, speed, flap_1, flap_2, lag_1):
     # one unit of the last digit, made with 120 elements as well; two for lag, which in the table is off lag² = flap² - speed² by that
-    flap, lag = (ss.rotating_beam(SLENDER, 120, speed, hub_radius=hub, bending=d) for d in "zy")
+    flap, lag = (
+        ss.model.rotating_beam(SLENDER, 120, speed, hub_radius=hub, bending=d) for d in "zy"
+    )
     np.testing.assert_allclose(omega(flap, 2), (flap_1, flap_2), rtol=0, atol=1e-6)
     assert omega(lag, 1)[0] == pytest.approx(lag_1, abs=2e-6)
 
 
 def test_third_flap_and_the_farthest_hub():
     for speed, third in THIRD.items():
-        assert omega(ss.rotating_beam(SLENDER, 120, speed), 3)[2] == pytest.approx(third, abs=1e-6)
+        assert omega(ss.model.rotating_beam(SLENDER, 120, speed), 3)[2] == pytest.approx(
+            third, abs=1e-6
+        )
     for speed, first in FAR_HUB.items():
-        found = omega(ss.rotating_beam(SLENDER, 120, speed, hub_radius=2.0), 1)[0]
+        found = omega(ss.model.rotating_beam(SLENDER, 120, speed, hub_radius=2.0), 1)[0]
         assert found == pytest.approx(first, abs=1e-6)
 
 
 def test_published_friction_beam_without_its_contact():
     # benchmark B10: fourteen elements, to the printed digits
     steel = ss.Material(young_modulus=0.6725 * 210e9, density=7850.0)
-    beam = ss.Beam(0.71, 0.05 * 0.06, 0.06 * 0.05**3 / 12, steel)
-    found = ss.natural_frequencies(ss.beam(beam, 14), 3)
+    beam = ss.model.Beam(0.71, 0.05 * 0.06, 0.06 * 0.05**3 / 12, steel)
+    found = ss.model.natural_frequencies(ss.model.beam(beam, 14), 3)
     np.testing.assert_allclose(found, (67.960197, 425.902892, 1192.610574), atol=1e-6)
 
 
@@ -79,15 +83,15 @@ def test_published_friction_beam_without_its_contact():
 )
 def test_supports(ends, equation, guess):
     root = scipy.optimize.brentq(equation, guess - 0.05, guess + 0.05)
-    shape = ss.Beam(1.0, 1.0, 1.0, UNIT, ends=ends)
+    shape = ss.model.Beam(1.0, 1.0, 1.0, UNIT, ends=ends)
     # the square of the frequency is (root / 20)⁴ / 720 too high
     expected = root**2 * (1 + (root / 20) ** 4 / 1440)
-    assert omega(ss.beam(shape, 20), 1)[0] == pytest.approx(expected, rel=1e-7)
+    assert omega(ss.model.beam(shape, 20), 1)[0] == pytest.approx(expected, rel=1e-7)
 
 
 def test_free_beam_moves_rigidly():
-    shape = ss.Beam(1.0, 1.0, 1.0, UNIT, ends=("free", "free"))
-    bending, both = (omega(ss.beam(shape, 20, axial=axial), 4) for axial in (False, True))
+    shape = ss.model.Beam(1.0, 1.0, 1.0, UNIT, ends=("free", "free"))
+    bending, both = (omega(ss.model.beam(shape, 20, axial=axial), 4) for axial in (False, True))
     np.testing.assert_array_equal(bending[:2], 0.0)
     assert bending[2] == pytest.approx(4.730040745**2, rel=1e-5)
     np.testing.assert_array_equal(both[:3], 0.0)
@@ -100,7 +104,7 @@ def rate(errors):
 
 def test_slender_elements_converge_with_the_fourth_power():
     exact = 4.694091132974174**2  # second root of cos x cosh x = -1
-    errors = [omega(ss.beam(SLENDER, n), 2)[1] / exact - 1 for n in (4, 8, 16, 32)]
+    errors = [omega(ss.model.beam(SLENDER, n), 2)[1] / exact - 1 for n in (4, 8, 16, 32)]
     assert np.all(np.array(errors) > 0)
     np.testing.assert_allclose(rate(errors), 4.0, atol=0.15)
 
@@ -119,9 +123,9 @@ def on_two_pins(n_modes):
 
 
 def test_thick_elements_converge_with_the_second_power():
-    shape = ss.Beam(**THICK, material=RUBBER, ends=("pinned", "pinned"))
+    shape = ss.model.Beam(**THICK, material=RUBBER, ends=("pinned", "pinned"))
     exact = on_two_pins(3)
-    errors = np.array([omega(ss.beam(shape, n), 3) / exact - 1 for n in (16, 32, 64)])
+    errors = np.array([omega(ss.model.beam(shape, n), 3) / exact - 1 for n in (16, 32, 64)])
     np.testing.assert_allclose(np.log2(errors[:-1] / errors[1:]), 2.0, atol=0.03)
     assert np.max(np.abs(errors[-1])) < 4e-4
 
@@ -137,10 +141,10 @@ def test_thick_cantilever_against_the_differential_equation():
         )
         return np.linalg.det(scipy.linalg.expm(rates)[2:, 2:])
 
-    found = omega(ss.beam(ss.Beam(**THICK, material=RUBBER), 60), 3)
+    found = omega(ss.model.beam(ss.model.Beam(**THICK, material=RUBBER), 60), 3)
     exact = [scipy.optimize.brentq(at_tip, 0.97 * w, 1.03 * w) for w in found]
     np.testing.assert_allclose(found, exact, rtol=6e-4)
-    coarse = omega(ss.beam(ss.Beam(**THICK, material=RUBBER), 30), 3)
+    coarse = omega(ss.model.beam(ss.model.Beam(**THICK, material=RUBBER), 30), 3)
     np.testing.assert_allclose(rate([coarse - exact, found - exact]), 2.0, atol=0.05)
 
 
@@ -148,8 +152,8 @@ def test_thick_cantilever_against_the_differential_equation():
 @pytest.mark.parametrize("elements", [1, 3])
 def test_static_deflection_is_exact_however_thin(thickness, elements):
     # a force at the tip: F L³ / 3 EI + F L / κGA, at any number of elements
-    shape = ss.Beam(1.0, thickness, thickness**3 / 12, RUBBER, shear_coefficient=5 / 6)
-    structure = ss.beam(shape, elements, bending="y")
+    shape = ss.model.Beam(1.0, thickness, thickness**3 / 12, RUBBER, shear_coefficient=5 / 6)
+    structure = ss.model.beam(shape, elements, bending="y")
     force = np.zeros(structure.n)
     force[structure.sets["tip"]] = 1.0
     moved = np.linalg.solve(structure.stiffness, force)
@@ -159,14 +163,16 @@ def test_static_deflection_is_exact_however_thin(thickness, elements):
 
 def test_thin_beam_with_shear_is_the_slender_one():
     shape = {"length": 1.0, "area": 1e-3, "second_moment": 1e-9 / 12, "material": UNIT}
-    thin, slender = ss.Beam(**shape, shear_coefficient=5 / 6), ss.Beam(**shape)
+    thin, slender = ss.model.Beam(**shape, shear_coefficient=5 / 6), ss.model.Beam(**shape)
     np.testing.assert_allclose(
-        omega(ss.beam(thin, 20), 3), omega(ss.beam(slender, 20), 3), rtol=1e-4
+        omega(ss.model.beam(thin, 20), 3), omega(ss.model.beam(slender, 20), 3), rtol=1e-4
     )
 
 
 def test_mass_and_names():
-    structure = ss.beam(ss.Beam(2.0, 0.3, 0.1, ss.Material(), ends=("free", "free")), 5, axial=True)
+    structure = ss.model.beam(
+        ss.model.Beam(2.0, 0.3, 0.1, ss.Material(), ends=("free", "free")), 5, axial=True
+    )
     for name in ("deflection", "axial"):
         unit = np.zeros(structure.n)
         unit[structure.sets[name]] = 1.0
@@ -180,7 +186,9 @@ def test_mass_and_names():
     )
     turn[structure.sets["rotation"]] = 1.0
     assert abs(turn @ structure.stiffness @ turn) < 1e-6 * structure.stiffness.max()
-    lag = ss.beam(ss.Beam(2.0, 0.3, 0.1, ss.Material(), ends=("free", "free")), 5, bending="y")
+    lag = ss.model.beam(
+        ss.model.Beam(2.0, 0.3, 0.1, ss.Material(), ends=("free", "free")), 5, bending="y"
+    )
     turn = np.zeros(lag.n)
     turn[lag.sets["deflection"]] = lag.dofs.position[lag.sets["deflection"], 0] - 1
     turn[lag.sets["rotation"]] = 1.0
@@ -191,15 +199,15 @@ def test_mass_and_names():
 
 
 def test_lag_is_flap_less_the_square_of_the_speed():
-    flap, lag = (ss.rotating_beam(SLENDER, 10, 4.0, hub_radius=0.5, bending=d) for d in "zy")
+    flap, lag = (ss.model.rotating_beam(SLENDER, 10, 4.0, hub_radius=0.5, bending=d) for d in "zy")
     np.testing.assert_allclose(omega(lag, 4) ** 2, omega(flap, 4) ** 2 - 16.0, rtol=1e-7)
 
 
 def test_turning_bar_stretches_at_lower_frequencies():
     # axial motion alone: ω² = ω₀² - Ω², whatever the hub
-    stiff = ss.Beam(1.0, 1.0, 1e6, UNIT)  # bending far above
+    stiff = ss.model.Beam(1.0, 1.0, 1e6, UNIT)  # bending far above
     at_rest, turning = (
-        ss.rotating_beam(stiff, 40, s, axial=True, hub_radius=0.3) for s in (0.0, 1.0)
+        ss.model.rotating_beam(stiff, 40, s, axial=True, hub_radius=0.3) for s in (0.0, 1.0)
     )
     assert omega(turning, 1)[0] ** 2 == pytest.approx(omega(at_rest, 1)[0] ** 2 - 1, rel=1e-6)
 
@@ -239,25 +247,27 @@ def polynomial_frequencies(shape, speed, hub, terms=9):
 
 def test_coriolis_forces_couple_lag_and_stretching():
     # thick enough that the bar's frequencies lie among those of bending
-    shape = ss.Beam(1.0, 1.0, 0.02, UNIT)
+    shape = ss.model.Beam(1.0, 1.0, 0.02, UNIT)
     exact = polynomial_frequencies(shape, 0.9, 0.2)[:4]
-    structure = ss.rotating_beam(
+    structure = ss.model.rotating_beam(
         shape, 60, 0.9, hub_radius=0.2, bending="y", axial=True, coriolis=True
     )
-    found = 2 * np.pi * ss.gyroscopic_modes(structure, 4).frequencies_hz
+    found = 2 * np.pi * ss.model.gyroscopic_modes(structure, 4).frequencies_hz
     # linear bar elements: (π/2 5/60)²/24 of the third bar mode
     np.testing.assert_allclose(found, exact, rtol=1e-3)
     without = omega(structure, 4)
     assert np.max(np.abs(without / exact - 1)) > 0.05  # it matters
-    back = ss.rotating_beam(shape, 60, -0.9, hub_radius=0.2, bending="y", axial=True, coriolis=True)
+    back = ss.model.rotating_beam(
+        shape, 60, -0.9, hub_radius=0.2, bending="y", axial=True, coriolis=True
+    )
     np.testing.assert_allclose(back.damping, -structure.damping)
 
 
 def test_campbell_diagram_of_a_blade():
     def at(speed):
-        return ss.rotating_beam(SLENDER, 20, speed, hub_radius=1.0, bending="z")
+        return ss.model.rotating_beam(SLENDER, 20, speed, hub_radius=1.0, bending="z")
 
-    found = ss.campbell(at, np.linspace(0.0, 10.0, 6), 2, (2, 5), tolerance=1e-8)
+    found = ss.response.campbell(at, np.linspace(0.0, 10.0, 6), 2, (2, 5), tolerance=1e-8)
     for crossing in found.crossings:
         exact = omega(at(crossing.speed), 2)[crossing.mode]
         assert exact == pytest.approx(crossing.engine_order * crossing.speed, rel=1e-6)
@@ -267,16 +277,18 @@ def test_campbell_diagram_of_a_blade():
 @pytest.mark.parametrize(
     ("make", "place"),
     [
-        (lambda: ss.Beam(-1.0, 1.0, 1.0, UNIT), "length"),
-        (lambda: ss.Beam(1.0, 1.0, 1.0, UNIT, shear_coefficient=0.0), "shear_coefficient"),
-        (lambda: ss.Beam(1.0, 1.0, 1.0, UNIT, ends=("clamped", "glued")), "ends"),
-        (lambda: ss.beam(SLENDER, 0), "elements"),
-        (lambda: ss.beam(SLENDER, 3, bending="x"), "bending"),
-        (lambda: ss.rotating_beam(SLENDER, 3, 1.0, hub_radius=-1.0), "hub radius"),
-        (lambda: ss.rotating_beam(SLENDER, 3, np.nan), "speed"),
-        (lambda: ss.rotating_beam(SLENDER, 3, 1.0, coriolis=True), "coriolis"),
+        (lambda: ss.model.Beam(-1.0, 1.0, 1.0, UNIT), "length"),
+        (lambda: ss.model.Beam(1.0, 1.0, 1.0, UNIT, shear_coefficient=0.0), "shear_coefficient"),
+        (lambda: ss.model.Beam(1.0, 1.0, 1.0, UNIT, ends=("clamped", "glued")), "ends"),
+        (lambda: ss.model.beam(SLENDER, 0), "elements"),
+        (lambda: ss.model.beam(SLENDER, 3, bending="x"), "bending"),
+        (lambda: ss.model.rotating_beam(SLENDER, 3, 1.0, hub_radius=-1.0), "hub radius"),
+        (lambda: ss.model.rotating_beam(SLENDER, 3, np.nan), "speed"),
+        (lambda: ss.model.rotating_beam(SLENDER, 3, 1.0, coriolis=True), "coriolis"),
         (
-            lambda: ss.rotating_beam(ss.Beam(1.0, 1.0, 1.0, UNIT, ends=("pinned", "free")), 3, 1.0),
+            lambda: ss.model.rotating_beam(
+                ss.model.Beam(1.0, 1.0, 1.0, UNIT, ends=("pinned", "free")), 3, 1.0
+            ),
             "tension depends",
         ),
     ],

@@ -15,7 +15,7 @@ TWO_PI = 2 * np.pi
 
 def of_squares(*squares):
     """Single masses of one kilogram on springs."""
-    return ss.lumped(np.ones(len(squares)), np.diag(squares))
+    return ss.model.lumped(np.ones(len(squares)), np.diag(squares))
 
 
 def rotor(speed, omega=10.0):
@@ -31,7 +31,7 @@ def stiffened(speed):
 
 def test_modes_that_cross_keep_their_columns():
     speeds = np.linspace(0.0, 3.0, 4)
-    found = ss.campbell(stiffened, speeds, 3).frequencies_hz * TWO_PI
+    found = ss.response.campbell(stiffened, speeds, 3).frequencies_hz * TWO_PI
     exact = np.sqrt(np.column_stack([1 + 2 * speeds**2, 4 + 0 * speeds, 9 + 0.5 * speeds**2]))
     np.testing.assert_allclose(found, exact, rtol=1e-12)
 
@@ -40,9 +40,9 @@ def test_modes_that_cross_keep_their_columns():
 def test_modes_that_veer_do_not_change_places(steps):
     # seen from the ends of a step alone the shapes seem to cross: they turn within 0.03 of the speed
     def coupled(speed):
-        return ss.lumped(np.ones(2), np.array([[1 + speed**2, 0.05], [0.05, 4.0]]))
+        return ss.model.lumped(np.ones(2), np.array([[1 + speed**2, 0.05], [0.05, 4.0]]))
 
-    found = ss.campbell(coupled, np.linspace(0.0, 3.0, steps), 2)
+    found = ss.response.campbell(coupled, np.linspace(0.0, 3.0, steps), 2)
     assert np.all(np.diff(found.frequencies_hz, axis=1) > 0)
     if steps > 3:
         assert np.min(found.agreement) > 0.7
@@ -50,7 +50,7 @@ def test_modes_that_veer_do_not_change_places(steps):
 
 def test_crossings_to_the_tolerance():
     # (mΩ)² = 1 + 2Ω² and = 4: closed forms
-    found = ss.campbell(stiffened, np.linspace(0.0, 3.0, 4), 2, (1, 2, 3), tolerance=1e-9)
+    found = ss.response.campbell(stiffened, np.linspace(0.0, 3.0, 4), 2, (1, 2, 3), tolerance=1e-9)
     exact = {
         (2, 0): np.sqrt(1 / 2),
         (3, 0): np.sqrt(1 / 7),
@@ -74,16 +74,18 @@ def test_crossings_to_the_tolerance():
 def test_a_crossing_on_a_speed_counts_once():
     # the constant mode, 2 rad/s, meets order 1 at the first, a middle and the last speed
     for speeds in ([2.0, 3.0], [1.0, 2.0, 3.0], [1.0, 2.0]):
-        met = ss.campbell(lambda _: of_squares(4.0), speeds, 1, (1,)).crossings
+        met = ss.response.campbell(lambda _: of_squares(4.0), speeds, 1, (1,)).crossings
         assert [c.speed for c in met] == [pytest.approx(2.0, rel=1e-6)]
-    free = ss.campbell(lambda _: of_squares(0.0, 1.0), [0.0, 0.5], 2, (1,))
+    free = ss.response.campbell(lambda _: of_squares(0.0, 1.0), [0.0, 0.5], 2, (1,))
     assert not free.crossings  # a rigid mode meets every order at rest: that is no resonance
 
 
 @pytest.mark.parametrize("order", [2, 30, 3000])
 def test_tolerance_is_relative_to_the_crossing(order):
     """Which may lie far below the first speeds: 1 + Ω²/2 = m²Ω²."""
-    met = ss.campbell(lambda w: of_squares(1 + w**2 / 2), [0.0, 100.0], 1, (order,), tolerance=1e-3)
+    met = ss.response.campbell(
+        lambda w: of_squares(1 + w**2 / 2), [0.0, 100.0], 1, (order,), tolerance=1e-3
+    )
     exact = 1 / np.sqrt(order**2 - 0.5)
     assert [c.speed for c in met.crossings] == [pytest.approx(exact, rel=1e-3)]
 
@@ -96,7 +98,7 @@ def test_a_looser_tolerance_costs_fewer_structures():
             asked.append(speed)
             return stiffened(speed)
 
-        ss.campbell(at, [0.0, 1.4], 1, (2,), tolerance=tolerance)
+        ss.response.campbell(at, [0.0, 1.4], 1, (2,), tolerance=tolerance)
         return len(asked)
 
     assert counted(1e-2) < counted(1e-10)
@@ -104,21 +106,23 @@ def test_a_looser_tolerance_costs_fewer_structures():
 
 def test_isotropic_rotor_in_the_rotating_frame():
     speeds = np.linspace(0.0, 8.0, 5)
-    found = ss.campbell(rotor, speeds, 2, (1, 3), coriolis=True)
+    found = ss.response.campbell(rotor, speeds, 2, (1, 3), coriolis=True)
     together = np.sort(found.frequencies_hz * TWO_PI, axis=1)
     np.testing.assert_allclose(together, np.column_stack([10 - speeds, 10 + speeds]), atol=1e-12)
     # 10 ± Ω = mΩ
     crossed = sorted((c.engine_order, round(c.speed, 5)) for c in found.crossings)
     assert crossed == [(1, 5.0), (3, 2.5), (3, 5.0)]
-    without = ss.campbell(rotor, speeds, 2)
+    without = ss.response.campbell(rotor, speeds, 2)
     np.testing.assert_allclose(without.frequencies_hz[-1] * TWO_PI, 6.0)
 
 
 def test_rotor_beyond_its_critical_speed_is_stable_by_coriolis_forces_alone():
-    modes = ss.gyroscopic_modes(rotor(25.0), 2)
+    modes = ss.model.gyroscopic_modes(rotor(25.0), 2)
     np.testing.assert_allclose(modes.frequencies_hz * TWO_PI, [15.0, 35.0], rtol=1e-9)
     np.testing.assert_allclose(modes.growth, 0.0, atol=1e-6)
-    assert np.all(ss.campbell(rotor, [25.0], 2).frequencies_hz < 0)  # diverges without them
+    assert np.all(
+        ss.response.campbell(rotor, [25.0], 2).frequencies_hz < 0
+    )  # diverges without them
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -130,7 +134,7 @@ def test_what_diverges_grows(seed):
         M, C, K = structure.mass, structure.damping, structure.stiffness
         state = np.block([[np.zeros((3, 3)), np.eye(3)], [-K, -np.linalg.solve(M, C)]])
         growing = np.sort(np.linalg.eigvals(state).real)[:3:-1]  # two of six
-        found = ss.gyroscopic_modes(structure, 3)
+        found = ss.model.gyroscopic_modes(structure, 3)
         np.testing.assert_allclose(found.growth, [*growing, 0.0], atol=1e-12)
         assert found.frequencies_hz[2] > 0.1
 
@@ -143,7 +147,7 @@ def gyroscopic_chain(n, speed=1.0):
     K = scipy.sparse.kron(K, np.diag([1.0, 1.7])) * 1e4
     # as if the masses lay farther and farther from the axis of rotation: not the same for all, so that modes mix
     G = scipy.sparse.kron(scipy.sparse.diags_array(np.linspace(0.0, 1.0, n)), SPIN) * 2 * speed
-    dofs = ss.Dofs(np.arange(2 * n), ("x", "y") * n, np.zeros((2 * n, 3)))
+    dofs = ss.model.Dofs(np.arange(2 * n), ("x", "y") * n, np.zeros((2 * n, 3)))
     parts = (scipy.sparse.csr_array(a) for a in (scipy.sparse.eye_array(2 * n), G, K))
     return ss.Structure(*parts, dofs)
 
@@ -160,7 +164,7 @@ def quadratic(structure):
 
 def test_small_structures_are_solved_whole():
     structure = gyroscopic_chain(20, speed=3.0)
-    modes = ss.gyroscopic_modes(structure, 40)
+    modes = ss.model.gyroscopic_modes(structure, 40)
     np.testing.assert_allclose(modes.frequencies_hz, quadratic(structure), rtol=1e-9)
     omega = TWO_PI * modes.frequencies_hz
     K, G, M = (a.toarray() for a in (structure.stiffness, structure.damping, structure.mass))
@@ -172,22 +176,22 @@ def test_small_structures_are_solved_whole():
 def test_static_answers_make_a_modal_basis_converge():
     structure = gyroscopic_chain(201, speed=3.0)
     exact = quadratic(structure)[:6]
-    enriched = ss.gyroscopic_modes(structure, 6, n_basis=12).frequencies_hz
+    enriched = ss.model.gyroscopic_modes(structure, 6, n_basis=12).frequencies_hz
     # the same twelve modes without the answers
     K, G, M = (a.toarray() for a in (structure.stiffness, structure.damping, structure.mass))
     _, basis = scipy.linalg.eigh(K, M, subset_by_index=(0, 11))
     small = [scipy.sparse.csr_array(basis.T @ a @ basis) for a in (M, G, K)]
-    dofs = ss.Dofs(np.arange(12), ("mode",) * 12, np.zeros((12, 3)))
+    dofs = ss.model.Dofs(np.arange(12), ("mode",) * 12, np.zeros((12, 3)))
     modal = quadratic(ss.Structure(*small, dofs))[:6]
-    shift = np.max(np.abs(exact - ss.natural_frequencies(structure, 6)))
+    shift = np.max(np.abs(exact - ss.model.natural_frequencies(structure, 6)))
     assert np.max(np.abs(enriched - exact)) < 1e-3 * shift
     assert np.max(np.abs(enriched - exact)) <= np.max(np.abs(modal - exact))
 
 
 def test_large_structures_at_rest_have_no_answers_to_add():
     structure = gyroscopic_chain(201, speed=0.0)
-    found = ss.gyroscopic_modes(structure, 5).frequencies_hz
-    np.testing.assert_allclose(found, ss.natural_frequencies(structure, 5), rtol=1e-10)
+    found = ss.model.gyroscopic_modes(structure, 5).frequencies_hz
+    np.testing.assert_allclose(found, ss.model.natural_frequencies(structure, 5), rtol=1e-10)
 
 
 def test_free_bodies_with_coriolis_forces_keep_real_frequencies():
@@ -196,7 +200,7 @@ def test_free_bodies_with_coriolis_forces_keep_real_frequencies():
     K[:2, :2] /= 2.0  # the first masses lose their grounding springs, the last ones too
     K[-2:, -2:] /= 2.0
     free = replace(structure, stiffness=scipy.sparse.csr_array(K))
-    modes = ss.gyroscopic_modes(free, 8)
+    modes = ss.model.gyroscopic_modes(free, 8)
     np.testing.assert_array_equal(modes.growth, 0.0)
     np.testing.assert_allclose(modes.frequencies_hz[2:], quadratic(free)[-400:][:6], rtol=1e-6)
 
@@ -207,18 +211,18 @@ def turning_ring(speed, sectors=7, blades=1.0):
     K = np.block([[own + tie, -tie], [-tie, tie]])
     C, M = np.zeros((4, 4)), np.zeros((4, 4))
     C[:2, :2], M[:2, :2] = 2 * speed * SPIN, np.eye(2)
-    dofs = ss.Dofs(np.array([0, 0, 1, 1]), ("radial", "tangential") * 2, np.zeros((4, 3)))
-    return ss.CyclicSector(
+    dofs = ss.model.Dofs(np.array([0, 0, 1, 1]), ("radial", "tangential") * 2, np.zeros((4, 3)))
+    return ss.reduction.CyclicSector(
         ss.Structure(M, C, K, dofs), sectors, np.array([0, 1]), np.array([2, 3]), axis=None
     )
 
 
 def test_waves_of_both_senses_are_the_whole_wheel():
     sector = turning_ring(0.8)
-    table = ss.nodal_diameter_map(sector, 2, coriolis=True)
+    table = ss.response.nodal_diameter_map(sector, 2, coriolis=True)
     assert np.all(table.forward_hz[0] == table.frequencies_hz[0])
     both = [table.frequencies_hz, table.forward_hz[1:]]
-    whole = ss.gyroscopic_modes(ss.wheel(sector), 14).frequencies_hz
+    whole = ss.model.gyroscopic_modes(ss.reduction.wheel(sector), 14).frequencies_hz
     np.testing.assert_allclose(
         np.sort(np.concatenate([b.ravel() for b in both])), whole, rtol=1e-10
     )
@@ -226,21 +230,21 @@ def test_waves_of_both_senses_are_the_whole_wheel():
 
 def test_engine_orders_meet_the_wave_they_excite():
     # orders 2 and 5 excite waves 2 and 5: backward and forward with two nodal diameters on seven sectors
-    diagrams = ss.cyclic_campbell(
+    diagrams = ss.response.cyclic_campbell(
         turning_ring, np.linspace(0.0, 1.2, 5), 2, (2, 5, 9), coriolis=True
     )
     assert [d.wave_number for d in diagrams] == [2, 5]
     assert [d.nodal_diameter for d in diagrams] == [2, 2]
     assert {c.engine_order for c in diagrams[0].crossings} == {2, 9}
     assert {c.engine_order for c in diagrams[1].crossings} == {5}
-    merged = ss.cyclic_campbell(turning_ring, np.linspace(0.0, 1.2, 5), 2, (2, 5, 9))
+    merged = ss.response.cyclic_campbell(turning_ring, np.linspace(0.0, 1.2, 5), 2, (2, 5, 9))
     assert [d.wave_number for d in merged] == [2]
     assert {c.engine_order for c in merged[0].crossings} == {2, 5, 9}
 
 
 def test_waves_may_be_named_and_watched():
     seen = []
-    diagrams = ss.cyclic_campbell(
+    diagrams = ss.response.cyclic_campbell(
         turning_ring, [0.0, 0.5, 1.0], 1, (2,), wave_numbers=(0, 6), coriolis=True,
         progress=lambda wave, speed: seen.append((wave, speed)),
     )  # fmt: skip
@@ -248,24 +252,26 @@ def test_waves_may_be_named_and_watched():
     assert not diagrams[0].crossings + diagrams[1].crossings  # order 2 excites neither
     assert seen == [(0, 0.5), (0, 1.0), (6, 0.5), (6, 1.0)]
     with pytest.raises(ss.InputError, match=r"wave_numbers: must be from 0 to 6, got 7"):
-        ss.cyclic_campbell(turning_ring, [0.0], 1, (), wave_numbers=(7,))
+        ss.response.cyclic_campbell(turning_ring, [0.0], 1, (), wave_numbers=(7,))
 
 
 def test_hub_on_springs_whirls_at_one_frequency_for_who_stands_still():
     # a hub shared by all sectors: k = 1 and k = n_s - 1 are its backward and forward whirl
     def hub(speed, sectors=5):
         structure = rotor(speed)
-        dofs = ss.Dofs(np.zeros(2, dtype=int), ("x", "y"), np.zeros((2, 3)))
-        return ss.CyclicSector(replace(structure, dofs=dofs), sectors, np.arange(2), np.arange(2))
+        dofs = ss.model.Dofs(np.zeros(2, dtype=int), ("x", "y"), np.zeros((2, 3)))
+        return ss.reduction.CyclicSector(
+            replace(structure, dofs=dofs), sectors, np.arange(2), np.arange(2)
+        )
 
     # each sector has its share of the hub, here all of its mass and stiffness: frequencies do not change
     speeds = np.linspace(0.0, 8.0, 5)
-    backward, forward = ss.cyclic_campbell(hub, speeds, 1, (1, 4), coriolis=True)
+    backward, forward = ss.response.cyclic_campbell(hub, speeds, 1, (1, 4), coriolis=True)
     np.testing.assert_allclose(backward.frequencies_hz[:, 0] * TWO_PI, 10 + speeds, rtol=1e-9)
     np.testing.assert_allclose(forward.frequencies_hz[:, 0] * TWO_PI, 10 - speeds, rtol=1e-9)
     for diagram in (backward, forward):
         np.testing.assert_allclose(diagram.stationary_hz * TWO_PI, 10.0, rtol=1e-9)
-    table = ss.nodal_diameter_map(hub(3.0), 1, [1], coriolis=True)
+    table = ss.response.nodal_diameter_map(hub(3.0), 1, [1], coriolis=True)
     assert table.frequencies_hz[0, 0] * TWO_PI == pytest.approx(13.0)
     assert table.forward_hz[0, 0] * TWO_PI == pytest.approx(7.0)
     np.testing.assert_allclose(np.array(table.stationary_hz(3.0)) * TWO_PI, 10.0, rtol=1e-9)
@@ -285,20 +291,20 @@ def test_hub_on_springs_whirls_at_one_frequency_for_who_stands_still():
 def test_wrong_input_is_named(change, place):
     arguments = {"speeds": [0.0, 1.0], "n_modes": 2, "engine_orders": (1,)} | change
     with pytest.raises(ss.InputError, match=place):
-        ss.campbell(stiffened, **arguments)
+        ss.response.campbell(stiffened, **arguments)
 
 
 def test_reduced_structures_are_compared_in_the_full_model():
     # each speed has its own reduction: coordinates differ, the blade does not
     def reduced(speed):
         K = 3.0 * np.eye(8) - np.eye(8, k=1) - np.eye(8, k=-1)
-        full = ss.lumped(np.ones(8), K + np.diag(np.arange(8.0)) * 0.2 * speed**2)
+        full = ss.model.lumped(np.ones(8), K + np.diag(np.arange(8.0)) * 0.2 * speed**2)
         return ss.craig_bampton(full, np.array([0]), 7)
 
     def full(speed):
         K = 3.0 * np.eye(8) - np.eye(8, k=1) - np.eye(8, k=-1)
-        return ss.lumped(np.ones(8), K + np.diag(np.arange(8.0)) * 0.2 * speed**2)
+        return ss.model.lumped(np.ones(8), K + np.diag(np.arange(8.0)) * 0.2 * speed**2)
 
     speeds = np.linspace(0.0, 3.0, 4)
-    one, other = (ss.campbell(f, speeds, 3) for f in (reduced, full))
+    one, other = (ss.response.campbell(f, speeds, 3) for f in (reduced, full))
     np.testing.assert_allclose(one.frequencies_hz, other.frequencies_hz, rtol=1e-10)

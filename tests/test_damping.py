@@ -15,7 +15,7 @@ import stickslip as ss
 def random_structure(seed, n=8):
     rng = np.random.default_rng(seed)
     a, b = rng.standard_normal((2, n, n))
-    return ss.lumped(a @ a.T / n + np.eye(n), 50 * (b @ b.T / n + np.eye(n)))
+    return ss.model.lumped(a @ a.T / n + np.eye(n), 50 * (b @ b.T / n + np.eye(n)))
 
 
 def ratios_of(structure):
@@ -34,15 +34,15 @@ def ratios_of(structure):
 @settings(max_examples=15, deadline=None)
 @given(st.integers(0, 10**6), st.lists(st.floats(0.0, 0.3), min_size=1, max_size=8))
 def test_modes_have_the_ratios_asked_for(seed, ratios):
-    damped = ss.modal_damping(random_structure(seed), ratios)
+    damped = ss.model.modal_damping(random_structure(seed), ratios)
     expected = np.pad(ratios, (0, 8 - len(ratios)))
     np.testing.assert_allclose(ratios_of(damped), expected, atol=1e-9)
 
 
 def test_one_number_damps_all_modes_and_rigid_ones_not():
     K = np.array([[2.0, -1, 0], [-1, 2, -1], [0, -1, 2]]) - np.diag([1.0, 0, 1.0])
-    free = ss.lumped(np.ones(3), K)
-    damped = ss.modal_damping(free, 0.01)
+    free = ss.model.lumped(np.ones(3), K)
+    damped = ss.model.modal_damping(free, 0.01)
     np.testing.assert_allclose(damped.damping @ np.ones(3), 0.0, atol=1e-12)
     np.testing.assert_allclose(damped.damping, damped.damping.T)
     values, shapes = scipy.linalg.eigh(damped.stiffness, damped.mass)
@@ -51,7 +51,9 @@ def test_one_number_damps_all_modes_and_rigid_ones_not():
 
 
 def test_modes_of_a_wave_are_damped_alike():
-    wave = ss.modal_damping(ss.travelling_wave(ss.blisk_with_ring(ring=None), 5), 1e-3)
+    wave = ss.model.modal_damping(
+        ss.reduction.travelling_wave(ss.reduction.blisk_with_ring(ring=None), 5), 1e-3
+    )
     values, shapes = scipy.linalg.eigh(wave.stiffness, wave.mass)
     modal = shapes.conj().T @ wave.damping @ shapes
     np.testing.assert_allclose(modal, np.diag(2e-3 * np.sqrt(values)), atol=1e-9)
@@ -60,8 +62,10 @@ def test_modes_of_a_wave_are_damped_alike():
 def test_friction_ring_free_and_stuck_has_the_published_peaks():
     # benchmark B9, engine order 2 on the tips: ring free (slip limit 0) and stuck (limit 20 and above); the blisk's modes are damped
     # with their ring away
-    alone = ss.modal_damping(ss.travelling_wave(ss.blisk_with_ring(ring=None), 2), 1e-3)
-    both = ss.travelling_wave(ss.blisk_with_ring(), 2)
+    alone = ss.model.modal_damping(
+        ss.reduction.travelling_wave(ss.reduction.blisk_with_ring(ring=None), 2), 1e-3
+    )
+    both = ss.reduction.travelling_wave(ss.reduction.blisk_with_ring(), 2)
     C = np.zeros((4, 4), dtype=complex)
     C[:3, :3] = alone.damping
     stuck = np.array(both.stiffness)
@@ -79,12 +83,15 @@ def test_friction_ring_free_and_stuck_has_the_published_peaks():
 
 def test_coriolis_terms_outlive_a_new_damping():
     skew = np.array([[0.0, -1.0], [1.0, 0.0]])
-    turning = ss.lumped(np.ones(2), np.diag([4.0, 9.0])).with_damping(3.0 * skew)
-    for damped in (ss.rayleigh_damping(turning, 0.01, (0.1, 1.0)), ss.modal_damping(turning, 0.01)):
+    turning = ss.model.lumped(np.ones(2), np.diag([4.0, 9.0])).with_damping(3.0 * skew)
+    for damped in (
+        ss.model.rayleigh_damping(turning, 0.01, (0.1, 1.0)),
+        ss.model.modal_damping(turning, 0.01),
+    ):
         np.testing.assert_allclose((damped.damping - damped.damping.T) / 2, 3.0 * skew)
         assert np.all(np.diagonal(damped.damping) > 0)
-    again = ss.modal_damping(ss.modal_damping(turning, 0.5), 0.01)
-    np.testing.assert_allclose(again.damping, ss.modal_damping(turning, 0.01).damping)
+    again = ss.model.modal_damping(ss.model.modal_damping(turning, 0.5), 0.01)
+    np.testing.assert_allclose(again.damping, ss.model.modal_damping(turning, 0.01).damping)
 
 
 def test_sparse_structures_stay_sparse():
@@ -97,24 +104,24 @@ def test_sparse_structures_stay_sparse():
         },
     )
     for damp in (
-        lambda s: ss.modal_damping(s, 0.02),
-        lambda s: ss.rayleigh_damping(s, 0.02, (0.5, 2.0)),
+        lambda s: ss.model.modal_damping(s, 0.02),
+        lambda s: ss.model.rayleigh_damping(s, 0.02, (0.5, 2.0)),
     ):
         found = damp(sparse).damping
         assert scipy.sparse.issparse(found)
         np.testing.assert_allclose(found.toarray(), damp(structure).damping, atol=1e-9)
-    assert scipy.sparse.issparse(ss.structural_damping(sparse, 0.1).loss)
+    assert scipy.sparse.issparse(ss.model.structural_damping(sparse, 0.1).loss)
 
 
 @pytest.mark.parametrize(
     ("damp", "place"),
     [
-        (lambda s: ss.modal_damping(s, [-0.1]), "ratios"),
-        (lambda s: ss.modal_damping(s, np.zeros(9)), "ratios"),
-        (lambda s: ss.modal_damping(s, []), "ratios"),
-        (lambda s: ss.modal_damping(replace(s, stiffness=-s.stiffness), 0.1), "diverge"),
-        (lambda s: ss.structural_damping(s, -0.1), "loss_factor"),
-        (lambda s: ss.structural_damping(s, 0.1, elastic=np.eye(2)), "elastic"),
+        (lambda s: ss.model.modal_damping(s, [-0.1]), "ratios"),
+        (lambda s: ss.model.modal_damping(s, np.zeros(9)), "ratios"),
+        (lambda s: ss.model.modal_damping(s, []), "ratios"),
+        (lambda s: ss.model.modal_damping(replace(s, stiffness=-s.stiffness), 0.1), "diverge"),
+        (lambda s: ss.model.structural_damping(s, -0.1), "loss_factor"),
+        (lambda s: ss.model.structural_damping(s, 0.1, elastic=np.eye(2)), "elastic"),
     ],
 )
 def test_wrong_input_is_named(damp, place):
@@ -128,9 +135,9 @@ def test_wrong_input_is_named(damp, place):
 def test_loss_bounds_a_resonance_whatever_its_frequency():
     # hysteretic damping: at resonance amplitude = force / (η k), for light and heavy masses alike
     for mass in (1.0, 1e-4, 1e4):
-        one = ss.structural_damping(ss.lumped([mass], [[5.0]]), 0.02)
+        one = ss.model.structural_damping(ss.model.lumped([mass], [[5.0]]), 0.02)
         load = ss.HarmonicLoad(np.array([3.0]), {1: np.array([1.0 + 0j])})
-        got = ss.condense(one, np.array([0]), load).condensed(np.sqrt(5.0 / mass), 1)
+        got = ss.harmonic.condense(one, np.array([0]), load).condensed(np.sqrt(5.0 / mass), 1)
         motion = got.load / got.stiffness[:, :, 0]
         assert abs(motion[1, 0]) == pytest.approx(1 / (0.02 * 5.0))
         assert motion[0, 0] == pytest.approx(3.0 / 5.0)  # statics feel none of it
@@ -139,21 +146,21 @@ def test_loss_bounds_a_resonance_whatever_its_frequency():
 def test_elastic_stiffness_alone_dissipates():
     at_rest = random_structure(1)
     at_speed = replace(at_rest, stiffness=at_rest.stiffness + 7 * np.eye(8))
-    damped = ss.structural_damping(at_speed, 0.01, elastic=at_rest.stiffness)
+    damped = ss.model.structural_damping(at_speed, 0.01, elastic=at_rest.stiffness)
     np.testing.assert_allclose(damped.loss, 0.01 * at_rest.stiffness)
 
 
 def test_joined_parts_keep_their_losses():
-    lossy, other = ss.structural_damping(random_structure(0, 2), 0.1), random_structure(1, 3)
-    both = ss.join(a=lossy, b=other)
+    lossy, other = ss.model.structural_damping(random_structure(0, 2), 0.1), random_structure(1, 3)
+    both = ss.model.join(a=lossy, b=other)
     np.testing.assert_allclose(both.loss, scipy.linalg.block_diag(lossy.loss, np.zeros((3, 3))))
-    assert ss.join(a=other).loss is None
+    assert ss.model.join(a=other).loss is None
     sparse = replace(
         other,
         mass=scipy.sparse.csr_array(other.mass),
         stiffness=scipy.sparse.csr_array(other.stiffness),
     )
-    np.testing.assert_allclose(np.asarray(ss.join(a=lossy, b=sparse).loss), both.loss)
+    np.testing.assert_allclose(np.asarray(ss.model.join(a=lossy, b=sparse).loss), both.loss)
 
 
 def full_response(structure, force, omega):
@@ -170,8 +177,10 @@ def turning_and_lossy(seed=2, n=8):
 
 REDUCTIONS = {
     "craig_bampton": lambda s: ss.craig_bampton(s, np.array([0, 3]), s.n - 2),
-    "rubin": lambda s: ss.rubin(s, np.array([0, 3]), s.n - 2),
-    "relative": lambda s: ss.in_relative_coordinates(s, np.eye(3, s.n) - np.eye(3, s.n, k=3))[0],
+    "rubin": lambda s: ss.reduction.rubin(s, np.array([0, 3]), s.n - 2),
+    "relative": lambda s: ss.reduction.in_relative_coordinates(
+        s, np.eye(3, s.n) - np.eye(3, s.n, k=3)
+    )[0],
 }
 
 
@@ -186,18 +195,18 @@ def test_reductions_without_loss_of_modes_keep_every_kind_of_damping(reduce):
 
 
 def test_loss_of_waves_is_the_loss_of_the_wheel():
-    sector = ss.blisk_with_ring(6)
-    sector = replace(sector, structure=ss.structural_damping(sector.structure, 0.02))
-    wheel = ss.wheel(sector)
+    sector = ss.reduction.blisk_with_ring(6)
+    sector = replace(sector, structure=ss.model.structural_damping(sector.structure, 0.02))
+    wheel = ss.reduction.wheel(sector)
     np.testing.assert_allclose(wheel.loss.toarray(), 0.02 * wheel.stiffness.toarray(), atol=1e-6)
-    wave = ss.travelling_wave(sector, 2)
+    wave = ss.reduction.travelling_wave(sector, 2)
     np.testing.assert_allclose(wave.loss, 0.02 * wave.stiffness, atol=1e-6)
 
 
 def test_files_keep_the_loss(tmp_path):
     for structure in (turning_and_lossy(), random_structure(0)):
-        ss.save_structure(structure, tmp_path / "s.npz")
-        found = ss.load_structure(tmp_path / "s.npz")
+        ss.model.save_structure(structure, tmp_path / "s.npz")
+        found = ss.model.load_structure(tmp_path / "s.npz")
         assert (found.loss is None) == (structure.loss is None)
         if structure.loss is not None:
             assert np.array_equal(found.loss, structure.loss)
@@ -218,9 +227,10 @@ def balance_of(structure, jacobian="dense", order=3):
     force = np.zeros(structure.n, dtype=complex)
     force[0] = 3.0 + 1.0j
     load = ss.HarmonicLoad(np.zeros(structure.n), {1: force})
-    linear = ss.condense(structure, system.retained, load)
+    linear = ss.harmonic.condense(structure, system.retained, load)
     return replace(
-        ss.harmonic_balance(linear, system.interface, order=order, samples=64), jacobian=jacobian
+        ss.harmonic.harmonic_balance(linear, system.interface, order=order, samples=64),
+        jacobian=jacobian,
     )
 
 
@@ -258,13 +268,15 @@ def test_forms_of_the_problem_agree_on_a_turning_structure():
     found = {}
     for name in ("dense", "structured"):
         balance = balance_of(turning_and_lossy(), name)
-        result = ss.newton(
-            lambda x, b=balance: b.linearise(x, 5.0), np.zeros(balance.size), ss.Newton()
+        result = ss.solve.newton(
+            lambda x, b=balance: b.linearise(x, 5.0), np.zeros(balance.size), ss.solve.Newton()
         )
-        assert result.status == ss.Status.CONVERGED
+        assert result.status == ss.solve.Status.CONVERGED
         found[name] = result.x
-    form = ss.ComplianceForm(balance_of(turning_and_lossy()))
-    result = ss.newton(lambda x: form.linearise(x, 5.0), np.zeros(form.size), ss.Newton())
+    form = ss.harmonic.ComplianceForm(balance_of(turning_and_lossy()))
+    result = ss.solve.newton(
+        lambda x: form.linearise(x, 5.0), np.zeros(form.size), ss.solve.Newton()
+    )
     found["compliance"] = result.x
     for name, x in found.items():
         np.testing.assert_allclose(
@@ -280,9 +292,13 @@ def test_time_integration_is_right_with_coriolis_terms_and_refuses_loss():
     load = ss.HarmonicLoad(np.zeros(structure.n), {1: force})
     laws = system.interface
     balance = balance_of(structure, order=15)
-    solution = ss.newton(lambda x: balance.linearise(x, 5.0), np.zeros(balance.size), ss.Newton())
+    solution = ss.solve.newton(
+        lambda x: balance.linearise(x, 5.0), np.zeros(balance.size), ss.solve.Newton()
+    )
     coefficients = balance.linear.recover(5.0, balance.coefficients(solution.x))
-    timed = ss.integrate(structure, laws.gap_operator, laws.laws, load, 5.0, np.arange(structure.n))
+    timed = ss.response.integrate(
+        structure, laws.gap_operator, laws.laws, load, 5.0, np.arange(structure.n)
+    )
     assert timed.settled
     harmonics = timed.harmonics
     # 64 samples a period leave 4e-5
@@ -290,7 +306,7 @@ def test_time_integration_is_right_with_coriolis_terms_and_refuses_loss():
         harmonics[1], coefficients[1], atol=1e-4 * np.abs(coefficients[1]).max()
     )
     with pytest.raises(ss.InputError, match="structural damping"):
-        ss.integrate(
+        ss.response.integrate(
             turning_and_lossy(), laws.gap_operator, laws.laws, load, 5.0, np.arange(structure.n)
         )
 
@@ -308,14 +324,14 @@ def test_forced_response_of_a_turning_lossy_structure_in_bonded_contact():
     force[0] = 3.0 + 1.0j
     load = ss.HarmonicLoad(np.zeros(structure.n), {1: force})
     sweep = ss.Sweep(omega_range=(5.0, 9.0))
-    problem = ss.forced_problem(system, load, sweep)
+    problem = ss.response.forced_problem(system, load, sweep)
     stuck = replace(
         structure, stiffness=structure.stiffness + rows.T @ np.diag([40.0, 40.0, 60.0]) @ rows
     )
-    points = ss.accepted_points(list(ss.forced_response(system, load, sweep)))
+    points = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))
     assert len(points) > 5
     for point in points:
         exact = full_response(stuck, force, point.omega)[[0, 5]]
         np.testing.assert_allclose(
-            ss.fields(problem, point).outputs[1], exact, atol=1e-6 * np.abs(exact).max()
+            ss.response.fields(problem, point).outputs[1], exact, atol=1e-6 * np.abs(exact).max()
         )

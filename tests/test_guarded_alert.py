@@ -87,7 +87,7 @@ def test_harmonics_that_a_reference_leaves_out_are_seen(name):
     spring = ss.Interface(
         ("spring",), (ss.PolynomialSpring(along_t=(0.1, 0.25)),), np.eye(3)[:, :1]
     )
-    mass = ss.lumped(np.eye(1), np.eye(1), 0.03 * np.eye(1))
+    mass = ss.model.lumped(np.eye(1), np.eye(1), 0.03 * np.eye(1))
     system = ss.System(mass, spring, np.array([0]))
     load = ss.HarmonicLoad(np.zeros(1), {1: np.array([0.1 + 0j])})
     sweep = ss.Sweep(
@@ -209,4 +209,4 @@ def test_reference_itself_is_accepted():
 @pytest.mark.parametrize("bad", [{"quick": 1.5}, {"quick": -0.1}, {"steps": -1}])
 def test_parameters_are_checked(bad):
     with pytest.raises(ss.InputError, match="GuardedAlert"):
-        ss.GuardedAlert(**bad)
+        ss.harmonic.GuardedAlert(**bad)

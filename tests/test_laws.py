@@ -24,9 +24,9 @@ some = st.floats(-1, 1)
 share = st.floats(0, 1)
 three = st.tuples(some, some, some)
 populations = (
-    st.builds(ss.UniformBand, n_sliders=st.integers(1, 6), half_width=st.floats(0.1, 1), elastic_share=st.floats(0, 0.5))
-    | st.builds(ss.FourParameter, chi=st.floats(-0.9, 0), beta=st.floats(0, 3), n_sliders=st.integers(2, 6))
-    | st.just(ss.FirstLoading(displacement=(1.0, 2.0, 4.0), force=(2.0, 3.0, 3.5)))
+    st.builds(ss.contact.UniformBand, n_sliders=st.integers(1, 6), half_width=st.floats(0.1, 1), elastic_share=st.floats(0, 0.5))
+    | st.builds(ss.contact.FourParameter, chi=st.floats(-0.9, 0), beta=st.floats(0, 3), n_sliders=st.integers(2, 6))
+    | st.just(ss.contact.FirstLoading(displacement=(1.0, 2.0, 4.0), force=(2.0, 3.0, 3.5)))
 )  # fmt: skip
 EXAMPLES = {
     "bonded": st.builds(ss.Bonded, k_t=stiff, k_w=stiff, k_n=stiff),
@@ -525,14 +525,14 @@ REFUSED = [
     (lambda: ss.BoucWen(k_t=1.0, beta=1.0, gamma=0.0, alpha=1.5), r"BoucWen\.alpha: must be 0 to 1, got 1.5"),
     (lambda: ss.BoucWen(k_t=1.0, beta=1.0, gamma=0.0, exponent=0.5), r"BoucWen\.exponent: must be 1 to 20, got 0.5"),
     (lambda: ss.Iwan(k_t=1.0, limit=np.nan), r"Iwan\.limit: must be finite and not negative, got nan"),
-    (lambda: ss.UniformBand(n_sliders=0), r"UniformBand\.n_sliders: must be at least 1, got 0"),
-    (lambda: ss.UniformBand(half_width=1.1), r"UniformBand\.half_width: must be above 0 and at most 1, got 1.1"),
-    (lambda: ss.UniformBand(elastic_share=1.0), r"UniformBand\.elastic_share: must be at least 0 and below 1, got 1.0"),
-    (lambda: ss.FourParameter(chi=-1.0, beta=0.0), r"FourParameter\.chi: must be above -1 and at most 0, got -1.0"),
-    (lambda: ss.FourParameter(chi=0.0, beta=-1.0), r"FourParameter\.beta: must be finite and not negative, got -1.0"),
-    (lambda: ss.FirstLoading(displacement=(1.0,), force=(1.0,)), "FirstLoading: got 1 displacements and 1 forces"),
-    (lambda: ss.FirstLoading(displacement=(2.0, 1.0), force=(1.0, 1.5)), r"FirstLoading\.displacement: must rise from above zero"),
-    (lambda: ss.FirstLoading(displacement=(1.0, 2.0), force=(1.0, 3.0)), r"FirstLoading\.force: must rise ever more slowly"),
+    (lambda: ss.contact.UniformBand(n_sliders=0), r"UniformBand\.n_sliders: must be at least 1, got 0"),
+    (lambda: ss.contact.UniformBand(half_width=1.1), r"UniformBand\.half_width: must be above 0 and at most 1, got 1.1"),
+    (lambda: ss.contact.UniformBand(elastic_share=1.0), r"UniformBand\.elastic_share: must be at least 0 and below 1, got 1.0"),
+    (lambda: ss.contact.FourParameter(chi=-1.0, beta=0.0), r"FourParameter\.chi: must be above -1 and at most 0, got -1.0"),
+    (lambda: ss.contact.FourParameter(chi=0.0, beta=-1.0), r"FourParameter\.beta: must be finite and not negative, got -1.0"),
+    (lambda: ss.contact.FirstLoading(displacement=(1.0,), force=(1.0,)), "FirstLoading: got 1 displacements and 1 forces"),
+    (lambda: ss.contact.FirstLoading(displacement=(2.0, 1.0), force=(1.0, 1.5)), r"FirstLoading\.displacement: must rise from above zero"),
+    (lambda: ss.contact.FirstLoading(displacement=(1.0, 2.0), force=(1.0, 3.0)), r"FirstLoading\.force: must rise ever more slowly"),
 ]  # fmt: skip
 
 
@@ -576,7 +576,7 @@ def test_planar_friction_on_a_circle(row):
 @pytest.mark.parametrize("row", case_b1_iwan.ENERGY, ids=lambda row: f"A={row[0]}")
 def test_energy_lost_in_an_iwan_element(row):
     amplitude, sliders = float(row[0]), 100
-    law = ss.Iwan(k_t=1.0, limit=1.0, population=ss.UniformBand(n_sliders=sliders))
+    law = ss.Iwan(k_t=1.0, limit=1.0, population=ss.contact.UniformBand(n_sliders=sliders))
     # midpoint rule over the sliders in cells of 2 / n, and 30 / samples² from sampling
     tolerance = (2.0 / sliders / amplitude) ** 2 + 30.0 / 1024**2
     assert case_b1_iwan.energy(law, amplitude, 1024) == pytest.approx(float(row[1]), rel=tolerance)
@@ -584,14 +584,16 @@ def test_energy_lost_in_an_iwan_element(row):
 
 def test_first_loading_of_an_iwan_element():
     x = np.array([0.1, 0.5, 1.0, 2.0, 3.0])
-    law = ss.Iwan(k_t=1.0, limit=1.0, population=ss.UniformBand(n_sliders=20))
+    law = ss.Iwan(k_t=1.0, limit=1.0, population=ss.contact.UniformBand(n_sliders=20))
     want = np.where(x < 2.0, x - x**2 / 4.0, 1.0)
     assert case_b1_iwan.first_loading(law, x) == pytest.approx(want, abs=1e-13)
 
 
 @pytest.mark.parametrize("chi", [0.0, -0.4, -0.8])
 def test_micro_slip_grows_with_the_power_of_its_population(chi):
-    law = ss.Iwan(k_t=1.0, limit=1.0, population=ss.FourParameter(chi=chi, beta=0.5, n_sliders=200))
+    law = ss.Iwan(
+        k_t=1.0, limit=1.0, population=ss.contact.FourParameter(chi=chi, beta=0.5, n_sliders=200)
+    )
     assert case_b1_iwan.slope(law, np.array([0.1, 0.2, 0.4])) == pytest.approx(3 + chi, abs=5e-3)
 
 
@@ -607,7 +609,7 @@ def test_sliders_add_up_to_the_element(population):
 
 def test_first_loading_follows_the_curve_it_was_made_of():
     x, f = (1.0, 2.0, 4.0), (2.0, 3.0, 3.5)
-    law = ss.Iwan(k_t=2.0, limit=3.0, population=ss.FirstLoading(displacement=x, force=f))
+    law = ss.Iwan(k_t=2.0, limit=3.0, population=ss.contact.FirstLoading(displacement=x, force=f))
     # the last piece goes on: 0.25 of elastic spring, under which the sliders hold 3.5 - 4 / 4 = 2.5
     got = case_b1_iwan.first_loading(law, np.array(x) * 3.0 / 2.5)
     assert got == pytest.approx(np.array(f) * 3.0 / 2.5, rel=1e-13)

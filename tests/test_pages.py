@@ -25,9 +25,9 @@ def run_page(name: str) -> dict[str, object]:
 def test_shooting_from_a_balance() -> None:
     names = run_page("theory/shooting.md")
     found = names["found"]
-    assert isinstance(found, ss.ShootingResult)
+    assert isinstance(found, ss.response.ShootingResult)
     assert found.stable
-    balance = ss.fields(names["problem"], names["peak"]).outputs[1, 0]
+    balance = ss.response.fields(names["problem"], names["peak"]).outputs[1, 0]
     # five harmonics and 1024 steps a period: the damper slips, so that neither is exact
     assert found.harmonics[1, 0] == pytest.approx(balance, rel=2e-3)
     # friction damps disturbances far more than the dashpot alone, e^{-cT/2m}
@@ -39,7 +39,7 @@ def test_stuck_damper_leaves_the_multipliers_of_the_dashpot() -> None:
     names = run_page("theory/shooting.md")
     blade, damper, omega = names["blade"], names["damper"], names["peak"].omega
     faint = ss.HarmonicLoad(np.zeros(1), {1: np.array([1.0 + 0j])})
-    found = ss.shoot(blade, damper.gap_operator, damper.laws, faint, omega, np.array([0]))
+    found = ss.response.shoot(blade, damper.gap_operator, damper.laws, faint, omega, np.array([0]))
     expected = [1.0, *[np.exp(-0.2 * 2 * np.pi / omega / (2 * 0.1))] * 2]
     np.testing.assert_allclose(
         np.sort(np.abs(found.floquet.multipliers))[::-1], expected, rtol=1e-9
@@ -47,25 +47,25 @@ def test_stuck_damper_leaves_the_multipliers_of_the_dashpot() -> None:
 
 
 def test_shoot_names_itself_when_it_refuses() -> None:
-    blade = ss.lumped(np.ones(1), np.ones((1, 1)))
+    blade = ss.model.lumped(np.ones(1), np.ones((1, 1)))
     arguments = (np.eye(3)[:, :1], [ss.Jenkins(k_t=1.0, limit=1.0)])
     load = ss.HarmonicLoad(np.zeros(1), {1: np.ones(1, dtype=complex)})
     with pytest.raises(InputError, match=r"shoot: laws.*Jenkins"):
-        ss.shoot(blade, *arguments, load, 1.0, np.array([0]))
+        ss.response.shoot(blade, *arguments, load, 1.0, np.array([0]))
     with pytest.raises(InputError, match=r"integrate: laws.*Jenkins"):
-        ss.integrate(blade, *arguments, load, 1.0, np.array([0]))
+        ss.response.integrate(blade, *arguments, load, 1.0, np.array([0]))
     with pytest.raises(InputError, match=r"shoot: omega"):
-        ss.shoot(blade, np.zeros((0, 1)), [], load, -1.0, np.array([0]))
+        ss.response.shoot(blade, np.zeros((0, 1)), [], load, -1.0, np.array([0]))
 
 
 def test_contributions_of_harmonics() -> None:
     names = run_page("theory/goal_oriented.md")
     problem, system, shaker = names["problem"], names["system"], names["shaker"]
     middle = min(
-        ss.accepted_points(list(ss.forced_response(system, shaker, names["sweep"]))),
+        ss.response.accepted_points(list(ss.forced_response(system, shaker, names["sweep"]))),
         key=lambda point: abs(point.omega - 0.5),
     )
-    found = ss.harmonic_contributions(problem, middle)
+    found = ss.response.harmonic_contributions(problem, middle)
     assert found.missing == (2, 3, 4, 5)
     assert found.labels == ("node0.x",)
     parts = np.abs(found.parts[0])
@@ -73,12 +73,12 @@ def test_contributions_of_harmonics() -> None:
     # the sum is the change that all five make, solved for: an estimate of third order in a change of 2 %
     every = ss.Sweep(omega_range=(0.3, 0.7), frequencies=3, peak_points=0, selection="always_high")
     full = min(
-        ss.accepted_points(list(ss.forced_response(system, shaker, every))),
+        ss.response.accepted_points(list(ss.forced_response(system, shaker, every))),
         key=lambda point: abs(point.omega - 0.5),
     )
     change = full.coefficients[1, 0] / middle.coefficients[1, 0] - 1.0
     assert found.parts[0].sum() == pytest.approx(change, rel=0.1)
-    alike = ss.harmonic_contributions(problem, full)
+    alike = ss.response.harmonic_contributions(problem, full)
     assert alike.missing == ()
     assert alike.bound == 0.0
 
@@ -87,6 +87,6 @@ def test_contributions_ask_for_a_solution() -> None:
     names = run_page("theory/goal_oriented.md")
     from dataclasses import replace
 
-    lost = replace(names["point"], status=ss.Status.STALLED)
+    lost = replace(names["point"], status=ss.solve.Status.STALLED)
     with pytest.raises(InputError, match="is not a solution"):
-        ss.harmonic_contributions(names["problem"], lost)
+        ss.response.harmonic_contributions(names["problem"], lost)

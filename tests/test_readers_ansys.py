@@ -16,10 +16,8 @@ from ansys_files import HALF, ZLIB, full_file, record, result_file
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stickslip import (
-    InputError,
-    Material,
-    Structure,
+from stickslip import InputError, Material, Structure
+from stickslip.model import (
     assemble_solid,
     natural_frequencies,
     read_ansys_archive,

@@ -13,23 +13,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from stickslip import (
-    CyclicSector,
-    InputError,
-    Structure,
-    Units,
+from stickslip import InputError, Structure, Units
+from stickslip.model import (
     assemble_deck,
-    cyclic_sector,
     model_summary,
     natural_frequencies,
     read_calculix_matrices,
     read_deck,
     read_frd,
     rotating_solid,
-    travelling_wave,
 )
 from stickslip.model.readers.node_table import mesh_nodes
 from stickslip.model.readers.positions import doubt_about_positions
+from stickslip.reduction import CyclicSector, cyclic_sector, travelling_wave
 
 DATA = Path(__file__).parent / "data" / "calculix"
 REFERENCE = Path(__file__).parent.parent.parent / "shared" / "reference" / "calculix"

@@ -5,15 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stickslip import (
-    InputError,
-    Material,
-    Units,
-    assemble_deck,
-    chain,
-    natural_frequencies,
-    read_deck,
-)
+from stickslip import InputError, Material, Units
+from stickslip.model import assemble_deck, chain, natural_frequencies, read_deck
 from stickslip.model.dofs import Dofs
 from stickslip.model.readers.units import check_material, doubt_about_units, in_si
 from stickslip.model.structure import Structure

@@ -11,17 +11,14 @@ import scipy.sparse
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stickslip import (
-    InputError,
-    Structure,
-    Units,
+from stickslip import InputError, Structure, Units, read_model
+from stickslip.model import (
     assemble_deck,
     model_summary,
     natural_frequencies,
     read_abaqus_matrices,
     read_deck,
     read_matrix_files,
-    read_model,
     save_structure,
 )
 from stickslip.model.readers.abaqus import read_coordinate_matrix

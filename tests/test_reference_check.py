@@ -27,14 +27,14 @@ def response(low, high, selection, span=HERTZ, count=11, **others):
         peak_points=0,
         **others,
     )
-    points = ss.accepted_points(list(ss.forced_response(system, load, sweep)))
-    return ss.forced_problem(system, load, sweep), points
+    points = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))
+    return ss.response.forced_problem(system, load, sweep), points
 
 
 def test_error_of_five_harmonics_against_ten():
     """Half to twice the truth where it matters, and dead on where no contact changes its state."""
     problem, points = response(1, 5, "always_high")
-    checks = ss.verify_reference(problem, points)
+    checks = ss.response.verify_reference(problem, points)
     _, exact = response(10, 10, "always_high")
     real = np.array([problem.real_error(p, e) for p, e in zip(points, exact, strict=True)])
     found = np.array([c.error for c in checks])
@@ -54,7 +54,7 @@ def test_error_of_five_harmonics_against_ten():
 def test_points_with_few_harmonics_are_held_against_the_same():
     """As the alert, but with what lies beyond its reference; 163 Hz, its blind spot, is left out."""
     problem, points = response(1, 5, "jacobian_alert")
-    checks = ss.verify_reference(problem, points)
+    checks = ss.response.verify_reference(problem, points)
     few = [c for c in checks if c.kept == (0, 1)]
     assert few
     assert len(few) < len(checks)
@@ -66,7 +66,7 @@ def test_points_with_few_harmonics_are_held_against_the_same():
 
 def test_even_harmonics_that_the_reference_lacks_are_found_missing():
     problem, points = response((1, 3, 5), (1, 3, 5), "always_low", count=6)
-    checks = ss.verify_reference(problem, points)
+    checks = ss.response.verify_reference(problem, points)
     _, exact = response(10, 10, "always_high", count=6)
     worst = max(checks, key=lambda c: c.error)
     real = {p.omega: problem.real_error(p, e) for p, e in zip(points, exact, strict=True)}
@@ -78,7 +78,7 @@ def test_even_harmonics_that_the_reference_lacks_are_found_missing():
 def test_worst_dof_is_one_of_those_asked_for():
     problem, points = response(1, 5, "always_low", count=3)
     chosen = replace(problem, system=replace(problem.system, alert_dofs=np.array([4, 2])))
-    for check in ss.verify_reference(chosen, points):
+    for check in ss.response.verify_reference(chosen, points):
         assert check.dof in {4, 2}
         assert check.label == problem.system.structure.dofs.labels[check.dof]
         assert check.harmonic == 1
@@ -87,7 +87,7 @@ def test_worst_dof_is_one_of_those_asked_for():
 def test_more_samples_where_more_harmonics_ask_for_them():
     problem, points = response(1, 5, "always_high", count=3, samples=32)
     assert problem.high.samples == 32
-    checks = ss.verify_reference(problem, points, factor=4)
+    checks = ss.response.verify_reference(problem, points, factor=4)
     assert checks[0].harmonics == tuple(range(21))
     assert all(0.0 <= c.error < 0.05 for c in checks)
 
@@ -95,15 +95,15 @@ def test_more_samples_where_more_harmonics_ask_for_them():
 def test_what_was_not_solved_is_passed_over():
     problem, points = response(1, 5, "always_low", count=3)
     lost = [replace(points[0], status=Status.TOO_MANY_ITERATIONS), *points[1:]]
-    assert len(ss.verify_reference(problem, lost)) == 2
-    assert ss.verify_reference(problem, []) == ()
+    assert len(ss.response.verify_reference(problem, lost)) == 2
+    assert ss.response.verify_reference(problem, []) == ()
 
 
 @pytest.mark.parametrize("factor", [1, 0, 2.5])
 def test_factors_that_add_nothing_are_refused(factor):
     problem, points = response(1, 5, "always_low", count=2)
     with pytest.raises(InputError, match="verify_reference: factor: must be an integer"):
-        ss.verify_reference(problem, points, factor=factor)
+        ss.response.verify_reference(problem, points, factor=factor)
 
 
 def ring(waves, low, high):
@@ -123,8 +123,8 @@ def ring(waves, low, high):
         frequencies=6,
         peak_points=0,
     )
-    points = ss.accepted_points(list(ss.forced_response(system, load, sweep)))
-    return ss.forced_problem(system, load, sweep), points
+    points = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))
+    return ss.response.forced_problem(system, load, sweep), points
 
 
 def test_friction_ring_lacks_what_the_literature_says():
@@ -133,7 +133,7 @@ def test_friction_ring_lacks_what_the_literature_says():
     reference, exact = ring(13, 13, 13)
     real = [reference.real_error(p, e) for p, e in zip(points, exact, strict=True)]
     for factor in (2, 4):
-        checks = ss.verify_reference(problem, points, factor)
+        checks = ss.response.verify_reference(problem, points, factor)
         for check, change, (_, three, many) in zip(checks, real, TABLE.values(), strict=True):
             assert check.error == pytest.approx(change, rel=0.15, abs=3e-4)
             assert check.error >= 0.9 * abs(many / three - 1.0)
@@ -143,4 +143,4 @@ def test_friction_ring_lacks_what_the_literature_says():
 def test_wheel_without_waves_for_the_check_is_refused():
     problem, points = ring(3, 3, 3)
     with pytest.raises(InputError, match="harmonics up to 3, asked for 4"):
-        ss.verify_reference(problem, points)
+        ss.response.verify_reference(problem, points)

@@ -8,7 +8,7 @@ from test_relative import relative, two_flexible_bodies
 
 import stickslip as ss
 
-TWO_MASSES = ss.lumped(
+TWO_MASSES = ss.model.lumped(
     np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]]), np.array([[0.04, -0.02], [-0.02, 0.02]])
 )
 LOAD = ss.HarmonicLoad(np.zeros(2), {1: np.array([20.0 + 0j, 0.0])})
@@ -23,8 +23,8 @@ def rubbing(law=None):
 
 
 def at(omega, order, samples=None):
-    how = ss.Discretisation(order=order, samples=samples or 32 * order)
-    (point,) = ss.rigid_response(rubbing(), LOAD, (omega, omega), discretisation=how)
+    how = ss.response.Discretisation(order=order, samples=samples or 32 * order)
+    (point,) = ss.response.rigid_response(rubbing(), LOAD, (omega, omega), discretisation=how)
     assert point.converged
     return point
 
@@ -53,8 +53,8 @@ def test_sticking_motions_of_benchmark_b5(omega, first, stick):
 
 
 def test_response_through_resonance_until_the_contact_sticks():
-    how = ss.Discretisation(order=5, samples=160)
-    points = list(ss.rigid_response(rubbing(), LOAD, (0.45, 2.2), 25, how))
+    how = ss.response.Discretisation(order=5, samples=160)
+    points = list(ss.response.rigid_response(rubbing(), LOAD, (0.45, 2.2), 25, how))
     assert all(p.converged for p in points)
     assert (points[0].omega, points[-1].omega) == (0.45, 2.2)
     heights = [abs(p.coefficients[1, 1]) for p in points]
@@ -68,7 +68,7 @@ def test_response_through_resonance_until_the_contact_sticks():
     # the penalty law follows, with its own fold of springs: the same peak to the flexibility that it adds
     soft = rubbing(ss.RigidCoulomb(mu=0.9, preload=9.0).softened(1e3))
     sweep = ss.Sweep(omega_range=(0.5, 0.8), selection="always_high", points=25)
-    forced = ss.forced_problem(soft, LOAD, sweep)
+    forced = ss.response.forced_problem(soft, LOAD, sweep)
     peak = max(forced.amplitude(p, 1) for p in ss.forced_response(soft, LOAD, sweep) if p.converged)
     assert max(heights) == pytest.approx(peak, rel=0.01)
 
@@ -78,10 +78,10 @@ def test_contact_between_two_flexible_bodies_in_relative_coordinates():
     laws = tuple(ss.RigidCoulomb(mu=0.3, preload=20.0) for _ in system.interface.laws)
     system = replace(system, interface=replace(system.interface, laws=laws))
     with pytest.raises(ss.InputError, match="in_relative_coordinates"):
-        next(ss.rigid_response(system, load, (330.0, 330.0)))
+        next(ss.response.rigid_response(system, load, (330.0, 330.0)))
     other, load = relative(system, load)
-    how = ss.Discretisation(order=3, samples=96)
-    (point,) = ss.rigid_response(other, load, (330.0, 330.0), discretisation=how)
+    how = ss.response.Discretisation(order=3, samples=96)
+    (point,) = ss.response.rigid_response(other, load, (330.0, 330.0), discretisation=how)
     assert point.converged
     assert set(np.unique(point.state)) == {0, 1}
     limit = np.max(np.abs(point.contact_force[:, :2]))
@@ -90,7 +90,7 @@ def test_contact_between_two_flexible_bodies_in_relative_coordinates():
 
 def test_messages():
     with pytest.raises(ss.InputError, match="omega_range: goes from 2 to 1 rad/s"):
-        next(ss.rigid_response(rubbing(), LOAD, (2.0, 1.0)))
+        next(ss.response.rigid_response(rubbing(), LOAD, (2.0, 1.0)))
     soft = rubbing(ss.RigidCoulomb(mu=0.9, preload=9.0).softened(10.0))
     with pytest.raises(ss.InputError, match="no contact is rigid"):
-        next(ss.rigid_response(soft, LOAD, (1.0, 2.0)))
+        next(ss.response.rigid_response(soft, LOAD, (1.0, 2.0)))

@@ -11,7 +11,8 @@ import scipy.sparse
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stickslip import InputError, chain, load_structure, save_structure
+from stickslip import InputError
+from stickslip.model import chain, load_structure, save_structure
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 

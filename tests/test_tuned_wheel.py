@@ -17,7 +17,7 @@ HOLD = 0.1  # N/m to ground: nothing else tells a slipping ring where its mean i
 
 def blisk(harmonics):
     """Return literature benchmark B9: sector, tuned wheel under engine order 2 and gap operator."""
-    free = ss.blisk_with_ring()
+    free = ss.reduction.blisk_with_ring()
     stiffness = np.asarray(free.structure.stiffness).copy()
     stiffness[RING, RING] += HOLD
     sector = replace(free, structure=replace(free.structure, stiffness=stiffness))
@@ -26,13 +26,13 @@ def blisk(harmonics):
 
     def damped(wave, _keep, _n_modes):
         """Damping of 0.1 % in the modes of the blisk without its ring."""
-        alone = ss.lumped(*(np.real(m[:3, :3]) for m in (wave.mass, wave.stiffness)))
+        alone = ss.model.lumped(*(np.real(m[:3, :3]) for m in (wave.mass, wave.stiffness)))
         damping = np.zeros((4, 4))
-        damping[:3, :3] = ss.modal_damping(alone, 1e-3).damping
+        damping[:3, :3] = ss.model.modal_damping(alone, 1e-3).damping
         return wave.with_damping(damping)
 
     keep = sector.independent
-    return ss.tuned_wheel(sector, 2, harmonics, (own, None), keep=keep, reduce=damped)
+    return ss.reduction.tuned_wheel(sector, 2, harmonics, (own, None), keep=keep, reduce=damped)
 
 
 # literature benchmark B9: tip amplitude in m; odd harmonics up to 1, 3 and 13
@@ -66,12 +66,12 @@ def test_blisk_with_friction_ring_has_the_published_amplitudes(column, order):
         frequencies=6,
         peak_points=0,
     )
-    problem = ss.forced_problem(system, load, sweep)
-    points = ss.accepted_points(list(ss.forced_response(system, load, sweep)))
+    problem = ss.response.forced_problem(system, load, sweep)
+    points = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))
     for (hertz, row), point in zip(TABLE.items(), points, strict=True):
         assert point.converged
         assert point.omega == pytest.approx(2 * math.pi * hertz, rel=1e-12)
-        moved = wheel.expand(ss.fields(problem, point).outputs[1], 1)
+        moved = wheel.expand(ss.response.fields(problem, point).outputs[1], 1)
         assert abs(moved[TIP]) == pytest.approx(row[column], rel=2e-6)
 
 
@@ -101,22 +101,22 @@ def test_one_sector_answers_as_the_wheel_of_all(engine_order):
 
     def solved(structure, interface, load):
         system = ss.System(structure, interface, outputs=np.arange(structure.n))
-        problem = ss.forced_problem(system, load, sweep)
-        point = ss.accepted_points(list(ss.forced_response(system, load, sweep)))[0]
+        problem = ss.response.forced_problem(system, load, sweep)
+        point = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))[0]
         assert point.converged
-        return ss.fields(problem, point)
+        return ss.response.fields(problem, point)
 
-    gaps = ss.neighbour_gaps(sector.structure, sectors, **place)
-    wheel, operator = ss.tuned_wheel(
+    gaps = ss.contact.neighbour_gaps(sector.structure, sectors, **place)
+    wheel, operator = ss.reduction.tuned_wheel(
         sector, engine_order, order, gaps, keep=keep, n_modes=modes, names=("shroud",)
     )
     load = ss.HarmonicLoad(wheel.project(static, 0).real, {1: wheel.project(force, 1)})
     one = solved(wheel, ss.Interface(("shroud",), (law,), operator), load)
     assert one.energy[0] > 1e-3  # else nothing slips
 
-    whole = ss.reduced_wheel(sector, keep, modes)
-    pairs = ss.neighbour_interface(whole.structure, sectors, law, **place)
-    wave = ss.excited_wave(engine_order, sectors)
+    whole = ss.reduction.reduced_wheel(sector, keep, modes)
+    pairs = ss.contact.neighbour_interface(whole.structure, sectors, law, **place)
+    wave = ss.reduction.excited_wave(engine_order, sectors)
     load = ss.HarmonicLoad(whole.load(static).real, {1: whole.load(force, wave)})
     all_sectors = solved(whole.structure, pairs, load)
     for h in range(order + 1):
@@ -146,8 +146,8 @@ def test_one_sector_answers_as_all_of_them_integrated_in_time(sectors, engine_or
     static[low] = 0.2, -0.1, 0.15
     force[high] = 1.5, 1.0, -0.5
     place = {"low": "left", "high": "right", "axis": TILTED, "normal": np.array([0.6, 0.0, 0.8])}
-    wheel, operator = ss.tuned_wheel(
-        sector, engine_order, order, ss.neighbour_gaps(sector.structure, sectors, **place)
+    wheel, operator = ss.reduction.tuned_wheel(
+        sector, engine_order, order, ss.contact.neighbour_gaps(sector.structure, sectors, **place)
     )
     system = ss.System(wheel, ss.Interface(("shroud",), (law,), operator), np.arange(wheel.n))
     load = ss.HarmonicLoad(wheel.project(static, 0).real, {1: wheel.project(force, 1)})
@@ -155,15 +155,15 @@ def test_one_sector_answers_as_all_of_them_integrated_in_time(sectors, engine_or
         omega_range=(omega, 1.0), low=order, high=order, selection="always_low", frequencies=2,
         peak_points=0,
     )  # fmt: skip
-    problem = ss.forced_problem(system, load, sweep)
-    point = ss.accepted_points(list(ss.forced_response(system, load, sweep)))[0]
+    problem = ss.response.forced_problem(system, load, sweep)
+    point = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))[0]
     assert point.converged
-    balanced = ss.fields(problem, point)
+    balanced = ss.response.fields(problem, point)
     assert balanced.energy[0] > 0.05
     assert np.abs(balanced.forces[2]).max() > 1e-2 * np.abs(balanced.forces[1]).max()
 
-    whole = ss.wheel(sector)
-    pairs = ss.neighbour_interface(whole, sectors, law, **place)
+    whole = ss.reduction.wheel(sector)
+    pairs = ss.contact.neighbour_interface(whole, sectors, law, **place)
     phases = np.exp(2j * math.pi * engine_order * np.arange(sectors) / sectors)
     f = np.zeros((2, whole.n), dtype=complex)
     for n, phase in enumerate(phases):
@@ -171,9 +171,9 @@ def test_one_sector_answers_as_all_of_them_integrated_in_time(sectors, engine_or
         for side, rows in (("left", static[low]), ("right", force[high])):
             mine = whole.dof_set(f"sector{n}.{side}")
             f[0 if side == "left" else 1, mine] += turn @ rows * (1 if side == "left" else phase)
-    moved = ss.integrate(
+    moved = ss.response.integrate(
         whole, pairs.gap_operator, pairs.laws, ss.HarmonicLoad(f[0].real, {1: f[1]}), omega,
-        whole.dof_set("right"), stepping=ss.TimeStepping(max_periods=600, tolerance=1e-6),
+        whole.dof_set("right"), stepping=ss.response.TimeStepping(max_periods=600, tolerance=1e-6),
     )  # fmt: skip
     assert moved.settled
     scale = np.abs(moved.harmonics[1]).max()
@@ -209,30 +209,33 @@ def test_what_a_tuned_wheel_cannot_do_is_said():
     with pytest.raises(ss.InputError, match="no form for a tuned wheel"):
         system.stuck_structure()
     with pytest.raises(ss.InputError, match="harmonics up to 3, asked for 4"):
-        ss.forced_problem(system, load, ss.Sweep(omega_range=(3900.0, 3910.0), high=5))
+        ss.response.forced_problem(system, load, ss.Sweep(omega_range=(3900.0, 3910.0), high=5))
     with pytest.raises(ss.InputError, match="there are waves up to 3"):
         system.condensed(ss.HarmonicLoad(load.static, {5: load.harmonics[1]}), 3)
     sector, (low, high) = shrouded(5)
     place = {"low": "left", "high": "right", "axis": TILTED, "normal": np.array([0.6, 0.0, 0.8])}
-    gaps = ss.neighbour_gaps(sector.structure, 5, **place)
+    gaps = ss.contact.neighbour_gaps(sector.structure, 5, **place)
     with pytest.raises(
         ss.InputError, match=r"keep: lacks node\d+.x, on which .* 3 such dofs in all"
     ):
-        ss.tuned_wheel(sector, 2, 1, gaps, keep=low, n_modes=5)
-    assert ss.tuned_wheel(sector, 2, 1, gaps, keep=np.append(high, low), n_modes=5)[0].n == 11
+        ss.reduction.tuned_wheel(sector, 2, 1, gaps, keep=low, n_modes=5)
+    assert (
+        ss.reduction.tuned_wheel(sector, 2, 1, gaps, keep=np.append(high, low), n_modes=5)[0].n
+        == 11
+    )
     with pytest.raises(ss.InputError, match="three rows"):
-        ss.tuned_wheel(ss.blisk_with_ring(), 2, 1, (np.zeros((2, 6)), None))
+        ss.reduction.tuned_wheel(ss.reduction.blisk_with_ring(), 2, 1, (np.zeros((2, 6)), None))
 
 
 def test_any_function_may_reduce_the_waves_and_is_told_what_it_got_wrong():
     """Without the look at what it returns: an AttributeError, or gaps in the wrong coordinates."""
     sector, (low, high) = shrouded(5)
     place = {"low": "left", "high": "right", "axis": TILTED, "normal": np.array([0.6, 0.0, 0.8])}
-    gaps = ss.neighbour_gaps(sector.structure, 5, **place)
+    gaps = ss.contact.neighbour_gaps(sector.structure, 5, **place)
     keep = np.append(high, low)
 
     def tuned(reduce):
-        return ss.tuned_wheel(sector, 2, 1, gaps, keep=keep, n_modes=5, reduce=reduce)[0]
+        return ss.reduction.tuned_wheel(sector, 2, 1, gaps, keep=keep, n_modes=5, reduce=reduce)[0]
 
     def own(wave, first, count):
         return ss.craig_bampton(wave, first, count)
@@ -247,7 +250,7 @@ def test_any_function_may_reduce_the_waves_and_is_told_what_it_got_wrong():
         "first coordinates are not the kept dofs": lambda wave, first, count: ss.craig_bampton(
             wave, first[::-1], count
         ),
-        "with a basis of shape": lambda wave, first, count: ss.chain(11, 1.0, 1.0),
+        "with a basis of shape": lambda wave, first, count: ss.model.chain(11, 1.0, 1.0),
         "left 10 coordinates of wave 2 and 11 of wave 0": lambda wave, first, count: (
             ss.craig_bampton(wave, first, count - np.iscomplexobj(wave.stiffness))
         ),
@@ -256,10 +259,10 @@ def test_any_function_may_reduce_the_waves_and_is_told_what_it_got_wrong():
         with pytest.raises(ss.InputError, match=f"tuned_wheel: reduce: .*{message}"):
             tuned(reduce)
         with pytest.raises(ss.InputError, match="reduced_wheel: reduce: "):
-            ss.reduced_wheel(sector, keep, 5, reduce=reduce)
+            ss.reduction.reduced_wheel(sector, keep, 5, reduce=reduce)
     with pytest.raises(ss.InputError, match="tuned_wheel: keep: is a mask"):
-        ss.tuned_wheel(sector, 2, 1, gaps, keep=np.ones(sector.structure.n, dtype=bool))
-    wheel = ss.reduced_wheel(sector, keep, 5)
+        ss.reduction.tuned_wheel(sector, 2, 1, gaps, keep=np.ones(sector.structure.n, dtype=bool))
+    wheel = ss.reduction.reduced_wheel(sector, keep, 5)
     assert repr(wheel).startswith(
         "<ReducedWheel: 5 sectors of 11 coordinates; <Structure: 55 dofs;"
     )

@@ -23,14 +23,14 @@ def step(displacement, velocity, state, parameters, force, new_state, jac, statu
 
 
 class Spring:
-    kernel = ss.law_kernel(step)
+    kernel = ss.contact.law_kernel(step)
     pairs = 5
     def parameters(self): return np.array([3.0])
     def initial_state(self): return np.zeros(0)
     def stuck_stiffness(self): return np.array([0.0, 0.0, 3.0])
 
 
-period = ss.contact_forces(np.ones((3, 3)), ss.compile_contacts([Spring()]), 16)
+period = ss.harmonic.contact_forces(np.ones((3, 3)), ss.contact.compile_contacts([Spring()]), 16)
 print(np.max(np.abs(period.coefficients - [0.0, 0.0, 3.0])) < 1e-14)
 """
 

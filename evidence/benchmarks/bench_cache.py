@@ -38,7 +38,7 @@ def step(displacement, velocity, state, parameters, force, new_state, jac, statu
 
 @dataclass(frozen=True)
 class Own:
-    kernel = ss.law_kernel(step)
+    kernel = ss.contact.law_kernel(step)
     pairs = 5
 
     def parameters(self):
@@ -62,7 +62,7 @@ GIVEN = {
     "regularised_coulomb": {"mu": 0.5, "transition_velocity": 1.0, "k_n": 1.0, "preload": 1.0},
     "dahl": {"k_t": 1.0, "limit": 0.5},
     "bouc_wen": {"k_t": 1.0, "alpha": 0.1, "a": 1.0, "beta": 0.5, "gamma": 0.5, "exponent": 1.0},
-    "iwan": {"k_t": 1.0, "limit": 0.5, "population": ss.UniformBand(n_sliders=4, half_width=0.5, elastic_share=0.0)},
+    "iwan": {"k_t": 1.0, "limit": 0.5, "population": ss.contact.UniformBand(n_sliders=4, half_width=0.5, elastic_share=0.0)},
 }
 assert set(GIVEN) == set(LAWS), "a law is not measured"
 
@@ -73,7 +73,7 @@ def work():
     for worth in (10**9, 1):
         threads.CONTACTS_WORTH_THREADS = worth
         for evaluator in ("march", "intervals", "events"):
-            ss.contact_forces(gap, ss.compile_contacts(laws, None, evaluator), 64)
+            ss.harmonic.contact_forces(gap, ss.contact.compile_contacts(laws, None, evaluator), 64)
     structure = chain(2, 1.0, 1.0, 0.1)
     gap_operator = np.zeros((3, 2))
     gap_operator[0, 0] = 1.0

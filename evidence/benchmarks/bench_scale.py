@@ -32,8 +32,8 @@ def sector(fineness: float) -> Structure:
         name: fineness * getattr(plain, name)
         for name in ("disk_size", "platform_size", "airfoil_size")
     }
-    mesh = ss.mesh_sector(ss.BladedSector(sectors=SECTORS, **sizes))
-    return ss.assemble_solid(mesh, ss.Material())
+    mesh = ss.model.mesh_sector(ss.BladedSector(sectors=SECTORS, **sizes))
+    return ss.model.assemble_solid(mesh, ss.Material())
 
 
 def interface(structure: Structure) -> np.ndarray:
@@ -61,7 +61,7 @@ def reduce(fineness: float, wave: int | None) -> dict[str, Any]:
     return {
         "dofs": structure.n,
         "reduced": reduced.n,
-        "frequencies_hz": ss.natural_frequencies(reduced, 3).tolist(),
+        "frequencies_hz": ss.model.natural_frequencies(reduced, 3).tolist(),
         "steps": [
             {"step": a[0], "cpu": b[1] - a[1], "wall": b[2] - a[2], "peak_gb": b[3]}
             for a, b in pairwise(steps)

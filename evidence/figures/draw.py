@@ -8,7 +8,7 @@ import numpy as np
 
 from evidence.figures.evidence import Evidence, Marker, Peaks
 from evidence.figures.solve import STEPS, Curve, Pair, time_signal
-from stickslip import signals
+from stickslip.response import signals
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -9,8 +9,9 @@ import numpy as np
 
 from evidence.figures.model import Model
 from evidence.figures.solve import HZ, STEPS, Curve, Orbit, Pair, curve, nearest, orbit, pairs
-from stickslip import ForcedPoint, harmonic_block_norms
 from stickslip.arrays import FloatArray
+from stickslip.harmonic import harmonic_block_norms
+from stickslip.response import ForcedPoint
 
 Say = Callable[[str], None]
 

@@ -9,9 +9,10 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from evidence.validation.case_two_blades import coarse_example
-from stickslip import HarmonicLoad, Sweep, System, read_study
+from stickslip import HarmonicLoad, Sweep, System
 from stickslip.arrays import IntArray
 from stickslip.study.build import Case, case_of
+from stickslip.study.schema import read_study
 
 # Angles and contact lines of a damper whose flat side does not slip: it rests on L1 and R alone, within both friction cones.
 GLUED = {

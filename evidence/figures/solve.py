@@ -9,22 +9,22 @@ from typing import Literal
 import numpy as np
 
 from evidence.figures.model import Model
-from stickslip import (
+from stickslip import forced_response
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.harmonic import jacobian_similarity
+from stickslip.harmonic.selection.alert import jacobian_alert
+from stickslip.harmonic.selection.similarity import JacobianSimilarity
+from stickslip.harmonic.selection.strategy import ErrorMeasure
+from stickslip.response import (
     ForcedPoint,
     ForcedProblem,
     TimeStepping,
     accepted_points,
     forced_problem,
-    forced_response,
     integrate,
-    jacobian_similarity,
     shoot,
     signals,
 )
-from stickslip.arrays import ComplexArray, FloatArray
-from stickslip.harmonic.selection.alert import jacobian_alert
-from stickslip.harmonic.selection.similarity import JacobianSimilarity
-from stickslip.harmonic.selection.strategy import ErrorMeasure
 from stickslip.response.time.transient import start_from_harmonics
 
 HZ = 2 * np.pi

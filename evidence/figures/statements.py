@@ -11,9 +11,9 @@ import numpy as np
 
 from evidence.figures.evidence import Evidence, Peaks, Timing
 from evidence.figures.solve import HZ, Curve, Pair, time_signal
-from stickslip import fields, signals
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import OPEN, SLIP
+from stickslip.response import fields, signals
 
 THRESHOLD = 0.05
 SMALL, LARGE = 0.005, 0.05  # the band in which predicted and actual error are said to be alike

@@ -1,1 +1,5 @@
 """Structures: blades of finite elements, rigid dampers, lumped masses, damping and modes."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

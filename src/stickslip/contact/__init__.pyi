@@ -1,0 +1,19 @@
+"""Public names of `stickslip.contact`, written once."""
+
+from .compiled import compile_contacts as compile_contacts
+from .law import law_kernel as law_kernel
+from .law_check import check_law as check_law
+from .laws.iwan_populations import FirstLoading as FirstLoading
+from .laws.iwan_populations import FourParameter as FourParameter
+from .laws.iwan_populations import UniformBand as UniformBand
+from .neighbours import neighbour_gaps as neighbour_gaps
+from .neighbours import neighbour_interface as neighbour_interface
+from .pairing import Pairing as Pairing
+from .pairing import node_to_node as node_to_node
+from .pairing import node_to_segment as node_to_segment
+from .pairing import paired_interface as paired_interface
+from .pairing import segment_to_segment as segment_to_segment
+from .surface import Surface as Surface
+from .surface import nodal_surface as nodal_surface
+from .surface import rigid_surface as rigid_surface
+from .surface import structure_surface as structure_surface

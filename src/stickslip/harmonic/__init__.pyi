@@ -1,0 +1,23 @@
+"""Public names of `stickslip.harmonic`, written once."""
+
+from .aft import contact_forces as contact_forces
+from .balance import harmonic_balance as harmonic_balance
+from .compliance import ComplianceForm as ComplianceForm
+from .dlft import dynamic_lagrangian as dynamic_lagrangian
+from .dynamic_stiffness import condense as condense
+from .selection.goal_oriented import GoalOriented as GoalOriented
+from .selection.grolet import Grolet as Grolet
+from .selection.guarded_alert import GuardedAlert as GuardedAlert
+from .selection.jacobian_alert import JacobianAlert as JacobianAlert
+from .selection.jaumouille import Jaumouille as Jaumouille
+from .selection.laxalde import Laxalde as Laxalde
+from .selection.maple import Maple as Maple
+from .selection.similarity import JacobianSimilarity as JacobianSimilarity
+from .selection.similarity import harmonic_block_norms as harmonic_block_norms
+from .selection.similarity import jacobian_similarity as jacobian_similarity
+from .selection.strategy import ErrorMeasure as ErrorMeasure
+from .selection.strategy import Step as Step
+from .selection.strategy import Strategy as Strategy
+from .selection.strategy import Verdict as Verdict
+from .selection.suess_jacobian import SuessJacobian as SuessJacobian
+from .selection.suess_spectral import SuessSpectral as SuessSpectral

@@ -1,0 +1,27 @@
+"""Public names of `stickslip.reduction`, written once."""
+
+from .cache import cached as cached
+from .cyclic import CyclicSector as CyclicSector
+from .cyclic import cyclic_sector as cyclic_sector
+from .cyclic import travelling_wave as travelling_wave
+from .free_interface import rubin as rubin
+from .full_wheel import wheel as wheel
+from .full_wheel import wheel_shape as wheel_shape
+from .interface_modes import reduce_interface as reduce_interface
+from .lumped_disks import blade_ring as blade_ring
+from .lumped_disks import blisk_with_ring as blisk_with_ring
+from .lumped_disks import mistuned_blade_ring as mistuned_blade_ring
+from .relative import in_relative_coordinates as in_relative_coordinates
+from .truncation import FrequencyError as FrequencyError
+from .truncation import FrequencyErrors as FrequencyErrors
+from .truncation import ModesBelow as ModesBelow
+from .truncation import frequency_errors as frequency_errors
+from .tuned import TunedWheel as TunedWheel
+from .tuned import tuned_wheel as tuned_wheel
+from .waves import Wave as Wave
+from .waves import excited_wave as excited_wave
+from .waves import to_sectors as to_sectors
+from .waves import to_waves as to_waves
+from .waves import wave as wave
+from .whole_wheel import ReducedWheel as ReducedWheel
+from .whole_wheel import reduced_wheel as reduced_wheel
