@@ -1,0 +1,175 @@
+"""The file of a job: everything it has finished, record by record.
+
+One SQLite file a job. Every record is its own transaction with full synchronisation and a rollback journal, so that a killed run
+leaves whole records only. While the job is at work its file is called ``<key>.part``; sealed, it is ``<key>.job``.
+"""
+
+import sqlite3
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from stickslip.errors import InputError, input_error
+from stickslip.study.keep.archive import decode, decode_record, encode, encode_record
+
+FORMAT = 5  # raised whenever the tables or the archives change
+AT_WORK, SEALED = ".part", ".job"
+FRESH = (
+    "If its disk is full, make room. Otherwise delete it, or start over with --fresh, which removes what runs wrote into the "
+    "folder and no other file."
+)
+TABLES = """
+create table if not exists meta (key text primary key, value text not null);
+create table if not exists record (
+    id integer primary key autoincrement,
+    arrived text not null default (strftime('%Y-%m-%dT%H:%M:%f', 'now')), payload blob not null);
+create table if not exists note (name text primary key, payload blob not null);
+"""
+
+
+class JobJournal:
+    """The open file of a job at work; use as a context manager. It is the job's `Notes`.
+
+    Parameters
+    ----------
+    path
+        The file, ``<key>.part``; created when it does not exist.
+    record_type
+        Dataclass of the records, of arrays, numbers, texts, enumerations and None.
+
+    Raises
+    ------
+    InputError
+        If the file is in use, or cannot be read.
+    """
+
+    def __init__(self, path: Path, record_type: type[Any]) -> None:
+        self._path = path
+        self._type = record_type
+        with _named(path):
+            # autocommit: each insert is a transaction of its own
+            self._db = sqlite3.connect(path, isolation_level=None, timeout=0.5)
+            try:
+                # held until the process ends, however it ends
+                self._db.execute("pragma locking_mode = exclusive")
+                self._db.execute("pragma journal_mode = delete")
+                self._db.execute("pragma synchronous = full")
+                self._db.executescript(TABLES)
+                self._db.execute("insert or ignore into meta values ('file', ?)", (_mark(path),))
+                self._db.execute("update meta set value = value")  # takes the lock
+                _check_mark(self._db, path)
+            except BaseException:
+                self._db.close()
+                raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._db.close()
+
+    def add(self, record: object) -> None:
+        """Store a finished record; it is on the disk when this returns."""
+        payload = encode_record(record)
+        with _named(self._path):
+            self._db.execute("insert into record (payload) values (?)", (payload,))
+
+    def records(self) -> list[Any]:
+        """Return the finished records in the order in which they came."""
+        with _named(self._path):
+            return _records(self._db, self._type)
+
+    def put(self, name: str, values: Mapping[str, Any]) -> None:
+        """Store named arrays, numbers and texts under `name`."""
+        payload = encode(values)
+        with _named(self._path):
+            self._db.execute("insert or replace into note values (?, ?)", (name, payload))
+
+    def get(self, name: str) -> dict[str, Any] | None:
+        """Return what `put` stored under `name`, or None."""
+        with _named(self._path):
+            return _note(self._db, name)
+
+    def seal(self) -> None:
+        """Close the file and give it the name of a finished job."""
+        self._db.close()
+        self._path.replace(self._path.with_suffix(SEALED))
+
+
+def read_sealed(path: Path, record_type: type[Any]) -> tuple[list[Any], dict[str, dict[str, Any]]]:
+    """Return the records and the notes of a sealed job.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    with _named(path), _reading(path) as db:
+        return _records(db, record_type), _notes(db)
+
+
+def read_note(path: Path, name: str) -> dict[str, Any] | None:
+    """Return one note of a sealed job, or None; as `read_sealed`."""
+    with _named(path), _reading(path) as db:
+        return _note(db, name)
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[sqlite3.Connection]:
+    db = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro&immutable=1", uri=True)
+    try:
+        _check_mark(db, path)
+        yield db
+    finally:
+        db.close()
+
+
+def _mark(path: Path) -> str:
+    return f"{FORMAT}:{path.stem}"
+
+
+def _check_mark(db: sqlite3.Connection, path: Path) -> None:
+    """Refuse the file of another job, or of another layout."""
+    row = db.execute("select value from meta where key = 'file'").fetchone()
+    if row is None or row[0] != _mark(path):
+        raise input_error(str(path), "is the file of another job or version", FRESH)
+
+
+def _records(db: sqlite3.Connection, kind: type[Any]) -> list[Any]:
+    rows = db.execute("select payload from record order by id")
+    return [decode_record(payload, kind) for (payload,) in rows]
+
+
+def _notes(db: sqlite3.Connection) -> dict[str, dict[str, Any]]:
+    rows = db.execute("select name, payload from note order by name")
+    return {name: decode(payload) for name, payload in rows}
+
+
+def _note(db: sqlite3.Connection, name: str) -> dict[str, Any] | None:
+    row = db.execute("select payload from note where name = ?", (name,)).fetchone()
+    return None if row is None else decode(row[0])
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Turn what a damaged file or a full disk makes the libraries say into a refusal that names the file."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (sqlite3.DatabaseError, zipfile.BadZipFile, ValueError, KeyError, TypeError) as error:
+        if "locked" in str(error):
+            raise input_error(
+                str(path.parent.parent), "another run is at work in it", "Wait for it, or stop it."
+            ) from None
+        raise input_error(
+            str(path), f"the file of a job cannot be used ({error})", FRESH
+        ) from error

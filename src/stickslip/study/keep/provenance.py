@@ -1,0 +1,63 @@
+"""Where a result comes from: attributes of the root of its tree."""
+
+import json
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from time import perf_counter
+from typing import Any
+
+from stickslip import __version__
+
+LIBRARIES = ("numpy", "scipy", "numba", "gmsh", "scikit-fem", "pydantic", "xarray", "h5netcdf")
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a result comes from.
+
+    Parameters
+    ----------
+    title
+        Of the study.
+    study_toml
+        Its text; empty for a model of Python.
+    versions
+        Of the libraries that make numbers.
+    created
+        Beginning of the run that wrote the result.
+    began
+        The same on a clock that only runs forward, s.
+    """
+
+    title: str
+    study_toml: str
+    versions: dict[str, str]
+    created: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
+    began: float = field(default_factory=perf_counter)
+
+    def attributes(self, warnings: Sequence[str], *, complete: bool) -> dict[str, Any]:
+        """Return the attributes of the root: texts and numbers only."""
+        return {
+            "title": self.title,
+            "study_toml": self.study_toml,
+            "stickslip_version": __version__,
+            "versions": json.dumps(self.versions),
+            "created": self.created,
+            "wall_seconds": perf_counter() - self.began,
+            "warnings": json.dumps(list(warnings)),
+            "complete": int(complete),
+        }
+
+
+def library_versions() -> dict[str, str]:
+    """Return the versions of this package, Python and the libraries that make numbers."""
+    found = {"stickslip": __version__, "python": platform.python_version()}
+    for name in LIBRARIES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found

@@ -1,0 +1,16 @@
+"""How many threads BLAS takes: said before NumPy is loaded, or never."""
+
+import os
+
+BLAS_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def one_blas_thread() -> None:
+    """Give BLAS one thread, before NumPy is loaded, unless the user said how many.
+
+    The matrices of a run have a few hundred rows: more threads wait for each other, and where other programs want the cores they
+    take ten times as long.
+    """
+    if not any(name in os.environ for name in BLAS_THREADS):
+        for name in BLAS_THREADS[1:]:
+            os.environ[name] = "1"
