@@ -14,7 +14,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded
@@ -367,34 +367,49 @@ def _is_diagonal(damping: FloatArray) -> bool:
     return bool(off <= DIAGONAL_TOLERANCE * size)
 
 
-def _asymmetry(matrix: FloatArray) -> float:
+def _asymmetry(matrix: Matrix) -> float:
     """Return the largest difference from the transpose over the largest entry."""
-    size = float(np.max(np.abs(matrix), initial=0.0))
-    return float(np.max(np.abs(matrix - matrix.T), initial=0.0)) / size if size else 0.0
+    if not matrix.shape[0]:
+        return 0.0
+    size = float(abs(matrix).max())
+    return float(abs(matrix - matrix.T).max()) / size if size else 0.0
 
 
-def _dense(structure: Structure, name: str) -> FloatArray:
+def is_real_symmetric(structure: Structure) -> bool:
+    """Whether all matrices but the damping are real and symmetric: then undamped modes of the interior decouple it."""
+    matrices = (structure.mass, structure.stiffness, structure.loss)
+    return not structure.is_complex and all(
+        _asymmetry(m) <= SYMMETRY for m in matrices if m is not None
+    )
+
+
+def checked_matrix(structure: Structure, name: str) -> FloatArray | ComplexArray:
+    """Return a matrix of a structure as an array, after checking that it is finite and whole."""
     matrix = getattr(structure, name)
-    if np.iscomplexobj(matrix):
-        raise input_error(
-            f"Structure.{name}",
-            "is complex",
-            "Give structural damping as Structure.loss (structural_damping), viscous damping as a real matrix. Of travelling waves, "
-            "assemble the wheel.",
-        )
-    dense = np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix, dtype=float)
+    dense = np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
     if not np.all(np.isfinite(dense)):
         raise input_error(
             f"Structure.{name}",
             "contains NaN or infinite entries",
             "Check the model that was read.",
         )
+    if _asymmetry(dense) > SYMMETRY and not (np.any(np.triu(dense, 1)) and np.any(np.tril(dense, -1))):  # fmt: skip
+        raise input_error(f"Structure.{name}", "holds one triangle alone", "Give both triangles.")
+    return dense
+
+
+def _dense(structure: Structure, name: str) -> FloatArray:
+    dense = checked_matrix(structure, name)
+    if np.iscomplexobj(dense):
+        raise input_error(
+            f"Structure.{name}",
+            "is complex",
+            "Give structural damping as Structure.loss (structural_damping); a System takes other complex matrices.",
+        )
     if name != "damping" and _asymmetry(dense) > SYMMETRY:
         raise input_error(
             f"Structure.{name}",
             "is not symmetric",
-            "Give both triangles. Coriolis terms belong into the damping.",
+            "Coriolis terms belong into the damping; a System takes other unsymmetric matrices.",
         )
-    if _asymmetry(dense) > SYMMETRY and not (np.any(np.triu(dense, 1)) and np.any(np.tril(dense, -1))):  # fmt: skip
-        raise input_error(f"Structure.{name}", "holds one triangle alone", "Give both triangles.")
-    return dense
+    return np.asarray(dense, dtype=float)

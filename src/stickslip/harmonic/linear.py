@@ -1,11 +1,57 @@
-"""The linear side as the harmonic balance sees it."""
+"""What vibrates, and the same condensed, as the harmonic balance sees it."""
 
 from typing import Protocol, Self
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.errors import input_error
 from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.spectral import Blocks
+from stickslip.model.dofs import Dofs
+from stickslip.model.structure import Structure
+
+
+class LinearSide(Protocol):
+    """What vibrates: one structure, or a wheel whose temporal harmonics are waves of their own; all on the same coordinates.
+
+    Matrices may be complex and unsymmetric, as those of waves and of aerodynamic forces are.
+    """
+
+    @property
+    def n(self) -> int:
+        """Number of coordinates."""
+        ...
+
+    @property
+    def dofs(self) -> Dofs:
+        """Table of the coordinates."""
+        ...
+
+    def of_harmonic(self, harmonic: int) -> Structure:
+        """Return the structure that temporal harmonic `harmonic` (0: the mean) vibrates as; the same object where it is the same."""
+        ...
+
+
+def one_structure(side: LinearSide, analysis: str) -> Structure:
+    """Return the structure that all harmonics vibrate as, for an `analysis` that knows no harmonics.
+
+    Raises
+    ------
+    InputError
+        If the harmonics vibrate as different structures, or as one whose matrices are complex.
+    """
+    structure = side.of_harmonic(0)
+    if side.of_harmonic(1) is not structure:
+        raise input_error(
+            analysis,
+            "has no form for a tuned wheel, whose harmonics are different travelling waves",
+            "Take the wheel of all sectors (reduced_wheel), or the forced response.",
+        )
+    if structure.is_complex:
+        raise input_error(
+            analysis, "needs real matrices", "The forced response takes complex ones."
+        )
+    return structure
 
 
 class DynamicStiffness(Protocol):

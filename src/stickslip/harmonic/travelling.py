@@ -1,4 +1,4 @@
-"""Dynamic stiffness of a tuned wheel: every temporal harmonic is a travelling wave with matrices of its own.
+"""Dynamic stiffness where every temporal harmonic has matrices of its own, complex and unsymmetric ones: the waves of a wheel.
 
 M. Krack, L. Salles and F. Thouverez, "Vibration prediction of bladed disks coupled by friction joints", Archives of
 Computational Methods in Engineering 24 (2017) 589-636, section 3 and appendices 1, 2 and 5.
@@ -8,12 +8,17 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import scipy.sparse
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
-from stickslip.harmonic.dynamic_stiffness import Condensed
+from stickslip.harmonic.dynamic_stiffness import (
+    Condensed,
+    checked_matrix,
+    condense,
+    is_real_symmetric,
+)
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.linear import DynamicStiffness, LinearSide
 from stickslip.harmonic.spectral import Blocks
 from stickslip.model.structure import Structure
 
@@ -22,9 +27,10 @@ Stack = ComplexArray  # (H+1, rows, columns)
 
 @dataclass(frozen=True, eq=False)
 class TravellingStiffness:
-    """The waves of a tuned wheel and its load, seen from the retained coordinates; `condense_waves` makes one.
+    """The waves of a wheel and its load, seen from the retained coordinates; `condense_waves` makes one.
 
-    The interior is solved at each frequency: reduced waves have few interior coordinates.
+    The interior is solved at each frequency: reduced waves have few interior coordinates. The mean of a real motion feels the real
+    part of the matrices.
     """
 
     structures: tuple[Structure, ...]  # of harmonics 0, 1, ...
@@ -118,9 +124,27 @@ class TravellingStiffness:
         """Stiffness, damping, mass and loss of all harmonics."""
 
         def stacked(name: str) -> Stack:
-            return np.array([_dense(getattr(s, name), s.n) for s in self.structures])
+            known = {id(s): _checked(s, name) for s in self.structures}
+            stack = np.array([known[id(s)] for s in self.structures])
+            stack[0] = stack[0].real
+            return stack
 
         return stacked("stiffness"), stacked("damping"), stacked("mass"), stacked("loss")
+
+
+def condense_side(
+    side: LinearSide, retained: IntArray, load: HarmonicLoad, order: int
+) -> DynamicStiffness:
+    """Prepare the exact condensation of what vibrates, for harmonics up to `order`.
+
+    By `condense`, whose frequencies cost few products, where all harmonics vibrate as one real symmetric structure; by
+    `condense_waves` otherwise.
+    """
+    structures = tuple(side.of_harmonic(h) for h in range(order + 1))
+    one = structures[0]
+    if all(s is one for s in structures) and is_real_symmetric(one):
+        return condense(one, retained, load)
+    return condense_waves(structures, retained, load)
 
 
 def condense_waves(
@@ -165,7 +189,7 @@ def _block(stack: Stack, rows: IntArray, columns: IntArray) -> Stack:
     return np.asarray(stack[:, rows[:, None], columns])
 
 
-def _dense(matrix: Matrix | None, n: int) -> FloatArray | ComplexArray:
-    if matrix is None:
-        return np.zeros((n, n))
-    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
+def _checked(structure: Structure, name: str) -> FloatArray | ComplexArray:
+    if getattr(structure, name) is None:
+        return np.zeros((structure.n, structure.n))
+    return checked_matrix(structure, name)

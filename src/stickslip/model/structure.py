@@ -61,7 +61,7 @@ class Structure:
         """Return what it is in a line, without its matrices."""
         matrices = [self.mass, self.damping, self.stiffness]
         kind = "sparse" if any(scipy.sparse.issparse(m) for m in matrices) else "dense"
-        numbers = "complex" if any(np.iscomplexobj(m) for m in matrices) else "real"
+        numbers = "complex" if self.is_complex else "real"
         parts = [f"{self.n} dofs", f"{kind} {numbers}"]
         if self.loss is not None:
             parts.append("structural damping")
@@ -76,6 +76,16 @@ class Structure:
     def n(self) -> int:
         """Number of dofs."""
         return len(self.dofs)
+
+    @property
+    def is_complex(self) -> bool:
+        """Whether a matrix is complex."""
+        matrices = (self.mass, self.damping, self.stiffness, self.loss)
+        return any(np.iscomplexobj(m) for m in matrices if m is not None)
+
+    def of_harmonic(self, harmonic: int) -> "Structure":
+        """Return the structure: it vibrates as itself in every harmonic (see `LinearSide`)."""
+        return self
 
     def dof_set(self, name: str) -> IntArray:
         """Return the dof indices of the set `name`; an `InputError` names the known sets."""

@@ -10,7 +10,6 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.contact.compiled import Evaluator, check_evaluator
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
-from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import AtFrequency, Family, law_field, load_level, rebuilt
 from stickslip.response.equilibrium import bonded_start, preload
@@ -71,7 +70,7 @@ class Discretisation:
 
     def balance(self, system: System, load: HarmonicLoad, more: IntArray) -> HarmonicBalance:
         """Set up the periodic problem, the dofs `more` retained beside those of the contacts."""
-        linear = condense(system.plain_structure, np.union1d(system.retained, more), load)
+        linear = system.condensed(load, self.order, more)
         return harmonic_balance(
             linear, system.interface, self.order, self.samples, self.evaluator, "dense"
         )

@@ -8,7 +8,6 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.dlft import DynamicLagrangian, dynamic_lagrangian
-from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.parameter import LARGEST, Discretisation
 from stickslip.response.system import System
@@ -96,8 +95,7 @@ def rigid_response(
         )
     how = discretisation or Discretisation()
     # where contacts stick throughout, their coordinates are zero and no measure of a step
-    retained = np.union1d(system.retained, system.outputs)
-    linear = condense(system.plain_structure, retained, load)
+    linear = system.condensed(load, how.order, system.outputs)
     problem = dynamic_lagrangian(
         linear, system.interface, how.order, how.samples, penalty, how.evaluator
     )

@@ -8,13 +8,13 @@ import scipy.sparse
 from stickslip.arrays import IntArray
 from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
-from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.linear import DynamicStiffness
-from stickslip.harmonic.travelling import condense_waves
+from stickslip.harmonic.linear import DynamicStiffness, LinearSide, one_structure
+from stickslip.harmonic.travelling import condense_side
 from stickslip.model.modes import with_springs
 from stickslip.model.structure import Structure
-from stickslip.reduction.tuned import TunedWheel
+
+NO_DOFS: IntArray = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class System:
     Parameters
     ----------
     structure
-        Blades joined with dampers, reduced; or one sector of a tuned wheel.
+        What vibrates: blades joined with dampers, reduced; or one sector of a tuned wheel.
     interface
         Contacts on the structure's dofs.
     outputs
@@ -35,7 +35,7 @@ class System:
         Dofs of rigid bodies that only contacts hold; they are retained whether or not a contact touches them.
     """
 
-    structure: Structure | TunedWheel
+    structure: LinearSide
     interface: Interface
     outputs: IntArray
     alert_dofs: IntArray | None = None
@@ -52,7 +52,7 @@ class System:
     @property
     def retained(self) -> IntArray:
         """Dofs that stay unknown: those of the contacts and of free bodies, sorted."""
-        free = np.zeros(0, dtype=np.int64) if self.free is None else self.free
+        free = NO_DOFS if self.free is None else self.free
         return np.union1d(self.interface.coordinates(), free)
 
     @property
@@ -61,29 +61,16 @@ class System:
         labels = self.structure.dofs.labels
         return tuple(labels[i] for i in self.retained)
 
-    def condensed(self, load: HarmonicLoad, order: int) -> DynamicStiffness:
-        """Return the structure and a load on it, condensed to the retained dofs, for harmonics up to `order`."""
-        if isinstance(self.structure, TunedWheel):
-            waves = [self.structure.of_harmonic(h) for h in range(order + 1)]
-            return condense_waves(tuple(waves), self.retained, load)
-        return condense(self.structure, self.retained, load)
+    def condensed(
+        self, load: HarmonicLoad, order: int, more: IntArray = NO_DOFS
+    ) -> DynamicStiffness:
+        """Return what vibrates and a load on it, condensed to the retained dofs and `more`, for harmonics up to `order`."""
+        return condense_side(self.structure, np.union1d(self.retained, more), load, order)
 
     @property
     def plain_structure(self) -> Structure:
-        """The structure, where one and the same vibrates in all harmonics.
-
-        Raises
-        ------
-        InputError
-            If it is a tuned wheel.
-        """
-        if isinstance(self.structure, TunedWheel):
-            raise input_error(
-                "System",
-                "this analysis has no form for a tuned wheel, whose harmonics are different travelling waves",
-                "Take the wheel of all sectors (reduced_wheel).",
-            )
-        return self.structure
+        """The structure, where one and the same vibrates in all harmonics; see `one_structure`."""
+        return one_structure(self.structure, "this analysis")
 
     def with_retention(self, stiffness: float) -> "System":
         """Return the system with a spring of `stiffness` (N/m, rotations N m/rad per m²) from each free dof to ground.
@@ -92,7 +79,7 @@ class System:
         """
         if self.free is None or stiffness == 0.0:
             return self
-        structure = self.plain_structure
+        structure = one_structure(self.structure, "System.with_retention")
         added = np.zeros(structure.n)
         dofs = structure.dofs
         turns = np.array([dofs.component[d].startswith("r") for d in self.free])
@@ -111,4 +98,5 @@ class System:
     def stuck_structure(self) -> Structure:
         """Return the linear structure with every contact bonded through its springs."""
         b = self.interface.gap_operator
-        return with_springs(self.plain_structure, b, self.interface.stuck_stiffness())
+        structure = one_structure(self.structure, "System.stuck_structure")
+        return with_springs(structure, b, self.interface.stuck_stiffness())

@@ -7,7 +7,6 @@ from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.selection.alert import Form, jacobian_alert
 from stickslip.harmonic.support import Harmonics, harmonics_of
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem
 
 SAMPLES_A_HARMONIC = 8
@@ -91,9 +90,7 @@ def _enlarged(problem: ForcedProblem, factor: int) -> HarmonicBalance:
     """Return the problem with all harmonics up to `factor` times the reference order, with samples enough for them."""
     high = problem.high
     harmonics = harmonics_of(factor * high.order)
-    linear = high.linear
-    if isinstance(problem.system.structure, TunedWheel):
-        linear = problem.system.condensed(linear.load, harmonics[-1])
+    linear = problem.system.condensed(high.linear.load, harmonics[-1])
     samples = max(high.samples, SAMPLES_A_HARMONIC * harmonics[-1])
     return replace(high, linear=linear, samples=samples).with_harmonics(harmonics)
 

@@ -1,6 +1,6 @@
 """The two passages of the Jacobian Alert: a branch with few harmonics, then the frequencies that need more."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from time import perf_counter
 
@@ -14,7 +14,7 @@ from stickslip.harmonic.support import Harmonics
 from stickslip.response.equilibrium import bonded_start, preload
 from stickslip.response.forced.accepted import branch_end, reached
 from stickslip.response.forced.rescue import homotopies
-from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, forced_point
+from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, Sweep, forced_point
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to
 from stickslip.solve.newton_method import Solution, charged, newton
@@ -36,44 +36,55 @@ def first_passage(
     Each new point depends on `points` alone, so that a run taken up again goes on as it would have.
     """
     sweep = problem.sweep
-    if sweep.frequencies:
+    if sweep.grid.size:
         yield from _grid(problem, load, points)
         return
-    first, last = sweep.omega_range
+    first, last = sweep.ends
     latest = Latest(problem.low)
-    while not points or points[-1].omega < last or not points[-1].converged:
+    while not points or _before(sweep, points[-1].omega, last) or not points[-1].converged:
         began = perf_counter()
-        reach = max((p.omega for p in points), default=first)
+        reach = points[_farthest(sweep, points)].omega if points else first
         if points and not points[-1].converged and reach == last:
             return
         point = None
         if points and not _lost(problem, points):
             following = problem.following(problem.low)
             point = advance(latest, problem.branch_point(points[-1]), last, following)
-        if point is None or not point.solution.status.converged or point.p < first:
+        if point is None or not point.solution.status.converged or _before(sweep, point.p, first):
             # the branch starts here, or is lost: take it up (again) a little further on
-            gap = sweep.control.largest * sweep.control.scale if points else 0.0
+            gap = sweep.forward * sweep.control.largest * sweep.control.scale if points else 0.0
+            ahead = reach + gap if _before(sweep, reach + gap, last) else last
             # a single frequency is left to the repeats, which know both sides; a second one in a row to the homotopies
             left = bool(points) and points[-1].converged and sweep.selection != "always_low"
-            point = fresh_point(problem, load, points, min(reach + gap, last), left, latest)
+            point = fresh_point(problem, load, points, ahead, left, latest)
+            point = point if sweep.direction == "up" else reversed_point(point)
         points.append(_low_point(problem, point, len(points), began, latest))
         yield points[-1]
 
 
+def _before(sweep: Sweep, omega: float, other: float) -> bool:
+    """Whether one frequency comes before another on the way."""
+    return sweep.forward * omega < sweep.forward * other
+
+
+def _farthest(sweep: Sweep, points: Sequence[ForcedPoint]) -> int:
+    """Return the position of the point farthest along the way."""
+    return int(np.argmax([sweep.forward * p.omega for p in points]))
+
+
 def _lost(problem: ForcedProblem, points: list[ForcedPoint]) -> bool:
     """Whether the branch ended or runs in circles."""
-    farthest = int(np.argmax([p.omega for p in points]))
+    farthest = _farthest(problem.sweep, points)
     return not points[-1].converged or len(points) - farthest > LOOP * problem.sweep.points
 
 
 def _grid(
     problem: ForcedProblem, load: HarmonicLoad, points: list[ForcedPoint]
 ) -> Iterator[ForcedPoint]:
-    """Step through equally spaced frequencies."""
-    sweep = problem.sweep
+    """Step through the frequencies of a list."""
     following = problem.following(problem.low)
     latest = Latest(problem.low)
-    for omega in np.linspace(*sweep.omega_range, sweep.frequencies)[len(points) :]:
+    for omega in problem.sweep.grid[len(points) :]:
         began = perf_counter()
         before = [p for p in points if p.converged]
         point = None
@@ -203,8 +214,7 @@ def follow_run(
         elif (
             reached(branch, low, last)
             or not branch[-1].converged
-            or len(branch) - int(np.argmax([p.omega for p in branch]))
-            > problem.sweep.points * STALLS
+            or len(branch) - _farthest(problem.sweep, branch) > problem.sweep.points * STALLS
             or not begin - margin < branch[-1].omega < stop + margin
         ):
             return
@@ -237,10 +247,16 @@ def _branch_start(
     for seed in sorted(usable, key=lambda p: -p.index)[:BRANCH_SEEDS]:
         point = start_point(balance, balance.unknowns(seed.coefficients), seed.omega, following)
         if point.solution.status.converged:
-            # a first passage that was coming back from a fold goes on downward
-            tangent = low[seed.index].tangent
-            return reversed_point(point) if tangent.size > 0 and tangent[-1] < 0.0 else point
+            # a first passage that goes down, or was coming back from a fold, goes on downward
+            return reversed_point(point) if _goes_down(problem.sweep, low[seed.index]) else point
     return None
+
+
+def _goes_down(sweep: Sweep, point: ForcedPoint) -> bool:
+    """Whether frequencies fall beyond a point of the first passage; tangents of listed frequencies all show upward."""
+    if sweep.grid.size:
+        return sweep.direction == "down"
+    return point.tangent.size > 0 and bool(point.tangent[-1] < 0.0)
 
 
 def along_branch(

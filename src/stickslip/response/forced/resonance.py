@@ -34,7 +34,7 @@ def resolve_peak(
     problem
         The forced response.
     accepted
-        Points of both passages in the order of the branch.
+        Points of both passages in the order of the branch, its lowest frequency first.
     done
         Peak points of an interrupted run.
     static

@@ -79,7 +79,8 @@ def forced_response(
         solved.append(point)
         yield point
     peak = [p for p in done if p.stage == "peak"]
-    yield from resolve_peak(problem, accepted_points(solved), peak, static)
+    upward = accepted_points(solved)[:: int(sweep.forward)]
+    yield from resolve_peak(problem, upward, peak, static)
 
 
 def _double_passage(

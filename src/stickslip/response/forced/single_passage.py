@@ -25,10 +25,10 @@ from stickslip.solve.newton_method import Solution, charged, newton
 def single_passage(
     problem: ForcedProblem, load: HarmonicLoad, done: Sequence[ForcedPoint]
 ) -> Iterator[ForcedPoint]:
-    """Go through equally spaced frequencies and let the strategy choose the harmonics of each.
+    """Go through equally spaced or listed frequencies and let the strategy choose the harmonics of each.
 
     A frequency whose solution asks for more is solved again with what it had and what it asks for; the last solution counts. One
-    that is not found is looked for once more with the reference support, and at the end once more from the frequency above.
+    that is not found is looked for once more with the reference support, and at the end once more from the frequency after it.
 
     Parameters
     ----------
@@ -43,7 +43,8 @@ def single_passage(
         Points not in `done`: the first solution of a frequency as ``low``, further ones as ``high``.
     """
     sweep = problem.sweep
-    grid = [float(w) for w in np.linspace(*sweep.omega_range, sweep.frequencies or sweep.points)]
+    listed = sweep.grid if sweep.grid.size else sweep.spaced(sweep.points)
+    grid = [float(w) for w in listed]
     stored = iter(done)
     tried: list[ForcedPoint] = []
     harmonics = problem.low.harmonics
@@ -76,13 +77,13 @@ def single_passage(
             start = verdict.start
             harmonics, before, first = again, step, False
         harmonics = verdict.following
-    yield from _from_above(problem, tried, stored)
+    yield from _from_behind(problem, tried, stored)
 
 
-def _from_above(
+def _from_behind(
     problem: ForcedProblem, tried: Sequence[ForcedPoint], stored: Iterator[ForcedPoint]
 ) -> Iterator[ForcedPoint]:
-    """Look for frequencies that were not found once more, along the branch from the frequency above, the last ones first."""
+    """Look for frequencies that were not found once more, along the branch from the frequency after each, the last ones first."""
     last = {p.index: p for p in tried}
     for index in reversed(range(len(last) - 1)):
         if last[index].converged or not last[index + 1].converged:

@@ -29,6 +29,7 @@ from stickslip.solve.status import Rung, Status
 
 FIXED = ("always_low", "always_high")  # the same harmonics at every frequency
 Passages = Literal["double", "single"]
+Direction = Literal["up", "down"]
 Stage = Literal["low", "high", "branch", "peak"]
 # arc length: a quarter of the size of the vibration, or `1 / points` of the range
 LARGEST_STEP = 0.25
@@ -67,6 +68,10 @@ class Sweep:
         Smallest number of points of the first passage; more are taken where the response turns.
     frequencies
         Number of equally spaced frequencies to step through instead of following the branch by arc length; 0: arc length.
+    at
+        Frequencies of your own to step through instead, rad/s, growing (falling too if the direction is ``down``), all in the range.
+    direction
+        ``up``: from the first frequency to the last; ``down``: from the last to the first, which finds other motions beside folds.
     peak_points
         Most points added to resolve the peak.
     newton
@@ -84,6 +89,8 @@ class Sweep:
     error_harmonics: Sequence[int] | None = None
     points: int = 40
     frequencies: int = 0
+    at: tuple[float, ...] = ()
+    direction: Direction = "up"
     peak_points: int = 12
     newton: Newton = Newton()  # noqa: RUF009  # frozen
 
@@ -104,6 +111,7 @@ class Sweep:
             )
         if not isinstance(self.selection, str):
             check_strategy(self.selection)
+        _check_steps(self)
         if self.passages not in get_args(Passages):
             raise input_error(
                 "Sweep.passages",
@@ -163,6 +171,26 @@ class Sweep:
         return strategy is not None and (self.passages == "single" or not strategy.verifies)
 
     @property
+    def ends(self) -> tuple[float, float]:
+        """Where the response begins and ends, rad/s, in the direction in which it is gone through."""
+        first, last = self.omega_range
+        return (first, last) if self.direction == "up" else (last, first)
+
+    @property
+    def forward(self) -> float:
+        """1 where frequencies grow on the way, -1 where they fall."""
+        return 1.0 if self.direction == "up" else -1.0
+
+    @property
+    def grid(self) -> FloatArray:
+        """Frequencies to step through, rad/s, in their order; empty where the branch is followed by arc length."""
+        return np.sort(self.at)[:: int(self.forward)] if self.at else self.spaced(self.frequencies)
+
+    def spaced(self, count: int) -> FloatArray:
+        """Return `count` equally spaced frequencies in the order of the way, rad/s."""
+        return np.linspace(*self.omega_range, count)[:: int(self.forward)]
+
+    @property
     def control(self) -> StepControl:
         """Step control of the branch: a step is at most a `points`-th of the range."""
         first, last = self.omega_range
@@ -175,6 +203,33 @@ class Sweep:
     def first_harmonics(self) -> Harmonics:
         """Harmonics with which the first passage is made."""
         return self.high_harmonics if self.selection == "always_high" else self.low_harmonics
+
+
+def _check_steps(sweep: Sweep) -> None:
+    """Refuse frequencies that are no list to step through, and a direction that is none."""
+    if sweep.direction not in get_args(Direction):
+        raise input_error(
+            "Sweep.direction",
+            f"{sweep.direction!r} is none of {', '.join(get_args(Direction))}",
+            "'up' goes from the first frequency to the last.",
+        )
+    if not sweep.at:
+        return
+    if sweep.frequencies:
+        raise input_error("Sweep", "has both frequencies and at", "Give one of them.")
+    first, last = sweep.omega_range
+    steps = np.diff(sweep.at)
+    inside = all(first <= omega <= last for omega in sweep.at)
+    if not (inside and (np.all(steps > 0.0) or np.all(steps < 0.0))):
+        raise input_error(
+            "Sweep.at",
+            f"must grow or fall strictly within {first:g} to {last:g} rad/s, got {len(sweep.at)} frequencies",
+            "Sort them, leave out what is twice, and widen omega_range to hold them.",
+        )
+    if steps.size and steps[0] < 0.0 and sweep.direction == "up":
+        raise input_error(
+            "Sweep.at", "falls, and the direction is up", "Give direction='down', or sort it."
+        )
 
 
 @dataclass(frozen=True, eq=False)
