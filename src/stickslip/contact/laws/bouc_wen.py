@@ -15,6 +15,7 @@ from stickslip.contact.laws.parameter_checks import (
     check_positive,
 )
 from stickslip.errors import input_error
+from stickslip.units import quantity
 
 # Gauss-Legendre points and weights on [0, 1] after s = y v², which makes broken powers of s smooth
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(24)
@@ -167,14 +168,32 @@ class BoucWen:
         If a parameter is not finite or out of its range.
     """
 
-    k_t: float
-    beta: float
-    gamma: float
-    alpha: float = 0.0
-    a: float = 1.0
-    exponent: float = 1.0
-    k_w: float = 0.0
-    k_n: float = 0.0
+    k_t: float = quantity(
+        "stiffness along the tangent t", "n_per_m", key="tangential_stiffness", least=0, shared=True
+    )
+    beta: float = quantity("shape of the loop β, m to the power of minus the exponent", above=0)
+    gamma: float = quantity("shape of the loop γ, above -β and at most β")
+    alpha: float = quantity(
+        "share of the stiffness left at the largest force", default=0.0, least=0, most=1
+    )
+    a: float = quantity("slope of the hysteretic part at zero force", default=1.0, above=0)
+    exponent: float = quantity("sharpness of the knee", default=1.0, least=1, most=20)
+    k_w: float = quantity(
+        "stiffness along the tangent w",
+        "n_per_m",
+        default=0.0,
+        key="axial_stiffness",
+        least=0,
+        shared=True,
+    )
+    k_n: float = quantity(
+        "stiffness along the normal",
+        "n_per_m",
+        default=0.0,
+        key="normal_stiffness",
+        least=0,
+        shared=True,
+    )
 
     kernel: ClassVar[Any] = law_kernel(_step)
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS

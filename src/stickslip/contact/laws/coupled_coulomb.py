@@ -12,6 +12,7 @@ from stickslip.contact.laws.parameter_checks import (
     check_finite,
     check_not_negative,
 )
+from stickslip.units import quantity
 
 
 def _step(displacement, velocity, state, parameters, force, new_state, jac, status):  # type: ignore[no-untyped-def]
@@ -82,9 +83,19 @@ class CoupledCoulomb:
         If a parameter is not finite or out of its range.
     """
 
-    k_t: float
-    k_n: float
-    mu: float
+    k_t: float = quantity(
+        "stiffness in every direction of the contact plane",
+        "n_per_m",
+        key="tangential_stiffness",
+        least=0,
+        shared=True,
+    )
+    k_n: float = quantity(
+        "stiffness along the normal", "n_per_m", key="normal_stiffness", least=0, shared=True
+    )
+    mu: float = quantity(
+        "friction coefficient (steel on steel: 0.6)", key="friction_coefficient", least=0, most=5
+    )
     preload: float = 0.0
 
     kernel: ClassVar[Any] = law_kernel(_step)

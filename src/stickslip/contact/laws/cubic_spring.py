@@ -13,6 +13,7 @@ from stickslip.contact.laws.parameter_checks import (
     check_not_negative,
 )
 from stickslip.contact.laws.polynomial_spring import polynomial_step
+from stickslip.units import quantity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,12 +33,48 @@ class CubicSpring:
         If a coefficient is not finite, a linear stiffness is negative, or all are zero.
     """
 
-    cubic_t: float = 0.0
-    cubic_w: float = 0.0
-    cubic_n: float = 0.0
-    k_t: float = 0.0
-    k_w: float = 0.0
-    k_n: float = 0.0
+    cubic_t: float = quantity(
+        "cubic coefficient along the tangent t; negative: the spring softens",
+        "n_per_m3",
+        default=0.0,
+        shared=True,
+    )
+    cubic_w: float = quantity(
+        "cubic coefficient along the tangent w; negative: the spring softens",
+        "n_per_m3",
+        default=0.0,
+        shared=True,
+    )
+    cubic_n: float = quantity(
+        "cubic coefficient along the normal; negative: the spring softens",
+        "n_per_m3",
+        default=0.0,
+        shared=True,
+    )
+    k_t: float = quantity(
+        "stiffness along the tangent t",
+        "n_per_m",
+        default=0.0,
+        key="tangential_stiffness",
+        least=0,
+        shared=True,
+    )
+    k_w: float = quantity(
+        "stiffness along the tangent w",
+        "n_per_m",
+        default=0.0,
+        key="axial_stiffness",
+        least=0,
+        shared=True,
+    )
+    k_n: float = quantity(
+        "stiffness along the normal",
+        "n_per_m",
+        default=0.0,
+        key="normal_stiffness",
+        least=0,
+        shared=True,
+    )
 
     kernel: ClassVar[Any] = polynomial_step
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS

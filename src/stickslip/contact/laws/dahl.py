@@ -12,6 +12,7 @@ from stickslip.contact.laws.parameter_checks import (
     check_not_negative,
     check_positive,
 )
+from stickslip.units import quantity
 
 
 def _step(displacement, velocity, state, parameters, force, new_state, jac, status):  # type: ignore[no-untyped-def]
@@ -61,10 +62,32 @@ class Dahl:
         If a parameter is not finite or out of its range.
     """
 
-    k_t: float
-    limit: float
-    k_w: float = 0.0
-    k_n: float = 0.0
+    k_t: float = quantity(
+        "stiffness along the tangent t", "n_per_m", key="tangential_stiffness", least=0, shared=True
+    )
+    limit: float = quantity(
+        "friction force at which all has slipped, along either tangent",
+        "n",
+        key="slip_limit",
+        above=0,
+        shared=True,
+    )
+    k_w: float = quantity(
+        "stiffness along the tangent w",
+        "n_per_m",
+        default=0.0,
+        key="axial_stiffness",
+        least=0,
+        shared=True,
+    )
+    k_n: float = quantity(
+        "stiffness along the normal",
+        "n_per_m",
+        default=0.0,
+        key="normal_stiffness",
+        least=0,
+        shared=True,
+    )
 
     kernel: ClassVar[Any] = law_kernel(_step)
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS

@@ -14,6 +14,7 @@ from stickslip.contact.laws.parameter_checks import (
     check_not_negative,
 )
 from stickslip.errors import input_error
+from stickslip.units import quantity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,12 +45,25 @@ class ElasticCoulomb:
         If a parameter is not finite or out of its range.
     """
 
-    k_t: float
-    k_w: float
-    k_n: float
-    mu: float
+    k_t: float = quantity(
+        "stiffness along the tangent t", "n_per_m", key="tangential_stiffness", least=0, shared=True
+    )
+    k_w: float = quantity(
+        "stiffness along the tangent w", "n_per_m", key="axial_stiffness", least=0, shared=True
+    )
+    k_n: float = quantity(
+        "stiffness along the normal", "n_per_m", key="normal_stiffness", least=0, shared=True
+    )
+    mu: float = quantity(
+        "friction coefficient (steel on steel: 0.6)", key="friction_coefficient", least=0, most=5
+    )
     preload: float = 0.0
-    residual_traction: float | None = None
+    residual_traction: float | None = quantity(
+        "share of the friction limit that each tangential spring is stretched by before the first period; left out: unstretched at zero displacement",
+        default=None,
+        least=-1,
+        most=1,
+    )
 
     kernel: ClassVar[Any] = element_step
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS

@@ -8,6 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import STICK, UNCOUPLED_TANGENTS, law_kernel
 from stickslip.errors import input_error
+from stickslip.units import quantity
 
 
 def _step(displacement, velocity, state, parameters, force, new_state, jac, status):  # type: ignore[no-untyped-def]
@@ -45,9 +46,19 @@ class PolynomialSpring:
         If a coefficient is not finite, or all are zero.
     """
 
-    along_t: tuple[float, ...] = ()
-    along_w: tuple[float, ...] = ()
-    along_n: tuple[float, ...] = ()
+    along_t: tuple[float, ...] = quantity(
+        "coefficients [c_1, c_2, ...] along the tangent t in N/m, N/m², ...",
+        default=(),
+        shared=True,
+    )
+    along_w: tuple[float, ...] = quantity(
+        "coefficients [c_1, c_2, ...] along the tangent w in N/m, N/m², ...",
+        default=(),
+        shared=True,
+    )
+    along_n: tuple[float, ...] = quantity(
+        "coefficients [c_1, c_2, ...] along the normal in N/m, N/m², ...", default=(), shared=True
+    )
 
     kernel: ClassVar[Any] = polynomial_step
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS

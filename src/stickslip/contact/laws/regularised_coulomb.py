@@ -12,6 +12,7 @@ from stickslip.contact.laws.parameter_checks import (
     check_not_negative,
     check_positive,
 )
+from stickslip.units import quantity
 
 
 def _step(displacement, velocity, state, parameters, force, new_state, jac, status):  # type: ignore[no-untyped-def]
@@ -56,9 +57,20 @@ class RegularisedCoulomb:
         If a parameter is not finite or out of its range.
     """
 
-    mu: float
-    transition_velocity: float
-    k_n: float = 0.0
+    mu: float = quantity(
+        "friction coefficient (steel on steel: 0.6)", key="friction_coefficient", least=0, most=5
+    )
+    transition_velocity: float = quantity(
+        "velocity at which friction has reached 76 % of its limit", "m_per_s", above=0
+    )
+    k_n: float = quantity(
+        "stiffness along the normal",
+        "n_per_m",
+        default=0.0,
+        key="normal_stiffness",
+        least=0,
+        shared=True,
+    )
     preload: float = 0.0
 
     kernel: ClassVar[Any] = law_kernel(_step)

@@ -18,6 +18,7 @@ from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.fe.solid import Material
 from stickslip.model.structure import Structure
+from stickslip.units import quantity
 
 End = Literal["clamped", "pinned", "sliding", "free"]
 Direction = Literal["y", "z"]
@@ -58,12 +59,21 @@ class Beam:
         If a size is not positive or an end unknown.
     """
 
-    length: float
-    area: float
-    second_moment: float
-    material: Material
-    shear_coefficient: float | None = None
-    ends: tuple[End, End] = ("clamped", "free")
+    length: float = quantity("length of the beam", "m", above=0, most=1e4)
+    area: float = quantity("area of its section", "m2", above=0)
+    second_moment: float = quantity("second moment of area for its bending", "m4", above=0)
+    material: Material = quantity("the table of its material")
+    shear_coefficient: float | None = quantity(
+        "shear coefficient κ, which makes a Timoshenko beam; left out: Euler-Bernoulli",
+        default=None,
+        above=0,
+        most=2,
+    )
+    ends: tuple[End, End] = quantity(
+        "how the first and the last end are held",
+        default=("clamped", "free"),
+        choices=get_args(End),
+    )
 
     def __post_init__(self) -> None:
         for name in ("length", "area", "second_moment", "shear_coefficient"):

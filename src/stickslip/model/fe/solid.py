@@ -26,6 +26,7 @@ from stickslip.model.fe.elements import (
 )
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.structure import Structure
+from stickslip.units import quantity
 
 CUT_FACES = ("cyclic_low", "cyclic_high")  # these sets may lose nodes to a clamp
 
@@ -44,9 +45,9 @@ class Material:
         In kg/m³.
     """
 
-    young_modulus: float = 210e9
-    poisson_ratio: float = 0.3
-    density: float = 7850.0
+    young_modulus: float = quantity("Young's modulus (steel: 2.1e11)", "pa", default=210e9, above=0)
+    poisson_ratio: float = quantity("Poisson's ratio (steel: 0.3)", default=0.3, least=0, below=0.5)
+    density: float = quantity("density (steel: 7850)", "kg_per_m3", default=7850.0, above=0)
 
     def __post_init__(self) -> None:
         for name in ("young_modulus", "density"):

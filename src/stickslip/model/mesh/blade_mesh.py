@@ -31,9 +31,10 @@ def mesh_blade_pair(geometry: BladePair, contacts: ContactPoints) -> SolidMesh:
     Returns
     -------
     SolidMesh
-        With the sets ``root``, ``contact`` (in the order of `contacts`), ``contact_L1`` and so on
-        (one a line), ``force`` (on blade 1's airfoil, at `force_span`) and ``output`` (tip of blade 1, mid-span
-        leading edge of blade 1, tip of blade 2).
+        With the sets ``root``, ``underside_1`` and ``underside_2`` (nodes at the contact points on the flat and on the
+        curved side, in their order), ``force`` (on blade 1's airfoil, at `force_span`), ``tip1``, ``edge1`` (tip and
+        mid-span leading edge of blade 1) and ``tip2`` (of blade 2). Further ``contact`` (in the order of `contacts`),
+        ``contact_L1`` and so on (one a line) and ``output``.
 
     Raises
     ------
@@ -44,7 +45,7 @@ def mesh_blade_pair(geometry: BladePair, contacts: ContactPoints) -> SolidMesh:
     """
     check_on_undersides(geometry, contacts)
     offset = np.array([geometry.pitch, 0.0, 0.0])
-    on_second = np.array([side == "curved" for side in contacts.side])
+    on_second = np.array([side == "curved" for side in contacts.side], dtype=bool)
     targets = contacts.position - on_second[:, None] * offset
     marks = {
         "force": _section(geometry, geometry.force_span)[7],
@@ -61,6 +62,8 @@ def mesh_blade_pair(geometry: BladePair, contacts: ContactPoints) -> SolidMesh:
     for line in dict.fromkeys(name.split(".")[0] for name in contacts.names):
         sets[f"contact_{line}"] = contact[contacts.on_line(line)]
     sets |= {"force": np.array([force]), "output": np.array([tip, edge, tip + n])}
+    sets |= {"underside_1": contact[~on_second], "underside_2": contact[on_second]}
+    sets |= {"tip1": np.array([tip]), "edge1": np.array([edge]), "tip2": np.array([tip + n])}
     return SolidMesh(np.vstack([points, points + offset]), np.vstack([cells, cells + n]), sets)
 
 

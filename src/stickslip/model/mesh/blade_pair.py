@@ -8,6 +8,7 @@ import math
 from dataclasses import dataclass, fields
 
 from stickslip.errors import InputError, input_error
+from stickslip.units import quantity
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,28 +56,87 @@ class BladePair:
         If a length is not positive or the parts do not fit together.
     """
 
-    pitch: float = 0.056
-    foot_width: float = 0.034
-    foot_depth: float = 0.048
-    foot_height: float = 0.020
-    shank_thickness: float = 0.0132
-    platform_gap: float = 0.001
-    platform_depth: float = 0.048
-    platform_height: float = 0.110
-    platform_edge: float = 0.004
-    flat_angle: float = math.radians(45)
-    curved_angle: float = math.radians(45)
-    airfoil_length: float = 0.160
-    hub_chord: float = 0.046
-    tip_chord: float = 0.040
-    hub_thickness: float = 0.0065
-    tip_thickness: float = 0.0055
-    camber: float = 0.04
-    twist: float = math.radians(8)
-    force_span: float = 0.0
-    airfoil_size: float = 0.0060
-    platform_size: float = 0.0055
-    foot_size: float = 0.0080
+    pitch: float = quantity(
+        "distance of the two blades along x", "m", default=0.056, above=0, most=100
+    )
+    foot_width: float = quantity(
+        "extent of the foot along x", "m", default=0.034, above=0, most=100
+    )
+    foot_depth: float = quantity(
+        "extent of the foot along y", "m", default=0.048, above=0, most=100
+    )
+    foot_height: float = quantity(
+        "extent of the foot along z; its bottom and flanks are clamped",
+        "m",
+        default=0.020,
+        above=0,
+        most=100,
+    )
+    shank_thickness: float = quantity(
+        "extent of the shank along x", "m", default=0.0132, above=0, most=100
+    )
+    platform_gap: float = quantity(
+        "clearance between neighbouring platforms along x", "m", default=0.001, above=0, most=100
+    )
+    platform_depth: float = quantity(
+        "extent of shank and platform along y", "m", default=0.048, above=0, most=100
+    )
+    platform_height: float = quantity(
+        "height of the platform's top above the foot", "m", default=0.110, above=0, most=100
+    )
+    platform_edge: float = quantity(
+        "thickness of the platform at its edges", "m", default=0.004, above=0, most=100
+    )
+    flat_angle: float = quantity(
+        "inclination from x of the underside of blade 1",
+        "deg",
+        default=math.radians(45),
+        above=0,
+        below=90,
+    )
+    curved_angle: float = quantity(
+        "inclination from x of the underside of blade 2",
+        "deg",
+        default=math.radians(45),
+        above=0,
+        below=90,
+    )
+    airfoil_length: float = quantity(
+        "length of the airfoil from the platform to the tip", "m", default=0.160, above=0, most=100
+    )
+    hub_chord: float = quantity(
+        "chord of the airfoil at the platform", "m", default=0.046, above=0, most=100
+    )
+    tip_chord: float = quantity(
+        "chord of the airfoil at the tip", "m", default=0.040, above=0, most=100
+    )
+    hub_thickness: float = quantity(
+        "thickness of the airfoil at the platform", "m", default=0.0065, above=0, most=100
+    )
+    tip_thickness: float = quantity(
+        "thickness of the airfoil at the tip", "m", default=0.0055, above=0, most=100
+    )
+    camber: float = quantity(
+        "height of the camber line over the chord", default=0.04, least=-0.3, most=0.3
+    )
+    twist: float = quantity(
+        "rotation of the tip against the hub", "deg", default=math.radians(8), least=-90, most=90
+    )
+    force_span: float = quantity(
+        "place of the node set force on blade 1's airfoil, a fraction of the span from the hub",
+        default=0.0,
+        least=0,
+        below=0.5,
+    )
+    airfoil_size: float = quantity(
+        "element size in the airfoil", "m", default=0.0060, above=0, most=100
+    )
+    platform_size: float = quantity(
+        "element size in the platform", "m", default=0.0055, above=0, most=100
+    )
+    foot_size: float = quantity(
+        "element size in shank and foot", "m", default=0.0080, above=0, most=100
+    )
 
     def __post_init__(self) -> None:
         for field in fields(self):

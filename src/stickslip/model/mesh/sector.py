@@ -12,6 +12,7 @@ import numpy as np
 from stickslip.arrays import BoolArray, FloatArray
 from stickslip.errors import InputError, input_error
 from stickslip.model.mesh.sector_parts import Airfoil, DiskProfile, Platform, Shroud
+from stickslip.units import quantity, table
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,14 +40,25 @@ class BladedSector:
         If the parts do not fit together, or reach into the neighbours.
     """
 
-    sectors: int = 24
-    disk: DiskProfile = field(default_factory=DiskProfile)
-    platform: Platform | None = field(default_factory=Platform)
-    airfoil: Airfoil = field(default_factory=Airfoil)
-    shroud: Shroud | None = None
-    disk_size: float = 0.012
-    platform_size: float = 0.008
-    airfoil_size: float = 0.010
+    sectors: int = quantity(
+        "number of sectors (blades) of the wheel", default=24, least=3, most=500
+    )
+    disk: DiskProfile = field(default_factory=DiskProfile, metadata=table("the disk"))
+    platform: Platform | None = field(
+        default_factory=Platform,
+        metadata=table("what carries the airfoil; left out: it stands on the rim"),
+    )
+    airfoil: Airfoil = field(default_factory=Airfoil, metadata=table("the blade"))
+    shroud: Shroud | None = field(
+        default=None, metadata=table("a ring segment on the blade; left out: none")
+    )
+    disk_size: float = quantity("element size in the disk", "m", default=0.012, above=0, most=100)
+    platform_size: float = quantity(
+        "element size in platform and shroud", "m", default=0.008, above=0, most=100
+    )
+    airfoil_size: float = quantity(
+        "element size in the airfoil", "m", default=0.010, above=0, most=100
+    )
 
     def __post_init__(self) -> None:
         if self.sectors < 3 or self.sectors % 1:

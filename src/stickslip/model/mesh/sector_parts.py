@@ -7,6 +7,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
+from stickslip.units import quantity
 
 SECTION_POINTS = 7  # on either face of the airfoil
 STEEPEST = math.radians(75)
@@ -35,13 +36,25 @@ class DiskProfile:
         If a length is not positive, or the radii do not follow each other.
     """
 
-    bore_radius: float = 0.060
-    hub_radius: float = 0.095
-    rim_radius: float = 0.170
-    rim_height: float = 0.014
-    bore_width: float = 0.050
-    web_width: float = 0.014
-    rim_width: float = 0.034
+    bore_radius: float = quantity(
+        "inner radius; the bore is clamped", "m", default=0.060, above=0, most=100
+    )
+    hub_radius: float = quantity(
+        "radius where the hub has narrowed to the web", "m", default=0.095, above=0, most=100
+    )
+    rim_radius: float = quantity("outer radius of the disk", "m", default=0.170, above=0, most=100)
+    rim_height: float = quantity(
+        "extent of the rim along the radius", "m", default=0.014, above=0, most=100
+    )
+    bore_width: float = quantity(
+        "extent of the hub along the axis at the bore", "m", default=0.050, above=0, most=100
+    )
+    web_width: float = quantity(
+        "extent of the web along the axis", "m", default=0.014, above=0, most=100
+    )
+    rim_width: float = quantity(
+        "extent of the rim along the axis", "m", default=0.034, above=0, most=100
+    )
 
     def __post_init__(self) -> None:
         _check_lengths(self)
@@ -89,12 +102,26 @@ class Platform:
         If a length is not positive, or the angle is too steep.
     """
 
-    top_radius: float = 0.187
-    thickness: float = 0.004
-    neck_width: float = 0.018
-    depth: float = 0.034
-    underside_angle: float = math.radians(20)
-    gap: float = 0.0008
+    top_radius: float = quantity(
+        "distance of the plane top from the axis", "m", default=0.187, above=0, most=100
+    )
+    thickness: float = quantity("thickness at the sides", "m", default=0.004, above=0, most=100)
+    neck_width: float = quantity(
+        "extent of the neck around the wheel", "m", default=0.018, above=0, most=100
+    )
+    depth: float = quantity(
+        "extent of neck and platform along the axis", "m", default=0.034, above=0, most=100
+    )
+    underside_angle: float = quantity(
+        "inclination of the undersides", "deg", default=math.radians(20), least=0, most=75
+    )
+    gap: float = quantity(
+        "clearance to the neighbour's platform; 0 lets them touch",
+        "m",
+        default=0.0008,
+        least=0,
+        most=100,
+    )
 
     def __post_init__(self) -> None:
         _check_lengths(self, zero=("underside_angle", "gap"))
@@ -124,14 +151,30 @@ class Airfoil:
         If a length is not positive, or a thickness exceeds its chord.
     """
 
-    airfoil_length: float = 0.105
-    hub_chord: float = 0.030
-    tip_chord: float = 0.026
-    hub_thickness: float = 0.0050
-    tip_thickness: float = 0.0028
-    camber: float = 0.08
-    stagger: float = math.radians(15)
-    twist: float = math.radians(25)
+    airfoil_length: float = quantity(
+        "from the platform's top (without platform: from the rim) to the tip",
+        "m",
+        default=0.105,
+        above=0,
+        most=100,
+    )
+    hub_chord: float = quantity("chord at the hub", "m", default=0.030, above=0, most=100)
+    tip_chord: float = quantity("chord at the tip", "m", default=0.026, above=0, most=100)
+    hub_thickness: float = quantity("thickness at the hub", "m", default=0.0050, above=0, most=100)
+    tip_thickness: float = quantity("thickness at the tip", "m", default=0.0028, above=0, most=100)
+    camber: float = quantity(
+        "height of the camber line over the chord", default=0.08, least=-0.3, most=0.3
+    )
+    stagger: float = quantity(
+        "angle of the hub's chord from the axis",
+        "deg",
+        default=math.radians(15),
+        least=-90,
+        most=90,
+    )
+    twist: float = quantity(
+        "rotation of the tip against the hub", "deg", default=math.radians(25), least=-90, most=90
+    )
 
     def __post_init__(self) -> None:
         _check_lengths(self, free=("camber", "stagger", "twist"))
@@ -186,11 +229,25 @@ class Shroud:
         If a length is not positive, the span is outside (0, 1], or the angle is too steep.
     """
 
-    span: float = 1.0
-    thickness: float = 0.004
-    depth: float = 0.026
-    gap: float = 0.0
-    face_angle: float = math.radians(20)
+    span: float = quantity(
+        "place as a fraction of the airfoil's length; 1 is the tip", default=1.0, above=0, most=1
+    )
+    thickness: float = quantity("extent along the radius", "m", default=0.004, above=0, most=100)
+    depth: float = quantity("extent along the axis", "m", default=0.026, above=0, most=100)
+    gap: float = quantity(
+        "clearance to the neighbour's shroud; 0 lets them touch",
+        "m",
+        default=0.0,
+        least=0,
+        most=100,
+    )
+    face_angle: float = quantity(
+        "inclination of the contact faces from the axial plane",
+        "deg",
+        default=math.radians(20),
+        least=-75,
+        most=75,
+    )
 
     def __post_init__(self) -> None:
         _check_lengths(self, zero=("gap",), free=("face_angle",))

@@ -9,6 +9,7 @@ from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
+from stickslip.units import quantity
 
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
 
@@ -32,9 +33,13 @@ class RigidBody:
         If mass or inertia are not positive, or no body can have these moments of inertia.
     """
 
-    mass: float
-    inertia: tuple[float, float, float]
-    centre: tuple[float, float, float]
+    mass: float = quantity("mass of the body", "kg", above=0)
+    inertia: tuple[float, float, float] = quantity(
+        "moments of inertia [x, y, z] about the centre of mass", "kg_m2", above=0
+    )
+    centre: tuple[float, float, float] = quantity(
+        "centre of mass [x, y, z]", "m", least=-100, most=100
+    )
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.mass) and self.mass > 0):

@@ -23,6 +23,7 @@ import numpy as np
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.model.rigid.body import RigidBody
+from stickslip.units import quantity
 
 CURVED_SEGMENTS = 24
 
@@ -84,16 +85,58 @@ class FlatCurvedDamper:
         Centre of mass in metres: offset (x, y, z) from the apex at y = 0.
     """
 
-    apex: tuple[float, float] = (0.028, 0.1065)
-    flat_angle: float = math.radians(45)
-    curved_angle: float = math.radians(45)
-    flat_distances: tuple[float, float] = (0.002, 0.029)
-    curved_distance: float = 0.0045
-    curved_radius: float = 0.05
-    sections: tuple[float, ...] = (-0.016, 0.0, 0.016)
-    mass: float = 0.12
-    inertia: tuple[float, float, float] = (1.89e-5, 9.45e-6, 2.26e-5)
-    centre: tuple[float, float, float] = (-0.0014, 0.0, -0.0134)
+    apex: tuple[float, float] = quantity(
+        "the point [x, z] where the contact planes meet",
+        "m",
+        default=(0.028, 0.1065),
+        least=-100,
+        most=100,
+    )
+    flat_angle: float = quantity(
+        "inclination of the flat side from x", "deg", default=math.radians(45), above=0, below=90
+    )
+    curved_angle: float = quantity(
+        "inclination from x of the plane that touches the curved side",
+        "deg",
+        default=math.radians(45),
+        above=0,
+        below=90,
+    )
+    flat_distances: tuple[float, float] = quantity(
+        "distances of the lines [L1, L2] from the apex, the nearer first",
+        "m",
+        default=(0.002, 0.029),
+        above=0,
+        most=100,
+    )
+    curved_distance: float = quantity(
+        "distance of the line R from the apex", "m", default=0.0045, above=0, most=100
+    )
+    curved_radius: float = quantity(
+        "radius of the curved side", "m", default=0.05, above=0, most=100
+    )
+    sections: tuple[float, ...] = quantity(
+        "axial positions y of the sections, growing; each holds one point a line",
+        "m",
+        default=(-0.016, 0.0, 0.016),
+        least=-100,
+        most=100,
+        entries=(1, 20),
+    )
+    mass: float = quantity("mass of the damper", "kg", default=0.12, above=0)
+    inertia: tuple[float, float, float] = quantity(
+        "moments of inertia [x, y, z] about the centre of mass",
+        "kg_m2",
+        default=(1.89e-5, 9.45e-6, 2.26e-5),
+        above=0,
+    )
+    centre: tuple[float, float, float] = quantity(
+        "centre of mass [x, y, z], from the apex",
+        "m",
+        default=(-0.0014, 0.0, -0.0134),
+        least=-100,
+        most=100,
+    )
 
     def __post_init__(self) -> None:
         for name in ("flat_angle", "curved_angle"):
