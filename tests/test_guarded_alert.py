@@ -10,7 +10,7 @@ from evidence.strategies.truth import low_order_points, truths
 from evidence.validation.models import b6_load, blade_damper_blade
 from stickslip.harmonic.selection import guarded_alert, strategy_named
 from stickslip.harmonic.selection.guarded_alert import doubled, truncated
-from stickslip.response.forced.sweep import forced_problem
+from stickslip.response.forced.problem import forced_problem
 
 HZ = 2 * np.pi
 

@@ -21,7 +21,7 @@ from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
 from stickslip.response.forced.response import Sweep, forced_problem
-from stickslip.response.forced.sweep import forced_point
+from stickslip.response.forced.problem import forced_point
 from stickslip.response.free_motion import drift
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, StepControl, start_point, trace

@@ -316,7 +316,7 @@ def test_supports_stay_between_the_smallest_and_the_reference(name, reference):
 
 @pytest.mark.parametrize("made", RIVALS)
 def test_rivals_take_the_single_passage_and_keep_their_own_threshold(made):
-    name = next(n for n, c in STRATEGIES.items() if c == made.__name__)
+    name = next(n for n, c in STRATEGIES.items() if c[1] == made.__name__)
     sweep = Sweep(omega_range=(1.0, 2.0), selection=name, threshold=0.3)
     assert sweep.single
     assert sweep.strategy == made()

@@ -8,16 +8,17 @@ import numpy as np
 import pytest
 import xarray as xr
 from small_study import write_small_study
-from typer.testing import CliRunner, Result
-
-from stickslip.cli import app
-from stickslip.harmonic.selection import STRATEGIES, strategy_named
 from stickslip.report.choice import choice
 from stickslip.report.figure_harmonics import kept_harmonics
 from stickslip.report.figures_error import errors
 from stickslip.report.result import load_result
 from stickslip.report.summary import headline
-from stickslip.response.forced.sweep import FIXED, Sweep
+from typer.testing import CliRunner, Result
+
+from stickslip.cli import app
+from stickslip.harmonic.selection import STRATEGIES, strategy_named
+from stickslip.harmonic.selection.strategy import always_kept
+from stickslip.response.forced.sweep import Sweep
 from stickslip.study import build
 from stickslip.study import run as run_module
 from stickslip.study.blades import ReducedBlades, reduced_blades
@@ -28,7 +29,8 @@ from stickslip.study.schema import json_schema, read_study
 
 # a damper that slips around the peak, at few frequencies
 SLIPPING = {"ratios": "[20]", "frequency_hz": "[177.6, 179.2]", "points": "4", "peak_points": "0"}
-ALONE = tuple(name for name in STRATEGIES if not strategy_named(name).verifies)
+FIXED = tuple(n for n in STRATEGIES if always_kept(strategy_named(n)))
+ALONE = tuple(n for n in STRATEGIES if n not in FIXED and not strategy_named(n).verifies)
 # one of those that go through the frequencies alone in every run of the tests, the others with the long ones
 JOURNEYS = [
     pytest.param(name, marks=pytest.mark.validation) if name in ALONE[1:] else name
@@ -103,7 +105,7 @@ def test_study_and_library_have_one_default(tmp_path: Path) -> None:
 
 def test_editors_are_offered_every_strategy() -> None:
     key = json.loads(json_schema())["$defs"]["Harmonics"]["properties"]["selection"]
-    assert key["enum"] == [*STRATEGIES, *FIXED]
+    assert key["enum"] == [*STRATEGIES]
     assert all(name in key["description"] for name in SELECTIONS)
 
 

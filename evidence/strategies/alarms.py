@@ -16,7 +16,7 @@ from evidence.strategies.truth import low_order_points, truths
 from evidence.validation.models import b6_load, blade_damper_blade
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
-from stickslip.response.forced.sweep import forced_problem
+from stickslip.response.forced.problem import forced_problem
 
 PAGE = Path(__file__).parents[2] / "docs" / "strategies_alarms.md"
 THRESHOLD = 0.05

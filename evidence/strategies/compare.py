@@ -15,8 +15,9 @@ from evidence.strategies.cases import CASES, SelectionCase
 from evidence.strategies.truth import judging_problem, reference_points
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
 from stickslip.response.forced.accepted import accepted_points
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.forced.response import forced_response
-from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, Passages, forced_point
+from stickslip.response.forced.sweep import Passages
 from stickslip.solve.newton_method import Newton, newton
 
 THRESHOLD = 0.05
@@ -91,8 +92,9 @@ class Comparison:
 
 def entries() -> list[Entry]:
     """Return all strategies: the same harmonics everywhere, those that verify, and those that foretell or step up."""
-    verifying = [n for n in STRATEGIES if strategy_named(n).verifies]
-    others = sorted(n for n in STRATEGIES if n not in verifying)
+    deciding = [n for n in STRATEGIES if n not in (FEW, MANY)]
+    verifying = [n for n in deciding if strategy_named(n).verifies]
+    others = sorted(n for n in deciding if n not in verifying)
     doubles = [Entry(n) for n in verifying]
     return [Entry(FEW), Entry(MANY), *doubles, Entry(PUBLISHED, "single"), *map(Entry, others)]
 

@@ -22,7 +22,7 @@ from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
 from stickslip.harmonic.selection.adjoint import estimate, outputs_of
-from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, forced_problem
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.solve.newton_method import Newton, newton
 
 THRESHOLD = 0.05

@@ -20,8 +20,8 @@ from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.response.forced.accepted import accepted_points
 from stickslip.response.forced.passages import along_branch
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.response.forced.response import forced_response
-from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.solve.newton_method import Newton, newton
 
 NEWTON = Newton(max_iterations=25)

@@ -8,7 +8,7 @@ from stickslip.arrays import ComplexArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.selection.adjoint import Goal, contributions, estimate, outputs_of
 from stickslip.harmonic.support import Harmonics
-from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 
 SINGULAR = 1e-9  # smallest over largest singular value of the balanced Jacobian below which a coordinate counts as undetermined
 

@@ -7,7 +7,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.fourier import to_complex, to_real
-from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.selection.alert import Form, jacobian_alert
 from stickslip.harmonic.support import Harmonics, harmonics_of
-from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 
 SAMPLES_A_HARMONIC = 8
 

@@ -7,8 +7,8 @@ import numpy as np
 import xarray as xr
 
 from stickslip.arrays import IntArray
+from stickslip.response.forced.problem import Stage
 from stickslip.response.forced.response import ForcedPoint
-from stickslip.response.forced.sweep import Stage
 from stickslip.solve.status import Status
 from stickslip.study.collect import HZ, CaseResult, unknowns
 from stickslip.study.netcdf import variable

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.support import Harmonics
 from stickslip.study.harmonics_table import Harmonics as HarmonicsTable
 from stickslip.study.harmonics_table import named
@@ -158,8 +159,8 @@ def chooser_of(table: HarmonicsTable, over: Sequence[str]) -> Chooser:
         single=table.single,
         low=table.low_harmonics,
         high=table.high_harmonics,
-        threshold=float("nan") if strategy is None else float(strategy.threshold),
-        is_error=strategy is not None and strategy.verifies,
+        threshold=float("nan") if always_kept(strategy) else float(strategy.threshold),
+        is_error=strategy.verifies,
         over=tuple(over),
         harmonics=tuple(table.alert_harmonics or ()),
     )

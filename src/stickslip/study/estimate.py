@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from stickslip.errors import input_error
-from stickslip.response.forced.sweep import FIXED
+from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.study.schema import Study
 
 BYTES_A_NODE = 35e3  # assembly and factorisation of second-order tetrahedra, measured at 10 to 30 thousand nodes
@@ -51,12 +51,13 @@ def estimate(study: Study, nodes: int) -> Estimate:
     h = t.harmonics
     grid = t.sweep.frequencies or (t.sweep.points if h.single else POINTS * t.sweep.points)
     points = len(t.loads.ratios) * (grid + t.sweep.peak_points)
-    share_high = {"always_low": 0.0, "always_high": 1.0}.get(h.selection, REPEATED)
+    kept = always_kept(h.strategy)
+    share_high = {"low": 0.0, "high": 1.0, None: REPEATED}[kept]
     low, high = ((2 * len(own) - 1) * coordinates for own in (h.low_harmonics, h.high_harmonics))
     # each strategy looks at the larger space about once a point
-    judged = points if h.selection not in FIXED else 0
+    judged = points if kept is None else 0
     steps_high = points * share_high * NEWTON_A_POINT + judged
-    steps_low = points * NEWTON_A_POINT if h.selection != "always_high" else 0
+    steps_low = points * NEWTON_A_POINT if kept != "high" else 0
     seconds = (steps_low * low**3 + steps_high * high**3) * 4 / FLOPS + nodes * SECONDS_A_NODE
     stored = points * (h.high_harmonics[-1] + 1) * 10 * coordinates * 16 / 1e9
     memory = BASE_GB + nodes * BYTES_A_NODE / 1e9 + stored + 6 * high**2 * 8 / 1e9

@@ -7,15 +7,15 @@ from pydantic import Field, field_validator, model_validator
 
 from stickslip.errors import InputError, did_you_mean
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
-from stickslip.harmonic.selection.strategy import Strategy
+from stickslip.harmonic.selection.strategy import Strategy, always_kept
 from stickslip.harmonic.support import Harmonics as Support
 from stickslip.harmonic.support import harmonics_of, named  # noqa: F401
-from stickslip.response.forced.sweep import FIXED, Passages, Sweep
+from stickslip.response.forced.sweep import Passages, Sweep
 from stickslip.study.messages import custom_error, library_error, shown
 from stickslip.study.sections import Positive, Section
 
 HIGHEST = 30  # harmonic that a study may keep
-SELECTIONS = (*STRATEGIES, *FIXED)
+SELECTIONS = tuple(STRATEGIES)
 DEFAULT_SELECTION = str({f.name: f.default for f in fields(Sweep)}["selection"])
 PLACES = ("along", "outputs", "contacts")
 
@@ -133,10 +133,8 @@ class Harmonics(Section):
         return harmonics_of(self.high)
 
     @property
-    def strategy(self) -> Strategy | None:
-        """What chooses, with this table's threshold where it has one; None where harmonics are the same at every frequency."""
-        if self.selection in FIXED:
-            return None
+    def strategy(self) -> Strategy:
+        """What chooses, with this table's threshold where it has one."""
         strategy = strategy_named(self.selection)
         if strategy.verifies:
             return strategy_named(self.selection, self.alert_threshold_percent / 100)
@@ -154,7 +152,8 @@ class Harmonics(Section):
     def single(self) -> bool:
         """Whether each frequency is settled before the next one."""
         strategy = self.strategy
-        return strategy is not None and (self.passages == "single" or not strategy.verifies)
+        decides = always_kept(strategy) is None
+        return decides and (self.passages == "single" or not strategy.verifies)
 
 
 def _harmonic(given: Any, least: int) -> bool:
@@ -193,7 +192,7 @@ def _check_supports(table: Harmonics) -> None:
 
 def _check_threshold(table: Harmonics) -> None:
     if table.strategy_threshold is not None:
-        if table.selection in FIXED:
+        if always_kept(strategy_named(table.selection)):
             raise custom_error(
                 f"has no meaning for selection = {table.selection!r}, got {table.strategy_threshold:g}",
                 "Remove it: nothing is decided.",

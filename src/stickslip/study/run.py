@@ -179,8 +179,7 @@ def _compile(run: _Run, case: Case) -> None:
     try:
         x = bonded_start(problem.low, omega, case.system)
         problem.low.linearise(x, omega)
-        if problem.strategy is not None:
-            problem.strategy.judge(problem.step(problem.low, x, omega))
+        problem.strategy.judge(problem.step(problem.low, x, omega))
     except NO_SOLUTION:
         return  # the load case says what is wrong
     seconds = perf_counter() - start

@@ -5,17 +5,19 @@ from typing import Any
 
 from stickslip.harmonic.selection.strategy import Strategy
 
-# file → class
+# name → file and class
 STRATEGIES = {
-    "jacobian_alert": "JacobianAlert",
-    "guarded_alert": "GuardedAlert",
-    "goal_oriented": "GoalOriented",
-    "grolet": "Grolet",
-    "jaumouille": "Jaumouille",
-    "laxalde": "Laxalde",
-    "maple": "Maple",
-    "suess_jacobian": "SuessJacobian",
-    "suess_spectral": "SuessSpectral",
+    "jacobian_alert": ("jacobian_alert", "JacobianAlert"),
+    "guarded_alert": ("guarded_alert", "GuardedAlert"),
+    "goal_oriented": ("goal_oriented", "GoalOriented"),
+    "grolet": ("grolet", "Grolet"),
+    "jaumouille": ("jaumouille", "Jaumouille"),
+    "laxalde": ("laxalde", "Laxalde"),
+    "maple": ("maple", "Maple"),
+    "suess_jacobian": ("suess_jacobian", "SuessJacobian"),
+    "suess_spectral": ("suess_spectral", "SuessSpectral"),
+    "always_low": ("fixed", "AlwaysLow"),
+    "always_high": ("fixed", "AlwaysHigh"),
 }
 
 
@@ -29,6 +31,7 @@ def strategy_named(name: str, threshold: float | None = None) -> Strategy:
     threshold
         Indicator above which more harmonics are asked for; None: that of the strategy's source.
     """
-    made: Any = getattr(import_module(f"{__name__}.{name}"), STRATEGIES[name])
+    file, own = STRATEGIES[name]
+    made: Any = getattr(import_module(f"{__name__}.{file}"), own)
     strategy: Strategy = made() if threshold is None else made(threshold=threshold)
     return strategy

@@ -9,7 +9,7 @@ which each frequency is settled, and the harmonics of the next one are chosen, b
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.support import Harmonics
 
+Kept = Literal["low", "high"]
 Solve = Callable[[FloatArray | StructuredJacobian, FloatArray], FloatArray | None]
 
 FLOOR = 1e-3  # dofs moving less than this share of the largest have no meaningful relative error
@@ -166,6 +167,15 @@ class Strategy(Protocol):
     def judge(self, step: Step) -> Verdict:
         """Say what a converged solution needs."""
         ...
+
+
+def always_kept(strategy: Strategy) -> Kept | None:
+    """Return the support that a strategy keeps at every frequency, which then decides nothing; None: it decides.
+
+    It is told by an attribute `always`, which other strategies need not have.
+    """
+    kept: Kept | None = getattr(strategy, "always", None)
+    return kept
 
 
 def check_strategy(strategy: object) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from stickslip.response.forced.sweep import ForcedPoint
+from stickslip.response.forced.problem import ForcedPoint
 
 # relative difference of two vibrations below which a branch has come back to the other
 ALIKE = 0.25

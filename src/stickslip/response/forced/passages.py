@@ -13,8 +13,9 @@ from stickslip.harmonic.selection.strategy import judged
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.equilibrium import bonded_start, preload
 from stickslip.response.forced.accepted import branch_end, reached
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.forced.rescue import homotopies
-from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, Sweep, forced_point
+from stickslip.response.forced.sweep import Sweep
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to
 from stickslip.solve.newton_method import Solution, charged, newton
@@ -55,7 +56,7 @@ def first_passage(
             gap = sweep.forward * sweep.control.largest * sweep.control.scale if points else 0.0
             ahead = reach + gap if _before(sweep, reach + gap, last) else last
             # a single frequency is left to the repeats, which know both sides; a second one in a row to the homotopies
-            left = bool(points) and points[-1].converged and sweep.selection != "always_low"
+            left = bool(points) and points[-1].converged and problem.repeats
             point = fresh_point(problem, load, points, ahead, left, latest)
             point = point if sweep.direction == "up" else reversed_point(point)
         points.append(_low_point(problem, point, len(points), began, latest))
@@ -169,7 +170,7 @@ def _low_point(
     error = np.nan
     asked: Harmonics = ()
     start = np.zeros((0, 0), dtype=complex)
-    if point.solution.status.converged and problem.strategy is not None:
+    if point.solution.status.converged:
         known = latest.known(point.x, point.p)
         left = known.events if isinstance(known, Linearisation) else None
         verdict = judged(problem.strategy, problem.step(problem.low, point.x, point.p, left=left))

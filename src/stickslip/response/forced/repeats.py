@@ -11,8 +11,8 @@ from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation
 from stickslip.harmonic.selection.strategy import judged
 from stickslip.response.forced.passages import along_branch
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.forced.rescue import homotopies
-from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, forced_point
 from stickslip.solve.linear import factorised
 from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Newton, Solution, charged, newton
@@ -131,14 +131,15 @@ def _from_start(
 
 def _predicted(problem: ForcedProblem, point: ForcedPoint) -> list[FloatArray]:
     """Return q + Δq in a list; empty if q is no solution, or the strategy knows no better start."""
-    strategy = problem.strategy
-    if not point.converged or strategy is None:
+    if not point.converged:
         return []
     if point.start.size:
         asked = tuple(int(h) for h in point.asked)
         return [problem.balance(asked).unknowns(point.start)]
     few = problem.balance(point.support)
-    verdict = judged(strategy, problem.step(few, few.unknowns(point.coefficients), point.omega))
+    verdict = judged(
+        problem.strategy, problem.step(few, few.unknowns(point.coefficients), point.omega)
+    )
     if verdict.start is None:
         return []
     return [problem.balance(verdict.again or problem.high.harmonics).unknowns(verdict.start)]

@@ -9,9 +9,9 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.selection.strategy import judged
 from stickslip.response.forced.passages import along_branch
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.forced.repeats import repeat
 from stickslip.response.forced.rescue import homotopies
-from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, forced_point
 from stickslip.solve.continuation import start_point, step_to
 from stickslip.solve.newton_method import Solution, charged
 from stickslip.solve.rescue import solve_robustly
@@ -140,7 +140,7 @@ def _peak_point(
     solution = _between(problem, ends, omega, static)
     made = forced_point(balance, solution, "peak", index, omega, perf_counter() - began)
     strategy = problem.strategy
-    if strategy is None or not strategy.verifies or not made.converged:
+    if not strategy.verifies or not made.converged:
         return made
     if balance is not problem.low:
         return made

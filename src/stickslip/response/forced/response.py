@@ -20,10 +20,11 @@ from stickslip.response.forced.accepted import (
     runs_of_repeats,
 )
 from stickslip.response.forced.passages import first_passage, follow_run
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.response.forced.repeats import passing, postponed, repeat, worth_a_try
 from stickslip.response.forced.resonance import resolve_peak
 from stickslip.response.forced.single_passage import single_passage
-from stickslip.response.forced.sweep import ForcedPoint, ForcedProblem, Sweep, forced_problem
+from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 
 __all__ = [

@@ -12,7 +12,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection.strategy import Step, Verdict, judged
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.forced.passages import along_branch, fresh_point
-from stickslip.response.forced.sweep import (
+from stickslip.response.forced.problem import (
     BRANCH_ITERATIONS,
     ForcedPoint,
     ForcedProblem,
@@ -146,8 +146,6 @@ def _judged(
     if not point.converged:
         # one that is not found may be so because its harmonics are too few
         return None, Verdict(np.nan, reference, problem.sweep.low_harmonics)
-    if problem.strategy is None:
-        return None, Verdict(np.nan, None, point.support)
     balance = problem.balance(point.support)
     x = balance.unknowns(point.coefficients)
     step = replace(problem.step(balance, x, point.omega, following), before=before)

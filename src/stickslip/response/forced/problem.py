@@ -1,0 +1,248 @@
+"""One forced response: the problem set up for both passages, and the points that it consists of."""
+
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.contact.event_integrals import Events
+from stickslip.errors import input_error
+from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.selection.strategy import (
+    ErrorMeasure,
+    Solve,
+    Step,
+    Strategy,
+    always_kept,
+)
+from stickslip.harmonic.support import Harmonics
+from stickslip.response.forced.sweep import Sweep
+from stickslip.response.system import System
+from stickslip.solve.continuation import Following, Point
+from stickslip.solve.krylov import to_tolerance
+from stickslip.solve.newton_method import Solution
+from stickslip.solve.status import Rung, Status
+
+Stage = Literal["low", "high", "branch", "peak"]
+FAINTEST = 1e-6  # excitation over static load: below, the residual tolerance swallows the vibration
+ALERT_TOLERANCE = 1e-6  # relative residual of the alert's step where it is found by iteration
+BRANCH_ITERATIONS = 10  # of a corrector along a branch
+
+
+@dataclass(frozen=True, eq=False)
+class ForcedPoint:
+    """One frequency of a forced response: arrays and numbers only, so that it can be written down and given back.
+
+    Attributes
+    ----------
+    stage
+        ``low``: first passage; ``high``: repeated with more harmonics; ``branch``: on the branch with more harmonics, where
+        repeats failed; ``peak``: added to resolve the peak.
+    index
+        Position in the stage; a ``high`` point has the index of the ``low`` point it repeats, a ``branch`` point that of the
+        first repeat that it replaces.
+    omega
+        Frequency, rad/s.
+    coefficients
+        (order+1, n_retained) complex displacement of the retained coordinates, m.
+    tangent, step, orientation
+        Where the branch goes on (scaled); empty and 0 outside the first passage.
+    status
+        How the solver ended; a point that did not converge is no solution.
+    iterations
+        Newton steps.
+    predicted_error
+        Indicator of the strategy: of an alert the predicted error, as a fraction; NaN where it was not asked.
+    seconds_contact, seconds_linear, seconds_total
+        Time in contact forces, in factorisations, and in all.
+    rescue
+        What it took to find the solution.
+    harmonics
+        Harmonics kept, growing from 0.
+    asked
+        Harmonics with which the strategy wants this frequency solved again; empty: none.
+    start
+        (H+1, n_retained) coefficients from which it is solved again, m; empty: the strategy has none, or asks for nothing.
+    """
+
+    stage: Stage
+    index: int
+    omega: float
+    coefficients: ComplexArray
+    tangent: FloatArray
+    step: float
+    status: Status
+    iterations: int
+    predicted_error: float
+    seconds_contact: float
+    seconds_linear: float
+    seconds_total: float
+    orientation: float = 0.0
+    rescue: Rung = Rung.FULL_STEPS
+    harmonics: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    asked: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    start: ComplexArray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
+
+    @property
+    def order(self) -> int:
+        """Highest harmonic kept at this point."""
+        return int(self.coefficients.shape[0]) - 1
+
+    @property
+    def support(self) -> Harmonics:
+        """Harmonics kept, as a tuple."""
+        return tuple(int(h) for h in self.harmonics)
+
+    @property
+    def converged(self) -> bool:
+        """Whether the point is a solution."""
+        return self.status.converged
+
+
+@dataclass(frozen=True, eq=False)
+class ForcedProblem:
+    """A system under a load, set up for both passages."""
+
+    system: System
+    sweep: Sweep
+    low: HarmonicBalance
+    high: HarmonicBalance
+    others: dict[Harmonics, HarmonicBalance] = field(default_factory=dict)  # made when first needed
+
+    @property
+    def strategy(self) -> Strategy:
+        """How harmonics are chosen."""
+        return self.sweep.strategy
+
+    @property
+    def measure(self) -> ErrorMeasure:
+        """What an error is taken of."""
+        system, chosen = self.system, self.sweep.error_harmonics
+        driven = tuple(h for h, f in sorted(self.low.linear.load.harmonics.items()) if np.any(f))
+        dofs = system.outputs if system.alert_dofs is None else system.alert_dofs
+        return ErrorMeasure(dofs, (driven or (1,)) if chosen is None else tuple(chosen))
+
+    @property
+    def alert_solve(self) -> Solve:
+        """Solver of the alert's enlarged system: that of Newton, but exact enough for an error of a thousandth."""
+        return to_tolerance(self.sweep.newton.linear, ALERT_TOLERANCE).solve
+
+    def balance(self, harmonics: Harmonics) -> HarmonicBalance:
+        """Return the periodic problem with these harmonics."""
+        for own in (self.low, self.high):
+            if own.harmonics == harmonics:
+                return own
+        if harmonics not in self.others:
+            self.others[harmonics] = self.high.with_harmonics(harmonics)
+        return self.others[harmonics]
+
+    def step(
+        self,
+        balance: HarmonicBalance,
+        x: FloatArray,
+        omega: float,
+        next_omega: float | None = None,
+        left: Events | None = None,
+    ) -> Step:
+        """Return a scaled solution of `balance` as a strategy sees it, with the events that its evaluation `left`."""
+        smallest = self.sweep.low_harmonics
+        following = omega if next_omega is None else next_omega
+        return Step(
+            balance,
+            self.high,
+            smallest,
+            x,
+            omega,
+            following,
+            self.measure,
+            self.alert_solve,
+            left=left,
+        )
+
+    def following(self, balance: HarmonicBalance) -> Following:
+        """Return how a branch of `balance` is followed."""
+        weights = np.ones(balance.size)
+        # the static part is left out of the arc length, or it would hide the growth of the vibration
+        weights[: balance.linear.n] = 0.0
+        # along a branch a shorter step is cheaper than a long correction
+        few = replace(
+            self.sweep.newton,
+            max_iterations=min(BRANCH_ITERATIONS, self.sweep.newton.max_iterations),
+        )
+        return Following(newton=few, control=self.sweep.control, weights=weights)
+
+    def alerted(self, point: ForcedPoint) -> bool:
+        """Whether the alert asks for more harmonics at a point of the first passage."""
+        return point.converged and bool(point.predicted_error > self.strategy.threshold)
+
+    @property
+    def repeats(self) -> bool:
+        """Whether a frequency may be solved again with the harmonics of the reference."""
+        return always_kept(self.strategy) != "low"
+
+    def asks_again(self, point: ForcedPoint) -> bool:
+        """Whether a point of the first passage is repeated: alerted, or not found although its neighbours may lead to it."""
+        return (self.repeats and not point.converged) or self.alerted(point)
+
+    def branch_point(self, point: ForcedPoint) -> Point:
+        """Return a point of a branch as one that it goes on from."""
+        x = self.balance(point.support).unknowns(point.coefficients)
+        solution = Solution(x, point.status, 0, 0.0, 0.0, 0.0)
+        return Point(x, point.omega, point.tangent, point.step, solution, point.orientation)
+
+    def real_error(self, point: ForcedPoint, reference: ForcedPoint) -> float:
+        """Return the largest relative error of a point against another at its frequency (eq. 29), a fraction."""
+        linear = self.low.linear
+        rows = min(len(point.coefficients), len(reference.coefficients))
+        motion, exact = (
+            linear.recover(point.omega, p.coefficients[:rows]) for p in (point, reference)
+        )
+        return self.measure.change(motion, exact - motion)[0]
+
+    def amplitude(self, point: ForcedPoint, output: int = 0) -> float:
+        """First-harmonic amplitude of output number `output`, m."""
+        motion = self.low.linear.recover(point.omega, point.coefficients)
+        return float(np.abs(motion[1, self.system.outputs[output]]))
+
+
+def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedProblem:
+    """Set up the forced response of `system` under `load`."""
+    first, reference = sweep.first_harmonics, sweep.high_harmonics
+    for h, force in load.harmonics.items():
+        if h not in first and np.any(force):
+            raise input_error(
+                "HarmonicLoad",
+                f"excites harmonic {h}, but the first passage keeps {', '.join(map(str, first))}",
+                f"Give Sweep(low={h}, high={max(h, reference[-1])}) or more.",
+            )
+    linear = system.condensed(load, reference[-1])
+    low = harmonic_balance(linear, system.interface, first, sweep.samples, sweep.evaluator)
+    dynamic = max(
+        (float(np.max(np.abs(f), initial=0.0)) for f in load.harmonics.values()), default=0.0
+    )
+    if 0.0 < dynamic < FAINTEST * low.force_scale:
+        raise input_error(
+            "HarmonicLoad",
+            f"the excitation of {dynamic:.3g} N is less than a millionth of the static load or preload of {low.force_scale:.3g} N, "
+            "too faint for the tolerance of the solver",
+            "Solve the stuck structure, which is linear, or raise the excitation.",
+        )
+    return ForcedProblem(system, sweep, low, low.with_harmonics(reference))
+
+
+def forced_point(
+    balance: HarmonicBalance,
+    solution: Solution,
+    stage: Stage,
+    index: int,
+    omega: float,
+    seconds: float,
+) -> ForcedPoint:
+    """Return a solution as a point of the response."""
+    return ForcedPoint(
+        stage, index, omega, balance.coefficients(solution.x), np.zeros(0), 0.0, solution.status, solution.iterations,
+        np.nan, solution.seconds_contact, solution.seconds_linear, seconds, rescue=solution.rung,
+        harmonics=np.array(balance.harmonics),
+    )  # fmt: skip
