@@ -3,9 +3,9 @@
 from .contributions import HarmonicContributions as HarmonicContributions
 from .contributions import harmonic_contributions as harmonic_contributions
 from .forced.accepted import accepted_points as accepted_points
-from .forced.sweep import ForcedPoint as ForcedPoint
-from .forced.sweep import ForcedProblem as ForcedProblem
-from .forced.sweep import forced_problem as forced_problem
+from .forced.problem import ForcedPoint as ForcedPoint
+from .forced.problem import ForcedProblem as ForcedProblem
+from .forced.problem import forced_problem as forced_problem
 from .free_motion import Drift as Drift
 from .free_motion import drift as drift
 from .parameter import Discretisation as Discretisation
