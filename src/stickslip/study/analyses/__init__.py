@@ -1,1 +1,8 @@
-"""The questions that a study asks, one file each."""
+"""The questions that a study may ask, one line each: name of the table -> module and its instance."""
+
+ANALYSES = {
+    "forced_response": "stickslip.study.analyses.forced_response:FORCED_RESPONSE",
+    "modes": "stickslip.study.analyses.modes:MODES",
+    "campbell": "stickslip.study.analyses.campbell:CAMPBELL",
+    "safe": "stickslip.study.analyses.safe:SAFE",
+}

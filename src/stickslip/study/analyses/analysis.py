@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
 import xarray as xr
 
 from stickslip.assembly.model import Model
+from stickslip.study.analyses import ANALYSES
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,6 +145,13 @@ class Analysis(Protocol):
     def summary(self, data: xr.Dataset) -> "tuple[TextTable, ...]":
         """Return what the terminal prints of a dataset."""
         ...
+
+
+def named(name: str) -> Analysis:
+    """Return an analysis of `ANALYSES`; its module is imported now, not before."""
+    module, _, instance = ANALYSES[name].partition(":")
+    found: Analysis = getattr(import_module(module), instance)
+    return found
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 import os
 import shutil
 import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -17,7 +17,6 @@ OWN = (
     RESULT,
     f"{RESULT}.part",
     REPORT,
-    LOG_FILE,
     *(f"{JOBS}/*{end}" for end in (AT_WORK, SEALED, f"{AT_WORK}-journal")),
     f"{PARTS}/*.npz",
     f"{PARTS}/*.npz.part",
@@ -46,9 +45,7 @@ def locked_folder(folder: Path) -> Iterator[None]:
         lock.close()
 
 
-def empty_folder(
-    folder: Path, own: Sequence[str] = (), spared: frozenset[Path] = frozenset()
-) -> None:
+def empty_folder(folder: Path, own: Sequence[str] = (), spared: Container[Path] = ()) -> None:
     """Remove what runs write, and no other file.
 
     Parameters

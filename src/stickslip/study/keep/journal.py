@@ -98,6 +98,11 @@ class JobJournal:
         with _named(self._path):
             return _note(self._db, name)
 
+    def notes(self) -> dict[str, dict[str, Any]]:
+        """Return all notes by name."""
+        with _named(self._path):
+            return _notes(self._db)
+
     def seal(self) -> None:
         """Close the file and give it the name of a finished job."""
         self._db.close()

@@ -4,9 +4,11 @@ Records of progress carry ``fraction`` (0 to 1) and ``job`` (what is being compu
 """
 
 import logging
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from pathlib import Path
 
 from stickslip.errors import StickslipError
 
@@ -32,3 +34,28 @@ def at_work(job: str) -> Iterator[None]:
         yield
     finally:
         _JOB.reset(token)
+
+
+@contextmanager
+def written_down(path: Path) -> Iterator[None]:
+    """Write all lines of a run to a file; what tells progress alone stays out."""
+    handler = logging.FileHandler(path, encoding="utf-8")
+    formatter = logging.Formatter("%(asctime)s %(warning)s%(message)s", "%Y-%m-%dT%H:%M:%S+00:00")
+    formatter.converter = time.gmtime
+    handler.setFormatter(formatter)
+    handler.addFilter(_line)
+    level = LOG.level
+    LOG.addHandler(handler)
+    LOG.setLevel(min(LOG.getEffectiveLevel(), logging.INFO))
+    try:
+        yield
+    finally:
+        LOG.setLevel(level)
+        LOG.removeHandler(handler)
+        handler.close()
+
+
+def _line(record: logging.LogRecord) -> bool:
+    """Say whether a record is a line of its own, and mark warnings."""
+    record.warning = "WARNING: " if record.levelno >= logging.WARNING else ""
+    return not hasattr(record, "fraction")

@@ -1,0 +1,129 @@
+"""What a run has found, put together: the only place that makes a result of what jobs have left."""
+
+import json
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from stickslip.study.analyses.analysis import Analysis, Case, Solved, TextTable
+from stickslip.study.keep.journal import read_note, read_sealed
+from stickslip.study.keep.netcdf import variable
+from stickslip.study.keep.progress import LOG
+from stickslip.study.keep.provenance import Provenance
+
+UNSOLVED, CHECKED = "no solution", "checks"  # notes that the runner itself puts down
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a run has found.
+
+    Parameters
+    ----------
+    tree
+        A node an analysis; attributes of the root say where it comes from.
+    summaries
+        Of each analysis, what the terminal prints.
+    warnings
+        In words.
+    failed
+        Number of points without a solution.
+    files
+        Of the run; the result first.
+    """
+
+    tree: xr.DataTree
+    summaries: dict[str, tuple[TextTable, ...]]
+    warnings: tuple[str, ...]
+    failed: int
+    files: tuple[Path, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """One case of one analysis, and the file of its job."""
+
+    analysis: Analysis
+    case: Case
+    sealed: Path
+
+    def finished(self) -> bool:
+        """Whether nothing is left to do: the job is sealed, and has had the checks."""
+        if not self.sealed.exists():
+            return False
+        return not self.case.checks or self.case.checks <= checked(read_note(self.sealed, CHECKED))
+
+
+def checked(note: Mapping[str, Any] | None) -> frozenset[str]:
+    """Return the checks that a job has had, by its note."""
+    return frozenset() if note is None else frozenset(map(str, note["names"]))
+
+
+@dataclass(frozen=True, eq=False)
+class Book:
+    """What is finished so far, put together."""
+
+    origin: Provenance
+    solved: dict[Path, tuple[list[Any], dict[str, dict[str, Any]]]] = field(default_factory=dict)
+    nodes: dict[str, xr.Dataset] = field(default_factory=dict)
+    doubts: dict[str, list[str]] = field(default_factory=dict)
+
+    def read(self, tasks: Sequence[Task], unfinished: Container[Path]) -> None:
+        """Put together the nodes of the analyses of which jobs have been sealed since."""
+        for asked in {t.analysis.name: t.analysis for t in tasks}.values():
+            own = [t for t in tasks if t.analysis is asked and t.sealed not in unfinished]
+            new = {t.sealed for t in own} - self.solved.keys()
+            self.solved.update({path: read_sealed(path, asked.record) for path in new})
+            if new:
+                self.enter(asked, [Solved(t.case, *self.solved[t.sealed]) for t in own])
+
+    def enter(self, asked: Analysis, solved: Sequence[Solved]) -> None:
+        """Make the node of an analysis from what its cases have found."""
+        node = asked.dataset(solved).assign(case_variables([s.case for s in solved]))
+        unsolved = [s.notes[UNSOLVED]["text"] for s in solved if UNSOLVED in s.notes]
+        doubts = [*json.loads(node.attrs.get("warnings", "[]")), *unsolved]
+        for text in doubts:
+            if text not in self.warnings:
+                LOG.warning(text)
+        self.doubts[asked.name] = doubts
+        failed = int(node.attrs.get("failed", 0)) + len(unsolved)
+        self.nodes[asked.name] = node.assign_attrs(warnings=json.dumps(doubts), failed=failed)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Those of all analyses, each once."""
+        return tuple(dict.fromkeys(text for own in self.doubts.values() for text in own))
+
+    def tree(self, *, complete: bool) -> xr.DataTree:
+        """Return the tree of all nodes, with what it comes from."""
+        attributes = self.origin.attributes(self.warnings, complete=complete)
+        root = xr.Dataset(attrs=attributes)
+        return xr.DataTree.from_dict({"/": root, **self.nodes})
+
+    def outcome(self, asked: Sequence[Analysis]) -> Outcome:
+        """Return what a run has found that has answered everything it was asked."""
+        return Outcome(
+            tree=self.tree(complete=True),
+            summaries={a.name: a.summary(self.nodes[a.name]) for a in asked},
+            warnings=self.warnings,
+            failed=sum(int(self.nodes[a.name].attrs["failed"]) for a in asked),
+            files=(),
+        )
+
+
+def case_variables(cases: Sequence[Case]) -> dict[str, Any]:
+    """Return the label of each case, and the values of the varied keys if there are any."""
+    found: dict[str, Any] = {
+        "case_label": variable("case", [c.label for c in cases], "1", "what is varied")
+    }
+    keys = list(cases[0].values)
+    if keys:
+        rows = [[case.values[key] for key in keys] for case in cases]
+        numeric = all(isinstance(v, int | float) for row in rows for v in row)
+        rows = [[float(v) if numeric else str(v) for v in row] for row in rows]
+        found["vary_value"] = variable("case vary", rows, "1", "values of the varied keys")
+        found["vary"] = variable("vary", keys, "1", "varied keys")
+    return found
