@@ -47,6 +47,11 @@ class InputError(StickslipError):
         """What to do about it, arguments by their names."""
         return Template(self._advice).safe_substitute(self.words) if self.words else self._advice
 
+    @property
+    def argument(self) -> str:
+        """What of an object is wrong, where the place is ``Object.argument``; empty for the object as a whole."""
+        return self.place.partition(".")[2]
+
     def __str__(self) -> str:
         own = f"{self.place}: {self.problem}. {self.remedy}"
         return "\n".join([own, *map(str, self.others)])

@@ -69,7 +69,7 @@ class Dahl:
         "friction force at which all has slipped, along either tangent",
         "n",
         key="slip_limit",
-        above=0,
+        least=0,
         shared=True,
     )
     k_w: float = quantity(

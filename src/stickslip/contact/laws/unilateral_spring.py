@@ -33,7 +33,7 @@ class UnilateralSpring:
     """
 
     k_n: float = quantity(
-        "stiffness along the normal", "n_per_m", key="normal_stiffness", above=0, shared=True
+        "stiffness along the normal", "n_per_m", key="normal_stiffness", least=0, shared=True
     )
     preload: float = 0.0
     initial_gap: float = 0.0

@@ -1,0 +1,168 @@
+"""From what pydantic found to sentences that name the file, the key, the value got and a remedy."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, get_args, get_origin
+
+from pydantic import BaseModel, Tag, ValidationError
+from pydantic_core import ErrorDetails
+
+from stickslip.errors import InputError, did_you_mean, input_error, together
+from stickslip.study.file.section import shown
+
+NO_ABOUT = "a value of the kind that the example of 'stickslip new' shows"
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A place in a study file.
+
+    Parameters
+    ----------
+    keys
+        As the file has them.
+    owner
+        Model of the table that holds the last key; None for what lies in no table of fixed keys.
+    about
+        What the last key means.
+    """
+
+    keys: tuple[str, ...]
+    owner: type[BaseModel] | None
+    about: str
+
+
+def told(
+    place: str,
+    model: type[BaseModel],
+    error: ValidationError,
+    renamed: Mapping[str, str] | None = None,
+) -> InputError:
+    """Return one error that tells each problem: ``FILE: table.key: problem, got VALUE. REMEDY``.
+
+    Parameters
+    ----------
+    place
+        The file.
+    model
+        Of the whole file.
+    error
+        What pydantic found.
+    renamed
+        Keys that come from elsewhere: ``load.shaker.ratio`` -> ``vary.load.shaker.ratio``.
+    """
+    found = (
+        _told(place, model, details, renamed or {}) for details in error.errors(include_url=False)
+    )
+    return together({str(one): one for one in found}.values())
+
+
+def _told(
+    place: str, model: type[BaseModel], details: ErrorDetails, renamed: Mapping[str, str]
+) -> InputError:
+    spot = spot_at(model, details["loc"])
+    context: dict[str, Any] = details.get("ctx", {})
+    keys = spot.keys
+    if details["type"] == "stickslip":
+        keys = (*keys, *filter(None, [context["key"]]))
+        problem, remedy = context["problem"], context["remedy"]
+    else:
+        problem, remedy = _problem(spot, details, context)
+    where = ".".join(keys)
+    for key, other in renamed.items():
+        if where == key or where.startswith((f"{key}.", f"{key}[")):
+            where = other
+    return input_error(f"{place}: {where}" if where else place, problem, remedy)
+
+
+def spot_at(model: type[BaseModel], path: Sequence[str | int]) -> Spot:
+    """Return the place that pydantic's path leads to: names of alternatives left out, places in lists in brackets."""
+    here: Any = model
+    keys: list[str] = []
+    owner, about = None, NO_ABOUT
+    for part in path:
+        here, owns = _opened(here, part)
+        if owns is None:  # the name of an alternative, which is no key of the file
+            continue
+        if isinstance(part, int):
+            keys[-1:] = [f"{keys[-1] if keys else ''}[{part}]"]
+            continue
+        keys.append(part)
+        owner = owns if isinstance(owns, type) else None
+        field = owner.model_fields.get(part) if owner is not None else None
+        about = (field.description if field is not None else None) or NO_ABOUT
+    return Spot(tuple(keys), owner, about)
+
+
+def _opened(here: Any, part: str | int) -> tuple[Any, type[BaseModel] | bool | None]:
+    """Return the annotation below `here` at `part`, and the table that holds it; None in its place if `part` names an alternative."""
+    tagged = alternatives(here)
+    if part in tagged:
+        return tagged[str(part)], None
+    for one in _plain(here):
+        if isinstance(one, type) and issubclass(one, BaseModel):
+            field = one.model_fields.get(str(part))
+            return (None, one) if field is None else (_whole(field), one)
+        if get_origin(one) in (dict, list, tuple):
+            return get_args(one)[-1], True
+    return None, True
+
+
+def _whole(field: Any) -> Any:
+    """Return a field's annotation with what pydantic took out of it."""
+    if field.metadata:
+        return Annotated[field.annotation, *field.metadata]
+    return field.annotation
+
+
+def _plain(annotation: Any) -> list[Any]:
+    """Return an annotation and what it is one of, ``Annotated`` taken off."""
+    if get_origin(annotation) is Annotated:
+        return _plain(get_args(annotation)[0])
+    if get_origin(annotation) in (dict, list, tuple) or not get_args(annotation):
+        return [annotation]
+    return [p for inner in get_args(annotation) for p in _plain(inner)]
+
+
+def alternatives(annotation: Any) -> dict[str, Any]:
+    """Return the tagged members of a union by their tags."""
+    if get_origin(annotation) is Annotated:
+        inner, *metadata = get_args(annotation)
+        tags = {m.tag: inner for m in metadata if isinstance(m, Tag)}
+        return tags or alternatives(inner)
+    found: dict[str, Any] = {}
+    if get_origin(annotation) not in (dict, list, tuple):
+        for inner in get_args(annotation):
+            found |= alternatives(inner)
+    return found
+
+
+def _problem(spot: Spot, details: ErrorDetails, context: dict[str, Any]) -> tuple[str, str]:
+    kind, got = details["type"], shown(details["input"])
+    if kind == "missing":
+        return "is missing", f"Add it: {spot.about}."
+    if kind == "extra_forbidden":
+        known = [] if spot.owner is None else list(spot.owner.model_fields)
+        return f"unknown key {spot.keys[-1]!r}", did_you_mean(spot.keys[-1], known)
+    if kind == "literal_error":
+        known = context["expected"].replace("'", "").replace(" or ", ", ").split(", ")
+        return f"is not known, got {got}", did_you_mean(str(details["input"]), known)
+    if kind == "finite_number":
+        return f"must be a finite number, got {got}", f"Give {spot.about}."
+    if kind in ("too_long", "too_short"):
+        return f"has the wrong number of entries, got {got}", f"Give {spot.about}."
+    if kind.endswith("model_type") or kind in ("model_attributes_type", "dict_type"):
+        return f"must be a table, got {got}", f"Give {spot.about}."
+    said = details["msg"]
+    for of_pydantic, ours in _WORDS:
+        said = said.replace(of_pydantic, ours)
+    return f"{said[0].lower()}{said[1:]}, got {got}", f"Give {spot.about}."
+
+
+_WORDS = (
+    ("Input should be", "must be"),
+    ("a valid ", "a "),
+    ("integer", "whole number"),
+    ("string", "text"),
+    ("list", "list of values"),
+)

@@ -1,0 +1,199 @@
+"""Tables made from the dataclasses that they become: keys, units, ranges and defaults are told once, by the dataclass."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import MISSING, Field, fields, is_dataclass
+from functools import cache
+from types import NoneType
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+
+import pydantic
+from pydantic import create_model, model_validator
+
+from stickslip.errors import InputError
+from stickslip.study.file.section import Section, custom_error
+from stickslip.units import Quantity, quantity_of
+
+IN_WORDS = {
+    "m": "m", "m2": "m²", "m4": "m⁴", "deg": "degrees", "kg": "kg", "kg_m2": "kg m²", "kg_per_m3": "kg/m³",
+    "pa": "Pa", "n": "N", "n_per_m": "N/m", "n_per_m3": "N/m³", "n_per_m5": "N/m⁵", "m_per_s": "m/s",
+}  # fmt: skip
+Column = tuple[Any, Any]  # annotation and pydantic's field
+
+
+def table_of(
+    cls: type,
+    *,
+    base: type[Section] = Section,
+    without: Collection[str] = (),
+    optional: Collection[str] = (),
+    name: str = "",
+    **more: Column,
+) -> type[Section]:
+    """Return the table of a dataclass whose fields tell their quantities; it refuses what the dataclass refuses.
+
+    Parameters
+    ----------
+    cls
+        The dataclass.
+    base
+        What the table is a section of.
+    without
+        Fields that are no keys.
+    optional
+        Fields that may be left out and then come from elsewhere; the table is not judged as a whole where they are.
+    name
+        Of the table's class; that of `cls` if empty.
+    more
+        Further keys.
+    """
+    columns = columns_of(cls, without=without, optional=optional)
+
+    def fits(table: Section) -> Section:
+        if not without and all(_given(table, cls, name) for name in optional):
+            refused_by(cls, lambda: build(cls, table))
+        return table
+
+    return create_model(
+        name or cls.__name__,
+        __base__=base,
+        __doc__=(cls.__doc__ or "").partition("\n")[0],
+        __validators__={"fits": model_validator(mode="after")(fits)},
+        **columns,
+        **more,
+    )
+
+
+def columns_of(
+    cls: type,
+    *,
+    without: Collection[str] = (),
+    optional: Collection[str] = (),
+    per_area: bool = False,
+) -> dict[str, Any]:
+    """Return the keys that the quantities of a dataclass make, each with its annotation and what pydantic knows of it."""
+    hints = get_type_hints(cls)
+    return {
+        q.key_of(entry.name, per_area=per_area): _column(
+            entry, q, hints[entry.name], entry.name in optional, per_area
+        )
+        for entry, q in quantities_of(cls)
+        if entry.name not in without
+    }
+
+
+@cache
+def quantities_of(cls: type) -> tuple[tuple[Field[Any], Quantity], ...]:
+    """Return the fields of a dataclass that are quantities."""
+    found = ((entry, quantity_of(entry)) for entry in fields(cls))
+    return tuple((entry, q) for entry, q in found if q is not None)
+
+
+def build(cls: type, table: Section, *, per_area: bool = False, **given: Any) -> Any:
+    """Return the dataclass that a table describes, in SI; `given` are fields that do not come from the table, or instead of it."""
+    hints = get_type_hints(cls)
+    for entry, q in quantities_of(cls):
+        if entry.name in given:
+            continue
+        value = getattr(table, q.key_of(entry.name, per_area=per_area), None)
+        if value is not None:
+            given[entry.name] = _in_si(value, q, hints[entry.name])
+        elif _inner(hints[entry.name]) is not hints[entry.name] and is_dataclass(
+            _inner(hints[entry.name])
+        ):
+            given[entry.name] = None  # a table that is left out is not there
+    return cls(**given)
+
+
+def refused_by(cls: type, make: Any) -> Any:
+    """Return what `make` makes of `cls`; its complaint about a field becomes one about the key."""
+    try:
+        return make()
+    except InputError as error:
+        raise custom_error(error.problem, error.remedy, key_path(cls, error.argument)) from None
+
+
+def key_path(cls: type, argument: str) -> str:
+    """Return the keys of the field ``a.b`` of a dataclass; empty where there is none."""
+    keys = []
+    for name in filter(None, argument.split(".")):
+        found = {entry.name: q for entry, q in quantities_of(cls)} if is_dataclass(cls) else {}
+        if name not in found:
+            break
+        keys.append(found[name].key_of(name))
+        cls = _inner(get_type_hints(cls)[name])
+    return ".".join(keys)
+
+
+def _given(table: Section, cls: type, name: str) -> bool:
+    key = next(q.key_of(entry.name) for entry, q in quantities_of(cls) if entry.name == name)
+    return getattr(table, key) is not None
+
+
+def _column(entry: Field[Any], q: Quantity, hint: Any, optional: bool, per_area: bool) -> Column:
+    kind, about = _inner(hint), _about(q, per_area)
+    if is_dataclass(kind):
+        left_out = None if entry.default_factory is not MISSING or hint is not kind else ...
+        nested = table_of(kind) if isinstance(kind, type) else kind
+        return (nested if left_out is ... else nested | None), pydantic.Field(
+            left_out, description=f"the table of it: {about}"
+        )
+    annotation = _annotation(kind, q)
+    default = ... if entry.default is MISSING else entry.default
+    if optional or default is None or hint is not kind:
+        annotation = annotation | None
+        default = None if optional or default is ... else default
+    elif default is not ... and q.factor != 1.0:
+        default = round(default / q.factor, 12)
+    if isinstance(default, tuple):
+        default = list(default)
+    return annotation, pydantic.Field(default, description=about)
+
+
+def _annotation(kind: Any, q: Quantity) -> Any:
+    if get_origin(kind) is tuple:
+        inner, *rest = get_args(kind)
+        least, most = q.entries if Ellipsis in rest else (1 + len(rest), 1 + len(rest))
+        return Annotated[
+            list[_annotation(inner, q)],  # type: ignore[misc]
+            pydantic.Field(min_length=least, max_length=most or 100),
+        ]
+    if q.choices:
+        return Literal[q.choices]
+    limits = {"gt": q.above, "ge": q.least, "lt": q.below, "le": q.most}
+    return Annotated[kind, pydantic.Field(**{k: v for k, v in limits.items() if v is not None})]
+
+
+def _inner(hint: Any) -> Any:
+    """Return a type without ``| None``."""
+    kinds = [kind for kind in get_args(hint) if kind is not NoneType]
+    return kinds[0] if NoneType in get_args(hint) and len(kinds) == 1 else hint
+
+
+def _in_si(value: Any, q: Quantity, hint: Any) -> Any:
+    if isinstance(value, Section):
+        return build(_inner(hint), value)
+    if isinstance(value, list):
+        return tuple(_in_si(v, q, hint) for v in value)
+    return value * q.factor if q.factor != 1.0 else value
+
+
+def _about(q: Quantity, per_area: bool) -> str:
+    """Return what a key means: the quantity, its unit, its range."""
+    unit = q.key_of("", per_area=per_area).removeprefix(q.key).removeprefix("_")
+    texts = [q.about + (f" in {IN_WORDS.get(unit, unit)}" if unit else ""), _range(q)]
+    return ", ".join(filter(None, texts))
+
+
+def _range(q: Quantity) -> str:
+    if q.choices:
+        return ", ".join(q.choices[:-1]) + f" or {q.choices[-1]}"
+    low = f"above {q.above:g}" if q.above is not None else ""
+    low = f"from {q.least:g}" if q.least is not None else low
+    high = f"below {q.below:g}" if q.below is not None else ""
+    high = f"to {q.most:g}" if q.most is not None else high
+    return "greater than zero" if low == "above 0" and not high else f"{low} {high}".strip()
+
+
+def shared_fields(cls: type) -> Mapping[str, Quantity]:
+    """Return the quantities of a law that are shared among the points of an interface."""
+    return {entry.name: q for entry, q in quantities_of(cls) if q.shared}

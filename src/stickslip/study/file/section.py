@@ -1,0 +1,50 @@
+"""What all tables of a study file have in common."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+from pydantic_core import PydanticCustomError
+
+LONGEST_VALUE = 60  # characters of a value that a message shows
+
+Positive = Annotated[float, Field(gt=0)]
+Count = Annotated[int, Field(ge=1, le=1000)]
+FilePath = Annotated[str, Field(min_length=1, max_length=500)]  # relative to the study's folder
+Name = Annotated[str, Field(min_length=1, max_length=100)]
+
+
+class Section(BaseModel):
+    """A table of the study file: unknown keys, non-finite numbers and quiet conversions are refused."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+def custom_error(problem: str, remedy: str, key: str = "") -> PydanticCustomError:
+    """Return the error that a validator of this package raises; `key` is the one at fault if it judges a whole table."""
+    context = {"problem": problem, "remedy": remedy, "key": key}
+    return PydanticCustomError("stickslip", "{problem}. {remedy}", context)
+
+
+def shown(value: object) -> str:
+    """Return `value` as a message shows it: cut when long."""
+    text = repr(value)
+    return text if len(text) <= LONGEST_VALUE else text[: LONGEST_VALUE - 3] + "..."
+
+
+def rising_pair(values: Sequence[float], key: str, what: str = "frequency") -> None:
+    """Refuse a pair that does not rise."""
+    if len(values) == 2 and not values[0] < values[1]:
+        raise custom_error(
+            f"must be the lower before the higher, got {list(values)}",
+            f"Give the lower {what} first.",
+            key,
+        )
+
+
+def once(values: Sequence[object], key: str) -> None:
+    """Refuse a list that holds an entry twice."""
+    if len(set(values)) < len(values):
+        raise custom_error(
+            f"holds an entry twice, got {shown(list(values))}", "Give every one once.", key
+        )
