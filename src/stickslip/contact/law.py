@@ -6,12 +6,16 @@ signature, and takes the step as a first-class function; a law of a user's scrip
 """
 
 from collections.abc import Callable
-from typing import Any, Protocol, runtime_checkable
+from dataclasses import fields, replace
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numba
+import numpy as np
 from numba import types
 
 from stickslip.arrays import FloatArray
+from stickslip.errors import input_error
+from stickslip.units import quantity_of
 
 STICK, SLIP, OPEN = 0, 1, 2  # what a step says of each tangent
 
@@ -55,6 +59,41 @@ class ContactLaw(Protocol):
     def stuck_stiffness(self) -> FloatArray:
         """Return the (3,) stiffnesses t, w, n of the contact that neither slips nor opens, N/m."""
         ...
+
+
+Law = TypeVar("Law", bound=ContactLaw)
+
+
+def scaled(law: Law, factor: float) -> Law:
+    """Return the law whose forces are `factor` times those of `law`: a share of an interface, or a pressure times an area.
+
+    Parameters
+    ----------
+    law
+        A dataclass whose force-like fields are marked as shared (`stickslip.units.quantity`); a field ``preload`` always is one.
+    factor
+        Above zero.
+
+    Raises
+    ------
+    InputError
+        If the factor is not 1 and no field is marked.
+    """
+    if factor == 1.0:
+        return law
+    changed: dict[str, Any] = {}
+    for entry in fields(law):  # type: ignore[arg-type]
+        known, value = quantity_of(entry), getattr(law, entry.name)
+        if value is not None and (entry.name == "preload" or (known is not None and known.shared)):
+            own = np.asarray(value) * factor
+            changed[entry.name] = tuple(own.tolist()) if own.ndim else float(own)
+    if not changed:
+        raise input_error(
+            type(law).__name__,
+            "does not say which of its parameters are shared among contact points",
+            "Mark stiffnesses and forces with quantity(..., shared=True), or give the law of each point.",
+        )
+    return replace(law, **changed)  # type: ignore[type-var]
 
 
 @runtime_checkable

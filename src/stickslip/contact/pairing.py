@@ -33,6 +33,7 @@ LISTED = 5  # points that a message names
 RIM = 1e-6  # overhang that is rounding, as a share of a facet's size
 
 Outside = Literal["error", "skip"]
+Direction = FloatArray | tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +69,7 @@ class Pairing:
         return len(self.weights)
 
 
-def contact_frames(normal: FloatArray, direction: FloatArray | tuple[float, ...]) -> FloatArray:
+def contact_frames(normal: FloatArray, direction: Direction) -> FloatArray:
     """Return right-handed frames (p, 3, 3), columns t, w, n.
 
     Parameters
@@ -76,22 +77,22 @@ def contact_frames(normal: FloatArray, direction: FloatArray | tuple[float, ...]
     normal
         (p, 3) unit normals.
     direction
-        (3,) its part in the tangent plane gives t.
+        (3,), or (p, 3) one a point: its part in the tangent plane gives t.
 
     Raises
     ------
     InputError
         If the direction is parallel to a normal.
     """
-    along = np.asarray(direction, dtype=float)
-    length = np.linalg.norm(along)
-    t = along - (normal @ along)[:, None] * normal
+    along = np.broadcast_to(np.asarray(direction, dtype=float), normal.shape)
+    length = np.linalg.norm(along, axis=1)
+    t = along - np.einsum("pc,pc->p", normal, along)[:, None] * normal
     size = np.linalg.norm(t, axis=1)
-    if not size.min(initial=np.inf) > PARALLEL * length or not length > 0:
+    if not np.all((size > PARALLEL * length) & (length > 0)):
         worst = int(np.argmin(size))
         raise input_error(
             "direction of t",
-            f"{tuple(float(x) for x in along)} is parallel to the normal {np.round(normal[worst], 6).tolist()} of point {worst}",
+            f"{tuple(float(x) for x in along[worst])} is parallel to the normal {np.round(normal[worst], 6).tolist()} of point {worst}",
             "Give a direction that is nowhere normal to the surface of body A.",
         )
     t = t / size[:, None]
@@ -103,7 +104,7 @@ def node_to_node(
     b: Surface,
     *,
     tolerance: float,
-    direction: tuple[float, float, float] = (1.0, 0.0, 0.0),
+    direction: Direction = (1.0, 0.0, 0.0),
     outside: Outside = "error",
 ) -> Pairing:
     """Pair each node of side A with the nearest node of side B: for matching meshes.
@@ -115,7 +116,7 @@ def node_to_node(
     tolerance
         Largest distance of partners, m.
     direction
-        Its part in the tangent plane is the tangent t.
+        Its part in the tangent plane is the tangent t; one for all nodes of A, or (n, 3).
     outside
         What to do about nodes of A without a partner: ``"error"`` or ``"skip"``.
 
@@ -143,7 +144,7 @@ def node_to_node(
             f"nodes {mine} of side A have the same nearest node {_numbers(b, np.array([shared]))[0]} of side B",
             "The meshes do not match: use node_to_segment or segment_to_segment.",
         )
-    frames = contact_frames(a.node_normals()[nodes], direction)
+    frames = contact_frames(a.node_normals()[nodes], _of_nodes(direction, nodes))
     one = np.ones((len(nodes), 1))
     return _pairing(
         frames,
@@ -161,7 +162,7 @@ def node_to_segment(
     *,
     reach: float | None = None,
     tolerance: float | None = None,
-    direction: tuple[float, float, float] = (1.0, 0.0, 0.0),
+    direction: Direction = (1.0, 0.0, 0.0),
     outside: Outside = "error",
 ) -> Pairing:
     """Pair each node of side A with its closest point on the facets of side B: for non-matching meshes.
@@ -177,7 +178,7 @@ def node_to_segment(
     tolerance
         Distance in m by which a node may stand beyond the rim of side B; None: nothing but rounding.
     direction
-        Its part in the tangent plane is the tangent t.
+        Its part in the tangent plane is the tangent t; one for all nodes of A, or (n, 3).
     outside
         What to do about nodes of A without a partner: ``"error"`` or ``"skip"``.
 
@@ -186,8 +187,9 @@ def node_to_segment(
     InputError
         If a node has no partner on side B.
     """
-    _need_facets("node_to_segment", a, b)
-    radius_a, radius_b = facet_balls(a)[1], facet_balls(b)[1]
+    _need_facets("node_to_segment", b)
+    radius_b = facet_balls(b)[1]
+    radius_a = facet_balls(a)[1] if len(a.facets) else radius_b
     reach = float(max(radius_a.max(), radius_b.max())) if reach is None else reach
     tolerance = RIM * float(radius_b.min()) if tolerance is None else tolerance
     nodes = a.used
@@ -205,7 +207,7 @@ def node_to_segment(
     kept, facet, reference = nodes[~lost], feet.facet[~lost], feet.reference[~lost]
     facets = b.facets[facet]
     return _pairing(
-        contact_frames(outward[~lost], direction),
+        contact_frames(outward[~lost], _of_nodes(direction, kept)),
         a.points[kept],
         positions(b.points, facets, reference),
         (a.weighted(kept[:, None], np.ones((len(kept), 1))), b.at(facet, reference)),
@@ -220,7 +222,7 @@ def segment_to_segment(
     *,
     reach: float | None = None,
     degree: int | None = None,
-    direction: tuple[float, float, float] = (1.0, 0.0, 0.0),
+    direction: Direction = (1.0, 0.0, 0.0),
     outside: Outside = "error",
 ) -> Pairing:
     """Pair quadrature points on the common pieces of both sides' facets: "Mortar-like" contact.
@@ -325,6 +327,10 @@ def _pairing(
     return Pairing(operator, places, frames, weights, gap, unpaired)
 
 
+def _of_nodes(direction: Direction, nodes: IntArray) -> Direction:
+    return direction[nodes] if isinstance(direction, np.ndarray) and direction.ndim > 1 else direction
+
+
 def _numbers(surface: Surface, nodes: IntArray) -> list[int]:
     assert surface.numbers is not None
     return [int(number) for number in surface.numbers[nodes]]
@@ -358,7 +364,7 @@ def _without_facet(a: Surface, left: IntArray, reach: float) -> InputError:
 
 
 def _need_facets(place: str, *sides: Surface) -> None:
-    for name, side in zip("AB", sides, strict=True):
+    for name, side in zip("AB"[-len(sides) :], sides, strict=True):
         if len(side.facets) == 0:
             raise input_error(
                 place, f"side {name} has no facets", "Give facets, or pair by node_to_node."

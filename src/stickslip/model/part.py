@@ -1,14 +1,24 @@
 """What a model is put together from: a structure with named surfaces, its place, and, if it is a sector, of how many."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from typing import Any
 
-from stickslip.arrays import FloatArray
+import numpy as np
+
+from stickslip.arrays import BoolArray, FloatArray
+from stickslip.errors import input_error
 from stickslip.model.axis import Axis
-from stickslip.model.fe.rotation import RotatingSolid
+from stickslip.model.fe.elements import EXACT, Quadrature
+from stickslip.model.fe.rotation import RotatingSolid, rotating_solid
+from stickslip.model.fe.solid import Materials
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.rigid.body import RigidBody
+from stickslip.model.rigid.damper import FlatCurvedDamper
 from stickslip.model.structure import Structure
+
+FACES = ("cyclic_low", "cyclic_high")
+Z_AXIS = Axis()
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,11 +33,25 @@ class BodyPoints:
         (p, 3) in m, global axes.
     frame
         (p, 3, 3) columns t, w, n; n points out of the body.
+
+    Raises
+    ------
+    InputError
+        If the numbers of names, positions and frames differ.
     """
 
     names: tuple[str, ...]
     position: FloatArray
     frame: FloatArray
+
+    def __post_init__(self) -> None:
+        p = len(self.names)
+        if self.position.shape != (p, 3) or self.frame.shape != (p, 3, 3):
+            raise input_error(
+                "BodyPoints",
+                f"{p} names, positions {self.position.shape}, frames {self.frame.shape}",
+                "Give (p, 3) positions and (p, 3, 3) frames.",
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,10 +64,43 @@ class Place:
         (3, 3) orthogonal matrix; a mirror has determinant -1.
     move
         (3,) in m.
+
+    Raises
+    ------
+    InputError
+        If the matrix is not orthogonal.
     """
 
     turn: FloatArray
     move: FloatArray
+
+    def __post_init__(self) -> None:
+        turn, move = np.asarray(self.turn, dtype=float), np.asarray(self.move, dtype=float)
+        if turn.shape != (3, 3) or move.shape != (3,) or not np.allclose(turn @ turn.T, np.eye(3)):
+            raise input_error(
+                "Place",
+                f"turn {turn.tolist()} with move {move.tolist()} is no rigid placement",
+                "Give an orthogonal (3, 3) matrix and three metres.",
+            )
+        object.__setattr__(self, "turn", turn)
+        object.__setattr__(self, "move", move)
+
+    def put(self, points: FloatArray) -> FloatArray:
+        """Return where points (n, 3) come to."""
+        return np.asarray(points @ self.turn.T + self.move)
+
+    @property
+    def mirrors(self) -> bool:
+        """Whether left becomes right."""
+        return bool(np.linalg.det(self.turn) < 0)
+
+    def keeps(self, axis: Axis) -> bool:
+        """Whether it is a turn about an axis, with a move along it: then the axis is to the copy what it was to the original."""
+        origin = np.asarray(axis.origin, dtype=float)
+        near = np.linalg.norm(axis.arm(self.put(origin[None]))) <= 1e-12 * (
+            1 + np.linalg.norm(origin)
+        )
+        return bool(near and not self.mirrors and np.allclose(self.turn @ axis.unit, axis.unit))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -71,9 +128,9 @@ class Part:
     n_modes
         Fixed-interface modes kept in the reduction; None: the part is not reduced.
     damping_ratio, between
-        Rayleigh damping: the ratio at two circular frequencies (rad/s); zero for none.
+        Rayleigh damping: the ratio at two circular frequencies (rad/s); zero: the structure's own damping.
     template, place
-        Of a copy: the part it copies, whose reduction it shares, and where it stands.
+        Of a copy: the part it copies, whose reduction it shares, and where it stands; `copy_of` makes one.
     warnings
         What the user should know.
     """
@@ -84,7 +141,7 @@ class Part:
     body: RigidBody | None = None
     surfaces: Mapping[str, BodyPoints] = field(default_factory=dict)
     sectors: int = 1
-    faces: tuple[str, str] = ("cyclic_low", "cyclic_high")
+    faces: tuple[str, str] = FACES
     axis: Axis = field(default_factory=Axis)
     n_modes: int | None = None
     damping_ratio: float = 0.0
@@ -92,3 +149,77 @@ class Part:
     template: "Part | None" = None
     place: Place | None = None
     warnings: tuple[str, ...] = ()
+    memo: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)  # its reductions
+
+    def __repr__(self) -> str:
+        """Return what it is in a line."""
+        kind = "rigid body" if self.body else "mesh" if self.mesh else "matrices"
+        words = [kind, f"{self.structure.n} dofs"]
+        if self.sectors > 1:
+            words.append(f"one of {self.sectors} sectors")
+        if self.template is not None:
+            words.append("a copy")
+        if self.n_modes is not None:
+            words.append(f"{self.n_modes} modes kept")
+        names = self.names
+        more = ", ..." if len(names) > 8 else ""
+        return f"<Part: {'; '.join(words)}; {', '.join(names[:8])}{more}>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave what can be computed again behind."""
+        own = {f.name: getattr(self, f.name) for f in fields(self)}
+        return own | {"memo": {}}
+
+    @property
+    def names(self) -> list[str]:
+        """Names of its surfaces, node sets and sets of dofs."""
+        sets = {} if self.mesh is None else self.mesh.node_sets
+        return list(dict.fromkeys([*self.surfaces, *sets, *self.structure.sets]))
+
+
+def solid_part(
+    mesh: SolidMesh,
+    material: Materials,
+    axis: Axis = Z_AXIS,
+    *,
+    clamped: tuple[str, ...] = ("root",),
+    held: BoolArray | None = None,
+    quadrature: Quadrature = EXACT,
+    **others: Any,
+) -> Part:
+    """Return a part of finite elements.
+
+    Parameters
+    ----------
+    mesh, material, axis, clamped, held, quadrature
+        As in `rotating_solid`.
+    **others
+        Further fields of `Part`: ``sectors``, ``faces``, ``n_modes``, ``damping_ratio``, ``between``, ``warnings``.
+    """
+    solid = rotating_solid(
+        mesh, material, axis, clamped=clamped, held=held, quadrature=quadrature
+    )
+    return Part(structure=solid.structure, mesh=mesh, solid=solid, axis=axis, **others)
+
+
+def structure_part(structure: Structure, **others: Any) -> Part:
+    """Return a part of matrices: lumped masses, a beam, what a reader found; `others` as of `solid_part`, and ``mesh`` for pictures."""
+    return Part(structure=structure, **others)
+
+
+def rigid_part(
+    body: RigidBody, surfaces: Mapping[str, BodyPoints] | None = None, **others: Any
+) -> Part:
+    """Return a rigid part, with its contact surfaces by name."""
+    return Part(structure=body.structure(), body=body, surfaces=dict(surfaces or {}), **others)
+
+
+def flat_curved_part(damper: FlatCurvedDamper, **others: Any) -> Part:
+    """Return a damper with the surfaces ``flat`` (points L1 and L2) and ``curved`` (points R)."""
+    points = damper.contact_points()
+    surfaces = {}
+    for side in ("flat", "curved"):
+        own = [i for i, word in enumerate(points.side) if word == side]
+        names = tuple(points.names[i] for i in own)
+        surfaces[side] = BodyPoints(names, points.position[own], points.frame[own])
+    return rigid_part(damper.body(), surfaces, **others)

@@ -1,0 +1,408 @@
+"""Contacts of a model as pairs of points, on the dofs of all parts: gaps, frames, areas, and each point's share of the law."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse
+from scipy.spatial import cKDTree
+
+from stickslip.arrays import FloatArray, Matrix
+from stickslip.assembly.contact import GROUND, NEXT, Contact, Join
+from stickslip.assembly.places import NO_FACETS, Places, Spot
+from stickslip.contact.law import ContactLaw, scaled
+from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
+from stickslip.contact.laws.unilateral_spring import UnilateralSpring
+from stickslip.contact.pairing import (
+    Pairing,
+    node_to_node,
+    node_to_segment,
+    segment_to_segment,
+)
+from stickslip.contact.surface import Surface
+from stickslip.errors import InputError, input_error
+from stickslip.model.axis import Axis
+
+NEAR = 1e-6  # m: partners node to node
+SQUARE = 0.3  # sine of the angle with a normal, above which a direction will do for t
+ROWS = {"tangential": 0, "normal": 2}
+
+
+@dataclass(frozen=True)
+class Turn:
+    """How the next sector lies to this one.
+
+    Parameters
+    ----------
+    sectors
+        Of the wheel.
+    axis
+        None where a turn changes no coordinate.
+    """
+
+    sectors: int
+    axis: Axis | None
+
+    @property
+    def matrix(self) -> FloatArray:
+        """(3, 3) rotation of vectors by one pitch."""
+        if self.axis is None:
+            return np.eye(3)
+        return self.axis.rotation(2 * np.pi / self.sectors)
+
+    def points(self, points: FloatArray) -> FloatArray:
+        """Return points (n, 3) of this sector as those of the next."""
+        return (
+            points if self.axis is None else self.axis.turned(points, 2 * np.pi / self.sectors)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Contact points, on N dofs.
+
+    Parameters
+    ----------
+    own, following
+        (3 p, N) CSR rows t, w, n: ``gap = own u + following u_next``, the second for the next sector's dofs in its own axes.
+    names, groups
+        Of each point, and the contact that it belongs to.
+    laws
+        Of each point, its share of the contact's.
+    position, frame, area
+        (p, 3) in m, (p, 3, 3) columns t, w, n, (p,) in m²; NaN where there is none.
+    warnings
+        What the user should know.
+    """
+
+    own: Matrix
+    following: Matrix
+    names: tuple[str, ...]
+    groups: tuple[str, ...]
+    laws: tuple[ContactLaw, ...]
+    position: FloatArray
+    frame: FloatArray
+    area: FloatArray
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def circles(self) -> bool:
+        """Whether a contact leads to the next sector."""
+        return bool(self.following.nnz)
+
+
+def pair_contacts(places: Places, contacts: Mapping[str, Contact], turn: Turn | None) -> Pairs:
+    """Pair the points of all contacts.
+
+    Parameters
+    ----------
+    places
+        What the names mean.
+    contacts
+        By name.
+    turn
+        Of the wheel that the model is a sector of; None for none.
+
+    Raises
+    ------
+    InputError
+        Naming the contact and what is wrong with it.
+    """
+    n = places.n
+    found = [one_contact(places, name, contact, turn) for name, contact in contacts.items()]
+    names = [name for pairs in found for name in pairs.names]
+    if len(set(names)) < len(names):  # the points of two bodies may have the same names
+        names = [f"{g}.{x}" for p in found for g, x in zip(p.groups, p.names, strict=True)]
+
+    def stacked(which: str, empty: Any) -> FloatArray:
+        return np.concatenate([empty, *(getattr(pairs, which) for pairs in found)])
+
+    rows = [scipy.sparse.csr_array((0, n))]
+    return Pairs(
+        scipy.sparse.vstack([*rows, *(p.own for p in found)], format="csr"),
+        scipy.sparse.vstack([*rows, *(p.following for p in found)], format="csr"),
+        tuple(names),
+        tuple(group for p in found for group in p.groups),
+        tuple(law for p in found for law in p.laws),
+        stacked("position", np.zeros((0, 3))),
+        stacked("frame", np.zeros((0, 3, 3))),
+        stacked("area", np.zeros(0)),
+        tuple(text for p in found for text in p.warnings),
+    )
+
+
+def one_contact(places: Places, name: str, contact: Contact, turn: Turn | None) -> Pairs:
+    """Pair the points of one contact."""
+    key = f"contact.{name}"
+    first, second, ahead = sides(places, key, contact, turn)
+    law = _at_rest(key, contact)
+    if first.surface is None or (second is not None and second.surface is None):
+        return _single_dofs(places, name, contact, law, first, second, ahead)
+    pairing = _paired(key, contact, law, first, second, ahead)
+    n, p = places.n, pairing.n_points
+    operator = scipy.sparse.csr_array(pairing.gap_operator)
+    has_area = contact.pairing == "segment_to_segment" or _whole(first.surface)
+    area = pairing.weights if has_area else np.full(p, np.nan)
+    _refuse_held(key, operator)
+    labels = first.labels if len(first.labels) == p else tuple(f"{name}.{i + 1}" for i in range(p))
+    warnings: tuple[str, ...] = ()
+    if contact.pairing != "node_to_node" and len(first.surface.facets):
+        lost = len(first.surface.points) - len(first.surface.used)
+        if lost:
+            text = f"{key}: {lost} nodes of {first.name} span no facet and take no part."
+            warnings = (text,)
+    return Pairs(
+        operator[:, :n],
+        operator[:, n:] if ahead else scipy.sparse.csr_array((3 * p, n)),
+        labels,
+        (name,) * p,
+        _shared(key, contact, law, area),
+        pairing.positions,
+        pairing.frames,
+        area,
+        warnings,
+    )
+
+
+def sides(
+    places: Places, key: str, contact: Contact | Join, turn: Turn | None
+) -> tuple[Spot, Spot | None, Turn | None]:
+    """Return both sides of a contact or join, None for the ground, and the turn of the second where it is the next sector's."""
+    one, two = contact.between
+    place = f"{key}.between"
+    if one.startswith(NEXT) or one == GROUND:
+        raise input_error(place, f"has {one!r} as its first side", "Let it be the second one.")
+    first = places.spot(one, place)
+    if two == GROUND:
+        return first, None, None
+    second = places.spot(two.removeprefix(NEXT), place)
+    if not two.startswith(NEXT):
+        return first, second, None
+    if turn is None or places.parts[second.part].sectors == 1 and places.parts[second.part].mesh:
+        raise input_error(
+            place,
+            f"has {two!r}, and {second.part!r} is no sector of a wheel",
+            f"Leave {NEXT!r} out, or give the part its number of sectors.",
+        )
+    return first, second, turn
+
+
+def _paired(
+    key: str, contact: Contact, law: ContactLaw, first: Spot, second: Spot | None, turn: Turn | None
+) -> Pairing:
+    """Pair two surfaces; the dofs of the next sector follow those of this one where there is a turn."""
+    assert first.surface is not None
+    a, b = widened(first.surface, second, turn)
+    with_normals = _with_normals(key, contact, first, a, second, b)
+    along = _direction(key, contact, law, first, with_normals, second, b)
+    if b is None:
+        empty = scipy.sparse.csr_array(with_normals.displacement.shape)
+        b = Surface(with_normals.points, empty, NO_FACETS)
+        return named(key, contact, lambda: node_to_node(with_normals, b, tolerance=NEAR, direction=along))
+    return named(key, contact, lambda: match(contact, with_normals, b, along))
+
+
+def match(contact: Contact | Join, a: Surface, b: Surface, along: Any) -> Pairing:
+    """Pair two surfaces as a contact or join says."""
+    reach = contact.tolerance
+    if contact.pairing == "node_to_node":
+        return node_to_node(a, b, tolerance=NEAR if reach is None else reach, direction=along)
+    if contact.pairing == "node_to_segment":
+        return node_to_segment(a, b, reach=reach, tolerance=None if reach is None else reach / 10, direction=along)
+    return segment_to_segment(a, b, reach=reach, direction=along)
+
+
+def widened(
+    first: Surface, second: Spot | None, turn: Turn | None
+) -> tuple[Surface, Surface | None]:
+    """Return both surfaces, the second turned to where the next sector has it, on the dofs of this sector and then of the next."""
+    if second is None:
+        return first, None
+    b = second.surface
+    assert b is not None
+    if turn is None:
+        return first, b
+    empty = [scipy.sparse.csr_array(s.displacement.shape) for s in (first, b)]
+    turned = scipy.sparse.kron(scipy.sparse.eye_array(len(b.points)), turn.matrix) @ b.displacement
+    own = scipy.sparse.hstack([first.displacement, empty[0]], format="csr")
+    theirs = scipy.sparse.hstack([empty[1], turned], format="csr")
+    normals = None if b.normals is None else b.normals @ turn.matrix.T
+    return (
+        replace(first, displacement=own),
+        Surface(turn.points(b.points), theirs, b.facets, normals, b.numbers),
+    )
+
+
+def named(key: str, contact: Contact | Join, pair: Any) -> Pairing:
+    """Say of which contact a complaint is."""
+    try:
+        found: Pairing = pair()
+    except InputError as error:
+        one, two = contact.between
+        raise error.inside(f"{key} (side A: {one}, side B: {two})") from None
+    return found
+
+
+def _whole(surface: Surface) -> bool:
+    """Whether facets hold all points."""
+    return bool(len(surface.facets)) and len(surface.used) == len(surface.points)
+
+
+def _with_normals(
+    key: str, contact: Contact, first: Spot, a: Surface, second: Spot | None, b: Surface | None
+) -> Surface:
+    """Return side A with its normals: of its own frames or facets, or against those of side B."""
+    if first.frame is not None:
+        return replace(a, normals=first.frame[:, :, 2])
+    if _whole(a) or (len(a.facets) and contact.pairing != "node_to_node"):
+        return a
+    if len(a.facets):  # some of the nodes span facets: the others take the normal of the nearest one
+        near = a.used[cKDTree(a.points[a.used]).query(a.points)[1]]
+        return replace(a, facets=NO_FACETS, normals=a.node_normals()[near])
+    theirs = None if second is None or b is None else _normals_of(second, b)
+    if theirs is None:
+        raise input_error(
+            f"{key}.between",
+            f"{first.name!r} spans no facet, and nothing else tells where its normal points",
+            "Name a set that holds whole facets of a mesh, let the first side be the body with known normals, or name single dofs "
+            "with acts.",
+        )
+    points, normals = theirs
+    return replace(a, normals=-normals[cKDTree(points).query(a.points)[1]])
+
+
+def _normals_of(spot: Spot, surface: Surface) -> tuple[FloatArray, FloatArray] | None:
+    if spot.frame is not None:
+        return surface.points, spot.frame[:, :, 2]
+    if not len(surface.facets):
+        return None
+    return surface.points[surface.used], surface.node_normals()[surface.used]
+
+
+def _direction(
+    key: str,
+    contact: Contact,
+    law: ContactLaw,
+    first: Spot,
+    a: Surface,
+    second: Spot | None,
+    b: Surface | None,
+) -> Any:
+    """Return the direction of t: the contact's, that of the frames, or any where that makes no difference."""
+    if contact.tangent is not None:
+        return contact.tangent
+    if first.frame is not None:
+        return first.frame[:, :, 0]
+    if second is not None and second.frame is not None and b is not None:
+        return second.frame[cKDTree(b.points).query(a.points)[1], :, 0]
+    stiffness = None if isinstance(law, RigidCoulomb) else law.stuck_stiffness()
+    if stiffness is not None and stiffness[0] != stiffness[1]:
+        raise input_error(
+            f"{key}.tangent",
+            f"is missing, and the law has {stiffness[0]:g} N/m along t and {stiffness[1]:g} N/m along w",
+            "Give the direction whose part in the contact plane is t.",
+        )
+    normals = a.node_normals()[a.used]
+    sines = [np.linalg.norm(np.cross(normals, axis), axis=1).min() for axis in np.eye(3)]
+    good = [i for i, sine in enumerate(sines) if sine > SQUARE] or [int(np.argmax(sines))]
+    return tuple(float(x) for x in np.eye(3)[good[0]])
+
+
+def _refuse_held(key: str, operator: Matrix) -> None:
+    if not operator.nnz:
+        raise input_error(
+            f"{key}.between",
+            "no point of the contact can move: its nodes are clamped",
+            "Name a surface that moves, or clamp less.",
+        )
+
+
+def _single_dofs(
+    places: Places,
+    name: str,
+    contact: Contact,
+    law: ContactLaw,
+    first: Spot,
+    second: Spot | None,
+    turn: Turn | None,
+) -> Pairs:
+    """Pair single dofs, in the order in which they are named."""
+    key = f"contact.{name}"
+    one, two = first.dofs, first.dofs[:0] if second is None else second.dofs
+    if first.surface is not None or (second is not None and len(one) != len(two)):
+        raise input_error(
+            f"{key}.between",
+            f"{contact.between[0]!r} is not of the kind of {contact.between[1]!r}: single dofs and points, or of another number",
+            "Pair single dofs with as many single dofs or the ground.",
+        )
+    if contact.acts is None:
+        raise input_error(
+            f"{key}.acts",
+            f"is missing: {first.name!r} is a single dof, which has no normal",
+            'Say what its relative motion is to the contact: acts = "normal" or "tangential".',
+        )
+    p, n = len(one), places.n
+    row = 3 * np.arange(p) + ROWS[contact.acts]
+
+    def rows(dofs: Any, sign: float) -> Matrix:
+        return scipy.sparse.csr_array((np.full(len(dofs), sign), (row[: len(dofs)], dofs)), (3 * p, n))
+
+    own, theirs = rows(one, -1.0), rows(two, 1.0)
+    names = (name,) if p == 1 else tuple(f"{name}.{i + 1}" for i in range(p))
+    area = np.full(p, np.nan)
+    return Pairs(
+        own if turn is not None else own + theirs,
+        theirs if turn is not None else rows(two[:0], 1.0),
+        names,
+        (name,) * p,
+        _shared(key, contact, law, area),
+        np.full((p, 3), np.nan),
+        np.tile(np.eye(3), (p, 1, 1)),
+        area,
+    )
+
+
+def _at_rest(key: str, contact: Contact) -> ContactLaw:
+    """Return the law with the contact's preload and gap in it."""
+    law: Any = contact.law
+    if contact.preload == 0.0 and contact.gap == 0.0:
+        return contact.law
+    if isinstance(law, RigidCoulomb) and contact.preload == 0.0:
+        return replace(law, initial_gap=law.initial_gap + contact.gap)
+    if getattr(law, "preload", None) is None or not hasattr(law, "k_n"):
+        what = "preload" if contact.preload else "gap"
+        raise input_error(
+            f"{key}.{what}",
+            f"the law {type(law).__name__} has none: its normal force does not depend on how far the bodies are apart",
+            "Choose a law that lifts off, such as elastic_coulomb, or leave it out.",
+        )
+    pressed = law.preload + contact.preload - law.k_n * contact.gap
+    if isinstance(law, UnilateralSpring) and pressed < 0.0:
+        return replace(law, preload=0.0, initial_gap=law.initial_gap - pressed / law.k_n)
+    found: ContactLaw = replace(law, preload=pressed)
+    return found
+
+
+def _shared(
+    key: str, contact: Contact, law: ContactLaw, area: FloatArray
+) -> tuple[ContactLaw, ...]:
+    """Return the law of each point."""
+    p, known = len(area), bool(np.all(np.isfinite(area)))
+    if contact.share == "point":
+        return (law,) * p
+    if contact.share == "interface":
+        factors = area / area.sum() if known else np.full(p, 1.0 / p)
+    elif known:
+        factors = area
+    else:
+        raise input_error(
+            f"{key}.law",
+            f"is given per area, and the points of {contact.between[0]!r} have none: they span no facets",
+            "Give the law of the whole interface or of a point, or name a set that holds whole facets.",
+        )
+    made: dict[float, ContactLaw] = {}
+    try:
+        return tuple(made.setdefault(f, scaled(law, f)) for f in map(float, factors))
+    except InputError as error:
+        raise error.inside(f"{key}.law") from None

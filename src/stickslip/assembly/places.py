@@ -1,0 +1,215 @@
+"""What the names of a model mean: surfaces, node sets, nodes, single dofs, as places on the dofs of all parts."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.contact.surface import Surface, nodal_surface, rigid_surface
+from stickslip.errors import did_you_mean, input_error
+from stickslip.model.dofs import Dofs, join_dofs
+from stickslip.model.mesh.mesh_facets import facets_of
+from stickslip.model.part import BodyPoints, Part
+
+AXES = ("x", "y", "z")
+COMPONENTS = (*AXES, "rx", "ry", "rz")
+_DOF = re.compile(r"(?:node(\d+)\.)?(\w+)")
+_NODE = re.compile(r"node(\d+)")
+NO_FACETS = np.zeros((0, 3), dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """What a name of a model means.
+
+    Parameters
+    ----------
+    name
+        ``part.set`` and the like.
+    part
+        Name of the part.
+    surface
+        Points that move along x, y, z, with operators on the dofs of all parts; None for single dofs.
+    dofs
+        (k,) single dofs; empty for points.
+    frame
+        (p, 3, 3) columns t, w, n that belong to the points; None where facets tell the normals.
+    labels
+        Names of the points; empty: they have none.
+    nodes
+        (p, 3) dofs of points that are nodes, -1 where they are held; None for points of rigid bodies.
+    """
+
+    name: str
+    part: str
+    surface: Surface | None
+    dofs: IntArray
+    frame: FloatArray | None = None
+    labels: tuple[str, ...] = ()
+    nodes: IntArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """The dofs of all parts side by side, and what stands where.
+
+    Parameters
+    ----------
+    parts
+        By name.
+    """
+
+    parts: Mapping[str, Part]
+
+    @cached_property
+    def dofs(self) -> Dofs:
+        """Table of all dofs."""
+        return join_dofs({name: part.structure.dofs for name, part in self.parts.items()})
+
+    @property
+    def n(self) -> int:
+        """Number of dofs."""
+        return sum(part.structure.n for part in self.parts.values())
+
+    def offset(self, name: str) -> int:
+        """Return the first dof of a part."""
+        names = list(self.parts)
+        return sum(self.parts[other].structure.n for other in names[: names.index(name)])
+
+    def own(self, name: str) -> IntArray:
+        """Return the dofs of a part."""
+        first = self.offset(name)
+        return np.arange(first, first + self.parts[name].structure.n)
+
+    def part_of(self, name: str, place: str) -> Part:
+        """Return a part by name; `place` is the key that names it."""
+        if name not in self.parts:
+            known = list(self.parts)
+            raise input_error(place, f"there is no part {name!r}", did_you_mean(name, known))
+        return self.parts[name]
+
+    def spot(self, name: str, place: str) -> Spot:
+        """Return what a name means.
+
+        Parameters
+        ----------
+        name
+            ``part`` (a rigid body: its centre), ``part.surface``, ``part.set``, ``part.node12``, ``part.node12.x``, ``part.rx``.
+        place
+            Key of the model that holds the name, for messages.
+
+        Raises
+        ------
+        InputError
+            If there is no such thing; the message says what is near.
+        """
+        head, _, rest = name.partition(".")
+        part = self.part_of(head, place)
+        if not rest:
+            return self._centre(head, part, place)
+        found = None
+        if rest in part.surfaces:
+            found = self._body_points(name, head, part, part.surfaces[rest])
+        elif part.mesh is not None and rest in part.mesh.node_sets:
+            found = self._mesh_nodes(name, head, part.mesh.node_sets[rest])
+        elif rest in part.structure.sets:
+            found = self._dof_set(name, head, part.structure.sets[rest])
+        else:
+            found = self._node(name, head, rest) or self._dof(name, head, rest)
+        if found is None:
+            known = [f"{head}.{word}" for word in part.names]
+            remedy = did_you_mean(name, known) if known else "The part has no sets."
+            raise input_error(place, f"there is no surface or set {name!r}", remedy)
+        return found
+
+    def _centre(self, head: str, part: Part, place: str) -> Spot:
+        if part.body is None:
+            raise input_error(
+                place,
+                f"{head!r} is a part that is not rigid",
+                f"Name one of its sets: {', '.join(part.names) or 'it has none'}.",
+            )
+        frame = np.eye(3)[None]
+        point = BodyPoints((head,), np.array([part.body.centre], dtype=float), frame)
+        return self._body_points(head, head, part, point)
+
+    def _body_points(self, name: str, head: str, part: Part, points: BodyPoints) -> Spot:
+        assert part.body is not None
+        own = self.own(head)
+        surface = rigid_surface(part.body, points.position, own, self.n, NO_FACETS)
+        return Spot(name, head, surface, own[:0], points.frame, points.names)
+
+    def _mesh_nodes(self, name: str, head: str, nodes: IntArray) -> Spot:
+        mesh = self.parts[head].mesh
+        assert mesh is not None
+        facets = facets_of(mesh, nodes)
+        place = np.full(len(mesh.points), -1)
+        place[nodes] = np.arange(len(nodes))
+        return self._nodal(name, head, mesh.numbers[nodes], mesh.points[nodes], place[facets])
+
+    def _dof_set(self, name: str, head: str, members: IntArray) -> Spot:
+        table = self.parts[head].structure.dofs
+        node, component = table.node[members], np.array(table.component)[members]
+        along = np.isin(component, AXES) & (node >= 0)
+        first = np.sort(np.unique(node[along], return_index=True)[1])
+        numbers = node[along][first]
+        if 2 * numbers.size > np.count_nonzero(along):  # no node moves in two directions
+            return Spot(name, head, None, self.offset(head) + members)
+        position = table.position[members[along]][first]
+        return self._nodal(name, head, numbers, position, NO_FACETS)
+
+    def _node(self, name: str, head: str, rest: str) -> Spot | None:
+        found, table = _NODE.fullmatch(rest), self.parts[head].structure.dofs
+        members = table.node == int(found[1]) if found else np.zeros(0, dtype=bool)
+        if found is None or not members.any():
+            return None
+        position = table.position[members][:1]
+        return self._nodal(name, head, table.node[members][:1], position, NO_FACETS)
+
+    def _dof(self, name: str, head: str, rest: str) -> Spot | None:
+        found, table = _DOF.fullmatch(rest), self.parts[head].structure.dofs
+        if found is None:
+            return None
+        number = -1 if found[1] is None else int(found[1])
+        hits = np.flatnonzero((table.node == number) & (np.array(table.component) == found[2]))
+        return Spot(name, head, None, self.offset(head) + hits) if hits.size == 1 else None
+
+    def _nodal(
+        self, name: str, head: str, numbers: IntArray, points: FloatArray, facets: IntArray
+    ) -> Spot:
+        """Return nodes of a part: x, y, z where the part has them; what it has not is held."""
+        table = self.parts[head].structure.dofs
+        rows = node_rows(table, numbers)[:, :3]
+        dofs = np.where(rows >= 0, rows + self.offset(head), -1)
+        surface = nodal_surface(points, dofs, self.n, facets)
+        surface = Surface(surface.points, surface.displacement, facets, numbers=numbers)
+        return Spot(name, head, surface, rows[:0, 0], nodes=dofs)
+
+    def rows(self, head: str, numbers: IntArray) -> IntArray:
+        """Return the (k, 6) dofs x, y, z, rx, ry, rz of nodes of a part by number; -1 where there is none."""
+        rows = node_rows(self.parts[head].structure.dofs, numbers)
+        return np.where(rows >= 0, rows + self.offset(head), -1)
+
+
+def node_rows(table: Dofs, numbers: IntArray) -> IntArray:
+    """Return the (k, 6) rows x, y, z, rx, ry, rz of nodes by number in a table of dofs; -1 where there is none."""
+    order = np.argsort(numbers, kind="stable")
+    mine = np.flatnonzero(np.isin(table.node, numbers) & (table.node >= 0))
+    at = order[np.searchsorted(numbers, table.node[mine], sorter=order)]
+    out = np.full((len(numbers), 6), -1, dtype=np.int64)
+    code = {component: i for i, component in enumerate(COMPONENTS)}
+    which = np.array([code.get(table.component[i], -1) for i in mine], dtype=np.int64)
+    known = which >= 0
+    out[at[known], which[known]] = mine[known]
+    return out
+
+
+def picked(index: IntArray, n: int) -> Matrix:
+    """Return the CSR matrix (len(index), n) that picks entries; rows of zeros where the index is -1."""
+    row = np.flatnonzero(index >= 0)
+    entries = (np.ones(row.size), (row, index[row]))
+    return scipy.sparse.csr_array(entries, shape=(index.size, n))

@@ -1,0 +1,206 @@
+"""Joins of a model: the first side's dofs follow the second's, ``u = tie @ q``."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse
+from scipy.spatial import cKDTree
+
+from stickslip.arrays import IntArray, Matrix
+from stickslip.assembly.contact import Join
+from stickslip.assembly.pairs import Turn, match, named, sides
+from stickslip.assembly.places import NO_FACETS, Places, Spot, picked
+from stickslip.contact.surface import Surface
+from stickslip.errors import InputError, input_error
+
+TINY = 1e-12  # weights of partners below are rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Ties:
+    """What follows what, on the N dofs of all parts.
+
+    Parameters
+    ----------
+    followers
+        (m,) dofs that follow.
+    weights
+        (m, N) CSR: each as a sum of dofs that do not follow.
+    low, high
+        (k,) dofs tied from sector to sector: those of this sector's `high` follow `low` of the next.
+    """
+
+    followers: IntArray
+    weights: Matrix
+    low: IntArray
+    high: IntArray
+
+    def matrix(self, index: IntArray) -> tuple[Matrix, IntArray]:
+        """Return the tie of some of the dofs, and which of them stay.
+
+        Parameters
+        ----------
+        index
+            (n,) dofs in the order of coordinates; those that a follower needs are among them.
+
+        Returns
+        -------
+        tie
+            (n, m) CSR from the coordinates that stay to all of `index`.
+        stays
+            (m,) positions in `index`.
+        """
+        place = np.full(self.weights.shape[1], -1)
+        place[index] = np.arange(index.size)
+        follows = np.isin(index, self.followers)
+        stays = np.flatnonzero(~follows)
+        column = np.full(self.weights.shape[1], -1)
+        column[index[stays]] = np.arange(stays.size)
+        own = picked(column[index], stays.size)
+        mine = self.weights[np.searchsorted(self.followers, index[follows])]
+        needed = scipy.sparse.coo_array(mine)
+        entries = (needed.data, (needed.row, column[needed.col]))
+        followed = scipy.sparse.csr_array(entries, shape=(mine.shape[0], stays.size))
+        into = picked(np.where(follows, np.cumsum(follows) - 1, -1), mine.shape[0])
+        return scipy.sparse.csr_array(own + into @ followed), stays
+
+
+def tie_joins(places: Places, joins: Mapping[str, Join], turn: Turn | None) -> Ties:
+    """Find what the joins of a model tie.
+
+    Raises
+    ------
+    InputError
+        Naming the join, if surfaces do not meet, a node follows twice or in a circle, or a follower is clamped.
+    """
+    n = places.n
+    rows: dict[int, Matrix] = {}
+    low, high = [], []
+    for name, join in joins.items():
+        key = f"join.{name}"
+        first, second, ahead = sides(places, key, join, turn)
+        if second is None or first.surface is None or second.surface is None:
+            raise input_error(
+                f"{key}.between", "needs two surfaces", "Clamp a part to hold it against the ground."
+            )
+        found = _followed(key, join, first, second, ahead)
+        if ahead is not None:
+            pair = _between_sectors(key, join, first, second, found)
+            low.append(pair[0])
+            high.append(pair[1])
+            continue
+        for dof, row in found.items():
+            if dof in rows:
+                raise _twice(places, key, dof)
+            rows[dof] = row
+    followers = np.array(sorted(rows), dtype=np.int64)
+    weights = scipy.sparse.vstack(
+        [scipy.sparse.csr_array((0, n)), *(rows[d] for d in followers)], format="csr"
+    )
+    weights = _resolved(places, followers, weights, len(joins))
+    empty = np.zeros(0, dtype=np.int64)
+    return Ties(followers, weights, np.concatenate([empty, *low]), np.concatenate([empty, *high]))
+
+
+def _followed(
+    key: str, join: Join, first: Spot, second: Spot, turn: Turn | None
+) -> dict[int, Matrix]:
+    """Return each dof of the first side with its row of weights; of the next sector, in its own axes."""
+    assert first.surface is not None and second.surface is not None
+    if first.nodes is None:
+        raise input_error(
+            f"{key}.between",
+            f"the points of {first.name!r} are those of a rigid body, which cannot follow",
+            "Let it be the second side.",
+        )
+    if join.pairing == "segment_to_segment":
+        raise input_error(
+            f"{key}.pairing", "segment_to_segment ties no nodes", "Use node_to_segment."
+        )
+    a, b = first.surface, second.surface
+    if turn is not None:
+        b = Surface(turn.points(b.points), b.displacement, b.facets, b.normals, b.numbers)
+    a = _towards(a, b)
+    pairing = named(key, join, lambda: match(join, a, b, _across(a)))
+    # gap = frameᵀ (u_b - u_a): back to global axes
+    p = pairing.n_points
+    blocks = (pairing.frames, np.arange(p), np.arange(p + 1))
+    back = scipy.sparse.bsr_array(blocks, shape=(3 * p, 3 * p)).tocsr()
+    theirs = scipy.sparse.csr_array(back @ pairing.gap_operator + a.displacement)
+    theirs.data[np.abs(theirs.data) < TINY] = 0.0
+    theirs.eliminate_zeros()
+    dofs = first.nodes.ravel()
+    _refuse_clamped(key, first, dofs, theirs)
+    return {int(d): theirs[[i]] for i, d in enumerate(dofs) if d >= 0}
+
+
+def _across(a: Surface) -> tuple[float, float, float]:
+    normals = a.node_normals()[a.used]
+    sines = [np.linalg.norm(np.cross(normals, axis), axis=1).min() for axis in np.eye(3)]
+    x, y, z = (float(v) for v in np.eye(3)[int(np.argmax(sines))])
+    return x, y, z
+
+
+def _towards(a: Surface, b: Surface) -> Surface:
+    """Return all nodes of side A with normals towards side B; without facets of B any will do."""
+    normals = np.tile([0.0, 0.0, 1.0], (len(a.points), 1))
+    if len(b.facets):
+        near = b.used[cKDTree(b.points[b.used]).query(a.points)[1]]
+        normals = -b.node_normals()[near]
+    return Surface(a.points, a.displacement, NO_FACETS, normals, a.numbers)
+
+
+def _refuse_clamped(key: str, first: Spot, dofs: IntArray, theirs: Matrix) -> None:
+    moving = np.diff(theirs.indptr) > 0
+    stuck = np.flatnonzero((dofs < 0) & moving)
+    if stuck.size:
+        assert first.surface is not None and first.surface.numbers is not None
+        node = first.surface.numbers[stuck[0] // 3]
+        raise input_error(
+            f"{key}.between",
+            f"node {node} of {first.name!r} is clamped and cannot follow, {stuck.size} such dofs in all",
+            "Clamp its partner as well, or take it out of the set.",
+        )
+
+
+def _between_sectors(
+    key: str, join: Join, first: Spot, second: Spot, found: dict[int, Matrix]
+) -> tuple[IntArray, IntArray]:
+    """Return the pairs of dofs on both sides, node to node."""
+    if any(row.nnz != 1 or abs(row.data[0] - 1.0) > TINY for row in found.values()):
+        raise input_error(
+            f"{key}.pairing",
+            f"{join.between[0]!r} and {join.between[1]!r} do not match node by node",
+            "Mesh both sides alike and join them by node_to_node: sectors are tied node to node.",
+        )
+    return (
+        np.array([int(row.indices[0]) for row in found.values()], dtype=np.int64),
+        np.array(list(found), dtype=np.int64),
+    )
+
+
+def _twice(places: Places, key: str, dof: int) -> InputError:
+    return input_error(
+        f"{key}.between",
+        f"{places.dofs.labels[dof]} follows another surface already",
+        "Tie it once: take the node out of one of the sets.",
+    )
+
+
+def _resolved(places: Places, followers: IntArray, weights: Matrix, rounds: int) -> Matrix:
+    """Replace followers among those followed by what they follow."""
+    for _ in range(rounds + 1):
+        chained = weights[:, followers]
+        if not chained.nnz:
+            return weights
+        keep = np.ones(weights.shape[1])
+        keep[followers] = 0.0
+        weights = scipy.sparse.csr_array(weights @ scipy.sparse.diags_array(keep) + chained @ weights)
+        weights.eliminate_zeros()
+    dof = int(followers[weights[:, followers].nonzero()[1][0]])
+    raise input_error(
+        "join",
+        f"{places.dofs.labels[dof]} follows itself round a circle of joins",
+        "Turn the sides of one of the joins round.",
+    )
