@@ -36,18 +36,21 @@ class CubicSpring:
     cubic_t: float = quantity(
         "cubic coefficient along the tangent t; negative: the spring softens",
         "n_per_m3",
+        key="cubic_tangential",
         default=0.0,
         shared=True,
     )
     cubic_w: float = quantity(
         "cubic coefficient along the tangent w; negative: the spring softens",
         "n_per_m3",
+        key="cubic_axial",
         default=0.0,
         shared=True,
     )
     cubic_n: float = quantity(
         "cubic coefficient along the normal; negative: the spring softens",
         "n_per_m3",
+        key="cubic_normal",
         default=0.0,
         shared=True,
     )
