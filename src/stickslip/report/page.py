@@ -1,94 +1,196 @@
-"""The report: one HTML page that needs neither network nor our package."""
+"""The report: one HTML page of all analyses of a result, which needs neither network nor our package."""
 
-from collections.abc import Callable
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from html import escape
 from pathlib import Path
+from typing import Any
 
-from stickslip.report import tables
-from stickslip.report.attempts import attempts
-from stickslip.report.choice import choice
-from stickslip.report.figure_harmonics import kept_harmonics
-from stickslip.report.figure_mesh import mesh_picture
-from stickslip.report.figures_contact import hysteresis, state_map
-from stickslip.report.figures_damper import damper, energy
-from stickslip.report.figures_error import error_scatter, errors
-from stickslip.report.figures_response import frequency_response, low_order, optimisation
-from stickslip.report.page_parts import figure_html, page_html, section, versions, write_page
+import plotly.graph_objects as go
+import xarray as xr
+
+from stickslip.errors import input_error
+from stickslip.report import model
+from stickslip.report.cases import cases_of, varied
+from stickslip.report.forced.contact import case_buttons
+from stickslip.report.frame import (
+    cards_html,
+    chapter,
+    figure_html,
+    page_html,
+    warnings_html,
+    write_page,
+)
+from stickslip.report.node import Node
 from stickslip.report.plot import Plot
-from stickslip.report.result import RATIO, Case, Result, load_result
-from stickslip.report.summary import headline, warnings_box
+from stickslip.report.quantities import NONE, fixed, quantity
+from stickslip.report.result import analysis, open_result, stored_warnings, versions
+from stickslip.report.section import Part, Section, Shown
+from stickslip.report.sections import campbell, forced_response, modes, safe
+from stickslip.report.tables import html_table
 
-_RESPONSE: tuple[Callable[[Result], Plot], ...] = (
-    frequency_response,
-    low_order,
-    kept_harmonics,
-    errors,
-    error_scatter,
-    optimisation,
+SECTIONS: tuple[Section, ...] = (
+    forced_response.SECTION,
+    modes.SECTION,
+    campbell.SECTION,
+    safe.SECTION,
 )
 
 
-def _chooser(result: Result, chosen: Case | None) -> str:
-    """Buttons that choose the load case of the contact figures."""
-    if chosen is None:
-        return ""
-    buttons = "".join(
-        f'<button type="button" data-case="{c.index}" aria-pressed="{str(c is chosen).lower()}">'
-        f'<i style="background:{c.colour}"></i>{c.label}</button>'
-        for c in result.peaked
-    )
-    return f'<nav class="chooser" aria-label="load case"><span>Load case {RATIO}:</span>{buttons}</nav>'
+def _shown(tree: xr.DataTree) -> Iterator[tuple[Section, xr.Dataset]]:
+    """Return the sections whose analysis is in the result, with its dataset."""
+    for section in SECTIONS:
+        data = analysis(tree, section.name) if section.name in tree.children else xr.Dataset()
+        if all(name in data for name in section.needs) and data.sizes.get("case", 1):
+            yield section, data
 
 
-def _body(result: Result) -> str:
-    chosen = result.peaked[-1] if result.peaked else None
-    contact = [
-        hysteresis(result, "t"),
-        hysteresis(result, "w"),
-        state_map(result),
-        damper(result),
-        energy(result),
-    ]
-    plots = [figure(result) for figure in _RESPONSE], contact, [mesh_picture(result)]
-    drawn, count = [], 0
-    for group in plots:
-        drawn.append(
-            "".join(figure_html(plot, count + k + 1, chosen) for k, plot in enumerate(group))
-        )
-        count += len(group)
-    checks = (
-        f"<h3>More harmonics</h3>{tables.reference(result)}"
-        f"<h3>Time integration</h3>{tables.verification(result)}<h3>Retention</h3>{tables.retention(result)}"
+def _views(section: Section, data: xr.Dataset) -> list[Any]:
+    """Return what a section draws: all cases at once, or one after the other."""
+    if not section.by_case:
+        return [section.view(data)]
+    if "case" not in data.dims:
+        return [section.view(data)]
+    views = [section.view(data.isel(case=k)) for k in range(data.sizes["case"])]
+    return [views[0], *(replace(view, key=f"_{k}") for k, view in enumerate(views[1:], 1))]
+
+
+def _as_list(shown: Shown) -> Sequence[Plot | str]:
+    if shown is None:
+        return ()
+    return (shown,) if isinstance(shown, (Plot, str)) else shown
+
+
+class _Numbered:
+    """Draws parts, numbering the figures of a page."""
+
+    def __init__(self) -> None:
+        self._count = 0
+
+    def html(self, parts: Sequence[Part], view: Any) -> str:
+        """Return the parts of a chapter that the view holds."""
+        return "".join(self._one(shown) for part in parts for shown in _as_list(part(view)))
+
+    def _one(self, shown: Plot | str) -> str:
+        if isinstance(shown, str):
+            return shown
+        self._count += 1
+        return figure_html(shown, self._count)
+
+
+def _by_case(data: xr.Dataset, bodies: Sequence[str]) -> str:
+    """Return the same chapter for each case, and the buttons that choose between them."""
+    if len(bodies) == 1:
+        return bodies[0]
+    each = "".join(
+        f'<div data-case="{k}"{" hidden" if k else ""}>{body}</div>'
+        for k, body in enumerate(bodies)
     )
-    sections = (
-        section("alert", "Where more harmonics were needed", choice(result)),
-        section("response", "Forced response", drawn[0]),
-        section("contact", "Contact and damper at the peak", _chooser(result, chosen) + drawn[1]),
-        section("model", "Model", f"{drawn[2]}<h3>Reduction</h3>{tables.reduction(result)}"),
-        section("cases", "Load cases", tables.load_cases(result) + attempts(result)),
-        section("checks", "Checks", checks),
-        section(
-            "provenance",
-            "Provenance",
-            tables.provenance(result, versions(result.text("versions", "{}"))),
+    return (case_buttons(varied(data), cases_of(data), 0) or "") + each
+
+
+def _nodes(tree: xr.DataTree) -> dict[str, Node]:
+    return {section.name: _views(section, data)[0] for section, data in _shown(tree)}
+
+
+def _provenance(tree: xr.DataTree) -> str:
+    """Who made this, with what, from which study."""
+    node = Node(tree.to_dataset())
+    rows = [
+        ["created", escape(node.text("created", NONE))],
+        ["stickslip", escape(node.text("stickslip_version", NONE))],
+        *(
+            [escape(name), escape(version)]
+            for name, version in versions(node.text("versions", "{}")).items()
+            if name != "stickslip"
         ),
+        ["wall time", quantity(node.scalar("wall_seconds"), "s")],
+    ]
+    for section, data in _shown(tree):
+        own = Node(data)
+        if own.text("selection"):
+            rows.append(
+                [f"{section.name}: harmonics", f"chosen by {escape(own.text('selection'))}"]
+            )
+            rows.append([f"{section.name}: samples per period", fixed(own.scalar("samples"), 0)])
+    study = escape(node.text("study_toml"))
+    text = html_table([], rows, numeric=False)
+    return text + (
+        f"<details><summary>The study file</summary><pre>{study}</pre></details>" if study else ""
     )
-    return headline(result) + warnings_box(result) + "".join(sections)
 
 
-def report_html(result: Result) -> str:
-    """Return the whole page."""
-    made = f"stickslip {result.text('stickslip_version')} · {result.text('created')}"
-    return page_html(result.text("title", "Forced response"), made, _body(result))
+def warnings_of(tree: xr.DataTree) -> list[str]:
+    """Return everything the reader must know before using the numbers, as HTML sentences."""
+    found = stored_warnings(tree)
+    for section, data in _shown(tree):
+        for view in _views(section, data):
+            found += section.warnings(view)
+    return list(dict.fromkeys(found))
 
 
-def write_report(dataset_path: Path, html_path: Path) -> None:
-    """Write the report of a result as one self-contained HTML page.
+def plots(tree: xr.DataTree) -> dict[str, go.Figure]:
+    """Return every figure of the page by its name, in the order of the page."""
+    found = [
+        shown
+        for section, data in _shown(tree)
+        for view in _views(section, data)
+        for block in section.blocks
+        for part in block.parts
+        for shown in _as_list(part(view))
+    ]
+    every = [*found, model.picture(_nodes(tree))]
+    return {plot.key: plot.figure for plot in every if isinstance(plot, Plot)}
+
+
+def report_html(tree: xr.DataTree) -> str:
+    """Return the whole page.
 
     Parameters
     ----------
-    dataset_path
-        netCDF-4 file of ``stickslip run``, finished or not.
-    html_path
-        The page to write; its folder must exist.
+    tree
+        A result: a node an analysis, provenance in the attributes of the root. What is missing is left out.
     """
-    write_page(report_html(load_result(dataset_path)), html_path)
+    numbered, cards, chapters = _Numbered(), [], []
+    for section, data in _shown(tree):
+        views = _views(section, data)
+        cards += section.cards(views[0])
+        for block in section.blocks:
+            bodies = [numbered.html(block.parts, view) for view in views]
+            if any(bodies):
+                chapters.append(chapter(block.key, block.title, _by_case(data, bodies)))
+    body = numbered.html(model.PARTS, _nodes(tree))
+    chapters += [chapter("model", "Model", body)] if body else []
+    chapters.append(chapter("provenance", "Provenance", _provenance(tree)))
+    root = Node(tree.to_dataset())
+    made = f"stickslip {root.text('stickslip_version')} · {root.text('created')}"
+    top = cards_html(cards) + warnings_html(warnings_of(tree))
+    return page_html(root.text("title") or "Result", made, top + "".join(chapters))
+
+
+def write_report(tree: xr.DataTree, path: Path) -> None:
+    """Write the page of a result; the folder of `path` must exist."""
+    write_page(report_html(tree), path)
+
+
+def report_file(path: Path, html_path: Path | None = None) -> Path:
+    """Write the page of a result file; return where it is.
+
+    Parameters
+    ----------
+    path
+        The file, or the folder that holds it.
+    html_path
+        The page to write; ``report.html`` beside the result if left out.
+    """
+    tree = open_result(path)
+    if not any(True for _ in _shown(tree)):
+        known = ", ".join(section.name for section in SECTIONS)
+        raise input_error(
+            str(path),
+            f"holds none of {known}",
+            "This is no result of 'stickslip run'; run the study again.",
+        )
+    target = html_path or (path if path.is_dir() else path.parent) / "report.html"
+    write_report(tree, target)
+    return target

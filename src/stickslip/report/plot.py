@@ -14,7 +14,10 @@ INK, MUTED, GRID, ALARM = "#1c2530", "#5b6673", "#e4e8ed", "#c0262d"
 STATE_COLOURS = ("#0072b2", "#e69f00", "#d8dce2")
 STATE_NAMES = ("stick", "slip", "open")
 _FEW_DECADES = 2.5  # up to here 1-2-5 ticks are far enough apart
-LEFT_SIDE, RIGHT_SIDE = "#0072b2", "#d55e00"
+# Okabe and Ito's colours without black and yellow, then darker ones: readable on white, distinct side by side
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7b3294", "#8c564b")
+# from navy over purple and red to dark gold, in grey as well
+_STOPS = ((20, 24, 96), (112, 30, 158), (200, 44, 110), (232, 100, 40), (212, 156, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,16 +27,18 @@ class Plot:
     Parameters
     ----------
     key
-        Name of the figure in the page, unique.
+        Name of the figure in the page and in Python, unique.
     title
         Its heading.
     caption
         HTML: what to see, in words and numbers taken from the data.
     figure
-        The figure, or None where the result does not hold it; the caption then says so.
+        The figure.
     case_captions
-        Load case -> HTML added to the caption while that case is chosen; empty if the figure does not depend
-        on the choice. Traces of such a figure carry the load case in ``meta``.
+        Case -> HTML added to the caption while that case is chosen; empty if the figure does not depend
+        on the choice. Traces of such a figure carry the case in ``meta``.
+    chosen
+        The case shown first.
     controls
         HTML above the figure, for scripts that change it.
     """
@@ -41,14 +46,28 @@ class Plot:
     key: str
     title: str
     caption: str
-    figure: go.Figure | None = None
+    figure: go.Figure
     case_captions: Mapping[int, str] = field(default_factory=dict)
+    chosen: int = -1
     controls: str = ""
 
+    def __post_init__(self) -> None:
+        """Hide the traces that belong to other cases, for a reader without scripts and for the first view."""
+        for trace in self.figure.data if self.case_captions else ():
+            trace.visible = trace.meta is None or trace.meta == self.chosen
 
-def absent(key: str, title: str, reason: str) -> Plot:
-    """Return the place of a figure that this result cannot show."""
-    return Plot(key, title, f"Not shown: {reason}.")
+
+def colour(index: int) -> str:
+    """Return the CSS colour of the line number `index`."""
+    return COLOURS[index % len(COLOURS)]
+
+
+def ramp(n: int) -> list[str]:
+    """Return `n` colours from dark to gold, all readable on white."""
+    stops = np.array(_STOPS, dtype=float)
+    at = np.linspace(0, len(stops) - 1, n)
+    mix = np.stack([np.interp(at, np.arange(len(stops)), stops[:, k]) for k in range(3)], axis=1)
+    return [f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in mix]
 
 
 def legend_above(figure: go.Figure) -> None:

@@ -1,1 +1,1 @@
-"""What the page says of each analysis, one file each."""
+"""What each analysis adds to the page, one file an analysis; `stickslip.report.page` lists them."""

@@ -1,4 +1,4 @@
-"""Style sheet of the page, and the script behind its load-case buttons."""
+"""Style sheet of the page, and the script behind its buttons."""
 
 STYLE = """
 :root { --ink: #1c2530; --muted: #5b6673; --rule: #d9dfe6; --soft: #f5f7f9; --accent: #1f4e79; }
@@ -25,7 +25,6 @@ sup { font-size: 0.7em; line-height: 0; }
 .bad { border-color: #c0262d; background: #fdf2f2; }
 figure { margin: 26px 0 34px; break-inside: avoid; }
 figcaption { color: var(--ink); font-size: 14.5px; line-height: 1.5; max-width: 96ch; margin-top: 6px; }
-figure.absent { background: var(--soft); padding: 12px 16px; color: var(--muted); }
 .chooser { position: sticky; top: 0; z-index: 5; background: white; padding: 10px 0; display: flex; flex-wrap: wrap;
   gap: 6px; align-items: center; border-bottom: 1px solid var(--rule); font-size: 14px; }
 .chooser span { margin-right: 6px; font-weight: 600; }
@@ -53,15 +52,13 @@ summary { cursor: pointer; font-weight: 600; }
 
 SCRIPT = """
 document.querySelectorAll(".chooser button").forEach(button => button.addEventListener("click", () => {
-  const chosen = button.dataset.case;
-  document.querySelectorAll(".chooser button").forEach(
+  const chosen = button.dataset.case, section = button.closest("section");
+  section.querySelectorAll(".chooser button").forEach(
     other => other.setAttribute("aria-pressed", String(other === button)));
-  document.querySelectorAll("figure.by-case").forEach(figure => {
-    figure.querySelectorAll("span[data-case]").forEach(span => { span.hidden = span.dataset.case !== chosen; });
-    const plot = figure.querySelector(".js-plotly-plot");
-    if (plot) {
-      Plotly.restyle(plot, {visible: plot.data.map(t => t.meta === undefined || String(t.meta) === chosen)});
-    }
+  section.querySelectorAll("div[data-case], span[data-case]").forEach(part => { part.hidden = part.dataset.case !== chosen; });
+  section.querySelectorAll("div[data-case]:not([hidden]) .js-plotly-plot").forEach(plot => Plotly.Plots.resize(plot));
+  section.querySelectorAll("figure.by-case .js-plotly-plot").forEach(plot => {
+    Plotly.restyle(plot, {visible: plot.data.map(t => t.meta === undefined || String(t.meta) === chosen)});
   });
 }));
 """

@@ -1,12 +1,16 @@
 """The Campbell diagram: frequencies over speed, engine-order lines, and where they meet."""
 
+from html import escape
+
 import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.plot import INK, MUTED, Plot, styled
 from stickslip.report.quantities import counted, number
-from stickslip.report.wheel_result import WheelResult
+from stickslip.report.section import Block, Card, Section
+from stickslip.report.tables import shortened
+from stickslip.report.waves import NEEDED, Waves
 
 _DASHES = ("solid", "dot", "dashdot", "longdash")
 # a wave has its own, so that a print without colours can be read
@@ -35,9 +39,9 @@ def _label_places(hz: FloatArray, top: float) -> tuple[IntArray, IntArray]:
     return speed, side
 
 
-def _branches(result: WheelResult) -> list[go.Scatter]:
-    rpm, hz = result.floats("speed_rpm"), result.floats("frequency_hz")
-    pairs = zip(result.waves, result.colours, strict=True)
+def _branches(view: Waves) -> list[go.Scatter]:
+    rpm, hz = view.floats("speed_rpm"), view.floats("frequency_hz")
+    pairs = zip(view.waves, view.colours, strict=True)
     at, side = _label_places(hz, float(np.nanmax(hz)))
     return [
         go.Scatter(
@@ -54,11 +58,11 @@ def _branches(result: WheelResult) -> list[go.Scatter]:
     ]  # fmt: skip
 
 
-def _orders(result: WheelResult, top: float) -> list[go.Scatter]:
+def _orders(view: Waves, top: float) -> list[go.Scatter]:
     """Engine-order lines, cut where they leave the picture, each with its name at the end."""
-    last, first = result.floats("speed_rpm").max(), result.floats("speed_rpm").min()
+    last, first = view.floats("speed_rpm").max(), view.floats("speed_rpm").min()
     traces = []
-    for index, order in enumerate(result.numbers("engine_orders").astype(int)):
+    for index, order in enumerate(view.numbers("engine_orders").astype(int)):
         end = last if order == 0 else min(last, top * 60 / order)
         if end <= first:
             continue
@@ -75,40 +79,40 @@ def _orders(result: WheelResult, top: float) -> list[go.Scatter]:
     return traces
 
 
-def _crossings(result: WheelResult) -> go.Scatter:
-    names = result.waves
+def _crossings(view: Waves) -> go.Scatter:
+    names = view.waves
     text = [
         f"EO {order} meets {names[w]}, mode {mode + 1}"
         for order, w, mode in zip(
-            result.integers("crossing_engine_order"),
-            result.integers("crossing_wave"),
-            result.integers("crossing_mode"),
+            view.integers("crossing_engine_order"),
+            view.integers("crossing_wave"),
+            view.integers("crossing_mode"),
             strict=True,
         )
     ]
     return go.Scatter(
-        x=result.floats("crossing_speed_rpm"), y=result.floats("crossing_frequency_hz"), text=text,
+        x=view.floats("crossing_speed_rpm"), y=view.floats("crossing_frequency_hz"), text=text,
         mode="markers", name="crossings",
         marker={"symbol": "circle-open", "size": 12, "color": INK, "line": {"width": 2}},
         hovertemplate="%{text}: %{y:.6g} Hz at %{x:.6g} rpm<extra></extra>",
     )  # fmt: skip
 
 
-def _not_shown(result: WheelResult, top: float) -> str:
+def _not_shown(view: Waves, top: float) -> str:
     """Say which engine orders leave the picture, and from where on their crossings are not known."""
-    last, first = float(result.floats("speed_rpm").max()), float(result.floats("speed_rpm").min())
-    orders = [int(m) for m in result.numbers("engine_orders")]
+    last, first = float(view.floats("speed_rpm").max()), float(view.floats("speed_rpm").min())
+    orders = [int(m) for m in view.numbers("engine_orders")]
     cut = [f"EO {m}" for m in orders if first < top * 60 / m < last]
     outside = [f"EO {m}" for m in orders if top * 60 / m <= first]
     text = f" Cut at the upper edge of the picture: the lines of {', '.join(cut)}." if cut else ""
     if outside:
         text += f" Above the picture at all speeds: {', '.join(outside)}."
-    if result.has("unfollowed_engine_order", "unfollowed_from_rpm"):
+    if view.has("unfollowed_engine_order", "unfollowed_from_rpm"):
         named = [
             f"EO {order} from {rpm:.4g} rpm"
             for order, rpm in zip(
-                result.integers("unfollowed_engine_order"),
-                result.floats("unfollowed_from_rpm"),
+                view.integers("unfollowed_engine_order"),
+                view.floats("unfollowed_from_rpm"),
                 strict=True,
             )
         ]
@@ -119,14 +123,14 @@ def _not_shown(result: WheelResult, top: float) -> str:
     return text
 
 
-def campbell_diagram(result: WheelResult) -> Plot:
+def campbell_diagram(view: Waves) -> Plot:
     """Show frequencies against speed with engine-order lines and the crossings that can be excited."""
-    hz, rpm = result.floats("frequency_hz"), result.floats("speed_rpm")
+    hz, rpm = view.floats("frequency_hz"), view.floats("speed_rpm")
     top = 1.06 * float(hz[np.isfinite(hz)].max())
-    figure = go.Figure([*_orders(result, top), *_branches(result)])
-    n = int(result.data.sizes.get("crossing", 0))
+    figure = go.Figure([*_orders(view, top), *_branches(view)])
+    n = int(view.data.sizes.get("crossing", 0))
     if n:
-        figure.add_trace(_crossings(result))
+        figure.add_trace(_crossings(view))
     styled(figure, 620)
     span = float(np.ptp(rpm))
     figure.update_xaxes(
@@ -139,6 +143,46 @@ def campbell_diagram(result: WheelResult) -> Plot:
         f"{counted(hz.shape[2], 'mode')} of {counted(len(hz), 'wave')} at {counted(len(rpm), 'speed')} from "
         f"{number(float(rpm.min()), 5)} to {number(float(rpm.max()), 5)} rpm, in the frame that turns with the wheel. "
         f"Lines are labelled with wave and mode. Thin and dashed: engine orders. Circles: {found}; only those where the engine "
-        f"order excites the nodal diameter of the mode.{_not_shown(result, top)}"
+        f"order excites the nodal diameter of the mode.{_not_shown(view, top)}"
     )
-    return Plot("campbell", "Campbell diagram", caption, figure)
+    return Plot(f"campbell{view.key}", "Campbell diagram", caption, figure)
+
+
+def crossings(view: Waves) -> str:
+    """Return the crossings of a Campbell diagram in the order of speed."""
+    title = "<h3>Crossings</h3>"
+    if not view.has("crossing_speed_rpm"):
+        return title + "<p>No engine order meets a mode that it excites within the speeds.</p>"
+    rpm, hz = view.floats("crossing_speed_rpm"), view.floats("crossing_frequency_hz")
+    order, wave, mode = (
+        view.integers(f"crossing_{name}") for name in ("engine_order", "wave", "mode")
+    )
+    rows = [
+        [
+            number(float(rpm[i]), 6),
+            number(float(hz[i]), 6),
+            f"{order[i]}",
+            escape(view.waves[wave[i]]),
+            str(mode[i] + 1),
+        ]
+        for i in np.argsort(rpm, kind="stable")
+    ]
+    return title + shortened(
+        ["speed (rpm)", "frequency (Hz)", "engine order", "wave", "mode"], rows, "crossings"
+    )
+
+
+def _cards(view: Waves) -> list[Card]:
+    rpm = view.floats("speed_rpm")
+    note = f"{number(float(rpm.min()), 5)} to {number(float(rpm.max()), 5)} rpm"
+    return [Card(str(view.data.sizes.get("crossing", 0)), "crossings with engine orders", note)]
+
+
+SECTION = Section(
+    "campbell",
+    (*NEEDED, "speed_rpm"),
+    Waves,
+    (Block("campbell", "Frequencies against speed", (campbell_diagram, crossings)),),
+    by_case=True,
+    cards=_cards,
+)

@@ -11,10 +11,9 @@ form.shapes input[type="range"] { width: 120px; accent-color: var(--accent); }
 """
 
 SCRIPT = """
-(() => {
-  const holder = document.getElementById("shapes-data"), form = document.getElementById("shapes-form");
-  const plot = document.getElementById("plot-shapes");
-  if (!holder || !form || !plot) return;
+document.querySelectorAll("form.shapes").forEach(form => {
+  const figure = form.closest("figure"), holder = figure.querySelector('script[type="application/json"]');
+  const plot = figure.querySelector(".js-plotly-plot");
   const data = JSON.parse(holder.textContent);
   const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer;
   const points = new Float32Array(bytes(data.points)), faces = new Int32Array(bytes(data.faces));
@@ -124,5 +123,5 @@ SCRIPT = """
     if (playing) step();
   });
   draw();
-})();
+});
 """

@@ -1,6 +1,6 @@
 """Mode shapes that turn in the page: one sector or the wheel, at any phase, coloured by displacement.
 
-The page holds the complex shapes of one sector; the script of `shapes_script` expands them to the wheel, sector n turned by
+The page holds the complex shapes of one sector; the script of `shapes_page` expands them to the wheel, sector n turned by
 n times the pitch and multiplied by exp(i n theta).
 """
 
@@ -14,12 +14,11 @@ import plotly.graph_objects as go
 
 from stickslip.arrays import FloatArray
 from stickslip.report.coarse_skin import coarse_skin
-from stickslip.report.figure_mesh import edges
-from stickslip.report.plot import FONT, MUTED, Plot, absent, styled
+from stickslip.report.plot import FONT, MUTED, Plot, styled
 from stickslip.report.quantities import counted
-from stickslip.report.wheel_result import WheelResult
+from stickslip.report.skin import edges
+from stickslip.report.waves import Waves
 
-_KEY, _TITLE = "shapes", "Mode shapes"
 _SHAPE_BYTES = 3_200_000  # of all shapes together, before they become text
 _POINT_BYTES = 12  # x, y, z, real and imaginary, 16 bits each
 _WHEEL_POINTS = 26_000  # of the whole wheel, so that it turns and moves without waiting
@@ -28,36 +27,34 @@ _FULL = 32767  # largest 16-bit number
 _MM = 1e3
 
 
-def mode_shapes(result: WheelResult) -> Plot:
+def mode_shapes(view: Waves) -> Plot | None:
     """Show the mode shapes on the skin, with controls for wave, mode, phase and size."""
-    if not result.has("shape", "skin_point", "skin_triangle"):
-        reason = "this result holds no mode shapes (a model of matrices without a mesh, or [modes] shapes = false)"
-        return absent(_KEY, _TITLE, reason)
-    waves, modes, _ = _selection(result)
-    points, triangles = result.floats("skin_point") * _MM, result.integers("skin_triangle")
+    if not view.has("shape", "skin_point", "skin_triangle"):
+        return None
+    waves, modes, _ = _selection(view)
+    points, triangles = view.floats("skin_point") * _MM, view.integers("skin_triangle")
     most = max(_FEWEST_POINTS, _SHAPE_BYTES // (_POINT_BYTES * waves * modes))
     kept, faces = coarse_skin(points, triangles, most)
-    data = _payload(result, modes, kept, faces)
+    data = _payload(view, modes, kept, faces)
     fine = "" if len(kept) == len(np.unique(triangles)) else ", coarser than the mesh"
     caption = (
         f"Displacement over its largest value, on {counted(len(kept), 'point')} of the skin of a sector{fine}. Choose nodal "
         f"diameter and mode, drag to turn, scroll to zoom; the camera button saves a PNG. Sector n moves as sector 0 turned by "
-        f"n pitches, n phase angles ahead: play shows which way the wave travels. {_shown_modes(result, modes)}"
+        f"n pitches, n phase angles ahead: play shows which way the wave travels. {_shown_modes(view, modes)}"
     )
-    return Plot(
-        _KEY, _TITLE, caption, _figure(points[kept], faces), {}, _controls(result, modes, data)
-    )
+    drawn, controls = _figure(points[kept], faces), _controls(view, modes, data)
+    return Plot(f"shapes{view.key}", "Mode shapes", caption, drawn, controls=controls)
 
 
-def _selection(result: WheelResult) -> tuple[int, int, int]:
+def _selection(view: Waves) -> tuple[int, int, int]:
     """Return how many waves and modes are shown, and how many modes there are."""
-    waves, there = result.data.sizes["wave"], result.data.sizes["mode"]
+    waves, there = view.data.sizes["wave"], view.data.sizes["mode"]
     room = _SHAPE_BYTES // (_POINT_BYTES * _FEWEST_POINTS * waves)
     return waves, max(1, min(there, room)), there
 
 
-def _shown_modes(result: WheelResult, modes: int) -> str:
-    there = result.data.sizes["mode"]
+def _shown_modes(view: Waves, modes: int) -> str:
+    there = view.data.sizes["mode"]
     return "" if modes == there else f"The first {modes} of {there} modes are in the page."
 
 
@@ -92,32 +89,32 @@ def _figure(points: FloatArray, triangles: npt.NDArray[np.int64]) -> go.Figure:
 
 
 def _payload(
-    result: WheelResult,
+    view: Waves,
     modes: int,
     kept: npt.NDArray[np.int64],
     faces: npt.NDArray[np.int64],
 ) -> dict[str, object]:
     """Return what the script needs, arrays as text."""
-    points = result.floats("skin_point")[kept] * _MM
-    shape = result.data["shape"].values[:, :modes, kept]
+    points = view.floats("skin_point")[kept] * _MM
+    shape = view.data["shape"].values[:, :modes, kept]
     largest = np.abs(shape).max(axis=(2, 3, 4), keepdims=True)
     whole = np.round(shape / np.where(largest > 0, largest, 1.0) * _FULL).astype("<i2")
-    hz = result.floats("frequency_hz")
-    inside = _outside_of_wheel(result, kept, faces)
-    wheel, wheel_faces = coarse_skin(points, inside, max(60, _WHEEL_POINTS // result.sectors))
-    origin = result.numbers("axis_origin") * _MM
+    hz = view.floats("frequency_hz")
+    inside = _outside_of_wheel(view, kept, faces)
+    wheel, wheel_faces = coarse_skin(points, inside, max(60, _WHEEL_POINTS // view.sectors))
+    origin = view.numbers("axis_origin") * _MM
     return {
-        "sectors": result.sectors,
-        "axis": _unit(result.numbers("axis_direction")).tolist(),
+        "sectors": view.sectors,
+        "axis": _unit(view.numbers("axis_direction")).tolist(),
         "origin": origin.tolist() if origin.size == 3 else [0.0, 0.0, 0.0],
         "points": _text(points.astype("<f4")),
         "faces": _text(faces.astype("<i4")),
         "wheelPoints": _text(wheel.astype("<i4")),
         "wheelFaces": _text(wheel_faces.astype("<i4")),
-        "waveNumbers": result.integers("wave_number").tolist(),
+        "waveNumbers": view.integers("wave_number").tolist(),
         "waves": [
-            f"{name}, {kind} wave" if result.sectors > 1 else name
-            for name, kind in zip(result.waves, result.data["wave_kind"].values, strict=True)
+            f"{name}, {kind} wave" if view.sectors > 1 else name
+            for name, kind in zip(view.waves, view.data["wave_kind"].values, strict=True)
         ],
         "hertz": [[f"{f:.6g}" for f in row[:modes]] for row in hz],
         "shapes": [[_text(s) for s in row] for row in whole],
@@ -125,11 +122,11 @@ def _payload(
 
 
 def _outside_of_wheel(
-    result: WheelResult, kept: npt.NDArray[np.int64], faces: npt.NDArray[np.int64]
+    view: Waves, kept: npt.NDArray[np.int64], faces: npt.NDArray[np.int64]
 ) -> npt.NDArray[np.int64]:
     """Leave out the faces between neighbouring sectors, where the skin was not made coarser already."""
-    cut = result.integers("skin_cut") if result.has("skin_cut") else np.zeros(0, dtype=np.int64)
-    same = len(cut) == len(faces) and result.sectors > 1
+    cut = view.integers("skin_cut") if view.has("skin_cut") else np.zeros(0, dtype=np.int64)
+    same = len(cut) == len(faces) and view.sectors > 1
     return faces[cut == 0] if same else faces
 
 
@@ -142,27 +139,27 @@ def _text(values: npt.NDArray[np.generic]) -> str:
     return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
 
 
-def _controls(result: WheelResult, modes: int, data: dict[str, object]) -> str:
+def _controls(view: Waves, modes: int, data: dict[str, object]) -> str:
     """Return the form above the picture and the data behind it, as HTML."""
-    kinds = result.data["wave_kind"].values
+    kinds = view.data["wave_kind"].values
     waves = "".join(
         f'<option value="{k}">{escape(name)} ({escape(str(kinds[k]))})</option>'
-        for k, name in enumerate(result.waves)
+        for k, name in enumerate(view.waves)
     )
     numbers = "".join(f'<option value="{m}">{m + 1}</option>' for m in range(modes))
     views = (
         '<label>show <select name="view"><option value="wheel">whole wheel</option>'
         '<option value="sector">one sector</option></select></label>'
-        if result.sectors > 1
+        if view.sectors > 1
         else '<input type="hidden" name="view" value="sector">'
     )
     # "<" could end the script element early
     text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
     return (
-        f'<form class="shapes" id="shapes-form"><label>wave <select name="wave">{waves}</select></label>'
+        f'<form class="shapes"><label>wave <select name="wave">{waves}</select></label>'
         f'<label>mode <select name="mode">{numbers}</select></label>{views}'
         '<label>phase <input type="range" name="phase" min="0" max="360" value="0" step="5"></label>'
         '<label>deformation <input type="range" name="size" min="0" max="20" value="6" step="0.5"></label>'
         '<button type="button" name="play">play</button></form>'
-        f'<script type="application/json" id="shapes-data">{text}</script>'
+        f'<script type="application/json">{text}</script>'
     )

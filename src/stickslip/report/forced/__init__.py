@@ -1,0 +1,1 @@
+"""Figures and tables of forced responses, each a function of a `Response`."""

@@ -1,0 +1,173 @@
+"""Where more harmonics were needed and why, in plain words."""
+
+from collections import Counter
+from html import escape
+
+import numpy as np
+
+from stickslip.harmonic.support import named
+from stickslip.report.cases import Case
+from stickslip.report.forced.contact import states
+from stickslip.report.quantities import number
+from stickslip.report.response import Response
+from stickslip.report.tables import html_table
+
+_NAMED = 4  # sets of harmonics that a cell names
+
+
+def flagged_ranges(response: Response, case: Case) -> list[tuple[float, float]]:
+    """Ranges of frequency in which the alert asked for more harmonics.
+
+    Returns
+    -------
+    ranges
+        (first Hz, last Hz) of each run of neighbouring points.
+    """
+    at = np.flatnonzero(response.alert.case == case.index)
+    hz, error = response.alert.hz[at], response.alert.error[at]
+    above = np.concatenate([[False], error > response.threshold, [False]])
+    starts = np.flatnonzero(~above[:-1] & above[1:])
+    ends = np.flatnonzero(above[:-1] & ~above[1:])
+    return [(float(hz[a:b].min()), float(hz[a:b].max())) for a, b in zip(starts, ends, strict=True)]
+
+
+def _harmonic_share(response: Response, case: Case) -> float:
+    """Largest share of the contact forces' vibration that harmonics beyond the first passage's carry, in percent."""
+    at = np.flatnonzero((response.point_case == case.index) & response.converged & response.more)
+    if not at.size or not response.has("contact_force"):
+        return float("nan")
+    force = response.data["contact_force"].isel(point=at)
+    parts = np.asarray(force.transpose("point", "harmonic", "contact", "direction", "part").values)
+    power = np.nansum(np.square(parts, dtype=np.float64), axis=(2, 3, 4))
+    moving = power[:, 1:].sum(axis=1)
+    beyond = ~np.isin(np.arange(power.shape[1]), response.low_harmonics)
+    share = np.sqrt(power[:, beyond].sum(axis=1) / np.where(moving > 0, moving, 1.0))
+    return float(100 * share.max())
+
+
+def _why(response: Response, case: Case) -> str:
+    """Say what the contact does at the peak of a case and what the higher harmonics carry."""
+    reasons = []
+    if response.has("peak_state") and response.peak(case) >= 0:
+        state = states(response, case)
+        slipping, open_ = (int((state == k).any(axis=(1, 2)).sum()) for k in (1, 2))
+        if slipping or open_:
+            reasons.append(
+                f"at the peak {slipping} of {len(state)} contacts slip, {open_} lift off"
+            )
+        else:
+            reasons.append("at the peak all contacts stick: the system is linear")
+    share = _harmonic_share(response, case)
+    if np.isfinite(share):
+        reasons.append(
+            f"harmonics beyond H = {response.low_name} carry up to {number(share, 2)} % of the contact force"
+        )
+    return "; ".join(reasons) or "–"
+
+
+def choice(response: Response) -> str | None:
+    """Where more harmonics were needed, what chose them, and why, in plain words."""
+    if not response.decides:
+        return f"<p>The same harmonics everywhere (<code>{response.selection}</code>): {_kept_where(response)}.</p>"
+    if not response.alert.error.size:
+        return None
+    rows = [
+        [
+            case.short,
+            *(_alert_row if response.is_error else _other_row)(response, case),
+            _why(response, case),
+        ]
+        for case in response.cases
+    ]
+    middle = (
+        (f"{response.more_name} asked for", "largest predicted error")
+        if response.is_error
+        else ("harmonics kept", "largest indicator")
+    )
+    stored = escape(response.text("alert_explanation"))
+    log = (
+        f"<details><summary>As the run put it</summary><p>{stored}</p></details>" if stored else ""
+    )
+    table = html_table([response.varied, *middle, "why"], rows, numeric=False)
+    return (
+        (_alert_text(response) if response.is_error else _other_text(response))
+        + table
+        + _cost(response)
+        + log
+    )
+
+
+def _cost(response: Response) -> str:
+    """Say what choosing has cost beside the harmonics of the reference everywhere."""
+    if not response.has("unknowns_solved", "retained_displacement"):
+        return ""
+    solved, points = int(response.floats("unknowns_solved").sum()), response.converged.size
+    each = response.data.sizes["retained"] * (2 * len(response.high_harmonics) - 1)
+    return (
+        f"<p>{solved} unknowns were solved in all; H = {response.high_name} everywhere would be about {points} points × {each} unknowns = "
+        f"{points * each} (an estimate: as many points, each solved once), so that choosing took {100 * solved / (points * each):.0f} % of it.</p>"
+    )
+
+
+_REASON = (
+    "A contact that slips or lifts off makes forces at multiples of the excitation frequency, which a solution with few "
+    "harmonics cannot see."
+)
+
+
+def _alert_text(response: Response) -> str:
+    over = escape(response.text("error_over")) or "the output"
+    single = response.text("passages") == "single"
+    first = (
+        "Each frequency is settled before the next one, beginning"
+        if single
+        else "Each point is first solved"
+    )
+    return (
+        f"<p>{first} with H = {response.low_name}. <code>{response.selection}</code> then predicts how far the motion of {over} would "
+        f"change with H = {response.high_name}; where that exceeds {response.shown(response.threshold)}, the point is solved again "
+        f"with more harmonics. {_REASON}</p>"
+    )
+
+
+def _other_text(response: Response) -> str:
+    return (
+        f"<p><code>{response.selection}</code> chooses among the harmonics of H = {response.high_name}, never fewer than "
+        f"H = {response.low_name}, one frequency after the other: it compares an indicator of its own, which is no error, with "
+        f"{response.shown(response.threshold)}. How good the solution is, it does not say; <code>--verify-harmonics</code> does. "
+        f"{_REASON}</p>"
+    )
+
+
+def _alert_row(response: Response, case: Case) -> tuple[str, str]:
+    """Say in which ranges a case was flagged, and how large its predicted error is at most."""
+    ranges = (
+        number(a, 5) + (f" to {number(b, 5)}" if a != b else "") + " Hz"
+        for a, b in flagged_ranges(response, case)
+    )
+    own = np.flatnonzero(response.alert.case == case.index)
+    if not own.size:
+        return "nowhere", "–"
+    worst = own[int(np.argmax(response.alert.error[own]))]
+    largest = f"{response.shown(float(response.alert.error[worst]))} at {number(float(response.alert.hz[worst]), 5)} Hz"
+    return "<br>".join(ranges) or "nowhere", largest
+
+
+def _other_row(response: Response, case: Case) -> tuple[str, str]:
+    own = response.alert.error[response.alert.case == case.index]
+    return _kept_where(response, case), response.shown(float(own.max())) if own.size else "–"
+
+
+def _kept_where(response: Response, case: Case | None = None) -> str:
+    """Say which harmonics were kept how often, the most frequent ones first."""
+    mine = (
+        response.converged
+        if case is None
+        else response.converged & (response.point_case == case.index)
+    )
+    counts = Counter(named(np.flatnonzero(row)) for row in response.kept[mine])
+    each = [f"H = {own} at {n}" for own, n in counts.most_common(_NAMED)]
+    rest = sum(counts.values()) - sum(n for _, n in counts.most_common(_NAMED))
+    if rest:
+        each.append(f"others at {rest}")
+    return "; ".join(each) + f" of {sum(counts.values())} points" if each else "–"

@@ -1,0 +1,235 @@
+"""Figures of the contacts at the peak of each case: loops and states."""
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.report.cases import Case
+from stickslip.report.plot import MUTED, STATE_COLOURS, STATE_NAMES, Plot, legend_above, styled
+from stickslip.report.quantities import counted, joined, percent, quantity
+from stickslip.report.response import Response
+
+_ROUNDING = 1e-9  # area of a loop over that of its bounding box, below which it is a line
+_MOST_LOOPS = 24  # panels
+_MOST_ROW = 4  # of them beside each other, where contact lines have more points
+_MOST_STATES = 40  # rows with a name of their own
+_STATE_SCALE = [[a, colour] for k, colour in enumerate(STATE_COLOURS) for a in (k / 3, (k + 1) / 3)]
+
+
+def chooser(response: Response) -> str | None:
+    """Buttons that choose the case of the figures below."""
+    return case_buttons(response.varied, response.peaked, response.chosen)
+
+
+def case_buttons(heading: str, cases: tuple[Case, ...], chosen: int) -> str | None:
+    """Return buttons that choose a case; None where there is no choice."""
+    if len(cases) < 2:
+        return None
+    buttons = "".join(
+        f'<button type="button" data-case="{c.index}" aria-pressed="{str(c.index == chosen).lower()}">'
+        f'<i style="background:{c.colour}"></i>{c.short}</button>'
+        for c in cases
+    )
+    return f'<nav class="chooser" aria-label="case"><span>{heading}:</span>{buttons}</nav>'
+
+
+def contact_lines(response: Response) -> list[list[int]]:
+    """Group contact points by the part of their name before the last dot, within each contact: one row of panels a line."""
+    names, rows = response.labels("contact"), []
+    for members in response.groups.values():
+        lines: dict[str, list[int]] = {}
+        for index in members:
+            lines.setdefault(names[index].rpartition(".")[0], []).append(index)
+        rows += [
+            row[k : k + _MOST_ROW] for row in lines.values() for k in range(0, len(row), _MOST_ROW)
+        ]
+    if all(len(row) == 1 for row in rows):
+        every = [row[0] for row in rows]
+        rows = [every[k : k + 3] for k in range(0, len(every), 3)]
+    return rows
+
+
+def states(response: Response, case: Case) -> IntArray:
+    """(contact, tangent, sample) states of a case at its peak; 0 stick, 1 slip, 2 open."""
+    return response.of_case("peak_state", case, "contact", "tangent", "sample").astype(np.int64)
+
+
+def period(response: Response, case: Case, name: str) -> FloatArray:
+    """(contact, direction, sample) of ``peak_gap`` or ``peak_force`` of a case."""
+    return response.of_case(name, case, "contact", "direction", "sample")
+
+
+def _drawn(response: Response, *names: str) -> tuple[Case, ...]:
+    """Cases with a peak whose variables are there and finite."""
+    if not response.has(*names):
+        return ()
+    first = response.data[names[0]]
+    return tuple(
+        c for c in response.peaked if bool(np.isfinite(first.isel(case=c.index).values).any())
+    )
+
+
+def _state_keys() -> list[go.Scatter]:
+    return [
+        go.Scatter(
+            x=[None], y=[None], mode="markers", name=name,
+            marker={"symbol": "square", "size": 11, "color": colour, "line": {"width": 1, "color": MUTED}},
+        )
+        for name, colour in zip(STATE_NAMES, STATE_COLOURS, strict=True)
+    ]  # fmt: skip
+
+
+def _loop(gap: FloatArray, force: FloatArray, state: IntArray | None, name: str) -> go.Scatter:
+    """One closed loop, its points coloured by state."""
+    closed = np.append(np.arange(len(gap)), 0)
+    colour: dict[str, object] = {"color": MUTED}
+    if state is not None:
+        colour = {"color": state[closed], "colorscale": _STATE_SCALE, "cmin": -0.5, "cmax": 2.5}
+    return go.Scatter(
+        x=gap[closed].astype(np.float32), y=force[closed].astype(np.float32), mode="lines+markers",
+        line={"color": MUTED, "width": 1}, marker={"size": 4, **colour}, name=name, showlegend=False,
+        hovertemplate=f"{name}<br>%{{x:.4g}} µm, %{{y:.4g}} N<extra></extra>",
+    )  # fmt: skip
+
+
+def _area(response: Response, case: Case, direction: int) -> FloatArray:
+    """(contact,) areas of the loops: energy lost in a cycle, J; zero where rounding alone makes one."""
+    gap, force = (period(response, case, name)[:, direction] for name in ("peak_gap", "peak_force"))
+    work = 0.5 * (force + np.roll(force, -1, -1)) * (np.roll(gap, -1, -1) - gap)
+    area = np.nan_to_num(np.abs(work.sum(axis=-1)))
+    return np.where(area > _ROUNDING * np.ptp(gap, axis=-1) * np.ptp(force, axis=-1), area, 0.0)
+
+
+def _loop_caption(response: Response, case: Case, direction: int) -> str:
+    area, names = _area(response, case, direction), response.labels("contact")
+    if not area.any():
+        return "No loop encloses an area: nothing is dissipated in this direction."
+    widest = int(np.argmax(area))
+    stroke, span = (
+        float(np.ptp(period(response, case, n)[widest, direction]))
+        for n in ("peak_gap", "peak_force")
+    )
+    return (
+        f"The widest loop is that of {names[widest]} ({quantity(float(area[widest]), 'J')} a cycle), with a stroke "
+        f"of {quantity(stroke, 'm')} and a force range of {quantity(span, 'N')}; "
+        f"{int((area > 0.01 * area.max()).sum())} of {counted(len(names), 'point')} enclose more than a hundredth of "
+        "its area."
+    )
+
+
+def _panels(response: Response, cases: tuple[Case, ...], direction: int) -> list[list[int]]:
+    """Return the contact points drawn, by row: all, or where they are many those that lose most energy in any case."""
+    rows = contact_lines(response)
+    if sum(map(len, rows)) <= _MOST_LOOPS:
+        return rows
+    area = np.max([_area(response, c, direction) for c in cases], axis=0)
+    most = sorted(np.argsort(-area, kind="stable")[:_MOST_LOOPS].tolist())
+    return [most[k : k + _MOST_ROW] for k in range(0, len(most), _MOST_ROW)]
+
+
+def _hysteresis(response: Response, direction: str) -> Plot | None:
+    """Loops of contact points at the peak in one tangential direction (Gastaldi and Berruti 2017, fig. 5 and 11)."""
+    column = {"t": 0, "w": 1}[direction]
+    cases = _drawn(response, "peak_gap", "peak_force")
+    moving = [np.ptp(period(response, c, "peak_force")[:, column], axis=-1) for c in cases]
+    if not np.any(np.nan_to_num(moving) > 0):
+        return None
+    names, rows = response.labels("contact"), _panels(response, cases, column)
+    width = max(len(r) for r in rows)
+    titles = [names[r[k]] if k < len(r) else "" for r in rows for k in range(width)]
+    figure = make_subplots(
+        len(rows),
+        width,
+        subplot_titles=titles,
+        horizontal_spacing=0.21 / width,
+        vertical_spacing=0.23 / len(rows),
+    )
+    for case in cases:
+        gap, force = period(response, case, "peak_gap"), period(response, case, "peak_force")
+        state = states(response, case) if response.has("peak_state") else None
+        for i, row in enumerate(rows):
+            for j, k in enumerate(row):
+                known = state[k, column] if state is not None else None
+                loop = _loop(gap[k, column] * 1e6, force[k, column], known, names[k])
+                figure.add_trace(loop.update(meta=case.index), row=i + 1, col=j + 1)
+    for trace in _state_keys() if response.has("peak_state") else []:
+        figure.add_trace(trace, row=1, col=1)
+    styled(figure, 130 + 215 * len(rows))
+    legend_above(figure)
+    figure.update_yaxes(nticks=6, title_text="force (N)", col=1)
+    figure.update_xaxes(nticks=6)
+    for j in range(width):
+        last = max(i for i, row in enumerate(rows) if j < len(row))
+        figure.update_xaxes(title_text="relative displacement (µm)", row=last + 1, col=j + 1)
+    drawn = sum(map(len, rows))
+    caption = (
+        f"Tangential force on the contact points against their relative displacement along {direction}, one panel a "
+        "point; axes differ between panels. The area of a loop is the energy lost in a cycle."
+    )
+    if drawn < len(names):
+        caption += f" The {drawn} of {len(names)} points that lose most are drawn."
+    captions = {c.index: _loop_caption(response, c, column) for c in cases}
+    title = f"Hysteresis loops at the peak, direction {direction}"
+    return Plot(f"loops_{direction}", title, caption, figure, captions, response.chosen)
+
+
+def hysteresis_t(response: Response) -> Plot | None:
+    """Loops along the first tangent."""
+    return _hysteresis(response, "t")
+
+
+def hysteresis_w(response: Response) -> Plot | None:
+    """Loops along the second tangent."""
+    return _hysteresis(response, "w")
+
+
+def _state_caption(response: Response, case: Case) -> str:
+    state, names = states(response, case), response.labels("contact")
+    slipping, open_ = ((state == k).any(axis=(1, 2)) for k in (1, 2))
+    share = [100 * float((state == k).mean()) for k in range(3)]
+    text = (
+        f"{int(slipping.sum())} of {counted(len(names), 'point')} slip during the cycle and {int(open_.sum())} "
+        f"lift off; over all points and directions the contact sticks for {percent(share[0])}, slips for "
+        f"{percent(share[1])} and is open for {percent(share[2])} of the time."
+    )
+    lifting = [n for n, o in zip(names, open_, strict=True) if o]
+    if lifting:
+        more = [f"{len(lifting) - 12} others"] if len(lifting) > 12 else []
+        text += f" Lift-off at {joined(lifting[:12] + more)}."
+    return text
+
+
+def state_map(response: Response) -> Plot | None:
+    """Stick, slip and open over one period for every contact point."""
+    cases = _drawn(response, "peak_state")
+    if not cases:
+        return None
+    rows = [
+        f"{name} {t} " for name in response.labels("contact") for t in response.labels("tangent")
+    ]
+    figure = go.Figure()
+    for case in cases:
+        state = states(response, case)
+        values = state.reshape(-1, state.shape[-1])
+        figure.add_heatmap(
+            x=(np.arange(values.shape[1]) + 0.5) / values.shape[1], y=rows, z=values.astype(np.int8),
+            zmin=-0.5, zmax=2.5, colorscale=_STATE_SCALE, showscale=False, ygap=2 if len(rows) <= _MOST_STATES else 0,
+            meta=case.index, customdata=np.array(STATE_NAMES, dtype=object)[values],
+            hovertemplate="%{y}: %{customdata} at %{x:.3f} T<extra></extra>",
+        )  # fmt: skip
+    figure.add_traces(_state_keys())
+    styled(figure, 130 + min(21 * len(rows), 900))
+    legend_above(figure)
+    figure.update_xaxes(title_text="time / period", range=[0, 1], showgrid=False)
+    figure.update_yaxes(autorange="reversed", showgrid=False, ticks="", tickfont={"size": 12})
+    caption = "Each row is a contact point in one tangential direction; read from left to right through one cycle."
+    captions = {c.index: _state_caption(response, c) for c in cases}
+    return Plot(
+        "states",
+        "Contact states over one period at the peak",
+        caption,
+        figure,
+        captions,
+        response.chosen,
+    )

@@ -1,0 +1,279 @@
+"""Figures of the response: curves of all cases, low against accepted order, the optimisation curves."""
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from stickslip.arrays import FloatArray
+from stickslip.harmonic.support import named
+from stickslip.report.cases import Case, first_number
+from stickslip.report.plot import ALARM, GRID, MUTED, Plot, key_marker, log_ticks, styled
+from stickslip.report.quantities import counted, joined, number, percent, scale_for
+from stickslip.report.response import Response
+
+COMPARED = 3  # curves that stay legible in one panel
+_FEWEST = 3  # cases of an optimisation curve
+
+
+def most(response: Response, size: FloatArray) -> list[Case]:
+    """Return the `COMPARED` cases with the largest value of `size` (point,), those without a finite one left out."""
+    largest = {
+        c: float(np.nanmax(size[response.point_case == c.index], initial=-np.inf))
+        for c in response.cases
+    }
+    known = [c for c in response.cases if np.isfinite(largest[c])]
+    chosen = sorted(known, key=lambda c: largest[c])[-COMPARED:]
+    return [c for c in response.cases if c in chosen]
+
+
+def _abscissa(response: Response) -> tuple[FloatArray, str, str]:
+    """Return what the response is drawn over (point,), its name and its unit: frequency, or speed where that was swept."""
+    if response.text("over") == "speed" and response.has("speed_rpm"):
+        return response.floats("speed_rpm"), "speed", "rpm"
+    return response.hz, "frequency", "Hz"
+
+
+def _curve(response: Response, case: Case) -> go.Scatter:
+    at, scale = response.points(case), response.scale
+    x, _, unit = _abscissa(response)
+    high = response.more[at]
+    kept = [named(np.flatnonzero(row)) for row in response.kept[at]]
+    error = response.floats("predicted_error_percent" if response.is_error else "indicator")[at]
+    said = [response.shown(float(e)) for e in error]
+    about = "predicted error" if response.is_error else "indicator"
+    return go.Scatter(
+        x=x[at], y=response.accepted[at] * scale.factor, mode="lines+markers",
+        name=case.short if len(response.cases) > 1 else "response",
+        legendgroup="cases", legendgrouptitle={"text": response.varied} if len(response.cases) > 1 else None,
+        line={"color": case.colour, "width": 1.6},
+        marker={
+            "symbol": np.where(high, "diamond", "circle-open").tolist(), "size": np.where(high, 7.0, 5.5).tolist(),
+            "color": case.colour, "line": {"width": 1.1, "color": case.colour},
+        },
+        customdata=list(zip(kept, said, response.hz[at], strict=True)),
+        hovertemplate=(
+            f"{case.named}<br>%{{x:.2f}} {unit}: %{{y:.4g}} {scale.unit}<br>"
+            f"H = %{{customdata[0]}}, {about} %{{customdata[1]}}<extra></extra>"
+        ),
+    )  # fmt: skip
+
+
+def _failures(response: Response) -> go.Scatter:
+    """Crosses where points did not converge: at their amplitude if it is known, else at the bottom."""
+    at = np.flatnonzero(~response.converged)
+    values = response.response() * response.scale.factor
+    good = values[response.converged & np.isfinite(values)]
+    floor = float(good.min()) if good.size else 1.0
+    x, _, unit = _abscissa(response)
+    return go.Scatter(
+        x=x[at], y=np.where(np.isfinite(values[at]), values[at], floor), mode="markers", name="did not converge",
+        legendgroup="key", marker={"symbol": "x", "size": 9, "color": ALARM},
+        hovertemplate=f"not converged<br>%{{x:.2f}} {unit}<extra></extra>",
+    )  # fmt: skip
+
+
+def _scale_buttons(*, logarithmic: bool) -> list[dict[str, object]]:
+    ticks = {"log": "array", "linear": "auto"}
+    buttons = [
+        {
+            "label": f"{kind} scale",
+            "method": "relayout",
+            "args": [{"yaxis.type": kind, "yaxis.tickmode": mode, "yaxis.autorange": True}],
+        }
+        for kind, mode in ticks.items()
+    ]
+    place = {"x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom", "pad": {"t": 0, "b": 4}}
+    look = {"font": {"size": 11}, "showactive": True, "bordercolor": GRID}
+    return [
+        {
+            "type": "buttons",
+            "direction": "right",
+            "active": 0 if logarithmic else 1,
+            "buttons": buttons,
+            **place,
+            **look,
+        }
+    ]
+
+
+def _peaks(response: Response) -> str:
+    """Say where the peaks of the first and the last case lie."""
+    scale, ends = response.scale, (*response.peaked[:1], *response.peaked[1:][-1:])
+    peaks = [
+        f"{number(response.peak_response(c) * scale.factor)} {scale.unit} at {number(response.peak_hz(c), 5)} Hz{c.where}"
+        for c in ends
+    ]
+    if len(ends) > 1:
+        return f"The peak goes from {' to '.join(peaks)}. "
+    return f"Peak: {peaks[0]}. " if ends else ""
+
+
+def _caption(response: Response) -> str:
+    converged, hz = response.converged, response.hz
+    high = converged & response.more
+    over = " divided by the amplitude of the excitation" if response.per_force else ""
+    text = f"First harmonic of {response.output_name}{over}. {_peaks(response)}"
+    if not response.decides:
+        text += f"All points keep the same harmonics (<code>{response.selection}</code>)."
+    else:
+        n = counted(int(converged.sum()), "accepted point")
+        where = (
+            f", from {number(hz[high].min(), 4)} to {number(hz[high].max(), 4)} Hz"
+            if high.any()
+            else ""
+        )
+        text += (
+            f"{int(high.sum())} of {n} keep {response.more_name} (filled diamonds){where}; the rest keep "
+            f"H = {response.low_name} (open circles)."
+        )
+    if not converged.all():
+        n = counted(int((~converged).sum()), "point")
+        text += f" {n} did not converge (crosses); the curve is left open there."
+    return text
+
+
+def frequency_response(response: Response) -> Plot | None:
+    """Responses of all cases with the harmonics at which each point was accepted (Gastaldi and Berruti 2017, fig. 4b)."""
+    if not np.isfinite(response.accepted).any():
+        return None
+    scale = response.scale
+    figure = go.Figure([_curve(response, case) for case in response.cases])
+    if response.decides:
+        low, more = response.low_name, response.more_name
+        figure.add_trace(key_marker(f"accepted with H = {low}", "circle-open", "key", "points"))
+        figure.add_trace(key_marker(f"accepted with {more}", "diamond", "key"))
+    if not response.converged.all():
+        figure.add_trace(_failures(response))
+    styled(figure, 540)
+    figure.update_layout(
+        updatemenus=_scale_buttons(logarithmic=True), showlegend=len(figure.data) > 1
+    )
+    _, name, unit = _abscissa(response)
+    figure.update_xaxes(title_text=f"{name} ({unit})")
+    ticks = log_ticks(response.accepted * scale.factor)
+    figure.update_yaxes(title_text=f"{response.quantity} ({scale.unit})", type="log", **ticks)
+    title = "Frequency response of all cases" if len(response.cases) > 1 else "Frequency response"
+    return Plot("response", title, _caption(response), figure)
+
+
+def _low_caption(response: Response, cases: list[Case], low: FloatArray) -> str:
+    parts = []
+    for case in cases:
+        at = response.points(case)
+        both = at[np.isfinite(low[at]) & np.isfinite(response.accepted[at])]
+        if both.size:
+            off = low[both] / response.accepted[both] - 1
+            worst = int(np.argmax(np.abs(off)))
+            parts.append(
+                f"{percent(100 * float(off[worst]))} at {number(float(response.hz[both[worst]]), 5)} Hz{case.where}"
+            )
+    return (
+        f"Solid: accepted; dashed: H = {response.low_name} alone, where that was solved. The largest difference of the "
+        f"low-order amplitude is {joined(parts)}."
+    )
+
+
+def low_order(response: Response) -> Plot | None:
+    """Low-order against accepted curves, where they differ most (Gastaldi and Berruti 2017, fig. 4a)."""
+    if not response.has("amplitude_low"):
+        return None
+    low, accepted, scale = response.response("amplitude_low"), response.accepted, response.scale
+    cases = most(response, np.abs(low / accepted - 1))
+    if not cases:
+        return None
+    figure = go.Figure()
+    for case in cases:
+        at = response.points(case)
+        group = {"legendgroup": str(case.index), "legendgrouptitle": {"text": case.label or None}}
+        only = at[np.isfinite(low[at])]
+        for x, y, name, line in (
+            (at, accepted, "accepted", {"width": 2}),
+            (only, low, f"H = {response.low_name} alone", {"width": 1.6, "dash": "dash"}),
+        ):
+            style = {**line, "color": case.colour}
+            figure.add_scatter(
+                x=response.hz[x],
+                y=y[x] * scale.factor,
+                mode="lines",
+                name=name,
+                line=style,
+                **group,
+            )
+    styled(figure, 440)
+    figure.update_layout(updatemenus=_scale_buttons(logarithmic=False))
+    figure.update_xaxes(title_text="frequency (Hz)")
+    ticks = log_ticks(accepted * scale.factor)
+    figure.update_yaxes(
+        title_text=f"{response.quantity} ({scale.unit})", **{**ticks, "tickmode": "auto"}
+    )
+    title = f"What H = {response.low_name} alone would have given"
+    return Plot("low_order", title, _low_caption(response, cases, low), figure)
+
+
+def _optimum_caption(cases: list[Case], peak: FloatArray, hz: FloatArray) -> str:
+    best = int(np.nanargmin(peak))
+    text = (
+        f"Among the cases computed the peak is smallest{cases[best].where}: "
+        f"{percent(100 * peak[best] / np.nanmax(peak))} of the largest one. "
+    )
+    if best in (0, len(peak) - 1):
+        text += "That is the end of the range: the optimum may lie beyond it. "
+    return text + (
+        f"Over the range the peak moves by {number(hz[-1] - hz[0])} Hz, "
+        f"from {number(hz[0], 5)} Hz{cases[0].where} to {number(hz[-1], 5)} Hz{cases[-1].where}."
+    )
+
+
+def _families(cases: list[Case], key: str) -> dict[str, list[Case]]:
+    """Group cases by all that is varied beside `key`: a curve each."""
+    found: dict[str, list[Case]] = {}
+    for case in cases:
+        others = ", ".join(t for t in case.label.split(", ") if not t.startswith(f"{key} = "))
+        found.setdefault(others, []).append(case)
+    return found
+
+
+def optimisation(response: Response) -> Plot | None:
+    """Peak amplitude and frequency against the first varied number (Gastaldi and Berruti 2017, fig. 9)."""
+    key = first_number(response.data)[0]
+    cases = sorted(
+        (c for c in response.peaked if np.isfinite(response.peak_response(c))),
+        key=lambda c: c.value,
+    )
+    if not key or len(cases) < _FEWEST:
+        return None
+    peak = {c: response.peak_response(c) for c in cases}
+    scale = scale_for(np.array(list(peak.values())), response.unit)
+    figure, families = make_subplots(1, 2, horizontal_spacing=0.12), _families(cases, key)
+    for name, family in families.items():
+        mark = {
+            "size": 10,
+            "color": [c.colour for c in family],
+            "line": {"width": 1, "color": "white"},
+        }
+        curves = (
+            (scale.unit, [peak[c] * scale.factor for c in family]),
+            ("Hz", [response.peak_hz(c) for c in family]),
+        )
+        for column, (unit, y) in enumerate(curves, 1):
+            figure.add_scatter(
+                x=[c.value for c in family], y=y, mode="lines+markers", line={"color": MUTED, "width": 1.3}, marker=mark,
+                name=name, showlegend=column == 1 and len(families) > 1, text=[c.named for c in family],
+                hovertemplate=f"%{{text}}<br>%{{y:.4g}} {unit}<extra></extra>", row=1, col=column,
+            )  # fmt: skip
+    styled(figure, 380)
+    values = np.unique([c.value for c in cases])
+    wide = values[0] > 0 and values[-1] > 5 * values[0]
+    ticks = {"tickvals": values, "ticktext": [number(float(v), 4) for v in values]}
+    figure.update_xaxes(
+        title_text=key, type="log" if wide else "linear", **(ticks if len(values) < 15 else {})
+    )
+    drawn = np.array(list(peak.values())) * scale.factor
+    figure.update_yaxes(
+        title_text=f"peak {response.quantity} ({scale.unit})", type="log", **log_ticks(drawn), col=1
+    )
+    figure.update_yaxes(title_text="peak frequency (Hz)", col=2)
+    found = _optimum_caption(
+        cases, np.array(list(peak.values())), np.array([response.peak_hz(c) for c in cases])
+    )
+    return Plot("optimisation", "Optimisation curves", found, figure)

@@ -1,0 +1,167 @@
+"""Figures of the strategy: predicted and real error of first solutions, or an indicator of its own."""
+
+import numpy as np
+import numpy.typing as npt
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from stickslip.arrays import FloatArray
+from stickslip.report.cases import Case
+from stickslip.report.forced.curves import COMPARED, most
+from stickslip.report.plot import ALARM, INK, Plot, log_ticks, styled
+from stickslip.report.quantities import counted, number, percent
+from stickslip.report.response import Response
+
+_SMALLEST_INDICATOR = 1e-8
+_SMALLEST_ERROR = 1e-3  # percent; below it the axis would only show rounding
+
+
+def _error_traces(figure: go.Figure, response: Response) -> None:
+    """Add predicted errors of all cases (left) and both errors of some (right)."""
+    asked, real = response.alert, response.floats("real_error_percent")
+    both = most(response, real) if response.is_error else []
+
+    def add(case: Case, x: FloatArray, y: FloatArray, column: int, **style: object) -> None:
+        unit = " %" if response.is_error else ""
+        hover = f"{case.named}<br>%{{x:.2f}} Hz: %{{y:.3g}}{unit}<extra></extra>"
+        options = {"legendgroup": "cases", "hovertemplate": hover, "showlegend": False, **style}
+        figure.add_scatter(x=x, y=y, row=1, col=column, **options)
+
+    named = len(response.cases) > 1
+    for case in response.cases:
+        own = np.flatnonzero(asked.case == case.index)
+        x, y = asked.hz[own], asked.error[own]
+        drawn = {"mode": "lines", "name": case.short, "line": {"color": case.colour, "width": 1.6}}
+        add(case, x, y, 1, **drawn, showlegend=named, legendgrouptitle={"text": response.varied})
+        if case in both:
+            at = response.points(case)
+            at = at[np.isfinite(real[at])]
+            mark = {
+                "color": case.colour,
+                "size": 6,
+                "symbol": "circle-open",
+                "line": {"width": 1.4},
+            }
+            add(case, x, y, 2, **drawn)
+            add(case, response.hz[at], real[at], 2, mode="markers", name="real", marker=mark)
+
+
+def _caption(response: Response) -> str:
+    asked, error = response.alert, response.alert.error
+    above, real = error > response.threshold, np.isfinite(response.floats("real_error_percent"))
+    if response.is_error:
+        text = (
+            f"The error that <code>{response.selection}</code> predicts of the solution with few harmonics "
+            f"(H = {response.low_name} at least); the dashed line is the threshold of {percent(response.threshold)}. "
+            f"{int(above.sum())} of {counted(error.size, 'checked point')} lie above it and were asked to repeat with more. "
+        )
+    else:
+        text = (
+            f"What <code>{response.selection}</code> compares with its threshold of {response.shown(response.threshold)} "
+            "(dashed) at the accepted solution of each frequency: no error, and not to be compared with the indicators of others. "
+        )
+    worst = int(np.argmax(error))
+    where = response.cases[asked.case[worst]].where
+    text += f"The largest, {response.shown(float(error[worst]))}, is at {number(float(asked.hz[worst]), 5)} Hz{where}. "
+    if real.any() and response.is_error:
+        text += (
+            "Right: the real error (open circles), the difference to the accepted solution, where a point was "
+            f"solved again ({counted(int(real.sum()), 'point')}; at most {COMPARED} cases are drawn). "
+        )
+    floor = _floor(response)
+    hidden, endless = int((error < floor).sum()), int(np.isinf(error).sum())
+    if hidden:
+        text += f"{counted(hidden, 'point')} below {response.shown(floor)} lie under the axis. "
+    return text + (
+        f"{counted(endless, 'point')} beyond all bounds are not drawn." if endless else ""
+    )
+
+
+def _floor(response: Response) -> float:
+    """Smallest value drawn: an error below is rounding; other indicators may be smaller."""
+    return _SMALLEST_ERROR if response.is_error else _SMALLEST_INDICATOR
+
+
+def errors(response: Response) -> Plot | None:
+    """Predicted and real error against frequency (Gastaldi and Berruti 2017, fig. 6)."""
+    error, real = response.alert.error, response.floats("real_error_percent")
+    if not error.size or not response.decides:
+        return None
+    two = response.is_error and bool(np.isfinite(real).any())
+    titles = ["predicted, all cases", "predicted (line) and real (circles)"] if two else [""]
+    figure = make_subplots(
+        1, len(titles), shared_yaxes=True, horizontal_spacing=0.04, subplot_titles=titles
+    )
+    _error_traces(figure, response)
+    styled(figure, 430)
+    shown = np.concatenate([error, real if two else [], [response.threshold]])
+    floor, top = _floor(response), float(shown[np.isfinite(shown)].max())
+    figure.add_hline(y=response.threshold, line={"dash": "dash", "color": ALARM, "width": 1.4})
+    hz = response.hz
+    figure.update_xaxes(title_text="frequency (Hz)", range=[float(hz.min()), float(hz.max())])
+    ticks = log_ticks(np.array([floor, top]))
+    figure.update_yaxes(type="log", range=[np.log10(floor), np.log10(2 * top)], **ticks)
+    what = "error (%)" if response.is_error else f"indicator of {response.selection}"
+    figure.update_yaxes(title_text=what, col=1)
+    title = "Predicted and real error against frequency"
+    if not response.is_error:
+        title = "The strategy's indicator against frequency"
+    return Plot("errors", title, _caption(response), figure)
+
+
+def _scatter(
+    response: Response, x: FloatArray, y: FloatArray, known: npt.NDArray[np.bool_]
+) -> go.Figure:
+    """Scatter the `known` points, one trace a case."""
+    figure = go.Figure()
+    for case in response.cases:
+        at = np.flatnonzero(known & (response.point_case == case.index))
+        if at.size:
+            mark = {
+                "color": case.colour,
+                "size": 7,
+                "symbol": "circle-open",
+                "line": {"width": 1.5},
+            }
+            figure.add_scatter(
+                x=x[at], y=y[at], mode="markers", name=case.short, marker=mark, customdata=response.hz[at],
+                hovertemplate="predicted %{x:.3g} %<br>real %{y:.3g} %<br>%{customdata:.2f} Hz<extra></extra>",
+            )  # fmt: skip
+    return figure
+
+
+def error_scatter(response: Response) -> Plot | None:
+    """Real against predicted error (Gastaldi and Berruti 2017, fig. 7a)."""
+    predicted, real = (
+        response.floats("predicted_error_percent"),
+        response.floats("real_error_percent"),
+    )
+    known = np.isfinite(predicted) & np.isfinite(real) & (predicted > 0) & (real > 0)
+    if not response.is_error or not known.any():
+        return None
+    figure = _scatter(response, predicted, real, known)
+    values = np.concatenate([predicted[known], real[known], [response.threshold]])
+    ends = np.array([values.min() / 1.5, values.max() * 1.5])
+    dotted = {"color": INK, "width": 1, "dash": "dot"}
+    figure.add_scatter(x=ends, y=ends, mode="lines", name="real = predicted", line=dotted)
+    styled(figure, 520, legend_title=response.varied if len(response.cases) > 1 else "")
+    dash = {"dash": "dash", "color": ALARM, "width": 1.2}
+    figure.add_hline(y=response.threshold, line=dash)
+    figure.add_vline(x=response.threshold, line=dash)
+    axis = {
+        "type": "log",
+        "range": np.log10(ends).tolist(),
+        "constrain": "domain",
+        **log_ticks(values),
+    }
+    figure.update_xaxes(title_text="predicted error (%)", **axis)
+    figure.update_yaxes(title_text="real error (%)", scaleanchor="x", **axis)
+    larger = int((real[known] > predicted[known]).sum())
+    caption = (
+        f"{counted(int(known.sum()), 'point')} solved again; on the dotted line the prediction is "
+        f"exact. In {larger} of them the real error is larger than predicted. Points below the threshold of "
+        f"{percent(response.threshold)} (dashed) were not solved twice, so that errors which the alert missed cannot show here."
+    )
+    return Plot(
+        "error_scatter", "Does the prediction hold? Real against predicted error", caption, figure
+    )

@@ -1,0 +1,76 @@
+"""Which harmonics were kept at which frequency, one row of panels a case."""
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from stickslip.arrays import IntArray
+from stickslip.report.cases import Case
+from stickslip.report.plot import ALARM, Plot, styled
+from stickslip.report.quantities import counted
+from stickslip.report.response import Response
+
+_SHOWN = 12  # cases that stay legible below one another
+_EDGE = 0.01  # of the frequency range, so that marks at its ends are whole
+_ROW, _LINE = 46, 13  # height of a panel and of each of its harmonics, pixels
+
+
+def kept_harmonics(response: Response) -> Plot | None:
+    """Draw a mark for every harmonic that an accepted solution keeps, against frequency."""
+    cases = [c for c in response.cases if np.any(response.point_case == c.index)][-_SHOWN:]
+    if not cases or not response.decides:
+        return None
+    spacing = 0.25 / len(cases) if len(cases) > 1 else 0.0
+    titles = [c.label for c in cases]
+    figure = make_subplots(
+        len(cases), 1, shared_xaxes=True, vertical_spacing=spacing, subplot_titles=titles
+    )
+    highest = int(response.high_harmonics[-1])
+    for row, case in enumerate(cases, 1):
+        figure.add_trace(_marks(response, case), row=row, col=1)
+        lost = np.flatnonzero(~response.converged & (response.point_case == case.index))
+        if lost.size:
+            figure.add_trace(_lost(response, lost, highest), row=row, col=1)
+    styled(figure, 90 + len(cases) * (_ROW + _LINE * highest))
+    figure.update_layout(showlegend=False)
+    ticks = [int(h) for h in response.high_harmonics if h > 0]
+    figure.update_yaxes(tickvals=ticks, range=[0.3, highest + 0.9])
+    figure.update_yaxes(title_text="harmonic", row=(len(cases) + 1) // 2, col=1)
+    hz = response.hz
+    aside = _EDGE * float(hz.max() - hz.min())
+    figure.update_xaxes(range=[float(hz.min()) - aside, float(hz.max()) + aside])
+    figure.update_xaxes(title_text="frequency (Hz)", row=len(cases), col=1)
+    return Plot("harmonics", "Harmonics kept at each frequency", _caption(response, cases), figure)
+
+
+def _marks(response: Response, case: Case) -> go.Scatter:
+    at = response.points(case)
+    at = at[response.converged[at]]
+    row, harmonic = np.nonzero(response.kept[at, 1:])
+    return go.Scatter(
+        x=response.hz[at][row], y=harmonic + 1, mode="markers", name=case.short,
+        marker={"symbol": "square", "size": 6, "color": case.colour},
+        hovertemplate="%{x:.2f} Hz: harmonic %{y} is kept<extra></extra>",
+    )  # fmt: skip
+
+
+def _lost(response: Response, at: IntArray, highest: int) -> go.Scatter:
+    return go.Scatter(
+        x=response.hz[at], y=np.full(at.size, highest + 0.5), mode="markers", name="did not converge",
+        marker={"symbol": "x", "size": 7, "color": ALARM}, hovertemplate="not converged<br>%{x:.2f} Hz<extra></extra>",
+    )  # fmt: skip
+
+
+def _caption(response: Response, cases: list[Case]) -> str:
+    good = response.converged
+    text = (
+        f"A mark stands for a harmonic that the accepted solution keeps, chosen by <code>{response.selection}</code>; the "
+        f"static term is always kept. {int(np.sum(response.more & good))} of {counted(int(good.sum()), 'accepted point')} "
+        f"keep other harmonics than H = {response.low_name}"
+    )
+    used = np.flatnonzero(response.kept[good].any(axis=0)) if good.any() else np.zeros(0, dtype=int)
+    unused = [str(h) for h in response.high_harmonics if h not in used]
+    text += f"; no point keeps {', '.join(unused)}." if unused and good.any() else "."
+    if len(cases) < len(response.cases):
+        text += f" The last {len(cases)} of {len(response.cases)} cases are drawn."
+    return text

@@ -1,0 +1,174 @@
+"""Tables of a forced response: cases, everything that was solved, and the checks of the numbers."""
+
+from html import escape
+
+import numpy as np
+
+from stickslip.harmonic.support import named
+from stickslip.report.quantities import NONE, fixed, number, percent, predicted, quantity, scale_for
+from stickslip.report.response import Response
+from stickslip.report.tables import html_table
+
+
+def peaks(response: Response) -> str:
+    """One row a case: peak, points, work."""
+    scale = scale_for(np.array([response.peak_response(c) for c in response.cases]), response.unit)
+    head = [
+        response.varied, "excitation", "peak", f"peak / force ({scale.unit})", "at (Hz)", "points", f"with H = {response.low_name}",
+        f"with {response.more_name}", "failed", "Newton steps", "unknowns solved", "contact (s)", "linear (s)", "rest (s)",
+    ]  # fmt: skip
+    counts = (
+        "points",
+        "points_low",
+        "points_high",
+        "points_failed",
+        "newton_steps",
+        "unknowns_solved",
+    )
+    clocks = ("seconds_contact", "seconds_linear", "seconds_rest")
+    rows = []
+    for case in response.cases:
+        value = response.peak_response(case)
+        rows.append(
+            [case.short, quantity(case.excitation, "N"),
+             quantity(value * (case.excitation if response.per_force else 1.0), response.length),
+             number(value * scale.factor, 4) if response.per_force else NONE, fixed(response.peak_hz(case), 2)]
+            + [fixed(response.number_of(name, case), 0) for name in counts]
+            + [fixed(response.number_of(name, case), 2) for name in clocks]
+        )  # fmt: skip
+    return _work_sentence(response) + html_table(head, rows)
+
+
+def _work_sentence(response: Response) -> str:
+    words = {"contact": "the contact laws", "linear": "linear algebra", "rest": "the rest"}
+    spent = {
+        text: float(np.nansum(response.floats(f"seconds_{name}")))
+        for name, text in words.items()
+        if response.has(f"seconds_{name}")
+    }
+    total = sum(spent.values())
+    if total <= 0:
+        return ""
+    shares = [f"{number(100 * s / total, 2)} % in {text}" for text, s in spent.items()]
+    return f"<p>The solver took {quantity(total, 's')}: {', '.join(shares)}.</p>"
+
+
+def attempts(response: Response) -> str | None:
+    """One row a case and set of harmonics: what it cost, those solutions included that nothing came of."""
+    if not response.has("attempt_case", "attempt_kept"):
+        return None
+    case = response.integers("attempt_case")
+    kept = response.values("attempt_kept", "attempt", "harmonic")
+    sets = np.array([named(np.flatnonzero(row)) for row in kept])
+    numbers = ("attempt_newton_iterations", "attempt_unknowns", "attempt_seconds")
+    columns = [response.floats(name) for name in numbers]
+    good, rows = response.floats("attempt_status") == 0, []
+    for one in response.cases:
+        mine = case == one.index
+        for own in sorted(set(sets[mine]), key=lambda s: (int(s.rsplit(", ", maxsplit=1)[-1]), s)):
+            at = mine & (sets == own)
+            sums = [float(column[at].sum()) for column in columns]
+            rows.append(
+                [one.short, own, str(int(at.sum())), str(int((at & ~good).sum()))]
+                + [fixed(total, digits) for total, digits in zip(sums, (0, 0, 2), strict=True)]
+            )
+    head = [response.varied, "H", "solved", "not converged", "Newton steps", "unknowns", "time (s)"]
+    text = (
+        "<h3>Everything that was solved</h3><p>By case and harmonics, those solutions included in whose place others were "
+        "accepted. The unknowns of all solutions together compare the work of strategies, whatever the machine.</p>"
+    )
+    return text + html_table(head, rows)
+
+
+def _sentences(response: Response, name: str) -> str:
+    """List what each check said, in words."""
+    if not response.has(name):
+        return ""
+    said = (f"<li>{escape(str(s))}</li>" for s in response.data[name].values)
+    return f"<ul>{''.join(said)}</ul>"
+
+
+def more_harmonics(response: Response) -> str | None:
+    """Say what twice as many harmonics would change."""
+    names = ("reference_worst_percent", "reference_worst_hz", "reference_above")
+    if not response.has(*names):
+        return None
+    rows = []
+    for case in response.cases:
+        worst, hz, above = (response.number_of(name, case) for name in names)
+        rows.append([case.short, predicted(worst), fixed(hz, 2), fixed(above, 0)])
+    head = [response.varied, "largest predicted change", "at (Hz)", "points above the threshold"]
+    text = (
+        f"<h3>More harmonics</h3><p>What twice as many harmonics as {response.high_name} are predicted to change at the accepted "
+        "points: the change of the complex amplitude, phase included, over its size.</p>"
+    )
+    return text + html_table(head, rows) + _sentences(response, "reference_sentence")
+
+
+def time_integration(response: Response) -> str | None:
+    """Time integration against harmonic balance."""
+    names = (
+        "verify_case",
+        "verify_frequency_hz",
+        "verify_transient",
+        "verify_balance",
+        "verify_difference_percent",
+    )
+    if not response.has(*names):
+        return None
+    columns = [response.floats(name) for name in names]
+    settled, periods = (
+        response.floats(n) if n in response.data else np.full(len(columns[0]), np.nan)
+        for n in ("verify_settled", "verify_periods")
+    )
+    rows = [
+        [response.cases[int(case)].short if np.isfinite(case) else NONE, fixed(float(hz), 3), quantity(float(transient), response.length, 5),
+         quantity(float(balance), response.length, 5), percent(float(off)),
+         NONE if not np.isfinite(done) else ("yes" if done else "no"), fixed(float(n), 0)]
+        for case, hz, transient, balance, off, done, n in zip(*columns, settled, periods, strict=True)
+    ]  # fmt: skip
+    finite = np.abs(columns[-1][np.isfinite(columns[-1])])
+    worst = percent(float(finite.max())) if finite.size else NONE
+    head = [
+        response.varied,
+        "frequency (Hz)",
+        "by time integration",
+        "by harmonic balance",
+        "difference",
+        "settled",
+        "periods",
+    ]
+    text = (
+        f"<h3>Time integration</h3><p>First-harmonic amplitude of {response.output_name}: the two independent ways differ by at most "
+        f"{worst}.</p>"
+    )
+    return text + html_table(head, rows) + _sentences(response, "verify_sentence")
+
+
+def retention(response: Response) -> str | None:
+    """How much the small retention stiffness of rigid bodies moves the peak."""
+    shift = (
+        response.floats("retention_peak_shift")
+        if response.has("retention_peak_shift")
+        else np.array([])
+    )
+    if not np.isfinite(shift).any():
+        return None
+    known = [c for c in response.cases if np.isfinite(shift[c.index])]
+    worst = max(known, key=lambda c: abs(shift[c.index]))
+    rows = [
+        [
+            c.short,
+            percent(100 * float(shift[c.index])),
+            number(response.number_of("retention_frequency_shift_hz", c)),
+        ]
+        for c in known
+    ]
+    rows += [[c.short, "no periodic motion found", NONE] for c in response.cases if c not in known]
+    text = (
+        "<h3>Retention</h3><p>With a retention stiffness ten times smaller the peak changes most"
+        f"{worst.where}: by {percent(100 * float(shift[worst.index]))}.</p>"
+    )
+    return text + html_table(
+        [response.varied, "change of the peak", "change of its frequency (Hz)"], rows
+    )

@@ -1,0 +1,89 @@
+"""What every page is made of: numbered figures, chapters, boxes, and the frame around them."""
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+from plotly.offline import get_plotlyjs
+
+from stickslip.errors import input_error
+from stickslip.report import shapes_page, style
+from stickslip.report.plot import Plot
+from stickslip.report.section import Card
+
+_CONFIG = {
+    "responsive": True,
+    "displaylogo": False,
+    "modeBarButtonsToRemove": ["select2d", "lasso2d"],
+    # the camera saves pictures for print: twice the size on the screen
+    "toImageButtonOptions": {"scale": 2},
+}
+
+
+def figure_html(plot: Plot, number: int) -> str:
+    """Return a figure with its number in the page and its caption."""
+    captions = "".join(
+        f'<span data-case="{index}"{"" if index == plot.chosen else " hidden"}> {text}</span>'
+        for index, text in plot.case_captions.items()
+    )
+    caption = f"<figcaption><b>Figure {number}. {escape(plot.title)}.</b> {plot.caption}{captions}</figcaption>"
+    drawing = plot.figure.to_html(
+        full_html=False, include_plotlyjs=False, div_id=f"plot-{plot.key}", config=_CONFIG
+    )
+    kind = "by-case" if plot.case_captions else "all-cases"
+    return f'<figure id="fig-{plot.key}" class="{kind}">{plot.controls}{drawing}{caption}</figure>'
+
+
+def chapter(key: str, title: str, body: str) -> str:
+    """Return a chapter with its heading."""
+    return f'<section id="{key}"><h2>{title}</h2>{body}</section>'
+
+
+def cards_html(cards: Sequence[Card]) -> str:
+    """Return the boxes at the top."""
+    boxes = "".join(
+        f'<div class="card"><b>{c.value}</b><span>{c.label}</span><small>{c.note}</small></div>'
+        for c in cards
+    )
+    return f'<div class="cards">{boxes}</div>' if boxes else ""
+
+
+def warnings_html(warnings: Sequence[str]) -> str:
+    """Return the warnings, or the statement that there are none."""
+    if not warnings:
+        return '<div class="box good"><b>No warnings.</b> The run is complete.</div>'
+    items = "".join(f"<li>{w}</li>" for w in warnings)
+    said = "1 warning" if len(warnings) == 1 else f"{len(warnings)} warnings"
+    return f'<div class="box bad"><b>{said}</b><ul>{items}</ul></div>'
+
+
+def page_html(title: str, made: str, body: str) -> str:
+    """Return a whole page, which needs neither network nor other files.
+
+    Parameters
+    ----------
+    title, made
+        Its heading and the line below it, plain text.
+    body
+        HTML.
+    """
+    title, made = escape(title), escape(made)
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{title}</title><style>{style.STYLE}{shapes_page.STYLE}</style><script>{get_plotlyjs()}</script></head>"
+        f'<body><main><header><h1>{title}</h1><p class="made">{made}</p></header>{body}</main>'
+        f"<script>{style.SCRIPT}{shapes_page.SCRIPT}</script></body></html>\n"
+    )
+
+
+def write_page(page: str, path: Path) -> None:
+    """Write a page; an `InputError` says why it cannot be."""
+    try:
+        path.write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise input_error(
+            str(path),
+            f"cannot be written ({error.strerror})",
+            "Choose a folder that exists and is writable.",
+        ) from error

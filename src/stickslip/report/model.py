@@ -1,0 +1,132 @@
+"""The chapter on the model: its skin and contact points, how well the reduced model stands for it, and its facts."""
+
+from collections.abc import Mapping
+from html import escape
+
+import numpy as np
+
+from stickslip.report.node import Node
+from stickslip.report.plot import Plot
+from stickslip.report.quantities import NONE, fixed, number, percent, quantity
+from stickslip.report.response import Response
+from stickslip.report.skin import skin_picture
+from stickslip.report.tables import html_table
+
+_CHECKED = (
+    ("free", "frequency_full_hz", "frequency_reduced_hz"),
+    ("stuck", "frequency_stuck_full_hz", "frequency_stuck_reduced_hz"),
+)
+_LAWS = 12  # contacts in a table
+
+
+def picture(nodes: Mapping[str, Node]) -> Plot | None:
+    """Return the picture of the skin with the contacts, where an analysis holds them."""
+    found = (
+        skin_picture(node)
+        for node in nodes.values()
+        if node.has("surface_point", "surface_triangle")
+    )
+    return next(found, None)
+
+
+def reduction(nodes: Mapping[str, Node]) -> str | None:
+    """Frequencies of the full against the reduced model."""
+    node = next(
+        (n for n in nodes.values() if n.has("frequency_full_hz", "frequency_reduced_hz")), None
+    )
+    if node is None:
+        return None
+    rows, off = [], []
+    for name, full, reduced in _CHECKED:
+        if node.has(full, reduced):
+            a, b = (np.ravel(node.values(n)) for n in (full, reduced))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                difference = np.where(a > 0, b / a - 1, np.nan)
+            cells = zip(a, b, difference, strict=True)
+            rows += [
+                [f"{name} {k + 1}", fixed(x, 3), fixed(y, 3), percent(100 * d)]
+                for k, (x, y, d) in enumerate(cells)
+                if np.isfinite(x)
+            ]
+            off += np.abs(difference[np.isfinite(difference)]).tolist()
+    worst = percent(100 * max(off)) if off else NONE
+    text = f"<h3>Reduction</h3><p>The reduced model reproduces the frequencies of the full one within {worst}.</p>"
+    return (
+        text + html_table(["mode", "full (Hz)", "reduced (Hz)", "difference"], rows)
+        if rows
+        else None
+    )
+
+
+def contacts(nodes: Mapping[str, Node]) -> str | None:
+    """Return a row a contact of the model: its points, law, area and force under the static loads."""
+    node = next((n for n in nodes.values() if isinstance(n, Response) and n.groups), None)
+    if not isinstance(node, Response) or not node.has("contact_law", "static_force"):
+        return None
+    laws, static = (
+        node.data["contact_law"].values,
+        node.values("static_force", "contact", "direction"),
+    )
+    area = node.floats("contact_area") if node.has("contact_area") else np.full(len(laws), np.nan)
+    rows = [
+        [group, str(len(at)), escape(", ".join(dict.fromkeys(str(laws[k]) for k in at))), quantity(-float(static[at, 2].sum()), "N", 4),
+         f"{number(1e6 * float(area[at].sum()), 4)} mm²" if np.isfinite(area[at]).all() else NONE]
+        for group, at in list(node.groups.items())[:_LAWS]
+    ]  # fmt: skip
+    return "<h3>Contacts</h3>" + html_table(
+        ["contact", "points", "law", "normal force at rest", "area"], rows, numeric=False
+    )
+
+
+def facts(nodes: Mapping[str, Node]) -> str | None:
+    """Return mass, centre, size and counts of the model."""
+    node = next(
+        (n for n in nodes.values() if "mass_kg" in n.data.attrs or "dofs" in n.data.attrs), None
+    )
+    if node is None:
+        return None
+    sectors = int(node.scalar("sectors", 1))
+    mass, each = node.scalar("mass_kg"), " of a sector" if sectors > 1 else ""
+    rows = [
+        ["sectors", str(sectors) if sectors > 1 else NONE],
+        [f"mass{each}", quantity(1e3 * mass, "g", 6)],
+        ["mass of the wheel", quantity(1e3 * sectors * mass, "g", 6) if sectors > 1 else NONE],
+        [f"centre of mass{each}", _lengths(node.numbers("centre_m"))],
+        ["box from", _lengths(node.numbers("box_low_m"))],
+        ["box to", _lengths(node.numbers("box_high_m"))],
+        *([text, fixed(node.scalar(name), 0)] for name, text in _COUNTS),
+        ["rotation", escape(node.text("rotation")) or NONE],
+        *_static(node),
+    ]
+    return "<h3>Facts</h3>" + html_table([], [row for row in rows if row[1] != NONE], numeric=False)
+
+
+_COUNTS = (
+    ("nodes", "nodes"), ("elements", "elements"), ("dofs", "free degrees of freedom"), ("reduced", "coordinates of the reduced model"),
+    ("retained", "coordinates of contacts and rigid bodies"),
+)  # fmt: skip
+
+
+def _static(node: Node) -> list[list[str]]:
+    """Return what the centrifugal load does, where something turns."""
+    displacement = node.scalar("static_displacement_m")
+    if not np.isfinite(displacement):
+        return []
+    rpm, strain = (
+        number(node.scalar("static_rpm"), 5),
+        percent(100 * node.scalar("static_strain"), 3),
+    )
+    degrees = number(float(np.degrees(node.scalar("static_rotation_rad"))), 3)
+    return [
+        [f"largest static displacement at {rpm} rpm", f"{number(1e3 * displacement, 4)} mm"],
+        ["with strains and rotations up to", f"{strain}, {degrees}°"],
+    ]
+
+
+def _lengths(values: np.ndarray) -> str:
+    if values.size != 3 or not np.isfinite(values).all():
+        return NONE
+    return f"({', '.join(number(float(v) * 1e3, 5) for v in values)}) mm"
+
+
+PARTS = (picture, contacts, reduction, facts)

@@ -1,0 +1,62 @@
+"""An analysis of a result as figures and tables see it: a dataset, and the few things that each of them asks of it."""
+
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+import xarray as xr
+
+from stickslip.arrays import FloatArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A dataset of one analysis.
+
+    Parameters
+    ----------
+    data
+        Its variables, and the attributes of the whole result with its own over them.
+    """
+
+    data: xr.Dataset
+
+    def has(self, *names: str) -> bool:
+        """Say whether all the variables are there and none is empty."""
+        return all(name in self.data and self.data[name].size > 0 for name in names)
+
+    def values(self, name: str, *dimensions: str) -> FloatArray:
+        """Return a variable as floats with its dimensions in the order named, or as they are stored."""
+        found = self.data[name]
+        return np.asarray(found.transpose(*dimensions or found.dims).values, dtype=np.float64)
+
+    def floats(self, name: str) -> FloatArray:
+        """Return the values of a variable as floats."""
+        return self.values(name)
+
+    def integers(self, name: str) -> IntArray:
+        """Return the values of a variable as integers."""
+        return np.asarray(self.data[name].values).astype(np.int64)
+
+    def labels(self, dimension: str) -> tuple[str, ...]:
+        """Return the labels of a dimension, escaped for HTML; numbers where it has none."""
+        if dimension in self.data.coords:
+            return tuple(escape(str(v)) for v in self.data[dimension].values)
+        return tuple(str(i) for i in range(self.data.sizes.get(dimension, 0)))
+
+    def text(self, attribute: str, default: str = "") -> str:
+        """Return an attribute as text, not escaped."""
+        value = self.data.attrs.get(attribute, default)
+        return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+    def numbers(self, attribute: str) -> FloatArray:
+        """Return an attribute as numbers, empty where it is missing or has none."""
+        try:
+            return np.atleast_1d(np.asarray(self.data.attrs.get(attribute, []), dtype=np.float64))
+        except ValueError:
+            return np.zeros(0)
+
+    def scalar(self, attribute: str, default: float = float("nan")) -> float:
+        """Return an attribute as a number, the default where it is missing or no number."""
+        found = self.numbers(attribute)
+        return float(found[0]) if found.size else default

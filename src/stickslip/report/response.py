@@ -1,0 +1,258 @@
+"""A forced response as figures and tables see it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+
+import numpy as np
+import numpy.typing as npt
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.harmonic.selection import STRATEGIES, strategy_named
+from stickslip.harmonic.selection.strategy import always_kept
+from stickslip.harmonic.support import named
+from stickslip.report.cases import Case, cases_of, varied
+from stickslip.report.node import Node
+from stickslip.report.quantities import Scale, number, predicted, scale_for
+
+NEEDED = ("point_case", "frequency_hz", "order", "status", "amplitude", "harmonic_kept")
+_TURNS = (".rx", ".ry", ".rz")
+
+
+@dataclass(frozen=True, eq=False)
+class Alert:
+    """The solutions about which the strategy was asked, one a frequency: the first one by an alert, else the accepted one."""
+
+    case: IntArray
+    hz: FloatArray
+    error: FloatArray  # percent, as predicted; of a strategy that predicts no error its indicator
+
+
+@dataclass(frozen=True, eq=False)
+class Response(Node):
+    """Accepted points of all cases; any variable but those of `NEEDED` may be missing."""
+
+    @cached_property
+    def cases(self) -> tuple[Case, ...]:
+        """All cases, in the order of the study."""
+        return cases_of(self.data)
+
+    @property
+    def varied(self) -> str:
+        """The varied keys, escaped: heading of legends and columns."""
+        return varied(self.data)
+
+    def floats(self, name: str) -> FloatArray:
+        """Return the values of a variable as floats; NaN of the shape of ``point`` if it is missing."""
+        if name not in self.data:
+            return np.full(self.data.sizes["point"], np.nan)
+        return self.values(name)
+
+    def of_case(self, name: str, case: Case, *dimensions: str) -> FloatArray:
+        """Return what a variable with the dimension ``case`` holds of one, its dimensions in the order named."""
+        found = self.data[name].isel(case=case.index)
+        return np.asarray(found.transpose(*dimensions).values, dtype=np.float64)
+
+    def number_of(self, name: str, case: Case) -> float:
+        """Return the number that a variable along ``case`` holds of one; NaN where it is missing."""
+        return float(self.values(name)[case.index]) if name in self.data else float("nan")
+
+    @cached_property
+    def point_case(self) -> IntArray:
+        """(point,) the case of each point."""
+        return self.integers("point_case")
+
+    @cached_property
+    def hz(self) -> FloatArray:
+        """(point,) frequency of each point."""
+        return self.floats("frequency_hz")
+
+    @property
+    def output(self) -> int:
+        """Position of the output whose peak counts along ``output``."""
+        names = [str(v) for v in self.data["output"].values] if "output" in self.data.coords else []
+        wanted = self.text("report_output")
+        return names.index(wanted) if wanted in names else 0
+
+    @property
+    def output_name(self) -> str:
+        """Label of that output, escaped."""
+        return self.labels("output")[self.output]
+
+    @property
+    def length(self) -> str:
+        """Unit of the output's motion."""
+        return "rad" if self.output_name.endswith(_TURNS) else "m"
+
+    @property
+    def per_force(self) -> bool:
+        """Whether responses are divided by the excitation: where every case has one."""
+        return all(c.excitation > 0 for c in self.cases)
+
+    @property
+    def unit(self) -> str:
+        """Unit of `response`."""
+        return f"{self.length}/N" if self.per_force else self.length
+
+    @property
+    def quantity(self) -> str:
+        """What `response` is called on an axis."""
+        return "amplitude / force" if self.per_force else "amplitude"
+
+    @cached_property
+    def converged(self) -> npt.NDArray[np.bool_]:
+        """(point,) True where the point was accepted: the flag that means ``converged``, else zero."""
+        attributes = self.data["status"].attrs
+        meanings = str(attributes.get("flag_meanings", "")).split()
+        values = np.atleast_1d(np.asarray(attributes.get("flag_values", [])))
+        good = [v for v, m in zip(values, meanings, strict=False) if m == "converged"]
+        return np.isin(self.integers("status"), good or [0])
+
+    @cached_property
+    def alert(self) -> Alert:
+        """Where the strategy was asked; the accepted points that have an indicator in files which do not say."""
+        if "alert_error_percent" in self.data:
+            return Alert(
+                self.integers("alert_case"),
+                self.values("alert_frequency_hz"),
+                self.values("alert_error_percent"),
+            )
+        error = self.floats("predicted_error_percent" if self.is_error else "indicator")
+        at = np.flatnonzero(~np.isnan(error))
+        return Alert(self.point_case[at], self.hz[at], error[at])  # fmt: skip
+
+    @property
+    def selection(self) -> str:
+        """Name of the strategy, escaped."""
+        return escape(self.text("selection", "jacobian_alert"))
+
+    @property
+    def is_error(self) -> bool:
+        """Whether the strategy's indicator is the predicted error of a solution."""
+        return self.text("indicator_name", "predicted error") == "predicted error"
+
+    @property
+    def decides(self) -> bool:
+        """Whether anything chose: not with the same harmonics at every frequency."""
+        known = self.selection in STRATEGIES
+        return not known or always_kept(strategy_named(self.selection)) is None
+
+    @property
+    def threshold(self) -> float:
+        """Threshold of the strategy; in percent where it is one of an error."""
+        if self.is_error:
+            return self.scalar("alert_threshold_percent", 5.0)
+        return self.scalar("selection_threshold")
+
+    def shown(self, indicator: float) -> str:
+        """Write what `alert` holds: in percent where it is an error."""
+        if self.is_error:
+            return predicted(indicator)
+        return "beyond all bounds" if np.isinf(indicator) else number(indicator)
+
+    @property
+    def low_harmonics(self) -> IntArray:
+        """Harmonics of the first passage, from 0."""
+        return self._support("low", 1)
+
+    @property
+    def high_harmonics(self) -> IntArray:
+        """Harmonics of the reference, from 0."""
+        return self._support("high", 5)
+
+    def _support(self, which: str, default: int) -> IntArray:
+        given = self.numbers(f"{which}_harmonics")
+        full = np.arange(int(self.scalar(f"{which}_order", default)) + 1)
+        return (given if given.size else full).astype(np.int64)
+
+    @property
+    def low_name(self) -> str:
+        """Harmonics of the first passage as text."""
+        return named(self.low_harmonics)
+
+    @property
+    def high_name(self) -> str:
+        """Harmonics of the reference as text."""
+        return named(self.high_harmonics)
+
+    @cached_property
+    def kept(self) -> IntArray:
+        """(point, harmonic) 1 where the solution keeps the harmonic."""
+        return self.values("harmonic_kept", "point", "harmonic").astype(np.int64)
+
+    @cached_property
+    def more(self) -> npt.NDArray[np.bool_]:
+        """(point,) True where the solution keeps harmonics that the first passage does not."""
+        own = np.isin(np.arange(self.kept.shape[1]), self.low_harmonics)
+        return np.asarray((self.kept[:, ~own] > 0).any(axis=1))
+
+    @property
+    def more_name(self) -> str:
+        """What such points keep, as text: the harmonics of the reference where it is all of them."""
+        some = self.kept[self.more]
+        own = np.isin(np.arange(self.kept.shape[1]), self.high_harmonics)
+        return f"H = {self.high_name}" if bool((some == own).all()) else "more harmonics"
+
+    def response(self, name: str = "amplitude") -> FloatArray:
+        """(point,) amplitude of the report output, divided by the excitation where there is one."""
+        values = np.asarray(self.data[name].isel(output=self.output).values, dtype=np.float64)
+        force = np.array([c.excitation for c in self.cases])[self.point_case]
+        return np.asarray(values / force) if self.per_force else values
+
+    @cached_property
+    def accepted(self) -> FloatArray:
+        """(point,) response, NaN where the point did not converge."""
+        return np.where(self.converged, self.response(), np.nan)
+
+    @property
+    def scale(self) -> Scale:
+        """Engineering unit of the accepted responses."""
+        return scale_for(self.accepted, self.unit)
+
+    def points(self, case: Case) -> IntArray:
+        """Points of a case in the order in which a curve joins them, the unconverged ones included.
+
+        A branch that folds back keeps its order and leaves out the peak refinements, whose place on it is
+        not stored; otherwise the order is that of frequency.
+        """
+        index = np.flatnonzero(self.point_case == case.index)
+        refined = np.nan_to_num(self.floats("refinement")[index]) > 0
+        along = np.diff(self.hz[index][~refined])
+        if np.any(along > 0) and np.any(along < 0):
+            return index[~refined]
+        return index[np.argsort(self.hz[index], kind="stable")]
+
+    def peak(self, case: Case) -> int:
+        """Position of the peak along ``point``; -1 if there is none."""
+        value = self.number_of("peak_point", case)
+        inside = np.isfinite(value) and 0 <= value < self.data.sizes["point"]
+        return int(value) if inside else -1
+
+    def peak_response(self, case: Case) -> float:
+        """Response at the peak; NaN without a peak."""
+        return float(self.response()[self.peak(case)]) if self.peak(case) >= 0 else float("nan")
+
+    def peak_hz(self, case: Case) -> float:
+        """Frequency of the peak in Hz; NaN without a peak."""
+        return float(self.hz[self.peak(case)]) if self.peak(case) >= 0 else float("nan")
+
+    @cached_property
+    def peaked(self) -> tuple[Case, ...]:
+        """The cases that have a peak."""
+        return tuple(c for c in self.cases if self.peak(c) >= 0)
+
+    @property
+    def chosen(self) -> int:
+        """The case whose contacts are shown first: the last one with a peak."""
+        return self.peaked[-1].index if self.peaked else -1
+
+    @cached_property
+    def groups(self) -> dict[str, list[int]]:
+        """Contact points by the contact of the model that they belong to, names escaped; by contact line in files which do not say."""
+        names = self.labels("contact")
+        if self.has("contact_group"):
+            names = tuple(escape(str(v)) + "." for v in self.data["contact_group"].values)
+        found: dict[str, list[int]] = {}
+        for index, name in enumerate(names):
+            found.setdefault(name.partition(".")[0], []).append(index)
+        return found

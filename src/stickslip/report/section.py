@@ -1,0 +1,73 @@
+"""What an analysis adds to the page: blocks of figures, tables and words, each a function of its dataset."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import xarray as xr
+
+from stickslip.report.plot import Plot
+
+Shown = Plot | str | Sequence[Plot] | None  # None where the dataset does not hold what is shown
+Part = Callable[[Any], Shown]  # of a view of the dataset
+
+
+@dataclass(frozen=True)
+class Card:
+    """A box at the top of the page: one number, what it is, and more about it."""
+
+    value: str
+    label: str
+    note: str
+
+
+@dataclass(frozen=True)
+class Block:
+    """A chapter of the page.
+
+    Parameters
+    ----------
+    key
+        Its anchor.
+    title
+        Its heading, HTML.
+    parts
+        In their order.
+    """
+
+    key: str
+    title: str
+    parts: tuple[Part, ...]
+
+
+def _nothing(_: Any) -> Sequence[Any]:
+    return ()
+
+
+@dataclass(frozen=True)
+class Section:
+    """All that the page shows of an analysis.
+
+    Parameters
+    ----------
+    name
+        Of the analysis, its node in the result.
+    needs
+        Variables without which there is nothing to show.
+    view
+        Makes of the dataset what the parts take.
+    blocks
+        Chapters of the page.
+    by_case
+        Whether `view` sees one case at a time, so that the blocks are drawn for each.
+    cards, warnings
+        Boxes for the top of the page, and sentences on what is doubtful, HTML.
+    """
+
+    name: str
+    needs: tuple[str, ...]
+    view: Callable[[xr.Dataset], Any]
+    blocks: tuple[Block, ...]
+    by_case: bool = False
+    cards: Callable[[Any], Sequence[Card]] = _nothing
+    warnings: Callable[[Any], Sequence[str]] = _nothing

@@ -1,0 +1,37 @@
+"""Forced responses on the page."""
+
+from stickslip.report.forced import tables
+from stickslip.report.forced.bodies import bodies, energy
+from stickslip.report.forced.choice import choice
+from stickslip.report.forced.contact import chooser, hysteresis_t, hysteresis_w, state_map
+from stickslip.report.forced.curves import frequency_response, low_order, optimisation
+from stickslip.report.forced.errors import error_scatter, errors
+from stickslip.report.forced.harmonics import kept_harmonics
+from stickslip.report.forced.head import cards, warnings
+from stickslip.report.response import NEEDED, Response
+from stickslip.report.section import Block, Section
+
+SECTION = Section(
+    "forced_response",
+    NEEDED,
+    Response,
+    (
+        Block("alert", "Where more harmonics were needed", (choice,)),
+        Block(
+            "response",
+            "Forced response",
+            (frequency_response, low_order, kept_harmonics, errors, error_scatter, optimisation),
+        ),
+        Block(
+            "contact",
+            "Contacts at the peak",
+            (chooser, hysteresis_t, hysteresis_w, state_map, bodies, energy),
+        ),
+        Block("cases", "Cases", (tables.peaks, tables.attempts)),
+        Block(
+            "checks", "Checks", (tables.more_harmonics, tables.time_integration, tables.retention)
+        ),
+    ),
+    cards=cards,
+    warnings=warnings,
+)

@@ -1,0 +1,123 @@
+"""Natural frequencies and mode shapes on the page."""
+
+from html import escape
+
+import numpy as np
+import plotly.graph_objects as go
+
+from stickslip.report.diameters import diameter_axes, mode_lines
+from stickslip.report.plot import INK, Plot, styled
+from stickslip.report.quantities import NONE, counted, number, percent
+from stickslip.report.section import Block, Card, Section
+from stickslip.report.shapes import mode_shapes
+from stickslip.report.tables import html_table
+from stickslip.report.waves import NEEDED, Waves
+
+
+def diameter_map(view: Waves) -> Plot:
+    """Show the frequencies over the nodal diameters."""
+    figure = go.Figure(mode_lines(view))
+    reference = ""
+    if view.has("reference_hz"):
+        known, mode = np.nonzero(np.isfinite(view.floats("reference_hz")))
+        figure.add_trace(
+            go.Scatter(
+                x=view.integers("nodal_diameter")[known], y=view.floats("reference_hz")[known, mode],
+                mode="markers", name="reference", hovertemplate="reference: %{y:.6g} Hz<extra></extra>",
+                marker={"size": 12, "symbol": "circle-open", "color": INK, "line": {"width": 1.2}},
+            )
+        )  # fmt: skip
+        reference = " Open circles are the frequencies to compare with."
+    styled(figure, 520)
+    diameter_axes(figure, view)
+    if view.sectors == 1:
+        figure.update_xaxes(title_text="", showticklabels=False)
+    hz = view.floats("frequency_hz")
+    caption = (
+        f"{counted(hz.shape[1], 'mode')} of {counted(len(hz), 'wave')}, {number(hz.min(), 5)} to {number(hz.max(), 5)} Hz, "
+        f"{view.text('rotation')}. Lines join the same mode number; modes of different families that come close repel each "
+        f"other instead of crossing (veering).{reference}"
+    )
+    return Plot(f"diameters{view.key}", "Nodal-diameter map", caption, figure)
+
+
+def frequencies(view: Waves) -> str:
+    """Return the natural frequencies: a row a wave, a column a mode."""
+    hz = view.floats("frequency_hz")
+    head = ["wave", *(f"mode {m + 1} (Hz)" for m in range(hz.shape[1]))]
+    # where nothing parts the directions, both have the frequencies
+    parted = len(set(view.integers("nodal_diameter"))) < len(hz)
+    kinds = [kind if parted or kind == "standing" else "both ways" for kind in view.kinds]
+    names = [
+        f"{name}, {kind}" if view.sectors > 1 else name
+        for name, kind in zip(view.waves, kinds, strict=True)
+    ]
+    rows = [
+        [escape(name), *(number(f, 7) for f in row)] for name, row in zip(names, hz, strict=True)
+    ]
+    return "<h3>Natural frequencies</h3>" + html_table(head, rows)
+
+
+def comparison(view: Waves) -> str | None:
+    """Return the relative differences from the reference, a row a wave."""
+    if not view.has("difference"):
+        return None
+    title, off = "<h3>Against the reference</h3>", view.floats("difference")
+    known = int(np.isfinite(off).sum())
+    if not known:
+        return title + "<p>The reference has none of these frequencies.</p>"
+    rows = [
+        [escape(name), *(_share(float(d)) for d in row)]
+        for name, row in zip(view.waves, off, strict=True)
+        if np.isfinite(row).any()
+    ]
+    worst = np.unravel_index(np.nanargmax(np.abs(off)), off.shape)
+    text = (
+        f"<p>{known} {'frequency' if known == 1 else 'frequencies'} compared; the largest relative difference is "
+        f"{_share(float(off[worst]))}, at {escape(view.waves[worst[0]])}, mode {worst[1] + 1}.</p>"
+    )
+    return (
+        title + text + html_table(["wave", *(f"mode {m + 1}" for m in range(off.shape[1]))], rows)
+    )
+
+
+def _share(value: float) -> str:
+    """Write a relative difference, in parts of a million where it is small."""
+    if not np.isfinite(value):
+        return NONE
+    return f"{number(1e6 * value)} ppm" if abs(value) < 1e-4 else percent(100 * value, 3)
+
+
+def _cards(view: Waves) -> list[Card]:
+    hz = view.floats("frequency_hz")
+    over = counted(len(hz), "wave") if view.sectors > 1 else "a whole structure"
+    found = [
+        Card(
+            f"{number(np.nanmin(hz), 5)} Hz", "lowest natural frequency", f"{hz.size} modes, {over}"
+        )
+    ]
+    if view.has("difference") and np.isfinite(view.floats("difference")).any():
+        off = np.abs(view.floats("difference"))
+        note = f"of {np.count_nonzero(np.isfinite(off))} frequencies"
+        found.append(
+            Card(
+                percent(100 * float(np.nanmax(off))), "largest difference from the reference", note
+            )
+        )
+    return found
+
+
+SECTION = Section(
+    "modes",
+    NEEDED,
+    Waves,
+    (
+        Block(
+            "modes",
+            "Natural frequencies and mode shapes",
+            (diameter_map, mode_shapes, frequencies, comparison),
+        ),
+    ),
+    by_case=True,
+    cards=_cards,
+)

@@ -1,0 +1,194 @@
+"""Picture of the skin of the model with the contact points; it turns with the mouse."""
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.report.forced.bodies import group_colours, rigid_bodies
+from stickslip.report.forced.contact import contact_lines
+from stickslip.report.node import Node
+from stickslip.report.plot import INK, Plot, styled
+from stickslip.report.quantities import NARROW_SPACE, counted, joined, number
+from stickslip.report.response import Response
+
+_MANY_EDGES = 40_000  # above it only the sharp edges are drawn, to keep the page small
+_SHARP = np.cos(np.radians(30.0))
+_STEEL = "#b9c4d0"
+_MOST_NAMES = 30  # of contact points that do not cover each other
+
+
+def edges(points: FloatArray, triangles: IntArray) -> tuple[IntArray, np.ndarray]:
+    """Find the edges of a triangulated surface.
+
+    Returns
+    -------
+    pairs
+        (n, 2) nodes of each edge, once.
+    sharp
+        (n,) True where the two faces make an angle of more than 30 degrees, or there is only one.
+    """
+    normal = np.cross(
+        points[triangles[:, 1]] - points[triangles[:, 0]],
+        points[triangles[:, 2]] - points[triangles[:, 0]],
+    )
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = normal / np.where(length > 0, length, 1.0)
+    corners = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    pairs, which = np.unique(corners, axis=0, return_inverse=True)
+    face = np.repeat(np.arange(len(triangles)), 3)
+    order = np.argsort(which.ravel(), kind="stable")
+    start = np.searchsorted(which.ravel()[order], np.arange(len(pairs)))
+    end = np.append(start[1:], len(order)) - 1
+    first, last = face[order[start]], face[order[end]]
+    angle = np.abs(np.sum(normal[first] * normal[last], axis=1))
+    return pairs, (start == end) | (angle < _SHARP)
+
+
+def _lines(points: FloatArray, pairs: IntArray, colour: str, width: float) -> go.Scatter3d:
+    """Draw separate segments as one trace, with gaps between them."""
+    path = np.full((len(pairs), 3, 3), np.nan, dtype=np.float32)
+    path[:, :2] = points[pairs]
+    x, y, z = path.reshape(-1, 3).T
+    line = {"color": colour, "width": width}
+    return go.Scatter3d(x=x, y=y, z=z, mode="lines", line=line, hoverinfo="skip", showlegend=False)
+
+
+def _skin(points: FloatArray, triangles: IntArray, opacity: float) -> go.Mesh3d:
+    x, y, z = points.astype(np.float32).T
+    i, j, k = triangles.astype(np.int32).T
+    light = {"ambient": 0.65, "diffuse": 0.6, "specular": 0.1, "roughness": 0.9}
+    return go.Mesh3d(
+        x=x, y=y, z=z, i=i, j=j, k=k, color=_STEEL, opacity=opacity, flatshading=True,
+        lighting=light, hoverinfo="skip", name="skin", showlegend=False,
+    )  # fmt: skip
+
+
+def _inside(points: FloatArray, parts: IntArray, low: FloatArray, high: FloatArray) -> IntArray:
+    """Keep the triangles or edges whose bounding box meets the box from `low` to `high`."""
+    corners = points[parts]
+    meets = (corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)
+    return np.asarray(parts[meets.all(axis=1)])
+
+
+def _contacts(response: Response, position: FloatArray, *, named: bool) -> list[go.Scatter3d]:
+    """Draw the contact points, coloured by the contact of the model that they belong to."""
+    names, colours = np.array(response.labels("contact"), dtype=object), group_colours(response)
+    # names of neighbouring contact lines go above and below their points, so that they do not cover each other
+    place = np.full(len(names), "top center", dtype=object)
+    for line, members in enumerate(contact_lines(response)):
+        place[members] = "bottom center" if line % 2 else "top center"
+    mode = "markers+text" if named and len(names) <= _MOST_NAMES else "markers"
+    return [
+        go.Scatter3d(
+            x=position[at, 0], y=position[at, 1], z=position[at, 2], mode=mode, name=group, legendgroup=group, showlegend=named,
+            text=names[at], textposition=place[at], textfont={"size": 12, "color": INK},
+            marker={"size": 5 if named else 3, "color": colours[group]},
+            hovertemplate="%{text}: x %{x:.2f}, y %{y:.2f}, z %{z:.2f} mm<extra></extra>",
+        )
+        for group, at in response.groups.items()
+    ]  # fmt: skip
+
+
+def _sections(response: Response, position: FloatArray) -> go.Scatter3d:
+    """Join the contact points of each section of a rigid body, which has no skin: names that end alike."""
+    rows: dict[str, list[int]] = {}
+    for index, name in enumerate(response.labels("contact") if rigid_bodies(response) else ()):
+        rows.setdefault(name.rpartition(".")[2], []).append(index)
+    gap = np.full((1, 3), np.nan)
+    paths = [np.vstack([position[[*row, row[0]]], gap]) for row in rows.values() if len(row) == 3]
+    x, y, z = np.vstack([*paths, gap]).T
+    line = {"color": INK, "width": 3}
+    return go.Scatter3d(
+        x=x,
+        y=y,
+        z=z,
+        mode="lines",
+        line=line,
+        hoverinfo="skip",
+        name="sections",
+        showlegend=bool(paths),
+    )
+
+
+def _neighbourhood(position: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Corners of a box around the contact points."""
+    margin = 0.35 * float(np.ptp(position, axis=0).max())
+    return position.min(axis=0) - margin, position.max(axis=0) + margin
+
+
+def _scene(low: FloatArray, high: FloatArray, *, close: bool) -> dict[str, object]:
+    """Axes of a view of the box between two corners; equal lengths on all axes."""
+    eye, size = (
+        ({"x": 0.32, "y": -1.5, "z": -0.8}, 1.3)
+        if close
+        else ({"x": 1.0, "y": -1.5, "z": 0.55}, 1.65)
+    )
+    span = size * (high - low) / (high - low).max()
+    axes = {
+        f"{name}axis": {
+            "range": [float(a), float(b)], "title": {"text": f"{name} (mm)", "font": {"size": 12}}, "showbackground": False,
+            "gridcolor": "#dfe4ea", "zeroline": False, "nticks": 6 if close else 3, "tickfont": {"size": 11},
+        }
+        for name, a, b in zip("xyz", low, high, strict=True)
+    }  # fmt: skip
+    camera = {"eye": eye, "projection": {"type": "orthographic"}}
+    ratio = dict(zip("xyz", span.tolist(), strict=True))
+    return {
+        **axes,
+        "aspectmode": "manual",
+        "aspectratio": ratio,
+        "camera": camera,
+        "dragmode": "orbit",
+    }
+
+
+def _caption(node: Node, points: FloatArray, triangles: IntArray) -> str:
+    size = np.ptp(points, axis=0)
+    text = (
+        f"Skin of the mesh: {counted(len(triangles), 'triangle')} between {len(np.unique(triangles))} corner nodes, "
+        f"{number(size[0])} × {number(size[1])} × {number(size[2])}{NARROW_SPACE}mm. Drag to turn, scroll to zoom."
+    )
+    if not isinstance(node, Response):
+        return text
+    each = [f"{counted(len(at), 'point')} of {group}" for group, at in node.groups.items()]
+    text += f" Contact points, coloured by contact: {joined(each)}." if each else ""
+    unmeshed = list(rigid_bodies(node))
+    verb = "is rigid and has" if len(unmeshed) == 1 else "are rigid and have"
+    return text + (f" Not drawn: {joined(unmeshed)}, which {verb} no mesh." if unmeshed else "")
+
+
+def skin_picture(node: Node) -> Plot | None:
+    """Show the skin with its mesh, whole and near the contacts."""
+    if not node.has("surface_point", "surface_triangle"):
+        return None
+    points, triangles = node.floats("surface_point") * 1e3, node.integers("surface_triangle")
+    contacts = isinstance(node, Response) and node.has("contact_position")
+    position = node.floats("contact_position") * 1e3 if contacts else points
+    contacts = contacts and bool(np.isfinite(position).all())
+    pairs, sharp = edges(points, triangles)
+    drawn = pairs if len(pairs) <= _MANY_EDGES else pairs[sharp]
+    titles = ("whole", "near the contacts")[: 1 + contacts]
+    specs = [[{"type": "scene"}] * len(titles)]
+    figure = make_subplots(
+        1, len(titles), specs=specs, horizontal_spacing=0.02, subplot_titles=titles
+    )
+    figure.add_traces(
+        [_skin(points, triangles, 1.0), _lines(points, drawn, "#6f7f91", 1.0)], rows=1, cols=1
+    )
+    if contacts and isinstance(node, Response):
+        low, high = _neighbourhood(position)
+        near = [_skin(points, _inside(points, triangles, low, high), 0.35)]
+        near += [
+            _lines(points, _inside(points, drawn, low, high), "#6f7f91", 1.0),
+            _sections(node, position),
+        ]
+        figure.add_traces(_contacts(node, position, named=False), rows=1, cols=1)
+        figure.add_traces([*near, *_contacts(node, position, named=True)], rows=1, cols=2)
+        figure.update_layout(scene2=_scene(low, high, close=True))
+    styled(figure, 620)
+    legend = {"orientation": "h", "x": 1, "xanchor": "right", "y": 0, "yanchor": "bottom"}
+    whole = _scene(points.min(axis=0), points.max(axis=0), close=False)
+    figure.update_layout(scene=whole, margin={"l": 0, "r": 0, "t": 40, "b": 10}, legend=legend)
+    title = "The mesh and the contact points" if contacts else "The mesh"
+    return Plot("mesh", title, _caption(node, points, triangles), figure)
