@@ -6,6 +6,7 @@ one that Newton sees.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Literal, Protocol, runtime_checkable
 from weakref import WeakKeyDictionary
 
@@ -101,6 +102,11 @@ class Krylov:
             raise input_error(
                 "Krylov.method", f"is {self.method!r}", "Give one of gmres, bicgstab."
             )
+
+    def __reduce__(self) -> tuple["partial[Krylov]", tuple[()]]:
+        """Pickle the options alone: what is kept belongs to the problems of one process."""
+        options = ("method", "tolerance", "tangent_tolerance", "max_products")
+        return partial(Krylov, **{name: getattr(self, name) for name in options}), ()
 
     def solve(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
         """Solve ``jac x = right`` to `tolerance`; see `LinearSolver`."""

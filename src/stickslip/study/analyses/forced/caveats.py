@@ -1,0 +1,82 @@
+"""What the user should know of a response: sentences, told while it is computed and with its result."""
+
+import math
+from collections.abc import Iterator
+
+from stickslip.response.free_motion import drift
+from stickslip.study.analyses.forced.points import Response
+from stickslip.study.analyses.forced.question import Question
+from stickslip.units import HZ
+
+
+def caveats(question: Question, response: Response, shift: tuple[float, float]) -> list[str]:
+    """Return the sentences on a response, without the case's label.
+
+    Parameters
+    ----------
+    question, response
+        The case.
+    shift
+        What `peak_shift` found.
+    """
+    return [
+        *_of_points(question, response),
+        *_of_shape(question, response),
+        *_of_drift(question, response),
+        *_of_peak(question, response, shift),
+    ]
+
+
+def _of_points(question: Question, response: Response) -> Iterator[str]:
+    if response.failed:
+        yield (
+            f"{response.failed} points did not converge; the peak is the largest of the others, and a larger one may stand "
+            "among them"
+        )
+    # between given frequencies any growth is possible: only steps of a branch are short enough to tell a jump
+    on_a_grid = question.sweep.single or question.sweep.grid.size > 0
+    if response.jumps_hz and not on_a_grid:
+        places = ", ".join(f"{f:.2f}" for f in response.jumps_hz)
+        yield (
+            f"the response jumps at {places} Hz, where solutions with few and with many harmonics meet: more than one periodic "
+            "motion exists near there, and which one a machine takes depends on its history."
+        )
+
+
+def _of_shape(question: Question, response: Response) -> Iterator[str]:
+    folded = response.folded_hz(int(question.sweep.forward))
+    if folded is not None:
+        yield (
+            f"the response folds between {folded[0]:.2f} and {folded[1]:.2f} Hz: more than one periodic motion was found there, "
+            "as a rule one of them unstable. Points outside the asked range belong to the fold."
+        )
+
+
+def _of_drift(question: Question, response: Response) -> Iterator[str]:
+    """Warn where friction leaves the mean position of a body free."""
+    chosen = [a.point for a in response.accepted if not a.point.converged]
+    if response.top is not None:
+        chosen = [response.top.point, *chosen]
+    for point in chosen:
+        found = drift(question.problem, point)
+        if found.undetermined:
+            yield (
+                f"{point.omega / HZ:.2f} Hz: every contact slips or opens in each cycle, the mean position of {found.coordinate} "
+                "is undetermined and the body may drift. Give [retention] a small stiffness_n_per_m (1e-6 of the contact "
+                "stiffness); the result then says how far it moves the peak."
+            )
+            return
+
+
+def _of_peak(question: Question, response: Response, shift: tuple[float, float]) -> Iterator[str]:
+    if response.peak_at_end:
+        key = "speed_rpm" if question.over_speed else "frequency_hz"
+        yield (
+            f"the largest amplitude stands at the end of the sweep ({response.peak_hz:.2f} Hz); it is no resonance. "
+            f"Widen forced_response.{key}."
+        )
+    if question.model.retention > 0.0 and response.top is not None and math.isnan(shift[0]):
+        yield (
+            "no periodic motion was found at the peak with a tenth of the retention stiffness; the peak rests on the body being "
+            "held, so do not rely on it"
+        )

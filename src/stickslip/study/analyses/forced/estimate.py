@@ -1,0 +1,124 @@
+"""What the response of a case will cost, told before anything long is computed."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from stickslip.assembly.contact import GROUND, NEXT
+from stickslip.assembly.model import Model
+from stickslip.errors import input_error
+from stickslip.harmonic.selection.strategy import always_kept
+from stickslip.model.part import Part
+from stickslip.response.forced.response import Sweep
+
+BYTES_A_NODE = 35e3  # assembly and factorisation of second-order tetrahedra, measured at 10 to 30 thousand nodes
+BASE_GB = 0.35  # interpreter and libraries
+POINTS = 1.7  # points of a branch for each one asked: more are taken where the response turns
+NEWTON_A_POINT = 10  # the two blades took 7, repeats and failed tries included
+REPEATED = 0.6  # share of points that a strategy solves with many harmonics
+FLOPS = 2e9  # of a Newton step: a small dense factorisation on one core, and the contacts
+SECONDS_A_NODE = 1.2e-3  # assembly, reduction and the full model's frequencies
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Cost of a case.
+
+    Parameters
+    ----------
+    nodes
+        Of all parts.
+    unknowns
+        Of a solution with all harmonics.
+    memory_gb
+        Largest memory.
+    newton_steps
+        Of all points.
+    seconds
+        Of one core: model and solver together, without time integration.
+    """
+
+    nodes: int
+    unknowns: int
+    memory_gb: float
+    newton_steps: int
+    seconds: float
+
+    def __str__(self) -> str:
+        return (
+            f"estimate: {self.nodes} nodes, {self.unknowns} unknowns at most, {self.memory_gb:.1f} GB of memory, "
+            f"{self.newton_steps} Newton steps, {self.seconds:.0f} s"
+        )
+
+
+def estimate(model: Model, sweep: Sweep) -> Estimate:
+    """Estimate memory and work of the response of a model that is not assembled yet."""
+    nodes, coordinates = nodes_of(model), retained_of(model)
+    low, high = (
+        (2 * len(own) - 1) * coordinates for own in (sweep.low_harmonics, sweep.high_harmonics)
+    )
+    grid = sweep.grid.size or (sweep.points if sweep.single else POINTS * sweep.points)
+    points = grid + sweep.peak_points
+    kept = always_kept(sweep.strategy)
+    share_high = {"low": 0.0, "high": 1.0}.get(kept or "", REPEATED)
+    # each strategy looks at the larger space about once a point
+    steps_high = points * share_high * NEWTON_A_POINT + (points if kept is None else 0)
+    steps_low = 0 if kept == "high" else points * NEWTON_A_POINT
+    seconds = (steps_low * low**3 + steps_high * high**3) * 4 / FLOPS + nodes * SECONDS_A_NODE
+    stored = points * (sweep.high_harmonics[-1] + 1) * 10 * coordinates * 16 / 1e9
+    memory = BASE_GB + nodes * BYTES_A_NODE / 1e9 + stored + 6 * high**2 * 8 / 1e9
+    return Estimate(nodes, high, memory, round(steps_low + steps_high), seconds)
+
+
+def check_limits(limits: Any, cost: Estimate) -> None:
+    """Refuse a case that is estimated above the study's limits.
+
+    Raises
+    ------
+    InputError
+        Naming the limit.
+    """
+    advice = "Take a coarser mesh, fewer points, contacts or harmonics, or raise the limit."
+    if cost.memory_gb > limits.memory_gb:
+        raise input_error(
+            "limits.memory_gb",
+            f"the forced response is estimated at {cost.memory_gb:.1f} GB ({cost.nodes} nodes, {cost.unknowns} unknowns), the "
+            f"limit is {limits.memory_gb:g} GB",
+            advice,
+        )
+    if cost.seconds > limits.work_s:
+        raise input_error(
+            "limits.work_s",
+            f"a case of the forced response is estimated at {cost.seconds:.0f} s ({cost.newton_steps} Newton steps), the limit "
+            f"is {limits.work_s:g} s",
+            advice,
+        )
+
+
+def nodes_of(model: Model) -> int:
+    """Return the number of nodes of all parts that are reduced; copies share the reduction of their template."""
+    return sum(_nodes(part) for part in model.parts.values() if part.template is None)
+
+
+def retained_of(model: Model) -> int:
+    """Return about how many coordinates stay unknown: those of the contacts, and six for each free rigid body."""
+    bodies = sum(part.body is not None for part in model.parts.values())
+    return 6 * bodies + sum(_coordinates(model, c.between) for c in model.contacts.values())
+
+
+def _nodes(part: Part) -> int:
+    return len(part.mesh.points) if part.mesh is not None else -(-part.structure.n // 3)
+
+
+def _coordinates(model: Model, between: tuple[str, str]) -> int:
+    """Return the dofs that a contact keeps of flexible parts, on a wheel its gaps alone."""
+    sides = [_dofs(model, name) for name in between if name != GROUND]
+    wheel = any(part.sectors > 1 for part in model.parts.values())
+    return max(sides, default=0) if wheel else sum(sides)
+
+
+def _dofs(model: Model, name: str) -> int:
+    part, _, surface = name.removeprefix(NEXT).partition(".")
+    owner = model.parts[part]
+    if owner.body is not None:
+        return 0
+    return len(owner.structure.sets.get(surface, ("one dof",)))

@@ -1,0 +1,193 @@
+"""The check inside a run (``--verify``): the same reduced model integrated in time at the peak, and beside it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stickslip.harmonic.linear import one_structure
+from stickslip.response.forced.response import ForcedPoint, ForcedProblem, forced_problem
+from stickslip.response.recovery import signals
+from stickslip.response.time.propagator import PeriodicLoad
+from stickslip.response.time.transient import (
+    TimeStepping,
+    TransientResult,
+    integrate,
+    start_from_harmonics,
+)
+from stickslip.solve.newton_method import newton
+from stickslip.study.analyses.forced.points import Accepted, Response
+from stickslip.study.analyses.forced.question import Question
+from stickslip.units import HZ
+
+PATIENCE = 600  # periods; a blade damped by 0.3 % forgets its start to 1e-5, undamped ringing of a damper never ends
+LARGE = 1.0  # percent: above it the balance is repeated with more harmonics, to tell which of the two is wrong
+NAMED = 3  # drifting coordinates that a sentence names
+MORE = 3  # times the harmonics, and the samples, of that repeat
+
+
+@dataclass(frozen=True)
+class Check:
+    """First-harmonic amplitude of the report output by balance and by time integration.
+
+    Parameters
+    ----------
+    frequency_hz
+        Where.
+    balance, transient
+        Amplitudes in m; of the integration the average over its last third where it did not become periodic.
+    settled
+        Whether the integration became periodic.
+    periods
+        Periods integrated.
+    scatter
+        Largest distance of a period's first harmonic from that average, relative to it; over all outputs.
+    drifting
+        Names of the coordinates whose mean moves on from period to period, with commas between them.
+    order
+        Harmonics of the balance.
+    refined_order, refined
+        Harmonics and amplitude of the balance repeated with more of them; NaN where it was not needed or failed.
+    """
+
+    frequency_hz: float
+    balance: float
+    transient: float
+    settled: bool
+    periods: int
+    scatter: float = 0.0
+    drifting: str = ""
+    order: int = 0
+    refined_order: int = 0
+    refined: float = float("nan")
+
+    @property
+    def difference_percent(self) -> float:
+        """Of the balance against the integration."""
+        return 100 * (self.balance - self.transient) / self.transient
+
+    @property
+    def sentence(self) -> str:
+        """What was compared and what happened."""
+        return (
+            f"{self.frequency_hz:.3f} Hz: balance {self.balance:.5e} m (H = {self.order}), "
+            f"time integration {self.transient:.5e} m, difference {self.difference_percent:+.2f} %; "
+            f"{self._motion}{self._verdict}"
+        )
+
+    @property
+    def _motion(self) -> str:
+        if not np.isfinite(self.transient):
+            return f"the integration overflowed after {self.periods} periods"
+        if self.settled:
+            return f"periodic after {self.periods} periods"
+        drifting = f", and these coordinates drift: {self.drifting}" if self.drifting else ""
+        return (
+            f"not periodic after {self.periods} periods: average over the last third, "
+            f"scatter {100 * self.scatter:.2g} %{drifting}"
+        )
+
+    @property
+    def _verdict(self) -> str:
+        if self.refined_order == 0:
+            return ""
+        if not np.isfinite(self.refined):
+            return f"; the balance with {self.refined_order} harmonics does not converge"
+        left = 100 * (self.refined - self.transient) / self.transient
+        return f"; the balance with {self.refined_order} harmonics gives {self.refined:.5e} m ({left:+.2f} %)"
+
+
+def chosen(question: Question, response: Response) -> list[Accepted]:
+    """Return the points that are integrated: the peak of each case, and where there is one case alone its flanks, too."""
+    if response.top is None:
+        return []
+    beside = () if question.label else response.flanks
+    return sorted((response.top, *beside), key=lambda a: a.point.omega)
+
+
+def check_in_time(question: Question, response: Response, accepted: Accepted) -> Check:
+    """Integrate in time at a point of the response, and compare.
+
+    Parameters
+    ----------
+    question, response
+        The model, and its finished response.
+    accepted
+        One of its points.
+    """
+    problem, point = question.problem, accepted.point
+    found = integrated(problem, point, question.model.load)
+    known = found.harmonics[1] if found.settled else found.average
+    check = Check(
+        frequency_hz=point.omega / HZ,
+        balance=response.amplitude(accepted),
+        transient=float(np.abs(known[response.output])),
+        settled=bool(found.settled),
+        periods=int(found.periods),
+        scatter=float(found.scatter),
+        drifting=listed(found.drifting),
+        order=point.order,
+    )
+    if abs(check.difference_percent) <= LARGE:
+        return check
+    order = MORE * max(question.sweep.high_harmonics[-1], point.order)
+    many = refined(question, point, order)
+    if many is None:
+        return replace(check, refined_order=order)
+    return replace(check, refined_order=order, refined=problem.amplitude(many, response.output))
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return the first few of many names as text."""
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return ", ".join(names[:NAMED]) + more
+
+
+def integrated(
+    problem: ForcedProblem, point: ForcedPoint, load: PeriodicLoad, periods: int = PATIENCE
+) -> TransientResult:
+    """Integrate in time from the balance's state at t = 0: near what is judged, so that little has to settle.
+
+    Parameters
+    ----------
+    problem, point
+        What was solved, and the solution.
+    load
+        Its loads.
+    periods
+        Give up settling after so many.
+    """
+    system = problem.system
+    motion = problem.low.linear.recover(point.omega, point.coefficients)
+    traction = signals(problem, point).force[:, :2, 0]
+    return integrate(
+        one_structure(system.structure, "time integration"),
+        system.interface.gap_operator,
+        system.interface.laws,
+        load,
+        point.omega,
+        system.outputs,
+        start=start_from_harmonics(motion, point.omega, traction),
+        stepping=TimeStepping(max_periods=periods),
+    )
+
+
+def refined(question: Question, point: ForcedPoint, order: int) -> ForcedPoint | None:
+    """Solve the balance with `order` harmonics; None if it does not converge.
+
+    Parameters
+    ----------
+    question
+        The model and how it is solved.
+    point
+        A solution with fewer harmonics, where Newton begins.
+    order
+        Harmonics; the samples grow with them.
+    """
+    sweep = replace(question.sweep, high=order, samples=(MORE + 1) * question.sweep.samples)
+    balance = forced_problem(question.model.system, question.model.load, sweep).high
+    start = balance.unknowns(point.coefficients)
+    solution = newton(lambda x: balance.linearise(x, point.omega), start, sweep.newton)
+    if not solution.status.converged:
+        return None
+    return replace(point, coefficients=balance.coefficients(solution.x))

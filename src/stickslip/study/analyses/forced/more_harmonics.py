@@ -1,0 +1,131 @@
+"""Whether the harmonics of a study are enough at all: each accepted solution against twice as many (``--verify-harmonics``)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.harmonic.support import Harmonics, named
+from stickslip.response.verification import verify_reference
+from stickslip.study.analyses.forced.chooser import error_text
+from stickslip.study.analyses.forced.points import Response
+from stickslip.study.analyses.forced.question import FACTOR, Question
+from stickslip.study.harmonics_table import HIGHEST
+from stickslip.units import HZ
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceDoubt:
+    """What twice as many harmonics would change in a response.
+
+    Parameters
+    ----------
+    harmonics
+        Highest harmonic against which the solutions are held.
+    high
+        Harmonics that the study keeps at most.
+    limit
+        Predicted change that is tolerated, a fraction.
+    errors
+        (accepted points,) predicted change, a fraction; NaN where there is no solution.
+    frequency_hz
+        Where it is largest; NaN without a solution.
+    kept
+        Harmonics of the solution there, as text.
+    label
+        Where the change is taken that is largest there.
+    """
+
+    harmonics: int
+    high: Harmonics
+    limit: float
+    errors: FloatArray
+    frequency_hz: float = float("nan")
+    kept: str = ""
+    label: str = ""
+
+    @property
+    def worst(self) -> float:
+        """Largest predicted change, a fraction; NaN without a solution."""
+        return float(np.nanmax(self.errors, initial=-np.inf)) if self.known else float("nan")
+
+    @property
+    def known(self) -> int:
+        """Number of solutions that were checked."""
+        return int(np.sum(~np.isnan(self.errors)))
+
+    @property
+    def above(self) -> int:
+        """Number of solutions that would change by more than is tolerated."""
+        return int(np.sum(self.errors > self.limit))
+
+    @property
+    def sentence(self) -> str:
+        """What was checked and what came out."""
+        if not self.known:
+            return "no solution that could be checked."
+        return (
+            f"against {self.harmonics} harmonics, {self.above} of {self.known} solutions are predicted to change by more than "
+            f"{100 * self.limit:g} % of their complex amplitude, phase included; the largest change is {error_text(self.worst)} "
+            f"of {self.label} at {self.frequency_hz:.2f} Hz, solved with H = {self.kept}."
+        )
+
+    @property
+    def warning(self) -> str:
+        """What to do about it; empty where nothing needs to be done."""
+        if not self.above:
+            return ""
+        return (
+            f"at {self.above} of {self.known} frequencies more harmonics than the study keeps are predicted to change the "
+            f"response, in amplitude or phase, by more than {100 * self.limit:g} %. {self.advice}"
+        )
+
+    @property
+    def advice(self) -> str:
+        """Which harmonics to keep instead, and what that costs."""
+        left_out = [h for h in range(1, self.high[-1]) if h not in self.high]
+        more = self.high[-1] if left_out else min(self.harmonics, HIGHEST)
+        if left_out:
+            told = (
+                f"harmonics.high leaves out {', '.join(map(str, left_out))}: keep them, and compare"
+            )
+        elif more > self.high[-1]:
+            told = f"Raise harmonics.high, for instance to {more}, and compare"
+        else:
+            return (
+                f"No study keeps more than {HIGHEST} harmonics: judge the result with that in mind."
+            )
+        return (
+            f"{told}; a solution then has {2 * more + 1} unknowns a coordinate instead of {2 * len(self.high) - 1}, and its cost "
+            "grows at least as much."
+        )
+
+
+def check_harmonics(question: Question, response: Response) -> ReferenceDoubt:
+    """Predict what twice as many harmonics would change.
+
+    Parameters
+    ----------
+    question, response
+        The model, and its finished response.
+    """
+    problem = question.problem
+    checks = verify_reference(problem, [a.point for a in response.accepted], FACTOR)
+    solved = np.array([a.point.converged for a in response.accepted], dtype=bool)
+    errors = np.full(solved.size, np.nan)
+    errors[solved] = [c.error for c in checks]
+    high = question.sweep.high_harmonics
+    doubt = ReferenceDoubt(FACTOR * high[-1], high, question.limit, errors)
+    if not checks:
+        return doubt
+    worst = max(checks, key=lambda c: c.error)
+    place = problem.measure.dofs.tolist().index(worst.dof)
+    return ReferenceDoubt(
+        doubt.harmonics,
+        high,
+        question.limit,
+        errors,
+        float(worst.omega / HZ),
+        named(worst.kept),
+        question.model.error_labels[place],
+    )

@@ -1,0 +1,156 @@
+"""What a job of the forced response is given, picklable, and what it is solved with."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from stickslip.assembly.assembled import Assembled
+from stickslip.assembly.model import Model
+from stickslip.contact.law import ContactLaw
+from stickslip.contact.laws import LAWS
+from stickslip.errors import input_error, together
+from stickslip.harmonic.support import named
+from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
+from stickslip.study.analyses.analysis import Case
+from stickslip.study.analyses.forced.chooser import Chooser, chooser_of
+from stickslip.study.analyses.forced.estimate import check_limits, estimate
+from stickslip.study.analyses.forced.section import sweep_of
+
+IN_TIME, HARMONICS = "verify", "verify_harmonics"  # checks that a run may ask for
+INTEGRABLE = "elastic_coulomb"  # the law that the time integration knows
+FACTOR = 2  # times the highest harmonic that is kept: what solutions are held against
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """The forced response of one case.
+
+    Parameters
+    ----------
+    label
+        Of the case; empty for a study without [vary].
+    model
+        The assembled model; its first output is the one whose peak is resolved.
+    sweep
+        How the response is computed.
+    limit
+        Change that more harmonics may make before there is a warning, a fraction.
+    over_speed
+        Whether the frequencies are those of a range of speeds.
+    checks
+        Checks asked for beside the response.
+    """
+
+    label: str
+    model: Assembled
+    sweep: Sweep
+    limit: float
+    over_speed: bool = False
+    checks: frozenset[str] = frozenset()
+
+    @cached_property
+    def problem(self) -> ForcedProblem:
+        """What is solved."""
+        return forced_problem(self.model.system, self.model.load, self.sweep)
+
+    @property
+    def driven(self) -> tuple[int, ...]:
+        """Harmonics that the load drives."""
+        forces = self.model.load.harmonics
+        return tuple(h for h in sorted(forces) if np.any(forces[h])) or (1,)
+
+    @property
+    def chooser(self) -> Chooser:
+        """How harmonics are chosen."""
+        return chooser_of(self.sweep, self.model.error_labels, self.driven)
+
+    def said(self, text: str) -> str:
+        """Return a sentence about the case, see `said`."""
+        return said(self.label, text)
+
+
+def said(label: str, text: str) -> str:
+    """Return a sentence about a case, with its label where there are several."""
+    return f"{label}: {text}" if label else text[:1].upper() + text[1:]
+
+
+def peak_first(model: Assembled) -> Assembled:
+    """Return the model with the output whose peak counts before the others: the solver resolves the peak of the first one."""
+    first = model.peak_output
+    if first == 0:
+        return model
+    order = [first, *(i for i in range(len(model.output_labels)) if i != first)]
+    labels = tuple(model.output_labels[i] for i in order)
+    system, bare = (replace(s, outputs=s.outputs[order]) for s in (model.system, model.bare))
+    return replace(model, system=system, bare=bare, output_labels=labels, peak_output=0)
+
+
+def question_of(case: Case, model: Model) -> Question:
+    """Return what a job solves; whatever can be refused is, before anything long is computed.
+
+    Raises
+    ------
+    InputError
+        If the sweep is none, harmonics that loads drive are not kept, a check has no form for the model, or the estimated cost
+        exceeds the study's limits.
+    """
+    settings = case.settings
+    sweep = sweep_of(settings, _engine_order(model))
+    _require_driven(model, sweep)
+    if IN_TIME in case.checks:
+        _require_integrable(model)
+    check_limits(settings.limits, estimate(model, sweep))
+    # the guard and the check of the harmonics look at twice as many as are kept
+    assembled = model.assembled(FACTOR * sweep.high_harmonics[-1])
+    return Question(
+        label=case.label,
+        model=peak_first(assembled),
+        sweep=sweep,
+        limit=sweep.threshold,
+        over_speed=settings.forced_response.over == "speed",
+        checks=case.checks,
+    )
+
+
+def _engine_order(model: Model) -> int | None:
+    """Return the engine order of the loads; None: they have none, or several."""
+    orders = {load.engine_order for load in model.loads.values() if load.engine_order}
+    return orders.pop() if len(orders) == 1 else None
+
+
+def _require_driven(model: Model, sweep: Sweep) -> None:
+    for name, load in model.loads.items():
+        if load.harmonic not in sweep.low_harmonics:
+            raise input_error(
+                "harmonics.low",
+                f"must hold harmonic {load.harmonic}, which load.{name} drives, got {named(sweep.low_harmonics)}",
+                f"Add it, for example low = {sorted({*sweep.low_harmonics[1:], load.harmonic})}.",
+            )
+
+
+def _require_integrable(model: Model) -> None:
+    """Refuse a check by time integration of what it does not know."""
+    for name, part in model.parts.items():
+        if part.sectors > 1:
+            raise input_error(
+                f"part.{name}.sectors",
+                "--verify integrates one structure in time, and the harmonics of a wheel are different travelling waves",
+                "Run without --verify; --verify-harmonics works.",
+            )
+    found = [
+        input_error(
+            f"contact.{name}.law",
+            f"--verify integrates in time, which knows {INTEGRABLE} alone, got {_law(contact.law)!r}",
+            f"Run without --verify, or give the law {INTEGRABLE}.",
+        )
+        for name, contact in model.contacts.items()
+        if _law(contact.law) != INTEGRABLE
+    ]
+    if found:
+        raise together(found)
+
+
+def _law(law: ContactLaw) -> str:
+    """Return the name that a study file has for a law, of one of your own its class."""
+    return next((name for name, kind in LAWS.items() if kind is type(law)), type(law).__name__)

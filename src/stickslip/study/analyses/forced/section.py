@@ -1,0 +1,139 @@
+"""The table [forced_response] of a study file, and the sweep that it becomes."""
+
+from itertools import pairwise
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from stickslip.errors import input_error
+from stickslip.response.forced.response import Sweep
+from stickslip.study.file.section import Positive, Section, custom_error, rising_pair
+from stickslip.units import HZ, RPM
+
+Range = Annotated[list[Positive], Field(min_length=2, max_length=2)]
+RANGES = ("frequency_hz", "frequencies_hz", "speed_rpm")
+ALONE = 1e-3  # of a frequency that stands alone: half the width of its range
+
+
+class ForcedResponse(Section):
+    """Where the steady vibration under harmonic loads is computed."""
+
+    frequency_hz: Range | None = Field(
+        None, description="the range [lowest, highest] in Hz, the lower frequency first"
+    )
+    frequencies_hz: Annotated[list[Positive], Field(min_length=1, max_length=10_000)] | None = Field(
+        None, description="frequencies of your own in Hz instead of a range, growing"
+    )  # fmt: skip
+    over: Literal["frequency", "speed"] = Field(
+        "frequency",
+        description="frequency: at the one speed of [rotation]; speed: along speed_rpm, the frequency being the engine order times "
+        "the speed, matrices and static loads those of [rotation]",
+    )
+    speed_rpm: Range | None = Field(
+        None, description='the range [lowest, highest] of speeds in rpm, for over = "speed"'
+    )
+    direction: Literal["up", "down"] = Field(
+        "up",
+        description="up: from the lowest frequency to the highest; down: back, which finds other motions beside folds",
+    )
+    points: int = Field(
+        40,
+        ge=2,
+        le=10_000,
+        description="smallest number of points of the first passage, 2 to 10000",
+    )
+    peak_points: int = Field(
+        8, ge=0, le=100, description="most points added to resolve the peak, 0 to 100"
+    )
+    frequencies: int | None = Field(
+        None,
+        ge=2,
+        le=10_000,
+        description="number of equally spaced frequencies to step through, 2 to 10000; left out: the branch is followed, with "
+        "more points where it turns (a single passage then steps through as many as points says)",
+    )
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        given = [key for key in RANGES if getattr(self, key) is not None]
+        wanted = ("speed_rpm",) if self.over == "speed" else RANGES[:2]
+        strange = [key for key in given if key not in wanted]
+        if strange:
+            raise custom_error(
+                f"is not for over = {self.over!r}",
+                f"Give {' or '.join(wanted)} instead.",
+                strange[0],
+            )
+        if len(given) != 1:
+            problem = "is missing" if not given else f"cannot stand beside {given[0]}"
+            raise custom_error(
+                problem, f"Give one of {' and '.join(wanted)}.", (given or wanted)[-1]
+            )
+        rising_pair(self.frequency_hz or [], "frequency_hz")
+        rising_pair(self.speed_rpm or [], "speed_rpm", "speed")
+        _check_list(self.frequencies_hz, self.frequencies)
+        return self
+
+
+def sweep_of(settings: Any, engine_order: int | None) -> Sweep:
+    """Return the sweep that a study's tables ask for.
+
+    Parameters
+    ----------
+    settings
+        With the tables ``forced_response``, ``harmonics`` and ``solver``.
+    engine_order
+        Of the loads, for a response over speed; None: they have none.
+
+    Raises
+    ------
+    InputError
+        If a response over speed is asked for and no load has an engine order.
+    """
+    table, h = settings.forced_response, settings.harmonics
+    lowest, highest = _range(table, engine_order)
+    return Sweep(
+        omega_range=(lowest, highest),
+        at=tuple(HZ * f for f in table.frequencies_hz or ()),
+        direction=table.direction,
+        low=h.low_harmonics,
+        high=h.high_harmonics,
+        samples=h.samples,
+        evaluator=settings.solver.evaluator,
+        threshold=h.alert_threshold_percent / 100,
+        selection=h.chooser,
+        passages=h.passages,
+        error_harmonics=h.alert_harmonics,
+        points=table.points,
+        frequencies=table.frequencies or 0,
+        peak_points=table.peak_points,
+    )
+
+
+def _check_list(own: list[float] | None, count: int | None) -> None:
+    if own is None:
+        return
+    if count is not None:
+        raise custom_error(
+            "cannot stand beside frequencies_hz", "Remove one of them.", "frequencies"
+        )
+    if any(b <= a for a, b in pairwise(own)):
+        raise custom_error("must grow", "Sort them, and give each once.", "frequencies_hz")
+
+
+def _range(table: ForcedResponse, engine_order: int | None) -> tuple[float, float]:
+    """Return the lowest and the highest excitation frequency, rad/s."""
+    if table.speed_rpm is not None:
+        if not engine_order:
+            raise input_error(
+                "forced_response.over",
+                "is speed, and no load has an engine order",
+                "Give the loads engine_order, or a range frequency_hz.",
+            )
+        lowest, highest = (engine_order * RPM * n for n in table.speed_rpm)
+        return lowest, highest
+    given = table.frequency_hz or table.frequencies_hz or []
+    lowest, highest = HZ * given[0], HZ * given[-1]
+    if lowest == highest:
+        return lowest * (1 - ALONE), highest * (1 + ALONE)
+    return lowest, highest

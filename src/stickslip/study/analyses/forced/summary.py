@@ -1,0 +1,94 @@
+"""What the terminal says of a forced response: a row a case, where more harmonics were asked for, what was checked."""
+
+import numpy as np
+import xarray as xr
+
+from stickslip.harmonic.support import named
+from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.analyses.forced.question import said
+
+HEAD = ("peak mm", "at Hz", "points")
+COUNTS = ("points_low", "points_high", "points_failed", "newton_steps", "unknowns_solved")
+SECONDS = ("seconds_contact", "seconds_linear", "seconds_rest")
+
+
+def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
+    """Return the tables of a dataset.
+
+    Parameters
+    ----------
+    data
+        Of `put_together`, with the label of each case.
+    """
+    labels = [str(x) for x in data["case_label"].values]
+    more, low = more_name(data), named(np.atleast_1d(data.attrs["low_harmonics"]))
+    first = named(np.atleast_1d(data.attrs["high_harmonics"])) if _always_high(data) else low
+    head = ("case", *HEAD, f"H = {first}", more, "failed", "Newton", "unknowns", "seconds")
+    rows = tuple(_row(data.isel(case=i), label) for i, label in enumerate(labels))
+    found = [
+        TextTable("Forced response", head, rows),
+        _lines(f"Where {data.attrs['selection']} asked for more harmonics", choices(data)),
+        _lines("Against twice as many harmonics", _sentences(data, "reference_sentence", labels)),
+        _lines("Against time integration", _checks(data, labels)),
+    ]
+    return tuple(table for table in found if table.rows or table.lines)
+
+
+def choices(data: xr.Dataset) -> tuple[str, ...]:
+    """Say case by case where more harmonics were asked for, and what choosing cost; nothing where nothing was decided."""
+    labels = [str(x) for x in data["case_label"].values]
+    told = _sentences(data, "choice_sentence", labels)
+    return (*told, cost_sentence(data)) if told and data.sizes["point"] else told
+
+
+def cost_sentence(data: xr.Dataset) -> str:
+    """Say what choosing has cost beside the harmonics of the reference at every frequency."""
+    high = np.atleast_1d(data.attrs["high_harmonics"])
+    solved, points = int(data["unknowns_solved"].sum()), data.sizes["point"]
+    each = data.sizes["retained"] * (2 * high.size - 1)
+    everywhere = points * each
+    return (
+        f"{solved} unknowns were solved in all; H = {named(high)} everywhere would be about {points} points × {each} unknowns = "
+        f"{everywhere} (an estimate: as many points, each solved once), so that choosing took {100 * solved / everywhere:.0f} % of it."
+    )
+
+
+def more_name(data: xr.Dataset) -> str:
+    """Return what points with other harmonics than those of the first passage are called."""
+    kept = {tuple(np.flatnonzero(row)) for row in data["harmonic_kept"].values}
+    supports = [tuple(np.atleast_1d(data.attrs[f"{w}_harmonics"])) for w in ("low", "high")]
+    alike = kept <= set(supports) and np.isfinite(data.attrs["selection_threshold"])
+    return f"H = {named(supports[1])}" if alike else "other H"
+
+
+def _always_high(data: xr.Dataset) -> bool:
+    return bool(data.attrs["selection"] == "always_high")
+
+
+def _row(case: xr.Dataset, label: str) -> tuple[str, ...]:
+    return (
+        label,
+        f"{1e3 * float(case['peak_amplitude']):.5g}",
+        f"{float(case['peak_frequency_hz']):.3f}",
+        str(int(case["points"])),
+        *(str(int(case[name])) for name in COUNTS),
+        f"{sum(float(case[name]) for name in SECONDS):.2f}",
+    )
+
+
+def _lines(title: str, lines: tuple[str, ...]) -> TextTable:
+    return TextTable(title, (), (), lines)
+
+
+def _sentences(data: xr.Dataset, name: str, labels: list[str]) -> tuple[str, ...]:
+    if name not in data:
+        return ()
+    told = zip(labels, map(str, data[name].values), strict=True)
+    return tuple(said(label, text) for label, text in told if text)
+
+
+def _checks(data: xr.Dataset, labels: list[str]) -> tuple[str, ...]:
+    if "verify_sentence" not in data:
+        return ()
+    told = zip(data["verify_case"].values, data["verify_sentence"].values, strict=True)
+    return tuple(said(labels[i], str(text)) for i, text in told)

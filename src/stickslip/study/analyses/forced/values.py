@@ -1,0 +1,232 @@
+"""The values of a case's variables, without the dimension ``case``: what a job puts down for the dataset."""
+
+import json
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.response.forced.response import ForcedPoint
+from stickslip.response.recovery import signals
+from stickslip.study.analyses.forced.in_time import Check
+from stickslip.study.analyses.forced.more_harmonics import ReferenceDoubt
+from stickslip.study.analyses.forced.points import Response, unknowns
+from stickslip.study.analyses.forced.quantities import STAGES
+from stickslip.study.analyses.forced.question import Question
+from stickslip.units import HZ, RPM
+
+Values = dict[str, Any]
+
+
+def of_model(question: Question) -> Values:
+    """Return what is known of the model alone: labels, contacts, static state, natural frequencies, skin."""
+    model, skin = question.model, question.model.skin
+    found = {
+        "output": model.output_labels,
+        "retained": model.system.retained_labels,
+        "contact": model.contacts.names,
+        "frequency_full_hz": model.frequencies.free_full,
+        "frequency_reduced_hz": model.frequencies.free_reduced,
+        "frequency_stuck_full_hz": model.frequencies.stuck_full,
+        "frequency_stuck_reduced_hz": model.frequencies.stuck_reduced,
+        "static_gap": model.static_gap,
+        "static_force": model.static_force,
+        "contact_law": model.contacts.laws,
+        "contact_group": model.contacts.groups,
+        "contact_position": model.contacts.position,
+        "contact_frame": model.contacts.frame,
+        "attributes": json.dumps(_attributes(question)),
+    }
+    if skin is None:
+        return found
+    return found | {"surface_point": skin.points, "surface_triangle": skin.triangles}
+
+
+def _attributes(question: Question) -> Values:
+    """Return the attributes of the dataset: texts, numbers and lists of numbers."""
+    model, sweep = question.model, question.sweep
+    order = {} if model.engine_order is None else {"engine_order": model.engine_order}
+    own = {"samples": sweep.samples, "evaluator": sweep.evaluator, "sectors": model.sectors}
+    return question.chooser.attributes() | own | order | {"report_output": model.output_labels[0]}
+
+
+def of_response(question: Question, response: Response, shift: tuple[float, float]) -> Values:
+    """Return the values of a finished response, without the dimension ``case``.
+
+    Parameters
+    ----------
+    question, response
+        The case.
+    shift
+        What `peak_shift` found.
+    """
+    return (
+        _of_case(question, response, shift)
+        | _of_points(question, response)
+        | _of_fields(question, response)
+        | _of_peak(question, response)
+        | _of_attempts(question, response)
+    )
+
+
+def of_checks(checks: Sequence[Check]) -> Values:
+    """Return comparisons with time integration."""
+    real = ("frequency_hz", "transient", "balance", "difference_percent", "scatter", "refined")
+    columns = {f"verify_{name}": np.array([getattr(c, name) for c in checks]) for name in real}
+    return columns | {
+        "verify_settled": _whole(int(c.settled) for c in checks),
+        "verify_periods": _whole(c.periods for c in checks),
+        "verify_sentence": np.array([c.sentence for c in checks], dtype=str),
+    }
+
+
+def of_doubt(doubt: ReferenceDoubt) -> Values:
+    """Return what more harmonics would change."""
+    return {
+        "reference_error_percent": 100 * doubt.errors,
+        "reference_worst_percent": 100 * doubt.worst,
+        "reference_worst_hz": doubt.frequency_hz,
+        "reference_above": doubt.above,
+        "reference_sentence": doubt.sentence,
+        "doubts": texts([doubt.warning] if doubt.warning else []),
+    }
+
+
+def _of_case(question: Question, response: Response, shift: tuple[float, float]) -> Values:
+    contact, linear, rest = response.seconds
+    return {
+        "excitation_n": question.model.excitation,
+        "peak_amplitude": response.peak_amplitude,
+        "peak_frequency_hz": response.peak_hz,
+        "peak_point": response.peak,
+        "points": len(response.accepted),
+        "points_low": response.points_low,
+        "points_high": len(response.accepted) - response.points_low,
+        "points_failed": response.failed,
+        "unknowns_solved": response.unknowns,
+        "newton_steps": response.newton_steps,
+        "seconds_contact": contact,
+        "seconds_linear": linear,
+        "seconds_rest": rest,
+        "choice_sentence": question.chooser.sentence(response) if question.chooser.decides else "",
+        "retention_peak_shift": shift[0],
+        "retention_frequency_shift_hz": shift[1],
+    }
+
+
+def _of_points(question: Question, response: Response) -> Values:
+    chooser, engine_order = question.chooser, question.model.engine_order
+    points = [a.point for a in response.accepted]
+    asked = np.array([a.indicator for a in response.accepted], dtype=float)
+    own = np.array([p.predicted_error for p in points], dtype=float)
+    omega = np.array([p.omega for p in points])
+    speed = omega / engine_order / RPM if question.over_speed and engine_order else omega * np.nan
+    return {
+        "frequency_hz": omega / HZ,
+        "speed_rpm": speed,
+        "order": _whole(p.order for p in points),
+        "unknowns": _whole(unknowns(p) for p in points),
+        "status": _whole(int(p.status) for p in points),
+        "indicator": asked if chooser.is_error else own,
+        "predicted_error_percent": 100 * asked if chooser.is_error else np.full(asked.size, np.nan),
+        "real_error_percent": 100 * np.array([a.real_error for a in response.accepted]),
+        "newton_iterations": _whole(p.iterations for p in points),
+        "seconds": np.array([p.seconds_total for p in points]),
+        "refinement": _whole(int(p.stage == "peak") for p in points),
+    }
+
+
+def _of_fields(question: Question, response: Response) -> Values:
+    low, high, every = question.chooser.low, question.chooser.high[-1], response.accepted
+    n_outputs, n_contacts = len(question.model.output_labels), len(question.model.contacts.names)
+    n_retained = question.model.system.retained.size
+
+    def block(name: str, *shape: int) -> FloatArray:
+        rows = [_padded(getattr(a.fields, name, None), high, shape) for a in every]
+        return _parts(rows, (high + 1, *shape))
+
+    retained = [_padded(a.point.coefficients if a.fields else None, high, (n_retained,)) for a in every]  # fmt: skip
+    lost = np.full(n_contacts, np.nan)
+    return {
+        "harmonic_kept": _kept([a.point for a in every], high),
+        "amplitude": _stacked([a.amplitudes(n_outputs) for a in every], n_outputs),
+        "amplitude_low": _stacked([a.first_amplitudes(n_outputs, low) for a in every], n_outputs),
+        "output_displacement": block("outputs", n_outputs),
+        "retained_displacement": _parts(retained, (high + 1, n_retained)),
+        "gap": block("gaps", n_contacts, 3),
+        "contact_force": block("forces", n_contacts, 3),
+        "dissipated_energy": _stacked([getattr(a.fields, "energy", lost) for a in every], n_contacts),
+    }  # fmt: skip
+
+
+def _of_peak(question: Question, response: Response) -> Values:
+    if response.top is None:
+        n, samples = len(question.model.contacts.names), question.sweep.samples
+        lost = np.full((n, 3, samples), np.nan)
+        state = np.full((n, 2, samples), -1)
+        return {"peak_time": lost[0, 0], "peak_gap": lost, "peak_force": lost, "peak_state": state}
+    period = signals(question.problem, response.top.point)
+    return {
+        "peak_time": period.time,
+        "peak_gap": period.gap,
+        "peak_force": period.force,
+        "peak_state": period.state,
+    }
+
+
+def _of_attempts(question: Question, response: Response) -> Values:
+    points = response.solved
+    # the accepted points do not tell it all: a branch with many harmonics takes the place of points that the alert spoke of
+    alert = question.chooser.is_error
+    asked = [p for p in points if alert and p.stage == "low" and not np.isnan(p.predicted_error)]
+    return {
+        "attempt_frequency_hz": np.array([p.omega / HZ for p in points]),
+        "attempt_stage": _whole(STAGES.index(p.stage) for p in points),
+        "attempt_kept": _kept(points, question.chooser.high[-1]),
+        "attempt_unknowns": _whole(unknowns(p) for p in points),
+        "attempt_indicator": np.array([p.predicted_error for p in points]),
+        "attempt_repeated": _whole(int(p.asked.size > 0) for p in points),
+        "attempt_status": _whole(int(p.status) for p in points),
+        "attempt_newton_iterations": _whole(p.iterations for p in points),
+        "attempt_seconds": np.array([p.seconds_total for p in points]),
+        "alert_frequency_hz": np.array([p.omega / HZ for p in asked]),
+        "alert_error_percent": np.array([100 * p.predicted_error for p in asked]),
+        "alert_repeated": _whole(int(p.asked.size > 0) for p in asked),
+    }
+
+
+def _kept(points: Sequence[ForcedPoint], high: int) -> IntArray:
+    """Return 1 for every harmonic from 0 to `high` that a solution keeps, else 0."""
+    table = np.zeros((len(points), high + 1), dtype=np.int64)
+    for row, point in zip(table, points, strict=True):
+        row[point.harmonics] = 1
+    return table
+
+
+def _padded(values: ComplexArray | None, high: int, shape: tuple[int, ...]) -> ComplexArray:
+    """Return harmonics 0..high: zero where they were not kept, NaN where there is no solution."""
+    out = np.zeros((high + 1, *shape), dtype=complex)
+    if values is None:
+        out[:] = complex(np.nan, np.nan)
+    else:
+        out[: len(values)] = values
+    return out
+
+
+def texts(values: Iterable[str]) -> Values:
+    """Return texts as an array, which may be empty."""
+    return np.array(list(values), dtype=str)
+
+
+def _whole(values: Iterable[int]) -> IntArray:
+    return np.array(list(values), dtype=np.int64)
+
+
+def _stacked(rows: Sequence[FloatArray], *shape: int) -> FloatArray:
+    return np.array(rows, dtype=float).reshape(len(rows), *shape)
+
+
+def _parts(rows: Sequence[ComplexArray], shape: tuple[int, ...]) -> FloatArray:
+    values = np.array(rows, dtype=complex).reshape(len(rows), *shape)
+    return np.stack([values.real, values.imag], axis=-1)

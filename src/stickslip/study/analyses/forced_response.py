@@ -1,0 +1,182 @@
+"""The steady vibration under harmonic loads, friction and all: branches, peaks, and how far its harmonics are to be trusted."""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from time import perf_counter
+
+import numpy as np
+import xarray as xr
+
+from stickslip.assembly.model import Model
+from stickslip.errors import SingularError
+from stickslip.harmonic.support import named
+from stickslip.response.equilibrium import bonded_start
+from stickslip.response.forced.response import ForcedPoint, Sweep, forced_response
+from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
+from stickslip.study.analyses.forced.caveats import caveats
+from stickslip.study.analyses.forced.dataset import put_together
+from stickslip.study.analyses.forced.estimate import estimate
+from stickslip.study.analyses.forced.in_time import Check, check_in_time, chosen
+from stickslip.study.analyses.forced.more_harmonics import check_harmonics
+from stickslip.study.analyses.forced.points import Response, collect
+from stickslip.study.analyses.forced.question import HARMONICS, IN_TIME, Question, question_of
+from stickslip.study.analyses.forced.retention import peak_shift
+from stickslip.study.analyses.forced.section import ForcedResponse
+from stickslip.study.analyses.forced.summary import tables
+from stickslip.study.analyses.forced.values import (
+    Values,
+    of_checks,
+    of_doubt,
+    of_model,
+    of_response,
+    texts,
+)
+from stickslip.study.keep.progress import LOG, advance
+from stickslip.units import HZ
+
+NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
+COMPILED = 5.0  # seconds of the first evaluation: below, it was found compiled
+NOTES = ("model", "response", IN_TIME, HARMONICS)  # what makes up the dataset
+
+
+class ForcedResponseAnalysis:
+    """The analysis; see `Analysis` for what its methods promise."""
+
+    name = "forced_response"
+    table = ForcedResponse
+    record = ForcedPoint
+    checks = (IN_TIME, HARMONICS)
+
+    def key(self, case: Case) -> str:
+        """Return the tables that the points of a case depend on beside the model."""
+        settings = case.settings
+        own = (settings.forced_response, settings.harmonics, settings.solver)
+        return json.dumps([table.model_dump(mode="json") for table in own], sort_keys=True)
+
+    def inputs(self, case: Case, model: Model) -> Question:
+        """Return the assembled model and the sweep; refuse what cannot be computed."""
+        return question_of(case, model)
+
+    def solve(
+        self, inputs: Question, done: Sequence[ForcedPoint], notes: Notes
+    ) -> Iterator[ForcedPoint]:
+        """Yield the points that are not done; put down what the dataset needs, and the checks asked for."""
+        points = list(done)
+        failure: Exception | None = None
+        try:
+            for point in _points(inputs, done, notes):
+                points.append(point)
+                yield point
+        except NO_SOLUTION as error:
+            failure = error  # what was found before counts
+        notes.put("finished", {"points": len(points)})
+        response = collect(inputs.problem, points, inputs.model.peak_output)
+        _put_down(inputs, response, notes)
+        if IN_TIME in inputs.checks:
+            _check_in_time(inputs, response, notes)
+        if HARMONICS in inputs.checks:
+            _check_harmonics(inputs, response, notes)
+        if failure is not None:
+            raise failure
+
+    def dataset(self, solved: Sequence[Solved]) -> xr.Dataset:
+        """Return the responses of all cases."""
+        cases = [_values(s) for s in solved]
+        labels = [s.case.label for s in solved]
+        return put_together(cases, labels)
+
+    def check(self, case: Case, model: Model) -> tuple[str, ...]:
+        """Return the estimated cost, and how harmonics will be chosen."""
+        question = self.inputs(case, model)
+        lines = question.chooser.lines(case.settings.harmonics.passages)
+        cost = estimate(model, question.sweep)
+        return (str(cost), *(f"harmonics: {line}" for line in lines))
+
+    def summary(self, data: xr.Dataset) -> tuple[TextTable, ...]:
+        """Return what the terminal prints."""
+        return tables(data)
+
+
+FORCED_RESPONSE = ForcedResponseAnalysis()
+
+
+def _points(question: Question, done: Sequence[ForcedPoint], notes: Notes) -> Iterator[ForcedPoint]:
+    """Yield the points that are not done."""
+    if notes.get("finished") is not None:
+        return
+    _compile(question)
+    model = question.model
+    for point in forced_response(model.system, model.load, question.sweep, done=done):
+        yield point
+        advance(*progress(point, question.sweep))
+
+
+def _put_down(question: Question, response: Response, notes: Notes) -> None:
+    """Put down all that the dataset needs, once."""
+    if notes.get("response") is not None:
+        return
+    shift = peak_shift(question, response)
+    notes.put("model", of_model(question))
+    told = texts(caveats(question, response, shift))
+    notes.put("response", of_response(question, response, shift) | {"caveats": told})
+    LOG.info(
+        question.said(
+            f"peak {response.peak_amplitude:.4e} m at {response.peak_hz:.3f} Hz, {len(response.accepted)} points, "
+            f"{response.failed} not converged, {response.newton_steps} Newton steps"
+        )
+    )
+
+
+def _check_in_time(question: Question, response: Response, notes: Notes) -> None:
+    """Integrate in time; what an interrupted run has integrated is not done again."""
+    checks = []
+    for accepted in chosen(question, response):
+        name = f"{IN_TIME}.{accepted.point.omega!r}"
+        known = notes.get(name)
+        check = Check(**known) if known else check_in_time(question, response, accepted)
+        notes.put(name, asdict(check))
+        LOG.info(f"time integration: {question.said(check.sentence)}")
+        checks.append(check)
+    notes.put(IN_TIME, of_checks(checks))
+
+
+def _check_harmonics(question: Question, response: Response, notes: Notes) -> None:
+    doubt = check_harmonics(question, response)
+    LOG.info(f"more harmonics: {question.said(doubt.sentence)}")
+    notes.put(HARMONICS, of_doubt(doubt))
+
+
+def _compile(question: Question) -> None:
+    """Evaluate contacts and strategy once, or the first case would count their compilation as work."""
+    problem, system, omega = question.problem, question.model.system, question.sweep.ends[0]
+    start = perf_counter()
+    try:
+        x = bonded_start(problem.low, omega, system)
+        problem.low.linearise(x, omega)
+        problem.strategy.judge(problem.step(problem.low, x, omega))
+    except NO_SOLUTION:
+        return  # the response says what is wrong
+    seconds = perf_counter() - start
+    if seconds > COMPILED:
+        LOG.info(f"compiled the contact laws in {seconds:.0f} s, once an installation")
+
+
+def progress(point: ForcedPoint, sweep: Sweep) -> tuple[float, str]:
+    """Return how much of a case is done, and a line that says so."""
+    first, last = sweep.ends
+    along = min(max((point.omega - first) / (last - first), 0.0), 1.0)
+    shares = {"low": (0.0, 0.4), "high": (0.4, 0.35), "branch": (0.75, 0.2), "peak": (0.95, 0.05)}
+    if sweep.single:  # repeats come in between
+        shares |= {"low": (0.0, 0.95), "high": (0.0, 0.95)}
+    begin, width = shares[point.stage]
+    state = "" if point.converged else f", {point.status.advice}"
+    return (
+        begin + width * along,
+        f"{point.stage} {point.index + 1}: {point.omega / HZ:.2f} Hz, H = {named(point.harmonics)}{state}",
+    )
+
+
+def _values(solved: Solved) -> Values:
+    """Return all that a job put down under the names of variables."""
+    return {name: v for note in NOTES for name, v in solved.notes.get(note, {}).items()}
