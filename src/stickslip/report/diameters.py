@@ -36,6 +36,7 @@ def mode_lines(view: Waves) -> list[go.Scatter]:
 
 
 def diameter_axes(figure: go.Figure, view: Waves) -> None:
+    """Label the axes of a figure over nodal diameters."""
     highest = int(view.integers("nodal_diameter").max())
     figure.update_xaxes(
         title_text="nodal diameter", range=[-0.04 * highest - 0.4, 1.04 * highest + 0.4]

@@ -16,7 +16,6 @@ _CHECKED = (
     ("free", "frequency_full_hz", "frequency_reduced_hz"),
     ("stuck", "frequency_stuck_full_hz", "frequency_stuck_reduced_hz"),
 )
-_LAWS = 12  # contacts in a table
 
 
 def picture(nodes: Mapping[str, Node]) -> Plot | None:
@@ -39,12 +38,12 @@ def reduction(nodes: Mapping[str, Node]) -> str | None:
     rows, off = [], []
     for name, full, reduced in _CHECKED:
         if node.has(full, reduced):
-            a, b = (np.ravel(node.values(n)) for n in (full, reduced))
+            a, b = (_first(node, n) for n in (full, reduced))
             with np.errstate(divide="ignore", invalid="ignore"):
                 difference = np.where(a > 0, b / a - 1, np.nan)
             cells = zip(a, b, difference, strict=True)
             rows += [
-                [f"{name} {k + 1}", fixed(x, 3), fixed(y, 3), percent(100 * d)]
+                [f"{name} {k + 1}", fixed(float(x), 3), fixed(float(y), 3), percent(100 * d)]
                 for k, (x, y, d) in enumerate(cells)
                 if np.isfinite(x)
             ]

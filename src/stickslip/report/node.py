@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from html import escape
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -44,19 +45,24 @@ class Node:
             return tuple(escape(str(v)) for v in self.data[dimension].values)
         return tuple(str(i) for i in range(self.data.sizes.get(dimension, 0)))
 
-    def text(self, attribute: str, default: str = "") -> str:
-        """Return an attribute as text, not escaped."""
-        value = self.data.attrs.get(attribute, default)
-        return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+    def stored(self, name: str) -> Any:
+        """Return a number, list or text that stands as a variable or as an attribute; None where there is none."""
+        return self.data[name].values if name in self.data else self.data.attrs.get(name)
 
-    def numbers(self, attribute: str) -> FloatArray:
-        """Return an attribute as numbers, empty where it is missing or has none."""
+    def text(self, name: str, default: str = "") -> str:
+        """Return what is stored under a name as text, not escaped."""
+        value = self.stored(name)
+        return default if value is None else str(value)
+
+    def numbers(self, name: str) -> FloatArray:
+        """Return what is stored under a name as numbers, empty where it is missing or has none."""
         try:
-            return np.atleast_1d(np.asarray(self.data.attrs.get(attribute, []), dtype=np.float64))
-        except ValueError:
+            value = self.stored(name)
+            return np.atleast_1d(np.asarray([] if value is None else value, dtype=np.float64))
+        except (TypeError, ValueError):
             return np.zeros(0)
 
-    def scalar(self, attribute: str, default: float = float("nan")) -> float:
-        """Return an attribute as a number, the default where it is missing or no number."""
-        found = self.numbers(attribute)
+    def scalar(self, name: str, default: float = float("nan")) -> float:
+        """Return what is stored under a name as a number, the default where it is missing or no number."""
+        found = self.numbers(name)
         return float(found[0]) if found.size else default

@@ -25,9 +25,10 @@ from stickslip.report.node import Node
 from stickslip.report.plot import Plot
 from stickslip.report.quantities import NONE, fixed, quantity
 from stickslip.report.result import analysis, open_result, stored_warnings, versions
-from stickslip.report.section import Part, Section, Shown
+from stickslip.report.section import Card, Part, Section, Shown
 from stickslip.report.sections import campbell, forced_response, modes, safe
 from stickslip.report.tables import html_table
+from stickslip.study.keep.netcdf import one_case
 
 SECTIONS: tuple[Section, ...] = (
     forced_response.SECTION,
@@ -41,7 +42,7 @@ def _shown(tree: xr.DataTree) -> Iterator[tuple[Section, xr.Dataset]]:
     """Return the sections whose analysis is in the result, with its dataset."""
     for section in SECTIONS:
         data = analysis(tree, section.name) if section.name in tree.children else xr.Dataset()
-        if all(name in data for name in section.needs) and data.sizes.get("case", 1):
+        if all(name in data for name in section.needs) and data.sizes.get("case"):
             yield section, data
 
 
@@ -49,9 +50,7 @@ def _views(section: Section, data: xr.Dataset) -> list[Any]:
     """Return what a section draws: all cases at once, or one after the other."""
     if not section.by_case:
         return [section.view(data)]
-    if "case" not in data.dims:
-        return [section.view(data)]
-    views = [section.view(data.isel(case=k)) for k in range(data.sizes["case"])]
+    views = [section.view(one_case(data, k)) for k in range(data.sizes.get("case", 0))]
     return [views[0], *(replace(view, key=f"_{k}") for k, view in enumerate(views[1:], 1))]
 
 
@@ -151,7 +150,8 @@ def report_html(tree: xr.DataTree) -> str:
     tree
         A result: a node an analysis, provenance in the attributes of the root. What is missing is left out.
     """
-    numbered, cards, chapters = _Numbered(), [], []
+    numbered, chapters = _Numbered(), []
+    cards: list[Card] = []
     for section, data in _shown(tree):
         views = _views(section, data)
         cards += section.cards(views[0])

@@ -102,7 +102,7 @@ def _payload(
     hz = view.floats("frequency_hz")
     inside = _outside_of_wheel(view, kept, faces)
     wheel, wheel_faces = coarse_skin(points, inside, max(60, _WHEEL_POINTS // view.sectors))
-    origin = view.numbers("axis_origin") * _MM
+    origin = view.numbers("axis_origin_m") * _MM
     return {
         "sectors": view.sectors,
         "axis": _unit(view.numbers("axis_direction")).tolist(),

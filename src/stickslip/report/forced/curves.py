@@ -28,7 +28,7 @@ def most(response: Response, size: FloatArray) -> list[Case]:
 
 def _abscissa(response: Response) -> tuple[FloatArray, str, str]:
     """Return what the response is drawn over (point,), its name and its unit: frequency, or speed where that was swept."""
-    if response.text("over") == "speed" and response.has("speed_rpm"):
+    if response.has("speed_rpm"):
         return response.floats("speed_rpm"), "speed", "rpm"
     return response.hz, "frequency", "Hz"
 

@@ -48,7 +48,7 @@ def _shift_card(response: Response) -> Card | None:
 
 
 def _loss_card(response: Response) -> Card | None:
-    """What one case loses at its peak; several have their shift instead."""
+    """Return what one case loses at its peak; several have their shift instead."""
     if len(response.peaked) != 1 or not response.has("dissipated_energy"):
         return None
     energy = float(

@@ -93,7 +93,9 @@ def _cards(view: Waves) -> list[Card]:
     over = counted(len(hz), "wave") if view.sectors > 1 else "a whole structure"
     found = [
         Card(
-            f"{number(np.nanmin(hz), 5)} Hz", "lowest natural frequency", f"{hz.size} modes, {over}"
+            f"{number(float(np.nanmin(hz)), 5)} Hz",
+            "lowest natural frequency",
+            f"{hz.size} modes, {over}",
         )
     ]
     if view.has("difference") and np.isfinite(view.floats("difference")).any():

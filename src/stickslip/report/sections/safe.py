@@ -60,6 +60,7 @@ def safe_diagram(view: Waves) -> Plot:
         figure.add_trace(_near(view, near))
     styled(figure, 600)
     diameter_axes(figure, view)
+    figure.update_yaxes(range=[-0.04 * top, top])  # the names of low orders lie below the line
     margin = number(view.scalar("margin_percent"), 3)
     verdict = (
         f"{counted(int(near.sum()), 'mode')} within {margin} % of an engine order that excites it (red)"
