@@ -57,24 +57,24 @@ def reduction(nodes: Mapping[str, Node]) -> str | None:
     )
 
 
+def _first(node: Node, name: str) -> FloatArray:
+    """Return a variable of the first case."""
+    found = node.data[name]
+    return np.asarray((found.isel(case=0) if "case" in found.dims else found).values, dtype=float)
+
+
 def contacts(nodes: Mapping[str, Node]) -> str | None:
-    """Return a row a contact of the model: its points, law, area and force under the static loads."""
+    """Return a row a contact of the model: its points, law, and force under the static loads."""
     node = next((n for n in nodes.values() if isinstance(n, Response) and n.groups), None)
     if not isinstance(node, Response) or not node.has("contact_law", "static_force"):
         return None
-    laws, static = (
-        node.data["contact_law"].values,
-        node.values("static_force", "contact", "direction"),
-    )
-    area = node.floats("contact_area") if node.has("contact_area") else np.full(len(laws), np.nan)
+    laws, static = node.labels_of("contact_law"), _first(node, "static_force")
     rows = [
-        [group, str(len(at)), escape(", ".join(dict.fromkeys(str(laws[k]) for k in at))), quantity(-float(static[at, 2].sum()), "N", 4),
-         f"{number(1e6 * float(area[at].sum()), 4)} mm²" if np.isfinite(area[at]).all() else NONE]
-        for group, at in list(node.groups.items())[:_LAWS]
+        [group, str(len(at)), ", ".join(dict.fromkeys(laws[k] for k in at)), quantity(-float(static[at, 2].sum()), "N", 4)]
+        for group, at in node.groups.items()
     ]  # fmt: skip
-    return "<h3>Contacts</h3>" + html_table(
-        ["contact", "points", "law", "normal force at rest", "area"], rows, numeric=False
-    )
+    head = ["contact", "points", "law", "normal force at rest"]
+    return "<h3>Contacts</h3>" + html_table(head, rows, numeric=False)
 
 
 def facts(nodes: Mapping[str, Node]) -> str | None:

@@ -45,6 +45,10 @@ class Node:
             return tuple(escape(str(v)) for v in self.data[dimension].values)
         return tuple(str(i) for i in range(self.data.sizes.get(dimension, 0)))
 
+    def labels_of(self, name: str) -> tuple[str, ...]:
+        """Return the texts of a variable, escaped for HTML."""
+        return tuple(escape(str(v)) for v in self.data[name].values)
+
     def stored(self, name: str) -> Any:
         """Return a number, list or text that stands as a variable or as an attribute; None where there is none."""
         return self.data[name].values if name in self.data else self.data.attrs.get(name)
