@@ -5,6 +5,7 @@ from html import escape
 
 import numpy as np
 
+from stickslip.arrays import FloatArray
 from stickslip.report.node import Node
 from stickslip.report.plot import Plot
 from stickslip.report.quantities import NONE, fixed, number, percent, quantity
@@ -79,9 +80,7 @@ def contacts(nodes: Mapping[str, Node]) -> str | None:
 
 def facts(nodes: Mapping[str, Node]) -> str | None:
     """Return mass, centre, size and counts of the model."""
-    node = next(
-        (n for n in nodes.values() if "mass_kg" in n.data.attrs or "dofs" in n.data.attrs), None
-    )
+    node = next((n for n in nodes.values() if n.stored("mass_kg") is not None), None)
     if node is None:
         return None
     sectors = int(node.scalar("sectors", 1))
