@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing
 from dataclasses import fields, replace
 from hashlib import sha256
 from pathlib import Path
@@ -128,10 +129,11 @@ def _run(
     for name, mesh in meshes.items():
         write_mesh(mesh, study.folder / f"{name}.vtu")
     target = study.folder / RESULT
-    for sealed in _worked(jobs, workers):
-        del unfinished[sealed]
-        book.read(tasks, unfinished)
-        write_tree(book.tree(complete=False), target)
+    with closing(_worked(jobs, workers)) as finished:
+        for sealed in finished:
+            del unfinished[sealed]
+            book.read(tasks, unfinished)
+            write_tree(book.tree(complete=False), target)
     book.read(tasks, unfinished)
     outcome = book.outcome(asked)
     write_tree(outcome.tree, target)

@@ -1,11 +1,16 @@
 """Labelled variables, and files of them that are always whole."""
 
+from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
+from stickslip.arrays import BoolArray, IntArray
 from stickslip.errors import input_error
+
+_TOLD = {"xyz", "order"}  # dimensions of what one case tells of itself
+_MISSING: dict[str, object] = {"f": np.nan, "c": np.nan, "i": -1, "U": "", "O": ""}
 
 
 def write_tree(tree: xr.DataTree, path: Path) -> None:
@@ -34,3 +39,47 @@ def variable(dims: str, values: object, units: str, long_name: str) -> xr.Variab
     return xr.Variable(
         tuple(dims.split()), np.asarray(values), {"units": units, "long_name": long_name}
     )
+
+
+def stacked(cases: Sequence[Mapping[str, xr.Variable]]) -> dict[str, xr.Variable]:
+    """Return the variables of all cases with the leading dimension ``case``.
+
+    Where cases differ in size, what is missing is NaN, -1 or an empty text; `one_case` leaves it out again.
+    """
+    sizes: dict[Hashable, int] = {}
+    for found in (v for case in cases for v in case.values()):
+        for dim, size in found.sizes.items():
+            sizes[dim] = max(size, sizes.get(dim, 0))
+    names = dict.fromkeys(name for case in cases for name in case)
+    return {name: _stack([case.get(name) for case in cases], sizes) for name in names}
+
+
+def _stack(found: Sequence[xr.Variable | None], sizes: Mapping[Hashable, int]) -> xr.Variable:
+    like = next(v for v in found if v is not None)
+    kind = np.result_type(*(v.dtype for v in found if v is not None))
+    shape = (len(found), *(sizes[dim] for dim in like.dims))
+    values = np.full(shape, _MISSING[kind.kind], dtype=kind)
+    for i, own in enumerate(found):
+        if own is not None:
+            values[(i, *(slice(n) for n in own.shape))] = own.values
+    return xr.Variable(("case", *like.dims), values, like.attrs)
+
+
+def one_case(data: xr.Dataset, index: int) -> xr.Dataset:
+    """Return one case of a dataset, without what other cases have more of; single numbers and texts become attributes."""
+    own = data[[name for name, v in data.data_vars.items() if "case" in v.dims]].isel(case=index)
+    kept: dict[Hashable, IntArray] = {}
+    for dim in own.dims:
+        there = [_there(v, dim) for v in own.data_vars.values() if dim in v.dims]
+        kept[dim] = np.flatnonzero(np.any(there, axis=0))
+    rest = data.drop_vars(own.data_vars)
+    told = {name: v.values.tolist() for name, v in own.data_vars.items() if set(v.dims) <= _TOLD}
+    return rest.merge(own.drop_vars(told)).isel(kept).assign_attrs({**data.attrs, **told})
+
+
+def _there(found: xr.Variable | xr.DataArray, dim: Hashable) -> BoolArray:
+    """Return where along a dimension a variable holds anything."""
+    values = np.moveaxis(found.values, found.dims.index(dim), 0)
+    kind = values.dtype.kind
+    missing = np.isnan(values) if kind in "fc" else values == _MISSING[kind]
+    return np.asarray(~missing.reshape(len(values), -1).all(axis=1))

@@ -1,0 +1,183 @@
+"""Natural frequencies against rotor speed, and where engine orders cross them."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, Self
+
+import numpy as np
+import xarray as xr
+from pydantic import Field, model_validator
+
+from stickslip.assembly.model import Model
+from stickslip.errors import input_error
+from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
+from stickslip.study.analyses.waves.dataset import Variables, dataset, frequencies
+from stickslip.study.analyses.waves.doubts import basis_doubts, campbell_doubts, unfollowed_from
+from stickslip.study.analyses.waves.numbers import Wheel
+from stickslip.study.analyses.waves.results import WaveBranches
+from stickslip.study.analyses.waves.solve import Question, each_wave, follow_wave
+from stickslip.study.analyses.waves.tables import Diameter, Order, Speed, WaveTable
+from stickslip.study.analyses.waves.texts import campbell_tables, of_cases
+from stickslip.study.file.section import once, rising_pair
+from stickslip.study.keep.netcdf import variable
+from stickslip.units import RPM
+
+
+class CampbellTable(WaveTable):
+    """Frequencies against rotor speed and their crossings with engine orders."""
+
+    speeds_rpm: list[Speed] = Field(
+        min_length=2,
+        max_length=2,
+        description="the range [lowest, highest] of the speed in rpm, the lower first",
+    )
+    points: int = Field(9, ge=2, le=1000, description="number of speeds in the range, 2 to 1000")
+    engine_orders: list[Order] = Field(
+        min_length=1, max_length=200, description="engine orders, a list of whole numbers from 1"
+    )
+    modes: int = Field(4, ge=1, le=100, description="number of modes that are followed, 1 to 100")
+    nodal_diameters: list[Diameter] | None = Field(
+        None,
+        min_length=1,
+        max_length=501,
+        description="nodal diameters; left out: those that the engine orders excite",
+    )
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        once(self.engine_orders, "engine_orders")
+        once(self.nodal_diameters or [], "nodal_diameters")
+        rising_pair(self.speeds_rpm, "speeds_rpm", "speed")
+        return self
+
+    @property
+    def speeds(self) -> tuple[float, ...]:
+        """In rad/s."""
+        return tuple(RPM * np.linspace(*self.speeds_rpm, self.points))
+
+    def numbers(self, wheel: Wheel) -> tuple[int, ...]:
+        """Return the wave numbers of the nodal diameters asked for; else those that the engine orders excite."""
+        if self.nodal_diameters is not None:
+            return wheel.numbers(self.nodal_diameters)
+        return tuple(sorted({wheel.diagram(m) for m in self.engine_orders}))
+
+
+class Campbell:
+    """The analysis ``campbell``."""
+
+    name = "campbell"
+    table = CampbellTable
+    record = WaveBranches
+    checks = ()
+
+    def key(self, case: Case) -> str:
+        """Return all that the records depend on."""
+        asked: CampbellTable = case.settings.campbell
+        return asked.model_dump_json()
+
+    def inputs(self, case: Case, model: Model) -> Question:
+        """Return what is solved."""
+        asked: CampbellTable = case.settings.campbell
+        if not model.turns:
+            raise input_error(
+                "campbell",
+                "the model is matrices, which no speed changes",
+                "Bring the mesh (a deck or an archive of one material) instead of matrices.",
+            )
+        wheel = Wheel(model.sectors, model.coriolis)
+        wheel.require(asked.nodal_diameters, "campbell.nodal_diameters")
+        return Question(
+            model,
+            asked.contacts,
+            wheel,
+            asked.numbers(wheel),
+            asked.modes,
+            asked.speeds,
+            engine_orders=tuple(asked.engine_orders),
+        )
+
+    def solve(
+        self, inputs: Question, done: Sequence[WaveBranches], notes: Notes
+    ) -> Iterator[WaveBranches]:
+        """Yield the branches of each wave."""
+        notes.put("directions", {"parted": inputs.wheel.parted})
+        return each_wave(follow_wave, inputs, done, notes)
+
+    def dataset(self, solved: Sequence[Solved]) -> xr.Dataset:
+        """Return branches and crossings."""
+        return dataset(solved, _of_case)
+
+    def check(self, case: Case, model: Model) -> tuple[str, ...]:
+        """Say how many modes of how many waves are followed."""
+        asked = self.inputs(case, model)
+        return (f"campbell: {asked.n_modes} modes of each of {len(asked.numbers)} waves",)
+
+    def summary(self, data: xr.Dataset) -> tuple[TextTable, ...]:
+        """Return the ends of the branches, and the crossings."""
+        return of_cases(data, campbell_tables)
+
+
+def _of_case(solved: Solved) -> tuple[Variables, list[str]]:
+    asked: CampbellTable = solved.case.settings.campbell
+    waves: Sequence[WaveBranches] = solved.records
+    parted = bool(solved.notes["directions"]["parted"])
+    wheel = Wheel(int(solved.notes["model"]["sectors"]), parted)
+    beyond = _unfollowed(waves, wheel, asked)
+    unseen = sorted(m for m in asked.engine_orders if wheel.diagram(m) not in asked.numbers(wheel))
+    doubts = [*basis_doubts(waves), *campbell_doubts(beyond, unseen, waves)]
+    return _curves(waves, asked) | _crossings(waves) | _beyond(beyond), doubts
+
+
+def _unfollowed(
+    waves: Sequence[WaveBranches], wheel: Wheel, asked: CampbellTable
+) -> list[tuple[int, float]]:
+    """Return engine orders that leave all followed modes of their wave below them, and the speed in rpm from which they do."""
+    known = {w.wave_number: w.frequencies_hz for w in waves}
+    found = []
+    for order in sorted(asked.engine_orders):
+        hertz = known.get(wheel.diagram(order))
+        rpm = None if hertz is None else unfollowed_from(order, hertz, np.array(asked.speeds))
+        if rpm is not None:
+            found.append((order, rpm))
+    return found
+
+
+def _curves(waves: Sequence[WaveBranches], asked: CampbellTable) -> Variables:
+    orders, error = asked.engine_orders, [w.error for w in waves]
+    about = "natural frequency in the rotating frame"
+    return {
+        "speed_rpm": variable("speed", np.array(asked.speeds) / RPM, "rpm", "speed of the rotor"),
+        "engine_orders": variable(
+            "order", orders, "1", "engine order whose crossings are looked for"
+        ),
+        "frequency_hz": variable("wave speed mode", frequencies(waves), "Hz", about),
+        "basis_error": variable("wave", error, "1", "relative error of frequencies between speeds"),
+    }
+
+
+def _crossings(waves: Sequence[WaveBranches]) -> Variables:
+    which = np.repeat(np.arange(len(waves)), [len(w.modes) for w in waves])
+
+    def every(name: str) -> Any:
+        return np.concatenate([getattr(w, name) for w in waves])
+
+    found = {
+        "wave": (which, "1", "index of the wave"),
+        "mode": (every("modes"), "1", "index of the mode"),
+        "engine_order": (every("engine_orders"), "1", "engine order that crosses"),
+        "speed_rpm": (every("speeds") / RPM, "rpm", "speed of the crossing"),
+        "frequency_hz": (every("crossings_hz"), "Hz", "frequency of the crossing"),
+    }
+    return {f"crossing_{name}": variable("crossing", *of) for name, of in found.items()}
+
+
+def _beyond(unfollowed: Sequence[tuple[int, float]]) -> Variables:
+    orders = np.array([m for m, _ in unfollowed], dtype=np.int64)
+    speeds = np.array([rpm for _, rpm in unfollowed], dtype=float)
+    about = "engine order that goes beyond the followed modes of its nodal diameter"
+    return {
+        "unfollowed_engine_order": variable("unfollowed", orders, "1", about),
+        "unfollowed_from_rpm": variable("unfollowed", speeds, "rpm", "speed from which it does"),
+    }
+
+
+CAMPBELL = Campbell()

@@ -1,0 +1,154 @@
+"""Natural frequencies and mode shapes: of each nodal diameter of a wheel, or of a structure as a whole."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+import xarray as xr
+from pydantic import Field, model_validator
+
+from stickslip.arrays import FloatArray
+from stickslip.assembly.model import Model
+from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
+from stickslip.study.analyses.waves.dataset import Variables, dataset, frequencies, growth
+from stickslip.study.analyses.waves.numbers import Wheel
+from stickslip.study.analyses.waves.reference import Reference, read_reference
+from stickslip.study.analyses.waves.results import WaveModes
+from stickslip.study.analyses.waves.solve import Question, each_wave, solve_wave
+from stickslip.study.analyses.waves.tables import Diameter, WaveTable
+from stickslip.study.analyses.waves.texts import modes_tables, of_cases
+from stickslip.study.file.section import FilePath, custom_error, once
+from stickslip.study.keep.netcdf import variable
+from stickslip.units import RPM
+
+
+class ModesTable(WaveTable):
+    """Natural frequencies and mode shapes for each nodal diameter."""
+
+    number: int = Field(
+        6, ge=1, le=200, description="number of modes of each nodal diameter, 1 to 200"
+    )
+    nodal_diameters: list[Diameter] | None = Field(
+        None,
+        min_length=1,
+        max_length=501,
+        description="nodal diameters, a list of whole numbers from 0 to half the number of sectors; left out: all",
+    )
+    shapes: bool = Field(True, description="store the mode shapes on the skin: true or false")
+    reference: FilePath | None = Field(
+        None,
+        description="CSV file of frequencies to compare with, relative to the study; columns nodal_diameter, mode (1 is the "
+        "lowest), frequency_hz",
+    )
+    reference_case: str | None = Field(
+        None,
+        max_length=100,
+        description="keep only the rows of the reference whose column 'case' has this value",
+    )
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        once(self.nodal_diameters or [], "nodal_diameters")
+        if self.reference_case is not None and self.reference is None:
+            raise custom_error(
+                "is given without a reference",
+                "Name the CSV file, or leave it out.",
+                "reference_case",
+            )
+        return self
+
+    def compared_with(self, home: Path) -> Reference | None:
+        """Return the frequencies to compare with; None if there are none."""
+        if self.reference is None:
+            return None
+        return read_reference(home / self.reference, self.reference_case)
+
+
+class Modes:
+    """The analysis ``modes``."""
+
+    name = "modes"
+    table = ModesTable
+    record = WaveModes
+    checks = ()
+
+    def key(self, case: Case) -> str:
+        """Return all that the records depend on; what they are compared with is not among it."""
+        asked: ModesTable = case.settings.modes
+        return asked.model_dump_json(exclude={"reference", "reference_case"})
+
+    def inputs(self, case: Case, model: Model) -> Question:
+        """Return what is solved."""
+        asked: ModesTable = case.settings.modes
+        wheel = Wheel(model.sectors, model.coriolis and model.turns and model.speed > 0)
+        wheel.require(asked.nodal_diameters, "modes.nodal_diameters")
+        numbers = wheel.numbers(asked.nodal_diameters)
+        known = asked.compared_with(case.home)
+        if known is not None:
+            known.of_waves(numbers, asked.number, model.sectors)
+        return Question(
+            model,
+            asked.contacts,
+            wheel,
+            numbers,
+            asked.number,
+            (model.speed,),
+            rpm=float(f"{model.speed / RPM:.12g}"),
+            shapes=asked.shapes and model.skin is not None,
+        )
+
+    def solve(
+        self, inputs: Question, done: Sequence[WaveModes], notes: Notes
+    ) -> Iterator[WaveModes]:
+        """Yield the modes of each wave."""
+        return each_wave(solve_wave, inputs, done, notes)
+
+    def dataset(self, solved: Sequence[Solved]) -> xr.Dataset:
+        """Return frequencies, shapes and what they are compared with."""
+        return dataset(solved, _of_case)
+
+    def check(self, case: Case, model: Model) -> tuple[str, ...]:
+        """Say how many modes of how many waves there will be."""
+        asked = self.inputs(case, model)
+        return (f"modes: {asked.n_modes} of each of {len(asked.numbers)} waves",)
+
+    def summary(self, data: xr.Dataset) -> tuple[TextTable, ...]:
+        """Return the frequencies, and their differences from the reference."""
+        return of_cases(data, modes_tables)
+
+
+def _of_case(solved: Solved) -> tuple[Variables, list[str]]:
+    waves: Sequence[WaveModes] = solved.records
+    hertz = frequencies(waves)
+    found = {
+        "frequency_hz": variable("wave mode", hertz, "Hz", "natural frequency"),
+        "growth": growth(waves),
+    }
+    return found | _compared(solved, hertz) | _shapes(waves), []
+
+
+def _compared(solved: Solved, hertz: FloatArray) -> Variables:
+    asked: ModesTable = solved.case.settings.modes
+    known = asked.compared_with(solved.case.home)
+    if known is None:
+        return {}
+    numbers = [w.wave_number for w in solved.records]
+    reference = known.of_waves(numbers, hertz.shape[1], int(solved.notes["model"]["sectors"]))
+    off = hertz / reference - 1
+    return {
+        "reference_hz": variable("wave mode", reference, "Hz", "frequency to compare with"),
+        "difference": variable("wave mode", off, "1", "relative difference from the reference"),
+    }
+
+
+def _shapes(waves: Sequence[WaveModes]) -> Variables:
+    shapes = np.stack([w.shapes for w in waves])
+    if not shapes.size:
+        return {}
+    parts = np.stack([shapes.real, shapes.imag], axis=-1).astype(np.float32)
+    about = "displacement of sector 0, largest is 1"
+    return {"shape": variable("wave mode skin_point xyz part", parts, "1", about)}
+
+
+MODES = Modes()

@@ -1,0 +1,107 @@
+"""What results say of the model beside its frequencies: mass, size, axis, what rotation does, the skin for pictures."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stickslip.assembly.model import ContactsAs, Model
+from stickslip.study.analyses.waves.doubts import static_doubts
+from stickslip.study.analyses.waves.static_state import StaticState, static_state
+from stickslip.study.keep.netcdf import variable
+
+ABOUT = "model"  # note of what is told here
+NUMBERS = {
+    "sectors": ("", "1", "number of sectors of the wheel; 1 for a whole structure"),
+    "axis_direction": ("xyz", "1", "direction of the axis of rotation"),
+    "axis_origin": ("xyz", "m", "a point of the axis of rotation"),
+    "speed_rpm": ("", "rpm", "speed of the rotor; NaN for a range"),
+    "rotation": ("", "1", "what of the rotation is in the numbers"),
+    "contacts": ("", "1", "what contacts do: static, stuck, open, or none"),
+    "mass_kg": ("", "kg", "mass of the model (one sector)"),
+    "centre_m": ("xyz", "m", "centre of mass"),
+    "box_low_m": ("xyz", "m", "lower corner of the box around all nodes"),
+    "box_high_m": ("xyz", "m", "upper corner of the box around all nodes"),
+    "dofs": ("", "1", "number of free dofs"),
+    "nodes": ("", "1", "number of nodes"),
+    "elements": ("", "1", "number of elements; 0 for matrices"),
+    "static_rpm": ("", "rpm", "speed of the static displacement"),
+    "static_displacement_m": ("", "m", "largest static displacement under the centrifugal load"),
+    "static_strain": ("", "1", "largest principal strain under the centrifugal load"),
+    "static_rotation_rad": ("", "rad", "largest rotation under the centrifugal load"),
+    "skin_point": ("skin_point xyz", "m", "points of the skin"),
+    "skin_triangle": ("face corner", "1", "triangles of the skin"),
+    "skin_cut": ("face", "1", "1 on a cyclic face, inside the wheel"),
+}
+
+
+def about(model: Model, contacts: ContactsAs, rpm: float, highest_rpm: float) -> dict[str, Any]:
+    """Return the note about a model.
+
+    Parameters
+    ----------
+    model
+        The model.
+    contacts
+        What its contacts do.
+    rpm
+        Speed of the rotor; NaN for a range.
+    highest_rpm
+        At which the static displacement is told.
+    """
+    facts, state = model.facts, static_state(model, float(f"{highest_rpm:.12g}"))
+    note = {
+        "sectors": model.sectors,
+        "axis_direction": np.asarray(model.axis.unit),
+        "axis_origin": np.asarray(model.axis.origin, dtype=float),
+        "speed_rpm": rpm,
+        "rotation": _in_words(model, rpm),
+        "contacts": contacts if model.contacts else "none",
+        "mass_kg": facts.mass,
+        "centre_m": np.asarray(facts.centre),
+        "box_low_m": np.asarray(facts.low),
+        "box_high_m": np.asarray(facts.high),
+        "dofs": facts.dofs,
+        "nodes": facts.nodes,
+        "elements": facts.elements,
+        "warnings": np.array([*model.warnings, *static_doubts(state)], dtype=str),
+    }
+    return note | _static(state) | _skin(model)
+
+
+def _static(state: StaticState | None) -> dict[str, float]:
+    names = {
+        "rpm": "rpm",
+        "displacement": "displacement_m",
+        "strain": "strain",
+        "rotation": "rotation_rad",
+    }
+    return {f"static_{key}": getattr(state, name, np.nan) for name, key in names.items()}
+
+
+def _skin(model: Model) -> dict[str, Any]:
+    skin = model.skin
+    if skin is None:
+        return {}
+    return {"skin_point": skin.points, "skin_triangle": skin.triangles, "skin_cut": skin.cut}
+
+
+def told(note: Mapping[str, Any]) -> dict[str, xr.Variable]:
+    """Return the variables of a note about a model."""
+    return {
+        name: variable(dims, note[name], units, long_name)
+        for name, (dims, units, long_name) in NUMBERS.items()
+        if name in note
+    }
+
+
+def _in_words(model: Model, rpm: float) -> str:
+    """Say which effects of rotation are in the numbers."""
+    if not model.turns:
+        return "matrices as read, unchanged by speed"
+    if rpm == 0:
+        return "at rest"
+    speed = "at each speed" if np.isnan(rpm) else f"{rpm:g} rpm"
+    coriolis = "with" if model.coriolis else "without"
+    return f"{speed}, {model.tangent} tangent, {coriolis} Coriolis forces"

@@ -1,0 +1,169 @@
+"""What is computed for one travelling wave: its modes at a speed, or its branches over a range of speeds."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+from typing import TypeVar
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, Matrix
+from stickslip.assembly.model import ContactsAs, Model
+from stickslip.model.gyroscopic import gyroscopic_modes
+from stickslip.model.modes import normal_modes
+from stickslip.model.structure import Structure
+from stickslip.reduction.speed_basis import speed_basis
+from stickslip.response.rotating.campbell import campbell
+from stickslip.study.analyses.analysis import Notes
+from stickslip.study.analyses.waves.about import ABOUT, about
+from stickslip.study.analyses.waves.numbers import Wheel
+from stickslip.study.analyses.waves.results import WaveBranches, WaveModes
+from stickslip.study.keep.progress import advance
+from stickslip.units import RPM
+
+W = TypeVar("W", WaveModes, WaveBranches)
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What modes or branches are computed of; picklable.
+
+    Parameters
+    ----------
+    model
+        The model.
+    contacts
+        What its contacts do.
+    wheel
+        Its sectors and directions.
+    numbers
+        Wave numbers.
+    n_modes
+        Modes of each wave.
+    speeds
+        In rad/s; one for modes, ascending for branches.
+    rpm
+        What the result calls the speed; NaN for a range.
+    shapes
+        Whether mode shapes are kept.
+    engine_orders
+        Whose crossings are looked for.
+    """
+
+    model: Model
+    contacts: ContactsAs
+    wheel: Wheel
+    numbers: tuple[int, ...]
+    n_modes: int
+    speeds: tuple[float, ...]
+    rpm: float = math.nan
+    shapes: bool = False
+    engine_orders: tuple[int, ...] = ()
+
+    def at(self, speed: float, wave_number: int) -> Structure:
+        """Return the structure at a speed in rad/s as a wave."""
+        return self.model.at(speed, wave_number, self.contacts)
+
+
+def each_wave(
+    solve: Callable[[Question, int], W], asked: Question, done: Sequence[W], notes: Notes
+) -> Iterator[W]:
+    """Yield what `solve` finds for the waves that are not done; what is told of the model goes into the notes first."""
+    if notes.get(ABOUT) is None:
+        notes.put(ABOUT, about(asked.model, asked.contacts, asked.rpm, asked.speeds[-1] / RPM))
+    known = {w.wave_number for w in done}
+    for i, number in enumerate(asked.numbers):
+        if number not in known:
+            found = solve(asked, number)
+            yield found
+            advance((i + 1) / len(asked.numbers), _progress(found))
+
+
+def _progress(wave: WaveModes | WaveBranches) -> str:
+    low, high = wave.frequencies_hz.min(), wave.frequencies_hz.max()
+    basis = f", basis good to {wave.error:.0e}" if isinstance(wave, WaveBranches) else ""
+    return (
+        f"wave number {wave.wave_number}: {low:.6g} to {high:.6g} Hz in {wave.seconds:.1f} s{basis}"
+    )
+
+
+def solve_wave(asked: Question, wave_number: int) -> WaveModes:
+    """Return the lowest modes of a wave.
+
+    Raises
+    ------
+    InputError
+        If the wave has fewer modes.
+    """
+    began = perf_counter()
+    structure = asked.at(asked.speeds[0], wave_number)
+    if asked.wheel.parted:
+        turning = gyroscopic_modes(structure, asked.n_modes)
+        hertz, vectors = turning.frequencies_hz, turning.shapes
+    else:
+        modes = normal_modes(structure, asked.n_modes)
+        hertz, vectors = modes.frequencies_hz, np.asarray(modes.shapes, dtype=complex)
+    moved = np.zeros((asked.n_modes, 0, 3), dtype=complex)
+    if asked.shapes:
+        moved = _unit(asked.model.on_skin(np.asarray(structure.expand(vectors), dtype=complex)))
+    growth = _growth(asked, wave_number, hertz, vectors)
+    return WaveModes(wave_number, hertz, moved, growth, perf_counter() - began)
+
+
+def _growth(asked: Question, wave_number: int, hertz: FloatArray, vectors: Matrix) -> FloatArray:
+    """Return the (m,) derivatives of ω² by Ω²: of ``φᴴ (K + iωD − ω²M) φ = 0``, whose φ counts to second order only."""
+    x = asked.speeds[0] ** 2
+    if x == 0 or not asked.model.turns:
+        return np.zeros(len(hertz))
+    here, low, high = (asked.at(np.sqrt(f * x), wave_number) for f in (1.0, 0.5, 1.5))
+
+    def form(matrix: Matrix) -> ComplexArray:
+        return np.asarray(np.sum(vectors.conj() * (matrix @ vectors), axis=0), dtype=complex)
+
+    # the stiffness has degree two in Ω², so that the central difference is exact
+    by_x = form((high.stiffness - low.stiffness) / x)
+    mass, omega = form(here.mass), 2 * np.pi * hertz
+    if not asked.wheel.parted:
+        return np.asarray((by_x / mass).real)
+    # Coriolis terms grow with Ω; what is left of the damping dissipates, and does not count here
+    turning = 1j * (form(here.damping) - form(here.damping.conj().T)) / 2
+    by_omega = 2 * omega * mass - turning
+    return np.asarray((2 * omega * (by_x + omega * turning / (2 * x)) / by_omega).real)
+
+
+def _unit(shapes: ComplexArray) -> ComplexArray:
+    """Return shapes (m, n, 3) whose largest displacement has length 1 and is real along its largest component."""
+    out = np.zeros_like(shapes)
+    for i, shape in enumerate(shapes):
+        length = np.linalg.norm(shape, axis=1)
+        top = int(length.argmax())
+        if length[top] > 0:
+            leading = shape[top, np.abs(shape[top]).argmax()]
+            out[i] = shape * (abs(leading) / leading / length[top])
+    return out
+
+
+def follow_wave(asked: Question, wave_number: int) -> WaveBranches:
+    """Return the branches of a wave over the speeds and their crossings with the engine orders that excite it."""
+    began = perf_counter()
+    orders = [m for m in asked.engine_orders if asked.wheel.diagram(m) == wave_number]
+    speeds, coriolis = np.array(asked.speeds), asked.wheel.parted
+    small = speed_basis(
+        lambda speed: asked.at(speed, wave_number),
+        (asked.speeds[0], asked.speeds[-1]),
+        asked.n_modes,
+        coriolis=coriolis,
+    )
+    found = campbell(small.at, speeds, asked.n_modes, orders, coriolis=coriolis)
+    crossings = found.crossings
+    return WaveBranches(
+        wave_number,
+        found.frequencies_hz,
+        np.array([c.engine_order for c in crossings], dtype=np.int64),
+        np.array([c.mode for c in crossings], dtype=np.int64),
+        np.array([c.speed for c in crossings]),
+        np.array([c.frequency_hz for c in crossings]),
+        small.error,
+        perf_counter() - began,
+    )
