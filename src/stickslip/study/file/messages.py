@@ -99,29 +99,29 @@ def _opened(here: Any, part: str | int) -> tuple[Any, type[BaseModel] | bool | N
     tagged = alternatives(here)
     if part in tagged:
         return tagged[str(part)], None
-    for one in _plain(here):
+    for one in plain(here):
         if isinstance(one, type) and issubclass(one, BaseModel):
             field = one.model_fields.get(str(part))
-            return (None, one) if field is None else (_whole(field), one)
+            return (None, one) if field is None else (whole(field), one)
         if get_origin(one) in (dict, list, tuple):
             return get_args(one)[-1], True
     return None, True
 
 
-def _whole(field: Any) -> Any:
+def whole(field: Any) -> Any:
     """Return a field's annotation with what pydantic took out of it."""
     if field.metadata:
         return Annotated[field.annotation, *field.metadata]
     return field.annotation
 
 
-def _plain(annotation: Any) -> list[Any]:
+def plain(annotation: Any) -> list[Any]:
     """Return an annotation and what it is one of, ``Annotated`` taken off."""
     if get_origin(annotation) is Annotated:
-        return _plain(get_args(annotation)[0])
+        return plain(get_args(annotation)[0])
     if get_origin(annotation) in (dict, list, tuple) or not get_args(annotation):
         return [annotation]
-    return [p for inner in get_args(annotation) for p in _plain(inner)]
+    return [p for inner in get_args(annotation) for p in plain(inner)]
 
 
 def alternatives(annotation: Any) -> dict[str, Any]:
@@ -147,18 +147,20 @@ def _problem(spot: Spot, details: ErrorDetails, context: dict[str, Any]) -> tupl
     if kind == "literal_error":
         known = context["expected"].replace("'", "").replace(" or ", ", ").split(", ")
         return f"is not known, got {got}", did_you_mean(str(details["input"]), known)
-    if kind == "finite_number":
-        return f"must be a finite number, got {got}", f"Give {spot.about}."
-    if kind in ("too_long", "too_short"):
-        return f"has the wrong number of entries, got {got}", f"Give {spot.about}."
-    if kind.endswith("model_type") or kind in ("model_attributes_type", "dict_type"):
-        return f"must be a table, got {got}", f"Give {spot.about}."
-    said = details["msg"]
+    said = _KINDS.get(kind) or details["msg"]
     for of_pydantic, ours in _WORDS:
         said = said.replace(of_pydantic, ours)
     return f"{said[0].lower()}{said[1:]}, got {got}", f"Give {spot.about}."
 
 
+_KINDS = {
+    "finite_number": "must be a finite number",
+    "too_long": "has the wrong number of entries",
+    "too_short": "has the wrong number of entries",
+    "model_type": "must be a table",
+    "model_attributes_type": "must be a table",
+    "dict_type": "must be a table",
+}
 _WORDS = (
     ("Input should be", "must be"),
     ("a valid ", "a "),

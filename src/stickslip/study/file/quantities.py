@@ -53,14 +53,15 @@ def table_of(
             refused_by(cls, lambda: build(cls, table))
         return table
 
-    return create_model(
+    keys: dict[str, Any] = columns | more
+    made: type[Section] = create_model(
         name or cls.__name__,
         __base__=base,
         __doc__=(cls.__doc__ or "").partition("\n")[0],
-        __validators__={"fits": model_validator(mode="after")(fits)},
-        **columns,
-        **more,
+        __validators__={"fits": model_validator(mode="after")(fits)},  # type: ignore[dict-item]
+        **keys,
     )
+    return made
 
 
 def columns_of(
@@ -133,7 +134,7 @@ def _column(entry: Field[Any], q: Quantity, hint: Any, optional: bool, per_area:
     kind, about = _inner(hint), _about(q, per_area)
     if is_dataclass(kind):
         left_out = None if entry.default_factory is not MISSING or hint is not kind else ...
-        nested = table_of(kind) if isinstance(kind, type) else kind
+        nested: Any = table_of(kind)  # type: ignore[arg-type]
         return (nested if left_out is ... else nested | None), pydantic.Field(
             left_out, description=f"the table of it: {about}"
         )
@@ -159,8 +160,7 @@ def _annotation(kind: Any, q: Quantity) -> Any:
         ]
     if q.choices:
         return Literal[q.choices]
-    limits = {"gt": q.above, "ge": q.least, "lt": q.below, "le": q.most}
-    return Annotated[kind, pydantic.Field(**{k: v for k, v in limits.items() if v is not None})]
+    return Annotated[kind, pydantic.Field(gt=q.above, ge=q.least, lt=q.below, le=q.most)]
 
 
 def _inner(hint: Any) -> Any:

@@ -1,0 +1,190 @@
+"""The tables [contact.NAME] and [join.NAME]; keys of laws are those of the laws' own dataclasses."""
+
+from functools import cache
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, ValidationInfo, create_model, field_validator, model_validator
+
+from stickslip.assembly.contact import GROUND, NEXT, PairingKind, Share
+from stickslip.contact.law import ContactLaw
+from stickslip.contact.laws import LAWS
+from stickslip.errors import did_you_mean
+from stickslip.study.file.parts import Triple
+from stickslip.study.file.quantities import build, columns_of, refused_by
+from stickslip.study.file.section import Name, Positive, Section, custom_error, shown
+
+Between = Annotated[list[Name], Field(min_length=2, max_length=2)]
+
+
+class Pair(Section):
+    """Two surfaces that meet."""
+
+    between: Between = Field(
+        description='the two surfaces: "part.surface" (a node set, a dof, a surface of a body), then "part.surface", '
+        '"next.part.surface" (of the neighbouring sector) or "ground"'
+    )
+    tolerance_m: Positive | None = Field(
+        None,
+        description="distance of partners node to node, reach of a segment, in m; left out: that of the pairing",
+    )
+
+    @field_validator("between")
+    @classmethod
+    def _are_surfaces(cls, given: list[str]) -> list[str]:
+        first, second = given
+        if first == GROUND or first.startswith(NEXT):
+            raise custom_error(
+                f"begins with {first!r}, but the first surface gives the points and their normal",
+                f"Give {[second, first]}.",
+            )
+        for name in given:
+            if name != GROUND and "." not in name.removeprefix(NEXT):
+                raise custom_error(
+                    f"{name!r} is no surface", 'Name part and surface, such as "blade.tip".'
+                )
+        return given
+
+
+class JoinTable(Pair):
+    """Two surfaces tied to each other for good: the first follows the second."""
+
+    pairing: PairingKind = Field(
+        "node_to_segment",
+        description="how points find their partners: node_to_node, node_to_segment or segment_to_segment",
+    )
+
+
+class ContactBase(Pair):
+    """Two surfaces that may stick, slip and lift off."""
+
+    pairing: PairingKind = Field(
+        "node_to_node",
+        description="how points find their partners: node_to_node, node_to_segment or segment_to_segment",
+    )
+    tangent: Triple | None = Field(
+        None,
+        description="direction [x, y, z] whose part in the contact plane is the tangent t; left out: that of the surface",
+    )
+    acts: Literal["tangential", "normal"] | None = Field(
+        None,
+        description="for single dofs, which have no normal: whether their motion is tangential or normal to the contact",
+    )
+    gap_m: float = Field(0.0, ge=0, le=10, description="clearance at rest in m, 0 for none")
+    law: str = Field(
+        description="the contact law: " + ", ".join(LAWS), json_schema_extra={"enum": list(LAWS)}
+    )
+    per: Share = Field(
+        "interface",
+        description="what stiffnesses and forces are of: interface (shared among its points), point, or area (N/m³ and Pa)",
+    )
+
+    @field_validator("law", mode="before")
+    @classmethod
+    def _is_known(cls, given: Any) -> Any:
+        if given not in list(LAWS):
+            raise custom_error(
+                f"is not known, got {shown(given)}", did_you_mean(str(given), list(LAWS))
+            )
+        return given
+
+    @model_validator(mode="after")
+    def _is_one(self) -> Self:
+        key = self._preload_key
+        if self.gap_m > 0 and getattr(self, key):
+            raise custom_error(
+                "is given together with a clearance",
+                "A contact at rest is either pressed or open: give one of them.",
+                key,
+            )
+        refused_by(LAWS[self.law], self.library)
+        return self
+
+    @property
+    def _preload_key(self) -> str:
+        return "preload_pa" if self.per == "area" else "preload_n"
+
+    @property
+    def preload(self) -> float:
+        """Normal force at rest of what `per` says, N or Pa."""
+        return float(getattr(self, self._preload_key) or 0.0)
+
+    def library(self) -> ContactLaw:
+        """Return the law, its parameters as given."""
+        law: ContactLaw = build(LAWS[self.law], self, per_area=self.per == "area")
+        return law
+
+
+@cache
+def keys_of(law: str, *, per_area: bool) -> dict[str, bool]:
+    """Return the keys of a law and whether each is needed."""
+    columns = columns_of(LAWS[law], per_area=per_area)
+    return {key: field.is_required() for key, (_, field) in columns.items()} | {
+        "preload_pa" if per_area else "preload_n": False
+    }
+
+
+def _owners(key: str, *, per_area: bool) -> list[str]:
+    return [law for law in LAWS if key in keys_of(law, per_area=per_area)]
+
+
+def _is_of_the_law(cls: type[Section], value: Any, info: ValidationInfo) -> Any:
+    law, key, per = info.data.get("law"), str(info.field_name), info.data.get("per")
+    if law is None or per is None:  # unknown, which is told already
+        return value
+    area = per == "area"
+    known = keys_of(law, per_area=area)
+    if value is None:
+        if known.get(key):
+            about = cls.model_fields[key].description
+            raise custom_error(f"is missing, the law {law} needs it", f"Add it: {about}.")
+    elif key not in known:
+        raise _foreign(law, key, area, value)
+    return value
+
+
+def _foreign(law: str, key: str, area: bool, value: Any) -> Exception:
+    """Return the complaint about a key that is of another law, or of another share."""
+    if key in keys_of(law, per_area=not area):
+        ours, theirs = (list(keys_of(law, per_area=a)) for a in (area, not area))
+        what = '"area"' if area else "one other than area"
+        return custom_error(
+            f"is not the key with per = {what}, got {shown(value)}",
+            f"Give {ours[theirs.index(key)]}, or another per.",
+        )
+    having = ", ".join(_owners(key, per_area=area) or _owners(key, per_area=not area))
+    return custom_error(
+        f"is no parameter of the law {law}, got {shown(value)}; it belongs to {having}",
+        "Remove it, or choose a law that has it.",
+    )
+
+
+def _columns() -> dict[str, Any]:
+    """Return the keys of all laws: each may be left out, and the law says which must not be."""
+    found: dict[str, Any] = {}
+    for area in (False, True):
+        unit = "Pa" if area else "N"
+        found[f"preload_{unit.lower()}"] = (
+            float | None,
+            Field(None, description=f"normal force at rest in {unit}, 0 for none"),
+        )
+        for law in LAWS:
+            for key, (annotation, field) in columns_of(LAWS[law], per_area=area).items():
+                about = Field(None, validate_default=True, description=field.description)
+                found.setdefault(key, (annotation | None, about))
+    return found
+
+
+def _made() -> type[ContactBase]:
+    columns = _columns()
+    check: Any = field_validator(*columns)(classmethod(_is_of_the_law))
+    return create_model(
+        "Contact",
+        __base__=ContactBase,
+        __doc__=ContactBase.__doc__,
+        __validators__={"is_of_the_law": check},
+        **columns,
+    )
+
+
+ContactTable = _made()
+__all__ = ["ContactTable", "JoinTable", "Pair", "keys_of"]

@@ -1,0 +1,204 @@
+"""The table [harmonics] of a study file: which harmonics are kept, and what chooses them at each frequency."""
+
+from dataclasses import fields
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from stickslip.errors import InputError, did_you_mean
+from stickslip.harmonic.selection import STRATEGIES, strategy_named
+from stickslip.harmonic.selection.strategy import Strategy, always_kept
+from stickslip.harmonic.support import Harmonics as Support
+from stickslip.harmonic.support import harmonics_of
+from stickslip.response.forced.sweep import Passages, Sweep
+from stickslip.study.file.section import Positive, Section, custom_error, shown
+
+HIGHEST = 30  # harmonic that a study may keep
+SELECTIONS = tuple(STRATEGIES)
+DEFAULT_SELECTION = str({f.name: f.default for f in fields(Sweep)}["selection"])
+PLACES = ("along", "outputs", "contacts")
+
+Harmonic = Annotated[int, Field(ge=1, le=HIGHEST)]
+Kept = Harmonic | list[Harmonic]
+
+
+class Harmonics(Section):
+    """Harmonics kept, and what chooses them at each frequency."""
+
+    low: Kept = Field(
+        1,
+        description=f"harmonics of the first passage: the highest of all, 1 to {HIGHEST}, or a list such as [1, 3]",
+    )
+    high: Kept = Field(
+        5,
+        description=f"harmonics beyond which none is kept: the highest of all, 1 to {HIGHEST}, or a list such as [1, 3, 5]",
+    )
+    samples: int = Field(256, ge=16, le=8192, description="time samples of a period, 16 to 8192")
+    selection: str = Field(
+        DEFAULT_SELECTION,
+        description="what chooses the harmonics of a frequency: " + ", ".join(SELECTIONS),
+        json_schema_extra={"enum": list(SELECTIONS)},
+    )
+    passages: Passages = Field(
+        "double",
+        description="double: finish the response with few harmonics, then repeat what needs more; single: settle each frequency "
+        "before the next one, as selections that foretell the next frequency always do",
+    )
+    alert_threshold_percent: Positive = Field(
+        5.0,
+        description="a percentage greater than zero: frequencies whose predicted error is larger get more harmonics "
+        "(for selections that predict an error)",
+    )
+    strategy_threshold: Positive | None = Field(
+        None,
+        description="threshold of a selection whose indicator is no error, greater than zero; left out: that of its source",
+    )
+    alert_over: Literal["along", "outputs", "contacts"] | list[str] = Field(
+        "along",
+        description="where the error is taken: along (the outputs' motion along the excitation), outputs (all of it), contacts "
+        '(of the second surfaces at the contact points) or a list of labels such as ["tip1.x", "L1.1.z", "damper.x"]',
+    )
+    alert_harmonics: list[Annotated[int, Field(ge=0, le=HIGHEST)]] | None = Field(
+        None,
+        description="harmonics of which the error is taken, 0 for the static part; left out: those that the excitation drives",
+    )
+
+    @field_validator("low", "high", mode="before")
+    @classmethod
+    def _is_support(cls, given: Any) -> Any:
+        one = isinstance(given, int) and not isinstance(given, bool)
+        entries = [given] if one else given
+        if isinstance(entries, list) and entries and all(_harmonic(h, 1) for h in entries):
+            return given
+        raise custom_error(
+            f"must be a harmonic from 1 to {HIGHEST} or a list of them, got {shown(given)}",
+            "5 keeps all up to the fifth; [1, 3, 5] keeps these alone. The static term is always kept.",
+        )
+
+    @field_validator("selection", mode="before")
+    @classmethod
+    def _is_known(cls, given: Any) -> Any:
+        if given not in SELECTIONS:
+            raise custom_error(
+                f"is not known, got {shown(given)}", did_you_mean(str(given), list(SELECTIONS))
+            )
+        return given
+
+    @field_validator("alert_over", mode="before")
+    @classmethod
+    def _is_place(cls, given: Any) -> Any:
+        labels = isinstance(given, list) and given and all(isinstance(v, str) for v in given)
+        if given in PLACES or labels:
+            return given
+        remedy = (
+            did_you_mean(given, list(PLACES)) if isinstance(given, str) else "Give one of these."
+        )
+        raise custom_error(
+            f"must be {', '.join(PLACES)} or a list of labels, got {shown(given)}", remedy
+        )
+
+    @field_validator("alert_harmonics", mode="before")
+    @classmethod
+    def _are_harmonics(cls, given: Any) -> Any:
+        if isinstance(given, list) and given and all(_harmonic(h, 0) for h in given):
+            return given
+        raise custom_error(
+            f"must be a list of harmonics from 0 to {HIGHEST}, got {shown(given)}",
+            "[1] is the vibration at the excitation's frequency, [0, 1] counts the static part, too.",
+        )
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        _check_supports(self)
+        _check_threshold(self)
+        first = self.low_harmonics
+        missing = [h for h in self.alert_harmonics or () if h not in first]
+        if missing:
+            raise custom_error(
+                f"names harmonic {missing[0]}, which low = {self.low} does not keep: nothing is known of its error",
+                "Add it to low, or leave it out.",
+                "alert_harmonics",
+            )
+        return self
+
+    @property
+    def low_harmonics(self) -> Support:
+        """Harmonics of the first passage, from 0."""
+        return harmonics_of(self.low)
+
+    @property
+    def high_harmonics(self) -> Support:
+        """Harmonics of the reference, from 0."""
+        return harmonics_of(self.high)
+
+    @property
+    def strategy(self) -> Strategy:
+        """What chooses, with this table's threshold where it has one."""
+        strategy = strategy_named(self.selection)
+        if strategy.verifies:
+            return strategy_named(self.selection, self.alert_threshold_percent / 100)
+        if self.strategy_threshold is None:
+            return strategy
+        return strategy_named(self.selection, self.strategy_threshold)
+
+    @property
+    def chooser(self) -> str | Strategy:
+        """What a sweep takes as its selection: the name, or the strategy with this table's own threshold."""
+        own = None if self.strategy_threshold is None else self.strategy
+        return self.selection if own is None else own
+
+    @property
+    def single(self) -> bool:
+        """Whether each frequency is settled before the next one."""
+        strategy = self.strategy
+        decides = always_kept(strategy) is None
+        return decides and (self.passages == "single" or not strategy.verifies)
+
+
+def _harmonic(given: Any, least: int) -> bool:
+    return isinstance(given, int) and not isinstance(given, bool) and least <= given <= HIGHEST
+
+
+def _check_supports(table: Harmonics) -> None:
+    low, high = table.low_harmonics, table.high_harmonics
+    if isinstance(table.low, int) and isinstance(table.high, int) and table.high < table.low:
+        raise custom_error(
+            f"must not be below low = {table.low}, got {table.high}",
+            "Raise it, or lower low.",
+            "high",
+        )
+    if not set(low) <= set(high):
+        lacking = ", ".join(str(h) for h in low if h not in high)
+        raise custom_error(
+            f"must hold every harmonic of low = {table.low}, got {table.high}",
+            f"Add {lacking}, or leave that out of low.",
+            "high",
+        )
+    if table.samples < 8 * high[-1]:
+        raise custom_error(
+            f"must be at least 8 times high = {high[-1]}, got {table.samples}",
+            f"Give at least {8 * high[-1]}, better a power of two.",
+            "samples",
+        )
+
+
+def _check_threshold(table: Harmonics) -> None:
+    if table.strategy_threshold is not None:
+        if always_kept(strategy_named(table.selection)):
+            raise custom_error(
+                f"has no meaning for selection = {table.selection!r}, got {table.strategy_threshold:g}",
+                "Remove it: nothing is decided.",
+                "strategy_threshold",
+            )
+        if strategy_named(table.selection).verifies:
+            raise custom_error(
+                f"is not for {table.selection}, which predicts an error, got {table.strategy_threshold:g}",
+                "Give alert_threshold_percent instead.",
+                "strategy_threshold",
+            )
+    try:
+        _ = table.strategy
+    except InputError as error:  # a strategy's own limits
+        percent = strategy_named(table.selection).verifies
+        key = "alert_threshold_percent" if percent else "strategy_threshold"
+        raise custom_error(error.problem, error.remedy, key) from None

@@ -1,0 +1,413 @@
+"""The tables [part.NAME]: shapes, lumped masses, rigid bodies, models from files and copies of other parts."""
+
+from collections.abc import Callable
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import (
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+
+from stickslip.errors import did_you_mean
+from stickslip.model.axis import Axis
+from stickslip.model.fe.beam import Beam, Direction
+from stickslip.model.fe.solid import Material
+from stickslip.model.mesh.blade_pair import BladePair
+from stickslip.model.mesh.sector import BladedSector
+from stickslip.model.readers.units import MODULI, SOLIDS
+from stickslip.model.rigid.body import RigidBody
+from stickslip.model.rigid.damper import FlatCurvedDamper
+from stickslip.study.file.quantities import table_of
+from stickslip.study.file.section import (
+    FilePath,
+    Name,
+    Positive,
+    Section,
+    custom_error,
+    once,
+    rising_pair,
+    shown,
+)
+
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Triple = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+# what a number may have been meant in, for messages
+STRESSES = {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3}
+DENSITIES = {"g/cm³": 1e3, "kg/mm³": 1e9, "t/mm³": 1e12}
+
+
+class _PlausibleMaterial(Section):
+    """Checks that numbers are those of a solid."""
+
+    plausible: bool = Field(
+        True,
+        description="whether stiffness and density are checked against what solids have: true, or false where the numbers are right",
+    )
+
+    @field_validator("young_modulus_pa", "density_kg_per_m3", check_fields=False)
+    @classmethod
+    def _is_of_a_solid(cls, value: float, info: ValidationInfo) -> float:
+        """Refuse what no solid has, as the readers of decks do."""
+        stiff = info.field_name == "young_modulus_pa"
+        (low, high), unit = (MODULI, "Pa") if stiff else (SOLIDS, "kg/m³")
+        if low <= value <= high or not info.data.get("plausible", True):
+            return value
+        meant = [
+            f", which is {value * factor:.4g} {unit} if it is in {name}"
+            for name, factor in (STRESSES if stiff else DENSITIES).items()
+            if low <= value * factor <= high
+        ]
+        raise custom_error(
+            f"no solid has {value:g} {unit}{meant[0] if meant else ''}",
+            f"Give a value from {low:g} to {high:g} {unit}, or plausible = false where the number is right.",
+        )
+
+
+MaterialTable: Any = table_of(Material, base=_PlausibleMaterial, name="MaterialTable")
+
+
+class Reduction(Section):
+    """Craig-Bampton reduction of a part: what contacts, loads and outputs need stays physical."""
+
+    fixed_interface_modes: int = Field(
+        25,
+        ge=1,
+        le=500,
+        description="number of fixed-interface modes kept beside the static ones, 1 to 500",
+    )
+
+
+class Damping(Section):
+    """Structural damping, proportional to mass and stiffness."""
+
+    ratio: float = Field(
+        ge=0, lt=1, description="damping ratio at the two frequencies of between_hz, 0 to 1"
+    )
+    between_hz: list[Positive] = Field(
+        min_length=2, max_length=2, description="two frequencies in Hz, the lower first"
+    )
+
+    @model_validator(mode="after")
+    def _rises(self) -> Self:
+        rising_pair(self.between_hz, "between_hz")
+        return self
+
+
+class PartTable(Section):
+    """What every part that vibrates by itself may say."""
+
+    material: MaterialTable | None = Field(
+        None, description="the table of its material; left out: the table [material]"
+    )
+    damping: Damping | None = Field(
+        None, description="the table of its damping; left out: the table [damping]"
+    )
+    reduction: Reduction | None = Field(
+        None, description="the table of its reduction; left out: the table [reduction]"
+    )
+
+    def files(self) -> dict[str, str]:
+        """Return the keys that name files, and the names."""
+        return {}
+
+
+def _shape(name: str) -> tuple[Any, Any]:
+    return Literal[name], Field(description=f'shape = "{name}"')
+
+
+PrismBlades = table_of(
+    BladePair,
+    base=PartTable,
+    name="PrismBlades",
+    shape=_shape("prism_blades"),
+    nodes_at=(
+        Annotated[list[Name], Field(max_length=20)],
+        Field(
+            default_factory=list,
+            description="surfaces of a flat_curved part whose points become nodes of the mesh, such as damper.flat",
+        ),
+    ),
+)
+Sector = table_of(BladedSector, base=PartTable, name="BladedSector", shape=_shape("bladed_sector"))
+BeamTable = table_of(
+    Beam,
+    base=PartTable,
+    name="Beam",
+    without=("material",),
+    shape=_shape("beam"),
+    elements=(int, Field(20, ge=1, le=10_000, description="number of equal elements, 1 to 10000")),
+    bending=(Direction, Field("z", description="direction of the deflection: y or z")),
+    axial=(bool, Field(False, description="whether it stretches too: true or false")),
+)
+FlatCurved = table_of(
+    FlatCurvedDamper,
+    name="FlatCurved",
+    optional=("apex", "flat_angle", "curved_angle"),
+    shape=_shape("flat_curved"),
+)
+
+
+class Surface(Section):
+    """Points of a rigid body that touch something."""
+
+    points_m: list[Triple] = Field(
+        min_length=1, max_length=10_000, description="positions [x, y, z] of its points in m"
+    )
+    normal: Triple = Field(
+        description="direction [x, y, z] out of the body, the same at all points"
+    )
+    tangent: Triple | None = Field(
+        None,
+        description="direction whose part in the contact plane is the tangent t; left out: the axis nearest to the plane",
+    )
+
+    @model_validator(mode="after")
+    def _has_directions(self) -> Self:
+        for key in ("normal", "tangent"):
+            if getattr(self, key) is not None and not any(getattr(self, key)):
+                raise custom_error("has no length", "Along z it is [0, 0, 1].", key)
+        return self
+
+
+RigidBodyTable = table_of(
+    RigidBody,
+    name="RigidBody",
+    shape=_shape("rigid_body"),
+    surfaces=(
+        dict[Name, Surface],
+        Field(
+            default_factory=dict,
+            description="the tables surfaces.NAME, points that touch something",
+        ),
+    ),
+)
+
+
+def _link(given: Any) -> Any:
+    if not (
+        isinstance(given, list)
+        and len(given) == 3
+        and all(isinstance(end, str | int) and not isinstance(end, bool) for end in given[:2])
+        and isinstance(given[2], float | int)
+        and not isinstance(given[2], bool)
+    ):
+        raise custom_error(
+            f"must be [end, end, value], got {shown(given)}",
+            'Ends are "ground", names of masses or their numbers from 1: ["ground", 1, 1e5].',
+        )
+    return [given[0], given[1], float(given[2])]
+
+
+Link = Annotated[list[Any], BeforeValidator(_link)]
+
+
+class Lumped(PartTable):
+    """Masses that move along one direction, springs and dashpots between them and to the ground."""
+
+    shape: Literal["lumped"] = Field(description='shape = "lumped"')
+    masses_kg: list[Positive] = Field(
+        min_length=1, max_length=2000, description="the masses in kg, greater than zero"
+    )
+    names: list[Name] | None = Field(
+        None, description="names of the masses, which are sets of the part; left out: m1, m2, ..."
+    )
+    springs_n_per_m: list[Link] = Field(
+        default_factory=list,
+        max_length=100_000,
+        description='springs [end, end, stiffness in N/m]; ends are "ground", names of masses or their numbers from 1',
+    )
+    dashpots_n_s_per_m: list[Link] = Field(
+        default_factory=list,
+        max_length=100_000,
+        description="dashpots [end, end, coefficient in N s/m]; ends as of springs",
+    )
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of the masses."""
+        return self.names or [f"m{i + 1}" for i in range(len(self.masses_kg))]
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        once(self.labels, "names")
+        if len(self.labels) != len(self.masses_kg):
+            raise custom_error(
+                f"has {len(self.labels)} names for {len(self.masses_kg)} masses",
+                "Name every mass, or leave names out.",
+                "names",
+            )
+        for key in ("springs_n_per_m", "dashpots_n_s_per_m"):
+            for i, link in enumerate(getattr(self, key)):
+                for end in link[:2]:
+                    self._check_end(end, f"{key}[{i}]")
+        return self
+
+    def _check_end(self, end: str | int, key: str) -> None:
+        if end == "ground" or end in self.labels:
+            return
+        if isinstance(end, int) and 1 <= end <= len(self.masses_kg):
+            return
+        raise custom_error(
+            f"there is no mass {end!r}", did_you_mean(str(end), [*self.labels, "ground"]), key
+        )
+
+
+class FileModel(PartTable):
+    """One sector, or a whole structure, from the files of a finite-element program."""
+
+    file: FilePath = Field(
+        description="the model's file, relative to the study: a mesh with its node sets (CalculiX or Abaqus .inp, ANSYS .cdb) "
+        "or matrices (.sti, .full, .npz, .mtx and others, see 'bring your model')"
+    )
+    units: Literal["SI", "mm-t-s", "mm-kg-ms", "mm-kg-s", "inch-lbf-s", "foot-slug-s"] = Field(
+        description="the file's unit system: SI, mm-t-s (mm, tonne, s: N, MPa), mm-kg-ms, mm-kg-s, inch-lbf-s or foot-slug-s"
+    )
+    plausible: bool = Field(
+        True,
+        description="whether mass and size are checked against what solids have: true, or false where the numbers are right",
+    )
+    sectors: int | None = Field(
+        None,
+        ge=1,
+        le=1000,
+        description="number of equal sectors that make the wheel; left out: that of the deck's cyclic symmetry, else 1 for "
+        "the whole structure",
+    )
+    low_face: Name | None = Field(
+        None,
+        description="name of the node set of the cyclic face at the lower angle; left out: the faces of the deck's cyclic tie",
+    )
+    high_face: Name | None = Field(
+        None, description="name of the node set of the cyclic face at the higher angle"
+    )
+    clamped: list[Name] = Field(
+        default_factory=list,
+        max_length=100,
+        description="names of the node sets of a mesh that are held in all directions, beside what a deck holds itself",
+    )
+    axis_direction: Triple | None = Field(
+        None,
+        description="direction [x, y, z] of the axis of rotation; left out: that of the deck, else the z axis",
+    )
+    axis_origin_m: Triple = Field(
+        [0.0, 0.0, 0.0],
+        description="a point [x, y, z] of the axis in m, whatever the file's units; goes with axis_direction",
+    )
+    quadrature: Literal["exact", "calculix"] = Field(
+        "exact",
+        description="integration of a mesh's matrices: exact, or calculix (the rules of that program, for comparisons)",
+    )
+    mesh: FilePath | None = Field(
+        None,
+        description="beside matrices without coordinates: the mesh file with the nodes and their sets (.inp for CalculiX's .sti)",
+    )
+    mass: FilePath | None = Field(
+        None,
+        description="with matrices in separate files: that of the mass; file is the stiffness",
+    )
+    damping_matrix: FilePath | None = Field(
+        None, description="with matrices in separate files: that of the damping"
+    )
+    nodes: FilePath | None = Field(
+        None,
+        description="with matrices in separate files: CSV of node, component, x, y, z of every row",
+    )
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        if (self.low_face is None) != (self.high_face is None):
+            missing = "low_face" if self.low_face is None else "high_face"
+            raise custom_error(
+                "is missing, the other face is given", "Name both faces or neither.", missing
+            )
+        if self.axis_direction is not None and not any(self.axis_direction):
+            raise custom_error("has no length", "The z axis is [0, 0, 1].", "axis_direction")
+        return self
+
+    def files(self) -> dict[str, str]:
+        """Return the keys that name files, and the names."""
+        named = {
+            key: getattr(self, key) for key in ("file", "mesh", "mass", "damping_matrix", "nodes")
+        }
+        return {key: name for key, name in named.items() if name is not None}
+
+    def axis(self) -> Axis | None:
+        """Return the axis of rotation; None where the study names none."""
+        if self.axis_direction is None:
+            return None
+        (a, b, c), (x, y, z) = self.axis_direction, self.axis_origin_m
+        return Axis((a, b, c), (x, y, z))
+
+
+class Placed(Section):
+    """How a copy is put in its place: mirrored, then turned, then moved."""
+
+    mirror: Literal["x", "y", "z"] | None = Field(
+        None, description="direction that a mirror through the origin turns round: x, y or z"
+    )
+    turn_deg: float = Field(0.0, ge=-360, le=360, description="turn about the axis in degrees")
+    axis: Literal["x", "y", "z"] = Field(
+        "z", description="axis through the origin of the turn: x, y or z"
+    )
+    move_m: Triple = Field([0.0, 0.0, 0.0], description="displacement [x, y, z] in m")
+
+
+class Copy(Section):
+    """A copy of another part, whose reduction it shares."""
+
+    of: Name = Field(description="name of the part that is copied")
+    placed: Placed = Field(description="the table placed: mirror, turn_deg, axis, move_m")
+
+
+SHAPES: dict[str, type[Section]] = {
+    "prism_blades": PrismBlades,
+    "bladed_sector": Sector,
+    "beam": BeamTable,
+    "lumped": Lumped,
+    "rigid_body": RigidBodyTable,
+    "flat_curved": FlatCurved,
+}
+KINDS: dict[str, type[Section]] = {**SHAPES, "file": FileModel, "of": Copy}
+
+
+def _kind(given: Any) -> str | None:
+    """Return which kind of part a table is."""
+    if isinstance(given, dict):
+        return next((key for key in ("file", "of") if key in given), given.get("shape"))
+    return next((kind for kind, table in KINDS.items() if type(given) is table), None)
+
+
+def _known_kind(given: Any) -> Any:
+    if not isinstance(given, dict) or _kind(given) in KINDS:
+        return given
+    shapes = ", ".join(SHAPES)
+    if "shape" not in given:
+        raise custom_error(
+            "is missing",
+            f'Say what the part is: a shape ({shapes}), file = "...", or of = "...".',
+            "shape",
+        )
+    raise custom_error(
+        f"is not known, got {shown(given['shape'])}",
+        did_you_mean(str(given["shape"]), list(SHAPES)),
+        "shape",
+    )
+
+
+def union_of(kinds: dict[str, type[Section]], which: Callable[[Any], str | None]) -> Any:
+    """Return the type of a table that is one of several kinds, told apart by `which`."""
+    members = tuple(Annotated[table, Tag(kind)] for kind, table in kinds.items())
+    joined: Any = members[0]
+    for member in members[1:]:
+        joined = joined | member
+    return Annotated[joined, Discriminator(which)]
+
+
+AnyPart: Any = Annotated[union_of(KINDS, _kind), BeforeValidator(_known_kind)]

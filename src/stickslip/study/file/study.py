@@ -1,0 +1,156 @@
+"""The study file: TOML, read and validated whole for each case that [vary] spans."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from stickslip.errors import input_error
+from stickslip.study.file.messages import told
+from stickslip.study.file.tables import VERSION, Tables, study_tables
+from stickslip.study.file.vary import cases_of, label_of, with_values
+
+LARGEST_FILE = 1_000_000  # bytes
+
+
+@dataclass(frozen=True, eq=False)
+class TablesOfCase:
+    """The tables of a study with the varied keys in place.
+
+    Parameters
+    ----------
+    label
+        What is varied, as text; empty for a study without [vary].
+    values
+        Varied key -> its value here.
+    tables
+        Validated.
+    """
+
+    label: str
+    values: Mapping[str, Any]
+    tables: Tables
+
+
+@dataclass(frozen=True, eq=False)
+class StudyFile:
+    """A study file that has been read and found good.
+
+    Parameters
+    ----------
+    path
+        The file, by which messages call it.
+    text
+        Its content, kept for the provenance of results.
+    raw
+        Its content as TOML has it.
+    cases
+        What [vary] spans; one without it.
+    """
+
+    path: Path
+    text: str
+    raw: Mapping[str, Any]
+    cases: tuple[TablesOfCase, ...]
+
+    @property
+    def tables(self) -> Tables:
+        """Tables of the first case: title, output folder and which analyses are asked for are those of all."""
+        return self.cases[0].tables
+
+    @property
+    def home(self) -> Path:
+        """Folder that names of files are relative to."""
+        return self.path.resolve().parent
+
+
+def read_file(path: Path) -> StudyFile:
+    """Read and validate a study file.
+
+    Raises
+    ------
+    InputError
+        Naming every problem of the file, one a line.
+    """
+    text = _text(path)
+    try:
+        raw = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise input_error(
+            str(path), f"is not valid TOML: {error}", "Correct the line named."
+        ) from None
+    return StudyFile(path, text, raw, validated(path, raw))
+
+
+def validated(path: Path, raw: Mapping[str, Any]) -> tuple[TablesOfCase, ...]:
+    """Return the tables of each case of a file's content.
+
+    Raises
+    ------
+    InputError
+        Naming every problem, one a line.
+    """
+    _check_version(path, raw.get("schema_version"))
+    model = study_tables()
+    return tuple(_case(path, raw, values) for values in cases_of(str(path), raw, model))
+
+
+def _case(path: Path, raw: Mapping[str, Any], values: Mapping[str, Any]) -> TablesOfCase:
+    model = study_tables()
+    try:
+        tables = model.model_validate(with_values(raw, values), context={"study": path})
+    except ValidationError as error:
+        renamed = {key: f"vary.{key}" for key in values}
+        raise told(str(path), model, error, renamed) from None
+    return TablesOfCase(label_of(values), values, tables)
+
+
+def _text(path: Path) -> str:
+    place = str(path)
+    if not path.exists():
+        raise input_error(
+            place,
+            "there is no such file",
+            "Check the name, or write an example with 'stickslip new NAME'.",
+        )
+    if not path.is_file():
+        raise input_error(
+            place, "is not a file", "Name the study file itself, for example two_blades/study.toml."
+        )
+    try:
+        with path.open("rb") as stream:
+            content = stream.read(LARGEST_FILE + 1)
+        if len(content) > LARGEST_FILE:
+            raise input_error(
+                place,
+                f"is larger than {LARGEST_FILE} bytes",
+                "A study file is a few kilobytes of TOML.",
+            )
+        # TOML allows both line ends; one form keeps hashes and provenance the same
+        return content.decode("utf-8").replace("\r\n", "\n")
+    except OSError as error:
+        raise input_error(
+            place, f"cannot be read ({error.strerror})", "Check its permissions."
+        ) from None
+    except UnicodeDecodeError as error:
+        raise input_error(
+            place, f"is not UTF-8 text (byte {error.start})", "Save it as UTF-8."
+        ) from None
+
+
+def _check_version(path: Path, found: object) -> None:
+    """Refuse another version of the layout before its keys are judged by this one's."""
+    if found is None or (found == VERSION and isinstance(found, int)):
+        return
+    older = found == 1
+    raise input_error(
+        f"{path}: schema_version",
+        f"this version of stickslip reads {VERSION}, got {found!r}",
+        "The tables have changed: [blades], [damper] and [model] are now [part.NAME], loads are [load.NAME], [sweep] is "
+        "[forced_response]. Begin with an example of 'stickslip new NAME'."
+        if older
+        else f"Write schema_version = {VERSION}, or install the stickslip that the file was written for.",
+    )

@@ -1,0 +1,102 @@
+"""Everything a study file may hold: one section for each table, those of the analyses among them."""
+
+import json
+from functools import cache
+from typing import Any, Literal
+
+from pydantic import Field, create_model
+
+from stickslip.contact.compiled import Evaluator
+from stickslip.study.analyses import ANALYSES
+from stickslip.study.analyses.analysis import named
+from stickslip.study.file.contacts import ContactTable, JoinTable
+from stickslip.study.file.harmonics import Harmonics
+from stickslip.study.file.loads import Limits, LoadTable, Output, Retention, Rotation
+from stickslip.study.file.parts import AnyPart, Damping, MaterialTable, Reduction
+from stickslip.study.file.section import Name, Section
+
+VERSION = 2
+OF_THE_MODEL = frozenset(
+    {"part", "material", "damping", "reduction", "contact", "join", "load", "rotation", "retention"}
+)
+
+
+class Solver(Section):
+    """How contact forces are computed."""
+
+    evaluator: Evaluator = Field(
+        "events",
+        description="how piecewise-linear laws are evaluated over a period: events (exact transition times, no sampling error), "
+        "intervals (transitions on the time samples) or march (sample by sample, as coupled_coulomb always is)",
+    )
+
+
+class Tables(Section):
+    """Everything a study file may hold, but for the tables of the analyses."""
+
+    schema_version: Literal[2] = Field(
+        description="schema_version = 2, the version of the file's layout"
+    )
+    title: str = Field("", max_length=200, description="a title of one line")
+    part: dict[Name, AnyPart] = Field(
+        min_length=1, description="the tables [part.NAME], one for each part"
+    )
+    material: MaterialTable | None = Field(
+        None, description="the table [material], of all parts without their own"
+    )
+    damping: Damping | None = Field(
+        None, description="the table [damping], of all parts without their own"
+    )
+    reduction: Reduction | None = Field(
+        None, description="the table [reduction], of all parts without their own"
+    )
+    contact: dict[Name, ContactTable] = Field(  # type: ignore[valid-type]
+        default_factory=dict, description="the tables [contact.NAME]"
+    )
+    join: dict[Name, JoinTable] = Field(
+        default_factory=dict, description="the tables [join.NAME], of surfaces tied for good"
+    )
+    load: dict[Name, LoadTable] = Field(default_factory=dict, description="the tables [load.NAME]")
+    rotation: Rotation = Field(default_factory=Rotation, description="the table [rotation]")
+    output: Output = Field(default_factory=Output, description="the table [output]")
+    harmonics: Harmonics = Field(default_factory=Harmonics, description="the table [harmonics]")
+    solver: Solver = Field(default_factory=Solver, description="the table [solver]")
+    retention: Retention = Field(default_factory=Retention, description="the table [retention]")
+    limits: Limits = Field(default_factory=Limits, description="the table [limits]")
+    vary: Any = Field(
+        None,
+        description="the table [vary], or several [[vary]]: keys of the file and the lists of their values; the lists of one table "
+        "run together, several tables multiply",
+    )
+
+
+@cache
+def study_tables() -> type[Tables]:
+    """Return the section of the whole file, with one optional table for each analysis."""
+    asked: dict[str, Any] = {
+        name: (_table_of(name) | None, Field(None, description=f"the table [{name}]"))
+        for name in ANALYSES
+    }
+    made: type[Tables] = create_model(
+        "StudyTables", __base__=Tables, __doc__="Everything a study file may hold.", **asked
+    )
+    return made
+
+
+def _table_of(name: str) -> Any:
+    try:
+        return named(name).table
+    except (ImportError, AttributeError):  # until all analyses are there
+        from stickslip.study import structure_tables as old
+
+        return {"modes": old.Modes, "campbell": old.CampbellTable, "safe": old.SafeTable}[name]
+
+
+def asked_of(tables: Tables) -> tuple[str, ...]:
+    """Return the names of the analyses that have a table."""
+    return tuple(name for name in ANALYSES if getattr(tables, name, None) is not None)
+
+
+def json_schema() -> str:
+    """Return the JSON Schema of study files."""
+    return json.dumps(study_tables().model_json_schema(), indent=2)

@@ -1,0 +1,159 @@
+"""The table [vary]: any key of the file becomes a list; lists of one table run together, several tables multiply."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
+from itertools import product
+from math import prod
+from typing import Any, get_args, get_origin
+
+from pydantic import BaseModel
+
+from stickslip.errors import InputError, did_you_mean, input_error, together
+from stickslip.study.file.messages import alternatives, plain, whole
+from stickslip.study.file.section import shown
+
+MOST_CASES = 1000
+EXAMPLE = "For example [vary] with load.shaker.ratio = [100, 20]."
+
+Values = dict[str, Any]  # varied key -> value
+
+
+def cases_of(place: str, raw: Mapping[str, Any], model: type[BaseModel]) -> list[Values]:
+    """Return the values of the varied keys in each case; one empty case for a file without [vary].
+
+    Parameters
+    ----------
+    place
+        The file.
+    raw
+        Its content.
+    model
+        Section of the whole file, which tells the keys that there are.
+
+    Raises
+    ------
+    InputError
+        If a key does not exist, is no list, or lists of one table differ in length.
+    """
+    given = raw.get("vary")
+    if given is None:
+        return [{}]
+    tables = given if isinstance(given, list) else [given]
+    if not all(isinstance(table, dict) for table in tables):
+        raise input_error(f"{place}: vary", f"must be a table, got {shown(given)}", EXAMPLE)
+    flat = [dict(_flat(place, table)) for table in tables]
+    _check(place, flat, raw, model)
+    count = prod(len(next(iter(lists.values()))) for lists in flat if lists)
+    if count > MOST_CASES:
+        raise input_error(
+            f"{place}: vary", f"spans {count} cases, more than {MOST_CASES}", "Vary fewer values."
+        )
+    runs = [
+        [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
+        for lists in flat
+        if lists
+    ]
+    return [{k: v for part in parts for k, v in part.items()} for parts in product(*runs)]
+
+
+def with_values(raw: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the content of a file with the varied keys in place, without [vary]."""
+    content = {key: value for key, value in deepcopy(dict(raw)).items() if key != "vary"}
+    for key, value in values.items():
+        *tables, last = key.split(".")
+        here = content
+        for name in tables:
+            here = here.setdefault(name, {})
+        here[last] = value
+    return content
+
+
+def label_of(values: Mapping[str, Any]) -> str:
+    """Return what is varied as text: ``load.shaker.ratio = 250``."""
+    return ", ".join(f"{key} = {_text(value)}" for key, value in values.items())
+
+
+def _text(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _flat(place: str, table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, list[Any]]]:
+    """Yield the keys of nested tables, joined by dots, and their lists."""
+    for name, value in table.items():
+        key = f"{above}{name}"
+        if isinstance(value, dict):
+            yield from _flat(place, value, f"{key}.")
+        elif isinstance(value, list) and value:
+            yield key, value
+        else:
+            raise input_error(
+                f"{place}: vary.{key}", f"must be a list of values, got {shown(value)}", EXAMPLE
+            )
+
+
+def _check(
+    place: str,
+    tables: Sequence[Mapping[str, list[Any]]],
+    raw: Mapping[str, Any],
+    model: type[BaseModel],
+) -> None:
+    errors: list[InputError] = []
+    seen: set[str] = set()
+    for lists in tables:
+        for key in lists:
+            errors += _unknown(place, key, raw, model)
+            if key in seen:
+                errors.append(
+                    input_error(f"{place}: vary.{key}", "is varied twice", "Give one list.")
+                )
+            seen.add(key)
+        lengths = {key: len(values) for key, values in lists.items()}
+        if len(set(lengths.values())) > 1:
+            told = ", ".join(f"{key} has {n}" for key, n in lengths.items())
+            errors.append(
+                input_error(
+                    f"{place}: vary",
+                    f"lists of one table run together and must be of one length: {told}",
+                    "Make them equally long, or give each a [[vary]] of its own: then all combinations are run.",
+                )
+            )
+    if errors:
+        raise together(errors)
+
+
+def _unknown(
+    place: str, key: str, raw: Mapping[str, Any], model: type[BaseModel]
+) -> list[InputError]:
+    """Return the complaint about a key that the file cannot have."""
+    content: Any = raw
+    here: Any = model
+    for i, name in enumerate(key.split(".")):
+        known, here = _below(here, content, name)
+        if name not in known or (i == 0 and name in ("vary", "schema_version", "title")):
+            return [
+                input_error(
+                    f"{place}: vary.{key}", f"there is no key {name!r}", did_you_mean(name, known)
+                )
+            ]
+        content = content.get(name) if isinstance(content, Mapping) else None
+    return []
+
+
+def _below(here: Any, content: Any, name: str) -> tuple[list[str], Any]:
+    """Return the keys that a table may have, and the annotation of one of them."""
+    for one in plain(here) if not alternatives(here) else _chosen(here, content):
+        if isinstance(one, type) and issubclass(one, BaseModel):
+            field = one.model_fields.get(name)
+            return list(one.model_fields), None if field is None else whole(field)
+        if get_origin(one) is dict:
+            return list(content or ()), get_args(one)[-1]
+    return [], None
+
+
+def _chosen(here: Any, content: Any) -> list[Any]:
+    """Return the alternative that a table of the file is."""
+    tagged = alternatives(here)
+    if not isinstance(content, Mapping):
+        return []
+    kind = next((key for key in tagged if key in content), content.get("shape"))
+    return [tagged[kind]] if kind in tagged else []
