@@ -69,7 +69,15 @@ axes.legend()
 # A blisk of 24 blades (Laxalde et al. 2007), each three masses on springs. At one speed the engine orders 0, 1, 2, ... lie on a
 # line that turns at twelve nodal diameters: order 22 has the shape of two. A resonance needs a mode *on* the line.
 
-wheel = ss.reduction.blisk_with_ring(24, ring=None)
+disk, root, tip, next_disk = np.eye(4)  # the last one is a copy, without mass, of the neighbour's
+springs = [(6e5, disk), (5e7, disk - next_disk), (1e6, disk - root), (2e6, root - tip)]
+sector = ss.Structure(
+    np.diag([1.2, 0.35, 0.25, 0.0]),
+    np.zeros((4, 4)),
+    sum(k * np.outer(pulled, pulled) for k, pulled in springs),
+    ss.model.Dofs(np.arange(4), ("x",) * 4, np.zeros((4, 3))),
+)
+wheel = ss.reduction.CyclicSector(sector, 24, low=np.array([0]), high=np.array([3]), axis=None)
 map_ = ss.response.nodal_diameter_map(wheel, 3)
 low, high = 1650 * rpm, 1780 * rpm
 found = ss.response.safe(map_, (low, high), engine_orders=range(1, 25), margin=0.0)

@@ -92,17 +92,6 @@ def analyse(signal: FloatArray, order: int) -> FloatArray:
 # ---- systems ------------------------------------------------------------------------------------------------------------
 
 
-def griffin(limit: float) -> tuple[System, HarmonicLoad]:
-    """One mass with a friction damper of constant limit (benchmark B3): m = k = 1, c = 0.02, kd = 0.5, force 0.1."""
-    one = np.ones((1, 1))
-    structure = Structure(one, 0.02 * one, one.copy(), table(("x",)))
-    law = ElasticCoulomb(k_t=0.5, k_w=0.0, k_n=0.0, mu=1.0, preload=limit)
-    system = System(
-        structure, Interface(("d",), (law,), np.array([[1.0], [0.0], [0.0]])), np.array([0])
-    )
-    return system, HarmonicLoad(np.zeros(1), {1: np.array([0.1 + 0j])})
-
-
 def lifting() -> tuple[System, HarmonicLoad]:
     """One mass on its spring and on a pressed contact that lifts off: its response bends to lower frequencies and folds.
 
@@ -115,51 +104,6 @@ def lifting() -> tuple[System, HarmonicLoad]:
         structure, Interface(("n",), (law,), np.array([[0.0], [0.0], [1.0]])), np.array([0])
     )
     return system, HarmonicLoad(np.zeros(1), {1: np.array([0.05 + 0j])})
-
-
-def blades_and_damper(
-    *, m: float | None = 0.0, excitation: float = 1.0, length: float = 1.0, force: float = 1.0, phase: float = 0.0,
-    mirrored: bool = False,
-) -> tuple[System, HarmonicLoad]:  # fmt: skip
-    """Blade, damper, blade with variable normal load (benchmark B6, after Ferhatoglu & Zucca 2021).
-
-    `length` and `force` are the sizes of the units in m and N; `phase` shifts the excitation; `mirrored` swaps left and right.
-    """
-    mass = np.diag([1.0, 1, 1, 1, 0.1, 0.1])
-    damping = np.diag([20.0, 20, 20, 20, 0, 0])
-    stiffness = np.diag([3e5] * 4 + [0.0, 0.0])
-    for a, b, k in ((0, 1, 3e5), (2, 3, 3e5), (0, 2, 7e5), (1, 3, 7e5), (4, 5, 3e5)):
-        stiffness[[a, b], [a, b]] += k
-        stiffness[[a, b], [b, a]] -= k
-    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
-    flip = np.diag([1.0, -1.0])  # the benchmark's normal is positive in compression
-    one, none = np.eye(2), np.zeros((2, 2))
-    gap = np.zeros((6, 6))
-    gap[[0, 2]] = flip @ np.array([[c, s], [-s, c]]) @ np.hstack([-one, none, one])
-    gap[[3, 5]] = flip @ np.array([[c, -s], [s, c]]) @ np.hstack([none, -one, one])
-    per_length = length / force
-    law = ElasticCoulomb(
-        k_t=3e5 * per_length, k_w=0.0, k_n=3e5 * per_length, mu=0.5, residual_traction=m
-    )
-    shake = excitation * np.array([0, -20, 5, 0, 0, 0.0]) * (-1j) * np.exp(1j * phase)
-    static = np.array([0, 0, 0, 0, 0, 120.0])
-    if mirrored:
-        gap = (
-            np.diag([-1.0, 1, 1, -1, 1, 1]) @ gap
-        )  # the tangents turn round, the physics must not notice
-    structure = Structure(
-        mass * per_length,
-        damping * per_length,
-        stiffness * per_length,
-        table(("x1", "y1", "x2", "y2", "xD", "yD")),
-    )
-    system = System(
-        structure,
-        Interface(("1", "2"), (law, law), gap),
-        np.array([3, 0, 1, 2]),
-        free=np.array([4, 5]),
-    )
-    return system, HarmonicLoad(static / force, {1: shake / force})
 
 
 def free_body_3d(seed: int = 0, preload: float = 30.0) -> tuple[System, HarmonicLoad]:

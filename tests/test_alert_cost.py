@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from models import blades_and_damper, griffin
 
+from evidence.models.lumped import blades_and_damper, griffin
 from stickslip.contact.compiled import compile_contacts
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic import balance as balance_module

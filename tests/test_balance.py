@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from models import SAMPLES, balance_of, blades_and_damper, bonded, free_body_3d, solved
+from models import SAMPLES, balance_of, bonded, free_body_3d, solved
 
+from evidence.models.lumped import blades_and_damper
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError
 from stickslip.harmonic.balance import harmonic_balance

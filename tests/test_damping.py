@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 import scipy.linalg
 import scipy.sparse
+from compliance_form import ComplianceForm
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import stickslip as ss
+from evidence.models.lumped_disks import blisk_with_ring
 
 
 def random_structure(seed, n=8):
@@ -51,9 +53,7 @@ def test_one_number_damps_all_modes_and_rigid_ones_not():
 
 
 def test_modes_of_a_wave_are_damped_alike():
-    wave = ss.model.modal_damping(
-        ss.reduction.travelling_wave(ss.reduction.blisk_with_ring(ring=None), 5), 1e-3
-    )
+    wave = ss.model.modal_damping(ss.reduction.travelling_wave(blisk_with_ring(ring=None), 5), 1e-3)
     values, shapes = scipy.linalg.eigh(wave.stiffness, wave.mass)
     modal = shapes.conj().T @ wave.damping @ shapes
     np.testing.assert_allclose(modal, np.diag(2e-3 * np.sqrt(values)), atol=1e-9)
@@ -63,9 +63,9 @@ def test_friction_ring_free_and_stuck_has_the_published_peaks():
     # benchmark B9, engine order 2 on the tips: ring free (slip limit 0) and stuck (limit 20 and above); the blisk's modes are damped
     # with their ring away
     alone = ss.model.modal_damping(
-        ss.reduction.travelling_wave(ss.reduction.blisk_with_ring(ring=None), 2), 1e-3
+        ss.reduction.travelling_wave(blisk_with_ring(ring=None), 2), 1e-3
     )
-    both = ss.reduction.travelling_wave(ss.reduction.blisk_with_ring(), 2)
+    both = ss.reduction.travelling_wave(blisk_with_ring(), 2)
     C = np.zeros((4, 4), dtype=complex)
     C[:3, :3] = alone.damping
     stuck = np.array(both.stiffness)
@@ -195,7 +195,7 @@ def test_reductions_without_loss_of_modes_keep_every_kind_of_damping(reduce):
 
 
 def test_loss_of_waves_is_the_loss_of_the_wheel():
-    sector = ss.reduction.blisk_with_ring(6)
+    sector = blisk_with_ring(6)
     sector = replace(sector, structure=ss.model.structural_damping(sector.structure, 0.02))
     wheel = ss.reduction.wheel(sector)
     np.testing.assert_allclose(wheel.loss.toarray(), 0.02 * wheel.stiffness.toarray(), atol=1e-6)
@@ -273,7 +273,7 @@ def test_forms_of_the_problem_agree_on_a_turning_structure():
         )
         assert result.status == ss.solve.Status.CONVERGED
         found[name] = result.x
-    form = ss.harmonic.ComplianceForm(balance_of(turning_and_lossy()))
+    form = ComplianceForm(balance_of(turning_and_lossy()))
     result = ss.solve.newton(
         lambda x: form.linearise(x, 5.0), np.zeros(form.size), ss.solve.Newton()
     )

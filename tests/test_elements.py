@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from solid_models import KINDS, box, plain_matrices, rigid_motions, without_sets
 
+from evidence.models.annulus import annular_sector
 from stickslip.errors import InputError
-from stickslip.model.annulus import annular_sector
 from stickslip.model.fe.elements import Quadrature, shape_functions
 from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.mesh.solid_mesh import SolidMesh, write_mesh

@@ -5,8 +5,9 @@ from itertools import islice, pairwise
 
 import numpy as np
 import pytest
-from models import blades_and_damper, griffin, lifting
+from models import lifting
 
+from evidence.models.lumped import blades_and_damper, griffin
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.forced import passages

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from evidence.models.lumped import blades_and_damper
 from evidence.strategies.cases import SelectionCase, friction_ring
 from evidence.strategies.random_systems import random_two_blade_system
 from evidence.strategies.truth import low_order_points, truths
-from evidence.validation.models import b6_load, blade_damper_blade
 from stickslip.harmonic.selection import guarded_alert, strategy_named
 from stickslip.harmonic.selection.guarded_alert import doubled, truncated
 from stickslip.response.forced.problem import forced_problem
@@ -17,7 +17,7 @@ HZ = 2 * np.pi
 
 def judged(hertz, factor=1.0, name="guarded_alert"):
     """Solve B6 with one harmonic at a frequency and ask a strategy."""
-    system, load = blade_damper_blade(), b6_load(factor)
+    system, load = blades_and_damper(excitation=factor)
     sweep = ss.Sweep(
         omega_range=(HZ * (hertz - 0.5), HZ * hertz),
         selection="always_low",
@@ -152,7 +152,7 @@ def test_never_silent_where_the_published_rule_alarms(number, threshold):
 
 def test_repeat_from_the_start_of_the_second_look_converges_at_once():
     """At 163 Hz the iterate that raised the alarm is nearer to the solution than ``q + Δq``."""
-    system, load = blade_damper_blade(), b6_load()
+    system, load = blades_and_damper()
     case = SelectionCase("b6", "B6", system, load, (HZ * 162.0, HZ * 163.0), 3)
     problem, points = solved(case)
     point = points[-1]

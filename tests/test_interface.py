@@ -7,8 +7,8 @@ import pytest
 import scipy.sparse
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from models import griffin
 
+from evidence.models.lumped import griffin
 from stickslip.contact.interface import Interface, add_contact_jacobian, sparse_rows
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError

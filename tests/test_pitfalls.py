@@ -9,8 +9,9 @@ the condensation by one eigendecomposition in `test_dynamic_stiffness`, precondi
 
 import numpy as np
 import pytest
-from models import SLIP, STICK, balance_of, blades_and_damper, bonded, lifting, table
+from models import SLIP, STICK, balance_of, bonded, lifting, table
 
+from evidence.models.lumped import blades_and_damper
 from stickslip.contact.compiled import compile_contacts
 from stickslip.contact.interface import Interface
 from stickslip.contact.law import TT
@@ -20,8 +21,8 @@ from stickslip.errors import InputError
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
-from stickslip.response.forced.response import Sweep, forced_problem
 from stickslip.response.forced.problem import forced_point
+from stickslip.response.forced.response import Sweep, forced_problem
 from stickslip.response.free_motion import drift
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, StepControl, start_point, trace

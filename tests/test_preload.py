@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import blades_and_damper, free_body_3d, table
+from models import free_body_3d, table
 
+from evidence.models.lumped import blades_and_damper
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import SingularError

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import blades_and_damper
 from test_tuned_wheel import TABLE, TIP, blisk
 
 import stickslip as ss
+from evidence.models.lumped import blades_and_damper
 from stickslip.errors import InputError
 from stickslip.solve.status import Status
 

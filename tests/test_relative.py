@@ -7,8 +7,9 @@ import pytest
 import scipy.linalg
 import scipy.sparse
 from cyclic_models import random_sector
-from models import blades_and_damper, solved, table
+from models import solved, table
 
+from evidence.models.lumped import blades_and_damper
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError

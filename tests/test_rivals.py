@@ -10,17 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from models import (
-    SAMPLES,
-    analyse,
-    basis,
-    blades_and_damper,
-    griffin,
-    solved,
-    table,
-    twin,
-)
+from models import SAMPLES, analyse, basis, solved, table, twin
 
+from evidence.models.lumped import blades_and_damper, griffin
 from evidence.strategies.cases import SelectionCase
 from evidence.strategies.compare import compared
 from evidence.strategies.page import page

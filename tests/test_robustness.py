@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from evidence.benchmarks.robustness_systems import draw
+from evidence.models.random_machines import draw
 from stickslip.response.equilibrium import preload
 from stickslip.response.forced.rescue import growing_load, homotopies, with_friction
 from stickslip.response.forced.response import accepted_points, forced_problem, forced_response

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from solid_models import beam_root, box, rigid_motions, without_sets
 
+from evidence.models.annulus import annular_sector
 from stickslip.errors import InputError, SingularError, StickslipError
-from stickslip.model.annulus import annular_sector
 from stickslip.model.axis import Axis
 from stickslip.model.fe.rotation import rotating_solid
 from stickslip.model.fe.solid import Material, assemble_solid

@@ -6,8 +6,8 @@ import re
 import numpy as np
 import pytest
 
+from evidence.models.annulus import annular_sector
 from stickslip.errors import InputError, StickslipError
-from stickslip.model.annulus import annular_sector
 from stickslip.model.axis import Axis
 from stickslip.model.deck import CalculixRun, write_deck
 from stickslip.model.fe.solid import Material, assemble_solid
@@ -210,19 +210,6 @@ def test_a_disk_may_be_cut_in_any_number_of_sectors():
         whole = frequencies(3, 4, wave_number)
         parts = [frequencies(6, 2, k) for k in (wave_number, wave_number + 3)]
         np.testing.assert_allclose(np.sort(np.concatenate(parts))[:6], whole, rtol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("radii", "numbers"),
-    [
-        ((0.2, 0.1, 0.01), {"sectors": 8}),
-        ((0.1, 0.2, 0.01), {"sectors": 1}),
-        ((0.1, 0.2, 0.01), {"sectors": 8, "divisions": (1, 0, 1)}),
-    ],
-)
-def test_rings_that_cannot_be_are_refused(radii, numbers):
-    with pytest.raises(InputError, match="annular_sector"):
-        annular_sector(*radii, **numbers)
 
 
 # --- decks ------------------------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from evidence.figures.evidence import Plan, gather
 from evidence.figures.model import Model, with_values
 from evidence.figures.page import page, table
 from evidence.figures.statements import Statement, statements
-from evidence.validation.models import b6_load, blade_damper_blade
+from evidence.models.lumped import blades_and_damper
 from stickslip import Sweep
 from stickslip.study.example import example_text
 
@@ -26,7 +26,7 @@ def evidence():
         evaluator="intervals",
     )
     model = Model(
-        blade_damper_blade(), sweep, lambda ratio: b6_load(RATIO / ratio), 4, np.array([0, 2]), np.array([0]),
+        blades_and_damper()[0], sweep, lambda ratio: blades_and_damper(excitation=RATIO / ratio)[1], 4, np.array([0, 2]), np.array([0]),
     )  # fmt: skip
     few = (60.0, RATIO)
     plan = Plan(

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import balance_of, blades_and_damper, griffin, solved, table
+from models import balance_of, solved, table
 
+from evidence.models.lumped import blades_and_damper, griffin
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb

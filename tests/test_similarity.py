@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import balance_of, blades_and_damper, free_body_3d, solved, table
+from models import balance_of, free_body_3d, solved, table
 
+from evidence.models.lumped import blades_and_damper
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.bonded import Bonded
 from stickslip.contact.laws.cubic_spring import CubicSpring

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import pytest
-from models import griffin
 
+from evidence.models.lumped import griffin
 from stickslip.errors import InputError
 from stickslip.harmonic.selection.jacobian_alert import JacobianAlert
 from stickslip.harmonic.selection.strategy import Verdict

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from transient_models import GRIFFIN_EXACT, load_of, structure_of, stuck_motion, wedge
 
+from evidence.models.solving import integrate_refined
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -15,7 +16,6 @@ from stickslip.response.time.transient import (
     TransientResult,
     TransientStart,
     integrate,
-    integrate_refined,
     rest,
     start_from_harmonics,
 )

@@ -9,31 +9,8 @@ import scipy.sparse
 from test_reduced_wheel import TILTED, shrouded
 
 import stickslip as ss
+from evidence.models.lumped_disks import TIP, blisk_with_ring, friction_ring
 from stickslip.harmonic.travelling import condense_waves
-
-RING, DISK, TIP = 3, 0, 2
-HOLD = 0.1  # N/m to ground: nothing else tells a slipping ring where its mean is
-
-
-def blisk(harmonics):
-    """Return literature benchmark B9: sector, tuned wheel under engine order 2 and gap operator."""
-    free = ss.reduction.blisk_with_ring()
-    stiffness = np.asarray(free.structure.stiffness).copy()
-    stiffness[RING, RING] += HOLD
-    sector = replace(free, structure=replace(free.structure, stiffness=stiffness))
-    own = np.zeros((3, sector.structure.n))
-    own[0, [DISK, RING]] = 1.0, -1.0
-
-    def damped(wave, _keep, _n_modes):
-        """Damping of 0.1 % in the modes of the blisk without its ring."""
-        alone = ss.model.lumped(*(np.real(m[:3, :3]) for m in (wave.mass, wave.stiffness)))
-        damping = np.zeros((4, 4))
-        damping[:3, :3] = ss.model.modal_damping(alone, 1e-3).damping
-        return wave.with_damping(damping)
-
-    keep = sector.independent
-    return ss.reduction.tuned_wheel(sector, 2, harmonics, (own, None), keep=keep, reduce=damped)
-
 
 # literature benchmark B9: tip amplitude in m; odd harmonics up to 1, 3 and 13
 TABLE = {
@@ -52,7 +29,7 @@ def test_blisk_with_friction_ring_has_the_published_amplitudes(column, order):
 
     The ring is held by 0.1 N/m beside 2e7 N/m of a contact: 5e-9 of the force, more near a resonance (Q = 500).
     """
-    wheel, operator = blisk(order)
+    wheel, operator = friction_ring(order)
     contacts = ss.Interface(("ring",), (ss.Jenkins(k_t=2e7, limit=4.0),), operator)
     system = ss.System(wheel, contacts, outputs=np.arange(wheel.n))
     force = np.zeros(6)
@@ -185,7 +162,7 @@ def test_one_sector_answers_as_all_of_them_integrated_in_time(sectors, engine_or
 
 
 def test_derivative_by_frequency_is_that_of_differences():
-    wheel, operator = blisk(3)
+    wheel, operator = friction_ring(3)
     force = np.zeros(6)
     force[TIP] = 1.0
     load = ss.HarmonicLoad(np.zeros(wheel.n), {1: wheel.project(force, 1)})
@@ -202,7 +179,7 @@ def test_derivative_by_frequency_is_that_of_differences():
 
 
 def test_what_a_tuned_wheel_cannot_do_is_said():
-    wheel, operator = blisk(3)
+    wheel, operator = friction_ring(3)
     contacts = ss.Interface(("ring",), (ss.Jenkins(k_t=2e7, limit=4.0),), operator)
     system = ss.System(wheel, contacts, outputs=np.arange(wheel.n))
     load = ss.HarmonicLoad(np.zeros(wheel.n), {1: np.ones(wheel.n, dtype=complex)})
@@ -224,7 +201,7 @@ def test_what_a_tuned_wheel_cannot_do_is_said():
         == 11
     )
     with pytest.raises(ss.InputError, match="three rows"):
-        ss.reduction.tuned_wheel(ss.reduction.blisk_with_ring(), 2, 1, (np.zeros((2, 6)), None))
+        ss.reduction.tuned_wheel(blisk_with_ring(), 2, 1, (np.zeros((2, 6)), None))
 
 
 def test_any_function_may_reduce_the_waves_and_is_told_what_it_got_wrong():

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from evidence.models.lumped import blades_and_damper
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -35,20 +36,9 @@ def load_of(
 
 def wedge() -> tuple[Structure, FloatArray, list[ElasticCoulomb], HarmonicLoad]:
     """Blade, wedge damper, blade in the plane (Ferhatoglu and Zucca's lumped model): x1 y1 x2 y2 xD yD."""
-    stiffness = np.diag([3e5] * 4 + [0.0, 0.0])
-    for a, b, k in ((0, 1, 3e5), (2, 3, 3e5), (0, 2, 7e5), (1, 3, 7e5), (4, 5, 3e5)):
-        stiffness[np.ix_([a, b], [a, b])] += k * np.array([[1, -1], [-1, 1]])
-    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
-    gap = np.zeros((6, 6))
-    for row, blade, frame in ((0, 0, [[c, s], [s, -c]]), (3, 2, [[c, -s], [-s, -c]])):
-        gap[[row, row + 2], 4:] = frame
-        gap[[row, row + 2], blade : blade + 2] = -np.array(frame)
-    law = ElasticCoulomb(k_t=3e5, k_w=0.0, k_n=3e5, mu=0.5, residual_traction=0.0)
-    structure = structure_of(
-        np.diag([1, 1, 1, 1, 0.1, 0.1]), np.diag([20.0] * 4 + [0, 0]), stiffness
-    )
-    force = [0, 20j, -5j, 0, 0, 0]  # (0, -20, 5, 0, 0, 0) sin(ωt)
-    return structure, gap, [law, law], load_of(6, {1: force}, [0, 0, 0, 0, 0, 120])
+    system, load = blades_and_damper()
+    contacts = system.interface
+    return system.structure, contacts.gap_operator, list(contacts.laws), load
 
 
 def stuck_motion(

@@ -20,7 +20,7 @@ import numba
 import numpy as np
 import scipy.sparse.linalg
 
-from evidence.benchmarks.many_contacts import Plates, two_plates
+from evidence.models.many_contacts import Plates, two_plates
 from stickslip.contact.compiled import compile_contacts
 from stickslip.contact.intervals import contact_period, contact_period_threads, prefix_sums
 from stickslip.contact.threads import thread_shares

@@ -28,7 +28,7 @@ from time import process_time
 import numpy as np
 
 from evidence.benchmarks.robustness_judge import Judgement, judge
-from evidence.benchmarks.robustness_systems import MANY, Drawn, draw, draw_many
+from evidence.models.random_machines import MANY, Drawn, draw, draw_many
 from stickslip.errors import StickslipError
 from stickslip.response.forced.response import (
     ForcedPoint,

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from evidence.models.solving import integrate_refined
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_real
@@ -18,7 +19,6 @@ from stickslip.response.time.transient import (
     TimeStepping,
     TransientStart,
     integrate,
-    integrate_refined,
     start_from_harmonics,
 )
 from stickslip.solve.newton_method import Newton, newton

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from evidence.models.lumped import blades_and_damper
 from evidence.strategies.cases import CASES, HZ, SelectionCase
 from evidence.strategies.random_systems import HELD_OUT, SYSTEMS, THIRD, random_two_blade_system
 from evidence.strategies.truth import low_order_points, truths
-from evidence.validation.models import b6_load, blade_damper_blade
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
 from stickslip.response.forced.problem import forced_problem
@@ -100,8 +100,7 @@ def _b6() -> Iterator[SelectionCase]:
         yield SelectionCase(
             f"B6, factor {factor:g}",
             "literature benchmark B6",
-            blade_damper_blade(),
-            b6_load(factor),
+            *blades_and_damper(excitation=factor),
             (HZ * 150, HZ * 235),
             86,
         )

@@ -9,15 +9,12 @@ from typing import Any
 import numpy as np
 
 from evidence.benchmarks.bench_chain import CASES as CHAINS
+from evidence.models.lumped_disks import TIP
+from evidence.models.lumped_disks import friction_ring as ring_and_wheel
 from evidence.validation.case_two_blades import example_case
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.damping import modal_damping
-from stickslip.model.matrices import lumped
-from stickslip.model.structure import Structure
-from stickslip.reduction.lumped_disks import blisk_with_ring
-from stickslip.reduction.tuned import tuned_wheel
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.study.build import Case
@@ -25,7 +22,6 @@ from stickslip.study.build import Case
 HZ = 2 * math.pi
 HIGHEST = 10  # harmonics that every case can be solved with: twice those of the reference
 RING_STIFFNESS, RING_LIMIT = 2e7, 4.0
-RING_HOLD = 0.1  # N/m to ground: nothing else tells a slipping ring where its mean is
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,27 +103,11 @@ def two_blades_stuck() -> SelectionCase:
 
 def friction_ring() -> SelectionCase:
     """Literature benchmark B9: a tuned blisk of 24 sectors with a friction ring under engine order 2."""
-    free = blisk_with_ring()
-    disk, tip, ring = 0, 2, 3
-    stiffness = np.asarray(free.structure.stiffness).copy()
-    stiffness[ring, ring] += RING_HOLD
-    sector = replace(free, structure=replace(free.structure, stiffness=stiffness))
-    own = np.zeros((3, sector.structure.n))
-    own[0, [disk, ring]] = 1.0, -1.0
-
-    def damped(wave: Structure, _keep: object, _n_modes: int) -> Structure:
-        """Damp the modes of the blisk without its ring by 0.1 %."""
-        alone = lumped(*(np.real(m[:3, :3]) for m in (wave.mass, wave.stiffness)))
-        damping = np.zeros((4, 4))
-        damping[:3, :3] = modal_damping(alone, 1e-3).damping
-        return wave.with_damping(damping)
-
-    keep = sector.independent
-    wheel, operator = tuned_wheel(sector, 2, HIGHEST, (own, None), keep=keep, reduce=damped)
+    wheel, operator = ring_and_wheel(HIGHEST)
     contacts = Interface(("ring",), (Jenkins(k_t=RING_STIFFNESS, limit=RING_LIMIT),), operator)
     system = System(wheel, contacts, outputs=wheel.of_harmonic(1).sets["tip"])
-    force = np.zeros(sector.structure.n)
-    force[tip] = 1.0
+    force = np.zeros(6)  # of the sector, with the copies of its neighbour's coordinates
+    force[TIP] = 1.0
     load = HarmonicLoad(np.zeros(wheel.n), {1: wheel.project(force, 1)})
     title = "blisk of 24 sectors with a friction ring (B9, slip limit 4 N)"
     return SelectionCase(

@@ -14,10 +14,10 @@ from time import process_time
 
 import numpy as np
 
+from evidence.models.lumped import blades_and_damper
 from evidence.strategies.cases import CASES, HZ, SelectionCase
 from evidence.strategies.random_systems import HELD_OUT, random_two_blade_system
 from evidence.strategies.truth import Truth, judging_problem, low_order_points, truths
-from evidence.validation.models import b6_load, blade_damper_blade
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
@@ -64,7 +64,7 @@ def b6(factor: float) -> Iterable[SelectionCase]:
     """Literature benchmark B6 from 150 to 235 Hz with its excitation times a factor."""
     title = f"B6, excitation times {factor:g}"
     yield SelectionCase(
-        f"b6_{factor:g}", title, blade_damper_blade(), b6_load(factor), (HZ * 150, HZ * 235), 171
+        f"b6_{factor:g}", title, *blades_and_damper(excitation=factor), (HZ * 150, HZ * 235), 171
     )
 
 

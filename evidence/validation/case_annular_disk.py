@@ -12,9 +12,9 @@ from functools import lru_cache
 import numpy as np
 from scipy import optimize, special
 
+from evidence.models.annulus import annular_sector
 from evidence.validation.compare import Record, record
 from stickslip.arrays import FloatArray
-from stickslip.model.annulus import annular_sector
 from stickslip.model.fe.elements import Quadrature
 from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.modes import natural_frequencies

@@ -3,12 +3,12 @@
 import numpy as np
 import scipy.optimize
 
+from evidence.models.lumped_disks import blade_ring, mistuned_blade_ring
 from evidence.validation.compare import Record, digits
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.structure import Structure
-from stickslip.reduction.lumped_disks import blade_ring, mistuned_blade_ring
 from stickslip.response.rotating.nodal_diameters import nodal_diameter_map
 
 SOURCE = "literature benchmark B12"

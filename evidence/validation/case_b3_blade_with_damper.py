@@ -10,20 +10,13 @@ integrated with located events; ours is the library's time integration, extrapol
 import numpy as np
 from numpy.polynomial import Chebyshev
 
+from evidence.models.lumped import griffin
+from evidence.models.solving import RefinedResult, balance_of, bonded, integrated, motion, solve
 from evidence.validation.compare import Record, digits
-from evidence.validation.models import (
-    B3_LOAD,
-    balance_of,
-    blade_with_damper,
-    bonded,
-    integrated,
-    motion,
-    solve,
-)
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.response.parameter import Discretisation
-from stickslip.response.time.transient import RefinedResult, TimeStepping
+from stickslip.response.time.transient import TimeStepping
 from stickslip.response.tracking import smallest_peak, track_peak
 
 SOURCE = "literature benchmark B3"
@@ -73,13 +66,13 @@ def peak(limit: float, near: float, samples: int = PEAK_SAMPLES) -> tuple[float,
     The maximum of a polynomial through nine Chebyshev points: sampling leaves an error of 1e-9 in each amplitude, which would hide the
     flat top from a search by differences but moves the fitted maximum by less than 1e-7. The window shrinks until slip sets in outside.
     """
-    problem = blade_with_damper(limit)
-    balance = balance_of(problem, B3_LOAD, 1, samples)
+    problem, load = griffin(limit)
+    balance = balance_of(problem, load, 1, samples)
     nodes = np.cos(np.pi * (np.arange(9) + 0.5) / 9)[::-1]
     best = near
     for width in (4e-3, 1e-3, 3e-4, 3e-4):
         omegas = best + width * nodes
-        start = bonded(problem, balance, B3_LOAD, float(omegas[0]))
+        start = bonded(problem, balance, load, float(omegas[0]))
         values = amplitudes(balance, omegas, start)
         fit = Chebyshev.fit(omegas, values, 6)
         turning = [
@@ -94,32 +87,28 @@ def peak(limit: float, near: float, samples: int = PEAK_SAMPLES) -> tuple[float,
 def tracked() -> list[tuple[float, float]]:
     """Return the largest |X1| at H = 1 and its frequency for each limit of `PEAKS`, each found from the one before."""
     limits = [STUCK if fc == "inf" else float(fc) for fc, *_ in PEAKS][::-1]
-    peaks = track_peak(
-        blade_with_damper(STUCK), B3_LOAD, "preload", limits, AROUND, discretisation=EXACT
-    )
+    peaks = track_peak(*griffin(STUCK), "preload", limits, AROUND, discretisation=EXACT)
     found = [(p.amplitude, p.omega) if p.converged else (np.nan, np.nan) for p in peaks]
     return found[::-1]
 
 
 def optimum() -> tuple[float, float, float]:
     """Return the preload with the smallest peak, that peak and its frequency: the root of the exact slope of the tracked peak."""
-    best = smallest_peak(
-        blade_with_damper(0.1), B3_LOAD, "preload", (0.1, 0.2), AROUND, discretisation=EXACT
-    )
+    best = smallest_peak(*griffin(0.1), "preload", (0.1, 0.2), AROUND, discretisation=EXACT)
     return best.value, best.amplitude, best.omega
 
 
 def time_domain(limit: float, omega: float) -> RefinedResult:
     """Integrate to the steady state; the error of the step is below 1e-9."""
     stepping = TimeStepping(steps_per_period=32768, tolerance=1e-9, max_periods=1000)
-    return integrated(blade_with_damper(limit), B3_LOAD, omega, 11, stepping)
+    return integrated(*griffin(limit), omega, 11, stepping)
 
 
 def response(limit: float, omega: float, order: int, samples: int = TABLE_SAMPLES) -> float:
     """Return |X1| of the harmonic balance with harmonics 0..order."""
-    problem = blade_with_damper(limit)
-    balance = balance_of(problem, B3_LOAD, order, samples)
-    x = solve(balance, omega, bonded(problem, balance, B3_LOAD, omega))
+    problem, load = griffin(limit)
+    balance = balance_of(problem, load, order, samples)
+    x = solve(balance, omega, bonded(problem, balance, load, omega))
     return float(abs(motion(balance, omega, x)[1, 0]))
 
 

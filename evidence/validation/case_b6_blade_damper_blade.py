@@ -7,18 +7,16 @@ was integrated with located events; ours is the library's time integration, extr
 import numpy as np
 import scipy.linalg
 
-from evidence.validation.compare import Record, digits
-from evidence.validation.models import (
-    Y2,
+from evidence.models.lumped import Y2, blades_and_damper
+from evidence.models.solving import (
     at_frequency,
-    b6_load,
     balance_of,
-    blade_damper_blade,
     frictionless,
     integrated,
     motion,
     solve,
 )
+from evidence.validation.compare import Record, digits
 from stickslip.arrays import FloatArray
 from stickslip.response.equilibrium import preload
 from stickslip.response.forced.response import Sweep, forced_problem
@@ -48,7 +46,7 @@ def y2(
     problem: System, hertz: float, order: int, samples: int, harmonic: int = 1, factor: float = 1.0
 ) -> complex:
     """Return a harmonic of y2 from the public forced response."""
-    load = b6_load(factor)
+    load = blades_and_damper(excitation=factor)[1]
     point = at_frequency(problem, load, hertz, order, samples)
     made = forced_problem(problem, load, Sweep(omega_range=(1.0, 2.0)))
     return complex(made.low.linear.recover(point.omega, point.coefficients)[harmonic, Y2])
@@ -64,13 +62,13 @@ def time_domain(hertz: float) -> tuple[float, float]:
     """
     order, steps = (0, 2048) if hertz == 160.0 else (11, 4096)
     stepping = TimeStepping(steps_per_period=steps, tolerance=1e-7, max_periods=1500)
-    result = integrated(blade_damper_blade(), b6_load(), 2 * np.pi * hertz, order, stepping)
+    result = integrated(*blades_and_damper(), 2 * np.pi * hertz, order, stepping)
     return float(abs(result.first_harmonic[0])), float(result.fine.harmonics[0, 0].real)
 
 
 def curve(order: int, traction: float, hertz: FloatArray, samples: int = 256) -> FloatArray:
     """Return |y2| at each frequency; every solution is the start of the next."""
-    problem, load = blade_damper_blade((traction, traction)), b6_load()
+    problem, load = blades_and_damper(m=traction)
     balance = balance_of(problem, load, order, samples)
     first = at_frequency(problem, load, float(hertz[0]), order, samples)
     x = balance.unknowns(first.coefficients)
@@ -112,7 +110,8 @@ def peak_records(case: str, order: int, traction: float, amplitude: str, at: str
 
 def frequencies(*, stuck: bool) -> FloatArray:
     """Return the natural frequencies (Hz) with all contact springs, or with the normal ones alone."""
-    problem = blade_damper_blade() if stuck else frictionless(blade_damper_blade())
+    problem, _ = blades_and_damper()
+    problem = problem if stuck else frictionless(problem)
     structure = problem.stuck_structure()
     return np.sqrt(scipy.linalg.eigh(structure.stiffness, structure.mass, eigvals_only=True)) / (
         2 * np.pi
@@ -128,7 +127,7 @@ def run() -> list[Record]:
             digits(case, f"natural frequency {i + 1}, {name}, Hz", ours, text, SOURCE)
             for i, (ours, text) in enumerate(zip(frequencies(stuck=stuck), printed, strict=True))
         ]
-    problem = blade_damper_blade()
+    problem, load = blades_and_damper()
     for hertz, exact, *columns in TABLE:
         f = float(hertz)
         amplitude, mean = time_domain(f)
@@ -149,6 +148,6 @@ def run() -> list[Record]:
     for order, traction, amplitude, at in PEAKS:
         records += peak_records(case, order, traction, amplitude, at)
     # a stuck mean depends on the start; the source's is that of tangential forces which are zero at rest
-    mean = preload(frictionless(problem), b6_load().static)[Y2]
+    mean = preload(frictionless(problem), load.static)[Y2]
     records.append(digits(case, "mean y2 when stuck, m", mean, MEANS["stuck"], SOURCE))
     return records

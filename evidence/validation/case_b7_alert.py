@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from evidence.models.lumped import blades_and_damper
 from evidence.validation.compare import Record, bound, digits, record
-from evidence.validation.models import b6_load, blade_damper_blade
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.response.forced.response import (
     ForcedPoint,
@@ -43,7 +43,7 @@ def both_passages(
     hertz: float, factor: float = 1.0
 ) -> tuple[ForcedProblem, ForcedPoint, ForcedPoint]:
     """Solve at H = 1 and repeat at H = 5 whatever the alert says."""
-    problem, load = blade_damper_blade(), b6_load(factor)
+    problem, load = blades_and_damper(excitation=factor)
     sweep = Sweep(
         omega_range=(2 * np.pi * (hertz - 0.5), 2 * np.pi * hertz),
         selection="jacobian_alert",  # as published, of which the table speaks
@@ -86,7 +86,7 @@ def crossing() -> list[ForcedPoint]:
         peak_points=0,
         evaluator="intervals",
     )
-    return accepted_points(list(forced_response(blade_damper_blade(), b6_load(), sweep)))
+    return accepted_points(list(forced_response(*blades_and_damper(), sweep)))
 
 
 def run() -> list[Record]:

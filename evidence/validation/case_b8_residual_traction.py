@@ -2,15 +2,9 @@
 
 import numpy as np
 
+from evidence.models.lumped import Y2, blades_and_damper
+from evidence.models.solving import at_frequency, balance_of, motion
 from evidence.validation.compare import Record, digits
-from evidence.validation.models import (
-    Y2,
-    at_frequency,
-    b6_load,
-    balance_of,
-    blade_damper_blade,
-    motion,
-)
 from stickslip.harmonic.balance import HarmonicBalance
 
 SOURCE = "literature benchmark B8"
@@ -29,7 +23,7 @@ MEANS_158 = ("1.2379e-4", "1.4954e-4")
 
 def y2(hertz: float, shares: tuple[float, float]) -> tuple[float, float]:
     """Return |y2| of the first harmonic and the mean of y2."""
-    problem, load = blade_damper_blade(shares), b6_load()
+    problem, load = blades_and_damper(m=shares)
     point = at_frequency(problem, load, hertz, 5)
     balance: HarmonicBalance = balance_of(problem, load, 5, 256)
     q = motion(balance, point.omega, balance.unknowns(point.coefficients))

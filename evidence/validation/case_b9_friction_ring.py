@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from evidence.models.lumped_disks import blisk_with_ring
 from evidence.validation.compare import Record, bound, digits, record
 from stickslip.arrays import FloatArray
 from stickslip.contact.interface import Interface
@@ -18,7 +19,6 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.damping import modal_damping
 from stickslip.model.structure import Structure
 from stickslip.reduction.full_wheel import wheel
-from stickslip.reduction.lumped_disks import blisk_with_ring
 from stickslip.response.rotating.nodal_diameters import nodal_diameter_map
 from stickslip.solve.newton_method import Newton, newton
 

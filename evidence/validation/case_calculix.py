@@ -11,10 +11,10 @@ import numpy as np
 import scipy.sparse
 import scipy.sparse.linalg
 
+from evidence.models.annulus import annular_sector
 from evidence.validation.calculix import PACKAGE, available, displacements, frequencies_hz, run_deck
 from evidence.validation.compare import Record, bound, record
 from stickslip.arrays import FloatArray, Matrix
-from stickslip.model.annulus import annular_sector
 from stickslip.model.axis import Axis
 from stickslip.model.deck import CalculixRun, write_deck
 from stickslip.model.fe.elements import Quadrature

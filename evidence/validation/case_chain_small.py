@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from evidence.models.lumped import force_at, small_chain
 from evidence.validation.compare import Record, digits, record
-from evidence.validation.models import force_at, small_chain
 from stickslip.response.forced.response import (
     Sweep,
     accepted_points,

@@ -8,16 +8,11 @@ the start at the next, so that residual tractions of contacts that never slip st
 import numpy as np
 import scipy.linalg
 
+from evidence.models.lumped import blades_and_damper, griffin
+from evidence.models.solving import at_frequency
 from evidence.validation.case_b3_blade_with_damper import RESPONSE
 from evidence.validation.case_two_blades import example_case
 from evidence.validation.compare import Record, bound, digits, record
-from evidence.validation.models import (
-    B3_LOAD,
-    at_frequency,
-    b6_load,
-    blade_damper_blade,
-    blade_with_damper,
-)
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.forced.response import Sweep, forced_problem
@@ -111,7 +106,7 @@ def balance_start(
 
 def linear_records() -> list[Record]:
     """Compare with the linear structure, where every contact sticks."""
-    system, load = blade_damper_blade(), b6_load()
+    system, load = blades_and_damper()
     records = []
     for hertz, printed in ((150.0, "2.791850e-5"), (170.0, "7.115741e-5")):
         found = shot(system, load, HZ * hertz, DEFAULT)
@@ -142,8 +137,8 @@ def griffin_records() -> list[Record]:
     """Compare with the exact column of B3."""
     records = []
     for limit, at, _, _, exact, _ in RESPONSE:
-        system = blade_with_damper(float(limit))
-        found = refined(system, B3_LOAD, float(at), None, EXACT_STEPS)
+        system, load = griffin(float(limit))
+        found = refined(system, load, float(at), None, EXACT_STEPS)
         value = abs(extrapolated(found)[0])
         records.append(digits(CASE, f"B3 |X1|, fc = {limit}, W = {at}", value, exact, B3))
     return records
@@ -241,7 +236,7 @@ def decay_record(
 def run() -> list[Record]:
     """Compare with closed forms, with exact values and with the settled state, and measure the order."""
     records = linear_records() + griffin_records()
-    system, load, omega = blade_damper_blade(), b6_load(), HZ * 163.0
+    (system, load), omega = blades_and_damper(), HZ * 163.0
     start, judged = balance_start(system, load, 163.0)
     found = refined(system, load, omega, start, STEPS)
     records.append(

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from evidence.models.solving import motion, solve
 from evidence.validation.compare import Record, record
-from evidence.validation.models import motion, solve
 from evidence.validation.reference_data import contact2d, contact2d_balance, has_complete
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from evidence.validation.models import balance_of, jenkins, lumped, system, unilateral
+from evidence.models.lumped import jenkins, lumped, system, unilateral
+from evidence.models.solving import balance_of
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws.cubic_spring import CubicSpring

@@ -2,7 +2,6 @@
 
 from .aft import contact_forces as contact_forces
 from .balance import harmonic_balance as harmonic_balance
-from .compliance import ComplianceForm as ComplianceForm
 from .dlft import dynamic_lagrangian as dynamic_lagrangian
 from .dynamic_stiffness import condense as condense
 from .selection.goal_oriented import GoalOriented as GoalOriented

@@ -1,6 +1,5 @@
 """Public names of `stickslip.model`, written once."""
 
-from .annulus import annular_sector as annular_sector
 from .axis import Axis as Axis
 from .damping import modal_damping as modal_damping
 from .damping import rayleigh_damping as rayleigh_damping

@@ -8,9 +8,6 @@ from .free_interface import rubin as rubin
 from .full_wheel import wheel as wheel
 from .full_wheel import wheel_shape as wheel_shape
 from .interface_modes import reduce_interface as reduce_interface
-from .lumped_disks import blade_ring as blade_ring
-from .lumped_disks import blisk_with_ring as blisk_with_ring
-from .lumped_disks import mistuned_blade_ring as mistuned_blade_ring
 from .relative import in_relative_coordinates as in_relative_coordinates
 from .truncation import FrequencyError as FrequencyError
 from .truncation import FrequencyErrors as FrequencyErrors

@@ -8,7 +8,7 @@ like a mass ``k h²/12`` too little on the spring; the switches between states a
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -162,27 +162,6 @@ class TransientResult:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class RefinedResult:
-    """The same periodic motion at a step and at half the step.
-
-    Parameters
-    ----------
-    first_harmonic
-        (n_outputs,) complex, m; extrapolated to a vanishing step as for an error of second order; the finer average
-        where the motion has not settled.
-    error
-        Estimated error of `first_harmonic`, relative to its largest amplitude, with the scatter of such averages.
-    coarse, fine
-        Results of the two integrations.
-    """
-
-    first_harmonic: ComplexArray
-    error: float
-    coarse: TransientResult
-    fine: TransientResult
-
-
 def rest(n: int, laws: Sequence[ContactLaw], caller: str = "integrate") -> TransientStart:
     """Return zero displacement and velocity of `n` coordinates, with the residual traction of each law."""
     known = _known(laws, caller)
@@ -257,34 +236,6 @@ def integrate(
     )
     state = initial_state(modes, gap_operator, law, start)
     return _settle(structure, operators, modes, state, outputs, stepping)
-
-
-def integrate_refined(
-    structure: Structure,
-    gap_operator: Matrix,
-    laws: Sequence[ContactLaw],
-    load: PeriodicLoad,
-    omega: float,
-    outputs: IntArray,
-    start: TransientStart | None = None,
-    stepping: TimeStepping | None = None,
-) -> RefinedResult:
-    """Integrate as `integrate` does, go on from there with half the step, and estimate the error of the step.
-
-    The switching instants fall anywhere within a step, so that the factor between the two errors is four only on
-    average: the whole difference of the two results is reported as the error, not the third that theory would allow.
-    """
-    stepping = stepping or TimeStepping()
-    coarse = integrate(structure, gap_operator, laws, load, omega, outputs, start, stepping)
-    halved = replace(stepping, steps_per_period=2 * stepping.steps_per_period)
-    begin = start if coarse.status == "diverged" else coarse.final
-    fine = integrate(structure, gap_operator, laws, load, omega, outputs, begin, halved)
-    first, finer = (r.harmonics[1] if r.settled else r.average for r in (coarse, fine))
-    difference, largest = finer - first, np.max(np.abs(finer))
-    scatter = sum(0.0 if r.settled else r.scatter for r in (coarse, fine))
-    error = float(np.max(np.abs(difference)) / largest) if largest != 0.0 else 0.0
-    share = 1.0 / 3.0 if coarse.settled and fine.settled else 0.0  # noise must not be extrapolated
-    return RefinedResult(finer + share * difference, error + scatter, coarse, fine)
 
 
 def _known(laws: Sequence[ContactLaw], caller: str) -> list[ElasticCoulomb]:

@@ -5,7 +5,6 @@ import math
 import numpy as np
 
 from stickslip.arrays import IntArray
-from stickslip.errors import input_error
 from stickslip.model.mesh.solid_mesh import SolidMesh
 
 # grid steps (radius, angle, axis) of a 20-node hexahedron's nodes within its 2 x 2 x 2 cell, VTK order
@@ -42,24 +41,7 @@ def annular_sector(
     -------
     SolidMesh
         With the node sets ``root`` (inner radius), ``tip`` (outer radius), ``cyclic_low`` and ``cyclic_high`` (paired).
-
-    Raises
-    ------
-    InputError
-        If the radii, the width or a number cannot be.
     """
-    if not (0 < inner_radius < outer_radius < math.inf and 0 < width < math.inf):
-        raise input_error(
-            "annular_sector",
-            f"inner_radius {inner_radius} m, outer_radius {outer_radius} m, width {width} m",
-            "The radii must be positive and grow outward, the width be positive.",
-        )
-    if sectors < 2 or sectors % 1 or min(divisions) < 1:
-        raise input_error(
-            "annular_sector",
-            f"cannot make {sectors} sectors of {divisions} elements",
-            "Take two sectors or more and one element or more each way.",
-        )
     steps = 2 * np.array(divisions) + 1
     half = math.pi / sectors
     radius = np.linspace(inner_radius, outer_radius, steps[0])

@@ -1,0 +1,1 @@
+"""The models that benchmarks, validation, strategies, figures and tests share."""
