@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from stickslip import __version__
-from stickslip.errors import SingularError, StickslipError, did_you_mean, input_error
+from stickslip.errors import InputError, SingularError, StickslipError, did_you_mean, input_error
 from stickslip.model.mesh.solid_mesh import SolidMesh, write_mesh
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.analysis import Analysis, Case, Job, Solved, named
@@ -120,9 +120,9 @@ def _run(
     # tasks whose numbers depend on the same things share a job; those not asked for are shown where they are finished
     unfinished = {t.sealed: t for t in tasks if fresh or not t.finished()}
     to_do = [t for t in unfinished.values() if t.analysis in asked]
-    LOG.info(f"{len(to_do)} jobs to do for {len(tasks)} answers")
+    LOG.info(f"jobs to do: {len(to_do)}, answers: {len(tasks)}")
     # all refusals come before any long computation, and before anything is given up
-    jobs = [(t, t.analysis.inputs(t.case, t.case.build())) for t in to_do]
+    jobs = [(t, _inputs(study, t)) for t in to_do]
     meshes = _meshes(t.case for t in to_do)
     if fresh:
         empty_folder(study.folder, [f"{name}.vtu" for name in meshes], store.written)
@@ -162,6 +162,15 @@ def _task(asked: Analysis, case: Case, folder: Path, versions: Mapping[str, str]
     parts = [asked.name, asked.key(case), case.digest, versions, layout]
     key = sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
     return Task(asked, case, folder / JOBS / f"{key}{SEALED}")
+
+
+def _inputs(study: Any, task: Task) -> Any:
+    """Return what a job needs; a refusal names the study's file, and the case where there are several."""
+    model, label = task.case.build(), task.case.label
+    try:
+        return task.analysis.inputs(task.case, model)
+    except InputError as error:
+        raise error.inside(f"{study.path} ({label})" if label else str(study.path)) from None
 
 
 def _label(asked: Analysis, case: Case) -> str:

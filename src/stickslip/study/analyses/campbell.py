@@ -52,7 +52,7 @@ class CampbellTable(WaveTable):
     @property
     def speeds(self) -> tuple[float, ...]:
         """In rad/s."""
-        return tuple(RPM * np.linspace(*self.speeds_rpm, self.points))
+        return tuple(RPM * np.linspace(self.speeds_rpm[0], self.speeds_rpm[1], self.points))
 
     def numbers(self, wheel: Wheel) -> tuple[int, ...]:
         """Return the wave numbers of the nodal diameters asked for; else those that the engine orders excite."""

@@ -23,8 +23,8 @@ def of_cases(
         if not case.sizes.get("wave"):
             continue
         head = f"{case.attrs['case_label']}: " if case.attrs.get("case_label") else ""
-        for made in (*tables(case), *_static(case)):
-            found.append(TextTable(f"{head}{made.title}", made.head, made.rows))
+        made = (*tables(case), *_static(case))
+        found += [TextTable(f"{head}{t.title}", t.head, t.rows) for t in made]
     return tuple(found)
 
 
