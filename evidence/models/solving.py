@@ -12,8 +12,8 @@ from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
 from stickslip.response.equilibrium import bonded_start, preload
-from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.problem import ForcedPoint
+from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.response.time.transient import (

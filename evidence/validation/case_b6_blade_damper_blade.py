@@ -2,6 +2,10 @@
 
 The source's H = 1, 3 and 5 columns belong to 256 samples a period, its H = 11 column to 1024; the same are used here. Its exact column
 was integrated with located events; ours is the library's time integration, extrapolated from two step lengths.
+
+The benchmark's note says what its digits are good to, found by comparing three programs: the exact column to 2e-5 at 150 and 160 Hz,
+and the peaks to 1.2e-4 in amplitude and 4e-4 in frequency, because with 256 samples the curve has several tops. All other numbers
+hold to their digits.
 """
 
 import numpy as np
@@ -39,6 +43,8 @@ PEAKS = (  # harmonics, residual traction, amplitude, Hz
 )
 STUCK = ("84.97105", "161.98103", "225.07908", "256.62963", "399.94984", "555.08743")
 FRICTIONLESS = ("84.80810", "155.76838", "200.27034", "245.24800", "280.53383", "490.37644")
+EXACT_GOOD_TO = {"150": 2e-5, "160": 2e-5}  # relative
+PEAK_GOOD_TO, PEAK_HZ_GOOD_TO = 1.2e-4, 4e-4
 MEANS = {"163": "1.43807e-4", "stuck": "1.32755e-4"}
 
 
@@ -96,8 +102,8 @@ def peak_records(case: str, order: int, traction: float, amplitude: str, at: str
     )[2:]
     closest = float(within[np.argmin(np.abs(within - float(amplitude)))])
     return [
-        digits(case, f"peak |y2|, {where}, m", values[top], amplitude, SOURCE),
-        digits(case, f"peak frequency, {where}, Hz", grid[top], at, SOURCE),
+        digits(case, f"peak |y2|, {where}, m", values[top], amplitude, SOURCE, PEAK_GOOD_TO),
+        digits(case, f"peak frequency, {where}, Hz", grid[top], at, SOURCE, PEAK_HZ_GOOD_TO),
         digits(
             case,
             f"|y2| at {at} Hz (where the source has the peak), {where}, m",
@@ -131,9 +137,9 @@ def run() -> list[Record]:
     for hertz, exact, *columns in TABLE:
         f = float(hertz)
         amplitude, mean = time_domain(f)
-        records.append(
-            digits(case, f"|y2| at {hertz} Hz, time integration, m", amplitude, exact, SOURCE)
-        )
+        good_to = EXACT_GOOD_TO.get(hertz, 0.0)
+        name = f"|y2| at {hertz} Hz, time integration, m"
+        records.append(digits(case, name, amplitude, exact, SOURCE, good_to))
         if hertz in MEANS:
             records.append(
                 digits(

@@ -27,15 +27,21 @@ def record(
     }
 
 
-def digits(case: str, quantity: str, ours: float, printed: str, source: str) -> Record:
-    """Compare with a reference as it is printed: half a unit of its last digit is the tolerance."""
+def digits(
+    case: str, quantity: str, ours: float, printed: str, source: str, least: float = 0.0
+) -> Record:
+    """Compare with a reference as it is printed: half a unit of its last digit is the tolerance, or `least` if that is more.
+
+    `least` is relative: what the reference is good to where that is less than its digits promise.
+    """
     reference = float(printed)
     mantissa, _, exponent = printed.lower().partition("e")
     decimals = len(mantissa.partition(".")[2])
     half_unit = 0.5 * 10.0 ** (int(exponent or 0) - decimals)
     if reference == 0.0:
         return record(case, quantity, ours, 0.0, half_unit, source)
-    return record(case, quantity, ours, reference, half_unit / abs(reference) + ROUNDING, source)
+    tolerance = max(half_unit / abs(reference) + ROUNDING, least)
+    return record(case, quantity, ours, reference, tolerance, source)
 
 
 def bound(case: str, quantity: str, ours: float, largest: float, source: str) -> Record:
