@@ -1,23 +1,22 @@
 """The commands. Everything heavy is imported inside them, so that ``--help`` is quick."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from stickslip import __version__
 from stickslip.errors import InputError, StickslipError, input_error
+from stickslip.front.screen import Screen, on_screen
 
 if TYPE_CHECKING:
-    from stickslip.study.structure_study import Command
-    from stickslip.study.structure_summary import StructureSummary
-    from stickslip.study.summary import RunSummary
+    from stickslip.front.result import Result
+    from stickslip.study.analyses.analysis import TextTable
 
 PLAIN_WIDTH = 130  # columns of a table that is not on a terminal
 DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -29,62 +28,20 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file.")]
-Kind = Literal["blades", "sector", "file"]
+Kind = Literal["blades", "sector", "file", "masses"]
 StudyKind = Annotated[
     Kind,
     typer.Option(
         "--kind",
-        help="blades: two blades and a damper; sector: a bladed disk; file: one from a finite-element program.",
+        help="blades: two blades and a damper; sector: a bladed disk; file: one from a finite-element program; "
+        "masses: four masses on springs, the smallest study.",
     ),
 ]
-Fresh = Annotated[
-    bool,
-    typer.Option(
-        "--fresh",
-        help="Start over: remove what this command wrote into the results folder, and no other file.",
-    ),
-]
-Report = Annotated[bool, typer.Option("--report/--no-report", help="Write the HTML report.")]
 
 
 def main() -> None:
     """Entry point of the ``stickslip`` command."""
     app()
-
-
-class ScreenSink:
-    """Progress on a terminal as a bar, elsewhere as plain lines.
-
-    Parameters
-    ----------
-    console
-        Where to write.
-    progress
-        The bar, or None where the output is no terminal.
-    """
-
-    def __init__(self, console: Console, progress: Progress | None) -> None:
-        self._console = console
-        self._progress = progress
-        self._task = None if progress is None else progress.add_task("model", total=1.0, state="")
-
-    def say(self, text: str) -> None:
-        """Write a line."""
-        self._console.print(text, markup=False, highlight=False, soft_wrap=True)
-
-    def begin(self, title: str) -> None:
-        """Start a load case."""
-        if self._progress is None or self._task is None:
-            self.say(title)
-        else:
-            self._progress.reset(self._task, description=title, total=1.0, state="")
-
-    def advance(self, fraction: float, text: str) -> None:
-        """Move the bar, or write the line."""
-        if self._progress is None or self._task is None:
-            self.say(f"  {text}")
-        else:
-            self._progress.update(self._task, completed=fraction, state=text)
 
 
 @app.callback(invoke_without_command=True)
@@ -104,6 +61,13 @@ def common(
 def run(
     study: StudyFile,
     *,
+    only: Annotated[
+        list[str] | None,
+        typer.Option("--only", metavar="NAME", help="Answer this analysis alone; may be repeated."),
+    ] = None,
+    workers: Annotated[
+        int, typer.Option("--workers", min=1, max=256, help="Processes; the numbers stay the same.")
+    ] = 1,
     verify: Annotated[
         bool, typer.Option("--verify", help="Integrate in time at three frequencies and compare.")
     ] = False,
@@ -114,51 +78,48 @@ def run(
             help="Predict at every frequency what twice as many harmonics would change, in amplitude and phase.",
         ),
     ] = False,
-    fresh: Fresh = False,
-    report: Report = True,
+    fresh: Annotated[
+        bool,
+        typer.Option(
+            "--fresh",
+            help="Start over: remove what runs wrote into the results folder, and no other file.",
+        ),
+    ] = False,
+    report: Annotated[
+        bool, typer.Option("--report/--no-report", help="Write the HTML report.")
+    ] = True,
 ) -> None:
-    """Run a study of two blades and a damper; an interrupted run goes on where it stopped."""
+    """Answer the questions of a study; an interrupted run goes on where it stopped."""
     with _errors_as_text():
-        from stickslip.study.threads import one_blas_thread
+        from stickslip.study.keep.threads import one_blas_thread
 
         one_blas_thread()
-        from stickslip.study.run import run_study
+        from stickslip.front.study import Study
 
-        with _screen() as sink:
-            summary = run_study(
-                study,
-                verify_in_time=verify,
-                verify_harmonics=verify_harmonics,
+        with on_screen(Screen(_console(), workers, warnings=False)):
+            result = Study.from_file(study).run(
+                workers=workers,
+                only=only or (),
                 fresh=fresh,
-                sink=sink,
+                verify=verify,
+                verify_harmonics=verify_harmonics,
             )
-        files = [*summary.files]
-        if report:
-            files.append(_write_report(summary.result))
-        _print_summary(summary, files)
-    raise typer.Exit(NOT_CONVERGED if summary.failed else DONE)
+        files = [*result.files, *([result.report()] if report else [])]
+        _print_result(result, files)
+    raise typer.Exit(NOT_CONVERGED if result.failed else DONE)
 
 
 @app.command()
 def check(study: StudyFile) -> None:
-    """Do everything but the computation: read, mesh, reduce, place the damper or pair the cyclic faces."""
+    """Do everything but the computation: read, mesh, reduce, find the static state and the natural frequencies."""
     with _errors_as_text():
-        from stickslip.study.schema import read_toml
-        from stickslip.study.structure_study import is_structure_study
+        from stickslip.front.study import Study
 
-        with _screen() as sink:
-            if is_structure_study(read_toml(study)[1]):
-                from stickslip.study.structure_run import check_structure
-
-                warnings = check_structure(study, sink)
-            else:
-                from stickslip.study.run import check_study
-
-                warnings = check_study(study, sink)
-        console = _console()
+        with on_screen(Screen(_console(), warnings=False)):
+            warnings = Study.from_file(study).check()
         for text in warnings:
-            console.print(f"WARNING: {text}", markup=False, highlight=False, soft_wrap=True)
-        console.print(f"{study}: good to run", markup=False, highlight=False)
+            _say(f"WARNING: {text}")
+        _say(f"{study}: good to run")
 
 
 @app.command()
@@ -184,13 +145,9 @@ def new(
                 f"cannot be written ({error.strerror})",
                 "Give a folder you may write to.",
             ) from None
-        if kind == "file":
-            typer.echo(
-                f"{target} written. Next: name your model's file in it, stickslip check {target}"
-            )
-            return
-        command = "run" if kind == "blades" else "modes"
-        typer.echo(f"{target} written. Next: stickslip {command} {target}")
+        step = "name your model's file in it, " if kind == "file" else ""
+        command = "check" if kind == "file" else "run"
+        typer.echo(f"{target} written. Next: {step}stickslip {command} {target}")
 
 
 @app.command()
@@ -201,31 +158,9 @@ def report(
 ) -> None:
     """Write the HTML report of a result."""
     with _errors_as_text():
-        folder = result if result.is_dir() else result.parent
-        of_wheel = any((folder / f"{c}.nc").is_file() for c in ("modes", "campbell", "safe"))
-        if of_wheel and (result.is_dir() or result.name != "result.nc"):
-            page = _write_wheel_report(result)
-        else:
-            page = _write_report(result / "result.nc" if result.is_dir() else result)
-        typer.echo(f"{page} written")
+        from stickslip.report.page import report_file
 
-
-@app.command()
-def modes(study: StudyFile, *, fresh: Fresh = False, report: Report = True) -> None:
-    """Find natural frequencies and mode shapes of a bladed disk for each nodal diameter."""
-    _run_structure(study, "modes", fresh=fresh, report=report)
-
-
-@app.command()
-def campbell(study: StudyFile, *, fresh: Fresh = False, report: Report = True) -> None:
-    """Follow the frequencies of a bladed disk over the speed and find where engine orders meet them."""
-    _run_structure(study, "campbell", fresh=fresh, report=report)
-
-
-@app.command()
-def safe(study: StudyFile, *, fresh: Fresh = False, report: Report = True) -> None:
-    """Say which modes of a bladed disk engine orders can excite at a speed (SAFE diagram)."""
-    _run_structure(study, "safe", fresh=fresh, report=report)
+        typer.echo(f"{report_file(result)} written")
 
 
 @app.command()
@@ -246,32 +181,18 @@ def inspect(
     with _errors_as_text():
         from stickslip.study.inspect_file import inspect_file
 
-        with _screen() as sink:
-            lines = inspect_file(file, units, frequencies, mesh, sink)
+        with on_screen(Screen(_console())):
+            lines = inspect_file(file, units, frequencies, mesh)
         for line in lines:
-            _console().print(line, markup=False, highlight=False, soft_wrap=True)
+            _say(line)
 
 
 @app.command()
-def schema(*, kind: StudyKind = "blades") -> None:
+def schema() -> None:
     """Print the JSON Schema of study files."""
-    from stickslip.study.schema import json_schema
-    from stickslip.study.structure_study import structure_schema
+    from stickslip.study.file.tables import json_schema
 
-    typer.echo(json_schema() if kind == "blades" else structure_schema())
-
-
-def _run_structure(study: Path, command: "Command", *, fresh: bool, report: bool) -> None:
-    """Run a command for bladed disks and print what it found."""
-    with _errors_as_text():
-        from stickslip.study.structure_run import run_structure
-
-        with _screen() as sink:
-            summary = run_structure(study, command, fresh=fresh, sink=sink)
-        files = [*summary.files]
-        if report:
-            files.append(_write_wheel_report(summary.result))
-        _print_structure(summary, files)
+    typer.echo(json_schema())
 
 
 @contextmanager
@@ -281,17 +202,16 @@ def _errors_as_text() -> Iterator[None]:
         yield
     except StickslipError as error:
         typer.echo(str(error), err=True)
-        stopped = type(error).__name__ == "Interrupted"
-        raise typer.Exit(
-            INTERRUPTED
-            if stopped
-            else BAD_INPUT
-            if isinstance(error, InputError)
-            else NOT_CONVERGED
-        ) from None
+        raise typer.Exit(_code(error)) from None
     except KeyboardInterrupt:
         typer.echo("Interrupted.", err=True)
         raise typer.Exit(INTERRUPTED) from None
+
+
+def _code(error: StickslipError) -> int:
+    if type(error).__name__ == "Interrupted":
+        return INTERRUPTED
+    return BAD_INPUT if isinstance(error, InputError) else NOT_CONVERGED
 
 
 def _console() -> Console:
@@ -299,99 +219,37 @@ def _console() -> Console:
     return Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH)
 
 
-@contextmanager
-def _screen() -> Iterator[ScreenSink]:
-    """Give a sink, with a bar where the output is a terminal."""
-    console = _console()
-    if not console.is_terminal:
-        yield ScreenSink(console, None)
-        return
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TimeElapsedColumn(),
-        TextColumn("{task.fields[state]}"),
-    )
-    with Progress(*columns, console=console, transient=True) as progress:
-        yield ScreenSink(console, progress)
+def _say(text: str) -> None:
+    _console().print(text, markup=False, highlight=False, soft_wrap=True)
 
 
-def _write_report(result: Path) -> Path:
-    from stickslip.report.page import write_report
-
-    target = result.with_name("report.html")
-    write_report(result, target)
-    return target
-
-
-def _write_wheel_report(result: Path) -> Path:
-    from stickslip.report.wheel_page import write_wheel_report
-
-    target = (result if result.is_dir() else result.parent) / "report.html"
-    write_wheel_report(result, target)
-    return target
-
-
-def _print_structure(summary: "StructureSummary", files: list[Path]) -> None:
-    console = _console()
-    for found in summary.tables:
-        table = Table(title=found.title, title_justify="left")
-        for name in found.head:
-            table.add_column(name, justify="right")
-        for cells in found.rows:
-            table.add_row(*cells)
-        console.print(table)
-    _print_lines(console, "Warnings", list(summary.warnings))
-    _print_lines(console, "Files", [str(f) for f in files])
-
-
-def _print_lines(console: Console, title: str, texts: list[str]) -> None:
-    if texts:
-        console.print(f"\n{title}", markup=False, highlight=False)
-    for text in texts:
-        console.print(f"  {text}", markup=False, highlight=False, soft_wrap=True)
-
-
-def _print_summary(summary: "RunSummary", files: list[Path]) -> None:
-    console = _console()
-    console.print(_table(summary))
-    asked = f"Where {summary.chooser.name} asked for more harmonics"
-    _print_lines(console, asked, list(summary.choices))
-    _print_lines(console, "Against twice as many harmonics", list(summary.doubts))
-    _print_lines(console, "Against time integration", [c.sentence for c in summary.checks])
-    _print_lines(console, "Warnings", list(summary.warnings))
-    if summary.failed:
+def _print_result(result: "Result", files: Sequence[Path]) -> None:
+    """Print the tables of all analyses, the warnings, and which files there are."""
+    for table in (t for tables in result.summaries.values() for t in tables):
+        _print_table(table)
+    _print_lines("Warnings", result.warnings)
+    if result.failed:
         told = (
-            f"{summary.failed} of the points: marked in the result and in the report, not filled in"
+            f"{result.failed} of the points: marked in the result and in the report, not filled in"
         )
-        _print_lines(console, "Not converged", [told])
-    _print_lines(console, "Files", [str(f) for f in files])
+        _print_lines("Not converged", [told])
+    _print_lines("Files", [str(f) for f in files])
 
 
-def _table(summary: "RunSummary") -> Table:
-    table = Table(title="Forced response")
-    names = (
-        "F_CL/F_HE",
-        "peak mm",
-        "at Hz",
-        "points",
-        f"H = {summary.chooser.low_name}",
-        summary.more,
-        "failed",
-        "Newton",
-        "unknowns",
-    )
-    for name in (*names, "contact s", "linear s", "rest s"):
+def _print_table(found: "TextTable") -> None:
+    if not found.rows:
+        _print_lines(found.title, found.lines)
+        return
+    table = Table(title=found.title, title_justify="left")
+    for name in found.head:
         table.add_column(name, justify="right")
-    for r in summary.rows:
-        counts = (
-            r.points, r.points_low, r.points_high, r.points_failed, r.newton_steps, r.unknowns,
-        )  # fmt: skip
-        table.add_row(
-            f"{r.ratio:g}",
-            f"{1e3 * r.peak_amplitude:.5g}",
-            f"{r.peak_frequency_hz:.3f}",
-            *(str(c) for c in counts),
-            *(f"{s:.2f}" for s in r.seconds),
-        )
-    return table
+    for cells in found.rows:
+        table.add_row(*cells)
+    _console().print(table)
+    for line in found.lines:
+        _say(f"  {line}")
+
+
+def _print_lines(title: str, texts: Sequence[str]) -> None:
+    for text in [f"\n{title}", *(f"  {text}" for text in texts)] if texts else []:
+        _say(text)

@@ -6,17 +6,21 @@ from pathlib import Path
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.model.facts import facts_of_solid
 from stickslip.model.readers.calculix_deck import Deck
 from stickslip.model.readers.open_model import model_summary, read_model
 from stickslip.model.readers.units import Units
-from stickslip.study.facts import facts_of_solid
-from stickslip.study.messages import of_the_command_line
-from stickslip.study.progress import Sink
+from stickslip.study.keep.progress import LOG
 
 WIDTH = 26  # of the column of names
+# what the arguments of readers are called here
+_OPTIONS = {
+    "mesh": "--mesh", "mass": "part.NAME.mass in a study", "nodes": "part.NAME.nodes in a study", "ignore": "",
+    "use": "Read it in Python, keep it with save_structure (.npz) and give that: use",
+}  # fmt: skip
 
 
-def inspect_file(path: Path, units: str, modes: int, mesh: Path | None, sink: Sink) -> list[str]:
+def inspect_file(path: Path, units: str, modes: int, mesh: Path | None) -> list[str]:
     """Return what is in a model's file.
 
     Parameters
@@ -29,8 +33,6 @@ def inspect_file(path: Path, units: str, modes: int, mesh: Path | None, sink: Si
         Natural frequencies to compute; 0 for none.
     mesh
         Where the nodes lie, beside matrices that do not say.
-    sink
-        Where progress is told.
 
     Raises
     ------
@@ -38,13 +40,13 @@ def inspect_file(path: Path, units: str, modes: int, mesh: Path | None, sink: Si
         If the file cannot be read.
     """
     system = Units.named(units)
-    sink.say(f"reading {path} in {system.name}")
+    LOG.info(f"reading {path} in {system.name}")
     # doubtful numbers are shown with a remark, not refused: that is what one inspects a file for
     try:
         model = read_model(path, units=system, mesh=mesh, plausible=False)
     except InputError as error:
-        raise of_the_command_line(error) from None
-    found = model_summary(model, n_modes=modes, units=system, say=sink.say)
+        raise error.called(_OPTIONS) from None
+    found = model_summary(model, n_modes=modes, units=system, say=LOG.info)
     if isinstance(model, Deck):
         materials = [model.materials[name] for name in model.cell_material]
         facts = facts_of_solid(model.mesh, materials, 0)

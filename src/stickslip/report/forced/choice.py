@@ -11,6 +11,7 @@ from stickslip.report.forced.contact import states
 from stickslip.report.quantities import number
 from stickslip.report.response import Response
 from stickslip.report.tables import html_table
+from stickslip.study.analyses.forced.summary import cost_sentence
 
 _NAMED = 4  # sets of harmonics that a cell names
 
@@ -68,45 +69,21 @@ def _why(response: Response, case: Case) -> str:
 def choice(response: Response) -> str | None:
     """Where more harmonics were needed, what chose them, and why, in plain words."""
     if not response.decides:
-        return f"<p>The same harmonics everywhere (<code>{response.selection}</code>): {_kept_where(response)}.</p>"
+        kept = _kept_where(response)
+        return f"<p>The same harmonics everywhere (<code>{response.selection}</code>): {kept}.</p>"
     if not response.alert.error.size:
         return None
-    rows = [
-        [
-            case.short,
-            *(_alert_row if response.is_error else _other_row)(response, case),
-            _why(response, case),
-        ]
-        for case in response.cases
-    ]
-    middle = (
-        (f"{response.more_name} asked for", "largest predicted error")
-        if response.is_error
-        else ("harmonics kept", "largest indicator")
-    )
-    stored = escape(response.text("alert_explanation"))
-    log = (
-        f"<details><summary>As the run put it</summary><p>{stored}</p></details>" if stored else ""
-    )
-    table = html_table([response.varied, *middle, "why"], rows, numeric=False)
-    return (
-        (_alert_text(response) if response.is_error else _other_text(response))
-        + table
-        + _cost(response)
-        + log
-    )
-
-
-def _cost(response: Response) -> str:
-    """Say what choosing has cost beside the harmonics of the reference everywhere."""
-    if not response.has("unknowns_solved", "retained_displacement"):
-        return ""
-    solved, points = int(response.floats("unknowns_solved").sum()), response.converged.size
-    each = response.data.sizes["retained"] * (2 * len(response.high_harmonics) - 1)
-    return (
-        f"<p>{solved} unknowns were solved in all; H = {response.high_name} everywhere would be about {points} points × {each} unknowns = "
-        f"{points * each} (an estimate: as many points, each solved once), so that choosing took {100 * solved / (points * each):.0f} % of it.</p>"
-    )
+    alert, middle, text = _other_row, ("harmonics kept", "largest indicator"), _other_text
+    if response.is_error:
+        middle = (f"{response.more_name} asked for", "largest predicted error")
+        alert, text = _alert_row, _alert_text
+    rows = [[c.short, *alert(response, c), _why(response, c)] for c in response.cases]
+    found = text(response) + html_table([response.varied, *middle, "why"], rows, numeric=False)
+    if response.has("unknowns_solved", "retained_displacement"):
+        found += f"<p>{cost_sentence(response.data)}</p>"
+    said = escape(response.text("alert_explanation"))
+    more = f"<details><summary>As the run put it</summary><p>{said}</p></details>"
+    return found + (more if said else "")
 
 
 _REASON = (

@@ -108,24 +108,9 @@ def cards(response: Response) -> list[Card]:
     return [card for card in (make(response) for make in found) if card is not None]
 
 
-def _unconverged(response: Response) -> list[str]:
-    warnings = []
-    for case in response.cases:
-        at = np.flatnonzero(~response.converged & (response.point_case == case.index))
-        if at.size:
-            hz = response.hz[at]
-            between = f"between {number(hz.min(), 5)} and {number(hz.max(), 5)} Hz"
-            where = f"at {number(hz[0], 5)} Hz" if at.size == 1 else between
-            warnings.append(
-                f"{counted(int(at.size), 'point')}{' of ' if case.label else ''}{case.label} did not converge, {where}. "
-                "They are left out of curves and peaks; smaller frequency steps may help."
-            )
-    return warnings
-
-
 def warnings(response: Response) -> list[str]:
-    """Return what follows from the numbers: points lost, a peak that hangs on the retention, a check that failed."""
-    found = _unconverged(response)
+    """Return what follows from the numbers: a peak that hangs on the retention, a check that failed."""
+    found = []
     for case in response.cases:
         shift = np.nan_to_num(response.number_of("retention_peak_shift", case))
         if abs(shift) > _LARGE_SHIFT:

@@ -1,0 +1,160 @@
+"""A model that answers questions itself, without any file."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from stickslip.assembly.contact import Contact
+from stickslip.assembly.model import Model as Assembly
+from stickslip.errors import did_you_mean, input_error
+from stickslip.front.result import Result
+from stickslip.front.screen import by_default
+from stickslip.model.part import Part
+from stickslip.study.analyses.analysis import Case, named
+from stickslip.study.file.messages import told
+from stickslip.study.file.section import Section
+from stickslip.study.file.tables import Tables
+from stickslip.study.runner import answer
+from stickslip.units import RPM
+
+_SHARED = ("harmonics", "solver", "limits")  # tables that analyses share
+_OF_THE_MODEL = ("alert_over",)  # keys of them that a model has itself
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Model(Assembly):
+    """Parts, contacts and loads, and the questions that can be asked of them.
+
+    Every key of a study's table is an argument of the method of that name (`forced_response` takes those of [harmonics], [solver]
+    and [limits], too), with the same meaning, unit and default. Numbers are the same as those of a study.
+    """
+
+    def forced_response(
+        self,
+        hz: Iterable[float] | None = None,
+        *,
+        verify: bool = False,
+        verify_harmonics: bool = False,
+        folder: str | Path | None = None,
+        **keys: Any,
+    ) -> Result:
+        """Compute the steady vibration under the harmonic loads.
+
+        Parameters
+        ----------
+        hz
+            The range (lowest, highest) in Hz; more than two frequencies are taken as they are.
+        verify, verify_harmonics
+            Compare with time integration, and with twice as many harmonics.
+        folder
+            Where to write ``result.nc``; left out: the result stays in memory.
+        keys
+            Of the tables, such as ``low=1, high=5, points=60, selection="guarded_alert", direction="down"``.
+
+        Raises
+        ------
+        InputError
+            If a key is none, or the model does not allow the answer.
+        """
+        if hz is not None:
+            own = [float(f) for f in hz]
+            keys["frequency_hz" if len(own) == 2 else "frequencies_hz"] = own
+        asked = {"verify": verify, "verify_harmonics": verify_harmonics}
+        checks = frozenset(name for name, wanted in asked.items() if wanted)
+        return self._answer("forced_response", keys, folder, checks)
+
+    def modes(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+        """Find natural frequencies and mode shapes; keys such as ``number=6, contacts="stuck"``."""
+        return self._answer("modes", keys, folder)
+
+    def campbell(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+        """Follow frequencies over speed; keys such as ``speeds_rpm=(0, 9000), engine_orders=[4, 20]``."""
+        return self._answer("campbell", keys, folder)
+
+    def safe(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+        """Say which modes engine orders can excite; keys such as ``engine_orders=range(1, 13), margin_percent=5.0``."""
+        return self._answer("safe", keys, folder)
+
+    def _answer(
+        self,
+        name: str,
+        keys: Mapping[str, Any],
+        folder: str | Path | None,
+        checks: frozenset[str] = frozenset(),
+    ) -> Result:
+        settings = SimpleNamespace(**_tables(name, keys))
+        case = Case(0, "", {}, settings, lambda: self, "", Path.cwd(), checks)
+        with by_default():
+            outcome = answer(
+                named(name), [case], f"{name.replace('_', ' ').capitalize()} of a model"
+            )
+        result = Result.of(outcome)
+        return result if folder is None else result.saved(Path(folder))
+
+    def __repr__(self) -> str:
+        lines = [f"Model: {_counted(self)}"]
+        lines += [f"  part {name}: {_part(part)}" for name, part in self.parts.items()]
+        lines += [f"  contact {name}: {_contact(c)}" for name, c in self.contacts.items()]
+        lines += [f"  join {name}: {' with '.join(j.between)}" for name, j in self.joins.items()]
+        for name, load in self.loads.items():
+            kind = f"harmonic {load.harmonic}" if load.harmonic else "static"
+            lines.append(f"  load {name}: {load.newton:g} N on {load.on}, {kind}")
+        lines += [f"  output {output.name}: {output.on}" for output in self.outputs]
+        if self.speed:
+            lines.append(f"  rotation: {self.speed / RPM:g} rpm")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(repr(self))}</pre>"
+
+
+def _counted(model: Assembly) -> str:
+    sizes = {"part": model.parts, "contact": model.contacts, "load": model.loads}
+    return ", ".join(f"{len(own)} {name}{'s' * (len(own) != 1)}" for name, own in sizes.items())
+
+
+def _part(part: Part) -> str:
+    kind = "rigid body" if part.body is not None else f"{part.structure.stiffness.shape[0]} dofs"
+    wheel = f", one of {part.sectors} sectors" if part.sectors > 1 else ""
+    return f"{kind}{wheel}"
+
+
+def _contact(contact: Contact) -> str:
+    return f"{' with '.join(contact.between)}, {type(contact.law).__name__}"
+
+
+def _tables(name: str, keys: Mapping[str, Any]) -> dict[str, Section]:
+    """Sort keys into the tables of an analysis and validate them."""
+    sections: dict[str, type[Section]] = {name: named(name).table}
+    if name == "forced_response":
+        sections |= {table: Tables.model_fields[table].annotation for table in _SHARED}  # type: ignore[misc]
+    home = {key: table for table, own in sections.items() for key in own.model_fields}
+    values: dict[str, dict[str, Any]] = {table: {} for table in sections}
+    for key, value in keys.items():
+        if key not in home or key in _OF_THE_MODEL:
+            known = [k for k in home if k not in _OF_THE_MODEL]
+            raise input_error(
+                f"{name}: {key}", "is no key of this question", did_you_mean(key, known)
+            )
+        values[home[key]][key] = _plain(value)
+    return {table: _validated(own, values[table], name) for table, own in sections.items()}
+
+
+def _validated(section: type[Section], values: Mapping[str, Any], place: str) -> Section:
+    try:
+        return section.model_validate(values)
+    except ValidationError as error:
+        raise told(place, section, error) from None
+
+
+def _plain(value: Any) -> Any:
+    """Return tuples, ranges and arrays as lists, as a study file has them."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return [_plain(v) for v in value] if isinstance(value, tuple | range | list) else value

@@ -1,0 +1,166 @@
+"""What a Python user holds of a result: its data, its figures, its peaks, its page."""
+
+import re
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from html import escape, unescape
+from pathlib import Path
+
+import numpy as np
+import plotly.graph_objects as go
+import xarray as xr
+
+from stickslip.errors import did_you_mean, input_error
+from stickslip.front.table import Table
+from stickslip.report.page import plots, warnings_of, write_report
+from stickslip.report.result import RESULT, open_result
+from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.keep.netcdf import write_tree
+from stickslip.study.outcome import Outcome
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What a study or a model has answered.
+
+    Parameters
+    ----------
+    data
+        A DataTree with a dataset for each analysis, in Hz and SI units; provenance in the attributes of the root.
+    path
+        The file that holds it; None for a result in memory.
+    files
+        All files that the run wrote.
+    failed
+        Number of points without a solution.
+    summaries
+        Of each analysis, what the terminal prints; empty for a result that was read from a file.
+    """
+
+    data: xr.DataTree
+    path: Path | None = None
+    files: tuple[Path, ...] = ()
+    failed: int = 0
+    summaries: dict[str, tuple[TextTable, ...]] = field(default_factory=dict)
+
+    @classmethod
+    def open(cls, path: str | Path) -> "Result":
+        """Read a result file, or the one in a folder."""
+        path = Path(path)
+        return cls(open_result(path), path / RESULT if path.is_dir() else path)
+
+    @classmethod
+    def of(cls, outcome: Outcome) -> "Result":
+        """Return what a run has found."""
+        path = outcome.files[0] if outcome.files else None
+        return cls(outcome.tree, path, outcome.files, outcome.failed, outcome.summaries)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the result as netCDF-4; return the file.
+
+        Parameters
+        ----------
+        path
+            The file, or a folder that exists.
+        """
+        path = Path(path)
+        target = path / RESULT if path.is_dir() else path
+        write_tree(self.data, target)
+        return target
+
+    def report(self, path: str | Path | None = None) -> Path:
+        """Write the page of all figures and tables; return it.
+
+        Parameters
+        ----------
+        path
+            The page; left out: ``report.html`` beside the result's file, or here.
+        """
+        folder = Path() if self.path is None else self.path.parent
+        target = folder / "report.html" if path is None else Path(path)
+        write_report(self.data, target)
+        return target
+
+    @cached_property
+    def _figures(self) -> dict[str, go.Figure]:
+        return plots(self.data)
+
+    @property
+    def plots(self) -> tuple[str, ...]:
+        """Names of the figures, in the order of the page."""
+        return tuple(self._figures)
+
+    def plot(self, name: str) -> go.Figure:
+        """Return a figure of the page.
+
+        Raises
+        ------
+        InputError
+            If the result has none of that name.
+        """
+        if name not in self._figures:
+            known = list(self.plots)
+            raise input_error(
+                f"plot({name!r})", "is no figure of this result", did_you_mean(name, known)
+            )
+        return self._figures[name]
+
+    @property
+    def peaks(self) -> Table:
+        """The peak of each case of the forced response, or the frequencies of all modes where there is none."""
+        if "forced_response" in self.data.children:
+            return _peaks(self.data["forced_response"].to_dataset())
+        name = next((n for n in ("modes", "safe") if n in self.data.children), None)
+        return _frequencies(self.data[name].to_dataset()) if name else Table({})
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What the page warns of, as text."""
+        return tuple(_plain(text) for text in warnings_of(self.data))
+
+    def saved(self, folder: Path) -> "Result":
+        """Return the result with a file in a folder, which is made."""
+        folder.mkdir(parents=True, exist_ok=True)
+        return replace(self, path=self.save(folder))
+
+    def __repr__(self) -> str:
+        title = str(self.data.attrs.get("title", "")) or "untitled"
+        lines = [f"Result: {title}", f"  file: {self.path or 'in memory'}"]
+        for name, node in self.data.children.items():
+            cases, points = node.sizes.get("case", 1), node.sizes.get("point")
+            size = f"{cases} cases" if cases != 1 else "1 case"
+            lines.append(f"  {name}: {size}" + (f", {points} points" if points else ""))
+        lines.append(f"  plots: {', '.join(self.plots)}")
+        lines += [f"  WARNING: {text}" for text in self.warnings]
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(repr(self))}</pre>{self.peaks._repr_html_()}"
+
+
+def _plain(text: str) -> str:
+    """Return HTML as text of one line."""
+    return unescape(re.sub(r"<sup>(.*?)</sup>", r"^\1", text).replace("\u202f", " "))
+
+
+def _peaks(data: xr.Dataset) -> Table:
+    keys = [str(k) for k in data["vary"].values] if "vary" in data.coords else []
+    found = {key: np.asarray(data["vary_value"].values[:, k]) for k, key in enumerate(keys)}
+    units = {
+        "excitation_n": "excitation (N)",
+        "peak_frequency_hz": "frequency (Hz)",
+        "peak_amplitude": "amplitude (m)",
+    }
+    found |= {name: np.asarray(data[key].values) for key, name in units.items() if key in data}
+    return Table(found)
+
+
+def _frequencies(data: xr.Dataset) -> Table:
+    """Return a row a wave of the first case."""
+    first = data.isel(case=0) if "case" in data.dims else data
+    hz = np.asarray(first["frequency_hz"].values)
+    found = {
+        name.replace("_", " "): np.asarray(first[name].values)
+        for name in ("nodal_diameter", "wave_kind")
+    }
+    return Table(found | {f"mode {m + 1} (Hz)": hz[:, m] for m in range(hz.shape[1])})
