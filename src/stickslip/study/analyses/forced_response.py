@@ -14,7 +14,7 @@ from stickslip.harmonic.support import named
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.response import ForcedPoint, Sweep, forced_response
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
-from stickslip.study.analyses.forced.caveats import caveats
+from stickslip.study.analyses.forced.caveats import caveats, inside, mixed_places, no_resonance
 from stickslip.study.analyses.forced.dataset import put_together
 from stickslip.study.analyses.forced.estimate import estimate
 from stickslip.study.analyses.forced.in_time import Check, check_in_time, chosen
@@ -87,11 +87,16 @@ class ForcedResponseAnalysis:
         return put_together(cases, labels)
 
     def check(self, case: Case, model: Model) -> tuple[str, ...]:
-        """Return the estimated cost, and how harmonics will be chosen."""
+        """Return the estimated cost, where resonances are to be expected, and how harmonics will be chosen."""
         question = self.inputs(case, model)
-        lines = question.chooser.lines(case.settings.harmonics.passages)
-        cost = estimate(model, question.sweep)
-        return (str(cost), *(f"harmonics: {line}" for line in lines))
+        chooser, passages = question.chooser, case.settings.harmonics.passages
+        doubts = [*no_resonance(question), *mixed_places(question.model.error_labels)]
+        return (
+            str(estimate(model, question.sweep)),
+            *(f"harmonics: {line}" for line in chooser.lines(passages)),
+            *inside(question),
+            *(f"WARNING: {text}" for text in doubts),
+        )
 
     def summary(self, data: xr.Dataset) -> tuple[TextTable, ...]:
         """Return what the terminal prints."""

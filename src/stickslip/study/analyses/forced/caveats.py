@@ -1,12 +1,17 @@
 """What the user should know of a response: sentences, told while it is computed and with its result."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+
+import numpy as np
 
 from stickslip.response.free_motion import drift
 from stickslip.study.analyses.forced.points import Response
 from stickslip.study.analyses.forced.question import Question
 from stickslip.units import HZ
+
+ROTATIONS = ("rx", "ry", "rz")
+LISTED = 5  # natural frequencies that a line names
 
 
 def caveats(question: Question, response: Response, shift: tuple[float, float]) -> list[str]:
@@ -20,11 +25,55 @@ def caveats(question: Question, response: Response, shift: tuple[float, float]) 
         What `peak_shift` found.
     """
     return [
+        *question.model.warnings,
+        *mixed_places(question.model.error_labels),
         *_of_points(question, response),
         *_of_shape(question, response),
         *_of_drift(question, response),
         *_of_peak(question, response, shift),
     ]
+
+
+def mixed_places(labels: Sequence[str]) -> list[str]:
+    """Return a warning where an error is taken over rotations and displacements together."""
+    rotations = [label for label in labels if label.rpartition(".")[2] in ROTATIONS]
+    others = [label for label in labels if label not in rotations]
+    if not rotations or not others:
+        return []
+    text = (
+        f"harmonics.alert_over mixes rotations ({', '.join(rotations)}) with displacements ({', '.join(others)}): dofs that move "
+        "less than a thousandth of the largest are left out, and here radians are held against metres. Name one kind only."
+    )
+    return [text]
+
+
+def inside(question: Question) -> list[str]:
+    """Return the natural frequencies beside the range of the sweep, and the normal forces at rest."""
+    lowest, highest = (omega / HZ for omega in question.sweep.omega_range)
+    known, normal = question.model.frequencies, -question.model.static_force[:, 2]
+    told = [f"sweep: {lowest:.2f} to {highest:.2f} Hz"]
+    for state, hertz in (("open", known.free_reduced), ("stuck", known.stuck_reduced)):
+        near = [f"{f:.2f}" for f in hertz if f <= highest][-LISTED:]
+        beyond = [f"{f:.2f}" for f in hertz if f > highest][:1]
+        told += [f"natural frequencies, contacts {state}: {', '.join([*near, *beyond])} Hz"] * bool(near or beyond)  # fmt: skip
+    if normal.size:
+        told.append(f"static equilibrium: normal forces {normal.min():.3g} to {normal.max():.3g} N")
+    return told
+
+
+def no_resonance(question: Question) -> list[str]:
+    """Return a warning where no natural frequency, contacts open or stuck, lies in the range of the sweep."""
+    lowest, highest = (omega / HZ for omega in question.sweep.omega_range)
+    known = question.model.frequencies
+    every = np.concatenate([known.free_reduced, known.stuck_reduced])
+    if not every.size or np.any((every >= lowest) & (every <= highest)):
+        return []
+    near = float(every[np.argmin(np.maximum(lowest - every, every - highest))])
+    text = (
+        f"no natural frequency lies between {lowest:.2f} and {highest:.2f} Hz, neither with open nor with stuck contacts; the "
+        f"nearest one is {near:.2f} Hz. Widen forced_response.{question.key}."
+    )
+    return [text]
 
 
 def _of_points(question: Question, response: Response) -> Iterator[str]:
@@ -70,10 +119,9 @@ def _of_drift(question: Question, response: Response) -> Iterator[str]:
 
 def _of_peak(question: Question, response: Response, shift: tuple[float, float]) -> Iterator[str]:
     if response.peak_at_end:
-        key = "speed_rpm" if question.over_speed else "frequency_hz"
         yield (
             f"the largest amplitude stands at the end of the sweep ({response.peak_hz:.2f} Hz); it is no resonance. "
-            f"Widen forced_response.{key}."
+            f"Widen forced_response.{question.key}."
         )
     if question.model.retention > 0.0 and response.top is not None and math.isnan(shift[0]):
         yield (

@@ -10,7 +10,7 @@ from stickslip.response.verification import verify_reference
 from stickslip.study.analyses.forced.chooser import error_text
 from stickslip.study.analyses.forced.points import Response
 from stickslip.study.analyses.forced.question import FACTOR, Question
-from stickslip.study.harmonics_table import HIGHEST
+from stickslip.study.file.harmonics import HIGHEST
 from stickslip.units import HZ
 
 

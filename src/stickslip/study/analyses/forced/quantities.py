@@ -167,6 +167,10 @@ OF_MODELS = (
         contact_law=("1", "law of the contact"),
         contact_group=("1", "name of the contact in the model"),
     )
+    | _table(
+        "contact",
+        contact_area=("m2", "area that belongs to the contact, NaN where there are no facets"),
+    )
     | _table("contact xyz", contact_position=("m", "position of the contact points"))
     | _table("contact xyz direction", contact_frame=("1", "axes t, w, n of the contact frames"))
     | _table("surface_node xyz", surface_point=("m", "skin of the meshed parts"))

@@ -36,8 +36,8 @@ class Question:
         How the response is computed.
     limit
         Change that more harmonics may make before there is a warning, a fraction.
-    over_speed
-        Whether the frequencies are those of a range of speeds.
+    key
+        Of the table, that gives the range: ``speed_rpm`` where the frequencies are those of a range of speeds.
     checks
         Checks asked for beside the response.
     """
@@ -46,8 +46,13 @@ class Question:
     model: Assembled
     sweep: Sweep
     limit: float
-    over_speed: bool = False
+    key: str = "frequency_hz"
     checks: frozenset[str] = frozenset()
+
+    @property
+    def over_speed(self) -> bool:
+        """Whether the frequencies are those of a range of speeds."""
+        return self.key == "speed_rpm"
 
     @cached_property
     def problem(self) -> ForcedProblem:
@@ -108,7 +113,7 @@ def question_of(case: Case, model: Model) -> Question:
         model=peak_first(assembled),
         sweep=sweep,
         limit=sweep.threshold,
-        over_speed=settings.forced_response.over == "speed",
+        key=settings.forced_response.range_key,
         checks=case.checks,
     )
 

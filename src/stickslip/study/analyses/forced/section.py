@@ -53,6 +53,11 @@ class ForcedResponse(Section):
         "more points where it turns (a single passage then steps through as many as points says)",
     )
 
+    @property
+    def range_key(self) -> str:
+        """The key that says where: one of three."""
+        return next(key for key in RANGES if getattr(self, key) is not None)
+
     @model_validator(mode="after")
     def _agree(self) -> Self:
         given = [key for key in RANGES if getattr(self, key) is not None]

@@ -36,6 +36,7 @@ def of_model(question: Question) -> Values:
         "contact_group": model.contacts.groups,
         "contact_position": model.contacts.position,
         "contact_frame": model.contacts.frame,
+        "contact_area": model.contacts.area,
         "attributes": json.dumps(_attributes(question)),
     }
     if skin is None:

@@ -1,0 +1,411 @@
+"""The analysis of the forced response: its dataset against the library, resumption, what it warns of and what it refuses."""
+
+import json
+import pickle
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray as xr
+from models import lifting, table
+from pydantic import ValidationError
+
+from stickslip.assembly.assembled import Assembled, ContactTable, Frequencies
+from stickslip.assembly.contact import Contact
+from stickslip.assembly.load import Load
+from stickslip.assembly.model import Model
+from stickslip.contact.interface import Interface
+from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.contact.laws.jenkins import Jenkins
+from stickslip.errors import InputError, SingularError
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.model.part import Part
+from stickslip.model.structure import Structure
+from stickslip.response.forced.response import (
+    ForcedPoint,
+    Sweep,
+    accepted_points,
+    forced_problem,
+    forced_response,
+)
+from stickslip.response.recovery import fields
+from stickslip.response.system import System
+from stickslip.solve.newton_method import Newton
+from stickslip.study.analyses.analysis import Case, Solved
+from stickslip.study.analyses.forced.caveats import mixed_places, no_resonance
+from stickslip.study.analyses.forced.estimate import estimate, retained_of
+from stickslip.study.analyses.forced.question import Question, question_of
+from stickslip.study.analyses.forced.section import ForcedResponse, sweep_of
+from stickslip.study.analyses.forced_response import FORCED_RESPONSE
+from stickslip.study.file.harmonics import Harmonics
+from stickslip.study.keep.journal import JobJournal
+from stickslip.study.outcome import case_variables
+from stickslip.units import HZ, RPM
+
+NO_TIME = ("seconds", "attempt_seconds", "seconds_contact", "seconds_linear", "seconds_rest")
+
+
+def question(system: System, load: HarmonicLoad, sweep: Sweep, **others: object) -> Question:
+    """Return a question about a system of the tests."""
+    n = system.interface.n_contacts
+    contacts = ContactTable(
+        system.interface.names, ("joint",) * n, ("elastic_coulomb",) * n,
+        np.full((n, 3), np.nan), np.tile(np.eye(3), (n, 1, 1)), np.full(n, np.nan),
+    )  # fmt: skip
+    labels = tuple(f"out{i}.x" for i in range(len(system.outputs)))
+    none = np.zeros((n, 3))
+    force = max(float(np.abs(f).max()) for f in load.harmonics.values())
+    model = Assembled(
+        system, system, load, contacts, labels, 0, labels, 0.0, force, none, none,
+        Frequencies(*(np.array([30.0, 50.0]),) * 4), None, 1, None, {},
+    )  # fmt: skip
+    asked = {"label": "", "limit": 0.05} | others
+    return Question(model=replace(model, **asked.pop("model", {})), sweep=sweep, **asked)  # type: ignore[arg-type]
+
+
+def solved(asked: Question, done: int | None = None, first: Solved | None = None) -> Solved:
+    """Solve a question, going on after `done` points of a first try."""
+    asked = pickle.loads(pickle.dumps(asked))
+    with JobJournal(Path(":memory:"), ForcedPoint) as journal:
+        for point in () if first is None else first.records[:done]:
+            journal.add(point)
+        for point in FORCED_RESPONSE.solve(asked, journal.records(), journal):
+            journal.add(point)
+        case = Case(0, asked.label, {"x": 1.0} if asked.label else {}, None, None, "", Path())  # type: ignore[arg-type]
+        return Solved(case, journal.records(), journal.notes())
+
+
+def dataset(*each: Solved) -> xr.Dataset:
+    """Return the dataset of cases, as the runner has it."""
+    return FORCED_RESPONSE.dataset(each).assign(case_variables([s.case for s in each]))
+
+
+def warnings_of(data: xr.Dataset) -> list[str]:
+    return list(json.loads(data.attrs["warnings"]))
+
+
+def rubbing() -> tuple[System, HarmonicLoad]:
+    """Two masses in a row, the first of which rubs at two places against the ground, each with a limit of its own."""
+    mass, stiffness = np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]])
+    gap = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 0.0]] * 2)
+    laws = tuple(ElasticCoulomb(k_t=0.5, k_w=0.0, k_n=1.0, mu=0.5, preload=n) for n in (1.0, 0.4))
+    structure = Structure(mass, 0.02 * stiffness, stiffness, table(("a.x", "b.x")))
+    system = System(structure, Interface(("1", "2"), laws, gap), np.array([0, 1]))
+    return system, HarmonicLoad(np.zeros(2), {1: np.array([0.0, 0.06 + 0j])})
+
+
+@pytest.fixture(scope="module")
+def rubbed() -> tuple[Question, Solved]:
+    """Their first resonance, at which one place slips."""
+    system, load = rubbing()
+    sweep = Sweep(omega_range=(0.6, 1.0), low=1, high=3, points=10, peak_points=3, samples=64)
+    asked = question(system, load, sweep)
+    return asked, solved(asked)
+
+
+def test_dataset_holds_what_the_library_finds(rubbed: tuple[Question, Solved]) -> None:
+    asked, found = rubbed
+    data = dataset(found)
+    system, load = asked.model.system, asked.model.load
+    points = accepted_points(list(forced_response(system, load, asked.sweep)))
+    problem = forced_problem(system, load, asked.sweep)
+    assert data.sizes["point"] == len(points) == int(data.points[0])
+    np.testing.assert_array_equal(data.frequency_hz, [p.omega / HZ for p in points])
+    np.testing.assert_array_equal(data.order, [p.order for p in points])
+    np.testing.assert_array_equal(data.unknowns, [2 * p.order + 1 for p in points])
+    assert set(data.order.values) == {1, 3}
+    for i, point in enumerate(points):
+        own = fields(problem, point)
+        for name, value in (("output_displacement", own.outputs), ("gap", own.gaps), ("contact_force", own.forces)):  # fmt: skip
+            stored = data[name][i].values[..., 0] + 1j * data[name][i].values[..., 1]
+            np.testing.assert_array_equal(stored[: point.order + 1], value)
+            assert np.all(stored[point.order + 1 :] == 0.0)
+        np.testing.assert_array_equal(data.dissipated_energy[i], own.energy)
+        assert data.harmonic_kept[i].values.tolist() == [int(h <= point.order) for h in range(4)]
+    top = int(np.argmax(data.amplitude[:, 0].values))
+    assert int(data.peak_point[0]) == top
+    assert float(data.peak_amplitude[0]) == data.amplitude[top, 0]
+    assert set(np.unique(data.peak_state)) == {0, 1}
+    assert data.contact_group.values.tolist() == ["joint", "joint"]
+    assert data.attrs["failed"] == 0
+    assert list(data.attrs["high_harmonics"]) == [0, 1, 2, 3]
+    assert "speed_rpm" not in data
+    assert "verify_case" not in data
+
+
+@pytest.mark.parametrize("kept", [1, 5, -3, -1, None])
+def test_what_was_interrupted_goes_on_to_the_same_bits(
+    rubbed: tuple[Question, Solved], kept: int | None
+) -> None:
+    asked, whole = rubbed
+    again = solved(asked, kept, whole)
+    assert len(again.records) == len(whole.records)
+    same = dataset(whole).drop_vars(NO_TIME)
+    xr.testing.assert_identical(dataset(again).drop_vars(NO_TIME), same)
+
+
+def test_file_of_netcdf_gives_the_same_dataset(
+    rubbed: tuple[Question, Solved], tmp_path: Path
+) -> None:
+    data = dataset(rubbed[1])
+    data.to_netcdf(tmp_path / "a.nc", engine="h5netcdf")
+    with xr.open_dataset(tmp_path / "a.nc", engine="h5netcdf") as read:
+        xr.testing.assert_equal(read.load(), data)
+
+
+def test_checks_of_a_finished_job_agree_and_solve_nothing_again(
+    rubbed: tuple[Question, Solved], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked, whole = rubbed
+    both = replace(asked, checks=frozenset(FORCED_RESPONSE.checks))
+    found = solved(both, None, whole)
+    data = dataset(found)
+    # one case alone: its peak and both flanks
+    assert data.sizes["check"] == 3
+    # three harmonics of a slipping contact: half a percent is what the fifth one does
+    assert np.abs(data.verify_difference_percent).max() < 1.0
+    assert np.all(data.verify_settled == 1)
+    assert data.sizes["point"] == data.reference_error_percent.size
+    assert float(data.reference_worst_percent[0]) == data.reference_error_percent.max()
+    told = [t.title for t in FORCED_RESPONSE.summary(data)]
+    assert told == [
+        "Forced response",
+        "Where guarded_alert asked for more harmonics",
+        "Against twice as many harmonics",
+        "Against time integration",
+    ]
+
+
+def test_cases_of_different_harmonics_and_contacts_stand_side_by_side(
+    rubbed: tuple[Question, Solved],
+) -> None:
+    asked, _ = rubbed
+    system = asked.model.system
+    other = replace(system, interface=replace(system.interface, names=("1", "3")))
+    sweep = replace(asked.sweep, high=5, selection="always_high", points=3, peak_points=0, samples=128)  # fmt: skip
+    contacts = replace(asked.model.contacts, names=("1", "3"))
+    one = replace(asked, sweep=replace(sweep, high=3), label="high = 3")
+    two = replace(asked, sweep=sweep, label="high = 5", model=replace(asked.model, system=other, contacts=contacts))  # fmt: skip
+    each = [solved(one), solved(two)]
+    data, alone = dataset(*each), [dataset(s) for s in each]
+    assert data.contact.values.tolist() == ["1", "2", "3"]
+    assert data.sizes["harmonic"] == 6
+    split = [data.isel(point=data.point_case == i) for i in (0, 1)]
+    for i, labels in enumerate((["1", "2"], ["1", "3"])):
+        n = alone[i].sizes["harmonic"]
+        np.testing.assert_array_equal(split[i].gap.sel(contact=labels)[:, :n], alone[i].gap.values)
+        assert np.all(split[i].gap.sel(contact=labels)[:, n:] == 0.0)
+        assert np.all(split[i].harmonic_kept[:, n:] == 0)
+        np.testing.assert_array_equal(data.peak_force[i].sel(contact=labels)[..., : alone[i].sizes["sample"]], alone[i].peak_force[0])  # fmt: skip
+    assert np.all(np.isnan(split[0].gap.sel(contact="3")))
+    assert np.all(data.peak_state[0].sel(contact="3") == -1)
+    assert int(data.peak_point[1]) >= int(data.points[0])
+    rows = FORCED_RESPONSE.summary(data)[0].rows
+    assert [r[0] for r in rows] == ["high = 3", "high = 5"]
+
+
+def lifted(**sweep: object) -> Question:
+    system, load = lifting()
+    given: dict[str, object] = {
+        "omega_range": (0.8, 1.6), "low": 3, "high": 3, "selection": "always_high", "points": 30, "peak_points": 4, "samples": 128,
+    }  # fmt: skip
+    return question(system, load, Sweep(**given | sweep))  # type: ignore[arg-type]
+
+
+def test_fold_is_told_with_the_label_of_its_case() -> None:
+    asked = lifted()
+    said = warnings_of(dataset(solved(asked)))
+    assert len(said) == 1
+    assert said[0].startswith("The response folds between 0.2")
+    said = warnings_of(dataset(solved(replace(asked, label="load.f.force_n = 2"))))
+    assert said[0].startswith("load.f.force_n = 2: the response folds between")
+
+
+def test_peak_at_the_end_is_no_resonance() -> None:
+    said = warnings_of(dataset(solved(lifted(omega_range=(0.6, 0.9), points=5))))
+    told = (
+        f"The largest amplitude stands at the end of the sweep ({0.9 / HZ:.2f} Hz); it is no resonance. "
+        "Widen forced_response.frequency_hz."
+    )
+    assert said == [told]
+
+
+def test_points_without_a_solution_are_marked_and_not_filled_in() -> None:
+    hopeless = Newton(max_iterations=1)
+    data = dataset(
+        solved(lifted(newton=hopeless, frequencies=2, omega_range=(0.3, 1.4), peak_points=0))
+    )
+    lost = data.status.values != 0
+    assert 0 < lost.sum() == int(data.points_failed[0]) == data.attrs["failed"]
+    for name in ("amplitude", "gap", "contact_force", "output_displacement", "dissipated_energy"):
+        assert np.all(np.isnan(data[name].values[lost])), name
+        assert np.all(np.isfinite(data[name].values[~lost])), name
+    assert f"{lost.sum()} points did not converge" in warnings_of(data)[0]
+
+
+def drifting(retention: float) -> Question:
+    """A mass between two contacts that both slip in every cycle: nothing says where it stands."""
+    mass, stiffness = np.diag([1.0, 0.1]), np.diag([100.0, 0.0])
+    damping = np.diag([0.4, 0.0])
+    gap = np.array([[1.0, -1.0], [0.0, 0.0], [0.0, 0.0]])
+    law = Jenkins(k_t=200.0, limit=0.05)
+    structure = Structure(mass, damping, stiffness, table(("blade.x", "ring.x")))
+    bare = System(structure, Interface(("ring",), (law,), gap), np.array([0]), free=np.array([1]))
+    load = HarmonicLoad(np.zeros(2), {1: np.array([1.0 + 0j, 0.0])})
+    sweep = Sweep(omega_range=(8.0, 12.0), low=1, high=3, points=8, peak_points=4, samples=64)
+    held = bare.with_retention(retention)
+    return question(held, load, sweep, model={"bare": bare, "retention": retention})
+
+
+def test_body_that_may_drift_is_told_and_retention_is_judged() -> None:
+    free = warnings_of(dataset(solved(drifting(0.0))))
+    assert any(
+        "the mean position of node1.ring.x is undetermined and the body may drift" in t
+        for t in free
+    )
+    data = dataset(solved(drifting(1e-2)))
+    assert not any("may drift" in t for t in warnings_of(data))
+    assert 0.0 < abs(float(data.retention_peak_shift[0])) < 1e-3
+
+
+def test_load_without_an_equilibrium_leaves_an_empty_case(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object, **__: object):
+        raise SingularError("static equilibrium: coordinate x is held by nothing")
+        yield
+
+    monkeypatch.setattr("stickslip.study.analyses.forced_response.forced_response", fails)
+    asked = lifted()
+    with JobJournal(Path(":memory:"), ForcedPoint) as journal:
+        with pytest.raises(SingularError, match="held by nothing"):
+            list(FORCED_RESPONSE.solve(asked, [], journal))
+        case = Case(0, "", {}, None, None, "", Path())  # type: ignore[arg-type]
+        empty = Solved(case, journal.records(), journal.notes())
+    monkeypatch.undo()
+    data = dataset(empty, solved(lifted(points=5, peak_points=0)))
+    assert data.points.values.tolist()[0] == 0
+    assert np.isnan(data.peak_amplitude[0])
+    assert int(data.peak_point[0]) == -1
+    assert np.all(data.point_case == 1)
+    assert data.order.dtype.kind == "i"
+
+
+def test_warnings_of_a_sweep_beside_all_resonances() -> None:
+    asked = lifted(omega_range=(60 * HZ, 70 * HZ))
+    told = (
+        "no natural frequency lies between 60.00 and 70.00 Hz, neither with open nor with stuck contacts; the nearest one is "
+        "50.00 Hz. Widen forced_response.frequency_hz."
+    )
+    assert no_resonance(asked) == [told]
+    assert no_resonance(lifted(omega_range=(40 * HZ, 70 * HZ))) == []
+    assert mixed_places(("a.x", "b.rz"))[0].startswith(
+        "harmonics.alert_over mixes rotations (b.rz)"
+    )
+    assert mixed_places(("a.x", "b.y")) == []
+
+
+# ---- the table, and what is refused ------------------------------------------------------------------------------------
+
+
+def settings(harmonics: dict[str, object] | None = None, **table_: object) -> SimpleNamespace:
+    return SimpleNamespace(
+        forced_response=ForcedResponse(**table_),
+        harmonics=Harmonics(**harmonics or {}),
+        solver=SimpleNamespace(evaluator="events"),
+        limits=SimpleNamespace(memory_gb=4.0, work_s=7200.0),
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({}, "is missing. Give one of frequency_hz and frequencies_hz"),
+        ({"frequency_hz": [2.0, 1.0]}, "must be the lower before the higher"),
+        ({"frequency_hz": [1.0, 2.0], "frequencies_hz": [1.0]}, "cannot stand beside frequency_hz"),
+        ({"frequencies_hz": [1.0, 1.0]}, "must grow"),
+        ({"frequencies_hz": [1.0, 2.0], "frequencies": 4}, "cannot stand beside frequencies_hz"),
+        (
+            {"frequency_hz": [1.0, 2.0], "over": "speed"},
+            "is not for over = 'speed'. Give speed_rpm",
+        ),
+        ({"speed_rpm": [1.0, 2.0]}, "is not for over = 'frequency'"),
+        ({"over": "speed"}, "is missing. Give one of speed_rpm"),
+        ({"frequency_hz": [1.0, 2.0], "frequencies": 1}, "greater than or equal to 2"),
+    ],
+)
+def test_tables_that_do_not_say_where_are_refused(given: dict[str, object], message: str) -> None:
+    with pytest.raises(ValidationError, match=message.replace("(", r"\(")):
+        ForcedResponse(**given)
+
+
+def test_sweeps_over_ranges_lists_and_speeds() -> None:
+    sweep = sweep_of(settings(frequency_hz=[1.0, 2.0], direction="down"), None)
+    assert sweep.omega_range == (HZ, 2 * HZ)
+    assert sweep.ends == (2 * HZ, HZ)
+    sweep = sweep_of(settings(frequencies_hz=[1.0, 1.5, 4.0]), None)
+    assert sweep.grid.tolist() == [HZ, 1.5 * HZ, 4 * HZ]
+    assert sweep_of(settings(frequencies_hz=[3.0]), None).grid.tolist() == [3 * HZ]
+    sweep = sweep_of(settings(over="speed", speed_rpm=[100.0, 200.0]), 6)
+    assert sweep.omega_range == (600 * RPM, 1200 * RPM)
+    with pytest.raises(
+        InputError, match=r"forced_response\.over: is speed, and no load has an engine order"
+    ):
+        sweep_of(settings(over="speed", speed_rpm=[100.0, 200.0]), None)
+
+
+def test_response_over_speed_has_speeds() -> None:
+    asked = replace(lifted(points=5, peak_points=0), key="speed_rpm")
+    asked = replace(asked, model=replace(asked.model, engine_order=2, sectors=4))
+    data = dataset(solved(asked))
+    np.testing.assert_allclose(data.speed_rpm * 2 / 60, data.frequency_hz, rtol=1e-14)
+    assert data.attrs["engine_order"] == 2
+    assert data.attrs["sectors"] == 4
+
+
+def model(**others: object) -> Model:
+    structure = Structure(np.eye(3), np.eye(3), np.eye(3), table(("x", "y", "z")), {"tip": np.arange(3)})  # fmt: skip
+    law = ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=1.0, mu=0.5)
+    given: dict[str, object] = {
+        "parts": {"blade": Part(structure=structure)},
+        "contacts": {"root": Contact(between=("blade.tip", "ground"), law=law)},
+        "loads": {"shaker": Load(on="blade.tip", newton=1.0, direction=(1.0, 0.0, 0.0))},
+    }
+    return Model(**given | others)  # type: ignore[arg-type]
+
+
+def refused(asked: Model, checks: frozenset[str] = frozenset(), **limits: float) -> str:
+    own = settings(frequency_hz=[1.0, 2.0])
+    own.limits = SimpleNamespace(**{"memory_gb": 4.0, "work_s": 7200.0} | limits)
+    case = Case(0, "", {}, own, lambda: asked, "", Path(), checks)
+    with pytest.raises(InputError) as error:
+        question_of(case, asked)
+    return str(error.value)
+
+
+def test_what_cannot_be_answered_is_refused_by_key() -> None:
+    third = Load(on="blade.tip", newton=1.0, direction=(1.0, 0.0, 0.0), harmonic=3)
+    assert refused(model(loads={"third": third})) == (
+        "harmonics.low: must hold harmonic 3, which load.third drives, got 1. Add it, for example low = [1, 3]."
+    )
+    slider = Contact(between=("blade.tip", "ground"), law=Jenkins(k_t=1.0, limit=1.0))
+    assert refused(model(contacts={"root": slider}), frozenset({"verify"})) == (
+        "contact.root.law: --verify integrates in time, which knows elastic_coulomb alone, got 'jenkins'. "
+        "Run without --verify, or give the law elastic_coulomb."
+    )
+    wheel = {"disk": replace(model().parts["blade"], sectors=12)}
+    assert refused(model(parts=wheel, contacts={}), frozenset({"verify"})).startswith(
+        "part.disk.sectors: --verify integrates one structure in time"
+    )
+    assert refused(model(), memory_gb=0.1).startswith(
+        "limits.memory_gb: the forced response is estimated at 0."
+    )
+    assert refused(model(), work_s=1e-9).startswith(
+        "limits.work_s: a case of the forced response is estimated at"
+    )
+
+
+def test_static_loads_need_no_harmonic_of_their_own() -> None:
+    pull = Load(on="blade.tip", newton=1.0, direction=(1.0, 0.0, 0.0), harmonic=0)
+    assert estimate(model(loads={"pull": pull}), lifted().sweep).nodes == 1
+    assert retained_of(model()) == 3
