@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from evidence.validation import case_chain_small, case_nlvib, case_tmdsimpy
+from evidence.validation import case_ansys_vm, case_chain_small, case_nlvib, case_tmdsimpy
 from evidence.validation.reference_data import COMPLETE, contact2d, has_complete, nlvib
 
 
@@ -43,6 +43,12 @@ def test_duffing_oscillator_has_several_motions_at_one_frequency():
     # the curve folds back, so that what is compared is more than one branch
     turns = np.diff(np.sign(np.diff(case.omega)))
     assert np.count_nonzero(turns) == 2
+
+
+def test_peaks_of_a_verification_manual():
+    records = case_ansys_vm.run()
+    assert len(records) == 14
+    assert [record["quantity"] for record in records if not record["holds"]] == []
 
 
 def test_peak_of_the_small_chain_under_partial_slip():

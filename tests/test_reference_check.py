@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_tuned_wheel import TABLE, TIP, blisk
+from test_tuned_wheel import TABLE
 
 import stickslip as ss
 from evidence.models.lumped import blades_and_damper
+from evidence.models.lumped_disks import TIP, friction_ring
 from stickslip.errors import InputError
 from stickslip.solve.status import Status
 
@@ -108,7 +109,7 @@ def test_factors_that_add_nothing_are_refused(factor):
 
 def ring(waves, low, high):
     """Return problem and points of literature benchmark B9 at 622 to 627 Hz; errors are those of the tip."""
-    wheel, operator = blisk(waves)
+    wheel, operator = friction_ring(waves)
     contacts = ss.Interface(("ring",), (ss.Jenkins(k_t=2e7, limit=4.0),), operator)
     force = np.zeros(6)
     force[TIP] = 1.0
