@@ -2,9 +2,15 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.system import System
+
+CHECKED = 5  # natural frequencies that must agree
+AGREEMENT = 1e-3  # relative
+RIGID = 1e-4  # of the highest frequency: below, rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +71,38 @@ class Frequencies:
     free_reduced: FloatArray
     stuck_full: FloatArray
     stuck_reduced: FloatArray
+
+    def lines(self) -> list[str]:
+        """Return the comparison as lines of text."""
+        return [
+            f"{what} mode {i + 1}: full {full:.4f} Hz, reduced {reduced:.4f} Hz, {100 * error:+.5f} %"
+            for what, fulls, reduceds in self._pairs()
+            for i, (full, reduced, error) in enumerate(
+                zip(fulls, reduceds, _errors(fulls, reduceds), strict=True)
+            )
+        ]
+
+    def warnings(self) -> list[str]:
+        """Return a sentence for each set of modes that the reduction does not reproduce."""
+        found = []
+        for what, full, reduced in self._pairs():
+            error = np.abs(_errors(full, reduced))[:CHECKED]
+            if np.any(error > AGREEMENT):
+                found.append(
+                    f"the reduced model misses a {what} natural frequency by {100 * error.max():.3g} % (mode "
+                    f"{int(np.argmax(error)) + 1}, more than {100 * AGREEMENT:g} %): raise reduction.fixed_interface_modes."
+                )
+        return found
+
+    def _pairs(self) -> tuple[tuple[str, FloatArray, FloatArray], ...]:
+        free = "free", self.free_full, self.free_reduced
+        return free, ("stuck", self.stuck_full, self.stuck_reduced)
+
+
+def _errors(full: FloatArray, reduced: FloatArray) -> FloatArray:
+    """Return relative errors of frequencies; zero for the modes of a body that nothing holds, as a damper without friction."""
+    moves = full > RIGID * full.max(initial=0.0)
+    return np.where(moves, reduced / np.where(moves, full, 1.0) - 1.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)

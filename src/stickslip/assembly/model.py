@@ -1,12 +1,34 @@
 """Parts, contacts and loads: a model. It does not know who asks."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import Any, Literal
 
+import numpy as np
+
+from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
+from stickslip.assembly.assembled import Assembled, Skin
 from stickslip.assembly.contact import Contact, Join
+from stickslip.assembly.coordinates import Coordinates, coordinates
 from stickslip.assembly.load import Load, Output
+from stickslip.assembly.pairs import Pairs, pair_contacts
+from stickslip.assembly.places import Places, picked
+from stickslip.assembly.reduced import Spin, Store, at_speed, in_memory
+from stickslip.assembly.skin import on_skin, skin_of
+from stickslip.assembly.statics import StaticState, static_state
+from stickslip.assembly.ties import Ties, tie_joins
+from stickslip.assembly.wheel import Neighbours, neighbours, with_joins
+from stickslip.errors import input_error
+from stickslip.model.axis import Axis
+from stickslip.model.facts import Facts, facts_of_parts
+from stickslip.model.modes import with_springs
 from stickslip.model.part import Part
+from stickslip.model.structure import Structure, join
+from stickslip.reduction.cyclic import travelling_wave
+from stickslip.reduction.projection import in_coordinates
+from stickslip.reduction.selection import surviving_sets
+from stickslip.reduction.waves import wave
 
 ContactsAs = Literal["static", "stuck", "open"]
 
@@ -20,11 +42,12 @@ class Model:
     parts, contacts, joins, loads
         By name.
     outputs
-        Where motion is reported; the first label decides the peak unless `peak_output` names another.
+        Where motion is reported; none: where harmonic loads act. The first label decides the peak unless `peak_output` names another.
     peak_output
         Label ``name.direction`` of the output whose peak is resolved; empty: the first one.
     alert_over
-        Labels over which the error of missing harmonics is taken; empty: the outputs along the excitation.
+        Labels over which the error of missing harmonics is taken, or one of the words ``outputs``, ``contacts``, ``along``; empty:
+        the outputs along the excitation.
     speed
         Of rotation, rad/s.
     tangent, coriolis
@@ -33,6 +56,11 @@ class Model:
         Whether the centrifugal load of rotating parts is a static load of the response.
     retention
         Stiffness that holds the mean position of free rigid bodies, N/m.
+
+    Raises
+    ------
+    InputError
+        When it is first used: naming the part, contact, join or load, and what is wrong with it.
     """
 
     parts: Mapping[str, Part]
@@ -47,3 +75,234 @@ class Model:
     coriolis: bool = False
     centrifugal: bool = True
     retention: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.parts:
+            raise input_error("part", "there is none", "Give a model at least one part.")
+
+    def __repr__(self) -> str:
+        """Return what it is in a line."""
+        named = {
+            "parts": self.parts,
+            "contacts": self.contacts,
+            "joins": self.joins,
+            "loads": self.loads,
+        }
+        words = [f"{what} {', '.join(own)}" for what, own in named.items() if own]
+        if self.sectors > 1:
+            words.append(f"one of {self.sectors} sectors")
+        if self.speed:
+            words.append(f"{self.speed:g} rad/s")
+        return f"<Model: {'; '.join(words)}>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave what can be computed again behind."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    @property
+    def sectors(self) -> int:
+        """Number of sectors of the wheel; 1 for a single structure."""
+        return max(part.sectors for part in self.parts.values())
+
+    @property
+    def rotates(self) -> bool:
+        """Whether a speed changes it."""
+        return any(part.solid is not None for part in self.parts.values())
+
+    @property
+    def axis(self) -> Axis:
+        """Axis of rotation: that of the first part that turns."""
+        turning = [
+            part for part in self.parts.values() if part.solid is not None or part.sectors > 1
+        ]
+        return (turning or list(self.parts.values()))[0].axis
+
+    @cached_property
+    def places(self) -> Places:
+        """What its names mean."""
+        return Places(self.parts)
+
+    @cached_property
+    def neighbours(self) -> Neighbours | None:
+        """How its parts meet their neighbours on the wheel; None for a single structure."""
+        return with_joins(neighbours(self.places, self.parts), self.ties)
+
+    @cached_property
+    def ties(self) -> Ties:
+        """What its joins tie."""
+        alone = neighbours(self.places, self.parts) if self.joins else None
+        return tie_joins(self.places, self.joins, None if alone is None else alone.turn)
+
+    @cached_property
+    def pairs(self) -> Pairs:
+        """Points of its contacts."""
+        here = self.neighbours
+        return pair_contacts(self.places, self.contacts, None if here is None else here.turn)
+
+    @cached_property
+    def pressed(self) -> BoolArray:
+        """(p,) contact points that stick in small vibrations about the static state at `speed`."""
+        from stickslip.assembly.build import pressed_points
+
+        return pressed_points(self)
+
+    @property
+    def facts(self) -> Facts:
+        """Mass, size and counts; of one sector."""
+        return facts_of_parts(self.parts.values())
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know."""
+        of_parts = [text for part in self.parts.values() for text in part.warnings]
+        of_wheel = () if self.neighbours is None else self.neighbours.warnings
+        return tuple(dict.fromkeys([*of_parts, *of_wheel, *self.pairs.warnings]))
+
+    def spin(self, speed: float) -> Spin:
+        """Return how it turns at a speed in rad/s."""
+        return Spin(float(speed), self.tangent, self.coriolis)
+
+    def full(self, speed: float) -> Structure:
+        """Return all parts side by side at a speed in rad/s, before joins and cyclic faces tie them."""
+        ties = {} if self.neighbours is None else self.neighbours.ties
+        spin = self.spin(speed)
+        return join(
+            **{
+                name: at_speed(name, part, spin, ties.get(name))
+                for name, part in self.parts.items()
+            }
+        )
+
+    @cached_property
+    def coordinates(self) -> Coordinates:
+        """Coordinates of `full` that the joins leave."""
+        return coordinates(np.arange(self.places.n), self.ties)
+
+    def at(self, speed: float, wave_number: int = 0, contacts: ContactsAs = "static") -> Structure:
+        """Return the full structure for small vibrations at a speed, as the travelling wave of a wave number where it is a sector.
+
+        Parameters
+        ----------
+        speed
+            In rad/s.
+        wave_number
+            Modulo the number of sectors; of no meaning for a single structure.
+        contacts
+            What contacts do: ``open``: nothing; ``stuck``: all are springs; ``static``: those are that the static state at the
+            model's own speed presses. Rigid bodies that nothing holds then are left out.
+
+        Returns
+        -------
+        Structure
+            Sparse where a part is; `basis` leads to the dofs of all parts, in the order of `places`.
+        """
+        at = self.coordinates
+        structure, tie = at.tied(self.full(speed)), at.tie
+        operators = [at.columns(self.pairs.own), at.columns(self.pairs.following)]
+        phase: complex | float = 1.0
+        if self.neighbours is not None:
+            structure = travelling_wave(self.neighbours.sector(structure, at), wave_number)
+            phase = wave(wave_number, self.sectors).phase
+            way = structure.basis
+            operators = [operator @ way for operator in operators]
+            tie = way if tie is None else tie @ way
+        holds = self._holding(contacts)
+        stiffness = np.where(np.repeat(holds, 3), self._springs(holds), 0.0)
+        if holds.any():
+            structure = with_springs(structure, operators[0] + phase * operators[1], stiffness)
+        structure = structure if tie is None else _leading(structure, tie)
+        return self._without(structure, self._loose(holds))
+
+    def _holding(self, contacts: ContactsAs) -> BoolArray:
+        p = len(self.pairs.names)
+        if contacts == "static" and p:
+            return self.pressed
+        return np.full(p, contacts == "stuck")
+
+    def _springs(self, holds: BoolArray) -> FloatArray:
+        rows = [
+            law.stuck_stiffness() if hold else np.zeros(3)
+            for law, hold in zip(self.pairs.laws, holds, strict=True)
+        ]
+        return np.array(rows, dtype=float).reshape(-1)
+
+    def _loose(self, holds: BoolArray) -> IntArray:
+        """Return the dofs of rigid bodies that no contact or join holds."""
+        rows = np.repeat(holds, 3)
+        touched = [m[rows].nonzero()[1] for m in (self.pairs.own, self.pairs.following)]
+        held = np.unique(np.concatenate([*touched, self.ties.weights.nonzero()[1]]))
+        bodies = [
+            self.places.own(name) for name, part in self.parts.items() if part.body is not None
+        ]
+        loose = [own for own in bodies if not np.isin(own, held).any()]
+        return np.concatenate([np.zeros(0, dtype=np.int64), *loose])
+
+    def _without(self, structure: Structure, dofs: IntArray) -> Structure:
+        """Return a structure without coordinates that are some of the dofs of rigid bodies."""
+        if not dofs.size:
+            return structure
+        table = structure.dofs
+        names = {self.places.dofs.part[dof] for dof in dofs}
+        stays = np.array([part not in names for part in table.part])
+        index = np.flatnonzero(stays)
+        if not index.size:
+            raise input_error(
+                "part",
+                "nothing is left without free rigid bodies",
+                "Let contacts stick, or give a part that is held.",
+            )
+        into = picked(np.where(stays, np.cumsum(stays) - 1, -1), index.size)
+        if structure.basis is None:
+            structure = _leading(structure, picked(np.arange(structure.n), structure.n))
+        return in_coordinates(structure, into, table.take(index), surviving_sets(structure, index))
+
+    @cached_property
+    def skin(self) -> Skin | None:
+        """The skin of its meshes; None where no part has one."""
+        return skin_of(self.parts)
+
+    def on_skin(self, field: Matrix) -> Matrix:
+        """Return displacements (m, n, 3) of the skin's points from fields (N, m) on the dofs of all parts, as `at(...).expand` makes them."""
+        return on_skin(self.places, field)
+
+    def static_displacement(self, speed: float) -> dict[str, FloatArray]:
+        """Return the (nodes, 3) static displacements in m of the meshes of rotating parts at a speed in rad/s; none at rest."""
+        found: dict[str, FloatArray] = {}
+        ties = {} if self.neighbours is None else self.neighbours.ties
+        for name, part in self.parts.items():
+            if part.solid is not None and speed > 0:
+                moved = part.solid.displacement(speed, tie=ties.get(name))
+                found[name] = part.solid.at_nodes(moved)
+        return found
+
+    def static_state(self, speed: float) -> StaticState | None:
+        """Return what the centrifugal load does to the solids at a speed in rad/s; None at rest, and where no speed changes anything."""
+        return static_state(self.parts, self.static_displacement(speed), speed)
+
+    def assembled(self, harmonics: int, store: Store | None = None) -> Assembled:
+        """Reduce the parts, join them, pair the contacts, and place all under the static loads.
+
+        Parameters
+        ----------
+        harmonics
+            Highest harmonic of the response.
+        store
+            Takes a text that all depends on and a function that makes named arrays; returns these, perhaps from an earlier run.
+
+        Raises
+        ------
+        InputError
+            If something of the model does not fit; the message names it.
+        SingularError
+            If nothing holds a body, or the static loads find no equilibrium.
+        """
+        from stickslip.assembly.build import assemble
+
+        return assemble(self, harmonics, in_memory if store is None else store)
+
+
+def _leading(structure: Structure, basis: Matrix) -> Structure:
+    """Return a structure whose way back is `basis`."""
+    return Structure(
+        structure.mass, structure.damping, structure.stiffness, structure.dofs, structure.sets, basis, structure.loss,
+    )  # fmt: skip

@@ -8,9 +8,9 @@ import numpy as np
 import scipy.sparse
 from scipy.spatial import cKDTree
 
-from stickslip.arrays import FloatArray, Matrix
+from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.contact import GROUND, NEXT, Contact, Join
-from stickslip.assembly.places import NO_FACETS, Places, Spot
+from stickslip.assembly.places import AXES, NO_FACETS, Places, Spot
 from stickslip.contact.law import ContactLaw, scaled
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
@@ -53,9 +53,7 @@ class Turn:
 
     def points(self, points: FloatArray) -> FloatArray:
         """Return points (n, 3) of this sector as those of the next."""
-        return (
-            points if self.axis is None else self.axis.turned(points, 2 * np.pi / self.sectors)
-        )
+        return points if self.axis is None else self.axis.turned(points, 2 * np.pi / self.sectors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +70,9 @@ class Pairs:
         Of each point, its share of the contact's.
     position, frame, area
         (p, 3) in m, (p, 3, 3) columns t, w, n, (p,) in m²; NaN where there is none.
+    nodes
+        (p, 3) dofs x, y, z of the node that a point is, of the first side, or of the second where the first is a rigid body; -1
+        where there is none.
     warnings
         What the user should know.
     """
@@ -84,6 +85,7 @@ class Pairs:
     position: FloatArray
     frame: FloatArray
     area: FloatArray
+    nodes: IntArray
     warnings: tuple[str, ...] = ()
 
     @property
@@ -128,6 +130,7 @@ def pair_contacts(places: Places, contacts: Mapping[str, Contact], turn: Turn | 
         stacked("position", np.zeros((0, 3))),
         stacked("frame", np.zeros((0, 3, 3))),
         stacked("area", np.zeros(0)),
+        np.concatenate([np.zeros((0, 3), dtype=np.int64), *(p.nodes for p in found)]),
         tuple(text for p in found for text in p.warnings),
     )
 
@@ -161,8 +164,26 @@ def one_contact(places: Places, name: str, contact: Contact, turn: Turn | None) 
         pairing.positions,
         pairing.frames,
         area,
+        _nodes(places, contact, first, operator[:, :n]),
         warnings,
     )
+
+
+def _nodes(places: Places, contact: Contact, first: Spot, own: Matrix) -> IntArray:
+    """Return the dofs of the node that each point is."""
+    assert first.surface is not None
+    p = own.shape[0] // 3
+    found = np.full((p, 3), -1, dtype=np.int64)
+    if first.nodes is not None:
+        return found if contact.pairing == "segment_to_segment" else first.nodes[first.surface.used]
+    table = places.dofs
+    for i in range(p):
+        used = np.unique(own[3 * i : 3 * i + 3].indices)
+        used = used[table.node[used] >= 0]
+        if np.unique(table.node[used]).size == 1:
+            axes = [AXES.index(table.component[dof]) for dof in used]
+            found[i, axes] = used
+    return found
 
 
 def sides(
@@ -179,7 +200,7 @@ def sides(
     second = places.spot(two.removeprefix(NEXT), place)
     if not two.startswith(NEXT):
         return first, second, None
-    if turn is None or places.parts[second.part].sectors == 1 and places.parts[second.part].mesh:
+    if turn is None or (places.parts[second.part].sectors == 1 and places.parts[second.part].mesh):
         raise input_error(
             place,
             f"has {two!r}, and {second.part!r} is no sector of a wheel",
@@ -199,7 +220,9 @@ def _paired(
     if b is None:
         empty = scipy.sparse.csr_array(with_normals.displacement.shape)
         b = Surface(with_normals.points, empty, NO_FACETS)
-        return named(key, contact, lambda: node_to_node(with_normals, b, tolerance=NEAR, direction=along))
+        return named(
+            key, contact, lambda: node_to_node(with_normals, b, tolerance=NEAR, direction=along)
+        )
     return named(key, contact, lambda: match(contact, with_normals, b, along))
 
 
@@ -209,7 +232,9 @@ def match(contact: Contact | Join, a: Surface, b: Surface, along: Any) -> Pairin
     if contact.pairing == "node_to_node":
         return node_to_node(a, b, tolerance=NEAR if reach is None else reach, direction=along)
     if contact.pairing == "node_to_segment":
-        return node_to_segment(a, b, reach=reach, tolerance=None if reach is None else reach / 10, direction=along)
+        return node_to_segment(
+            a, b, reach=reach, tolerance=None if reach is None else reach / 10, direction=along
+        )
     return segment_to_segment(a, b, reach=reach, direction=along)
 
 
@@ -257,7 +282,9 @@ def _with_normals(
         return replace(a, normals=first.frame[:, :, 2])
     if _whole(a) or (len(a.facets) and contact.pairing != "node_to_node"):
         return a
-    if len(a.facets):  # some of the nodes span facets: the others take the normal of the nearest one
+    if len(
+        a.facets
+    ):  # some of the nodes span facets: the others take the normal of the nearest one
         near = a.used[cKDTree(a.points[a.used]).query(a.points)[1]]
         return replace(a, facets=NO_FACETS, normals=a.node_normals()[near])
     theirs = None if second is None or b is None else _normals_of(second, b)
@@ -346,7 +373,9 @@ def _single_dofs(
     row = 3 * np.arange(p) + ROWS[contact.acts]
 
     def rows(dofs: Any, sign: float) -> Matrix:
-        return scipy.sparse.csr_array((np.full(len(dofs), sign), (row[: len(dofs)], dofs)), (3 * p, n))
+        return scipy.sparse.csr_array(
+            (np.full(len(dofs), sign), (row[: len(dofs)], dofs)), (3 * p, n)
+        )
 
     own, theirs = rows(one, -1.0), rows(two, 1.0)
     names = (name,) if p == 1 else tuple(f"{name}.{i + 1}" for i in range(p))
@@ -360,6 +389,7 @@ def _single_dofs(
         np.full((p, 3), np.nan),
         np.tile(np.eye(3), (p, 1, 1)),
         area,
+        np.column_stack([one, np.full((p, 2), -1)]),
     )
 
 

@@ -42,7 +42,7 @@ class Ties:
         Parameters
         ----------
         index
-            (n,) dofs in the order of coordinates; those that a follower needs are among them.
+            (n,) dofs in the order of coordinates, -1 for modal ones; those that a follower needs are among them.
 
         Returns
         -------
@@ -51,16 +51,15 @@ class Ties:
         stays
             (m,) positions in `index`.
         """
-        place = np.full(self.weights.shape[1], -1)
-        place[index] = np.arange(index.size)
         follows = np.isin(index, self.followers)
         stays = np.flatnonzero(~follows)
+        own = picked(np.where(follows, -1, np.cumsum(~follows) - 1), stays.size)
+        if not follows.any():
+            return own, stays
         column = np.full(self.weights.shape[1], -1)
-        column[index[stays]] = np.arange(stays.size)
-        own = picked(column[index], stays.size)
-        mine = self.weights[np.searchsorted(self.followers, index[follows])]
-        needed = scipy.sparse.coo_array(mine)
-        entries = (needed.data, (needed.row, column[needed.col]))
+        column[index[stays][index[stays] >= 0]] = np.flatnonzero(index[stays] >= 0)
+        mine = self.weights[np.searchsorted(self.followers, index[follows])].tocoo()
+        entries = (mine.data, (mine.row, column[mine.col]))
         followed = scipy.sparse.csr_array(entries, shape=(mine.shape[0], stays.size))
         into = picked(np.where(follows, np.cumsum(follows) - 1, -1), mine.shape[0])
         return scipy.sparse.csr_array(own + into @ followed), stays
@@ -82,7 +81,9 @@ def tie_joins(places: Places, joins: Mapping[str, Join], turn: Turn | None) -> T
         first, second, ahead = sides(places, key, join, turn)
         if second is None or first.surface is None or second.surface is None:
             raise input_error(
-                f"{key}.between", "needs two surfaces", "Clamp a part to hold it against the ground."
+                f"{key}.between",
+                "needs two surfaces",
+                "Clamp a part to hold it against the ground.",
             )
         found = _followed(key, join, first, second, ahead)
         if ahead is not None:
@@ -107,7 +108,8 @@ def _followed(
     key: str, join: Join, first: Spot, second: Spot, turn: Turn | None
 ) -> dict[int, Matrix]:
     """Return each dof of the first side with its row of weights; of the next sector, in its own axes."""
-    assert first.surface is not None and second.surface is not None
+    assert first.surface is not None
+    assert second.surface is not None
     if first.nodes is None:
         raise input_error(
             f"{key}.between",
@@ -155,7 +157,8 @@ def _refuse_clamped(key: str, first: Spot, dofs: IntArray, theirs: Matrix) -> No
     moving = np.diff(theirs.indptr) > 0
     stuck = np.flatnonzero((dofs < 0) & moving)
     if stuck.size:
-        assert first.surface is not None and first.surface.numbers is not None
+        assert first.surface is not None
+        assert first.surface.numbers is not None
         node = first.surface.numbers[stuck[0] // 3]
         raise input_error(
             f"{key}.between",
@@ -196,7 +199,9 @@ def _resolved(places: Places, followers: IntArray, weights: Matrix, rounds: int)
             return weights
         keep = np.ones(weights.shape[1])
         keep[followers] = 0.0
-        weights = scipy.sparse.csr_array(weights @ scipy.sparse.diags_array(keep) + chained @ weights)
+        weights = scipy.sparse.csr_array(
+            weights @ scipy.sparse.diags_array(keep) + chained @ weights
+        )
         weights.eliminate_zeros()
     dof = int(followers[weights[:, followers].nonzero()[1][0]])
     raise input_error(

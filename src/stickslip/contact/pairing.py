@@ -328,7 +328,9 @@ def _pairing(
 
 
 def _of_nodes(direction: Direction, nodes: IntArray) -> Direction:
-    return direction[nodes] if isinstance(direction, np.ndarray) and direction.ndim > 1 else direction
+    return (
+        direction[nodes] if isinstance(direction, np.ndarray) and direction.ndim > 1 else direction
+    )
 
 
 def _numbers(surface: Surface, nodes: IntArray) -> list[int]:

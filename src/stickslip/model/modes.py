@@ -165,7 +165,7 @@ def natural_frequencies(structure: Structure, n: int) -> FloatArray:
 
 
 def with_springs(structure: Structure, operator: Matrix, stiffness: FloatArray) -> Structure:
-    """Return the structure with springs added: ``K + operatorᵀ diag(stiffness) operator``.
+    """Return the structure with springs added: ``K + operatorᴴ diag(stiffness) operator``.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def with_springs(structure: Structure, operator: Matrix, stiffness: FloatArray) 
         (m,) in N/m.
     """
     sparse = scipy.sparse.csr_array(operator)
-    added = sparse.T @ scipy.sparse.diags_array(np.asarray(stiffness, dtype=float)) @ sparse
+    added = sparse.conj().T @ scipy.sparse.diags_array(np.asarray(stiffness, dtype=float)) @ sparse
     if scipy.sparse.issparse(structure.stiffness):
         return replace(structure, stiffness=(structure.stiffness + added).tocsr())
     return replace(structure, stiffness=structure.stiffness + added.toarray())

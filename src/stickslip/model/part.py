@@ -196,9 +196,7 @@ def solid_part(
     **others
         Further fields of `Part`: ``sectors``, ``faces``, ``n_modes``, ``damping_ratio``, ``between``, ``warnings``.
     """
-    solid = rotating_solid(
-        mesh, material, axis, clamped=clamped, held=held, quadrature=quadrature
-    )
+    solid = rotating_solid(mesh, material, axis, clamped=clamped, held=held, quadrature=quadrature)
     return Part(structure=solid.structure, mesh=mesh, solid=solid, axis=axis, **others)
 
 

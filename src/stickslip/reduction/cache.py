@@ -80,6 +80,14 @@ def cached(
     return made
 
 
+def content_hash(*values: object) -> str:
+    """Return the SHA-256 of the version of this package and all content of `values`: numbers, texts, None, arrays, dataclasses of these."""
+    digest = hashlib.sha256(f"{LAYOUT} {stickslip.__version__}".encode())
+    for i, value in enumerate(values):
+        _add(digest, f"value {i + 1}", value)
+    return digest.hexdigest()
+
+
 def _key(
     reduction: Callable[..., Structure], structure: Structure, arguments: tuple[object, ...]
 ) -> str:

@@ -9,12 +9,12 @@ import numpy as np
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.errors import InputError, input_error
 from stickslip.model.axis import Axis
+from stickslip.model.facts import facts_of_matrices, facts_of_solid
 from stickslip.model.fe.rotation import RotatingSolid, rotating_solid
 from stickslip.model.mesh.sector_mesh import mesh_sector
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
-from stickslip.study.facts import facts_of_matrices, facts_of_solid
 from stickslip.study.file_model import (
     HIGH,
     LOW,

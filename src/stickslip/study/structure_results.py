@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.model.facts import Facts as Facts
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,31 +23,6 @@ class Skin:
     points: FloatArray
     triangles: IntArray
     cut: IntArray
-
-
-@dataclass(frozen=True)
-class Facts:
-    """What the model is, in numbers.
-
-    Parameters
-    ----------
-    mass
-        Of the model (one sector) in kg; NaN where it cannot be told.
-    centre
-        (3,) centre of mass in m; NaN where the positions are not known.
-    low, high
-        (3,) corners of the box around all nodes in m.
-    dofs, nodes, elements
-        Counts; elements is 0 for models of matrices.
-    """
-
-    mass: float
-    centre: tuple[float, float, float]
-    low: tuple[float, float, float]
-    high: tuple[float, float, float]
-    dofs: int
-    nodes: int
-    elements: int
 
 
 @dataclass(frozen=True, eq=False)

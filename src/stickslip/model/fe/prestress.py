@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import FloatArray, Matrix
-from stickslip.model.fe.elements import NodeBlocks, Shape, chunks, gradients
+from stickslip.model.fe.elements import NodeBlocks, Shape, chunks, gradients, shape_functions
 from stickslip.model.fe.solid import Materials, lame_constants
 from stickslip.model.mesh.solid_mesh import SolidMesh
 
@@ -137,3 +137,24 @@ def _blocks(matrix: FloatArray) -> FloatArray:
     """Return (m, 3k, 3k) as (m, k, k, 9) blocks of node pairs."""
     m, k = len(matrix), matrix.shape[1] // 3
     return matrix.reshape(m, k, 3, k, 3).transpose(0, 1, 3, 2, 4).reshape(m, k, k, 9)
+
+
+def strain_and_rotation(mesh: SolidMesh, displacement: FloatArray) -> tuple[float, float]:
+    """Return the largest principal strain (a magnitude) and the largest rotation (rad) at the middles of the elements.
+
+    Parameters
+    ----------
+    mesh
+        Of the solid.
+    displacement
+        (nodes, 3) in m.
+    """
+    shape = shape_functions(mesh.cells.shape[1], 1)
+    strain = rotation = 0.0
+    for piece in chunks(mesh, shape):
+        slopes, _ = gradients(mesh, shape, piece)
+        found = np.einsum("mkx,mqky->mqxy", displacement[mesh.cells[piece]], slopes)
+        turned = np.swapaxes(found, 2, 3)
+        strain = max(strain, float(np.linalg.norm(found + turned, 2, axis=(2, 3)).max()) / 2)
+        rotation = max(rotation, float(np.linalg.norm(found - turned, 2, axis=(2, 3)).max()) / 2)
+    return strain, rotation

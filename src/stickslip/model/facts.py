@@ -1,15 +1,81 @@
 """Mass, centre of mass, size and counts of a model."""
 
+from collections.abc import Iterable
+from dataclasses import dataclass
+
 import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.model.fe.elements import chunks, gradients, shape_functions
 from stickslip.model.fe.solid import Material, Materials
 from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.part import Part
 from stickslip.model.structure import Structure
-from stickslip.study.structure_results import Facts
 
 DEGREE = 4  # integrates volume and first moment of straight-edged cells of second order exactly
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What the model is, in numbers.
+
+    Parameters
+    ----------
+    mass
+        Of the model (one sector) in kg; NaN where it cannot be told.
+    centre
+        (3,) centre of mass in m; NaN where the positions are not known.
+    low, high
+        (3,) corners of the box around all nodes in m.
+    dofs, nodes, elements
+        Counts; elements is 0 for models of matrices.
+    """
+
+    mass: float
+    centre: tuple[float, float, float]
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+    dofs: int
+    nodes: int
+    elements: int
+
+
+def facts_of_part(part: Part) -> Facts:
+    """Return the facts of a part."""
+    if "facts" not in part.memo:
+        part.memo["facts"] = _facts_of_part(part)
+    found: Facts = part.memo["facts"]
+    return found
+
+
+def _facts_of_part(part: Part) -> Facts:
+    if part.body is not None:
+        x, y, z = part.body.centre
+        places = [points.position for points in part.surfaces.values()]
+        corners = np.vstack([np.array([[x, y, z]]), *places])
+        low, high = _triple(corners.min(axis=0)), _triple(corners.max(axis=0))
+        return Facts(part.body.mass, (x, y, z), low, high, 6, 0, 0)
+    if part.mesh is not None and part.solid is not None:
+        return facts_of_solid(part.mesh, part.solid.material, part.structure.n)
+    return facts_of_matrices(part.structure)
+
+
+def facts_of_parts(parts: Iterable[Part]) -> Facts:
+    """Return the facts of several parts together."""
+    found = [facts_of_part(part) for part in parts]
+    if len(found) == 1:
+        return found[0]
+    mass = np.array([f.mass for f in found])
+    centre = mass @ np.array([f.centre for f in found]) / mass.sum()
+    return Facts(
+        mass=float(mass.sum()),
+        centre=_triple(centre),
+        low=_triple(np.fmin.reduce([f.low for f in found])),
+        high=_triple(np.fmax.reduce([f.high for f in found])),
+        dofs=sum(f.dofs for f in found),
+        nodes=sum(f.nodes for f in found),
+        elements=sum(f.elements for f in found),
+    )
 
 
 def facts_of_solid(mesh: SolidMesh, material: Materials, dofs: int) -> Facts:

@@ -1,0 +1,331 @@
+"""From a model to what solvers see: parts reduced, joined and loaded, contacts paired, all placed under the static loads."""
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
+from stickslip.assembly.assembled import Assembled, ContactTable, Frequencies
+from stickslip.assembly.coordinates import Coordinates, coordinates
+from stickslip.assembly.forces import (
+    Labels,
+    engine_order,
+    error_names,
+    force_of,
+    output_labels,
+)
+from stickslip.assembly.model import Model
+from stickslip.assembly.reduced import Store, in_memory, reduced_parts
+from stickslip.assembly.statics import pressed_by, static_contact_force
+from stickslip.assembly.waves import reduced_sector
+from stickslip.contact.interface import Interface
+from stickslip.contact.laws import LAWS
+from stickslip.errors import input_error
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.linear import LinearSide
+from stickslip.model.modes import natural_frequencies, with_springs
+from stickslip.model.structure import Structure, join
+from stickslip.reduction.cache import content_hash
+from stickslip.reduction.waves import excited_wave
+from stickslip.response.equilibrium import preload
+from stickslip.response.system import System
+
+MODES = 10  # natural frequencies compared
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """The linear side of a model on few coordinates.
+
+    Parameters
+    ----------
+    side
+        One structure, or the waves of a wheel.
+    gaps
+        (3 p, n) CSR.
+    steady
+        (n,) static load of steady rotation, N.
+    of_dofs
+        From dofs of all parts to coordinates; the second argument is the key that asks.
+    load
+        From a force on the dofs of all parts, in a harmonic, to one on the coordinates.
+    """
+
+    side: LinearSide
+    gaps: Matrix
+    steady: FloatArray
+    of_dofs: Any
+    load: Any
+
+
+def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
+    """Return a model as solvers see it; see `Model.assembled`."""
+    order = engine_order(model.loads, model.sectors > 1)
+    forces = {name: force_of(model.places, name, load) for name, load in model.loads.items()}
+    _refuse_beyond(model, harmonics)
+    labels = output_labels(model.places, model.outputs, model.loads)
+    if not labels.names:
+        raise input_error(
+            "output.points", "there is none", "Name a point whose motion is reported."
+        )
+    points = contact_labels(model)
+    names = error_names(labels, points, model.loads, model.alert_over)
+    watched = _joined(labels, points, _body_labels(model)).of(names, "alert_over")
+    if not model.pairs.names:
+        raise input_error(
+            "contact", "there is none: no coordinate would be left to solve for", "Give a contact."
+        )
+    kept = np.concatenate([labels.dofs, watched, *(np.flatnonzero(f) for f in forces.values())])
+    stay = np.concatenate([labels.dofs, watched])
+    linear = linear_side(model, order or 0, harmonics, kept, stay, store)
+    system = System(
+        linear.side,
+        Interface(model.pairs.names, model.pairs.laws, linear.gaps),
+        linear.of_dofs(labels.dofs, "output.points"),
+        alert_dofs=linear.of_dofs(watched, "alert_over"),
+        free=_free(model, linear),
+    )
+    load = _loads(model, linear, forces)
+    held = system.with_retention(model.retention)
+    gap, force = static_state(held, load.static)
+    checked = frequencies(model, system, order, store)
+    peak = labels.names.index(model.peak_output) if model.peak_output in labels.names else 0
+    if model.peak_output and model.peak_output not in labels.names:
+        labels.of((model.peak_output,), "output.peak")
+    return Assembled(
+        system=held,
+        bare=system,
+        load=load,
+        contacts=_table(model),
+        output_labels=labels.names,
+        peak_output=peak,
+        error_labels=names,
+        retention=model.retention,
+        excitation=_excitation(model),
+        static_gap=gap,
+        static_force=force,
+        frequencies=checked,
+        skin=model.skin,
+        sectors=model.sectors,
+        engine_order=order,
+        counts={
+            "nodes": model.facts.nodes,
+            "dofs": model.places.n,
+            "reduced": linear.side.n,
+            "retained": int(held.retained.size),
+        },
+        warnings=(*model.warnings, *checked.warnings()),
+    )
+
+
+def _refuse_beyond(model: Model, harmonics: int) -> None:
+    for name, load in model.loads.items():
+        if load.harmonic > harmonics:
+            raise input_error(
+                f"load.{name}.harmonic",
+                f"is {load.harmonic}, and harmonics up to {harmonics} are computed",
+                "Keep more harmonics.",
+            )
+
+
+def _joined(*labels: Labels) -> Labels:
+    names = tuple(name for one in labels for name in one.names)
+    return Labels(names, np.concatenate([one.dofs for one in labels]))
+
+
+def contact_labels(model: Model) -> Labels:
+    """Return names of the motion of contact points, ``point.x`` and so on, of those that are nodes."""
+    pairs, table = model.pairs, model.places.dofs
+    known = [(i, dof) for i, row in enumerate(pairs.nodes) for dof in row if dof >= 0]
+    names = tuple(f"{pairs.names[i]}.{table.component[dof]}" for i, dof in known)
+    return Labels(names, np.array([dof for _, dof in known], dtype=np.int64))
+
+
+def _body_labels(model: Model) -> Labels:
+    own = [model.places.own(name) for name, part in model.parts.items() if part.body is not None]
+    dofs = np.concatenate([np.zeros(0, dtype=np.int64), *own])
+    table = model.places.dofs
+    return Labels(tuple(f"{table.part[d]}.{table.component[d]}" for d in dofs), dofs)
+
+
+def linear_side(
+    model: Model, order: int, harmonics: int, kept: IntArray, stay: IntArray, store: Store
+) -> Linear:
+    """Reduce a model.
+
+    Parameters
+    ----------
+    model
+        The model.
+    order, harmonics
+        Engine order (of no meaning for a single structure) and highest harmonic.
+    kept
+        Dofs of all parts that stay physical beside those of contacts and joins.
+    stay
+        Those that have to be coordinates of their own.
+    store
+        As in `Model.assembled`.
+    """
+    pairs, ties = model.pairs, model.ties
+    operators = [pairs.own, pairs.following, ties.weights]
+    used = [kept, ties.followers, *(operator.nonzero()[1] for operator in operators)]
+    kept = np.unique(np.concatenate(used))
+    bodies = [model.places.own(name) for name, p in model.parts.items() if p.body is not None]
+    kept = np.unique(np.concatenate([kept, *bodies]))
+    if model.neighbours is None:
+        return _of_one(model, kept, store)
+    stay = np.concatenate([stay, *bodies])
+    found = reduced_sector(model, (order, harmonics), kept, stay, store)
+    at = model.coordinates
+
+    def of_dofs(dofs: IntArray, place: str) -> IntArray:
+        return found.of_dofs(at.of_dofs(dofs, model.places.dofs, place), place)
+
+    def load(force: Matrix, harmonic: int) -> Matrix:
+        number = excited_wave(order, model.sectors, harmonic)
+        return found.load(at.load(force), number)
+
+    return Linear(found.wheel, found.gaps, found.steady, of_dofs, load)
+
+
+def _of_one(model: Model, kept: IntArray, store: Store) -> Linear:
+    own = {
+        name: kept[np.isin(kept, model.places.own(name))] - model.places.offset(name)
+        for name in model.parts
+    }
+    parts = reduced_parts(model.parts, own, model.spin(model.speed), store)
+    ids = []
+    for name, part in parts.items():
+        modal = np.full(part.structure.n - part.kept.size, -1)
+        ids.append(np.concatenate([part.kept + model.places.offset(name), modal]))
+    at = coordinates(np.concatenate(ids), model.ties)
+    structure = at.tied(join(**{name: part.structure for name, part in parts.items()}))
+    steady = at.load(np.concatenate([part.steady for part in parts.values()]))
+
+    def of_dofs(dofs: IntArray, place: str) -> IntArray:
+        return at.of_dofs(dofs, model.places.dofs, place)
+
+    def load(force: Matrix, _harmonic: int) -> Matrix:
+        return _on_kept(at, force)
+
+    return Linear(structure, at.columns(model.pairs.own), steady, of_dofs, load)
+
+
+def _on_kept(at: Coordinates, force: Matrix) -> Matrix:
+    untied = np.zeros(at.ids.size, dtype=force.dtype)
+    known = at.ids >= 0
+    untied[known] = force[at.ids[known]]
+    return at.load(untied)
+
+
+def _free(model: Model, linear: Linear) -> IntArray | None:
+    """Return the coordinates of rigid bodies that no join holds."""
+    tied = np.unique(model.ties.weights.nonzero()[1])
+    bodies = [model.places.own(name) for name, p in model.parts.items() if p.body is not None]
+    dofs = [own for own in bodies if not np.isin(own, tied).any()]
+    return linear.of_dofs(np.concatenate(dofs), "part") if dofs else None
+
+
+def _loads(model: Model, linear: Linear, forces: dict[str, Matrix]) -> HarmonicLoad:
+    """Return all loads on the coordinates: static ones, that of steady rotation, and harmonics."""
+    static = np.zeros(linear.side.n)
+    if model.centrifugal and model.speed > 0:
+        static = static + linear.steady + np.real(linear.load(centrifugal_of_bodies(model), 0))
+    harmonics: dict[int, Matrix] = {}
+    for name, load in model.loads.items():
+        own = linear.load(forces[name], load.harmonic)
+        if load.harmonic == 0:
+            static = static + np.real(own)
+        else:
+            harmonics[load.harmonic] = harmonics.get(load.harmonic, 0) + own
+    return HarmonicLoad(static, harmonics)
+
+
+def centrifugal_of_bodies(model: Model) -> FloatArray:
+    """Return the (N,) centrifugal forces on rigid bodies at their centres of mass, N."""
+    force = np.zeros(model.places.n)
+    axis = model.axis
+    for name, part in model.parts.items():
+        if part.body is not None:
+            arm = axis.arm(np.array([part.body.centre], dtype=float))[0]
+            force[model.places.own(name)[:3]] = part.body.mass * model.speed**2 * arm
+    return force
+
+
+def _excitation(model: Model) -> float:
+    """Return the amplitude by which responses are divided, N; NaN where nothing vibrates."""
+    driven = [abs(load.newton) for load in model.loads.values() if load.harmonic > 0]
+    return max(driven, default=float("nan")) or float("nan")
+
+
+def static_state(system: System, static_load: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the (p, 3) gaps (m) and contact forces (N) under a static load."""
+    if not system.retained.size:
+        raise input_error(
+            "contact", "touches no coordinate that can move", "Name surfaces that are not clamped."
+        )
+    moved = preload(system, static_load)
+    gap = (system.interface.gap_operator[:, system.retained] @ moved).reshape(-1, 3)
+    return gap, static_contact_force(system.interface, gap)
+
+
+def pressed_points(model: Model) -> BoolArray:
+    """Return the contact points that the static loads at the model's own speed press, and those that cannot open."""
+    static = {name: load for name, load in model.loads.items() if load.harmonic == 0}
+    forces = {name: force_of(model.places, name, load) for name, load in static.items()}
+    empty = np.zeros(0, dtype=np.int64)
+    kept = np.concatenate([empty, *(np.flatnonzero(f) for f in forces.values())])
+    linear = linear_side(model, 0, 0, kept, empty, in_memory)
+    interface = Interface(model.pairs.names, model.pairs.laws, linear.gaps)
+    system = System(linear.side, interface, empty, free=_free(model, linear))
+    load = np.zeros(linear.side.n)
+    if model.centrifugal and model.speed > 0:
+        load = linear.steady + np.real(linear.load(centrifugal_of_bodies(model), 0))
+    for force in forces.values():
+        load = load + np.real(linear.load(force, 0))
+    gap, force = static_state(system.with_retention(model.retention), load)
+    return pressed_by(model.pairs.laws, force)
+
+
+def frequencies(model: Model, system: System, order: int | None, store: Store) -> Frequencies:
+    """Compare natural frequencies of the full and the reduced model, contacts open and stuck."""
+    number = 0 if order is None else order
+    reduced = system.structure.of_harmonic(1 if order is not None else 0)
+    springs = system.interface.stuck_stiffness()
+    free = reduced if system.free is None else _without(reduced, system.free)
+    stuck = with_springs(reduced, system.interface.gap_operator, springs)
+    count = min(MODES, *(int(np.count_nonzero(s.mass.diagonal())) for s in (free, stuck)))
+    full = [partial(model.at, model.speed, number, how) for how in ("open", "stuck")]
+    found = [_lowest(model, at(), count, store) for at in full]
+    return Frequencies(
+        found[0], natural_frequencies(free, count), found[1], natural_frequencies(stuck, count)
+    )
+
+
+def _without(structure: Structure, dofs: IntArray) -> Structure:
+    stays = np.setdiff1d(np.arange(structure.n), dofs)
+    square = np.ix_(stays, stays)
+    parts = []
+    for matrix in (structure.mass, structure.damping, structure.stiffness):
+        dense = matrix.toarray() if scipy.sparse.issparse(matrix) else matrix
+        parts.append(dense[square])
+    return Structure(*parts, structure.dofs.take(stays))
+
+
+def _lowest(model: Model, structure: Structure, count: int, store: Store) -> FloatArray:
+    """Return natural frequencies of the full model, remembered by its content."""
+    content = content_hash("frequencies", structure.mass, structure.stiffness, count)
+    memo = next(iter(model.parts.values())).memo
+    if content not in memo:
+        memo[content] = store(content, lambda: {"hz": natural_frequencies(structure, count)})["hz"]
+    return np.asarray(memo[content])
+
+
+def _table(model: Model) -> ContactTable:
+    pairs = model.pairs
+    names = {law: name for name, law in LAWS.items()}
+    laws = tuple(names.get(type(law), type(law).__name__) for law in pairs.laws)
+    return ContactTable(pairs.names, pairs.groups, laws, pairs.position, pairs.frame, pairs.area)

@@ -1,0 +1,89 @@
+"""Coordinates of a joined model: which dof of which part each one is, and what follows what."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import IntArray, Matrix
+from stickslip.assembly.ties import Ties
+from stickslip.errors import input_error
+from stickslip.model.dofs import Dofs
+from stickslip.model.structure import Structure
+from stickslip.reduction.projection import in_coordinates
+from stickslip.reduction.selection import surviving_sets
+
+
+@dataclass(frozen=True, eq=False)
+class Coordinates:
+    """Coordinates of parts side by side, tied by the joins.
+
+    Parameters
+    ----------
+    ids
+        (n0,) dof among those of all parts that each untied coordinate is; -1 for modal ones.
+    tie
+        (n0, n) CSR: untied coordinates from those that stay; None where nothing is tied.
+    stays
+        (n,) untied coordinates that stay.
+    """
+
+    ids: IntArray
+    tie: Matrix | None
+    stays: IntArray
+
+    @property
+    def n(self) -> int:
+        """Number of coordinates."""
+        return int(self.stays.size)
+
+    def tied(self, structure: Structure) -> Structure:
+        """Return a structure of the untied coordinates on those that stay, without a way back."""
+        if self.tie is None:
+            return structure
+        sets = surviving_sets(structure, self.stays)
+        found = in_coordinates(structure, self.tie, structure.dofs.take(self.stays), sets)
+        return replace(found, basis=None)
+
+    def columns(self, operator: Matrix) -> Matrix:
+        """Return an operator (m, N) on the dofs of all parts as one on the coordinates; what they do not hold must not move."""
+        mine = scipy.sparse.csr_array(operator).tocoo()
+        place = np.full(operator.shape[1], -1)
+        known = self.ids >= 0
+        place[self.ids[known]] = np.flatnonzero(known)
+        column = place[mine.col]
+        assert np.all(column >= 0), "an operator reaches a dof that was not kept"
+        entries = (mine.data, (mine.row, column))
+        own = scipy.sparse.csr_array(entries, shape=(operator.shape[0], self.ids.size))
+        return own if self.tie is None else scipy.sparse.csr_array(own @ self.tie)
+
+    def load(self, untied: Matrix) -> Matrix:
+        """Return a load (n0,) on the untied coordinates as one on those that stay."""
+        return untied if self.tie is None else np.asarray(self.tie.T @ untied)
+
+    def of_dofs(self, dofs: IntArray, table: Dofs, place: str) -> IntArray:
+        """Return the coordinates that dofs of the parts are.
+
+        Raises
+        ------
+        InputError
+            If one follows several others; `place` is the key that asks for it.
+        """
+        rows = self.columns(scipy.sparse.eye_array(len(table), format="csr")[dofs])
+        single = (np.diff(rows.indptr) == 1) & np.isclose(np.asarray(rows.sum(axis=1)).ravel(), 1.0)
+        if not np.all(single):
+            name = table.labels[int(dofs[np.flatnonzero(~single)[0]])]
+            raise input_error(
+                place,
+                f"{name} lies on a joined surface and is no coordinate of its own",
+                "Take a place off the surface, or let the join's other side be the first.",
+            )
+        return np.asarray(rows.indices, dtype=np.int64)
+
+
+def coordinates(ids: IntArray, ties: Ties) -> Coordinates:
+    """Return the coordinates of parts whose untied ones are the dofs `ids` (-1: modal)."""
+    if not ties.followers.size:
+        return Coordinates(ids, None, np.arange(ids.size))
+    tie, stays = ties.matrix(ids)
+    return Coordinates(ids, tie, stays)

@@ -1,0 +1,202 @@
+"""Loads of a model as forces on the dofs of all parts, and where motion is reported."""
+
+import cmath
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.assembly.load import Load, Output
+from stickslip.assembly.places import AXES, COMPONENTS, Places, Spot
+from stickslip.errors import did_you_mean, input_error
+
+ALONG = 1e-6  # share of a direction below which it has no such component
+
+
+def force_of(places: Places, name: str, load: Load) -> Matrix:
+    """Return the (N,) force of a load, complex where it has a phase.
+
+    Raises
+    ------
+    InputError
+        If the place is not there or cannot move, or the direction is missing.
+    """
+    key = f"load.{name}"
+    spot = places.spot(load.on, f"{key}.on")
+    amplitude = load.newton * (cmath.exp(1j * load.phase) if load.phase else 1.0)
+    force = np.zeros(places.n, dtype=type(amplitude))
+    if spot.surface is None:
+        force[spot.dofs] = amplitude / spot.dofs.size
+        return force
+    unit = _unit(key, load)
+    points = len(spot.surface.points)
+    shape = spot.surface.displacement.T @ np.tile(unit / points, points)
+    if not np.any(shape):
+        raise input_error(
+            f"{key}.on",
+            f"{load.on!r} cannot move along {unit.tolist()}",
+            "Choose a place that is not clamped.",
+        )
+    return amplitude * shape
+
+
+def _unit(key: str, load: Load) -> FloatArray:
+    if load.direction is None:
+        raise input_error(f"{key}.direction", "is missing", 'Give "x", "y", "z" or three numbers.')
+    vector = np.asarray(load.direction, dtype=float)
+    length = float(np.linalg.norm(vector))
+    if vector.shape != (3,) or not 0 < length < np.inf:
+        raise input_error(
+            f"{key}.direction", f"is no direction: {load.direction}", "Give three numbers."
+        )
+    return np.asarray(vector if abs(length - 1.0) < 1e-12 else vector / length)
+
+
+def engine_order(loads: Mapping[str, Load], wheel: bool) -> int | None:
+    """Return the engine order of the loads; None for a single structure, and where nothing vibrates.
+
+    Raises
+    ------
+    InputError
+        If a load has one and the model is no sector, or has none and it is one, or loads differ.
+    """
+    found: dict[str, int] = {}
+    for name, load in loads.items():
+        order = load.engine_order
+        if order is not None and not wheel:
+            raise input_error(
+                f"load.{name}.engine_order",
+                f"is {order}, and the model is no sector of a wheel",
+                "Give a part its number of sectors, or leave the engine order out.",
+            )
+        if load.harmonic > 0 and order is None and wheel:
+            raise input_error(
+                f"load.{name}.engine_order",
+                "is missing: on a wheel a harmonic force is a wave",
+                "Give the engine order m; harmonic h travels as the wave h m.",
+            )
+        if order is not None and load.harmonic > 0:
+            found[name] = order
+    if len(set(found.values())) > 1:
+        listed = ", ".join(f"load.{name}: {order}" for name, order in found.items())
+        raise input_error(
+            "load", f"engine orders differ ({listed})", "Study one engine order after the other."
+        )
+    return next(iter(found.values()), None)
+
+
+@dataclass(frozen=True, eq=False)
+class Labels:
+    """Dofs that are reported, by name.
+
+    Parameters
+    ----------
+    names
+        ``tip1.x`` and so on.
+    dofs
+        Among those of all parts.
+    """
+
+    names: tuple[str, ...]
+    dofs: IntArray
+
+    def of(self, names: tuple[str, ...], place: str) -> IntArray:
+        """Return the dofs of some of the names; an `InputError` at `place` says what is near."""
+        at = dict(zip(self.names, self.dofs, strict=True))
+        for name in names:
+            if name not in at:
+                raise input_error(
+                    place, f"there is no place {name!r}", did_you_mean(name, list(at))
+                )
+        return np.array([at[name] for name in names], dtype=np.int64)
+
+
+def output_labels(places: Places, outputs: tuple[Output, ...], loads: Mapping[str, Load]) -> Labels:
+    """Return what is reported: the outputs, or where harmonic loads act if there are none.
+
+    Raises
+    ------
+    InputError
+        If a place is not there, is clamped, or has not the directions asked for.
+    """
+    if not outputs:
+        vibrating = {name: load for name, load in loads.items() if load.harmonic > 0}
+        outputs = tuple(Output(name=name, on=load.on) for name, load in vibrating.items())
+    names: list[str] = []
+    dofs: list[int] = []
+    for output in outputs:
+        for component, dof in _of_output(places, output):
+            names.append(f"{output.name}.{component}")
+            dofs.append(dof)
+    twice = [name for i, name in enumerate(names) if name in names[:i]]
+    if twice:
+        raise input_error("output.points", f"has {twice[0]!r} twice", "Name each point once.")
+    return Labels(tuple(names), np.array(dofs, dtype=np.int64))
+
+
+def _of_output(places: Places, output: Output) -> list[tuple[str, int]]:
+    key = f"output.points.{output.name}"
+    components = np.array(places.dofs.component)
+    if output.near is not None:
+        rows = _nearest(places, output, key)
+    else:
+        spot = places.spot(output.on, key)
+        if spot.surface is None:
+            return [(str(components[dof]), int(dof)) for dof in spot.dofs[:1]]
+        rows = _first(places, spot)
+    has = {c: int(row) for c, row in zip(COMPONENTS, rows, strict=True) if row >= 0}
+    wanted = output.directions or tuple(has)
+    lost = [c for c in wanted if c not in has]
+    if lost or not has:
+        raise input_error(
+            key,
+            f"{output.on!r} has no {lost[0] if lost else 'coordinates: it is clamped'}",
+            f"It moves along {', '.join(has)}." if has else "Choose a place that can move.",
+        )
+    return [(c, has[c]) for c in wanted]
+
+
+def _first(places: Places, spot: Spot) -> IntArray:
+    """Return the dofs of a spot's first node, or of the body that a rigid point belongs to."""
+    part = places.parts[spot.part]
+    if part.body is not None:
+        return places.own(spot.part)
+    assert spot.surface is not None
+    assert spot.surface.numbers is not None
+    return places.rows(spot.part, spot.surface.numbers[:1])[0]
+
+
+def _nearest(places: Places, output: Output, key: str) -> IntArray:
+    part = places.part_of(output.on, key)
+    table = part.structure.dofs
+    known = np.flatnonzero((table.node >= 0) & np.isfinite(table.position).all(axis=1))
+    if not known.size:
+        raise input_error(key, f"the part {output.on!r} has no nodes", "Name a dof or a set.")
+    away = np.linalg.norm(table.position[known] - np.asarray(output.near, dtype=float), axis=1)
+    return places.rows(output.on, table.node[known[[int(np.argmin(away))]]])[0]
+
+
+def error_names(
+    labels: Labels, contacts: Labels, loads: Mapping[str, Load], over: tuple[str, ...]
+) -> tuple[str, ...]:
+    """Return the labels over which the error of missing harmonics is taken: by default the outputs along the excitation."""
+    if over == ("outputs",):
+        return labels.names
+    if over == ("contacts",):
+        return contacts.names
+    if over and over != ("along",):
+        return tuple(dict.fromkeys(over))
+    axis = _axis_of_excitation(loads)
+    along = tuple(name for name in labels.names if axis is not None and name.endswith(f".{axis}"))
+    return along or labels.names
+
+
+def _axis_of_excitation(loads: Mapping[str, Load]) -> str | None:
+    driven = [load for load in loads.values() if load.harmonic > 0]
+    if not driven:
+        return None
+    largest = max(driven, key=lambda load: abs(load.newton))
+    if largest.direction is None:
+        return largest.on.rpartition(".")[2]
+    return AXES[int(np.argmax(np.abs(largest.direction)))]

@@ -1,0 +1,141 @@
+"""Copies of parts: mirrored, turned, moved."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import FloatArray, Matrix
+from stickslip.errors import input_error
+from stickslip.model.axis import Axis
+from stickslip.model.dofs import Dofs
+from stickslip.model.fe.rotation import RotatingSolid
+from stickslip.model.mesh.mesh_facets import mirrored_cells
+from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.part import BodyPoints, Part, Place
+from stickslip.model.structure import Structure
+from stickslip.reduction.turning import dof_rotation
+
+
+def place_of(
+    *,
+    mirror: tuple[float, float, float] | None = None,
+    turn: float = 0.0,
+    axis: Axis = Axis(),  # noqa: B008  # frozen
+    move: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Place:
+    """Return a place: mirrored in the plane through the origin with the normal `mirror`, then turned, then moved.
+
+    Parameters
+    ----------
+    mirror
+        Normal of the mirror; None for none.
+    turn
+        Angle in rad about `axis`.
+    axis
+        Of the turn.
+    move
+        In m.
+    """
+    flip = np.eye(3)
+    if mirror is not None:
+        normal = np.asarray(mirror, dtype=float)
+        if not np.linalg.norm(normal) > 0:
+            raise input_error("place_of: mirror", "has no length", "Give a normal, e.g. (1, 0, 0).")
+        normal = normal / np.linalg.norm(normal)
+        flip = flip - 2 * np.outer(normal, normal)
+    rotation = axis.rotation(turn) if turn else np.eye(3)
+    origin = np.asarray(axis.origin, dtype=float)
+    return Place(rotation @ flip, np.asarray(move, dtype=float) + origin - rotation @ origin)
+
+
+def copy_of(part: Part, place: Place, **others: Any) -> Part:
+    """Return a copy of a part in another place; both share one reduction.
+
+    Parameters
+    ----------
+    part
+        What is copied; a copy of a copy is one of the first.
+    place
+        Where the copy stands, relative to `part`.
+    **others
+        Further fields of `Part` that differ.
+
+    Raises
+    ------
+    InputError
+        If a node lacks a component that the turn mixes with another one.
+    """
+    template = part if part.template is None else part.template
+    whole = place
+    if part.place is not None and part.template is not None:
+        whole = Place(place.turn @ part.place.turn, place.turn @ part.place.move + place.move)
+    mesh = None if template.mesh is None else moved_mesh(template.mesh, whole)
+    structure = turned_structure(template.structure, whole)
+    solid = None
+    if template.solid is not None and mesh is not None:
+        solid = _moved_solid(template.solid, whole, structure)
+        mesh = solid.mesh
+    body = template.body
+    if body is not None:
+        x, y, z = (float(v) for v in whole.put(np.array([body.centre]))[0])
+        body = replace(body, centre=(x, y, z))
+    surfaces = {name: _moved_points(points, whole) for name, points in template.surfaces.items()}
+    return replace(
+        part, structure=structure, mesh=mesh, solid=solid, body=body, surfaces=surfaces,
+        template=template, place=whole, **others,
+    )  # fmt: skip
+
+
+def moved_mesh(mesh: SolidMesh, place: Place) -> SolidMesh:
+    """Return a mesh in another place; numbers and sets stay."""
+    cells = mirrored_cells(mesh.cells) if place.mirrors else mesh.cells
+    return replace(mesh, points=place.put(mesh.points), cells=cells)
+
+
+def turned_dofs(dofs: Dofs, place: Place) -> Matrix:
+    """Return the CSR matrix from displacements of the original to those of the copy; modal and other scalars stay."""
+    matrix = dof_rotation(dofs, place.turn, "copy_of")
+    if place.mirrors:  # rotations are axial vectors
+        sign = [-1.0 if c in ("rx", "ry", "rz") else 1.0 for c in dofs.component]
+        matrix = scipy.sparse.csr_array(scipy.sparse.diags_array(np.array(sign)) @ matrix)
+    return matrix
+
+
+def turned_structure(structure: Structure, place: Place) -> Structure:
+    """Return a structure in another place: its matrices on the coordinates x, y, z there."""
+    turn = turned_dofs(structure.dofs, place)
+
+    def turned(matrix: Matrix) -> Matrix:
+        if matrix is None:
+            return None
+        found = turn @ matrix @ turn.T
+        return scipy.sparse.csr_array(found) if scipy.sparse.issparse(matrix) else np.asarray(found)
+
+    dofs = replace(structure.dofs, position=place.put(structure.dofs.position))
+    return replace(
+        structure,
+        mass=turned(structure.mass),
+        damping=turned(structure.damping),
+        stiffness=turned(structure.stiffness),
+        loss=turned(structure.loss),
+        dofs=dofs,
+        basis=None,
+    )
+
+
+def _moved_points(points: BodyPoints, place: Place) -> BodyPoints:
+    frame = place.turn @ points.frame
+    if place.mirrors:  # frames stay right-handed: w turns round
+        frame = frame * np.array([1.0, -1.0, 1.0])
+    return BodyPoints(points.names, place.put(points.position), frame)
+
+
+def _moved_solid(solid: RotatingSolid, place: Place, structure: Structure) -> RotatingSolid:
+    mesh = moved_mesh(solid.mesh, place)
+    load: FloatArray = solid.nodal_mass @ solid.axis.arm(mesh.points)
+    return RotatingSolid(
+        structure, mesh, solid.material, solid.axis, solid.quadrature, solid.moving,
+        solid.nodal_mass, np.asarray(load).ravel()[solid.moving],
+    )  # fmt: skip

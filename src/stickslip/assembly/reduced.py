@@ -1,0 +1,221 @@
+"""Parts reduced one by one, each once: copies share the reduction of what they copy, later models that of earlier ones."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.assembly.places import node_rows
+from stickslip.assembly.placing import turned_dofs, turned_structure
+from stickslip.errors import InputError, SingularError
+from stickslip.model.damping import rayleigh_damping
+from stickslip.model.dofs import Dofs
+from stickslip.model.part import Part
+from stickslip.model.structure import Structure
+from stickslip.reduction.cache import content_hash
+from stickslip.reduction.fixed_interface import craig_bampton
+from stickslip.reduction.projection import with_modal_dofs
+from stickslip.reduction.selection import surviving_sets
+from stickslip.units import HZ
+
+Store = Callable[[str, Callable[[], Mapping[str, Any]]], Mapping[str, Any]]
+REMEMBERED = 4  # reductions of a part that are kept in memory
+
+
+@dataclass(frozen=True)
+class Spin:
+    """How a model turns.
+
+    Parameters
+    ----------
+    speed
+        In rad/s.
+    tangent, coriolis
+        As in `RotatingSolid.at_speed`.
+    """
+
+    speed: float = 0.0
+    tangent: Literal["consistent", "textbook"] = "consistent"
+    coriolis: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedPart:
+    """A part on few coordinates.
+
+    Parameters
+    ----------
+    structure
+        Kept dofs, then modal coordinates; without the way back.
+    kept
+        (k,) dofs of the part that the first coordinates are.
+    steady
+        (n,) static load that leads to the displacement of steady rotation, N; zeros at rest.
+    """
+
+    structure: Structure
+    kept: IntArray
+    steady: FloatArray
+
+
+def in_memory(_content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
+    """Keep nothing: the store of a model that no study has."""
+    return make()
+
+
+def at_speed(name: str, part: Part, spin: Spin, tie: Matrix | None = None) -> Structure:
+    """Return the full structure of a part at a speed; `tie` is that of its cyclic faces."""
+    if part.solid is None or spin.speed == 0.0:
+        return part.structure
+    try:
+        return part.solid.at_speed(
+            spin.speed, tie=tie, tangent=spin.tangent, coriolis=spin.coriolis
+        )
+    except SingularError as error:
+        raise SingularError(
+            f"part.{name}: {error} The stress of a part that joins or contacts alone hold is not computed: hold it by a clamp."
+        ) from None
+
+
+def steady_load(part: Part, spin: Spin, structure: Structure, tie: Matrix | None) -> FloatArray:
+    """Return the (n,) load on a part's dofs, at a speed, under which it comes to the displacement of steady rotation."""
+    if part.solid is None or spin.speed == 0.0:
+        return np.zeros(part.structure.n)
+    return np.asarray(structure.stiffness @ part.solid.displacement(spin.speed, tie=tie))
+
+
+def damped(name: str, part: Part, structure: Structure) -> Structure:
+    """Return a structure of a part with its damping."""
+    if part.damping_ratio == 0.0:
+        return structure
+    low, high = part.between
+    try:
+        return rayleigh_damping(structure, part.damping_ratio, (low / HZ, high / HZ))
+    except InputError as error:
+        raise error.inside(f"part.{name}") from None
+
+
+def whole_nodes(table: Dofs, dofs: IntArray) -> IntArray:
+    """Return the dofs of all nodes of which one dof is among `dofs`, in rising order."""
+    numbers = np.unique(table.node[dofs])
+    rows = node_rows(table, numbers[numbers >= 0])
+    return np.union1d(dofs, rows[rows >= 0])
+
+
+def reduced_parts(
+    parts: Mapping[str, Part], kept: Mapping[str, IntArray], spin: Spin, store: Store = in_memory
+) -> dict[str, ReducedPart]:
+    """Reduce all parts of a single structure.
+
+    Parameters
+    ----------
+    parts
+        By name.
+    kept
+        Dofs of each part that stay physical.
+    spin
+        At what speed.
+    store
+        Takes a text that all depends on and a function that makes named arrays; returns these, perhaps from an earlier run.
+
+    Raises
+    ------
+    InputError
+        If a part has fewer dofs than modes are asked of it.
+    SingularError
+        If a part is free to move although its kept dofs are fixed.
+    """
+    wanted: dict[int, IntArray] = {}
+    for name, part in parts.items():
+        root = _root(part, spin)
+        own = whole_nodes(part.structure.dofs, kept[name])
+        wanted[id(root)] = np.union1d(wanted.get(id(root), own), own)
+    found = {}
+    for name, part in parts.items():
+        root = _root(part, spin)
+        made = _reduced(name, root, wanted[id(root)], spin, store)
+        found[name] = made if root is part else _placed(made, part)
+    return found
+
+
+def _root(part: Part, spin: Spin) -> Part:
+    """Return the part whose reduction a part shares."""
+    if part.template is None or part.place is None:
+        return part
+    turns = part.solid is not None and spin.speed != 0.0
+    return part if turns and not part.place.keeps(part.axis) else part.template
+
+
+def _reduced(name: str, part: Part, kept: IntArray, spin: Spin, store: Store) -> ReducedPart:
+    own = spin if part.solid is not None else Spin()
+    key = (own, part.n_modes, kept.tobytes())
+    if key not in part.memo:
+        content = _content(part, own, kept)
+        make = lambda: _packed(_reduce(name, part, kept, own))  # noqa: E731  # a thunk
+        whole = part.n_modes is None or part.body is not None
+        made = (
+            _reduce(name, part, kept, own) if whole else _unpacked(store(content, make), part, kept)
+        )
+        while len(part.memo) >= REMEMBERED:
+            part.memo.pop(next(iter(part.memo)))
+        part.memo[key] = made
+    found: ReducedPart = part.memo[key]
+    return found
+
+
+def _reduce(name: str, part: Part, kept: IntArray, spin: Spin) -> ReducedPart:
+    full = at_speed(name, part, spin)
+    steady = steady_load(part, spin, full, None)
+    full = damped(name, part, full)
+    if part.n_modes is None or part.body is not None:
+        return ReducedPart(full, np.arange(full.n), steady)
+    try:
+        small = craig_bampton(full, kept, part.n_modes)
+    except InputError as error:
+        raise error.inside(f"part.{name}") from None
+    except SingularError as error:
+        raise SingularError(f"part.{name}: {error}") from None
+    return ReducedPart(replace(small, basis=None), kept, np.asarray(small.project(steady)))
+
+
+def _placed(made: ReducedPart, part: Part) -> ReducedPart:
+    """Return the reduction of a part for a copy of it: physical coordinates turn, modal ones stay."""
+    assert part.place is not None
+    structure = turned_structure(made.structure, part.place)
+    turn = turned_dofs(made.structure.dofs, part.place)
+    return ReducedPart(structure, made.kept, np.asarray(turn @ made.steady))
+
+
+def _content(part: Part, spin: Spin, kept: IntArray) -> str:
+    solid = part.solid
+    turning: tuple[object, ...] = ()
+    if solid is not None and spin.speed != 0.0:
+        mesh, material = solid.mesh, solid.material
+        given = (material,) if not isinstance(material, list | tuple) else tuple(material)
+        turning = (spin, mesh.points, mesh.cells, given, solid.axis, solid.quadrature)
+    damping = (part.damping_ratio, *part.between)
+    return content_hash("craig_bampton", part.structure, kept, part.n_modes, damping, turning)
+
+
+def _packed(made: ReducedPart) -> dict[str, Any]:
+    s = made.structure
+    arrays = {"mass": s.mass, "damping": s.damping, "stiffness": s.stiffness, "loss": s.loss}
+    own = {name: _dense(matrix) for name, matrix in arrays.items() if matrix is not None}
+    return own | {"steady": made.steady}
+
+
+def _unpacked(values: Mapping[str, Any], part: Part, kept: IntArray) -> ReducedPart:
+    """Return a reduced part from its matrices: the table of its dofs and its sets follow from the part."""
+    mass = np.asarray(values["mass"])
+    modes = len(mass) - kept.size
+    dofs = with_modal_dofs(part.structure.dofs.take(kept), modes)
+    sets = surviving_sets(part.structure, kept)
+    loss = values.get("loss")
+    structure = Structure(mass, values["damping"], values["stiffness"], dofs, sets, None, loss)
+    return ReducedPart(structure, kept, np.asarray(values["steady"]))
+
+
+def _dense(matrix: Matrix) -> FloatArray:
+    return np.asarray(matrix.toarray() if hasattr(matrix, "toarray") else matrix)

@@ -1,0 +1,70 @@
+"""The skin of a model's meshes, and fields on it, for pictures."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from stickslip.arrays import BoolArray, IntArray, Matrix
+from stickslip.assembly.assembled import Skin
+from stickslip.assembly.places import AXES, Places
+from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.part import Part
+
+
+def skin_of(parts: Mapping[str, Part]) -> Skin | None:
+    """Return the skin of all meshes by their corner nodes; None where no part has one."""
+    points, triangles, cuts = [], [], []
+    count = 0
+    for part in parts.values():
+        if part.mesh is None:
+            continue
+        skin = part.mesh.surface
+        used, place = np.unique(skin, return_inverse=True)
+        points.append(part.mesh.points[used])
+        triangles.append(place.reshape(skin.shape) + count)
+        cuts.append(_cut(part, part.mesh, skin))
+        count += len(used)
+    if not points:
+        return None
+    return Skin(np.vstack(points), np.vstack(triangles).astype(np.int64), np.concatenate(cuts))
+
+
+def on_skin(places: Places, field: Matrix) -> Matrix:
+    """Return displacements (m, n, 3) of the skin's points from fields (N, m) on the dofs of all parts."""
+    found = []
+    for name, part in places.parts.items():
+        if part.mesh is None:
+            continue
+        out = np.zeros((field.shape[1], len(part.mesh.points), 3), dtype=field.dtype)
+        dofs, nodes, components = mesh_dofs(part, part.mesh)
+        out[:, nodes, components] = field[places.offset(name) + dofs].T
+        found.append(out[:, np.unique(part.mesh.surface)])
+    return np.concatenate(found, axis=1)
+
+
+def mesh_dofs(part: Part, mesh: SolidMesh) -> tuple[IntArray, IntArray, IntArray]:
+    """Return a part's dofs that are displacements of nodes of its mesh, the nodes (indices), and their components (0, 1, 2)."""
+    table = part.structure.dofs
+    order = np.argsort(mesh.numbers, kind="stable")
+    at = np.searchsorted(mesh.numbers, table.node, sorter=order)
+    nodes = order[np.minimum(at, len(order) - 1)]
+    known = (mesh.numbers[nodes] == table.node) & np.isin(table.component, AXES)
+    dofs = np.flatnonzero(known)
+    components = np.array([AXES.index(table.component[i]) for i in dofs], dtype=np.int64)
+    return dofs, nodes[dofs], components
+
+
+def _cut(part: Part, mesh: SolidMesh, skin: IntArray) -> IntArray:
+    """Return 1 for triangles on a cyclic face: all corners on the face or clamped, and one at least on the face."""
+    cut = np.zeros(len(skin), dtype=np.int64)
+    if part.sectors == 1:
+        return cut
+    dofs, nodes, _ = mesh_dofs(part, mesh)
+    held = np.ones(len(mesh.points), dtype=bool)
+    held[nodes] = False
+    for face in part.faces:
+        own: BoolArray = np.zeros(len(mesh.points), dtype=bool)
+        if face in part.structure.sets:
+            own[nodes[np.isin(dofs, part.structure.sets[face])]] = True
+        cut |= (own | held)[skin].all(axis=1) & own[skin].any(axis=1)
+    return cut

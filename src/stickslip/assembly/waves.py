@@ -1,0 +1,151 @@
+"""The sector that a model is, reduced wave by wave; waves that were reduced before are taken from memory or store."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.assembly.model import Model
+from stickslip.assembly.reduced import Store, at_speed, damped, steady_load
+from stickslip.assembly.wheel import (
+    ReducedSector,
+    conjugate,
+    reduced_wave,
+    roles,
+    wave_numbers,
+    wheel_of,
+)
+from stickslip.errors import InputError
+from stickslip.model.structure import Structure, join
+from stickslip.reduction.cache import content_hash
+from stickslip.reduction.cyclic import CyclicSector
+from stickslip.reduction.projection import with_modal_dofs
+from stickslip.reduction.selection import surviving_sets
+
+REMEMBERED = 64  # waves kept in memory
+
+
+def reduced_sector(
+    model: Model, order: tuple[int, int], kept: IntArray, stay: IntArray, store: Store
+) -> ReducedSector:
+    """Reduce the waves that an engine order excites.
+
+    Parameters
+    ----------
+    model
+        Of a sector.
+    order
+        Engine order and highest harmonic.
+    kept, stay
+        Dofs of all parts that stay physical, and those that have to be coordinates of their own.
+    store
+        As in `Model.assembled`.
+    """
+    at, here = model.coordinates, model.neighbours
+    assert here is not None
+    structure, steady = _sector_at_speed(model)
+    sector = here.sector(at.tied(structure), at)
+    pairs = replace(
+        model.pairs, own=at.columns(model.pairs.own), following=at.columns(model.pairs.following)
+    )
+    n_modes, whole = _modes(model)
+    needed = np.unique(np.concatenate([kept, whole]))
+    needed = needed[~np.isin(needed, model.ties.followers)]
+    role = roles(sector, pairs, at.of_dofs(needed, model.places.dofs, "part"))
+    made: dict[int, tuple[Structure, Matrix]] = {}
+    memo = next(iter(model.parts.values())).memo
+    for k in wave_numbers(model.sectors, *order):
+        mirror = made.get(sector.sectors - k)
+        if mirror is not None and k > 0:
+            made[k] = conjugate(mirror[0]), np.conj(mirror[1])
+            continue
+        key = content_hash(
+            "wave",
+            k,
+            sector.structure,
+            sector.low,
+            sector.high,
+            sector.sectors,
+            sector.axis,
+            role.kept,
+            n_modes,
+            steady,
+        )
+        if key not in memo:
+            memo[key] = _kept(sector, role.kept, k, n_modes, at.load(steady), (key, store))
+            _forget(memo)
+        made[k] = memo[key]
+    stay = at.of_dofs(np.unique(stay), model.places.dofs, "output.points")
+    return wheel_of(sector, role, made, order, model.pairs.names, stay)
+
+
+def _sector_at_speed(model: Model) -> tuple[Structure, FloatArray]:
+    """Return all parts side by side at the model's speed, damped, and the load of steady rotation on them."""
+    assert model.neighbours is not None
+    spin, ties = model.spin(model.speed), model.neighbours.ties
+    own: dict[str, Structure] = {}
+    steady = []
+    for name, part in model.parts.items():
+        turning = at_speed(name, part, spin, ties.get(name))
+        steady.append(steady_load(part, spin, turning, ties.get(name)))
+        own[name] = damped(name, part, turning)
+    return join(**own), np.concatenate(steady)
+
+
+def _modes(model: Model) -> tuple[int | None, IntArray]:
+    """Return the number of modes kept of each wave, and the dofs of parts that are not reduced."""
+    counts = [part.n_modes for part in model.parts.values() if part.body is None]
+    if all(count is None for count in counts):
+        return None, np.zeros(0, dtype=np.int64)
+    high = np.zeros(0, dtype=np.int64) if model.neighbours is None else model.neighbours.high
+    whole = [
+        np.setdiff1d(model.places.own(name), high)
+        for name, part in model.parts.items()
+        if part.n_modes is None
+    ]
+    return sum(count or 0 for count in counts), np.concatenate([high[:0], *whole])
+
+
+def _kept(
+    sector: CyclicSector,
+    kept: IntArray,
+    k: int,
+    n_modes: int | None,
+    steady: FloatArray,
+    where: tuple[str, Store],
+) -> tuple[Structure, Matrix]:
+    def make() -> tuple[Structure, Matrix]:
+        try:
+            return reduced_wave(sector, kept, k, n_modes, steady)
+        except InputError as error:
+            raise error.inside(f"wave {k}") from None
+
+    if n_modes is None:
+        return make()
+    values = where[1](where[0], lambda: _packed(make))
+    return _unpacked(values, sector, kept)
+
+
+def _packed(make: Callable[[], tuple[Structure, Matrix]]) -> dict[str, Any]:
+    s, steady = make()
+    own = {"mass": s.mass, "damping": s.damping, "stiffness": s.stiffness, "steady": steady}
+    return own if s.loss is None else own | {"loss": s.loss}
+
+
+def _unpacked(
+    values: Mapping[str, Any], sector: CyclicSector, kept: IntArray
+) -> tuple[Structure, Matrix]:
+    mass = np.asarray(values["mass"])
+    dofs = with_modal_dofs(sector.structure.dofs.take(kept), len(mass) - kept.size)
+    sets = surviving_sets(sector.structure, kept)
+    own = mass, values["damping"], values["stiffness"]
+    structure = Structure(*own, dofs, sets, None, values.get("loss"))
+    return structure, np.asarray(values["steady"])
+
+
+def _forget(memo: dict[Any, Any]) -> None:
+    waves = [key for key, value in memo.items() if isinstance(value, tuple)]
+    for key in waves[:-REMEMBERED]:
+        del memo[key]
