@@ -27,6 +27,11 @@ class LinearSide(Protocol):
         """Table of the coordinates."""
         ...
 
+    @property
+    def multipliers(self) -> IntArray:
+        """Coordinates that are forces of constraints, which are never condensed."""
+        ...
+
     def of_harmonic(self, harmonic: int) -> Structure:
         """Return the structure that temporal harmonic `harmonic` (0: the mean) vibrates as; the same object where it is the same."""
         ...

@@ -83,6 +83,11 @@ class Structure:
         matrices = (self.mass, self.damping, self.stiffness, self.loss)
         return any(np.iscomplexobj(m) for m in matrices if m is not None)
 
+    @property
+    def multipliers(self) -> IntArray:
+        """No coordinate is the force of a constraint (see `LinearSide`)."""
+        return np.zeros(0, dtype=np.int64)
+
     def of_harmonic(self, harmonic: int) -> "Structure":
         """Return the structure: it vibrates as itself in every harmonic (see `LinearSide`)."""
         return self

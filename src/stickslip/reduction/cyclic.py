@@ -17,6 +17,7 @@ from stickslip.model.axis import Axis
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic_faces import face, pair_faces, refuse_torn_axis
+from stickslip.reduction.projection import is_hermitian
 from stickslip.reduction.selection import selection, surviving_sets
 from stickslip.reduction.turning import dof_rotation, node_table
 from stickslip.reduction.waves import check_sectors, wave
@@ -219,21 +220,21 @@ def travelling_wave(sector: CyclicSector, wave_number: int) -> Structure:
     Returns
     -------
     Structure
-        Complex Hermitian, real for standing waves; CSR where the sector's matrices are. Its coordinates are those of
-        the sector without the high face; sets whose dofs are among them survive. `basis` leads to the sector's
+        Complex, real for standing waves of real sectors, Hermitian where the sector's matrices are; CSR where they are. Its coordinates
+        are those of the sector without the high face; sets whose dofs are among them survive. `basis` leads to the sector's
         displacements, or to the model that was reduced to the sector.
     """
     tie = sector.wave_tie(wave_number)
     structure = sector.structure
     free = sector.independent
     return Structure(
-        _hermitian(_projected(structure.mass, tie)),
+        _evenly_projected(structure.mass, tie),
         _projected(structure.damping, tie),
-        _hermitian(_projected(structure.stiffness, tie)),
+        _evenly_projected(structure.stiffness, tie),
         _wave_dofs(structure.dofs, free, tie[:, free.size :]),
         surviving_sets(structure, free),
         structure.expand(tie),
-        None if structure.loss is None else _hermitian(_projected(structure.loss, tie)),
+        None if structure.loss is None else _evenly_projected(structure.loss, tie),
     )
 
 
@@ -242,8 +243,10 @@ def _projected(matrix: Matrix, tie: Matrix) -> Matrix:
     return scipy.sparse.csr_array(product) if scipy.sparse.issparse(matrix) else np.asarray(product)
 
 
-def _hermitian(matrix: Matrix) -> Matrix:
-    return (matrix + matrix.conj().T) / 2
+def _evenly_projected(matrix: Matrix, tie: Matrix) -> Matrix:
+    """Return the projection, Hermitian to the last digit where the matrix is Hermitian to rounding."""
+    product = _projected(matrix, tie)
+    return (product + product.conj().T) / 2 if is_hermitian(matrix) else product
 
 
 def _wave_dofs(dofs: Dofs, free: IntArray, whirl: Matrix) -> Dofs:

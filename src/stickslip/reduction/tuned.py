@@ -4,17 +4,19 @@ M. Krack, L. Salles and F. Thouverez, "Vibration prediction of bladed disks coup
 Computational Methods in Engineering 24 (2017) 589-636, appendices 1 and 2.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from stickslip.arrays import IntArray, Matrix
-from stickslip.errors import input_error
+from stickslip.errors import InputError, input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave
 from stickslip.reduction.fixed_interface import craig_bampton
+from stickslip.reduction.nodal import nodal_coordinates
+from stickslip.reduction.projection import is_hermitian
 from stickslip.reduction.relative import in_relative_coordinates
 from stickslip.reduction.waves import excited_wave, wave
 from stickslip.reduction.whole_wheel import (
@@ -25,30 +27,38 @@ from stickslip.reduction.whole_wheel import (
     refuse_unequal,
 )
 
+Gaps = tuple[Matrix, Matrix | None]
+Write = Callable[[int], tuple[Structure, Matrix]]  # a wave in other coordinates, and its gaps
+
 
 @dataclass(frozen=True, eq=False)
 class TunedWheel:
     """One sector of a wheel whose sectors all do the same, one after the other; `tuned_wheel` makes one.
 
     Harmonic h of the vibration has the wave number ``h m mod n_s`` of the engine order m, and its structure is that of this
-    wave. The first coordinates are the gaps of the contacts, in all waves alike; the others differ from wave to wave.
+    wave. The first coordinates mean the same in all waves: the gaps of the contacts, or the kept dofs of a sector, those of a
+    neighbour on which a contact acts in its phase. The others differ from wave to wave.
 
     Parameters
     ----------
     waves
-        Wave number -> structure, in gaps and other coordinates.
+        Wave number -> structure, in these coordinates.
     sectors
         Number of sectors.
     engine_order
         m.
     harmonics
         Highest temporal harmonic for which there is a wave.
+    multipliers
+        Coordinates that are forces of constraints: between the motion of a sector and that of a neighbour, where contacts touch the
+        same dof of both.
     """
 
     waves: Mapping[int, Structure]
     sectors: int
     engine_order: int
     harmonics: int
+    multipliers: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __repr__(self) -> str:
         """Return what it is in a line, without its matrices."""
@@ -93,23 +103,24 @@ class TunedWheel:
         return self.of_harmonic(harmonic).expand(vector)
 
 
-def tuned_wheel(
+def tuned_wheel(  # noqa: PLR0913
     sector: CyclicSector,
     engine_order: int,
     harmonics: int,
-    gaps: tuple[Matrix, Matrix | None],
+    gaps: Gaps,
     *,
     keep: IntArray | None = None,
     n_modes: int = 0,
     reduce: Reduce = craig_bampton,
     names: Sequence[str] = (),
+    relative: bool | None = None,
 ) -> tuple[TunedWheel, Matrix]:
-    """Reduce the travelling waves that an engine order excites, and write them in the gaps of the contacts.
+    """Reduce the travelling waves that an engine order excites, and write them so that the gaps are the same in all of them.
 
     Parameters
     ----------
     sector
-        One sector.
+        One sector; also parts joined, of which some are on no face: a disk segment with its blade and rigid dampers.
     engine_order
         m; harmonic h travels with the wave number ``h m mod n_s``.
     harmonics
@@ -127,50 +138,121 @@ def tuned_wheel(
         dofs `keep` of the wave, as many coordinates in every wave.
     names
         Names of the contacts.
+    relative
+        Whether the gaps are coordinates, which halves the unknowns (`in_relative_coordinates`); False: the kept dofs in the order of
+        `keep` are (`nodal_coordinates`), for outputs on nodes of contacts and gaps that depend on each other; None: where gaps
+        allow it.
 
     Returns
     -------
     wheel
-        For `System`, which then solves for the gaps of one sector alone.
+        For `System`, which then solves for one sector alone.
     gap_operator
-        (3 n_contacts, n) from its coordinates to the gaps.
+        (3 n_contacts, n) from its coordinates to the gaps, real.
 
     Raises
     ------
     InputError
-        If operators do not fit, dofs of the contacts are not kept, gaps depend on each other in one of the waves, or
-        `reduce` returns something else than described.
+        If operators do not fit, dofs of the contacts are not kept, gaps that are to be coordinates depend on each other in one of
+        the waves, or `reduce` returns something else than described.
     """
-    own, following = gaps
-    n = sector.structure.n
+    _refuse_misfits(sector, gaps)
+    orders = range(harmonics + 1)
+    wanted = sorted({excited_wave(engine_order, sector.sectors, h) for h in orders})
+    place = None if keep is None else kept_places("tuned_wheel", sector, keep)
+    if place is not None:
+        _refuse_lost_contacts(sector, place, *gaps)
+    moving = _moving(sector, wanted, place, n_modes, reduce)
+
+    def gap_coordinates(k: int) -> tuple[Structure, Matrix]:
+        return in_relative_coordinates(
+            moving[k], _gaps_of(sector, k, gaps) @ moving[k].basis, names
+        )
+
+    first = moving[wanted[0]]
+    if relative is not False:
+        try:
+            waves, operator = _written(sector, wanted, moving, gap_coordinates)
+            return TunedWheel(waves, sector.sectors, engine_order, harmonics), operator.real
+        except InputError:
+            if relative:
+                raise
+    known = np.arange(sector.independent.size) if place is None else place
+    nodal = nodal_coordinates(sector, known, first.n, gaps)
+
+    def node_coordinates(k: int) -> tuple[Structure, Matrix]:
+        return nodal.of_wave(moving[k], wave(k, sector.sectors).phase), nodal.operator
+
+    waves, operator = _written(sector, wanted, moving, node_coordinates)
+    wheel = TunedWheel(waves, sector.sectors, engine_order, harmonics, nodal.multipliers)
+    return wheel, operator
+
+
+def _moving(
+    sector: CyclicSector,
+    wanted: Sequence[int],
+    place: IntArray | None,
+    n_modes: int,
+    reduce: Reduce,
+) -> dict[int, Structure]:
+    """Return the travelling waves, reduced where dofs are kept; those that are conjugates of others are left out."""
+    if place is None:
+        return {k: travelling_wave(sector, k) for k in wanted}
+    moving: dict[int, Structure] = {}
+    for k in wanted:
+        if not _mirrored(sector, moving, k):
+            moving[k] = reduced_wave("tuned_wheel", reduce, sector, k, place, n_modes)
+    refuse_unequal("tuned_wheel", moving)
+    return moving
+
+
+def _refuse_misfits(sector: CyclicSector, gaps: Gaps) -> None:
+    """Refuse a sector that is reduced already, and operators that are not of its dofs."""
     refuse_reduced("tuned_wheel", sector)
-    for operator in (own, following):
+    n = sector.structure.n
+    for operator in gaps:
         if operator is not None and (operator.shape[1] != n or operator.shape[0] % 3):
             raise input_error(
                 "tuned_wheel: gaps",
                 f"an operator has shape {operator.shape} for a sector of {n} dofs",
                 "Give three rows (t, w, n) a contact.",
             )
-    wanted = {excited_wave(engine_order, sector.sectors, h) for h in range(harmonics + 1)}
-    place = None if keep is None else kept_places("tuned_wheel", sector, keep)
-    if place is not None:
-        _refuse_lost_contacts(sector, place, own, following)
+
+
+def _gaps_of(sector: CyclicSector, wave_number: int, gaps: Gaps) -> Matrix:
+    """Return the operator from the displacements of sector 0 to the gaps in a wave."""
+    own, following = gaps
+    return own if following is None else own + wave(wave_number, sector.sectors).phase * following
+
+
+def _mirrored(sector: CyclicSector, waves: Mapping[int, Structure], k: int) -> bool:
+    """Whether wave k is the conjugate of one that is known: real matrices of a sector do not tell the two directions apart."""
+    other = waves.get(sector.sectors - k)
+    if other is None or k == 0 or sector.structure.is_complex:
+        return False
+    return is_hermitian(other.stiffness) and is_hermitian(other.mass)
+
+
+def _written(
+    sector: CyclicSector, wanted: Sequence[int], moving: Mapping[int, Structure], write: Write
+) -> tuple[dict[int, Structure], Matrix]:
+    """Return the waves in other coordinates and the operator to the gaps, which has to be the same in all."""
     waves: dict[int, Structure] = {}
-    operator = own
-    for k in sorted(wanted):
-        mirror = waves.get(sector.sectors - k)
-        if mirror is not None and k > 0:
-            waves[k] = _conjugate(mirror)
-            continue
-        if place is None:
-            moving = travelling_wave(sector, k)
+    operators: dict[int, Matrix] = {}
+    for k in wanted:
+        if _mirrored(sector, {j: moving[j] for j in waves if j in moving}, k):
+            waves[k] = _conjugate(waves[sector.sectors - k])
         else:
-            moving = reduced_wave("tuned_wheel", reduce, sector, k, place, n_modes)
-        whole = own if following is None else own + wave(k, sector.sectors).phase * following
-        waves[k], operator = in_relative_coordinates(moving, whole @ moving.basis, names)
-    if place is not None:
-        refuse_unequal("tuned_wheel", waves)
-    return TunedWheel(waves, sector.sectors, engine_order, harmonics), operator.real  # ones alone
+            waves[k], operators[k] = write(k)
+    common = operators[wanted[0]]
+    for k, operator in operators.items():
+        if operator.shape != common.shape or np.any(operator != common):
+            raise input_error(
+                "tuned_wheel: gaps",
+                f"a gap that there is in wave {wanted[0]} is none in wave {k}, or the other way round",
+                "Take nodal coordinates (relative=False).",
+            )
+    return waves, common
 
 
 def _refuse_lost_contacts(

@@ -51,9 +51,10 @@ class System:
 
     @property
     def retained(self) -> IntArray:
-        """Dofs that stay unknown: those of the contacts and of free bodies, sorted."""
+        """Dofs that stay unknown: those of the contacts, of free bodies and of constraints, sorted."""
         free = NO_DOFS if self.free is None else self.free
-        return np.union1d(self.interface.coordinates(), free)
+        held = np.union1d(free, self.structure.multipliers).astype(np.int64)
+        return np.union1d(self.interface.coordinates(), held)
 
     @property
     def retained_labels(self) -> tuple[str, ...]:
