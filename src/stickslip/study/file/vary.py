@@ -56,9 +56,11 @@ def cases_of(place: str, raw: Mapping[str, Any], model: type[BaseModel]) -> list
     return [{k: v for part in parts for k, v in part.items()} for parts in product(*runs)]
 
 
-def with_values(raw: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the content of a file with the varied keys in place, without [vary]."""
-    content = {key: value for key, value in deepcopy(dict(raw)).items() if key != "vary"}
+def with_values(
+    raw: Mapping[str, Any], values: Mapping[str, Any], *, keep_vary: bool = False
+) -> dict[str, Any]:
+    """Return the content of a file with some keys in place, without [vary] unless it is kept."""
+    content = {k: v for k, v in deepcopy(dict(raw)).items() if keep_vary or k != "vary"}
     for key, value in values.items():
         *tables, last = key.split(".")
         here = content

@@ -1,0 +1,283 @@
+"""What can be refused without a mesh: names that are not there, files that are not there, questions without what they need."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from stickslip.assembly.contact import GROUND, NEXT
+from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.study.file.parts import (
+    BeamTable,
+    Copy,
+    FileModel,
+    FlatCurved,
+    Lumped,
+    PrismBlades,
+    RigidBodyTable,
+    Sector,
+)
+from stickslip.study.file.section import Section
+from stickslip.study.file.tables import Tables
+from stickslip.study.models.files import MESHES
+
+BLADES = ("root", "force", "tip1", "edge1", "tip2")
+SECTOR = ("root", "cyclic_low", "cyclic_high", "tip")
+SIDES = ("flat", "curved")
+COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
+
+
+def refusals(tables: Tables, home: Path) -> Iterator[InputError]:
+    """Yield what is wrong with the tables of a case, their places being keys of the file.
+
+    Parameters
+    ----------
+    tables
+        Of the case.
+    home
+        Folder that names of files are relative to.
+    """
+    wrong = [*_parts(tables, home)]
+    yield from wrong
+    if not wrong:  # else names mean nothing
+        yield from _surfaces(tables)
+        yield from _loads(tables)
+        yield from _outputs(tables)
+        yield from _questions(tables)
+
+
+def sectors_of(tables: Tables) -> int | None:
+    """Return the number of sectors of the wheel, 1 for a single structure; None where only a file knows it."""
+    found: list[int | None] = [1]
+    for table in tables.part.values():
+        known: Any = table
+        if isinstance(known, Sector):
+            found.append(known.sectors)  # type: ignore[attr-defined]
+        elif isinstance(known, FileModel):
+            found.append(known.sectors)
+    return None if None in found else max(n for n in found if n is not None)
+
+
+def _parts(tables: Tables, home: Path) -> Iterator[InputError]:
+
+    for name, table in tables.part.items():
+        if "." in name or name in (GROUND, NEXT.rstrip(".")):
+            yield input_error(f"part.{name}", "is no name of a part", "Give one without dots.")
+        if isinstance(table, FileModel):
+            for key, file in table.files().items():
+                if not (home / file).is_file():
+                    yield input_error(
+                        f"part.{name}.{key}",
+                        f"there is no file {home / file}",
+                        "Check the name; it is relative to the study's folder.",
+                    )
+        if isinstance(table, Copy):
+            original = tables.part.get(table.of)
+            if original is None or isinstance(original, Copy):
+                problem = "is a copy itself" if original is not None else "is no part"
+                originals = [n for n, t in tables.part.items() if not isinstance(t, Copy)]
+                yield input_error(
+                    f"part.{name}.of", f"{table.of!r} {problem}", did_you_mean(table.of, originals)
+                )
+        if isinstance(table, PrismBlades):
+            yield from _nodes_at(tables, f"part.{name}.nodes_at", table)
+        if isinstance(table, PrismBlades | Sector | BeamTable) and not (
+            table.material or tables.material  # type: ignore[attr-defined]
+        ):
+            yield input_error(
+                f"part.{name}.material",
+                "is missing",
+                "Add the table [material], or one of the part.",
+            )
+
+
+def _nodes_at(tables: Tables, place: str, table: Any) -> Iterator[InputError]:
+    dampers = [name for name, other in tables.part.items() if isinstance(other, FlatCurved)]
+    known = [f"{name}.{side}" for name in dampers for side in SIDES]
+    for word in table.nodes_at:
+        if word not in known:
+            yield input_error(
+                place, f"there is no surface {word!r} of a flat_curved part", _near(word, known)
+            )
+    if len({word.partition(".")[0] for word in table.nodes_at}) > 1:
+        yield input_error(place, "names surfaces of several parts", "Name those of one damper.")
+
+
+def _surfaces(tables: Tables) -> Iterator[InputError]:
+    for kind in ("contact", "join"):
+        for name, table in getattr(tables, kind).items():
+            place = f"{kind}.{name}.between"
+            for word in table.between:
+                if word != GROUND:
+                    yield from _refused(tables, place, word, ("surface", "set"))
+                if word.startswith(NEXT):
+                    yield from _no_sector(tables, place, word)
+
+
+def _no_sector(tables: Tables, place: str, word: str) -> Iterator[InputError]:
+    head = word.removeprefix(NEXT).partition(".")[0]
+    table: Any = tables.part.get(head)
+    if isinstance(table, Copy):
+        table = tables.part[table.of]
+    alone = table is not None and sectors_of(tables) == 1
+    if alone:
+        yield input_error(
+            place,
+            f"{word!r} is on the next sector, but {head!r} is no sector of a wheel",
+            f"Give part.{head}.sectors, or name a surface of another part.",
+        )
+
+
+def _refused(tables: Tables, place: str, word: str, what: tuple[str, ...]) -> Iterator[InputError]:
+    """Yield the complaint about a name that no part has, as far as that is known without a mesh."""
+    head, _, rest = word.removeprefix(NEXT).partition(".")
+    if head not in tables.part:
+        yield input_error(place, f"there is no part {head!r}", _near(head, list(tables.part)))
+        return
+    known = names_of(tables, head)
+    if known is None or not rest or rest in known:
+        return
+    node = rest.removeprefix("node").partition(".")[0]
+    if node.isdigit() or rest in COMPONENTS:
+        return
+    ahead = NEXT if word.startswith(NEXT) else ""
+    own = [f"{ahead}{head}.{name}" for name in known]
+    yield input_error(place, f"there is no {' or '.join(what)} {word!r}", _near(word, own))
+
+
+def names_of(tables: Tables, part: str) -> tuple[str, ...] | None:
+    """Return the names of surfaces and sets that a part will have; None where only a file knows them."""
+    table: Any = tables.part[part]
+    if isinstance(table, Copy):
+        return names_of(tables, table.of)
+    return None if isinstance(table, FileModel) else _NAMES[type(table)](table)
+
+
+def _of_blades(table: Any) -> tuple[str, ...]:
+    sides = {word.partition(".")[2] for word in table.nodes_at}
+    undersides = [f"underside_{i + 1}" for i, side in enumerate(SIDES) if side in sides]
+    return (*undersides, *BLADES)
+
+
+def _of_sector(table: Any) -> tuple[str, ...]:
+    platform = ("platform_low", "platform_high", "platform_under") if table.platform else ()
+    shroud = ("shroud_low", "shroud_high") if table.shroud else ()
+    return (*SECTOR, *platform, *shroud)
+
+
+_NAMES: dict[type[Section], Callable[[Any], tuple[str, ...]]] = {
+    PrismBlades: _of_blades,
+    Sector: _of_sector,
+    BeamTable: lambda _: ("deflection", "rotation", "axial", "tip"),
+    Lumped: lambda table: tuple(table.labels),
+    RigidBodyTable: lambda table: tuple(table.surfaces),
+    FlatCurved: lambda _: SIDES,
+}
+
+
+def _loads(tables: Tables) -> Iterator[InputError]:
+    orders = set()
+    for name, table in tables.load.items():
+        place = f"load.{name}"
+        yield from _refused(tables, f"{place}.on", table.on, ("set",))
+        if table.ratio_of is not None:
+            other = tables.load.get(table.ratio_of.removeprefix("load."))
+            if other is None or other.force_n is None:
+                problem = "is no load" if other is None else "has no force_n itself"
+                known = [f"load.{n}" for n, t in tables.load.items() if t.force_n is not None]
+                yield input_error(
+                    f"{place}.ratio_of",
+                    f"{table.ratio_of!r} {problem}",
+                    _near(table.ratio_of, known),
+                )
+        if table.engine_order is not None:
+            orders.add(table.engine_order)
+            if sectors_of(tables) == 1:
+                yield input_error(
+                    f"{place}.engine_order",
+                    "is of a wheel, but no part is a sector of one",
+                    "Leave it out, or give the part its number of sectors.",
+                )
+        low = tables.harmonics.low_harmonics
+        if table.harmonic not in low:
+            yield input_error(
+                f"{place}.harmonic",
+                f"{table.harmonic} is not kept by harmonics.low = {tables.harmonics.low}",
+                "Add it there.",
+            )
+    if len(orders) > 1:
+        yield input_error(
+            "load", f"has the engine orders {sorted(orders)}", "Give all loads the same one."
+        )
+
+
+def _outputs(tables: Tables) -> Iterator[InputError]:
+    for name, point in tables.output.points.items():
+        yield from _refused(tables, f"output.points.{name}", point.on, ("set", "dof"))
+    peak = tables.output.peak
+    if peak:
+        head, _, direction = peak.partition(".")
+        if head not in tables.output.points or direction not in COMPONENTS:
+            usual = tables.output.directions or COMPONENTS[:3]
+            known = [f"{name}.{d}" for name in tables.output.points for d in usual]
+            yield input_error("output.peak", f"there is no output {peak!r}", _near(peak, known))
+
+
+def _questions(tables: Tables) -> Iterator[InputError]:
+    """Yield the complaints about analyses that lack what they need."""
+    asked: Any = tables
+    forced = getattr(asked, "forced_response", None)
+    driven = [table for table in tables.load.values() if table.harmonic > 0]
+    if forced is not None and not driven:
+        yield input_error(
+            "forced_response",
+            "has no harmonic load to respond to",
+            'Add one, for example [load.shaker] with on = "part.set", force_n = 1.0 and direction = "x".',
+        )
+    sectors = sectors_of(tables)
+    if forced is not None and sectors is not None and sectors > 1:
+        for name, table in tables.load.items():
+            if table.harmonic > 0 and table.engine_order is None:
+                yield input_error(
+                    f"load.{name}.engine_order",
+                    f"is missing on a wheel of {sectors} sectors",
+                    "Say how many periods the force has around the circumference.",
+                )
+    if getattr(asked, "campbell", None) is not None and not any(map(_turns, tables.part.values())):
+        yield input_error(
+            "campbell",
+            "needs a part that a speed changes, and none is a mesh",
+            "Give a part a shape, a deck (.inp) or an archive (.cdb).",
+        )
+    for name in ("modes", "campbell"):
+        yield from _diameters(name, getattr(asked, name, None), sectors)
+
+
+def _turns(table: Any) -> bool:
+    if isinstance(table, FileModel):
+        return table.file.lower().endswith(MESHES)
+    return isinstance(table, PrismBlades | Sector | Copy)
+
+
+def _diameters(name: str, table: Any, sectors: int | None) -> Iterator[InputError]:
+    given = getattr(table, "nodal_diameters", None)
+    if sectors is None or not given:
+        return
+    if max(given) > sectors // 2:
+        yield input_error(
+            f"{name}.nodal_diameters",
+            f"{max(given)} is above half of {sectors} sectors",
+            f"The nodal diameters go from 0 to {sectors // 2}.",
+        )
+        return
+    for order in getattr(table, "engine_orders", ()):
+        excited = min(order % sectors, -order % sectors)
+        if excited not in given:
+            yield input_error(
+                f"{name}.engine_orders",
+                f"{order} excites the nodal diameter {excited}, which is not computed",
+                "Add it to nodal_diameters, or leave those out: then all that are excited are computed.",
+            )
+
+
+def _near(word: str, known: list[str]) -> str:
+    return did_you_mean(word, known) if known else "There is none."

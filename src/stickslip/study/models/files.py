@@ -1,0 +1,259 @@
+"""A part from the files of a finite-element program: one way from the reader to the part."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.arrays import IntArray
+from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.model.axis import Axis
+from stickslip.model.fe.elements import EXACT, Quadrature
+from stickslip.model.fe.solid import Material, Materials
+from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.part import FACES, Part, solid_part, structure_part
+from stickslip.model.readers.ansys_archive import read_ansys_archive, read_ansys_materials
+from stickslip.model.readers.calculix_deck import Deck, read_deck
+from stickslip.model.readers.open_model import read_model
+from stickslip.model.readers.units import Units
+from stickslip.model.structure import Structure
+from stickslip.study.file.parts import FileModel
+
+ROOT = "root"
+DECKS, ARCHIVES = (".inp", ".inp.gz"), (".cdb",)
+MESHES = (*DECKS, *ARCHIVES)
+COMPANIONS = (".mas", ".dof")  # what CalculiX writes beside a stiffness
+_KEPT = "Read it in Python, keep it with save_structure (.npz) and give that: use"
+
+
+def file_part(
+    key: str, table: FileModel, home: Path, material: Material | None, **others: Any
+) -> Part:
+    """Read a part from its files.
+
+    Parameters
+    ----------
+    key
+        Of the table, for messages: ``part.blade``.
+    table
+        The table.
+    home
+        Folder that names of files are relative to.
+    material
+        Of all elements; None: that of the file.
+    **others
+        Further fields of `Part`.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, table and file disagree, or a set is not there.
+    """
+    path = home / table.file
+    name = path.name.lower()
+    try:
+        if name.endswith(DECKS):
+            return _from_deck(key, table, path, material, others)
+        if name.endswith(ARCHIVES):
+            return _from_archive(key, table, path, material, others)
+        return _from_matrices(key, table, home, others)
+    except InputError as error:
+        raise error.called(_words(key, error)) from None
+
+
+def with_companions(path: Path) -> list[Path]:
+    """Return a file and those that CalculiX writes beside a stiffness."""
+    zipped = ".gz" if path.name.endswith(".gz") else ""
+    plain = path.name.removesuffix(".gz")
+    if not plain.endswith(".sti"):
+        return [path]
+    beside = [path.with_name(plain.removesuffix(".sti") + end + zipped) for end in COMPANIONS]
+    return [path, *(p for p in beside if p.is_file())]
+
+
+def _words(key: str, error: InputError) -> dict[str, str]:
+    """Return the keys of the study for arguments of the readers and of what pairs faces."""
+    words = {name: f"{key}.{name}" for name in ("units", "mesh", "mass", "nodes")}
+    words |= {"plausible": f"{key}.plausible = false", "ignore": "", "use": _KEPT}
+    return words | face_words(error)
+
+
+def face_words(error: InputError) -> dict[str, str]:
+    """Return what a study calls the arguments of what pairs cyclic faces."""
+    words = {"swap": "Swap low_face and high_face"}
+    if "sectors" in error.words:
+        words["sectors"] = error.words["sectors"].replace("=", " = ")
+    return words
+
+
+def _sectors(key: str, table: FileModel, of_deck: int | None = None) -> int:
+    """Return the number of sectors: the deck's, which the study may repeat, or the study's."""
+    if of_deck is not None and table.sectors not in (None, of_deck):
+        raise input_error(
+            f"{key}.sectors",
+            f"is {table.sectors}, but the deck's cyclic symmetry has {of_deck}",
+            f"Give sectors = {of_deck}, or leave it out.",
+        )
+    sectors = of_deck or table.sectors or 1
+    if sectors == 1 and table.low_face is not None:
+        raise input_error(
+            f"{key}.sectors",
+            "must be above 1 with cyclic faces",
+            "Give the number of sectors of the wheel, or leave the faces out.",
+        )
+    return sectors
+
+
+def _units(table: FileModel) -> Units:
+    return Units.named(table.units)
+
+
+def _from_deck(
+    key: str, table: FileModel, path: Path, given: Material | None, others: dict[str, Any]
+) -> Part:
+    deck = read_deck(path, units=_units(table), plausible=table.plausible)
+    sectors = _sectors(key, table, deck.sectors)
+    partly = deck.held.any(axis=1) & ~deck.held.all(axis=1)
+    return _solid(
+        key,
+        table,
+        deck.mesh,
+        given or _materials(deck),
+        sectors,
+        deck.axis,
+        held=deck.held if partly.any() else None,
+        quadrature=deck.quadrature if table.quadrature == "calculix" else EXACT,
+        warnings=tuple(f"{table.file}: passed over {text}" for text in deck.ignored),
+        **others,
+    )
+
+
+def _materials(deck: Deck) -> Materials:
+    if len(set(deck.cell_material)) > 1:
+        return [deck.materials[name] for name in deck.cell_material]
+    return deck.material
+
+
+def _from_archive(
+    key: str, table: FileModel, path: Path, given: Material | None, others: dict[str, Any]
+) -> Part:
+    mesh = read_ansys_archive(path, units=_units(table))
+    if given is None:
+        found = read_ansys_materials(path, units=_units(table), plausible=table.plausible)
+        if len(found) != 1:
+            raise input_error(
+                f"{key}.material",
+                f"is missing, and {path.name} holds {len(found)} materials",
+                "Add the table [material].",
+            )
+        given = next(iter(found.values()))
+    quadrature = Quadrature.calculix() if table.quadrature == "calculix" else EXACT
+    sectors = _sectors(key, table)
+    return _solid(key, table, mesh, given, sectors, None, quadrature=quadrature, **others)
+
+
+def _solid(
+    key: str,
+    table: FileModel,
+    mesh: SolidMesh,
+    material: Materials,
+    sectors: int,
+    axis: Axis | None,
+    **others: Any,
+) -> Part:
+    faces = _faces(key, table, mesh.node_sets, sectors)
+    mesh = _clamped(key, table, mesh)
+    axis = table.axis() or axis or Axis()
+    return solid_part(mesh, material, axis, sectors=sectors, faces=faces, **others)
+
+
+def _from_matrices(key: str, table: FileModel, home: Path, others: dict[str, Any]) -> Part:
+    if table.clamped:
+        raise input_error(
+            f"{key}.clamped",
+            "cannot be applied to a model of matrices, which hold their supports already",
+            "Leave it out, and hold the nodes in the program that wrote the file.",
+        )
+    sectors = _sectors(key, table)
+    files = {name: home / file for name, file in table.files().items()}
+    structure = _matrices(key, table, files)
+    mesh = None
+    if "mesh" in files and files["mesh"].name.lower().endswith(DECKS):
+        mesh = read_deck(files["mesh"], units=_units(table), plausible=table.plausible).mesh
+    faces = _faces(key, table, structure.sets, sectors)
+    return structure_part(
+        structure, mesh=mesh, sectors=sectors, faces=faces, axis=table.axis() or Axis(), **others
+    )
+
+
+def _matrices(key: str, table: FileModel, files: Mapping[str, Path]) -> Structure:
+    """Read matrices by the suffix of their file."""
+    names = {"mesh": "mesh", "mass": "mass", "damping_matrix": "damping", "nodes": "nodes"}
+    beside = {names[name]: path for name, path in files.items() if name != "file"}
+    found = read_model(files["file"], units=_units(table), plausible=table.plausible, **beside)
+    if isinstance(found, Structure):
+        return found
+    raise input_error(
+        f"{key}.file",
+        f"{table.file} holds results, not a model",
+        "Give a deck (.inp), an archive (.cdb), or matrices.",
+    )
+
+
+def _clamped(key: str, table: FileModel, mesh: SolidMesh) -> SolidMesh:
+    """Return the mesh with the nodes that are held in the set ``root`` alone."""
+    sets = dict(mesh.node_sets)
+    held = set(sets.pop(ROOT, np.zeros(0, dtype=np.int64)).tolist())
+    for i, name in enumerate(table.clamped):
+        held.update(sets[_known(f"{key}.clamped[{i}]", name, sets)].tolist())
+    root = np.array(sorted(held), dtype=np.int64)
+    kept = {name: _without(members, root) for name, members in sets.items()}
+    return replace(mesh, node_sets={ROOT: root} | {k: m for k, m in kept.items() if m.size})
+
+
+def _faces(
+    key: str, table: FileModel, sets: Mapping[str, IntArray], sectors: int
+) -> tuple[str, str]:
+    """Return the names of the sets that are the cyclic faces."""
+    found = []
+    for face, usual in zip(("low_face", "high_face"), FACES, strict=True):
+        name = getattr(table, face)
+        if name is None and sectors > 1 and usual not in sets:
+            raise _no_face(f"{key}.{face}", sectors, sets)
+        found.append(usual if name is None else _known(f"{key}.{face}", name, sets))
+    return found[0], found[1]
+
+
+def _no_face(place: str, sectors: int, sets: Iterable[str]) -> InputError:
+    return input_error(
+        place,
+        f"is missing with {sectors} sectors, and the file has no cyclic tie",
+        f"Name one of its sets: {', '.join(sorted(sets)) or 'it has none'}.",
+    )
+
+
+def _known(place: str, name: str, sets: Mapping[str, IntArray]) -> str:
+    """Return the set's name in the file, which may differ in capitals."""
+    found = alike(name, sets)
+    if found is not None:
+        return found
+    raise input_error(
+        place,
+        f"the file has no set {name!r} of free nodes",
+        did_you_mean(name, list(sets)) if sets else "It has no sets.",
+    )
+
+
+def alike(name: str, known: Iterable[str]) -> str | None:
+    """Return the one of the known names that a name is, capitals aside; None if there is none, or several."""
+    words = list(known)
+    if name in words:
+        return name
+    found = [word for word in words if word.lower() == name.lower()]
+    return found[0] if len(found) == 1 else None
+
+
+def _without(members: IntArray, held: IntArray) -> IntArray:
+    return np.asarray(members[~np.isin(members, held)])

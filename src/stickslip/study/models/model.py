@@ -1,0 +1,145 @@
+"""From the tables of a study to a model."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from stickslip.assembly.contact import GROUND, NEXT, Contact, Join
+from stickslip.assembly.load import Load, Output
+from stickslip.assembly.model import Model
+from stickslip.errors import input_error
+from stickslip.model.part import Part
+from stickslip.study.file.loads import LoadTable
+from stickslip.study.file.parts import BeamTable, Lumped
+from stickslip.study.file.tables import Tables
+from stickslip.study.models.files import alike
+from stickslip.study.models.parts import Memo, Workshop
+from stickslip.units import DEG, RPM
+
+NORMAL_ALONE = ("unilateral_spring",)  # laws without tangential forces
+
+
+def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
+    """Return the model of one case.
+
+    Parameters
+    ----------
+    tables
+        Of the case.
+    home
+        Folder that names of files are relative to.
+    memo
+        Parts of earlier cases; new ones are added.
+
+    Raises
+    ------
+    InputError
+        Naming the key, if files cannot be read or something does not fit.
+    """
+    parts = Workshop(tables, home, memo).parts()
+    rotation = tables.rotation
+    model = Model(
+        parts=parts,
+        contacts={name: _contact(tables, parts, table) for name, table in tables.contact.items()},
+        joins={
+            name: Join(
+                between=_between(parts, table.between),
+                pairing=table.pairing,
+                tolerance=table.tolerance_m,
+            )
+            for name, table in tables.join.items()
+        },
+        loads={name: _load(tables, parts, table) for name, table in tables.load.items()},
+        outputs=_outputs(tables, parts),
+        peak_output=tables.output.peak,
+        alert_over=_alert_over(tables),
+        speed=RPM * rotation.speed_rpm,
+        tangent=rotation.tangent,
+        coriolis=rotation.coriolis,
+        centrifugal=rotation.centrifugal,
+        retention=tables.retention.stiffness_n_per_m,
+    )
+    if rotation.speed_rpm > 0 and not model.rotates:
+        raise input_error(
+            "rotation.speed_rpm",
+            f"is {rotation.speed_rpm:g}, but no part is a mesh, and a speed changes nothing else",
+            "Give 0, or bring a mesh. Matrices that were exported at speed hold its effects already.",
+        )
+    return model
+
+
+def newton(tables: Tables, table: LoadTable) -> float:
+    """Return the force of a load, N: its own, or that of another one over the ratio."""
+    if table.force_n is not None:
+        return table.force_n
+    other = tables.load[str(table.ratio_of).removeprefix("load.")]
+    assert table.ratio is not None
+    return newton(tables, other) / table.ratio
+
+
+def _contact(tables: Tables, parts: Mapping[str, Part], table: Any) -> Contact:
+    return Contact(
+        between=_between(parts, table.between),
+        law=table.library(),
+        share=table.per,
+        pairing=table.pairing,
+        tangent=None if table.tangent is None else tuple(table.tangent),
+        acts=table.acts or _acts(tables, table),
+        tolerance=table.tolerance_m,
+        gap=table.gap_m,
+        preload=table.preload,
+    )
+
+
+def _acts(tables: Tables, table: Any) -> Any:
+    """Return the direction of a contact that the motion of single dofs is; None for surfaces, which have normals."""
+    part = tables.part[table.between[0].partition(".")[0]]
+    if not isinstance(part, Lumped | BeamTable):
+        return None
+    return "normal" if table.law in NORMAL_ALONE else "tangential"
+
+
+def _between(parts: Mapping[str, Part], names: list[str]) -> tuple[str, str]:
+    first, second = (_own_name(parts, name) for name in names)
+    return first, second
+
+
+def _own_name(parts: Mapping[str, Part], name: str) -> str:
+    """Return the name of a surface as its file has it, whatever the capitals in the study."""
+    ahead = NEXT if name.startswith(NEXT) else ""
+    head, dot, rest = name.removeprefix(NEXT).partition(".")
+    if name == GROUND or head not in parts or not rest:
+        return name
+    return f"{ahead}{head}{dot}{alike(rest, parts[head].names) or rest}"
+
+
+def _load(tables: Tables, parts: Mapping[str, Part], table: LoadTable) -> Load:
+    x, y, z = table.direction or (0.0, 0.0, 0.0)
+    return Load(
+        on=_own_name(parts, table.on),
+        newton=newton(tables, table),
+        direction=None if table.direction is None else (x, y, z),
+        harmonic=table.harmonic,
+        phase=table.phase_deg * DEG,
+        engine_order=table.engine_order,
+    )
+
+
+def _outputs(tables: Tables, parts: Mapping[str, Part]) -> tuple[Output, ...]:
+    usual = tables.output.directions
+    return tuple(
+        Output(
+            name=name,
+            on=_own_name(parts, point.on),
+            near=None
+            if point.near_m is None
+            else (point.near_m[0], point.near_m[1], point.near_m[2]),
+            directions=tuple(point.directions or usual or ()),
+        )
+        for name, point in tables.output.points.items()
+    )
+
+
+def _alert_over(tables: Tables) -> tuple[str, ...]:
+    over = tables.harmonics.alert_over
+    return (over,) if isinstance(over, str) else tuple(over)

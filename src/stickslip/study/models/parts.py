@@ -1,0 +1,312 @@
+"""From the tables [part.NAME] to parts; equal tables give the same part, so that nothing is meshed or reduced twice."""
+
+import json
+import logging
+from collections.abc import Callable, MutableMapping
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.assembly.placing import copy_of, place_of
+from stickslip.errors import input_error
+from stickslip.model.axis import Axis
+from stickslip.model.fe.beam import Beam, beam
+from stickslip.model.fe.solid import Material
+from stickslip.model.matrices import lumped
+from stickslip.model.mesh.blade_mesh import mesh_blade_pair
+from stickslip.model.mesh.blade_pair import BladePair
+from stickslip.model.mesh.sector import BladedSector
+from stickslip.model.mesh.sector_mesh import mesh_sector
+from stickslip.model.part import (
+    BodyPoints,
+    Part,
+    flat_curved_part,
+    rigid_part,
+    solid_part,
+    structure_part,
+)
+from stickslip.model.rigid.body import RigidBody
+from stickslip.model.rigid.damper import ContactPoints, FlatCurvedDamper
+from stickslip.study.file.parts import (
+    AXES,
+    BeamTable,
+    Copy,
+    FileModel,
+    FlatCurved,
+    Lumped,
+    PrismBlades,
+    Reduction,
+    RigidBodyTable,
+    Sector,
+    Surface,
+)
+from stickslip.study.file.quantities import build
+from stickslip.study.file.section import Section
+from stickslip.study.file.tables import Tables
+from stickslip.study.models.files import file_part, with_companions
+from stickslip.units import DEG, HZ
+
+LOG = logging.getLogger("stickslip")
+REMEMBERED = 16  # parts that are kept in memory
+CHUNK = 1 << 20  # bytes of a file that are hashed at a time
+
+Memo = MutableMapping[str, Part]
+
+
+@dataclass(frozen=True, eq=False)
+class Workshop:
+    """What parts are made from.
+
+    Parameters
+    ----------
+    tables
+        Of one case.
+    home
+        Folder that names of files are relative to.
+    memo
+        Parts made before, by the digest of all they depend on.
+    """
+
+    tables: Tables
+    home: Path
+    memo: Memo
+
+    def parts(self) -> dict[str, Part]:
+        """Return all parts, in the order of the file."""
+        return {name: self.part(name) for name in self.tables.part}
+
+    def part(self, name: str) -> Part:
+        """Return a part, that of an earlier case if nothing it depends on has changed."""
+        key = digest(self.tables, name, self.home)
+        if key not in self.memo:
+            made = self._made(name, self.tables.part[name])
+            while len(self.memo) >= REMEMBERED:
+                self.memo.pop(next(iter(self.memo)))
+            self.memo[key] = made
+        return self.memo[key]
+
+    def _made(self, name: str, table: Any) -> Part:
+        if isinstance(table, Copy):
+            placed = table.placed
+            mirror = None if placed.mirror is None else AXES[placed.mirror]
+            x, y, z = placed.move_m
+            place = place_of(
+                mirror=mirror,
+                turn=placed.turn_deg * DEG,
+                axis=Axis(AXES[placed.axis]),
+                move=(x, y, z),
+            )
+            return copy_of(self.part(table.of), place)
+        return _MAKERS[type(table)](self, name, table)
+
+    def material(self, table: Any) -> Material | None:
+        """Return the material of a part; None where the study names none."""
+        given = table.material or self.tables.material
+        return None if given is None else build(Material, given)
+
+    def _material(self, name: str, table: Any) -> Material:
+        found = self.material(table)
+        if found is None:
+            raise input_error(
+                f"part.{name}.material",
+                "is missing",
+                "Add the table [material], or one of the part.",
+            )
+        return found
+
+    def others(self, table: Any, *, reduced: bool = True) -> dict[str, Any]:
+        """Return how a part is damped and reduced; `reduced`: whether it is where the study does not say."""
+        reduction = table.reduction or self.tables.reduction or Reduction()
+        found: dict[str, Any] = {}
+        if reduced or table.reduction is not None:
+            found["n_modes"] = reduction.fixed_interface_modes
+        damping = table.damping or self.tables.damping
+        if damping is not None:
+            low, high = damping.between_hz
+            found |= {"damping_ratio": damping.ratio, "between": (HZ * low, HZ * high)}
+        return found
+
+    def blades(self, name: str, table: Any) -> Part:
+        """Mesh a pair of prismatic blades, with nodes where a damper touches them."""
+        points = contact_nodes(self.tables, table)
+        LOG.info("meshing the part %s", name)
+        mesh = mesh_blade_pair(build(BladePair, table), points)
+        return solid_part(mesh, self._material(name, table), **self.others(table))
+
+    def sector(self, name: str, table: Any) -> Part:
+        """Mesh a sector of a bladed disk."""
+        LOG.info("meshing the part %s, one of %d sectors", name, table.sectors)
+        mesh = mesh_sector(build(BladedSector, table))
+        material = self._material(name, table)
+        return solid_part(mesh, material, sectors=table.sectors, **self.others(table))
+
+    def beam(self, name: str, table: Any) -> Part:
+        """Make a beam along x."""
+        shape = build(Beam, table, material=self._material(name, table))
+        structure = beam(shape, table.elements, bending=table.bending, axial=table.axial)
+        return structure_part(structure, **self.others(table, reduced=False))
+
+    def lumped(self, name: str, table: Lumped) -> Part:
+        """Make a structure of masses, springs and dashpots."""
+        n = len(table.masses_kg)
+        stiffness, damping = (
+            _links(links, table.labels, n)
+            for links in (table.springs_n_per_m, table.dashpots_n_s_per_m)
+        )
+        structure = lumped(np.array(table.masses_kg), stiffness, damping, table.labels)
+        others = self.others(table, reduced=False)
+        if table.dashpots_n_s_per_m and table.damping is None:  # has its own
+            others = {key: value for key, value in others.items() if key == "n_modes"}
+        return structure_part(structure, **others)
+
+    def rigid(self, name: str, table: Any) -> Part:
+        """Make a rigid body with its surfaces."""
+        surfaces = {word: _body_points(word, surface) for word, surface in table.surfaces.items()}
+        return rigid_part(build(RigidBody, table), surfaces)
+
+    def flat_curved(self, name: str, table: Any) -> Part:
+        """Make a damper with a flat and a curved side."""
+        return flat_curved_part(damper_of(self.tables, name))
+
+    def from_file(self, name: str, table: FileModel) -> Part:
+        """Read a part."""
+        LOG.info("reading %s", table.file)
+        others = self.others(table)
+        return file_part(f"part.{name}", table, self.home, self.material(table), **others)
+
+
+_MAKERS: dict[type[Section], Callable[[Workshop, str, Any], Part]] = {
+    PrismBlades: Workshop.blades,
+    Sector: Workshop.sector,
+    BeamTable: Workshop.beam,
+    Lumped: Workshop.lumped,
+    RigidBodyTable: Workshop.rigid,
+    FlatCurved: Workshop.flat_curved,
+    FileModel: Workshop.from_file,
+}
+
+
+def damper_of(tables: Tables, name: str) -> FlatCurvedDamper:
+    """Return the geometry of a flat_curved part; what its table leaves out is taken from the platforms that have its nodes.
+
+    Raises
+    ------
+    InputError
+        If the table leaves something out, and no blades have nodes at its points.
+    """
+    table: Any = tables.part[name]
+    given: dict[str, Any] = {}
+    for blades in _blades_at(tables, name):
+        given = {
+            "apex": blades.wedge_apex,
+            "flat_angle": blades.flat_angle,
+            "curved_angle": blades.curved_angle,
+        }
+    keys = {"apex": "apex_m", "flat_angle": "flat_angle_deg", "curved_angle": "curved_angle_deg"}
+    for field, key in keys.items():
+        if getattr(table, key) is not None:
+            given.pop(field, None)
+        elif field not in given:
+            raise input_error(
+                f"part.{name}.{key}",
+                "is missing, and no prism_blades have nodes at the points of this part",
+                f'Give it, or give blades nodes_at = ["{name}.flat", "{name}.curved"].',
+            )
+    damper: FlatCurvedDamper = build(FlatCurvedDamper, table, **given)
+    return damper
+
+
+def _blades_at(tables: Tables, name: str) -> list[BladePair]:
+    """Return the geometry of blades that have nodes at the points of a part."""
+    return [
+        build(BladePair, table)
+        for table in tables.part.values()
+        if isinstance(table, PrismBlades) and name in _owners(table)
+    ]
+
+
+def _owners(table: Any) -> list[str]:
+    """Return the parts that blades have nodes for."""
+    return list(dict.fromkeys(word.partition(".")[0] for word in table.nodes_at))
+
+
+def contact_nodes(tables: Tables, table: Any) -> ContactPoints:
+    """Return the points at which blades have nodes."""
+    sides: list[str] = [word.partition(".")[2] for word in table.nodes_at]
+    if not sides:
+        return ContactPoints((), (), np.zeros((0, 3)), np.zeros((0, 3, 3)))
+    points = damper_of(tables, _owners(table)[0]).contact_points()
+    own = [i for i, side in enumerate(points.side) if side in sides]
+    return ContactPoints(
+        tuple(points.names[i] for i in own),
+        tuple(points.side[i] for i in own),
+        points.position[own],
+        points.frame[own],
+    )
+
+
+def digest(tables: Tables, name: str, home: Path) -> str:
+    """Return the hash of all that a part depends on: tables and the content of files."""
+    related = _related(tables, name)
+    given = {key: tables.part[key].model_dump(mode="json") for key in related}
+    shared = tables.model_dump(mode="json", include={"material", "damping", "reduction"})
+    files = [home / file for key in related for file in _files(tables.part[key])]
+    content = [digest_of(path) for file in files for path in with_companions(file)]
+    kinds = [type(tables.part[key]).__name__ for key in related]
+    return sha256(json.dumps([name, kinds, given, shared, content]).encode()).hexdigest()
+
+
+def _related(tables: Tables, name: str) -> list[str]:
+    """Return the parts whose tables a part depends on, itself first."""
+    table: Any = tables.part[name]
+    if isinstance(table, Copy):
+        return [name, *_related(tables, table.of)]
+    if isinstance(table, PrismBlades):
+        return [name, *_owners(table)]
+    if isinstance(table, FlatCurved):
+        blades = tables.part.items()
+        return [name, *(k for k, t in blades if isinstance(t, PrismBlades) and name in _owners(t))]
+    return [name]
+
+
+def _files(table: Any) -> list[str]:
+    return list(table.files().values()) if isinstance(table, FileModel) else []
+
+
+def digest_of(path: Path) -> str:
+    """Return the hash of a file's content."""
+    found = sha256()
+    with path.open("rb") as stream:
+        while chunk := stream.read(CHUNK):
+            found.update(chunk)
+    return found.hexdigest()
+
+
+def _links(links: list[list[Any]], labels: list[str], n: int) -> FloatArray:
+    """Return the (n, n) matrix of springs or dashpots."""
+    matrix = np.zeros((n, n))
+    for first, second, value in links:
+        column = np.zeros(n)
+        for end, sign in ((first, 1.0), (second, -1.0)):
+            if end != "ground":
+                column[labels.index(end) if isinstance(end, str) else end - 1] += sign
+        matrix += value * np.outer(column, column)
+    return matrix
+
+
+def _body_points(name: str, surface: Surface) -> BodyPoints:
+    """Return the points of a body's surface, their frames made of normal and tangent."""
+    normal = np.array(surface.normal, dtype=float)
+    normal /= np.linalg.norm(normal)
+    along = np.eye(3)[np.argmin(np.abs(normal))] if surface.tangent is None else surface.tangent
+    tangent = np.asarray(along, dtype=float)
+    tangent = tangent - (tangent @ normal) * normal
+    tangent /= np.linalg.norm(tangent)
+    frame = np.column_stack([tangent, np.cross(normal, tangent), normal])
+    count = len(surface.points_m)
+    names = tuple(f"{name}.{i + 1}" for i in range(count))
+    return BodyPoints(names, np.array(surface.points_m, dtype=float), np.tile(frame, (count, 1, 1)))

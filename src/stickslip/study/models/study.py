@@ -1,0 +1,136 @@
+"""A study: what is to be computed of which models."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from stickslip.assembly.model import Model
+from stickslip.errors import InputError, together
+from stickslip.study.analyses.analysis import Case
+from stickslip.study.file.study import StudyFile, TablesOfCase, read_file, validated
+from stickslip.study.file.tables import OF_THE_MODEL, Tables, asked_of
+from stickslip.study.file.vary import with_values
+from stickslip.study.models.checks import refusals
+from stickslip.study.models.model import model_of
+from stickslip.study.models.parts import Memo, digest
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """A study that has been read and found good as far as that is possible without a mesh.
+
+    Parameters
+    ----------
+    file
+        Its content, one set of tables for each case.
+    memo
+        Parts that are built, shared by all cases.
+    """
+
+    file: StudyFile
+    memo: Memo = field(default_factory=dict, repr=False)
+
+    @property
+    def path(self) -> Path:
+        """The file, by which messages call it."""
+        return self.file.path
+
+    @property
+    def text(self) -> str:
+        """Content of the file."""
+        return self.file.text
+
+    @property
+    def tables(self) -> Tables:
+        """Tables of the first case."""
+        return self.file.tables
+
+    @property
+    def title(self) -> str:
+        """Title of a line; the name of the file's folder where it has none."""
+        return self.tables.title or self.file.home.name
+
+    @property
+    def folder(self) -> Path:
+        """Where results go, inside the file's folder."""
+        return self.file.home / self.tables.output.folder
+
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """Names of the analyses that the file has tables of."""
+        return asked_of(self.tables)
+
+    def cases(self, _store: Any = None) -> tuple[Case, ...]:
+        """Return what [vary] spans; one case without it. Models are built when they are asked for."""
+        return tuple(self._case(i, case) for i, case in enumerate(self.file.cases))
+
+    def model(self, case: int = 0) -> Model:
+        """Return the model of a case.
+
+        Raises
+        ------
+        InputError
+            If files cannot be read, or something does not fit.
+        """
+        tables = self.file.cases[case].tables
+        try:
+            return model_of(tables, self.file.home, self.memo)
+        except InputError as error:
+            raise error.inside(str(self.path)) from None
+
+    def replace(self, values: Mapping[str, Any]) -> "Study":
+        """Return the study with other values of some keys: ``{"contact.flat.friction_coefficient": 0.4}``.
+
+        Raises
+        ------
+        InputError
+            If there is no such key, or its value is refused.
+        """
+        raw = with_values(self.file.raw, values, keep_vary=True)
+        changed = StudyFile(self.path, self.text, raw, validated(self.path, raw))
+        return _checked(Study(changed, self.memo))
+
+    def _case(self, index: int, case: TablesOfCase) -> Case:
+        return Case(
+            index=index,
+            label=case.label,
+            values=case.values,
+            settings=case.tables,
+            build=partial(self.model, index),
+            digest=model_digest(case.tables, self.file.home),
+            home=self.file.home,
+        )
+
+
+def read_study(path: Path) -> Study:
+    """Read a study file and refuse what can be refused without a mesh.
+
+    Raises
+    ------
+    InputError
+        Naming every problem of the file, one a line.
+    """
+    return _checked(Study(read_file(path)))
+
+
+def model_digest(tables: Tables, home: Path) -> str:
+    """Return the hash of all that a model depends on: its tables and the content of its files."""
+    own = tables.model_dump(mode="json", include=set(OF_THE_MODEL))
+    output = tables.output.model_dump(mode="json", exclude={"folder"})
+    parts: Sequence[str] = [digest(tables, name, home) for name in tables.part]
+    content = json.dumps([own, output, tables.harmonics.alert_over, parts])
+    return sha256(content.encode()).hexdigest()
+
+
+def _checked(study: Study) -> Study:
+    found: dict[str, InputError] = {}
+    for case in study.file.cases:
+        for error in refusals(case.tables, study.file.home):
+            found.setdefault(str(error), error.inside(str(study.path)))
+    if found:
+        raise together(found.values())
+    return study
