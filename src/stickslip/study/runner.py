@@ -1,7 +1,7 @@
 """From a study to its results: every job of every analysis, each record safe on the disk. The only runner."""
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
@@ -186,7 +186,7 @@ def _meshes(cases: Iterable[Case]) -> dict[str, SolidMesh]:
     return {}
 
 
-def _worked(plan: Sequence[tuple[Task, Any]], workers: int) -> Iterator[Path]:
+def _worked(plan: Sequence[tuple[Task, Any]], workers: int) -> Generator[Path]:
     """Work the jobs off; give the file of each when it is sealed."""
     left = list(reversed(plan))
     running: dict[Future[None], Path] = {}

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import xarray as xr
 
 from stickslip.assembly.model import Model
+from stickslip.assembly.reduced import Store, in_memory
 from stickslip.study.analyses import ANALYSES
 
 
@@ -35,6 +36,8 @@ class Case:
         Folder that names of files are relative to.
     checks
         Further checks that this run asks for, of those that the analysis names in `Analysis.checks`.
+    store
+        Keeps what is expensive of the model: for `Model.assembled`.
     """
 
     index: int
@@ -45,6 +48,7 @@ class Case:
     digest: str
     home: Path
     checks: frozenset[str] = frozenset()
+    store: Store = in_memory
 
 
 @dataclass(frozen=True, eq=False)

@@ -77,7 +77,7 @@ class Campbell:
     def inputs(self, case: Case, model: Model) -> Question:
         """Return what is solved."""
         asked: CampbellTable = case.settings.campbell
-        if not model.turns:
+        if not model.rotates:
             raise input_error(
                 "campbell",
                 "the model is matrices, which no speed changes",

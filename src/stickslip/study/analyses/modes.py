@@ -81,7 +81,7 @@ class Modes:
     def inputs(self, case: Case, model: Model) -> Question:
         """Return what is solved."""
         asked: ModesTable = case.settings.modes
-        wheel = Wheel(model.sectors, model.coriolis and model.turns and model.speed > 0)
+        wheel = Wheel(model.sectors, model.coriolis and model.rotates and model.speed > 0)
         wheel.require(asked.nodal_diameters, "modes.nodal_diameters")
         numbers = wheel.numbers(asked.nodal_diameters)
         known = asked.compared_with(case.home)

@@ -79,8 +79,8 @@ class SafeDiagram:
                 f"must be above zero, got {rpm:g}",
                 "Give the speed at which the engine orders act.",
             )
-        at = rpm * RPM if model.turns else 0.0
-        wheel = Wheel(model.sectors, model.coriolis and model.turns)
+        at = rpm * RPM if model.rotates else 0.0
+        wheel = Wheel(model.sectors, model.coriolis and model.rotates)
         return Question(model, asked.contacts, wheel, wheel.numbers(), asked.modes, (at,), rpm=rpm)
 
     def solve(

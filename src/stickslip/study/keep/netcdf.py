@@ -61,20 +61,22 @@ def _stack(found: Sequence[xr.Variable | None], sizes: Mapping[Hashable, int]) -
     values = np.full(shape, _MISSING[kind.kind], dtype=kind)
     for i, own in enumerate(found):
         if own is not None:
-            values[(i, *(slice(n) for n in own.shape))] = own.values
+            at: tuple[int | slice, ...] = (i, *(slice(n) for n in own.shape))
+            values[at] = own.values
     return xr.Variable(("case", *like.dims), values, like.attrs)
 
 
 def one_case(data: xr.Dataset, index: int) -> xr.Dataset:
     """Return one case of a dataset, without what other cases have more of; single numbers and texts become attributes."""
-    own = data[[name for name, v in data.data_vars.items() if "case" in v.dims]].isel(case=index)
+    names = [name for name, v in data.variables.items() if "case" in v.dims]
+    case = data.isel(case=index)
     kept: dict[Hashable, IntArray] = {}
-    for dim in own.dims:
-        there = [_there(v, dim) for v in own.data_vars.values() if dim in v.dims]
+    for dim in case[names].dims:
+        there = [_there(case[name], dim) for name in names if dim in case[name].dims]
         kept[dim] = np.flatnonzero(np.any(there, axis=0))
-    rest = data.drop_vars(own.data_vars)
-    told = {name: v.values.tolist() for name, v in own.data_vars.items() if set(v.dims) <= _TOLD}
-    return rest.merge(own.drop_vars(told)).isel(kept).assign_attrs({**data.attrs, **told})
+    case = case.isel(kept)
+    told = {name: case[name].values.tolist() for name in names if set(case[name].dims) <= _TOLD}
+    return case.drop_vars(told).assign_attrs({**data.attrs, **told})
 
 
 def _there(found: xr.Variable | xr.DataArray, dim: Hashable) -> BoolArray:

@@ -7,10 +7,12 @@ import numpy as np
 import xarray as xr
 
 from stickslip.assembly.model import ContactsAs, Model
+from stickslip.assembly.statics import StaticState, static_state
 from stickslip.study.analyses.waves.doubts import static_doubts
-from stickslip.study.analyses.waves.static_state import StaticState, static_state
 from stickslip.study.keep.netcdf import variable
+from stickslip.units import RPM
 
+STATIC = ("static_rpm", "static_displacement_m", "static_strain", "static_rotation_rad")
 ABOUT = "model"  # note of what is told here
 NUMBERS = {
     "sectors": ("", "1", "number of sectors of the wheel; 1 for a whole structure"),
@@ -36,7 +38,7 @@ NUMBERS = {
 }
 
 
-def about(model: Model, contacts: ContactsAs, rpm: float, highest_rpm: float) -> dict[str, Any]:
+def about(model: Model, contacts: ContactsAs, rpm: float, highest: float) -> dict[str, Any]:
     """Return the note about a model.
 
     Parameters
@@ -47,10 +49,11 @@ def about(model: Model, contacts: ContactsAs, rpm: float, highest_rpm: float) ->
         What its contacts do.
     rpm
         Speed of the rotor; NaN for a range.
-    highest_rpm
-        At which the static displacement is told.
+    highest
+        Speed at which the static displacement is told, rad/s.
     """
-    facts, state = model.facts, static_state(model, float(f"{highest_rpm:.12g}"))
+    moved = model.static_displacement(highest)
+    facts, state = model.facts, static_state(model.parts, moved, highest)
     note = {
         "sectors": model.sectors,
         "axis_direction": np.asarray(model.axis.unit),
@@ -67,23 +70,20 @@ def about(model: Model, contacts: ContactsAs, rpm: float, highest_rpm: float) ->
         "elements": facts.elements,
         "warnings": np.array([*model.warnings, *static_doubts(state)], dtype=str),
     }
-    return note | _static(state) | _skin(model)
+    return note | _static(state)
 
 
 def _static(state: StaticState | None) -> dict[str, float]:
-    names = {
-        "rpm": "rpm",
-        "displacement": "displacement_m",
-        "strain": "strain",
-        "rotation": "rotation_rad",
-    }
-    return {f"static_{key}": getattr(state, name, np.nan) for name, key in names.items()}
+    if state is None:
+        return dict.fromkeys(STATIC, np.nan)
+    found = state.speed / RPM, state.displacement, state.strain, state.rotation
+    return dict(zip(STATIC, found, strict=True))
 
 
-def _skin(model: Model) -> dict[str, Any]:
+def skin_note(model: Model) -> dict[str, Any]:
+    """Return the note about the skin, for mode shapes."""
     skin = model.skin
-    if skin is None:
-        return {}
+    assert skin is not None
     return {"skin_point": skin.points, "skin_triangle": skin.triangles, "skin_cut": skin.cut}
 
 
@@ -98,7 +98,7 @@ def told(note: Mapping[str, Any]) -> dict[str, xr.Variable]:
 
 def _in_words(model: Model, rpm: float) -> str:
     """Say which effects of rotation are in the numbers."""
-    if not model.turns:
+    if not model.rotates:
         return "matrices as read, unchanged by speed"
     if rpm == 0:
         return "at rest"

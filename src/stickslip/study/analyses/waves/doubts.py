@@ -6,14 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.assembly.statics import MOST_DISPLACEMENT, MOST_ROTATION, MOST_STRAIN, StaticState
 from stickslip.response.rotating.safe import Safe
 from stickslip.study.analyses.waves.results import WaveBranches
-from stickslip.study.analyses.waves.static_state import (
-    MOST_DISPLACEMENT,
-    MOST_ROTATION,
-    MOST_STRAIN,
-    StaticState,
-)
+from stickslip.units import HZ, RPM
 
 BASIS_ERROR = 1e-4  # relative, of frequencies in a Campbell diagram, above which there is a warning
 
@@ -33,7 +29,7 @@ def static_doubts(state: StaticState | None) -> tuple[str, ...]:
     if state is None or not state.too_large:
         return ()
     text = (
-        f"the static displacement at {state.rpm:g} rpm is too large for linear statics: up to {1e3 * state.displacement:.4g} mm "
+        f"the static displacement at {state.speed / RPM:g} rpm is too large for linear statics: up to {1e3 * state.displacement:.4g} mm "
         f"at a radius of {1e3 * state.radius:.4g} mm, strains up to {100 * state.strain:.3g} %, rotations up to "
         f"{state.rotation:.3g} rad (the limits are {100 * MOST_DISPLACEMENT:g} % of the radius, {100 * MOST_STRAIN:g} %, "
         f"{MOST_ROTATION:g} rad); frequencies at this speed are in doubt: check the speed (rpm), the material (Young's modulus in Pa, density in kg/m3) and the supports"
@@ -46,7 +42,7 @@ def safe_doubts(found: Safe) -> tuple[str, ...]:
     orders = found.not_judged
     if not orders:
         return ()
-    sectors, per_order = found.frequencies.sectors, found.speed_range[1] / (2 * math.pi)
+    sectors, per_order = found.frequencies.sectors, found.speed_range[1] / HZ
     highest = {m: float(found.frequencies.of_wave(m).max()) for m in orders}
     n_modes = found.frequencies.frequencies_hz.shape[1]
     ratio = max(m * per_order * (1 + found.allowed) / max(highest[m], 1e-300) for m in orders)
@@ -105,11 +101,11 @@ def unfollowed_from(order: int, hertz: FloatArray, speeds: FloatArray) -> float 
         (s,) in rad/s, ascending.
     """
     # squares of frequencies are nearly straight in the square of the speed
-    above = (order * speeds / (2 * np.pi)) ** 2 - hertz.max(axis=1) ** 2
+    above = (order * speeds / HZ) ** 2 - hertz.max(axis=1) ** 2
     where = np.flatnonzero(above > 0)
     if not where.size:
         return None
-    first, squares = int(where[0]), (speeds * 60 / (2 * np.pi)) ** 2
+    first, squares = int(where[0]), (speeds / RPM) ** 2
     if first == 0:
         return float(np.sqrt(squares[0]))
     share = above[first - 1] / (above[first - 1] - above[first])

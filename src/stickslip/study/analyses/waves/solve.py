@@ -16,11 +16,10 @@ from stickslip.model.structure import Structure
 from stickslip.reduction.speed_basis import speed_basis
 from stickslip.response.rotating.campbell import campbell
 from stickslip.study.analyses.analysis import Notes
-from stickslip.study.analyses.waves.about import ABOUT, about
+from stickslip.study.analyses.waves.about import ABOUT, about, skin_note
 from stickslip.study.analyses.waves.numbers import Wheel
 from stickslip.study.analyses.waves.results import WaveBranches, WaveModes
 from stickslip.study.keep.progress import advance
-from stickslip.units import RPM
 
 W = TypeVar("W", WaveModes, WaveBranches)
 
@@ -71,7 +70,8 @@ def each_wave(
 ) -> Iterator[W]:
     """Yield what `solve` finds for the waves that are not done; what is told of the model goes into the notes first."""
     if notes.get(ABOUT) is None:
-        notes.put(ABOUT, about(asked.model, asked.contacts, asked.rpm, asked.speeds[-1] / RPM))
+        note = about(asked.model, asked.contacts, asked.rpm, asked.speeds[-1])
+        notes.put(ABOUT, note | (skin_note(asked.model) if asked.shapes else {}))
     known = {w.wave_number for w in done}
     for i, number in enumerate(asked.numbers):
         if number not in known:
@@ -114,7 +114,7 @@ def solve_wave(asked: Question, wave_number: int) -> WaveModes:
 def _growth(asked: Question, wave_number: int, hertz: FloatArray, vectors: Matrix) -> FloatArray:
     """Return the (m,) derivatives of ω² by Ω²: of ``φᴴ (K + iωD − ω²M) φ = 0``, whose φ counts to second order only."""
     x = asked.speeds[0] ** 2
-    if x == 0 or not asked.model.turns:
+    if x == 0 or not asked.model.rotates:
         return np.zeros(len(hertz))
     here, low, high = (asked.at(np.sqrt(f * x), wave_number) for f in (1.0, 0.5, 1.5))
 
