@@ -32,7 +32,12 @@ from .modes import natural_frequencies as natural_frequencies
 from .modes import normal_modes as normal_modes
 from .modes import with_springs as with_springs
 from .part import BodyPoints as BodyPoints
+from .part import Part as Part
 from .part import Place as Place
+from .part import flat_curved_part as flat_curved_part
+from .part import rigid_part as rigid_part
+from .part import solid_part as solid_part
+from .part import structure_part as structure_part
 from .readers.abaqus import read_abaqus_matrices as read_abaqus_matrices
 from .readers.ansys import read_ansys_full as read_ansys_full
 from .readers.ansys_archive import read_ansys_archive as read_ansys_archive
