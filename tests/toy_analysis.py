@@ -5,7 +5,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -118,7 +118,7 @@ class ToyStudy:
     def _case(self, index: int, factor: float, store: PartStore) -> Case:
         stop_at = self.stop_at if index == self.stop_in else -1
         toy = SimpleNamespace(terms=self.terms, stop_at=stop_at, how=self.how)
-        build: Callable[[], Any] = cache(partial(self._build, factor, store))
+        build: Callable[[], Any] = partial(self._build, factor, store)
         values = {"factor": factor}
         return Case(
             index,

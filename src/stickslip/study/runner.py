@@ -1,11 +1,12 @@
 """From a study to its results: every job of every analysis, each record safe on the disk. The only runner."""
 
 import json
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import fields, replace
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -116,7 +117,8 @@ def _run(
 ) -> Outcome:
     book = Book(Provenance(study.title, study.text, library_versions()))
     store = PartStore(study.folder / PARTS, fresh=fresh)
-    tasks = _tasks(study, asked, study.cases(store), checks, book.origin.versions)
+    cases = [replace(c, build=cache(c.build), store=store.kept) for c in study.cases(store)]
+    tasks = _tasks(study, asked, cases, checks, book.origin.versions)
     # tasks whose numbers depend on the same things share a job; those not asked for are shown where they are finished
     unfinished = {t.sealed: t for t in tasks if fresh or not t.finished()}
     to_do = [t for t in unfinished.values() if t.analysis in asked]
@@ -164,13 +166,20 @@ def _task(asked: Analysis, case: Case, folder: Path, versions: Mapping[str, str]
     return Task(asked, case, folder / JOBS / f"{key}{SEALED}")
 
 
-def _inputs(study: Any, task: Task) -> Any:
-    """Return what a job needs; a refusal names the study's file, and the case where there are several."""
-    model, label = task.case.build(), task.case.label
+@contextmanager
+def of_task(study: Any, case: Case) -> Iterator[None]:
+    """Let a refusal name the study's file, and the case where there are several."""
     try:
-        return task.analysis.inputs(task.case, model)
+        yield
     except InputError as error:
-        raise error.inside(f"{study.path} ({label})" if label else str(study.path)) from None
+        place = f"{study.path} ({case.label})" if case.label else str(study.path)
+        raise error.inside(place) from None
+
+
+def _inputs(study: Any, task: Task) -> Any:
+    model = task.case.build()
+    with of_task(study, task.case):
+        return task.analysis.inputs(task.case, model)
 
 
 def _label(asked: Analysis, case: Case) -> str:

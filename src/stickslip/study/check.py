@@ -1,0 +1,44 @@
+"""Everything of a run but the computation: models, static state, natural frequencies, choices, cost. Nothing is written."""
+
+from typing import Any
+
+from stickslip.assembly.model import Model
+from stickslip.study.keep.progress import LOG
+from stickslip.study.runner import asked_for, of_task
+
+WARNING = "WARNING: "
+
+
+def check_study(study: Any) -> tuple[str, ...]:
+    """Build every model and refuse what a run would refuse; tell what is known beforehand, and return warnings.
+
+    Raises
+    ------
+    InputError
+        If the study cannot be run.
+    """
+    asked = asked_for(study)
+    told: list[str] = []
+    for case in study.cases():
+        model = case.build()
+        lines = [_size(model), *(f"{WARNING}{text}" for text in model.warnings)]
+        for one in asked:
+            with of_task(study, case):
+                lines += one.check(case, model)
+        label = f"{case.label}: " if case.label else ""
+        # what holds for all cases is said once
+        new = [line for line in lines if line not in told]
+        told += new
+        for line in new:
+            if not line.startswith(WARNING):
+                LOG.info(f"{label}{line}")
+    return tuple(t.removeprefix(WARNING) for t in told if t.startswith(WARNING))
+
+
+def _size(model: Model) -> str:
+    facts = model.facts
+    wheel = f"one of {model.sectors} sectors, " if model.sectors > 1 else ""
+    return (
+        f"{wheel}{facts.nodes} nodes, {facts.elements} elements, {facts.dofs} free dofs, mass {facts.mass:.6g} kg, "
+        f"{len(model.pairs.names)} contact points"
+    )
