@@ -1,4 +1,4 @@
-"""A synthetic result for tests of the report: the dataset contract of docs/design.md, filled with a toy model.
+"""A synthetic forced response for tests of the report: the dataset contract of docs/design.md, filled with a toy model.
 
 One bending mode carries a Jenkins spring whose limit follows the load ratio (harmonic linearisation), and nine contact
 points are marched in time with a variable normal load. The numbers are plausible; nothing here is a prediction.
@@ -25,6 +25,7 @@ OUTPUTS = ("tip1.x", "tip1.y", "tip2.x")
 DAMPER = tuple(f"damper.{c}" for c in ("x", "y", "z", "rx", "ry", "rz"))
 RETAINED = (*(f"blades.{name}.{c}" for name in CONTACTS for c in "xyz"), *DAMPER)
 HIGH = 5
+KEY = "load.shaker.ratio"
 DIRECTIONS = ["t", "w", "n"]
 
 
@@ -188,7 +189,7 @@ def _variable(dims: str, values: object, units: str, long_name: str) -> xr.Varia
 def _case_variables(
     table: dict[str, np.ndarray], ratios: FloatArray, peak: IntArray
 ) -> dict[str, xr.Variable]:
-    case, status, order = table["case"], table["status"], table["order"]
+    case, status, order = table["point_case"], table["status"], table["order"]
     cases = range(len(ratios))
 
     def count(mask: np.ndarray) -> list[int]:
@@ -208,19 +209,17 @@ def _case_variables(
         "seconds_contact": ("s", seconds),
         "seconds_linear": ("s", 1.4 * seconds),
         "seconds_rest": ("s", 0.3 * seconds),
-        "load_ratio": ("1", ratios),
         "excitation_n": ("N", CENTRIFUGAL / ratios),
-        "centrifugal_n": ("N", np.full(len(ratios), CENTRIFUGAL)),
     }
-    result = {k: _variable("load_case", v, u, k.replace("_", " ")) for k, (u, v) in peaks.items()}
-    result |= {k: _variable("load_case", v, "1", k.replace("_", " ")) for k, v in counts.items()}
-    result["peak_point"] = _variable("load_case", peak, "1", "index of the peak into point")
+    result = {k: _variable("case", v, u, k.replace("_", " ")) for k, (u, v) in peaks.items()}
+    result |= {k: _variable("case", v, "1", k.replace("_", " ")) for k, v in counts.items()}
+    result["peak_point"] = _variable("case", peak, "1", "index of the peak into point")
     return result
 
 
 def _retained(table: dict[str, np.ndarray]) -> np.ndarray:
     """Retained coordinates (point, harmonic, retained): only the damper moves."""
-    amplitude, n = table["amplitude"], len(table["case"])
+    amplitude, n = table["amplitude"], len(table["point_case"])
     retained = np.zeros((n, HIGH + 1, len(RETAINED)), dtype=complex)
     six = np.array([0.03, 0.002, 0.02j, 0.05, 0.8 + 0.3j, 0.1])
     retained[:, 1, -6:] = amplitude[:, None] * six
@@ -230,7 +229,7 @@ def _retained(table: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def _point_variables(table: dict[str, np.ndarray], preload: FloatArray) -> dict[str, xr.Variable]:
-    amplitude, n = table["amplitude"], len(table["case"])
+    amplitude, n = table["amplitude"], len(table["point_case"])
     gap = contact_motion(amplitude)
     force, _ = march(gap, preload)
     energy = np.sum(force[..., :2, :] * (np.roll(gap, -1, -1) - gap)[..., :2, :], axis=(-1, -2))
@@ -243,7 +242,7 @@ def _point_variables(table: dict[str, np.ndarray], preload: FloatArray) -> dict[
         "real_error_percent": "percent",
     }
     plain = (
-        "case",
+        "point_case",
         "frequency_hz",
         "order",
         "status",
@@ -270,6 +269,7 @@ def _point_variables(table: dict[str, np.ndarray], preload: FloatArray) -> dict[
         "gap": _variable("point harmonic contact direction part", fourier(gap), "m", "contact gap"),
         "contact_force": _variable("point harmonic contact direction part", fourier(force), "N", "force"),
         "dissipated_energy": _variable("point contact", energy, "J", "energy lost in a cycle"),
+        "harmonic_kept": _variable("point harmonic", np.arange(HIGH + 1) <= table["order"][:, None], "1", "kept"),
     }  # fmt: skip
 
 
@@ -283,14 +283,10 @@ def _peak_variables(
     for values in (gap, force, time):
         values[missing] = np.nan
     result = {
-        "peak_time": _variable("load_case sample", time, "s", "time in the period"),
-        "peak_gap": _variable("load_case contact direction sample", gap, "m", "gap at the peak"),
-        "peak_force": _variable(
-            "load_case contact direction sample", force, "N", "force at the peak"
-        ),
-        "peak_state": _variable(
-            "load_case contact tangent sample", state, "1", "state at the peak"
-        ),
+        "peak_time": _variable("case sample", time, "s", "time in the period"),
+        "peak_gap": _variable("case contact direction sample", gap, "m", "gap at the peak"),
+        "peak_force": _variable("case contact direction sample", force, "N", "force at the peak"),
+        "peak_state": _variable("case contact tangent sample", state, "1", "state at the peak"),
     }
     result["peak_state"].attrs |= {"flag_values": [0, 1, 2], "flag_meanings": "stick slip open"}
     return result
@@ -309,6 +305,8 @@ def _model_variables(preload: FloatArray) -> dict[str, xr.Variable]:
     }  # fmt: skip
     result = {k: _variable("mode", v, "Hz", k.replace("_", " ")) for k, v in modes.items()}
     return result | {
+        "contact_law": _variable("contact", ["elastic_coulomb"] * 9, "1", "law"),
+        "contact_group": _variable("contact", ["flat"] * 6 + ["curved"] * 3, "1", "contact"),
         "static_gap": _variable("contact direction", static, "m", "gap of the static solve"),
         "static_force": _variable(
             "contact direction", static - [0, 0, 1] * preload[:, None], "N", "static force"
@@ -322,8 +320,8 @@ def _model_variables(preload: FloatArray) -> dict[str, xr.Variable]:
 
 def _check_variables(table: dict[str, np.ndarray], n_cases: int) -> dict[str, xr.Variable]:
     case = np.full(3, n_cases - 1)
-    at = np.array([5, 20, 30]) % int(np.sum(table["case"] == n_cases - 1))
-    first = int(np.argmax(table["case"] == n_cases - 1))
+    at = np.array([5, 20, 30]) % int(np.sum(table["point_case"] == n_cases - 1))
+    first = int(np.argmax(table["point_case"] == n_cases - 1))
     balance = table["amplitude"][first + at]
     return {
         "verify_case": _variable("check", case, "1", "load case"),
@@ -339,14 +337,30 @@ def _check_variables(table: dict[str, np.ndarray], n_cases: int) -> dict[str, xr
 
 
 def _attributes() -> dict[str, object]:
-    study = 'schema_version = 1\n[damper]\nmass_kg = 0.02  # "flat" & <curved>\n'
+    return {
+        "selection": "jacobian_alert", "alert_threshold_percent": 5.0, "low_order": 1, "high_order": HIGH,
+        "low_harmonics": [0, 1], "high_harmonics": list(range(HIGH + 1)), "selection_threshold": 0.05, "failed": 0,
+        "samples": SAMPLES, "report_output": "tip1.x", "warnings": json.dumps([]), "error_over": "tip1.x",
+        "alert_explanation": "One Newton step with harmonics 0 to 5 moves the outputs by more than 5 %.",
+    }  # fmt: skip
+
+
+def provenance(**more: object) -> dict[str, object]:
+    """Return the attributes of the root."""
+    study = 'schema_version = 2\n[damper]\nmass_kg = 0.02  # "flat" & <curved>\n'
     return {
         "title": "Two blades, one damper <synthetic>", "stickslip_version": "0.1.0", "study_toml": study,
         "versions": json.dumps({"numpy": "2.4", "scipy": "1.17"}), "created": "2026-01-01T00:00:00+00:00",
-        "wall_seconds": 12.3, "alert_threshold_percent": 5.0, "low_order": 1, "high_order": HIGH,
-        "samples": SAMPLES, "report_output": "tip1.x", "warnings": json.dumps([]), "complete": 1,
-        "alert_explanation": "One Newton step with harmonics 0 to 5 moves the outputs by more than 5 %.",
-    }  # fmt: skip
+        "wall_seconds": 12.3, "warnings": json.dumps([]), "complete": 1,
+    } | more  # fmt: skip
+
+
+def labelled(data: xr.Dataset, key: str, values: Sequence[float]) -> xr.Dataset:
+    """Add what the runner adds to the node of an analysis: the varied key and the label of each case."""
+    labels = [f"{key} = {v:g}" for v in values]
+    rows = _variable("case vary", np.array(values, dtype=float)[:, None], "1", "values")
+    data = data.assign(case_label=_variable("case", labels, "1", "what is varied"), vary_value=rows)
+    return data.assign_coords(vary=[key])
 
 
 def synthetic_result(
@@ -355,13 +369,13 @@ def synthetic_result(
     failed: int = 0,
     verify: bool = True,
 ) -> xr.Dataset:
-    """Build the whole dataset; `failed` points in the middle of the last load case did not converge."""
+    """Build the node ``forced_response``; `failed` points in the middle of the last load case did not converge."""
     runs = [branch(r, n, failed if i == len(ratios) - 1 else 0) for i, r in enumerate(ratios)]
     table = {k: np.concatenate([run[k] for run in runs]) for k in runs[0]}
-    table["case"] = np.repeat(np.arange(len(ratios)), [len(run["order"]) for run in runs])
+    table["point_case"] = np.repeat(np.arange(len(ratios)), [len(run["order"]) for run in runs])
     amplitude = np.where(table["status"] == 0, table["amplitude"], -1)
     peak = np.array(
-        [np.argmax(np.where(table["case"] == i, amplitude, -2)) for i in range(len(ratios))]
+        [np.argmax(np.where(table["point_case"] == i, amplitude, -2)) for i in range(len(ratios))]
     )
     preload = CENTRIFUGAL / np.array([8.0] * 3 + [16.0] * 3 + [6.0] * 3)
     preload *= np.tile([1.1, 1.0, 0.9], 3) / 3 * 2
@@ -375,10 +389,15 @@ def synthetic_result(
         "harmonic": np.arange(HIGH + 1), "direction": DIRECTIONS, "tangent": DIRECTIONS[:2],
         "part": ["re", "im"], "xyz": ["x", "y", "z"],
     }  # fmt: skip
-    return xr.Dataset(variables, coords=coordinates, attrs=_attributes())
+    return labelled(xr.Dataset(variables, coords=coordinates, attrs=_attributes()), KEY, ratios)
 
 
-def write_result(dataset: xr.Dataset, path: Path) -> Path:
-    """Write `dataset` as netCDF-4 and return the path."""
-    dataset.to_netcdf(path, engine="h5netcdf")
+def tree_of(root: dict[str, object] | None = None, **nodes: xr.Dataset) -> xr.DataTree:
+    """Put analyses together as the runner does."""
+    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=root or provenance()), **nodes})
+
+
+def write_result(tree: xr.DataTree, path: Path) -> Path:
+    """Write a result as netCDF-4 and return the path."""
+    tree.to_netcdf(path, engine="h5netcdf")
     return path

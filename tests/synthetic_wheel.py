@@ -1,14 +1,12 @@
 """Results of bladed disks made from formulas: a ring of eight flat sectors whose modes are cosines."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 import xarray as xr
 
+from stickslip.study.keep.netcdf import stacked
+
 SECTORS, MODES = 8, 3
 PITCH = 2 * np.pi / SECTORS
-STUDY = 'schema_version = 1\ntitle = "A <flat> ring & nothing else"\n'
 
 
 def skin(n: int = 6) -> tuple[np.ndarray, np.ndarray]:
@@ -35,15 +33,20 @@ def waves(numbers: list[int]) -> dict[str, xr.Variable]:
     }
 
 
-def attributes(command: str, **more: object) -> dict[str, object]:
-    return {
-        "command": command, "title": "A <flat> ring & nothing else", "study_toml": STUDY,
-        "stickslip_version": "0.0", "versions": json.dumps({"python": "3.11"}), "created": "2026-01-01T00:00:00",
-        "wall_seconds": 3.5, "warnings": json.dumps([]), "complete": 1, "model_hash": "a", "sectors": SECTORS,
-        "axis_direction": [0.0, 0.0, 1.0], "axis_origin": [0.0, 0.0, 0.0], "speed_rpm": 6000.0,
-        "rotation": "6000 rpm, consistent tangent", "mass_kg": 0.25, "centre_m": [0.15, 0.0, 0.0],
+def facts(**more: object) -> dict[str, xr.Variable]:
+    """Return what results of waves say of the model."""
+    numbers = {
+        "sectors": SECTORS, "axis_direction": [0.0, 0.0, 1.0], "axis_origin_m": [0.0, 0.0, 0.0], "speed_rpm": 6000.0,
+        "rotation": "6000 rpm, consistent tangent", "contacts": "none", "mass_kg": 0.25, "centre_m": [0.15, 0.0, 0.0],
         "box_low_m": [0.09, -0.08, 0.0], "box_high_m": [0.2, 0.08, 0.01], "dofs": 108, "nodes": 36, "elements": 50,
     } | more  # fmt: skip
+    return {k: variable("xyz" if isinstance(v, list) else "", v) for k, v in numbers.items()}
+
+
+def node(*cases: dict[str, xr.Variable]) -> xr.Dataset:
+    """Return the node of an analysis with the variables of its cases."""
+    data = xr.Dataset(stacked(cases))
+    return data.assign(case_label=variable("case", [""] * len(cases)))
 
 
 def frequency(k: np.ndarray, mode: np.ndarray, rpm: np.ndarray | float = 6000.0) -> np.ndarray:
@@ -52,7 +55,7 @@ def frequency(k: np.ndarray, mode: np.ndarray, rpm: np.ndarray | float = 6000.0)
 
 
 def modes_result() -> xr.Dataset:
-    """Return what ``stickslip modes`` writes."""
+    """Return the node ``modes``."""
     points, triangles = skin()
     k, mode = np.meshgrid(np.arange(SECTORS // 2 + 1), np.arange(MODES), indexing="ij")
     angle, radius = np.arctan2(points[:, 1], points[:, 0]), np.hypot(points[:, 0], points[:, 1])
@@ -64,23 +67,27 @@ def modes_result() -> xr.Dataset:
     hz = frequency(k, mode)
     reference = hz * (1 + 1e-4 * (mode + 1))
     reference[0, 0] = np.nan
-    data = waves(list(range(SECTORS // 2 + 1))) | {
-        "frequency_hz": variable("wave mode", hz, "Hz"),
-        "seconds": variable("wave", np.ones(len(hz)), "s"),
-        "reference_hz": variable("wave mode", reference, "Hz"),
-        "difference": variable("wave mode", hz / reference - 1),
-        "shape": variable(
-            "wave mode skin_point xyz part", np.stack([shape.real, shape.imag], axis=-1)
-        ),
-        "skin_point": variable("skin_point xyz", points, "m"),
-        "skin_triangle": variable("face corner", triangles),
-        "skin_cut": variable("face", np.zeros(len(triangles), dtype=int)),
-    }
-    return xr.Dataset(data, attrs=attributes("modes"))
+    data = (
+        facts()
+        | waves(list(range(SECTORS // 2 + 1)))
+        | {
+            "frequency_hz": variable("wave mode", hz, "Hz"),
+            "seconds": variable("wave", np.ones(len(hz)), "s"),
+            "reference_hz": variable("wave mode", reference, "Hz"),
+            "difference": variable("wave mode", hz / reference - 1),
+            "shape": variable(
+                "wave mode skin_point xyz part", np.stack([shape.real, shape.imag], axis=-1)
+            ),
+            "skin_point": variable("skin_point xyz", points, "m"),
+            "skin_triangle": variable("face corner", triangles),
+            "skin_cut": variable("face", np.zeros(len(triangles), dtype=int)),
+        }
+    )
+    return node(data)
 
 
 def campbell_result() -> xr.Dataset:
-    """Return what ``stickslip campbell`` writes; the crossings come from the formula of the frequencies."""
+    """Return the node ``campbell``; the crossings come from the formula of the frequencies."""
     numbers, orders, rpm = [2, 3], [2, 3, 5, 6], np.linspace(0.0, 12000.0, 7)
     k, s, mode = np.meshgrid(numbers, rpm, np.arange(MODES), indexing="ij")
     rows = []
@@ -96,21 +103,26 @@ def campbell_result() -> xr.Dataset:
                 if x * 60 <= rpm[-1]:
                     rows.append((w, m, order, x * 60, x * order))
     columns = list(zip(*rows, strict=True))
-    data = waves(numbers) | {
-        "speed_rpm": variable("speed", rpm, "rpm"),
-        "frequency_hz": variable("wave speed mode", frequency(k, mode, s), "Hz"),
-        "seconds": variable("wave", [1.0, 1.0], "s"),
-        "crossing_wave": variable("crossing", columns[0]),
-        "crossing_mode": variable("crossing", columns[1]),
-        "crossing_engine_order": variable("crossing", columns[2]),
-        "crossing_speed_rpm": variable("crossing", columns[3], "rpm"),
-        "crossing_frequency_hz": variable("crossing", columns[4], "Hz"),
-    }
-    return xr.Dataset(data, attrs=attributes("campbell", engine_orders=orders))
+    data = (
+        facts(speed_rpm=0.0)
+        | waves(numbers)
+        | {
+            "engine_orders": variable("order", orders),
+            "speed_rpm": variable("speed", rpm, "rpm"),
+            "frequency_hz": variable("wave speed mode", frequency(k, mode, s), "Hz"),
+            "seconds": variable("wave", [1.0, 1.0], "s"),
+            "crossing_wave": variable("crossing", columns[0]),
+            "crossing_mode": variable("crossing", columns[1]),
+            "crossing_engine_order": variable("crossing", columns[2]),
+            "crossing_speed_rpm": variable("crossing", columns[3], "rpm"),
+            "crossing_frequency_hz": variable("crossing", columns[4], "Hz"),
+        }
+    )
+    return node(data)
 
 
 def safe_result(margin: float = 0.05) -> xr.Dataset:
-    """Return what ``stickslip safe`` writes."""
+    """Return the node ``safe``."""
     k, mode = np.meshgrid(np.arange(SECTORS // 2 + 1), np.arange(MODES), indexing="ij")
     hz, rows = frequency(k, mode), []
     for order in range(1, 13):
@@ -118,22 +130,18 @@ def safe_result(margin: float = 0.05) -> xr.Dataset:
         rows += [(wave, m, order, hz[wave, m], order * 100.0) for m in range(MODES)]
     columns = [np.array(c) for c in zip(*rows, strict=True)]
     off = columns[4] / columns[3] - 1
-    data = waves(list(range(SECTORS // 2 + 1))) | {
-        "frequency_hz": variable("wave mode", hz, "Hz"),
-        "pair_wave": variable("pair", columns[0]),
-        "pair_mode": variable("pair", columns[1]),
-        "pair_engine_order": variable("pair", columns[2]),
-        "pair_frequency_hz": variable("pair", columns[3], "Hz"),
-        "pair_excitation_hz": variable("pair", columns[4], "Hz"),
-        "pair_margin": variable("pair", off),
-        "pair_near": variable("pair", (np.abs(off) <= margin).astype(int)),
-    }
-    return xr.Dataset(data, attrs=attributes("safe", margin_percent=100 * margin))
-
-
-def write_results(folder: Path, *results: xr.Dataset) -> Path:
-    """Write results into `folder` under the names that the commands use; return the folder."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for data in results:
-        data.to_netcdf(folder / f"{data.attrs['command']}.nc", engine="h5netcdf")
-    return folder
+    data = (
+        facts(margin_percent=100 * margin)
+        | waves(list(range(SECTORS // 2 + 1)))
+        | {
+            "frequency_hz": variable("wave mode", hz, "Hz"),
+            "pair_wave": variable("pair", columns[0]),
+            "pair_mode": variable("pair", columns[1]),
+            "pair_engine_order": variable("pair", columns[2]),
+            "pair_frequency_hz": variable("pair", columns[3], "Hz"),
+            "pair_excitation_hz": variable("pair", columns[4], "Hz"),
+            "pair_margin": variable("pair", off),
+            "pair_near": variable("pair", (np.abs(off) <= margin).astype(int)),
+        }
+    )
+    return node(data)

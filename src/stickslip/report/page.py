@@ -50,7 +50,9 @@ def _views(section: Section, data: xr.Dataset) -> list[Any]:
     """Return what a section draws: all cases at once, or one after the other."""
     if not section.by_case:
         return [section.view(data)]
-    views = [section.view(one_case(data, k)) for k in range(data.sizes.get("case", 0))]
+    n = data.sizes["case"]
+    each = [one_case(data, k) for k in range(n)] if n > 1 else [data.isel(case=0)]
+    views = [section.view(own) for own in each]
     return [views[0], *(replace(view, key=f"_{k}") for k, view in enumerate(views[1:], 1))]
 
 
