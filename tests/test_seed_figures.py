@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from evidence.figures.evidence import Plan, gather
-from evidence.figures.model import Model, with_values
+from evidence.figures.model import Model
 from evidence.figures.page import page, table
 from evidence.figures.statements import Statement, statements
 from evidence.models.lumped import blades_and_damper
 from stickslip import Sweep
-from stickslip.study.example import example_text
 
 RATIO = 6.0  # 120 N on the damper, 20 N on the blade
 BELOW = "Where the predicted error is below 5 % the actual one is, too"
@@ -82,9 +81,3 @@ def test_every_row_is_printed_with_its_reason_only_where_it_fails(evidence):
     text = page(evidence, rows, "the same", (512, 250, 1.0))
     judged = [r for r in rows if r.holds is not None]
     assert f"**{sum(r.holds for r in judged)} of {len(judged)} statements hold here.**" in text
-
-
-def test_values_of_another_damper_must_be_keys_of_the_example():
-    assert "flat_angle_deg = 30.0" in with_values(example_text(), {"flat_angle_deg": "30.0"})
-    with pytest.raises(ValueError, match="flat_angel_deg"):
-        with_values(example_text(), {"flat_angel_deg": "30.0"})

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from time import process_time
 from typing import Any
 
-from evidence.benchmarks.two_blades import twenty_steps, two_blades
+from evidence.models.two_blades import two_blades
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, accepted_points
 
 REPEATS = 2
@@ -63,7 +63,7 @@ def timed(ratio: float, selection: str, repeats: int = REPEATS) -> Timed:
     best: Timed | None = None
     for _ in range(repeats):
         start = process_time()
-        problem, points = twenty_steps(ratio, HERTZ, selection)
+        problem, points = two_blades().stepped(ratio, HERTZ, selection)
         seconds = process_time() - start
         if best is None or seconds < best.seconds:
             best = Timed(problem, points, seconds)

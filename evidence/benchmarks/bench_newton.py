@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from evidence.benchmarks.two_blades import two_blades
+from evidence.models.two_blades import two_blades
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.response.equilibrium import bonded_start, preload

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from evidence.benchmarks.bench_forced import Timed, difference, timed
-from evidence.benchmarks.two_blades import two_blades
+from evidence.models.two_blades import two_blades
 from stickslip.harmonic.selection import STRATEGIES
 from stickslip.response.forced.response import accepted_points
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from evidence.benchmarks.two_blades import twenty_steps, two_blades
+from evidence.models.two_blades import two_blades
 from stickslip.arrays import ComplexArray, IntArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.equilibrium import preload
@@ -85,7 +85,7 @@ def balance_seconds(ratio: float, selection: str) -> tuple[float, ForcedProblem,
     seconds = []
     for _ in range(2):
         begin = process_time()
-        problem, points = twenty_steps(ratio, HERTZ, selection)
+        problem, points = two_blades().stepped(ratio, HERTZ, selection)
         seconds.append(process_time() - begin)
     accepted = [p for p in accepted_points(points) if p.converged]
     return min(seconds) / 20.0, problem, accepted
@@ -174,7 +174,7 @@ def run() -> list[dict[str, Any]]:
     """Compile, then measure the ratios."""
     case = two_blades()
     system, load = case.system, case.load(RATIOS[0])
-    twenty_steps(RATIOS[0], HERTZ, "jacobian_alert")
+    case.stepped(RATIOS[0], HERTZ, "jacobian_alert")
     begin = equilibrium(system, load)
     interface = system.interface
     arguments = (system.plain_structure, interface.gap_operator, interface.laws, load, 1000.0)

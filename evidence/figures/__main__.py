@@ -6,7 +6,7 @@ from pathlib import Path
 from time import process_time
 
 from evidence.figures.evidence import Plan, gather
-from evidence.figures.model import GLUED, two_blades
+from evidence.figures.model import GLUED, model
 from evidence.figures.page import page
 from evidence.figures.solve import PATIENCE, STEPS
 from evidence.figures.statements import statements
@@ -38,7 +38,7 @@ def main() -> int:
         )
         return 1
     say("meshing and reducing both models")
-    evidence = gather(two_blades(), two_blades(GLUED), Plan(), say)
+    evidence = gather(model(), model(**GLUED), Plan(), say)
     rows = statements(evidence)
     say("pictures")
     for file in draw_all(evidence, DOCS / "images"):

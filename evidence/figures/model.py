@@ -1,25 +1,18 @@
 """The models of the figures: the example study, and the same blades with a damper whose flat side cannot slip."""
 
-import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
-import numpy as np
-
-from evidence.validation.case_two_blades import coarse_example
+from evidence.models.two_blades import COARSER, two_blades
 from stickslip import HarmonicLoad, Sweep, System
 from stickslip.arrays import IntArray
-from stickslip.study.build import Case, case_of
-from stickslip.study.schema import read_study
 
 # Angles and contact lines of a damper whose flat side does not slip: it rests on L1 and R alone, within both friction cones.
 GLUED = {
-    "flat_angle_deg": "50.0",
-    "curved_angle_deg": "70.0",
-    "flat_distances_m": "[0.008, 0.023]",
-    "curved_distance_m": "0.01",
+    "part.blades.flat_angle_deg": 50.0,
+    "part.blades.curved_angle_deg": 70.0,
+    "part.damper.flat_distances_m": (0.008, 0.023),
+    "part.damper.curved_distance_m": 0.01,
 }
 
 
@@ -49,27 +42,7 @@ class Model:
     flat: IntArray
 
 
-def with_values(text: str, values: Mapping[str, str]) -> str:
-    """Return a study file with other values; every key must be there."""
-    for key, value in values.items():
-        text, found = re.subn(rf"(?m)^{key} = [^#\n]*", f"{key} = {value} ", text)
-        if found != 1:
-            raise ValueError(f"{key} stands {found} times in the example")
-    return text
-
-
-def model_of(case: Case) -> Model:
-    """Return a study's case as the figures need it."""
-    structure = case.system.plain_structure
-    contact = structure.dof_set("blades.contact").reshape(-1, 3)
-    flat = np.array([i for i, side in enumerate(case.contacts.side) if side == "flat"])
-    rotation = int(structure.dof_set("damper")[4])
-    return Model(case.system, case.sweep, case.load, rotation, contact[:, 0], flat)
-
-
-def two_blades(values: Mapping[str, str] | None = None) -> Model:
-    """Mesh and reduce the example with elements twice as large, and with other `values`."""
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "study.toml"
-        path.write_text(with_values(coarse_example(), values or {}), encoding="utf-8")
-        return model_of(case_of(read_study(path), None, lambda _: None))
+def model(**values: object) -> Model:
+    """Return the example with elements twice as large, and with other `values`."""
+    own = two_blades(COARSER, **values)
+    return Model(own.system, own.sweep, own.load, own.rotation, own.contact_dofs, own.flat)

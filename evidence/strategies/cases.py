@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,13 +10,12 @@ import numpy as np
 from evidence.benchmarks.bench_chain import CASES as CHAINS
 from evidence.models.lumped_disks import TIP
 from evidence.models.lumped_disks import friction_ring as ring_and_wheel
-from evidence.validation.case_two_blades import example_case
+from evidence.models.two_blades import COARSER, two_blades
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
-from stickslip.study.build import Case
 
 HZ = 2 * math.pi
 HIGHEST = 10  # harmonics that every case can be solved with: twice those of the reference
@@ -67,17 +65,11 @@ class SelectionCase:
         return replace(sweep, **changes)
 
 
-@lru_cache(maxsize=1)
-def _two_blades() -> Case:
-    """Mesh and reduce the coarse example; once a process."""
-    return example_case()
-
-
-def two_blades(
+def example(
     name: str, title: str, ratio: float, hertz: tuple[float, float], frequencies: int
 ) -> SelectionCase:
     """Return the example study on its coarse mesh with F_CL/F_HE = `ratio`."""
-    case = _two_blades()
+    case = two_blades(COARSER)
     return SelectionCase(
         name,
         title,
@@ -92,13 +84,13 @@ def two_blades(
 def two_blades_strong() -> SelectionCase:
     """F_CL/F_HE = 5: the strongest ratio of the example with a periodic motion at all frequencies."""
     title = "two blades, strongly nonlinear (F_CL/F_HE = 5)"
-    return two_blades("two_blades_strong", title, 5.0, (160.0, 184.0), 49)
+    return example("two_blades_strong", title, 5.0, (160.0, 184.0), 49)
 
 
 def two_blades_stuck() -> SelectionCase:
     """F_CL/F_HE = 250: the damper sticks or all but sticks."""
     title = "two blades, stuck damper (F_CL/F_HE = 250)"
-    return two_blades("two_blades_stuck", title, 250.0, (172.0, 184.0), 49)
+    return example("two_blades_stuck", title, 250.0, (172.0, 184.0), 49)
 
 
 def friction_ring() -> SelectionCase:

@@ -29,6 +29,7 @@ import numpy as np
 
 from evidence.strategies.cases import HZ, SelectionCase
 from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.assembly.statics import static_contact_force
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import SingularError
@@ -38,7 +39,6 @@ from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.response.equilibrium import preload
 from stickslip.response.system import System
-from stickslip.study.build import static_contact_force
 
 Random = np.random.Generator
 STREAM = 20261121  # beside the number of the system: other numbers would be other systems

@@ -10,8 +10,8 @@ import scipy.linalg
 
 from evidence.models.lumped import blades_and_damper, griffin
 from evidence.models.solving import at_frequency
+from evidence.models.two_blades import COARSER, two_blades
 from evidence.validation.case_b3_blade_with_damper import RESPONSE
-from evidence.validation.case_two_blades import example_case
 from evidence.validation.compare import Record, bound, digits, record
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -245,7 +245,7 @@ def run() -> list[Record]:
     records += order_records("B6 at 163 Hz", found, judged)
     still = rest(system.structure.n, system.interface.laws)
     records += settled_records("B6 at 163 Hz", system, load, omega, still)
-    case = example_case()
+    case = two_blades(COARSER)
     for ratio, hertz in POINTS:
         load, name = case.load(ratio), f"two blades, F_CL/F_HE = {ratio:g}, {hertz:g} Hz"
         start, judged = balance_start(case.system, load, hertz)

@@ -8,28 +8,17 @@ element sizes doubled, so that the comparison takes minutes: it is a comparison 
 A row that does not hold is left as it is, with what is known of the reason.
 """
 
-import re
-from pathlib import Path
-from tempfile import TemporaryDirectory
-
 import numpy as np
 
+from evidence.models.two_blades import COARSER, two_blades
 from evidence.validation.compare import Record, record
-from stickslip.response.forced.response import (
-    ForcedPoint,
-    ForcedProblem,
-    forced_problem,
-    forced_response,
-)
-from stickslip.study.build import Case, case_of
-from stickslip.study.collect import HZ, Accepted, CaseResult, collect
-from stickslip.study.example import example_text
-from stickslip.study.schema import read_study
-from stickslip.study.verify import integrated, listed, peak_and_flanks, refined
+from stickslip.response.forced.problem import ForcedPoint
+from stickslip.study.analyses.forced.in_time import integrated, listed, refined
+from stickslip.study.analyses.forced.points import Accepted, Response
+from stickslip.study.analyses.forced.question import Question
+from stickslip.units import HZ
 
 CASE = "Two blades and a damper"
-SIZES = ("airfoil_size_m", "platform_size_m", "foot_size_m")
-COARSER = 2.0  # times the element sizes of the example
 TOLERANCE = 0.01  # issue of the first release: first-harmonic amplitude at H = 5
 PERIODS = 300  # a blade damped by 0.3 % forgets its start: 2 % of what was off is left where the average begins
 ORDERS = (
@@ -40,40 +29,11 @@ ORDERS = (
 UNCHANGED = 3e-3  # relative
 
 
-def coarse_example() -> str:
-    """Return the example study with larger elements."""
-
-    def larger(match: re.Match[str]) -> str:
-        return f"{match[1]}{COARSER * float(match[2]):g}"
-
-    return re.sub(rf"(?m)^((?:{'|'.join(SIZES)}) = )([0-9.e-]+)", larger, example_text())
-
-
-def example_case() -> Case:
-    """Mesh and reduce the coarse example."""
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "study.toml"
-        path.write_text(coarse_example(), encoding="utf-8")
-        return case_of(read_study(path), None, lambda _: None)
-
-
-def load_case(case: Case, ratio: float) -> tuple[ForcedProblem, CaseResult]:
-    """Compute the response for one ratio as a run does."""
-    load = case.load(ratio)
-    problem = forced_problem(case.system, load, case.sweep)
-    points = list(forced_response(case.system, load, case.sweep))
-    excitation = case.centrifugal / ratio
-    result = collect(problem, points, ratio=ratio, excitation=excitation, report_output=0)
-    return problem, result
-
-
-def converged(
-    case: Case, problem: ForcedProblem, ratio: float, point: ForcedPoint
-) -> ForcedPoint | None:
+def converged(question: Question, point: ForcedPoint) -> ForcedPoint | None:
     """Raise the harmonics until the amplitude no longer changes; the last solution, or None if there is none."""
-    found = None
+    found, problem = None, question.problem
     for order in ORDERS:
-        more = refined(case, ratio, found or point, order)
+        more = refined(question, found or point, order)
         if more is None:
             break
         change = abs(problem.amplitude(more) / problem.amplitude(found or point) - 1)
@@ -83,14 +43,12 @@ def converged(
     return found
 
 
-def compare(
-    case: Case, problem: ForcedProblem, ratio: float, accepted: Accepted, where: str
-) -> list[Record]:
+def compare(question: Question, ratio: float, accepted: Accepted, where: str) -> list[Record]:
     """Compare what a run accepts, and the balance with many harmonics, with the integration."""
-    point, output = accepted.point, case.report_output
-    many = converged(case, problem, ratio, point)
+    problem, point, output = question.problem, accepted.point, question.model.peak_output
+    many = converged(question, point)
     # several periodic motions may exist beside each other: begin at the one that is compared
-    found = integrated(problem, many or point, case.load(ratio), PERIODS)
+    found = integrated(problem, many or point, question.model.load, PERIODS)
     first = found.harmonics[1] if found.settled else found.average
     reference = float(np.abs(first[output]))
     motion = (
@@ -108,12 +66,23 @@ def compare(
     return [record(CASE, name, own, reference, TOLERANCE, source) for name, own in rows]
 
 
+def places(response: Response) -> list[tuple[str, Accepted]]:
+    """Return the peak and a point on either flank, each with what it is."""
+    if response.top is None:
+        return []
+    named = [
+        ("below the peak" if a.point.omega < response.top.point.omega else "above the peak", a)
+        for a in response.flanks
+    ]
+    return [("peak", response.top), *named]
+
+
 def run() -> list[Record]:
     """Compare at the peak and on both flanks for every ratio of the example."""
-    case = example_case()
+    example = two_blades(COARSER)
     records = []
-    for ratio in case.ratios:
-        problem, result = load_case(case, ratio)
-        for where, accepted in peak_and_flanks(result):
-            records += compare(case, problem, ratio, accepted, where)
+    for ratio in example.ratios:
+        question = example.at(ratio)
+        for where, accepted in places(example.response(ratio)):
+            records += compare(question, ratio, accepted, where)
     return records

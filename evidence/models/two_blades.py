@@ -1,0 +1,121 @@
+"""The example study of two blades and a damper, as evidence solves it: one system, loads of any ratio."""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip.arrays import IntArray
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_problem
+from stickslip.response.forced.response import forced_response
+from stickslip.response.forced.sweep import Sweep
+from stickslip.response.system import System
+from stickslip.study.analyses.forced.points import Response, collect
+from stickslip.study.analyses.forced.question import Question, question_of
+from stickslip.study.models.study import read_study
+
+STUDY = Path(__file__).parents[2] / "examples" / "two_blades" / "study.toml"
+SIZES = {"airfoil_size_m": 0.006, "platform_size_m": 0.0055, "foot_size_m": 0.008}  # the example's
+COARSER = 2.0  # times the element sizes of the example: minutes where it needs hours
+RATIO = "load.shaker.ratio"
+
+
+@dataclass(frozen=True, eq=False)
+class TwoBlades:
+    """The reduced example.
+
+    Attributes
+    ----------
+    question
+        The forced response of the study's first ratio.
+    ratios
+        F_CL / F_HE of all its cases.
+    """
+
+    question: Question
+    ratios: tuple[float, ...]
+
+    @property
+    def system(self) -> System:
+        """What vibrates."""
+        return self.question.model.system
+
+    @property
+    def sweep(self) -> Sweep:
+        """How the study sweeps."""
+        return self.question.sweep
+
+    def load(self, ratio: float) -> HarmonicLoad:
+        """Return the loads of a ratio."""
+        known = self.question.model.load
+        shake = known.harmonics[1] * (self.ratios[0] / ratio)
+        return HarmonicLoad(known.static, {1: shake})
+
+    def at(self, ratio: float) -> Question:
+        """Return the forced response of a ratio as a job of the study has it."""
+        model = self.question.model
+        excitation = model.excitation * self.ratios[0] / ratio
+        model = replace(model, load=self.load(ratio), excitation=excitation)
+        return replace(self.question, model=model, label=f"{RATIO} = {ratio:g}")
+
+    def response(self, ratio: float) -> Response:
+        """Compute the response of a ratio as a run does."""
+        question = self.at(ratio)
+        points = list(forced_response(self.system, question.model.load, self.sweep))
+        return collect(question.problem, points, question.model.peak_output)
+
+    def stepped(
+        self, ratio: float, hertz: tuple[float, float], selection: str, frequencies: int = 20
+    ) -> tuple[ForcedProblem, list[ForcedPoint]]:
+        """Return the response at equally spaced frequencies, without refinement of the peak."""
+        load = self.load(ratio)
+        sweep = Sweep(
+            omega_range=(2 * np.pi * hertz[0], 2 * np.pi * hertz[1]),
+            low=1,
+            high=5,
+            samples=self.sweep.samples,
+            threshold=self.sweep.threshold,
+            selection=selection,  # type: ignore[arg-type]  # one of the words, as text
+            frequencies=frequencies,
+            peak_points=0,
+        )
+        problem = forced_problem(self.system, load, sweep)
+        return problem, list(forced_response(self.system, load, sweep))
+
+    @property
+    def rotation(self) -> int:
+        """Dof of the damper's rotation about the axial direction."""
+        return int(self.system.plain_structure.dof_set("damper")[4])
+
+    @property
+    def contact_dofs(self) -> IntArray:
+        """Dofs of the blades at the contact points, along the excitation."""
+        sides = ("blades.underside_1", "blades.underside_2")
+        return np.concatenate([self.system.plain_structure.dof_set(s)[::3] for s in sides])
+
+    @property
+    def flat(self) -> IntArray:
+        """Contacts of the damper's flat side."""
+        return np.flatnonzero(np.array(self.question.model.contacts.groups) == "flat")
+
+
+@lru_cache(maxsize=2)
+def two_blades(coarser: float = 1.0, **values: Any) -> TwoBlades:
+    """Mesh and reduce the example, once a process.
+
+    Parameters
+    ----------
+    coarser
+        Factor on the element sizes of the blades.
+    values
+        Of other keys of the study, lists as tuples: ``**{"part.blades.flat_angle_deg": 50.0}``.
+    """
+    changed: dict[str, Any] = {f"part.blades.{k}": coarser * v for k, v in SIZES.items()}
+    changed |= {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
+    study = read_study(STUDY).replace(changed)
+    cases = study.cases()
+    ratios = tuple(float(case.values[RATIO]) for case in cases)
+    return TwoBlades(question_of(cases[0], cases[0].build()), ratios)
