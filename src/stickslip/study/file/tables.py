@@ -74,22 +74,13 @@ class Tables(Section):
 def study_tables() -> type[Tables]:
     """Return the section of the whole file, with one optional table for each analysis."""
     asked: dict[str, Any] = {
-        name: (_table_of(name) | None, Field(None, description=f"the table [{name}]"))
+        name: (named(name).table | None, Field(None, description=f"the table [{name}]"))
         for name in ANALYSES
     }
     made: type[Tables] = create_model(
         "StudyTables", __base__=Tables, __doc__="Everything a study file may hold.", **asked
     )
     return made
-
-
-def _table_of(name: str) -> Any:
-    try:
-        return named(name).table
-    except (ImportError, AttributeError):  # until all analyses are there
-        from stickslip.study import structure_tables as old
-
-        return {"modes": old.Modes, "campbell": old.CampbellTable, "safe": old.SafeTable}[name]
 
 
 def asked_of(tables: Tables) -> tuple[str, ...]:

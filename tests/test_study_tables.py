@@ -1,0 +1,386 @@
+"""The study file of schema 2: tables made from dataclasses, refusals that name key, value and remedy, [vary]."""
+
+import json
+import math
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_v2 import (
+    EXAMPLES,
+    write_four_masses,
+    write_shrouded_deck,
+    write_shrouded_sector,
+    write_two_blades,
+)
+
+from stickslip.contact.laws import LAWS
+from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.errors import InputError, input_error, together
+from stickslip.model.mesh.blade_pair import BladePair
+from stickslip.model.mesh.sector import BladedSector
+from stickslip.model.mesh.sector_parts import Shroud
+from stickslip.model.rigid.damper import FlatCurvedDamper
+from stickslip.study.file.quantities import build, table_of
+from stickslip.study.file.study import read_file
+from stickslip.study.file.tables import json_schema
+from stickslip.study.models.parts import damper_of
+from stickslip.study.models.study import read_study
+
+
+def refused(path: Path) -> str:
+    with pytest.raises(InputError) as error:
+        read_study(path)
+    return str(error.value)
+
+
+# errors carry fields
+
+
+def test_an_error_says_place_problem_and_remedy_and_gives_its_arguments_other_names():
+    error = input_error("a.inp", "is in doubt", "Give $units or leave it.", units="units=…")
+    assert (error.place, error.problem) == ("a.inp", "is in doubt")
+    assert str(error) == "a.inp: is in doubt. Give units=… or leave it."
+    theirs = error.called({"units": "part.blade.units"}).inside("study.toml")
+    assert str(theirs) == "study.toml: a.inp: is in doubt. Give part.blade.units or leave it."
+
+
+def test_a_dollar_in_a_remedy_without_words_is_left_alone():
+    assert input_error("p", "costs", "Pay 5 $mass.").remedy == "Pay 5 $mass."
+
+
+def test_several_errors_make_one_with_a_line_each_and_survive_a_process():
+    import pickle
+
+    both = together([input_error("a", "is wrong", "Mend it."), input_error("b", "too", "Too.")])
+    again = pickle.loads(pickle.dumps(both))
+    assert str(again).splitlines() == ["a: is wrong. Mend it.", "b: too. Too."]
+    assert [other.place for other in again.inside("f").others] == ["f: b"]
+
+
+# tables are made from the dataclasses
+
+
+@pytest.mark.parametrize("cls", [BladePair, FlatCurvedDamper, BladedSector])
+def test_an_empty_table_builds_the_dataclass_with_its_defaults(cls):
+    made = build(cls, table_of(cls)())
+    expected = BladedSector(platform=None) if cls is BladedSector else cls()
+    assert made == expected
+
+
+def test_keys_end_with_their_unit_and_become_si():
+    table = table_of(BladePair)(twist_deg=8.0, pitch_m=0.06)
+    made = build(BladePair, table)
+    assert (made.twist, made.pitch) == (math.radians(8), 0.06)
+
+
+def test_tables_of_a_table_become_the_dataclass_of_a_field():
+    table = table_of(BladedSector).model_validate({"shroud": {"face_angle_deg": -20.0}})
+    assert build(BladedSector, table).shroud == Shroud(face_angle=math.radians(-20))
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_every_law_can_be_written_in_a_study(name, tmp_path):
+    from stickslip.study.file.contacts import ContactTable, keys_of
+
+    needed = [key for key, need in keys_of(name, per_area=False).items() if need]
+    values = {key: [1.0] if key.startswith("along") else 0.5 for key in needed}
+    if name in ("cubic_spring", "polynomial_spring"):
+        values |= {
+            "cubic_spring": {"cubic_normal_n_per_m3": 1.0},
+            "polynomial_spring": {"along_n": [1.0]},
+        }[name]
+    if name in ("bonded", "jenkins", "iwan", "dahl", "bouc_wen"):
+        values["normal_stiffness_n_per_m"] = 1.0
+    table = ContactTable.model_validate({"between": ["a.b", "c.d"], "law": name} | values)
+    assert type(table.library()) is LAWS[name]
+
+
+def test_the_schema_lists_tables_and_keys():
+    schema = json.loads(json_schema())
+    assert {"part", "contact", "load", "vary", "forced_response", "modes"} <= set(
+        schema["properties"]
+    )
+    assert "friction_coefficient" in schema["$defs"]["Contact"]["properties"]
+
+
+# examples
+
+
+@pytest.mark.parametrize(
+    ("name", "most"), [("two_blades", 80), ("four_masses", 24), ("shrouded_sector", 80)]
+)
+def test_the_examples_are_short_and_good(name, most):
+    path = EXAMPLES / name / "study.toml"
+    lines = path.read_text(encoding="utf-8").splitlines()
+    code = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
+    assert len(code) <= most
+    assert read_study(path).asked
+
+
+def test_the_two_blades_have_nine_cases_and_share_their_parts():
+    study = read_study(EXAMPLES / "two_blades" / "study.toml")
+    labels = [case.label for case in study.cases()]
+    assert labels[0] == "load.shaker.ratio = 250"
+    assert len(labels) == 9
+    assert len({case.digest for case in study.cases()}) == 9
+
+
+def test_the_damper_takes_its_apex_from_the_platforms(tmp_path):
+    tables = read_study(write_two_blades(tmp_path)).tables
+    damper = damper_of(tables, "damper")
+    assert damper.apex == BladePair().wedge_apex
+    assert damper == FlatCurvedDamper(apex=BladePair().wedge_apex, centre=damper.centre)
+
+
+# models
+
+
+def test_a_study_becomes_a_model(tmp_path):
+    model = read_study(write_four_masses(tmp_path)).model()
+    stiffness = model.parts["chain"].structure.stiffness
+    expected = 4e4 * (2 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1))
+    expected[3, 3] = 4e4
+    assert np.allclose(stiffness, expected)
+    assert [c.acts for c in model.contacts.values()] == ["tangential", "tangential", "normal"]
+    assert model.contacts["stop"].gap == 2e-3
+    assert model.loads["shaker"].newton == 5.0
+
+
+def test_a_law_and_its_share_reach_the_model(tmp_path):
+    model = read_study(write_two_blades(tmp_path)).model()
+    contact = model.contacts["flat"]
+    assert contact.law == ElasticCoulomb(k_t=450e6, k_w=450e6, k_n=520e6, mu=0.6)
+    assert contact.share == "interface"
+    assert model.loads["shaker"].newton == 442.0 / 2000
+    assert model.loads["pull"].harmonic == 0
+
+
+def test_a_friction_coefficient_that_varies_meshes_nothing_again(tmp_path):
+    path = write_two_blades(tmp_path, {"vary.contact.flat.friction_coefficient": "[0.3]"})
+    study = read_study(path)
+    first, other = (
+        study.model(),
+        study.replace({"contact.curved.friction_coefficient": 0.1}).model(),
+    )
+    assert first.parts["blades"] is other.parts["blades"]
+    assert other.contacts["curved"].law.mu == 0.1
+    coarser = study.replace({"part.blades.foot_size_m": 0.02})
+    assert coarser.model().parts["blades"] is not first.parts["blades"]
+    assert coarser.model().parts["damper"] is not first.parts["damper"]
+
+
+def test_what_a_model_depends_on_changes_its_digest_and_nothing_else_does(tmp_path):
+    path = write_shrouded_deck(tmp_path)
+    study = read_study(path)
+    digest = study.cases()[0].digest
+    same = {
+        "title": "another",
+        "modes.number": 3,
+        "output.folder": "elsewhere",
+        "limits.work_s": 1.0,
+    }
+    assert study.replace(same).cases()[0].digest == digest
+    for key, value in {"rotation.speed_rpm": 1.0, "contact.shroud.gap_m": 1e-6}.items():
+        other = {key: value} | ({"contact.shroud.preload_n": 0.0} if "gap" in key else {})
+        assert study.replace(other).cases()[0].digest != digest
+    deck = tmp_path / "sector.inp"
+    deck.write_text(deck.read_text(encoding="ascii") + "** changed\n", encoding="ascii")
+    assert study.cases()[0].digest != digest
+
+
+def test_sets_of_a_deck_are_found_whatever_their_capitals(tmp_path):
+    model = read_study(write_shrouded_deck(tmp_path)).model()
+    assert model.contacts["shroud"].between == ("blade.SHROUD_HIGH", "next.blade.SHROUD_LOW")
+    assert model.parts["blade"].sectors == 8
+
+
+def test_a_copy_stands_where_it_is_placed_and_shares_its_original(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text(
+        'schema_version = 2\n[part.a]\nshape = "rigid_body"\nmass_kg = 1.0\ninertia_kg_m2 = [1.0, 1.0, 1.0]\n'
+        "centre_m = [1.0, 0.0, 0.0]\n[part.a.surfaces.side]\npoints_m = [[1.5, 0.0, 0.0]]\nnormal = [1.0, 0.0, 0.0]\n"
+        '[part.b]\nof = "a"\nplaced = { turn_deg = 90.0, move_m = [0.0, 0.0, 2.0] }\n',
+        encoding="utf-8",
+    )
+    parts = read_study(path).model().parts
+    assert parts["b"].template is parts["a"]
+    assert np.allclose(parts["b"].surfaces["side"].position, [[0.0, 1.5, 2.0]])
+    assert np.allclose(parts["a"].surfaces["side"].frame[0, :, 2], [1.0, 0.0, 0.0])
+    assert np.isclose(np.linalg.det(parts["a"].surfaces["side"].frame[0]), 1.0)
+
+
+# refusals: file, key, value, remedy
+
+
+WRONG = [
+    ({"contact.flat.friction": "0.3"}, "contact.flat.friction: unknown key 'friction'"),
+    (
+        {"contact.flat.slip_limit_n": "3.0"},
+        "contact.flat.slip_limit_n: is no parameter of the law elastic_coulomb, got 3.0; it belongs to jenkins",
+    ),
+    ({"contact.flat.law": '"jenkins"'}, "contact.flat.slip_limit_n: is missing, the law jenkins needs it. Add it: friction force"),
+    ({"contact.flat.law": '"elastic_coulom"'}, "contact.flat.law: is not known, got 'elastic_coulom'. Did you mean 'elastic_coulomb'?"),
+    ({"contact.flat.friction_coefficient": "-0.1"}, "contact.flat.friction_coefficient: must be greater than or equal to 0, got -0.1."),
+    ({"contact.flat.per": '"area"'}, "Give normal_stiffness_n_per_m3, or another per."),
+    ({"contact.flat.between": '["damper.flat", "blades.underside_3"]'}, "there is no surface or set 'blades.underside_3'. Did you mean 'blades.underside_2'?"),
+    ({"contact.flat.between": '["damber.flat", "blades.underside_1"]'}, "contact.flat.between: there is no part 'damber'. Did you mean 'damper'?"),
+    ({"contact.flat.between": '["damper.flat", "next.blades.underside_1"]'}, "'blades' is no sector of a wheel"),
+    ({"contact.flat.between": '["ground", "blades.underside_1"]'}, "Give ['blades.underside_1', 'ground']."),
+    ({"load.shaker.ratio_of": '"load.pul"'}, "load.shaker.ratio_of: 'load.pul' is no load. Did you mean 'load.pull'?"),
+    ({"load.shaker.engine_order": "3"}, "load.shaker.engine_order: is of a wheel, but no part is a sector of one."),
+    ({"load.shaker.direction": '"q"'}, "load.shaker.direction: is no direction, got 'q'."),
+    ({"load.shaker.harmonic": "0"}, "forced_response: has no harmonic load to respond to."),
+    ({"load.shaker.harmonic": "2"}, "load.shaker.harmonic: 2 is not kept by harmonics.low = 1."),
+    ({"load.shaker.force_n": "3.0"}, "load.shaker.force_n: needs one of force_n and ratio_of, got both."),
+    ({"part.blades.pitch_m": "-1.0"}, "part.blades.pitch_m: must be greater than 0, got -1.0. Give distance of the two blades along x in m"),
+    ({"part.blades.shape": '"prism_blade"'}, "part.blades.shape: is not known, got 'prism_blade'. Did you mean 'prism_blades'?"),
+    ({"part.blades.pich_m": "0.05"}, "part.blades.pich_m: unknown key 'pich_m'. Did you mean 'pitch_m'?"),
+    ({"part.blades.hub_chord_m": "0.2"}, "part.blades.hub_chord_m: the airfoil's hub section"),
+    ({"part.blades.nodes_at": '["damper.flt"]'}, "part.blades.nodes_at: there is no surface 'damper.flt' of a flat_curved part. Did you mean 'damper.flat'?"),
+    ({"part.damper.mass_kg": "0.0"}, "part.damper.mass_kg: must be greater than 0, got 0.0."),
+    ({"material.young_modulus_pa": "210.0"}, "material.young_modulus_pa: no solid has 210 Pa, which is 2.1e+11 Pa if it is in GPa."),
+    ({"output.peak": '"tip1.q"'}, "output.peak: there is no output 'tip1.q'. Did you mean 'tip1.z'?"),
+    ({"output.folder": '"../out"'}, "output.folder: must be a folder inside the study's folder"),
+    ({"forced_response.frequency_hz": "[207.0, 185.0]"}, "forced_response.frequency_hz: must be the lower before the higher"),
+    ({"campbell.speeds_rpm": "[0.0, 1.0]"}, "campbell.engine_orders: is missing. Add it: engine orders"),
+    ({"schema_version": "1"}, "schema_version: this version of stickslip reads 2, got 1. The tables have changed: [blades]"),
+    ({"schema_version": "3"}, "Write schema_version = 2, or install the stickslip that the file was written for."),
+    ({"vary.load.shaker.ratios": "[1, 2]"}, "vary.load.shaker.ratios: there is no key 'ratios'. Did you mean 'ratio'?"),
+    ({"vary.part.damber.mass_kg": "[1.0]"}, "vary.part.damber.mass_kg: there is no key 'damber'. Did you mean 'damper'?"),
+    ({"vary.part.blades.mass_kg": "[1.0]"}, "vary.part.blades.mass_kg: there is no key 'mass_kg'."),
+    ({"vary.load.shaker.ratio": "[20, -1]"}, "vary.load.shaker.ratio: must be greater than 0, got -1."),
+    ({"vary.load.shaker.ratio": "20"}, "vary.load.shaker.ratio: must be a list of values, got 20."),
+    ({"vary.contact.flat.friction_coefficient": "[0.1, 0.2]"}, "must be of one length: contact.flat.friction_coefficient has 2, load.shaker.ratio has 1."),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "said"), WRONG, ids=[said[:50] for _, said in WRONG])
+def test_what_is_wrong_is_told_with_file_key_value_and_remedy(changes, said, tmp_path):
+    path = write_two_blades(tmp_path, changes)
+    told = refused(path)
+    assert said in told
+    assert told.startswith(str(path))
+
+
+def test_all_problems_of_a_file_are_told_at_once(tmp_path):
+    path = write_two_blades(
+        tmp_path,
+        {"part.damper.mass_kg": "-1.0", "load.pull.force": "1.0", "contact.flat.law": '"x"'},
+    )
+    assert len(refused(path).splitlines()) == 3
+
+
+WHEEL = [
+    ({"load.gas.engine_order": "-1"}, "load.gas.engine_order: must be greater than or equal to 0, got -1."),
+    ({"modes.nodal_diameters": "[0, 5]"}, "modes.nodal_diameters: 5 is above half of 8 sectors. The nodal diameters go from 0 to 4."),
+    ({"campbell.nodal_diameters": "[0, 1]"}, "campbell.engine_orders: 2 excites the nodal diameter 2, which is not computed."),
+    ({"contact.shroud.between": '["blade.shroud_hgh", "next.blade.shroud_low"]'}, "Did you mean 'blade.shroud_high'?"),
+    ({"contact.shroud.between": '["blade.shroud_high", "next.blade.shroud_lw"]'}, "Did you mean 'next.blade.shroud_low'?"),
+    ({"part.blade.shroud.span": "1.5"}, "part.blade.shroud.span: must be less than or equal to 1, got 1.5."),
+    ({"part.blade.shroud.thickness_m": "1.0"}, "part.blade.shroud.span: 1.0 puts the shroud into the blade's foot."),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "said"), WHEEL, ids=[said[:50] for _, said in WHEEL])
+def test_what_is_wrong_of_a_wheel_is_told(changes, said, tmp_path):
+    assert said in refused(write_shrouded_sector(tmp_path, changes))
+
+
+def test_a_wheel_without_engine_order_is_told_to_have_one(tmp_path):
+    path = write_shrouded_sector(tmp_path)
+    path.write_text(
+        path.read_text(encoding="utf-8").replace("engine_order = 2\n", ""), encoding="utf-8"
+    )
+    assert "load.gas.engine_order: is missing on a wheel of 8 sectors." in refused(path)
+
+
+def test_a_file_that_is_not_there_is_told_before_anything_is_read(tmp_path):
+    path = write_shrouded_deck(tmp_path)
+    (tmp_path / "sector.inp").unlink()
+    assert f"part.blade.file: there is no file {tmp_path / 'sector.inp'}." in refused(path)
+
+
+DECK = [
+    ({"part.blade.sectors": "9"}, "part.blade.sectors: is 9, but the deck's cyclic symmetry has 8. Give sectors = 8, or leave it out."),
+    ({"part.blade.units": '"mm-t-s"'}, "Give part.blade.units, or part.blade.plausible = false where"),
+    ({"part.blade.clamped": '["TIPP"]'}, "part.blade.clamped[0]: the file has no set 'TIPP' of free nodes. Did you mean 'TIP'?"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "said"), DECK, ids=[said[:50] for _, said in DECK])
+def test_what_a_deck_contradicts_is_told_with_keys_of_the_study(changes, said, tmp_path):
+    study = read_study(write_shrouded_deck(tmp_path, changes))
+    with pytest.raises(InputError) as error:
+        study.model()
+    assert said in str(error.value)
+    assert str(error.value).startswith(f"{study.path}: ")
+
+
+def test_a_speed_of_what_no_speed_changes_is_refused(tmp_path):
+    study = read_study(write_four_masses(tmp_path, {"rotation.speed_rpm": "100.0"}))
+    with pytest.raises(InputError, match=r"rotation.speed_rpm: is 100, but no part is a mesh"):
+        study.model()
+
+
+def test_a_campbell_diagram_of_masses_is_refused(tmp_path):
+    changes = {"campbell.speeds_rpm": "[0.0, 100.0]\nengine_orders = [1]"}
+    told = refused(write_four_masses(tmp_path, changes))
+    assert "campbell: needs a part that a speed changes, and none is a mesh." in told
+
+
+def test_what_is_no_file_and_no_toml_is_told(tmp_path):
+    assert "there is no such file" in refused(tmp_path / "none.toml")
+    assert "is not a file" in refused(tmp_path)
+    path = tmp_path / "study.toml"
+    path.write_text("a = = 1", encoding="utf-8")
+    assert "is not valid TOML" in refused(path)
+    path.write_bytes(b"\xff\xfe")
+    assert "is not UTF-8 text" in refused(path)
+    path.write_text("#" * 1_000_001, encoding="utf-8")
+    assert "is larger than 1000000 bytes" in refused(path)
+
+
+# what a study varies
+
+
+def test_lists_of_one_table_run_together_and_several_tables_multiply(tmp_path):
+    path = write_four_masses(tmp_path)
+    text = path.read_text(encoding="utf-8") + (
+        "[[vary]]\nload.shaker.force_n = [1.0, 2.0]\ncontact.brake.slip_limit_n = [3.0, 4.0]\n"
+        '[[vary]]\nforced_response.direction = ["up", "down"]\n'
+    )
+    path.write_text(text, encoding="utf-8")
+    cases = read_study(path).cases()
+    assert [case.label for case in cases] == [
+        "load.shaker.force_n = 1, contact.brake.slip_limit_n = 3, forced_response.direction = up",
+        "load.shaker.force_n = 1, contact.brake.slip_limit_n = 3, forced_response.direction = down",
+        "load.shaker.force_n = 2, contact.brake.slip_limit_n = 4, forced_response.direction = up",
+        "load.shaker.force_n = 2, contact.brake.slip_limit_n = 4, forced_response.direction = down",
+    ]
+    assert cases[3].settings.contact["brake"].slip_limit_n == 4.0
+    assert cases[3].settings.forced_response.direction == "down"
+    assert cases[0].digest == cases[1].digest != cases[2].digest
+
+
+def test_a_key_may_be_varied_that_the_file_leaves_out(tmp_path):
+    path = write_four_masses(tmp_path, {"vary.contact.stop.preload_n": "[0.0, 1.0]"})
+    path.write_text(
+        path.read_text(encoding="utf-8").replace(", gap_m = 2e-3", ""), encoding="utf-8"
+    )
+    assert [c.tables.contact["stop"].preload for c in read_file(path).cases] == [0.0, 1.0]
+
+
+def test_values_that_are_lists_themselves_vary(tmp_path):
+    path = write_two_blades(tmp_path, {"vary.load.shaker.direction": '["x"]'})
+    model = read_study(path).model()
+    assert model.loads["shaker"].direction == (1.0, 0.0, 0.0)
+
+
+def test_replacing_keys_is_checked_like_the_file(tmp_path):
+    study = read_study(write_four_masses(tmp_path))
+    assert study.replace({"load.shaker.force_n": 2.0}).model().loads["shaker"].newton == 2.0
+    with pytest.raises(InputError, match=r"unknown key 'forc_n'. Did you mean 'force_n'"):
+        study.replace({"load.shaker.forc_n": 2.0})
+    assert tomllib.loads(study.text)["load"]["shaker"]["force_n"] == 5.0
