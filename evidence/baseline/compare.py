@@ -9,6 +9,7 @@ import numpy as np
 from evidence.baseline.results import Node
 
 TOLERANCE = 1e-8  # of fields, of their largest value in the case
+ROUNDING = 1e-9  # of the largest value of all cases: smaller ones are rounding, as dissipated energy where all sticks
 SAME_FREQUENCY = 1e-9  # relative: points of one frequency
 OTHER_MOTION = (
     1e-3  # relative: two motions of one frequency that differ by more are two branches of a fold
@@ -58,16 +59,16 @@ def compare_table(old: Node, new: Node) -> list[Finding]:
     return findings
 
 
-def _close(name: str, old: np.ndarray, new: np.ndarray) -> Finding:
-    worst = _worst(old, new)
+def _close(name: str, old: np.ndarray, new: np.ndarray, least: float = 0.0) -> Finding:
+    worst = _worst(old, new, least)
     return Finding(name, worst <= TOLERANCE, f"differs by {worst:.1e}")
 
 
-def _worst(old: np.ndarray, new: np.ndarray) -> float:
-    """Return the largest difference over the largest value; infinite where only one of them is a number."""
+def _worst(old: np.ndarray, new: np.ndarray, least: float = 0.0) -> float:
+    """Return the largest difference over the largest value, or over `least`; infinite where only one of them is a number."""
     if not np.array_equal(np.isnan(old), np.isnan(new)):
         return np.inf
-    scale = float(np.nanmax(np.abs(old), initial=0.0))
+    scale = max(float(np.nanmax(np.abs(old), initial=0.0)), least)
     return float(np.nanmax(np.abs(new - old), initial=0.0)) / scale if scale else 0.0
 
 
@@ -75,10 +76,12 @@ def compare_forced(old: Node, new: Node) -> list[Finding]:
     """Compare a forced response: cases as tables, points at equal frequency, the others by their distance from the curve."""
     cases = {name: old[name] for name in (*CASES, *STATIC) if name in old}
     findings = compare_table(cases, new)
+    least = {n: ROUNDING * float(np.nanmax(np.abs(old[n]), initial=0.0)) for n in FIELDS}
     for case in range(int(old["point_case"].max()) + 1):
         mine, its = (_points(node, case) for node in (old, new))
         findings += [
-            Finding(f"case {case}: {one.what}", one.holds, one.found) for one in _case(mine, its)
+            Finding(f"case {case}: {one.what}", one.holds, one.found)
+            for one in _case(mine, its, least)
         ]
     return findings
 
@@ -88,7 +91,7 @@ def _points(node: Node, case: int) -> Node:
     return {name: node[name][here] for name in ("frequency_hz", *STATES, *FIELDS)}
 
 
-def _case(old: Node, new: Node) -> list[Finding]:
+def _case(old: Node, new: Node, least: Mapping[str, float]) -> list[Finding]:
     partner = _partners(old, new)
     met = partner >= 0
     count = (
@@ -98,7 +101,7 @@ def _case(old: Node, new: Node) -> list[Finding]:
     for name in STATES:
         same = bool(np.array_equal(old[name][met], new[name][partner[met]]))
         found.append(Finding(name, same, "equal" if same else "not equal"))
-    found += [_close(name, old[name][met], new[name][partner[met]]) for name in FIELDS]
+    found += [_close(n, old[n][met], new[n][partner[met]], least[n]) for n in FIELDS]
     if not met.all():
         far = _distance(_curve(old)[~met], _curve(new))
         found.append(Finding("other points", far <= NEAR, f"{far:.1e} of the range off the curve"))

@@ -15,6 +15,7 @@ FIRST_LAYOUT = {
     "safe": "safe.nc",
 }
 RENAMED = {"case": "point_case"}
+OF_THE_MODEL = ("static_", "frequency_full", "frequency_reduced", "frequency_stuck")
 TIMES = "seconds"  # in the names of what no two runs share
 
 
@@ -44,10 +45,14 @@ def _first_layout(path: Path) -> Node:
 
 
 def _node(name: str, data: xr.Dataset) -> Node:
-    """Drop the leading dimension of the cases where the baseline has none."""
+    """Drop the leading dimension of the cases where the baseline has none: its loads did not change the model."""
     single = name != "forced_response" and data.sizes.get("case") == 1
     return {
-        str(key): (data[key][0] if single and data[key].dims[:1] == ("case",) else data[key]).values
+        str(key): (
+            data[key][0]
+            if data[key].dims[:1] == ("case",) and (single or str(key).startswith(OF_THE_MODEL))
+            else data[key]
+        ).values
         for key in data.variables
     }
 
