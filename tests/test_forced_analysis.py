@@ -368,7 +368,7 @@ def model(**others: object) -> Model:
     law = ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=1.0, mu=0.5)
     given: dict[str, object] = {
         "parts": {"blade": Part(structure=structure)},
-        "contacts": {"root": Contact(between=("blade.tip", "ground"), law=law)},
+        "contacts": {"root": Contact(between=("blade.tip", "ground"), law=law, acts="tangential")},
         "loads": {"shaker": Load(on="blade.tip", newton=1.0, direction=(1.0, 0.0, 0.0))},
     }
     return Model(**given | others)  # type: ignore[arg-type]
@@ -388,7 +388,9 @@ def test_what_cannot_be_answered_is_refused_by_key() -> None:
     assert refused(model(loads={"third": third})) == (
         "harmonics.low: must hold harmonic 3, which load.third drives, got 1. Add it, for example low = [1, 3]."
     )
-    slider = Contact(between=("blade.tip", "ground"), law=Jenkins(k_t=1.0, limit=1.0))
+    slider = Contact(
+        between=("blade.tip", "ground"), law=Jenkins(k_t=1.0, limit=1.0), acts="tangential"
+    )
     assert refused(model(contacts={"root": slider}), frozenset({"verify"})) == (
         "contact.root.law: --verify integrates in time, which knows elastic_coulomb alone, got 'jenkins'. "
         "Run without --verify, or give the law elastic_coulomb."

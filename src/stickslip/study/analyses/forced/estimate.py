@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
-from stickslip.assembly.contact import GROUND, NEXT
+import numpy as np
+
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 from stickslip.harmonic.selection.strategy import always_kept
@@ -100,25 +101,13 @@ def nodes_of(model: Model) -> int:
 
 
 def retained_of(model: Model) -> int:
-    """Return about how many coordinates stay unknown: those of the contacts, and six for each free rigid body."""
-    bodies = sum(part.body is not None for part in model.parts.values())
-    return 6 * bodies + sum(_coordinates(model, c.between) for c in model.contacts.values())
+    """Return how many coordinates stay unknown: those of contacts and free rigid bodies, of a wheel its gaps."""
+    pairs = (model.pairs.own, model.pairs.following)
+    if model.sectors > 1:
+        return np.unique(np.concatenate([p.nonzero()[0] for p in pairs])).size
+    bodies = [model.places.own(name) for name, part in model.parts.items() if part.body is not None]
+    return np.unique(np.concatenate([*bodies, *(p.nonzero()[1] for p in pairs)])).size
 
 
 def _nodes(part: Part) -> int:
     return len(part.mesh.points) if part.mesh is not None else -(-part.structure.n // 3)
-
-
-def _coordinates(model: Model, between: tuple[str, str]) -> int:
-    """Return the dofs that a contact keeps of flexible parts, on a wheel its gaps alone."""
-    sides = [_dofs(model, name) for name in between if name != GROUND]
-    wheel = any(part.sectors > 1 for part in model.parts.values())
-    return max(sides, default=0) if wheel else sum(sides)
-
-
-def _dofs(model: Model, name: str) -> int:
-    part, _, surface = name.removeprefix(NEXT).partition(".")
-    owner = model.parts[part]
-    if owner.body is not None:
-        return 0
-    return len(owner.structure.sets.get(surface, ("one dof",)))

@@ -107,7 +107,7 @@ def question_of(case: Case, model: Model) -> Question:
         _require_integrable(model)
     check_limits(settings.limits, estimate(model, sweep))
     # the guard and the check of the harmonics look at twice as many as are kept
-    assembled = model.assembled(FACTOR * sweep.high_harmonics[-1])
+    assembled = model.assembled(FACTOR * sweep.high_harmonics[-1], case.store)
     return Question(
         label=case.label,
         model=peak_first(assembled),
