@@ -11,7 +11,6 @@ from .assembly.contact import Contact as Contact
 from .assembly.contact import Join as Join
 from .assembly.load import Load as Load
 from .assembly.load import Output as Output
-from .assembly.model import Model as Model
 from .contact.interface import Interface as Interface
 from .contact.laws.bonded import Bonded as Bonded
 from .contact.laws.bouc_wen import BoucWen as BoucWen
@@ -28,6 +27,9 @@ from .contact.laws.unilateral_spring import UnilateralSpring as UnilateralSpring
 from .errors import InputError as InputError
 from .errors import SingularError as SingularError
 from .errors import StickslipError as StickslipError
+from .front.model import Model as Model
+from .front.result import Result as Result
+from .front.study import Study as Study
 from .harmonic.excitation import HarmonicLoad as HarmonicLoad
 from .model.fe.solid import Material as Material
 from .model.mesh.blade_pair import BladePair as BladePair
@@ -43,6 +45,5 @@ from .response.equilibrium import preload as preload
 from .response.forced.response import forced_response as forced_response
 from .response.forced.sweep import Sweep as Sweep
 from .response.system import System as System
-from .study.schema import Study as Study
 
 __version__: str

@@ -32,7 +32,6 @@ from .modes import natural_frequencies as natural_frequencies
 from .modes import normal_modes as normal_modes
 from .modes import with_springs as with_springs
 from .part import BodyPoints as BodyPoints
-from .part import Part as Part
 from .part import Place as Place
 from .part import flat_curved_part as flat_curved_part
 from .part import rigid_part as rigid_part
