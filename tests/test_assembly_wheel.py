@@ -22,10 +22,10 @@ from stickslip.model.fe.rotation import rotating_solid
 from stickslip.model.fe.solid import Material
 from stickslip.model.mesh.mesh_facets import facets_of
 from stickslip.model.mesh.solid_mesh import SolidMesh
-from stickslip.model.modes import natural_frequencies
+from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.part import BodyPoints, rigid_part, solid_part
 from stickslip.model.rigid.body import RigidBody
-from stickslip.reduction.waves import excited_wave
+from stickslip.model.structure import join
 from stickslip.response.equilibrium import preload
 from stickslip.response.forced.response import Sweep, forced_problem, forced_response
 from stickslip.response.recovery import fields
@@ -52,8 +52,18 @@ def shrouded_sector():
     for i, columns in ((0, range(3)), (1, (1,)), (2, range(3))):
         for j in columns:
             for k in range(2):
-                a, b, c, d = number[i, j, k], number[i + 1, j, k], number[i + 1, j + 1, k], number[i, j + 1, k]
-                top = [number[i, j, k + 1], number[i + 1, j, k + 1], number[i + 1, j + 1, k + 1], number[i, j + 1, k + 1]]
+                a, b, c, d = (
+                    number[i, j, k],
+                    number[i + 1, j, k],
+                    number[i + 1, j + 1, k],
+                    number[i, j + 1, k],
+                )
+                top = [
+                    number[i, j, k + 1],
+                    number[i + 1, j, k + 1],
+                    number[i + 1, j + 1, k + 1],
+                    number[i, j + 1, k + 1],
+                ]
                 cells.append([a, b, c, d, *top])
     sets = {
         "root": number[0].ravel(),
@@ -78,7 +88,9 @@ def whole_wheel(mesh):
     for s in range(SECTORS):
         place[s, high] = place[(s + 1) % SECTORS, low]
     axis = Axis()
-    points = np.vstack([axis.turned(mesh.points, 2 * math.pi * s / SECTORS) for s in range(SECTORS)])
+    points = np.vstack(
+        [axis.turned(mesh.points, 2 * math.pi * s / SECTORS) for s in range(SECTORS)]
+    )
     used, cells = np.unique(place[:, mesh.cells].reshape(-1, 8), return_inverse=True)
     nodes = np.searchsorted(used, place)
     sets = {"root": np.unique(nodes[:, root])}
@@ -87,7 +99,10 @@ def whole_wheel(mesh):
 
 def dofs_of(structure, nodes):
     """Return the (k, 3) dofs of nodes of a structure assembled from a mesh without numbers."""
-    place = {(int(n), c): i for i, (n, c) in enumerate(zip(structure.dofs.node, structure.dofs.component, strict=True))}
+    place = {
+        (int(n), c): i
+        for i, (n, c) in enumerate(zip(structure.dofs.node, structure.dofs.component, strict=True))
+    }
     return np.array([[place.get((int(n), c), -1) for c in "xyz"] for n in nodes])
 
 
@@ -116,7 +131,14 @@ def sector_model(mesh, **changes):
         },
         loads={
             "gas": Load(on="blade.tip", newton=2000.0, direction=(0.2, 1, 0.3), engine_order=ORDER),
-            "more": Load(on="blade.tip", newton=600.0, direction=(1, 0, 0), harmonic=2, phase=0.4, engine_order=ORDER),
+            "more": Load(
+                on="blade.tip",
+                newton=600.0,
+                direction=(1, 0, 0),
+                harmonic=2,
+                phase=0.4,
+                engine_order=ORDER,
+            ),
             "lean": Load(on="blade.tip", newton=15.0, direction=(0, 1, 1), harmonic=0),
         },
         outputs=(Output(name="tip", on="blade.tip"),),
@@ -141,7 +163,6 @@ def test_shrouds_that_do_not_match_answer_on_one_sector_as_on_all():
     force = {h: np.zeros(damped.n, dtype=complex) for h in (1, 2)}
     tip = mesh.node_sets["tip"]
     axis = Axis()
-    surfaces, directions = [], []
     for s in range(SECTORS):
         turn = axis.rotation(2 * math.pi * s / SECTORS)
         here = dofs_of(damped, nodes[s, tip])
@@ -150,19 +171,9 @@ def test_shrouds_that_do_not_match_answer_on_one_sector_as_on_all():
         force[1][here] += turn @ unit * 2000.0 / 2 * np.exp(1j * theta)
         force[2][here] += turn @ np.array([1.0, 0, 0]) * 600.0 / 2 * np.exp(1j * (0.4 + 2 * theta))
         static[here] += turn @ np.array([0, 1, 1]) / math.sqrt(2) * 15.0 / 2
-        for side in ("shroud_high", "shroud_low"):
-            own = nodes[s, mesh.node_sets[side]]
-            local = np.full(len(mesh.points), -1)
-            local[mesh.node_sets[side]] = np.arange(6)
-            facets = local[facets_of(mesh, mesh.node_sets[side])]
-            surfaces.append(nodal_surface(whole.points[own], dofs_of(damped, own), damped.n, facets))
-        directions.append(tuple(turn[:, 0]))
-    gaps = [
-        node_to_segment(surfaces[2 * s], surfaces[2 * ((s + 1) % SECTORS) + 1], direction=directions[s]).gap_operator
-        for s in range(SECTORS)
-    ]
+    _, gaps = whole_with_gaps(model)
     names = tuple(f"{s}.{i}" for s in range(SECTORS) for i in range(6))
-    interface = Interface(names, (LAW,) * len(names), scipy.sparse.vstack(gaps, format="csr"))
+    interface = Interface(names, (LAW,) * len(names), gaps)
     seen = dofs_of(damped, nodes[0, tip[:1]]).ravel()
     system = System(damped, interface, seen)
     load = HarmonicLoad(static, force)
@@ -180,3 +191,200 @@ def test_shrouds_that_do_not_match_answer_on_one_sector_as_on_all():
             own = np.tile(one.gaps[h].reshape(6, 3), (SECTORS, 1))
             there = every.gaps[h].reshape(-1, 3)
             assert np.abs(there - phase[:, None] * own).max() < 1e-8 * np.abs(every.gaps).max()
+
+
+def test_full_waves_have_the_frequencies_of_the_whole_wheel_with_its_contacts_stuck_open_or_pressed():
+    model = sector_model(shrouded_sector())
+    damped, gaps = whole_with_gaps(model)
+    holds = {"open": np.zeros(30), "stuck": np.ones(30), "static": np.tile(model.pressed, SECTORS)}
+    assert 0 < np.count_nonzero(model.pressed) < 6
+    springs = np.array([LAW.k_t, LAW.k_w, LAW.k_n])
+    for how, held in holds.items():
+        waves = [model.at(SPEED, k, how) for k in range(SECTORS)]
+        found = np.sort(np.concatenate([natural_frequencies(w, 3) for w in waves]))[:10]
+        whole = with_springs(damped, gaps, (held[:, None] * springs).ravel())
+        np.testing.assert_allclose(found, natural_frequencies(whole, 10), rtol=1e-9)
+        assert scipy.sparse.issparse(waves[0].stiffness)
+        assert waves[1].basis.shape[0] == model.places.n
+
+
+def whole_with_gaps(model):
+    """Return the turning wheel of all sectors and the gaps between its shrouds."""
+    mesh = model.parts["blade"].mesh
+    whole, nodes = whole_wheel(mesh)
+    turning = rotating_solid(whole, STEEL).at_speed(model.speed)
+    rows = []
+    for s in range(SECTORS):
+        high, low = (
+            face_of(turning, whole, nodes[n], mesh, side)
+            for n, side in ((s, "shroud_high"), ((s + 1) % SECTORS, "shroud_low"))
+        )
+        along = tuple(Axis().rotation(2 * math.pi * s / SECTORS)[:, 0])
+        rows.append(node_to_segment(high, low, direction=along).gap_operator)
+    return turning, scipy.sparse.vstack(rows, format="csr")
+
+
+def face_of(structure, whole, own, mesh, side):
+    """Return a shroud face of one sector, whose nodes in the whole wheel are `own`."""
+    members = mesh.node_sets[side]
+    local = np.full(len(mesh.points), -1)
+    local[members] = np.arange(len(members))
+    facets = local[facets_of(mesh, members)]
+    here = own[members]
+    return nodal_surface(whole.points[here], dofs_of(structure, here), structure.n, facets)
+
+
+BODY = RigidBody(mass=0.02, inertia=(3e-6, 3e-6, 3e-6), centre=(0.155, 0.0, 0.0))
+
+
+def test_a_rigid_damper_between_blade_and_next_blade_answers_on_one_sector_as_on_all():
+    """A body in each sector, nodes of both neighbours, thrown outward by the rotation; a node of a contact is an output."""
+    mesh = shrouded_sector()
+    high, low = (mesh.node_sets[f"shroud_{side}"][[0, 2, 3]] for side in ("high", "low"))
+    mesh = replace(mesh, node_sets={**mesh.node_sets, "left": high, "right": low})
+    axis, pitch = Axis(), 2 * math.pi / SECTORS
+    tilt = axis.rotation(pitch / 2)
+    out = np.array([1.0, 0.0, 0.0])
+    frames = {}
+    for side, sign in (("left", -1), ("right", 1)):
+        normal = tilt @ np.array([math.cos(0.6), sign * math.sin(0.6), 0.0])
+        frames[side] = np.column_stack([np.cross(normal, [0, 0, 1]), [0, 0, -1], normal])
+        frames[side] = np.column_stack(
+            [frames[side][:, 0], np.cross(normal, frames[side][:, 0]), normal]
+        )
+    places = {"left": mesh.points[high], "right": axis.turned(mesh.points[low], pitch)}
+    surfaces = {
+        side: BodyPoints(
+            tuple(f"{side}.{i}" for i in range(3)), places[side], np.tile(frames[side], (3, 1, 1))
+        )
+        for side in frames
+    }
+    x, y, z = tilt @ (out * 0.185)
+    body = replace(BODY, centre=(float(x), float(y), float(z)))
+    law = replace(LAW, preload=0.0, mu=0.4)
+    model = Model(
+        parts={
+            "blade": solid_part(
+                mesh, STEEL, sectors=SECTORS, damping_ratio=0.003, between=(3000.0, 20000.0)
+            ),
+            "damper": rigid_part(body, surfaces),
+        },
+        contacts={
+            "left": Contact(between=("damper.left", "blade.left"), law=law),
+            "right": Contact(between=("damper.right", "next.blade.right"), law=law),
+        },
+        loads={
+            "gas": Load(on="blade.tip", newton=3600.0, direction=(0, 1, 0.2), engine_order=ORDER)
+        },
+        outputs=(
+            Output(name="tip", on="blade.tip"),
+            Output(name="damper", on="damper"),
+            Output(name="foot", on="blade.left"),
+        ),
+        alert_over=("damper.x", "left.0.x"),
+        speed=SPEED,
+    )
+    found = model.assembled(H)
+    assert found.output_labels[3:9] == tuple(
+        f"damper.{c}" for c in ("x", "y", "z", "rx", "ry", "rz")
+    )
+    assert np.all(found.static_force[:, 2] < 0)
+
+    whole, nodes = whole_wheel(mesh)
+    solid = rotating_solid(whole, STEEL)
+    turning = solid.at_speed(SPEED)
+    damped = rayleigh_damping(turning, 0.003, (3000.0 / (2 * math.pi), 20000.0 / (2 * math.pi)))
+    bodies = [
+        replace(body, centre=tuple(axis.rotation(pitch * s) @ body.centre)) for s in range(SECTORS)
+    ]
+    both = join(wheel=damped, **{f"b{s}": b.structure() for s, b in enumerate(bodies)})
+    n = both.n
+    static, force = np.zeros(n), np.zeros(n, dtype=complex)
+    static[: damped.n] = turning.stiffness @ solid.displacement(SPEED)
+    unit = np.array([0, 1, 0.2]) / np.linalg.norm([0, 1, 0.2])
+    rows = []
+    for s, b in enumerate(bodies):
+        turn = axis.rotation(pitch * s)
+        own = both.sets[f"b{s}"]
+        arm = np.array(b.centre) * [1, 1, 0]
+        static[own[:3]] = b.mass * SPEED**2 * arm
+        here = dofs_of(damped, nodes[s, mesh.node_sets["tip"]])
+        force[here] += turn @ unit * 1800.0 * np.exp(2j * math.pi * ORDER * s / SECTORS)
+        for side, sector in (("left", s), ("right", (s + 1) % SECTORS)):
+            there = nodes[sector, mesh.node_sets[side]]
+            motion = b.displacement_operator(whole.points[there])
+            for i, dofs in enumerate(dofs_of(damped, there)):
+                gap = np.zeros((3, n))
+                gap[:, dofs] = (turn @ frames[side]).T
+                gap[:, own] -= (turn @ frames[side]).T @ motion[i]
+                rows.append(gap)
+    names = tuple(f"c{i}" for i in range(len(rows)))
+    interface = Interface(names, (law,) * len(rows), np.vstack(rows))
+    seen = np.concatenate(
+        [
+            dofs_of(damped, nodes[0, [mesh.node_sets["tip"][0]]])[0],
+            both.sets["b0"],
+            dofs_of(damped, nodes[0, high[:1]])[0],
+        ]
+    )
+    free = np.concatenate([both.sets[f"b{s}"] for s in range(SECTORS)])
+    system = System(both, interface, seen, free=free)
+    hertz = (1900.0, 2000.0)
+    mine = answered(found.system, found.load, hertz)
+    theirs = answered(system, HarmonicLoad(static, {1: force}), hertz)
+    for one, every in zip(mine, theirs, strict=True):
+        assert one.energy.max() > 1e-4
+        assert np.abs(one.outputs - every.outputs).max() < 1e-8 * np.abs(every.outputs).max()
+
+
+def test_shrouds_joined_from_sector_to_sector_are_one_ring():
+    mesh = shrouded_sector()
+    points = mesh.points.copy()
+    high = mesh.node_sets["shroud_high"]
+    points[high, 2] = mesh.points[mesh.node_sets["shroud_low"], 2]  # now both sides match
+    mesh = replace(mesh, points=points)
+    part = solid_part(mesh, STEEL, sectors=SECTORS)
+    joined = Model(
+        parts={"blade": part},
+        joins={
+            "ring": Join(
+                between=("blade.shroud_high", "next.blade.shroud_low"), pairing="node_to_node"
+            )
+        },
+    )
+    sets = dict(mesh.node_sets)
+    for side in ("low", "high"):
+        sets[f"cyclic_{side}"] = np.unique(
+            np.concatenate([sets[f"cyclic_{side}"], sets[f"shroud_{side}"]])
+        )
+    ring = Model(parts={"blade": solid_part(replace(mesh, node_sets=sets), STEEL, sectors=SECTORS)})
+    for k in range(3):
+        found, expected = (natural_frequencies(m.at(SPEED, k), 6) for m in (joined, ring))
+        np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+def test_what_is_wrong_with_a_wheel_is_named():
+    mesh = shrouded_sector()
+    model = sector_model(mesh)
+    plain = {name: replace(load, engine_order=None) for name, load in model.loads.items()}
+    other = {**model.loads, "more": replace(model.loads["more"], engine_order=3)}
+    two = {**model.parts, "second": solid_part(mesh, STEEL, sectors=6)}
+    for match, changes in (
+        ("load.gas.engine_order: is missing", {"loads": plain}),
+        ("engine orders differ .load.gas: 2, load.more: 3", {"loads": other}),
+        ("part.second.sectors: is 6, and the part 'blade' is one of 5", {"parts": two}),
+        (
+            "part.second.sectors: is 1, and",
+            {"parts": {**model.parts, "second": solid_part(mesh, STEEL)}},
+        ),
+        (
+            "part.blade: .*there is no set 'nowhere'",
+            {
+                "parts": {
+                    "blade": solid_part(mesh, STEEL, sectors=5, faces=("nowhere", "cyclic_high"))
+                }
+            },
+        ),
+    ):
+        with pytest.raises(InputError, match=match):
+            replace(model, **changes).assembled(H)

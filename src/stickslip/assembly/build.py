@@ -196,7 +196,7 @@ def _of_one(model: Model, kept: IntArray, store: Store) -> Linear:
         name: kept[np.isin(kept, model.places.own(name))] - model.places.offset(name)
         for name in model.parts
     }
-    parts = reduced_parts(model.parts, own, model.spin(model.speed), store)
+    parts = reduced_parts(model.parts, own, model.spin(model.speed), model.steady, store)
     ids = []
     for name, part in parts.items():
         modal = np.full(part.structure.n - part.kept.size, -1)
@@ -286,7 +286,7 @@ def pressed_points(model: Model) -> BoolArray:
         load = linear.steady + np.real(linear.load(centrifugal_of_bodies(model), 0))
     for force in forces.values():
         load = load + np.real(linear.load(force, 0))
-    gap, force = static_state(system.with_retention(model.retention), load)
+    _, force = static_state(system.with_retention(model.retention), load)
     return pressed_by(model.pairs.laws, force)
 
 
@@ -308,11 +308,12 @@ def frequencies(model: Model, system: System, order: int | None, store: Store) -
 def _without(structure: Structure, dofs: IntArray) -> Structure:
     stays = np.setdiff1d(np.arange(structure.n), dofs)
     square = np.ix_(stays, stays)
-    parts = []
-    for matrix in (structure.mass, structure.damping, structure.stiffness):
-        dense = matrix.toarray() if scipy.sparse.issparse(matrix) else matrix
-        parts.append(dense[square])
-    return Structure(*parts, structure.dofs.take(stays))
+
+    def rest(matrix: Matrix) -> Matrix:
+        return (matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)[square]
+
+    own = rest(structure.mass), rest(structure.damping), rest(structure.stiffness)
+    return Structure(*own, structure.dofs.take(stays))
 
 
 def _lowest(model: Model, structure: Structure, count: int, store: Store) -> FloatArray:

@@ -164,7 +164,7 @@ def _first(places: Places, spot: Spot) -> IntArray:
         return places.own(spot.part)
     assert spot.surface is not None
     assert spot.surface.numbers is not None
-    return places.rows(spot.part, spot.surface.numbers[:1])[0]
+    return np.asarray(places.rows(spot.part, spot.surface.numbers[:1])[0])
 
 
 def _nearest(places: Places, output: Output, key: str) -> IntArray:
@@ -174,7 +174,7 @@ def _nearest(places: Places, output: Output, key: str) -> IntArray:
     if not known.size:
         raise input_error(key, f"the part {output.on!r} has no nodes", "Name a dof or a set.")
     away = np.linalg.norm(table.position[known] - np.asarray(output.near, dtype=float), axis=1)
-    return places.rows(output.on, table.node[known[[int(np.argmin(away))]]])[0]
+    return np.asarray(places.rows(output.on, table.node[known[[int(np.argmin(away))]]])[0])
 
 
 def error_names(

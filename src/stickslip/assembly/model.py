@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
+import scipy.sparse
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.assembled import Assembled, Skin
@@ -14,7 +15,7 @@ from stickslip.assembly.coordinates import Coordinates, coordinates
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.pairs import Pairs, pair_contacts
 from stickslip.assembly.places import Places, picked
-from stickslip.assembly.reduced import Spin, Store, at_speed, in_memory
+from stickslip.assembly.reduced import Spin, Steady, Store, at_speed, in_memory
 from stickslip.assembly.skin import on_skin, skin_of
 from stickslip.assembly.statics import StaticState, static_state
 from stickslip.assembly.ties import Ties, tie_joins
@@ -22,6 +23,7 @@ from stickslip.assembly.wheel import Neighbours, neighbours, with_joins
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
 from stickslip.model.facts import Facts, facts_of_parts
+from stickslip.model.fe.factorisation import factorise
 from stickslip.model.modes import with_springs
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure, join
@@ -164,14 +166,37 @@ class Model:
 
     def full(self, speed: float) -> Structure:
         """Return all parts side by side at a speed in rad/s, before joins and cyclic faces tie them."""
-        ties = {} if self.neighbours is None else self.neighbours.ties
-        spin = self.spin(speed)
+        spin, rest = self.spin(speed), self.steady
         return join(
-            **{
-                name: at_speed(name, part, spin, ties.get(name))
-                for name, part in self.parts.items()
-            }
+            **{name: at_speed(name, part, spin, rest[name]) for name, part in self.parts.items()}
         )
+
+    @cached_property
+    def steady(self) -> dict[str, Steady]:
+        """What the displacements of steady rotation obey: cyclic faces, and joins, by which parts share in it."""
+        if self.joins and self.rotates:
+            return self._joined_displacements()
+        ties = {} if self.neighbours is None else self.neighbours.ties
+        return {name: Steady(ties.get(name)) for name in self.parts}
+
+    def _joined_displacements(self) -> dict[str, Steady]:
+        """Solve the linear statics of all joined parts at rest under the centrifugal load at 1 rad/s."""
+        at, parts = self.coordinates, self.parts
+        rest = at.tied(join(**{name: part.structure for name, part in parts.items()}))
+        tie = picked(np.arange(at.ids.size), at.ids.size) if at.tie is None else at.tie
+        if self.neighbours is not None:
+            tie = tie @ self.neighbours.sector(rest, at).wave_tie(0)
+        loose = self._loose(np.zeros(len(self.pairs.names), dtype=bool))
+        moves = np.setdiff1d(np.arange(tie.shape[1]), tie[loose].nonzero()[1])
+        tie = scipy.sparse.csr_array(tie[:, moves])
+        stiffness = scipy.sparse.block_diag([part.structure.stiffness for part in parts.values()])
+        load = [
+            np.zeros(p.structure.n) if p.solid is None else p.solid.centrifugal
+            for p in parts.values()
+        ]
+        solve = factorise(scipy.sparse.csr_array(tie.T @ stiffness @ tie))
+        moved = tie @ solve(tie.T @ np.concatenate(load))
+        return {name: Steady(unit=np.asarray(moved[self.places.own(name)])) for name in parts}
 
     @cached_property
     def coordinates(self) -> Coordinates:
@@ -267,13 +292,11 @@ class Model:
 
     def static_displacement(self, speed: float) -> dict[str, FloatArray]:
         """Return the (nodes, 3) static displacements in m of the meshes of rotating parts at a speed in rad/s; none at rest."""
-        found: dict[str, FloatArray] = {}
-        ties = {} if self.neighbours is None else self.neighbours.ties
-        for name, part in self.parts.items():
-            if part.solid is not None and speed > 0:
-                moved = part.solid.displacement(speed, tie=ties.get(name))
-                found[name] = part.solid.at_nodes(moved)
-        return found
+        return {
+            name: part.solid.at_nodes(self.steady[name].displacement(part, speed))
+            for name, part in self.parts.items()
+            if part.solid is not None and speed > 0
+        }
 
     def static_state(self, speed: float) -> StaticState | None:
         """Return what the centrifugal load does to the solids at a speed in rad/s; None at rest, and where no speed changes anything."""

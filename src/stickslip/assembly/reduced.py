@@ -42,6 +42,32 @@ class Spin:
 
 
 @dataclass(frozen=True, eq=False)
+class Steady:
+    """What the displacement of steady rotation of a part obeys.
+
+    Parameters
+    ----------
+    tie
+        That of its cyclic faces; None for none.
+    unit
+        (n,) the displacement itself at 1 rad/s in m s², where joined parts share in it; None: that of the part alone.
+    """
+
+    tie: Matrix | None = None
+    unit: FloatArray | None = None
+
+    def displacement(self, part: Part, speed: float) -> FloatArray:
+        """Return the (n,) displacement in m of a part with a solid at a speed in rad/s."""
+        assert part.solid is not None
+        if self.unit is not None:
+            return np.asarray(speed**2 * self.unit)
+        return part.solid.displacement(speed, tie=self.tie)
+
+
+ALONE = Steady()
+
+
+@dataclass(frozen=True, eq=False)
 class ReducedPart:
     """A part on few coordinates.
 
@@ -65,25 +91,25 @@ def in_memory(_content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[s
     return make()
 
 
-def at_speed(name: str, part: Part, spin: Spin, tie: Matrix | None = None) -> Structure:
-    """Return the full structure of a part at a speed; `tie` is that of its cyclic faces."""
+def at_speed(name: str, part: Part, spin: Spin, rest: Steady = ALONE) -> Structure:
+    """Return the full structure of a part at a speed."""
     if part.solid is None or spin.speed == 0.0:
         return part.structure
     try:
         return part.solid.at_speed(
-            spin.speed, tie=tie, tangent=spin.tangent, coriolis=spin.coriolis
+            spin.speed, tie=rest.tie, unit=rest.unit, tangent=spin.tangent, coriolis=spin.coriolis
         )
     except SingularError as error:
         raise SingularError(
-            f"part.{name}: {error} The stress of a part that joins or contacts alone hold is not computed: hold it by a clamp."
+            f"part.{name}: {error} What contacts alone hold has no stress of rotation here: clamp it, or join it."
         ) from None
 
 
-def steady_load(part: Part, spin: Spin, structure: Structure, tie: Matrix | None) -> FloatArray:
+def steady_load(part: Part, spin: Spin, structure: Structure, rest: Steady = ALONE) -> FloatArray:
     """Return the (n,) load on a part's dofs, at a speed, under which it comes to the displacement of steady rotation."""
     if part.solid is None or spin.speed == 0.0:
         return np.zeros(part.structure.n)
-    return np.asarray(structure.stiffness @ part.solid.displacement(spin.speed, tie=tie))
+    return np.asarray(structure.stiffness @ rest.displacement(part, spin.speed))
 
 
 def damped(name: str, part: Part, structure: Structure) -> Structure:
@@ -105,7 +131,11 @@ def whole_nodes(table: Dofs, dofs: IntArray) -> IntArray:
 
 
 def reduced_parts(
-    parts: Mapping[str, Part], kept: Mapping[str, IntArray], spin: Spin, store: Store = in_memory
+    parts: Mapping[str, Part],
+    kept: Mapping[str, IntArray],
+    spin: Spin,
+    rest: Mapping[str, Steady],
+    store: Store = in_memory,
 ) -> dict[str, ReducedPart]:
     """Reduce all parts of a single structure.
 
@@ -117,6 +147,8 @@ def reduced_parts(
         Dofs of each part that stay physical.
     spin
         At what speed.
+    rest
+        What the displacements of steady rotation obey.
     store
         Takes a text that all depends on and a function that makes named arrays; returns these, perhaps from an earlier run.
 
@@ -129,45 +161,58 @@ def reduced_parts(
     """
     wanted: dict[int, IntArray] = {}
     for name, part in parts.items():
-        root = _root(part, spin)
+        root = _root(part, spin, rest[name])
         own = whole_nodes(part.structure.dofs, kept[name])
         wanted[id(root)] = np.union1d(wanted.get(id(root), own), own)
     found = {}
     for name, part in parts.items():
-        root = _root(part, spin)
-        made = _reduced(name, root, wanted[id(root)], spin, store)
+        root = _root(part, spin, rest[name])
+        steady = rest[name] if root.solid is not None and spin.speed != 0.0 else ALONE
+        made = _reduced(name, root, wanted[id(root)], (spin, steady), store)
         found[name] = made if root is part else _placed(made, part)
     return found
 
 
-def _root(part: Part, spin: Spin) -> Part:
+def _root(part: Part, spin: Spin, rest: Steady) -> Part:
     """Return the part whose reduction a part shares."""
     if part.template is None or part.place is None:
         return part
     turns = part.solid is not None and spin.speed != 0.0
-    return part if turns and not part.place.keeps(part.axis) else part.template
+    alike = part.place.keeps(part.axis) and rest.unit is None
+    return part if turns and not alike else part.template
 
 
-def _reduced(name: str, part: Part, kept: IntArray, spin: Spin, store: Store) -> ReducedPart:
-    own = spin if part.solid is not None else Spin()
-    key = (own, part.n_modes, kept.tobytes())
+def _reduced(
+    name: str, part: Part, kept: IntArray, turning: tuple[Spin, Steady], store: Store
+) -> ReducedPart:
+    spin, rest = turning if part.solid is not None else (Spin(), ALONE)
+    shared = None if rest.unit is None else rest.unit.tobytes()
+    key = (spin, shared, kept.tobytes())
     if key not in part.memo:
-        content = _content(part, own, kept)
-        make = lambda: _packed(_reduce(name, part, kept, own))  # noqa: E731  # a thunk
-        whole = part.n_modes is None or part.body is not None
-        made = (
-            _reduce(name, part, kept, own) if whole else _unpacked(store(content, make), part, kept)
-        )
-        while len(part.memo) >= REMEMBERED:
-            part.memo.pop(next(iter(part.memo)))
+
+        def make() -> ReducedPart:
+            return _reduce(name, part, kept, spin, rest)
+
+        if part.n_modes is None or part.body is not None:
+            made = make()
+        else:
+            content = _content(part, spin, rest, kept)
+            made = _unpacked(store(content, lambda: _packed(make())), part, kept)
+        _forget(part.memo)
         part.memo[key] = made
     found: ReducedPart = part.memo[key]
     return found
 
 
-def _reduce(name: str, part: Part, kept: IntArray, spin: Spin) -> ReducedPart:
-    full = at_speed(name, part, spin)
-    steady = steady_load(part, spin, full, None)
+def _forget(memo: dict[Any, Any]) -> None:
+    reductions = [key for key, value in memo.items() if isinstance(value, ReducedPart)]
+    for key in reductions[: len(reductions) - REMEMBERED + 1]:
+        del memo[key]
+
+
+def _reduce(name: str, part: Part, kept: IntArray, spin: Spin, rest: Steady) -> ReducedPart:
+    full = at_speed(name, part, spin, rest)
+    steady = steady_load(part, spin, full, rest)
     full = damped(name, part, full)
     if part.n_modes is None or part.body is not None:
         return ReducedPart(full, np.arange(full.n), steady)
@@ -188,13 +233,13 @@ def _placed(made: ReducedPart, part: Part) -> ReducedPart:
     return ReducedPart(structure, made.kept, np.asarray(turn @ made.steady))
 
 
-def _content(part: Part, spin: Spin, kept: IntArray) -> str:
+def _content(part: Part, spin: Spin, rest: Steady, kept: IntArray) -> str:
     solid = part.solid
     turning: tuple[object, ...] = ()
     if solid is not None and spin.speed != 0.0:
         mesh, material = solid.mesh, solid.material
         given = (material,) if not isinstance(material, list | tuple) else tuple(material)
-        turning = (spin, mesh.points, mesh.cells, given, solid.axis, solid.quadrature)
+        turning = (spin, rest.unit, mesh.points, mesh.cells, given, solid.axis, solid.quadrature)
     damping = (part.damping_ratio, *part.between)
     return content_hash("craig_bampton", part.structure, kept, part.n_modes, damping, turning)
 

@@ -12,8 +12,8 @@ from stickslip.assembly.reduced import Store, at_speed, damped, steady_load
 from stickslip.assembly.wheel import (
     ReducedSector,
     conjugate,
+    partners,
     reduced_wave,
-    roles,
     wave_numbers,
     wheel_of,
 )
@@ -53,12 +53,12 @@ def reduced_sector(
     n_modes, whole = _modes(model)
     needed = np.unique(np.concatenate([kept, whole]))
     needed = needed[~np.isin(needed, model.ties.followers)]
-    role = roles(sector, pairs, at.of_dofs(needed, model.places.dofs, "part"))
+    kept = np.unique(partners(sector)[at.of_dofs(needed, model.places.dofs, "part")])
     made: dict[int, tuple[Structure, Matrix]] = {}
     memo = next(iter(model.parts.values())).memo
     for k in wave_numbers(model.sectors, *order):
         mirror = made.get(sector.sectors - k)
-        if mirror is not None and k > 0:
+        if mirror is not None and k > 0 and not sector.structure.is_complex:
             made[k] = conjugate(mirror[0]), np.conj(mirror[1])
             continue
         key = content_hash(
@@ -69,27 +69,26 @@ def reduced_sector(
             sector.high,
             sector.sectors,
             sector.axis,
-            role.kept,
+            kept,
             n_modes,
             steady,
         )
         if key not in memo:
-            memo[key] = _kept(sector, role.kept, k, n_modes, at.load(steady), (key, store))
+            memo[key] = _kept(sector, kept, k, n_modes, at.load(steady), (key, store))
             _forget(memo)
         made[k] = memo[key]
     stay = at.of_dofs(np.unique(stay), model.places.dofs, "output.points")
-    return wheel_of(sector, role, made, order, model.pairs.names, stay)
+    return wheel_of(sector, kept, made, order, pairs, stay)
 
 
 def _sector_at_speed(model: Model) -> tuple[Structure, FloatArray]:
     """Return all parts side by side at the model's speed, damped, and the load of steady rotation on them."""
-    assert model.neighbours is not None
-    spin, ties = model.spin(model.speed), model.neighbours.ties
+    spin, rest = model.spin(model.speed), model.steady
     own: dict[str, Structure] = {}
     steady = []
     for name, part in model.parts.items():
-        turning = at_speed(name, part, spin, ties.get(name))
-        steady.append(steady_load(part, spin, turning, ties.get(name)))
+        turning = at_speed(name, part, spin, rest[name])
+        steady.append(steady_load(part, spin, turning, rest[name]))
         own[name] = damped(name, part, turning)
     return join(**own), np.concatenate(steady)
 

@@ -6,16 +6,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse
 
-from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
+from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.coordinates import Coordinates
 from stickslip.assembly.pairs import Pairs, Turn
-from stickslip.assembly.places import Places
+from stickslip.assembly.places import Places, picked
 from stickslip.assembly.ties import Ties
 from stickslip.errors import InputError, input_error
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
 from stickslip.reduction.fixed_interface import craig_bampton
+from stickslip.reduction.nodal import nodal_coordinates
+from stickslip.reduction.projection import in_coordinates
 from stickslip.reduction.relative import in_relative_coordinates
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.reduction.waves import excited_wave, wave
@@ -147,93 +149,12 @@ def _in_space(structure: Structure, members: IntArray) -> bool:
     return bool(nodes.size and nodes[0] >= 0 and counts.max() >= IN_SPACE)
 
 
-@dataclass(frozen=True, eq=False)
-class Roles:
-    """Contacts of a sector on its kept coordinates, alike in all waves.
-
-    Coordinates on which a contact of the neighbour behind acts stand for this dof of the sector ahead: ``u_next = exp(iθ) u``.
-
-    Parameters
-    ----------
-    kept
-        (k,) dofs of the sector that stay physical.
-    ahead
-        (k,) which of them stand for those of the next sector.
-    gaps
-        (3 p, k) CSR.
-    """
-
-    kept: IntArray
-    ahead: BoolArray
-    gaps: Matrix
-
-    def shift(self, k: int, sectors: int, n: int) -> Matrix:
-        """Return the (n,) factors that make displacements of a wave's kept dofs and modes of the coordinates."""
-        phase = wave(k, sectors).phase
-        factors = np.ones(n, dtype=type(phase))
-        factors[: self.kept.size][self.ahead] = np.conj(phase)
-        return factors
-
-
-def roles(sector: CyclicSector, pairs: Pairs, kept: IntArray) -> Roles:
-    """Find which coordinates stand for the next sector's.
-
-    Raises
-    ------
-    InputError
-        If contacts need one dof both as this sector's and as the next one's.
-    """
-    own, following = _off_the_high_face(sector, pairs)
-    needed = np.union1d(own.nonzero()[1], following.nonzero()[1])
-    kept = np.union1d(_partners(sector)[kept], needed)
-    here, there = (np.isin(kept, m.nonzero()[1]) for m in (own, following))
-    both = np.flatnonzero(here & there)
-    if both.size:
-        name = sector.structure.dofs.labels[kept[both[0]]]
-        raise input_error(
-            "contact",
-            f"{name} takes part both in a contact with the sector ahead and in one with the sector behind or inside, {both.size} such dofs",
-            "Take its node out of one of the surfaces.",
-        )
-    return Roles(kept, there, scipy.sparse.csr_array((own + following)[:, kept]))
-
-
-def _partners(sector: CyclicSector) -> IntArray:
+def partners(sector: CyclicSector) -> IntArray:
     """Return each dof of a sector, those of the high face replaced by their partners on the low one."""
     place = np.arange(sector.structure.n)
     tied = sector.low != sector.high
     place[sector.high[tied]] = sector.low[tied]
     return place
-
-
-def _off_the_high_face(sector: CyclicSector, pairs: Pairs) -> tuple[Matrix, Matrix]:
-    """Return the gap operators with the motion of the high face written as that of the next sector's low face."""
-    own, following = pairs.own, pairs.following
-    tied = sector.low != sector.high
-    high = sector.high[tied]
-    if following[:, high].nnz:
-        raise input_error(
-            "contact",
-            "the sector ahead is touched on its high cyclic face, which belongs to the one after it",
-            "Let the contact be that between the sector behind and this one's low side.",
-        )
-    if not own[:, high].nnz:
-        return own, following
-    n = sector.structure.n
-    tie = sector.wave_tie(
-        0
-    )  # to displacements of the high face from those of the low one in the next sector
-    moved = scipy.sparse.csr_array(own[:, high] @ tie[high])
-    free = sector.independent
-    place = scipy.sparse.csr_array(
-        (np.ones(free.size), (np.arange(free.size), free)), shape=(tie.shape[1], n)
-    )
-    stays = np.ones(n)
-    stays[high] = 0.0
-    return (
-        scipy.sparse.csr_array(own @ scipy.sparse.diags_array(stays)),
-        scipy.sparse.csr_array(following + moved @ place),
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,42 +165,36 @@ class ReducedSector:
     ----------
     sector
         What was reduced.
-    role
-        Kept dofs, and what contacts make of them.
+    kept
+        (k,) its dofs that the first coordinates of reduced waves are.
+    ways
+        Wave number -> (n0, n) from the coordinates to those of the reduced wave.
     wheel
         Waves without their way back.
     gaps
         (3 p, n) CSR.
     steady
         (n,) load of steady rotation.
-    into
-        (n0, n) CSR from the coordinates to kept dofs and modes; None where they are the same.
     """
 
     sector: CyclicSector
-    role: Roles
+    kept: IntArray
+    ways: Mapping[int, Matrix]
     wheel: TunedWheel
     gaps: Matrix
     steady: FloatArray
-    into: Matrix | None
 
     def load(self, force: Matrix, wave_number: int) -> Matrix:
         """Return the (n,) load on the coordinates of a wave of a load (n_sector,) on kept dofs."""
         k = wave_number % self.sector.sectors
         on_wave = self.sector.wave_tie(k).conj().T @ force
-        place = np.searchsorted(self.sector.independent, self.role.kept)
-        n0 = self.wheel.n if self.into is None else self.into.shape[0]
-        own = np.zeros(n0, dtype=on_wave.dtype)
-        own[: place.size] = on_wave[place]
-        own = np.conj(self.role.shift(k, self.sector.sectors, n0)) * own
-        return own if self.into is None else np.asarray(self.into.T @ own)
+        own = np.zeros(self.ways[k].shape[0], dtype=on_wave.dtype)
+        own[: self.kept.size] = on_wave[np.searchsorted(self.sector.independent, self.kept)]
+        return np.asarray(self.ways[k].conj().T @ own)
 
     def of_dofs(self, dofs: IntArray, place: str) -> IntArray:
         """Return the coordinates that dofs of the sector are; `place` is the key that asks for them."""
-        found = np.searchsorted(self.role.kept, _partners(self.sector)[dofs])
-        if self.into is None:
-            return found
-        rows = self.into[found]
+        rows = self.ways[0][np.searchsorted(self.kept, partners(self.sector)[dofs])]
         single = np.diff(rows.indptr) == 1
         if not single.all():
             name = self.sector.structure.dofs.labels[int(dofs[np.flatnonzero(~single)[0]])]
@@ -298,46 +213,26 @@ def reduced_wave(
     if n_modes is not None:
         moving = craig_bampton(moving, place, n_modes)
     else:
-        moving = _taken(moving, np.concatenate([place, np.setdiff1d(np.arange(moving.n), place)]))
+        rest = np.setdiff1d(np.arange(moving.n), place)
+        moving = _in_order(moving, np.concatenate([place, rest]))
     return replace(moving, basis=None), moving.project(steady)
 
 
-def _taken(structure: Structure, order: IntArray) -> Structure:
-    square = np.ix_(order, order)
-    dense = _dense(structure)
-    place = np.argsort(order)
-    sets = {name: place[index] for name, index in structure.sets.items()}
-    loss = None if dense.loss is None else dense.loss[square]
-    return Structure(
-        dense.mass[square], dense.damping[square], dense.stiffness[square],
-        structure.dofs.take(order), sets, structure.basis[:, order], loss,
-    )  # fmt: skip
-
-
-def _dense(structure: Structure) -> Structure:
-    def full(matrix: Matrix) -> Matrix:
-        return matrix.toarray() if scipy.sparse.issparse(matrix) else matrix
-
-    names = ("mass", "damping", "stiffness", "loss")
-    return replace(structure, **{name: full(getattr(structure, name)) for name in names})
-
-
-def _shifted(structure: Structure, shift: Matrix) -> Structure:
-    """Return a structure in coordinates of another phase: ``u = shift * q``; the way back is dropped."""
-
-    def turned(matrix: Matrix) -> Matrix:
-        return None if matrix is None else np.conj(shift)[:, None] * matrix * shift
-
-    names = ("mass", "damping", "stiffness", "loss")
-    found = {name: turned(getattr(structure, name)) for name in names}
-    return replace(structure, basis=None, **found)
+def _in_order(structure: Structure, order: IntArray) -> Structure:
+    into = picked(order, structure.n).T.tocsr()
+    return in_coordinates(structure, into, structure.dofs.take(order), {})
 
 
 def conjugate(structure: Structure) -> Structure:
     """Return the wave that travels the other way."""
-    names = ("mass", "damping", "stiffness", "loss")
-    own = {name: getattr(structure, name) for name in names}
-    return replace(structure, **{k: None if m is None else np.conj(m) for k, m in own.items()})
+    loss = None if structure.loss is None else structure.loss.conj()
+    return replace(
+        structure,
+        mass=structure.mass.conj(),
+        damping=structure.damping.conj(),
+        stiffness=structure.stiffness.conj(),
+        loss=loss,
+    )
 
 
 def wave_numbers(sectors: int, engine_order: int, harmonics: int) -> list[int]:
@@ -347,50 +242,48 @@ def wave_numbers(sectors: int, engine_order: int, harmonics: int) -> list[int]:
 
 def wheel_of(
     sector: CyclicSector,
-    role: Roles,
+    kept: IntArray,
     waves: Mapping[int, tuple[Structure, Matrix]],
     order: tuple[int, int],
-    names: tuple[str, ...],
+    pairs: Pairs,
     stay: IntArray,
 ) -> ReducedSector:
     """Put the waves together, in gaps where these do not depend on each other and no coordinate that has to stay is touched.
 
     Parameters
     ----------
-    sector, role
-        What was reduced.
+    sector, kept
+        What was reduced, and the dofs kept.
     waves
         Wave number -> what `reduced_wave` returned.
     order
         Engine order and highest harmonic.
-    names
-        Of the contacts.
+    pairs
+        Contacts, on the dofs of the sector.
     stay
         Dofs that have to stay coordinates: outputs, rigid bodies.
     """
-    n = waves[0][0].n
-    gaps = _padded(role.gaps, n)
-    steady = np.real(waves[0][1])
-    structures = {
-        k: _shifted(structure, role.shift(k, sector.sectors, n))
-        for k, (structure, _) in waves.items()
-    }
+    place = np.searchsorted(sector.independent, kept)
+    nodal = nodal_coordinates(sector, place, waves[0][0].n, (pairs.own, pairs.following))
+    phases = {k: wave(k, sector.sectors).phase for k in waves}
+    written = {k: nodal.of_wave(structure, phases[k]) for k, (structure, _) in waves.items()}
+    ways = {k: scipy.sparse.csr_array(structure.basis) for k, structure in written.items()}
+    gaps = nodal.operator
     touched = np.unique(gaps.nonzero()[1])
-    into = None
-    if touched.size and not np.isin(role.kept[touched], _partners(sector)[stay]).any():
+    hidden = np.isin(kept[touched[touched < kept.size]], partners(sector)[stay])
+    if touched.size and not hidden.any() and not nodal.multipliers.size:
+        # the gaps are the same combinations in all waves, and so is what is beside them
+        plain = {k: replace(structure, basis=None) for k, structure in written.items()}
         try:
-            small = {k: in_relative_coordinates(s, gaps, names) for k, s in structures.items()}
+            small = {k: in_relative_coordinates(s, gaps, pairs.names) for k, s in plain.items()}
         except InputError:  # gaps depend on each other: nodes stay
             small = {}
         if small:
+            gaps = small[0][1]
+            written = {k: structure for k, (structure, _) in small.items()}
             into = scipy.sparse.csr_array(small[0][0].basis)
-            gaps = scipy.sparse.csr_array(small[0][1])
-            steady = np.asarray(into.T @ steady)
-            structures = {k: replace(s, basis=None) for k, (s, _) in small.items()}
-    wheel = TunedWheel(structures, sector.sectors, *order)
-    return ReducedSector(sector, role, wheel, gaps, steady, into)
-
-
-def _padded(gaps: Matrix, n: int) -> Matrix:
-    own = gaps.tocoo()
-    return scipy.sparse.csr_array((own.data, (own.row, own.col)), shape=(gaps.shape[0], n))
+            ways = {k: scipy.sparse.csr_array(way @ into) for k, way in ways.items()}
+    structures = {k: replace(structure, basis=None) for k, structure in written.items()}
+    wheel = TunedWheel(structures, sector.sectors, *order, nodal.multipliers)
+    steady = np.real(ways[0].conj().T @ waves[0][1])
+    return ReducedSector(sector, kept, ways, wheel, scipy.sparse.csr_array(gaps), steady)

@@ -3,10 +3,10 @@
 In axes that turn with the solid, ``M ü + (C + 2 Ω G) u̇ + K(Ω) u = f``.
 """
 
-import hashlib
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from hashlib import sha256
 from typing import Literal
 
 import numpy as np
@@ -154,7 +154,11 @@ class RotatingSolid:
         return self._equilibrium(speed, tie, linear)[0] if nonlinear else linear
 
     def polynomial(
-        self, tie: Matrix | None = None, *, tangent: Tangent = "consistent"
+        self,
+        tie: Matrix | None = None,
+        *,
+        tangent: Tangent = "consistent",
+        unit: FloatArray | None = None,
     ) -> SpeedPolynomial:
         """Return the stiffness as a polynomial of the speed, exact where the static displacement is linear.
 
@@ -162,7 +166,7 @@ class RotatingSolid:
         ----------
         tie
             As in `displacement`. Nothing is computed twice for the same tie.
-        tangent
+        tangent, unit
             As in `at_speed`; ``"nonlinear"`` has no polynomial.
         """
         if tangent not in TANGENTS[:2]:
@@ -171,9 +175,10 @@ class RotatingSolid:
                 f"tangent {tangent!r} is no polynomial of the speed",
                 "Use 'consistent' or 'textbook', or at_speed.",
             )
-        key = (_content(tie), tangent)
+        key = (_content(tie) if unit is None else sha256(unit.tobytes()).hexdigest(), tangent)
         if key not in self._polynomials:
-            self._polynomials[key] = self._assemble_polynomial(tie, tangent)
+            moved = self._unit_displacement(tie) if unit is None else unit
+            self._polynomials[key] = self._assemble_polynomial(moved, tangent)
         return self._polynomials[key]
 
     def at_speed(
@@ -183,6 +188,7 @@ class RotatingSolid:
         tie: Matrix | None = None,
         tangent: Tangent = "consistent",
         coriolis: bool = False,
+        unit: FloatArray | None = None,
     ) -> Structure:
         """Return the structure of small vibrations about the state of steady rotation.
 
@@ -198,6 +204,8 @@ class RotatingSolid:
             of the static strain. ``"nonlinear"``: the exact tangent at the equilibrium at finite displacement.
         coriolis
             Add ``2 Ω G`` to the damping.
+        unit
+            (n,) linear static displacement at 1 rad/s in m s², where others bodies share in it; None: computed from `tie`.
         """
         _check_speed(speed)
         if tangent not in TANGENTS:
@@ -210,7 +218,7 @@ class RotatingSolid:
             start = speed**2 * self._unit_displacement(tie)
             stiffness = self._equilibrium(speed, tie, start)[1]
         else:
-            stiffness = self.polynomial(tie, tangent=tangent).at(speed)
+            stiffness = self.polynomial(tie, tangent=tangent, unit=unit).at(speed)
         damping = self.structure.damping
         if coriolis:
             damping = scipy.sparse.csr_array(damping + 2 * speed * self.coriolis)
@@ -267,8 +275,8 @@ class RotatingSolid:
             "The solid may be unstable at this speed: try a lower one, and look at displacement(speed)."
         )
 
-    def _assemble_polynomial(self, tie: Matrix | None, tangent: Tangent) -> SpeedPolynomial:
-        terms = self._terms(self._unit_displacement(tie))
+    def _assemble_polynomial(self, unit: FloatArray, tangent: Tangent) -> SpeedPolynomial:
+        terms = self._terms(unit)
         square = terms.geometric - self.spin_softening
         if tangent == "textbook":
             return SpeedPolynomial(self.structure.stiffness, square)
@@ -317,7 +325,7 @@ def _content(tie: Matrix | None) -> str:
     if tie is None:
         return ""
     tie = scipy.sparse.csr_array(tie)
-    digest = hashlib.sha256(repr(tie.shape).encode())
+    digest = sha256(repr(tie.shape).encode())
     for part in (tie.indptr, tie.indices, tie.data):
         digest.update(np.ascontiguousarray(part).tobytes())
     return digest.hexdigest()
