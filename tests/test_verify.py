@@ -1,22 +1,22 @@
 """The check inside a run: which points it takes, and what it says of them."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
-from small_study import write_small_study
+from small_v2 import write_two_blades
 
-from stickslip.response.forced.response import forced_problem, forced_response
-from stickslip.study.build import Case, case_of
-from stickslip.study.collect import CaseResult, collect
-from stickslip.study.journal import Journal
-from stickslip.study.schema import read_study
-from stickslip.study.verify import Check, chosen, peak_and_flanks, refined, verify
+from stickslip.response.forced.response import forced_response
+from stickslip.study.analyses import forced_response as analysis
+from stickslip.study.analyses.forced.in_time import Check, chosen, refined
+from stickslip.study.analyses.forced.points import Response, collect
+from stickslip.study.analyses.forced.question import Question
+from stickslip.study.analyses.forced_response import FORCED_RESPONSE
+from stickslip.study.keep.journal import JobJournal
+from stickslip.study.models.study import read_study
 
 CHECK = Check(
-    load_case=1,
-    ratio=20.0,
     frequency_hz=180.0,
     balance=1.02e-3,
     transient=1.0e-3,
@@ -27,84 +27,65 @@ CHECK = Check(
 
 
 @pytest.fixture(scope="module")
-def stuck(tmp_path_factory: pytest.TempPathFactory) -> tuple[Case, CaseResult]:
-    path = write_small_study(tmp_path_factory.mktemp("verify"))
-    case = case_of(read_study(path), None, lambda _: None)
-    load = case.load(case.ratios[0])
-    points = list(forced_response(case.system, load, case.sweep))
-    problem = forced_problem(case.system, load, case.sweep)
-    excitation = case.centrifugal / case.ratios[0]
-    return case, collect(
-        problem, points, ratio=case.ratios[0], excitation=excitation, report_output=0
-    )
+def stuck(tmp_path_factory: pytest.TempPathFactory) -> tuple[Question, Response]:
+    (case,) = read_study(write_two_blades(tmp_path_factory.mktemp("verify"))).cases()
+    asked = FORCED_RESPONSE.inputs(case, case.build())
+    points = list(forced_response(asked.model.system, asked.model.load, asked.sweep))
+    return replace(asked, label=""), collect(asked.problem, points, 0)
 
 
-def like(result: CaseResult, ratio: float, *, slips: bool, excitation: float) -> CaseResult:
-    """Return a result that stands for another load case."""
-    assert result.signals is not None
-    state = np.full_like(result.signals.state, int(slips))
-    signals = replace(result.signals, state=state)
-    return replace(result, ratio=ratio, excitation=excitation, signals=signals)
-
-
-def test_one_load_case_gives_its_peak_and_both_flanks(stuck: tuple[Case, CaseResult]) -> None:
-    _, result = stuck
-    points = [a.point.omega for _, a in chosen([result])]
-    assert points == sorted(a.point.omega for _, a in peak_and_flanks(result))
+def test_one_case_alone_gives_its_peak_and_both_flanks(stuck: tuple[Question, Response]) -> None:
+    asked, response = stuck
+    points = [a.point.omega for a in chosen(asked, response)]
+    assert response.top is not None
+    assert points == sorted(a.point.omega for a in (response.top, *response.flanks))
     assert len(points) == 3
-    assert points[1] == result.accepted[result.peak].point.omega
+    assert points[1] == response.top.point.omega
 
 
-def test_three_load_cases_are_first_slip_optimum_and_most_nonlinear(
-    stuck: tuple[Case, CaseResult],
-) -> None:
-    _, result = stuck
-    # the same amplitude throughout: the largest excitation is the optimum
-    results = [
-        like(result, 100.0, slips=False, excitation=1.0),
-        like(result, 50.0, slips=True, excitation=2.0),
-        like(result, 20.0, slips=True, excitation=9.0),
-        like(result, 10.0, slips=True, excitation=3.0),
-        like(result, 5.0, slips=True, excitation=4.0),
-    ]
-    found = chosen(results)
-    assert [i for i, _ in found] == [1, 2, 4]
-    assert all(a is results[i].accepted[results[i].peak] for i, a in found)
+def test_each_of_several_cases_gives_its_peak(stuck: tuple[Question, Response]) -> None:
+    asked, response = stuck
+    assert chosen(replace(asked, label="load.shaker.ratio = 20"), response) == [response.top]
 
 
-def test_a_run_without_a_peak_has_nothing_to_check(stuck: tuple[Case, CaseResult]) -> None:
-    assert chosen([replace(stuck[1], peak=-1)]) == []
+def test_a_run_without_a_peak_has_nothing_to_check(stuck: tuple[Question, Response]) -> None:
+    asked, response = stuck
+    assert chosen(asked, replace(response, peak=-1)) == []
 
 
 def test_stuck_contacts_agree_and_nothing_is_integrated_twice(
-    stuck: tuple[Case, CaseResult], tmp_path: Path
+    stuck: tuple[Question, Response],
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
-    case, result = stuck
-    lines: list[str] = []
-    with Journal(tmp_path / "journal.sqlite", "any", type(result.solved[0])) as journal:
-        checks = verify(case, [result], journal, lines.append)
+    asked, response = stuck
+    asked = replace(asked, checks=frozenset({"verify"}))
+
+    def solve(journal: JobJournal, points: Sequence[object]) -> dict[str, object]:
+        assert list(FORCED_RESPONSE.solve(asked, points, journal)) == []
+        return journal.get("verify") or {}
+
+    with JobJournal(Path(":memory:"), FORCED_RESPONSE.record) as journal, caplog.at_level("INFO"):
+        journal.put("finished", {"points": len(response.solved)})
+        found = solve(journal, response.solved)
         # a model that cannot be integrated: the second time everything comes from the journal
-        again = verify(
-            replace(case, ratios=()), [replace(result, ratio=0.0)], journal, lines.append
-        )
-    assert [c.sentence for c in again] == [c.sentence for c in checks]
-    for check in checks:
-        # a linear motion: exact but for the start from few harmonics, tolerance of settling 1e-5
-        assert abs(check.difference_percent) < 1e-2
-        assert check.settled
-        assert check.refined_order == 0
-    assert len(lines) == 6
-    assert "periodic after" in lines[0]
+        monkeypatch.setattr(analysis, "check_in_time", None)
+        again = solve(journal, response.solved)
+    assert list(again["verify_sentence"]) == list(found["verify_sentence"])
+    # a linear motion: exact but for the start from few harmonics, tolerance of settling 1e-5
+    assert max(abs(found["verify_difference_percent"])) < 1e-2
+    assert all(found["verify_settled"])
+    assert caplog.text.count("periodic after") == 6
 
 
-def test_more_harmonics_leave_a_linear_response_as_it_is(stuck: tuple[Case, CaseResult]) -> None:
-    case, result = stuck
-    accepted = result.accepted[result.peak]
-    many = refined(case, result.ratio, accepted.point, 9)
+def test_more_harmonics_leave_a_linear_response_as_it_is(stuck: tuple[Question, Response]) -> None:
+    asked, response = stuck
+    assert response.top is not None
+    many = refined(asked, response.top.point, 9)
     assert many is not None
     assert many.order == 9
-    problem = forced_problem(case.system, case.load(result.ratio), case.sweep)
-    assert problem.amplitude(many) == pytest.approx(problem.amplitude(accepted.point), rel=1e-8)
+    before = asked.problem.amplitude(response.top.point)
+    assert asked.problem.amplitude(many) == pytest.approx(before, rel=1e-8)
 
 
 def test_sentence_tells_what_happened() -> None:
