@@ -240,11 +240,13 @@ def _print_table(found: "TextTable") -> None:
     if not found.rows:
         _print_lines(found.title, found.lines)
         return
-    table = Table(title=found.title, title_justify="left")
-    for name in found.head:
+    _say(f"\n{found.title}")
+    table = Table()
+    told = [k for k in range(len(found.head)) if any(row[k] for row in found.rows)]
+    for name in (found.head[k] for k in told):
         table.add_column(name, justify="right")
     for cells in found.rows:
-        table.add_row(*cells)
+        table.add_row(*(cells[k] for k in told))
     _console().print(table)
     for line in found.lines:
         _say(f"  {line}")

@@ -130,7 +130,9 @@ class Study:
         mark = sha256("\n".join(said).encode()).hexdigest()[:8]
         named = {"output.folder": f"{self.content.tables.output.folder}-{mark}"}
         changed = self.content.replace({**named, **values})
-        text = "\n".join([self.content.text, "# replaced in Python", *(f"# {line}" for line in said), ""])
+        text = "\n".join(
+            [self.content.text, "# replaced in Python", *(f"# {line}" for line in said), ""]
+        )
         return Study(replace(changed, file=replace(changed.file, text=text)))
 
     def model(self, case: int = 0) -> Model:
