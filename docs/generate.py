@@ -2,6 +2,8 @@
 
 import ast
 import json
+import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,15 @@ from sector_drawing import draw_sector
 
 import stickslip
 
+PARTS_OF_THE_PAGE = {
+    "general": ("", "material", "damping", "reduction"),
+    "parts": ("part",),
+    "contacts": ("contact", "join"),
+    "loads": ("load", "rotation"),
+    "output": ("output",),
+    "analyses": ("forced_response", "modes", "campbell", "safe"),
+    "settings": ("harmonics", "solver", "retention", "limits"),
+}
 RESULTS = Path(__file__).parent.parent / "evidence" / "validation" / "out" / "results.json"
 PACKAGES = [
     "stickslip",
@@ -26,8 +37,11 @@ PACKAGES = [
 def write_all(folder: Path) -> None:
     """Write every generated page part into `folder`."""
     folder.mkdir(exist_ok=True)
-    (folder / "study_file.md").write_text(study_file(), encoding="utf-8")
-    (folder / "structure_study.md").write_text(structure_study(), encoding="utf-8")
+    for name, tables in keys().items():
+        (folder / f"keys_{name}.md").write_text(tables, encoding="utf-8")
+    (folder / "keys_laws.md").write_text(laws(), encoding="utf-8")
+    (folder / "variables.md").write_text(variables(), encoding="utf-8")
+    (folder / "variables_of_models.md").write_text(variables_of_models(), encoding="utf-8")
     (folder / "validation.md").write_text(validation(), encoding="utf-8")
     (folder / "api.md").write_text(api(), encoding="utf-8")
     for name, table in alert_tables().items():
@@ -35,48 +49,168 @@ def write_all(folder: Path) -> None:
     draw_sector(folder / "sector.svg")
 
 
-def study_file() -> str:
-    """Return one table of keys for each table of the study file."""
-    from stickslip.study.schema import json_schema
+def keys() -> dict[str, str]:
+    """Return one table of keys for each table of the study file, by the parts of the page that include them."""
+    from stickslip.study.file.parts import PartTable
+    from stickslip.study.file.tables import json_schema
 
     schema = json.loads(json_schema())
-    return "\n".join(_section("", schema, schema.get("$defs", {})))
+    return {
+        name: "\n".join(Keys(schema, tuple(PartTable.model_fields)).of(tables))
+        for name, tables in PARTS_OF_THE_PAGE.items()
+    }
 
 
-def structure_study() -> str:
-    """Return one table of keys for each table of a study of a bladed disk."""
-    from stickslip.study.structure_study import structure_schema
+@dataclass(frozen=True)
+class Keys:
+    """Tables of keys from the JSON Schema of study files.
 
-    schema = json.loads(structure_schema())
-    return "\n".join(_section("", schema, schema.get("$defs", {})))
+    Parameters
+    ----------
+    schema
+        Of the whole file.
+    common
+        Keys of every part that vibrates, told once.
+    """
+
+    schema: dict[str, Any]
+    common: tuple[str, ...]
+
+    def of(self, tables: tuple[str, ...]) -> list[str]:
+        """Return the tables of keys of some tables of the file; the empty name is the top."""
+        lines: list[str] = []
+        for name in tables:
+            if not name:
+                lines += self._table("At the top", self.schema, flat=True)
+                continue
+            entry = self.schema["properties"][name]
+            every = entry.get("additionalProperties")
+            lines += self._below(name if every is None else f"{name}.NAME", every or entry)
+        return lines
+
+    def _below(self, path: str, entry: dict[str, Any]) -> list[str]:
+        """Return the table at `path`; one for each kind where it may be one of several."""
+        if path != "part.NAME":
+            return self._table(f"`[{path}]`", self._resolved(entry), path=path)
+        lines: list[str] = []
+        for option in entry["oneOf"]:
+            node = self._resolved(option)
+            shape = node["properties"].get("shape", {}).get("const")
+            mark = f'shape = "{shape}"' if shape else f'{next(iter(node["required"]))} = "..."'
+            lines += self._table(f"`[{path}]` with `{mark}`", node, path=path, without=self.common)
+        return lines
+
+    def _table(
+        self,
+        title: str,
+        node: dict[str, Any],
+        *,
+        path: str = "",
+        without: tuple[str, ...] = (),
+        flat: bool = False,
+    ) -> list[str]:
+        rows, below = [], []
+        laws = "law" in node["properties"]  # their keys have tables of their own
+        for key, entry in node["properties"].items():
+            if key in (*without, "shape") or (laws and key in self._of_laws()):
+                continue
+            inner, every = self._resolved(entry), entry.get("additionalProperties")
+            nested = inner if "properties" in inner else None
+            if flat and (nested is not None or every is not None or _is_table(entry)):
+                continue
+            if isinstance(every, dict) and not flat:
+                below += self._table(
+                    f"`[{path}.{key}.NAME]`", self._resolved(every), path=f"{path}.{key}.NAME"
+                )
+            if nested is not None and not (path == "part.NAME" and key in self.common):
+                below += self._table(f"`[{path}.{key}]`", nested, path=f"{path}.{key}")
+                continue
+            rows.append(
+                f"| `{key}` | {_escaped(entry.get('description', ''))} | {_default(key, node)} |"
+            )
+        if not rows:
+            return below
+        # the dataclass speaks of SI; keys have their units at their ends
+        text = "" if flat else re.sub(r"; (lengths in )?metres.*", ".", node["description"])
+        return [
+            f"### {title}", "", text, "",
+            "| key | meaning | default |", "|---|---|---|", *rows, "", *below,
+        ]  # fmt: skip
+
+    def _of_laws(self) -> set[str]:
+        from stickslip.contact.laws import LAWS
+        from stickslip.study.file.contacts import keys_of
+
+        each = (keys_of(law, per_area=area) for law in LAWS for area in (False, True))
+        return {key for found in each for key in found if not key.startswith("preload")}
+
+    def _resolved(self, entry: dict[str, Any]) -> dict[str, Any]:
+        parts = [
+            *entry.get("allOf", []),
+            *entry.get("anyOf", []),
+        ]  # a table that may be left out is one of two
+        reference = entry.get("$ref") or next((p["$ref"] for p in parts if "$ref" in p), None)
+        return self.schema["$defs"][reference.rsplit("/", 1)[1]] if reference else entry
 
 
-def _section(path: str, node: dict[str, Any], definitions: dict[str, Any]) -> list[str]:
-    rows, below = [], []
-    for key, entry in node.get("properties", {}).items():
-        inner = _resolved(entry, definitions)
-        if "properties" in inner:
-            below += _section(f"{path}.{key}" if path else key, inner, definitions)
-            continue
-        default = "" if "default" not in entry else f"`{json.dumps(entry['default'])}`"
-        default = "(left out)" if default == "`null`" else default
-        rows.append(
-            f"| `{key}` | {_escaped(entry.get('description', ''))} | {default or '(required)'} |"
-        )
-    if not rows:
-        return below
-    title = f"## `[{path}]`" if path else "## At the top"
-    text = node.get("description", "") if path else ""
-    return [title, "", text, "", "| key | meaning | default |", "|---|---|---|", *rows, "", *below]
+def _is_table(entry: dict[str, Any]) -> bool:
+    return entry.get("description", "").startswith("the table")
 
 
-def _resolved(entry: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
-    parts = [
-        *entry.get("allOf", []),
-        *entry.get("anyOf", []),
-    ]  # a table that may be left out is one of two
-    reference = entry.get("$ref") or next((p["$ref"] for p in parts if "$ref" in p), None)
-    return definitions[reference.rsplit("/", 1)[1]] if reference else entry
+def _default(key: str, node: dict[str, Any]) -> str:
+    if key in node.get("required", ()):
+        return "(required)"
+    value = node["properties"][key].get("default")
+    if value is None or value in ("", []):
+        return "(left out)"
+    return f"`{value:g}`" if isinstance(value, float) else f"`{json.dumps(value)}`"
+
+
+def laws() -> str:
+    """Return one table of keys for each contact law, from the fields of its dataclass."""
+    from stickslip.contact.laws import LAWS
+    from stickslip.study.file.quantities import columns_of
+
+    lines: list[str] = []
+    for name, law in LAWS.items():
+        whole, area = (columns_of(law, per_area=flag) for flag in (False, True))
+        rows = []
+        for (key, (_, column)), of_area in zip(whole.items(), area, strict=True):
+            default = "(required)" if column.is_required() else f"`{json.dumps(column.default)}`"
+            default = "(left out)" if default == "`null`" else default
+            also = "" if of_area == key else f"`{of_area}`"
+            rows.append(f"| `{key}` | {also} | {_escaped(column.description)} | {default} |")
+        lines += [
+            f"### `law = \"{name}\"`", "", (law.__doc__ or "").partition("\n")[0], "",
+            "| key | with `per = \"area\"` | meaning | default |", "|---|---|---|---|", *rows, "",
+        ]  # fmt: skip
+    return "\n".join(lines)
+
+
+def variables() -> str:
+    """Return the variables of a forced response, as the code that writes them lists them."""
+    from stickslip.study.analyses.forced.quantities import QUANTITIES
+
+    rows = [
+        f"| `{name}` | {', '.join(q.dims)} | {_escaped(q.about)} | {_unit(q.units)} |"
+        for name, q in QUANTITIES.items()
+    ]
+    return "\n".join(["| variable | dimensions | meaning | unit |", "|---|---|---|---|", *rows, ""])
+
+
+def variables_of_models() -> str:
+    """Return what the linear analyses say of the model."""
+    from stickslip.study.analyses.waves.about import NUMBERS
+
+    rows = [
+        f"| `{name}` | {', '.join(['case', *dims.split()])} | {_escaped(about)} | {_unit(units)} |"
+        for name, (dims, units, about) in NUMBERS.items()
+    ]
+    return "\n".join(["| variable | dimensions | meaning | unit |", "|---|---|---|---|", *rows, ""])
+
+
+def _unit(units: str) -> str:
+    return {"1": "–", "percent": "%"}.get(units, units)
 
 
 def _escaped(text: str) -> str:
