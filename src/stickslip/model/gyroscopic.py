@@ -13,6 +13,7 @@ from stickslip.errors import input_error
 from stickslip.model.fe.factorisation import DENSE, factorise
 from stickslip.model.modes import connected_parts, lowest_modes, normal_modes
 from stickslip.model.structure import Structure
+from stickslip.units import HZ
 
 SPARE = 10  # modes beyond twice as many as are asked for
 SHIFT = 1e-8  # share of the mean of K/M: the factorised matrix is regular where a body is free
@@ -78,9 +79,7 @@ def gyroscopic_modes(
         squares, shapes = _enriched(structure, G, n_basis)
     rates, amplitudes = _eigenpairs(squares, shapes.conj().T @ (G @ shapes))
     first = np.lexsort((-rates.real, _without_rounding(rates)))[:n_modes]
-    return GyroscopicModes(
-        rates.imag[first] / (2 * np.pi), shapes @ amplitudes[:, first], rates.real[first]
-    )
+    return GyroscopicModes(rates.imag[first] / HZ, shapes @ amplitudes[:, first], rates.real[first])
 
 
 def _eigenpairs(squares: FloatArray, coriolis: ComplexArray) -> tuple[ComplexArray, ComplexArray]:

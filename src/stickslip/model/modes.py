@@ -24,6 +24,7 @@ from stickslip.model.fe.factorisation import (
 from stickslip.model.fe.lanczos import lanczos
 from stickslip.model.rigid.motion import refuse_unheld
 from stickslip.model.structure import Structure
+from stickslip.units import HZ
 
 RIGID = (
     1e-14  # strain energy of a mode over the sum of its terms' magnitudes: below, it is rounding
@@ -50,7 +51,7 @@ class Modes:
     @property
     def frequencies_hz(self) -> FloatArray:
         """Frequencies (n,) in Hz; negative where the square is, since the motion then diverges."""
-        return np.asarray(np.sign(self.squares) * np.sqrt(np.abs(self.squares)) / (2 * np.pi))
+        return np.asarray(np.sign(self.squares) * np.sqrt(np.abs(self.squares)) / HZ)
 
     @property
     def rigid(self) -> int:

@@ -12,6 +12,7 @@ from stickslip.errors import input_error
 from stickslip.model.gyroscopic import gyroscopic_modes
 from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
+from stickslip.units import HZ
 
 CLEAR = 0.7  # modal assurance below which a step in speed is halved
 HALVINGS = 5  # of a step: a veering narrower than a thirtieth of it counts as a crossing
@@ -89,11 +90,11 @@ class Campbell:
             if 2 * self.wave_number <= self.sectors
             else self.wave_number - self.sectors
         )
-        return np.abs(self.frequencies_hz - k * self.speeds[:, None] / (2 * np.pi))
+        return np.abs(self.frequencies_hz - k * self.speeds[:, None] / HZ)
 
     def engine_order_hz(self, engine_order: int) -> FloatArray:
         """Return the (s,) frequencies of an engine order."""
-        return engine_order * self.speeds / (2 * np.pi)
+        return engine_order * self.speeds / HZ
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,7 +295,7 @@ def _crossings_at(here: _Spectrum, engine_orders: Sequence[int]) -> list[Crossin
     return [
         Crossing(int(order), int(mode), here.speed, float(here.hertz[mode]))
         for order in engine_orders
-        for mode in np.flatnonzero(here.hertz == order * here.speed / (2 * np.pi))
+        for mode in np.flatnonzero(here.hertz == order * here.speed / HZ)
         if here.speed > 0.0
     ]
 
@@ -309,10 +310,10 @@ def _crossings(
     """Return the crossings in the interval between two speeds, its end included."""
     found = []
     for order in engine_orders:
-        low, high = (s.hertz - order * s.speed / (2 * np.pi) for s in (before, after))
+        low, high = (s.hertz - order * s.speed / HZ for s in (before, after))
         for mode in np.flatnonzero((low * high < 0) | ((high == 0.0) & (low != 0.0))):
             speed = _crossing_speed(family, before, after, order, int(mode), tolerance)
-            found.append(Crossing(int(order), int(mode), speed, order * speed / (2 * np.pi)))
+            found.append(Crossing(int(order), int(mode), speed, order * speed / HZ))
     return found
 
 

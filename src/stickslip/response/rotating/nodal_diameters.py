@@ -11,6 +11,7 @@ from stickslip.model.gyroscopic import gyroscopic_modes
 from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave
+from stickslip.units import HZ
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +64,7 @@ class NodalDiameterMap:
         speed
             Of the rotor, in rad/s; the one that the sector was computed at.
         """
-        turning = self.nodal_diameters[:, None] * speed / (2 * np.pi)
+        turning = self.nodal_diameters[:, None] * speed / HZ
         return np.abs(self.frequencies_hz - turning), np.abs(self.forward_hz + turning)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.response.rotating.nodal_diameters import NodalDiameterMap
+from stickslip.units import HZ
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,7 @@ class Safe:
         corners = half * np.arange(math.ceil(last / half))
         orders = np.union1d(np.arange(last + 1), corners)
         wave = orders % self.frequencies.sectors
-        return np.minimum(wave, self.frequencies.sectors - wave), orders * speed / (2 * np.pi)
+        return np.minimum(wave, self.frequencies.sectors - wave), orders * speed / HZ
 
 
 def safe(
