@@ -71,7 +71,7 @@ friction_coefficient = 0.3
 preload_n = 300.0
 [load.gas]
 on = "blade.tip"
-force_n = 5.0
+force_n = 2.0
 direction = "y"
 engine_order = 2
 [rotation]
