@@ -1,5 +1,6 @@
 """A forced response as figures and tables see it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
@@ -14,6 +15,7 @@ from stickslip.harmonic.support import named
 from stickslip.report.cases import Case, cases_of, varied
 from stickslip.report.node import Node
 from stickslip.report.quantities import Scale, number, predicted, scale_for
+from stickslip.report.tables import html_table
 
 NEEDED = ("point_case", "frequency_hz", "order", "status", "amplitude", "harmonic_kept")
 _TURNS = (".rx", ".ry", ".rz")
@@ -208,6 +210,14 @@ class Response(Node):
     def scale(self) -> Scale:
         """Engineering unit of the accepted responses."""
         return scale_for(self.accepted, self.unit)
+
+    def table(
+        self, head: Sequence[str], rows: Sequence[Sequence[str]], *, numeric: bool = True
+    ) -> str:
+        """Return a table whose first column names the case; without it where there is one case."""
+        first = 0 if len(self.cases) > 1 or self.cases[0].label else 1
+        cells = [list(row)[first:] for row in rows]
+        return html_table([self.varied, *head][first:], cells, numeric=numeric)
 
     def points(self, case: Case) -> IntArray:
         """Points of a case in the order in which a curve joins them, the unconverged ones included.

@@ -39,6 +39,7 @@ th { text-align: left; font-weight: 600; border-bottom: 2px solid var(--ink); pa
   vertical-align: bottom; }
 td { border-bottom: 1px solid var(--rule); padding: 5px 16px 5px 0; vertical-align: top; }
 .numeric th:not(:first-child), .numeric td:not(:first-child) { text-align: right; padding: 5px 0 5px 22px; }
+.numeric td { white-space: nowrap; }
 pre { background: var(--soft); border: 1px solid var(--rule); padding: 14px; font-size: 13px; line-height: 1.45;
   overflow-x: auto; }
 details { margin: 14px 0; }

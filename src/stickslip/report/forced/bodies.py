@@ -156,7 +156,11 @@ def _energy_caption(response: Response, case: Case) -> str:
     text = f"At the peak {quantity(total, 'J')} are lost in a cycle, {percent(100 * float(energy[most]) / total)} of it at {names[most]}"
     shares = {g: 100 * float(np.nansum(energy[at])) / total for g, at in response.groups.items()}
     largest = max(shares, key=lambda g: shares[g])
-    return text + (f"; {largest} takes {percent(shares[largest])}." if len(shares) > 1 else ".")
+    return text + (
+        f"; {largest} takes {percent(shares[largest])}."
+        if len(response.groups[largest]) > 1 and len(shares) > 1
+        else "."
+    )
 
 
 def _energy_traces(

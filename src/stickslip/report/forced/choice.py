@@ -10,7 +10,6 @@ from stickslip.report.cases import Case
 from stickslip.report.forced.contact import states
 from stickslip.report.quantities import number
 from stickslip.report.response import Response
-from stickslip.report.tables import html_table
 from stickslip.study.analyses.forced.summary import cost_sentence
 
 _NAMED = 4  # sets of harmonics that a cell names
@@ -78,7 +77,7 @@ def choice(response: Response) -> str | None:
         middle = (f"{response.more_name} asked for", "largest predicted error")
         alert, text = _alert_row, _alert_text
     rows = [[c.short, *alert(response, c), _why(response, c)] for c in response.cases]
-    found = text(response) + html_table([response.varied, *middle, "why"], rows, numeric=False)
+    found = text(response) + response.table([*middle, "why"], rows, numeric=False)
     if response.has("unknowns_solved", "retained_displacement"):
         found += f"<p>{cost_sentence(response.data)}</p>"
     said = escape(response.text("alert_explanation"))

@@ -35,19 +35,23 @@ def case_buttons(heading: str, cases: tuple[Case, ...], chosen: int) -> str | No
 
 
 def contact_lines(response: Response) -> list[list[int]]:
-    """Group contact points by the part of their name before the last dot, within each contact: one row of panels a line."""
-    names, rows = response.labels("contact"), []
-    for members in response.groups.values():
-        lines: dict[str, list[int]] = {}
+    """Group contact points by the part of their name before the last dot, within each contact: rows of panels."""
+    names = response.labels("contact")
+    lines: dict[tuple[str, str], list[int]] = {}
+    for group, members in response.groups.items():
         for index in members:
-            lines.setdefault(names[index].rpartition(".")[0], []).append(index)
-        rows += [
-            row[k : k + _MOST_ROW] for row in lines.values() for k in range(0, len(row), _MOST_ROW)
-        ]
-    if all(len(row) == 1 for row in rows):
-        every = [row[0] for row in rows]
-        rows = [every[k : k + 3] for k in range(0, len(every), 3)]
-    return rows
+            lines.setdefault((group, names[index].rpartition(".")[0]), []).append(index)
+    rows = list(lines.values())
+    return rows if any(len(row) > 1 for row in rows) else [[row[0] for row in rows]]
+
+
+def _wrapped(rows: list[list[int]]) -> list[list[int]]:
+    """Break long rows into parts of about equal length."""
+    found = []
+    for row in rows:
+        width = -(-len(row) // max(1, -(-len(row) // _MOST_ROW)))
+        found += [row[k : k + width] for k in range(0, len(row), width)]
+    return found
 
 
 def states(response: Response, case: Case) -> IntArray:
@@ -119,23 +123,24 @@ def _loop_caption(response: Response, case: Case, direction: int) -> str:
 
 
 def _panels(response: Response, cases: tuple[Case, ...], direction: int) -> list[list[int]]:
-    """Return the contact points drawn, by row: all, or where they are many those that lose most energy in any case."""
-    rows = contact_lines(response)
-    if sum(map(len, rows)) <= _MOST_LOOPS:
-        return rows
-    area = np.max([_area(response, c, direction) for c in cases], axis=0)
-    most = sorted(np.argsort(-area, kind="stable")[:_MOST_LOOPS].tolist())
-    return [most[k : k + _MOST_ROW] for k in range(0, len(most), _MOST_ROW)]
+    """Return the contact points drawn, by row: those with a force, where they are many those that lose most in any case."""
+    spans = [np.ptp(period(response, c, "peak_force")[:, direction], axis=-1) for c in cases]
+    acting = np.flatnonzero(np.any(np.nan_to_num(spans) > 0, axis=0)).tolist()
+    if len(acting) > _MOST_LOOPS:
+        area = np.max([_area(response, c, direction) for c in cases], axis=0)
+        acting = sorted(acting, key=lambda k: -area[k])[:_MOST_LOOPS]
+        return _wrapped([sorted(acting)])
+    rows = [[k for k in row if k in acting] for row in contact_lines(response)]
+    return _wrapped([row for row in rows if row])
 
 
 def _hysteresis(response: Response, direction: str) -> Plot | None:
     """Loops of contact points at the peak in one tangential direction (Gastaldi and Berruti 2017, fig. 5 and 11)."""
     column = {"t": 0, "w": 1}[direction]
     cases = _drawn(response, "peak_gap", "peak_force")
-    moving = [np.ptp(period(response, c, "peak_force")[:, column], axis=-1) for c in cases]
-    if not np.any(np.nan_to_num(moving) > 0):
+    names, rows = response.labels("contact"), _panels(response, cases, column) if cases else []
+    if not rows:
         return None
-    names, rows = response.labels("contact"), _panels(response, cases, column)
     width = max(len(r) for r in rows)
     titles = [names[r[k]] if k < len(r) else "" for r in rows for k in range(width)]
     figure = make_subplots(
@@ -168,7 +173,7 @@ def _hysteresis(response: Response, direction: str) -> Plot | None:
         "point; axes differ between panels. The area of a loop is the energy lost in a cycle."
     )
     if drawn < len(names):
-        caption += f" The {drawn} of {len(names)} points that lose most are drawn."
+        caption += f" {drawn} of {len(names)} points are drawn: those that carry a force along {direction} and lose most."
     captions = {c.index: _loop_caption(response, c, column) for c in cases}
     title = f"Hysteresis loops at the peak, direction {direction}"
     return Plot(f"loops_{direction}", title, caption, figure, captions, response.chosen)
@@ -200,20 +205,33 @@ def _state_caption(response: Response, case: Case) -> str:
     return text
 
 
+def _state_rows(response: Response, cases: tuple[Case, ...]) -> tuple[list[int], list[str]]:
+    """Return the rows of (contact, tangent) that are drawn and their names: one for a point that has no tangential motion."""
+    names, tangents = response.labels("contact"), response.labels("tangent")
+    n, rows, labels = len(tangents), [], []
+    moves = np.ones((len(names), n), dtype=bool)
+    if response.has("peak_gap"):
+        spans = [np.ptp(period(response, c, "peak_gap")[:, :n], axis=-1) for c in cases]
+        moves = np.any(np.nan_to_num(spans) > 0, axis=0)
+    for k, name in enumerate(names):
+        acting = np.flatnonzero(moves[k]) if moves[k].any() else [0]
+        rows += [k * n + int(t) for t in acting]
+        labels += [f"{name} {tangents[t]} " if moves[k].any() else f"{name} " for t in acting]
+    return rows, labels
+
+
 def state_map(response: Response) -> Plot | None:
     """Stick, slip and open over one period for every contact point."""
     cases = _drawn(response, "peak_state")
     if not cases:
         return None
-    rows = [
-        f"{name} {t} " for name in response.labels("contact") for t in response.labels("tangent")
-    ]
+    rows, labels = _state_rows(response, cases)
     figure = go.Figure()
     for case in cases:
         state = states(response, case)
-        values = state.reshape(-1, state.shape[-1])
+        values = state.reshape(-1, state.shape[-1])[rows]
         figure.add_heatmap(
-            x=(np.arange(values.shape[1]) + 0.5) / values.shape[1], y=rows, z=values.astype(np.int8),
+            x=(np.arange(values.shape[1]) + 0.5) / values.shape[1], y=labels, z=values.astype(np.int8),
             zmin=-0.5, zmax=2.5, colorscale=_STATE_SCALE, showscale=False, ygap=2 if len(rows) <= _MOST_STATES else 0,
             meta=case.index, customdata=np.array(STATE_NAMES, dtype=object)[values],
             hovertemplate="%{y}: %{customdata} at %{x:.3f} T<extra></extra>",
@@ -225,11 +243,5 @@ def state_map(response: Response) -> Plot | None:
     figure.update_yaxes(autorange="reversed", showgrid=False, ticks="", tickfont={"size": 12})
     caption = "Each row is a contact point in one tangential direction; read from left to right through one cycle."
     captions = {c.index: _state_caption(response, c) for c in cases}
-    return Plot(
-        "states",
-        "Contact states over one period at the peak",
-        caption,
-        figure,
-        captions,
-        response.chosen,
-    )
+    title = "Contact states over one period at the peak"
+    return Plot("states", title, caption, figure, captions, response.chosen)

@@ -7,14 +7,13 @@ import numpy as np
 from stickslip.harmonic.support import named
 from stickslip.report.quantities import NONE, fixed, number, percent, predicted, quantity, scale_for
 from stickslip.report.response import Response
-from stickslip.report.tables import html_table
 
 
 def peaks(response: Response) -> str:
     """One row a case: peak, points, work."""
     scale = scale_for(np.array([response.peak_response(c) for c in response.cases]), response.unit)
     head = [
-        response.varied, "excitation", "peak", f"peak / force ({scale.unit})", "at (Hz)", "points", f"with H = {response.low_name}",
+        "excitation", "peak", f"peak / force ({scale.unit})", "at (Hz)", "points", f"with H = {response.low_name}",
         f"with {response.more_name}", "failed", "Newton steps", "unknowns solved", "contact (s)", "linear (s)", "rest (s)",
     ]  # fmt: skip
     counts = (
@@ -36,7 +35,7 @@ def peaks(response: Response) -> str:
             + [fixed(response.number_of(name, case), 0) for name in counts]
             + [fixed(response.number_of(name, case), 2) for name in clocks]
         )  # fmt: skip
-    return _work_sentence(response) + html_table(head, rows)
+    return _work_sentence(response) + response.table(head, rows)
 
 
 def _work_sentence(response: Response) -> str:
@@ -72,12 +71,12 @@ def attempts(response: Response) -> str | None:
                 [one.short, own, str(int(at.sum())), str(int((at & ~good).sum()))]
                 + [fixed(total, digits) for total, digits in zip(sums, (0, 0, 2), strict=True)]
             )
-    head = [response.varied, "H", "solved", "not converged", "Newton steps", "unknowns", "time (s)"]
+    head = ["H", "solved", "not converged", "Newton steps", "unknowns", "time (s)"]
     text = (
         "<h3>Everything that was solved</h3><p>By case and harmonics, those solutions included in whose place others were "
         "accepted. The unknowns of all solutions together compare the work of strategies, whatever the machine.</p>"
     )
-    return text + html_table(head, rows)
+    return text + response.table(head, rows)
 
 
 def _sentences(response: Response, name: str) -> str:
@@ -97,12 +96,12 @@ def more_harmonics(response: Response) -> str | None:
     for case in response.cases:
         worst, hz, above = (response.number_of(name, case) for name in names)
         rows.append([case.short, predicted(worst), fixed(hz, 2), fixed(above, 0)])
-    head = [response.varied, "largest predicted change", "at (Hz)", "points above the threshold"]
+    head = ["largest predicted change", "at (Hz)", "points above the threshold"]
     text = (
         f"<h3>More harmonics</h3><p>What twice as many harmonics as {response.high_name} are predicted to change at the accepted "
         "points: the change of the complex amplitude, phase included, over its size.</p>"
     )
-    return text + html_table(head, rows) + _sentences(response, "reference_sentence")
+    return text + response.table(head, rows) + _sentences(response, "reference_sentence")
 
 
 def time_integration(response: Response) -> str | None:
@@ -130,7 +129,6 @@ def time_integration(response: Response) -> str | None:
     finite = np.abs(columns[-1][np.isfinite(columns[-1])])
     worst = percent(float(finite.max())) if finite.size else NONE
     head = [
-        response.varied,
         "frequency (Hz)",
         "by time integration",
         "by harmonic balance",
@@ -142,7 +140,7 @@ def time_integration(response: Response) -> str | None:
         f"<h3>Time integration</h3><p>First-harmonic amplitude of {response.output_name}: the two independent ways differ by at most "
         f"{worst}.</p>"
     )
-    return text + html_table(head, rows) + _sentences(response, "verify_sentence")
+    return text + response.table(head, rows) + _sentences(response, "verify_sentence")
 
 
 def retention(response: Response) -> str | None:
@@ -169,6 +167,4 @@ def retention(response: Response) -> str | None:
         "<h3>Retention</h3><p>With a retention stiffness ten times smaller the peak changes most"
         f"{worst.where}: by {percent(100 * float(shift[worst.index]))}.</p>"
     )
-    return text + html_table(
-        [response.varied, "change of the peak", "change of its frequency (Hz)"], rows
-    )
+    return text + response.table(["change of the peak", "change of its frequency (Hz)"], rows)

@@ -178,7 +178,7 @@ def _cards(view: Waves) -> list[Card]:
     return [Card(str(view.data.sizes.get("crossing", 0)), "crossings with engine orders", note)]
 
 
-SECTION = Section(
+SECTION: Section = Section(
     "campbell",
     (*NEEDED, "speed_rpm"),
     Waves,

@@ -11,7 +11,7 @@ from stickslip.report.forced.head import cards, warnings
 from stickslip.report.response import NEEDED, Response
 from stickslip.report.section import Block, Section
 
-SECTION = Section(
+SECTION: Section = Section(
     "forced_response",
     NEEDED,
     Response,

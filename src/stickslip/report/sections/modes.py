@@ -109,7 +109,7 @@ def _cards(view: Waves) -> list[Card]:
     return found
 
 
-SECTION = Section(
+SECTION: Section = Section(
     "modes",
     NEEDED,
     Waves,

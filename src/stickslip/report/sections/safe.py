@@ -170,7 +170,7 @@ def _cards(view: Waves) -> list[Card]:
     ]
 
 
-SECTION = Section(
+SECTION: Section = Section(
     "safe",
     (*NEEDED, "pair_margin"),
     Waves,
