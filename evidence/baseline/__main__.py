@@ -1,6 +1,6 @@
 """Compare with the baseline: ``python -m evidence.baseline [two_blades=FOLDER] [shrouded_sector=FOLDER]``.
 
-Folders are those of results; without any, today's examples are run. ``--store`` makes the folders the baseline.
+Folders are those of results; without any, the studies are run. ``--store`` makes the folders the baseline.
 """
 
 import argparse
@@ -8,12 +8,16 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import stickslip as ss
 from evidence.baseline.compare import Finding, compare_forced, compare_table, differing
 from evidence.baseline.results import read_nodes, timeless
 from evidence.baseline.stored import store, stored
 
-EXAMPLES = ("two_blades", "shrouded_sector")
-ROOT = Path(__file__).parent.parent.parent
+HERE = Path(__file__).parent
+STUDIES = {
+    "two_blades": HERE.parents[1] / "examples" / "two_blades" / "study.toml",
+    "shrouded_sector": HERE / "shrouded_sector.toml",
+}
 
 
 def main() -> int:
@@ -29,16 +33,13 @@ def main() -> int:
         return 0
     if folders:
         return max(judge(name, Path(folder)) for name, folder in folders.items())
-    return max([run_and_judge(name) for name in EXAMPLES])
+    return max([run_and_judge(name) for name in STUDIES])
 
 
 def run_and_judge(name: str) -> int:
-    """Run an example in a folder that is thrown away, and compare."""
-    import stickslip as ss
-
+    """Run a study in a folder that is thrown away, and compare."""
     with TemporaryDirectory() as folder:
-        study = ss.Study.from_file(ROOT / "examples" / name / "study.toml")
-        study.replace({"output.folder": folder}).run()
+        ss.Study.from_file(STUDIES[name]).run(folder=folder)
         return judge(name, Path(folder))
 
 
