@@ -1,4 +1,4 @@
-"""Runs that are stopped: nothing finished is computed twice, and the numbers are the same to the last bit."""
+"""Runs of a study that are stopped: nothing finished is computed twice, and the numbers are the same to the last bit."""
 
 import os
 import signal
@@ -10,39 +10,53 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from small_study import write_small_study
+from small_v2 import write_four_masses
+
+from stickslip.study.models import parts
+from stickslip.study.models.study import read_study
+from stickslip.study.runner import run_study
 
 SECONDS = 120.0
-# a damper that slips around the peak: first passage, repeats with more harmonics, and points of the peak
-SLIPPING = {"ratios": "[20]", "frequency_hz": "[172.0, 184.0]", "points": "6"}
+# two tables multiply; modes do not depend on the load's case
+SLIPPING = {
+    "vary.load.shaker.force_n": "[5.0, 8.0]",
+    "modes.number": "3",
+}
 # a user's interrupt in the first passage, a lost machine in the repeats
 STOPS = {signal.SIGINT: "  low 6:", signal.SIGKILL: "  high 15:"}
+SCRIPT = """
+import logging, sys
+from pathlib import Path
+from stickslip.study.keep.progress import Interrupted
+from stickslip.study.models.study import read_study
+from stickslip.study.runner import run_study
+if __name__ == "__main__":
+    logging.basicConfig(level=logging.INFO, format="  %(message)s", stream=sys.stdout)
+    try:
+        run_study(read_study(Path(sys.argv[1])), workers=int(sys.argv[2]))
+    except Interrupted as stopped:
+        print(stopped, file=sys.stderr)
+        sys.exit(130)
+"""
 
 
-def command(study: Path, *options: str) -> list[str]:
-    return [sys.executable, "-u", "-m", "stickslip", "run", str(study), "--no-report", *options]
-
-
-def environment() -> dict[str, str]:
-    return os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-
-
-def run(study: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        command(study, *options),
-        capture_output=True,
+def start(study: Path, workers: int) -> subprocess.Popen[str]:
+    script = study.with_name("run.py")
+    script.write_text(SCRIPT)
+    command = [sys.executable, "-u", str(script), str(study), str(workers)]
+    one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    return subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         text=True,
-        check=False,
-        timeout=SECONDS,
-        env=environment(),
+        env=os.environ | one_thread,
     )
 
 
-def stopped(study: Path, how: signal.Signals) -> tuple[int, str]:
+def stopped(study: Path, how: signal.Signals, workers: int) -> tuple[int, str]:
     """Start a run, send it a signal after some points, return its exit code and what it said on stderr."""
-    with subprocess.Popen(
-        command(study), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment()
-    ) as process:
+    with start(study, workers) as process:
         assert process.stdout is not None
         assert process.stderr is not None
         for line in process.stdout:
@@ -54,123 +68,113 @@ def stopped(study: Path, how: signal.Signals) -> tuple[int, str]:
         return process.wait(SECONDS), said
 
 
-def journalled(study: Path) -> list[tuple[int, str, bytes]]:
-    db = sqlite3.connect(study.parent / "results/journal.sqlite")
-    rows = db.execute("select id, arrived, payload from point order by id").fetchall()
-    db.close()
-    return rows
+def finished(study: Path, workers: int) -> str:
+    with start(study, workers) as process:
+        said, errors = process.communicate(timeout=SECONDS)
+    assert process.returncode == 0, errors
+    return said
+
+
+def journalled(study: Path) -> dict[str, list[tuple[int, str, bytes]]]:
+    found = {}
+    for path in sorted((study.parent / "results/jobs").glob("*.*")):
+        if path.suffix in (".part", ".job"):
+            db = sqlite3.connect(path)
+            rows = db.execute("select id, arrived, payload from record order by id").fetchall()
+            db.close()
+            found[path.stem] = rows
+    return found
+
+
+def same(found: Path, expected: Path) -> None:
+    trees = [
+        xr.load_datatree(path.parent / "results/result.nc", engine="h5netcdf")
+        for path in (found, expected)
+    ]
+    assert all(tree.attrs["complete"] == 1 for tree in trees)
+    assert list(trees[0].children) == list(trees[1].children) == ["forced_response", "modes"]
+    for name in trees[0].children:
+        for variable in trees[1][name].data_vars:
+            if "seconds" not in str(variable):
+                ours, theirs = (tree[name][variable].values for tree in trees)
+                np.testing.assert_array_equal(ours, theirs, err_msg=str(variable))
 
 
 @pytest.fixture(scope="module")
-def whole(
-    tmp_path_factory: pytest.TempPathFactory,
-) -> tuple[Path, subprocess.CompletedProcess[str]]:
-    study = write_small_study(tmp_path_factory.mktemp("whole"), **SLIPPING)
-    return study, run(study)
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    study = write_four_masses(tmp_path_factory.mktemp("whole"), SLIPPING)
+    finished(study, workers=1)
+    return study
 
 
-def test_whole_run_is_read_without_this_package(
-    whole: tuple[Path, subprocess.CompletedProcess[str]],
-) -> None:
-    study, ended = whole
-    assert ended.returncode in (0, 1), ended.stderr
-    assert ended.stderr == ""
-    reader = (
-        "import sys, numpy, xarray\n"
-        f"d = xarray.open_dataset({str(study.parent / 'results/result.nc')!r})\n"
-        "assert 'stickslip' not in sys.modules\n"
-        "assert d.attrs['complete'] == 1 and list(d['part'].values) == ['re', 'im']\n"
-        "q = d.output_displacement.sel(part='re') + 1j * d.output_displacement.sel(part='im')\n"
-        "good = d.status.values == 0\n"
-        "numpy.testing.assert_allclose(abs(q).sel(harmonic=1)[good], d.amplitude[good], rtol=1e-14)\n"
-        "assert all('units' in v.attrs and 'long_name' in v.attrs for v in d.data_vars.values())\n"
-        "assert int(d.points.sum()) == d.sizes['point'] == int((d.points_low + d.points_high).sum())\n"
-        "peak = int(d.peak_point[0])\n"
-        "assert float(d.amplitude[peak, 0]) == float(d.peak_amplitude[0]) == float(d.amplitude[:, 0].max())\n"
-        "assert d.sizes['contact'] == 9 and d.sizes['retained'] == 33 and d.sizes['harmonic'] == 6\n"
-    )
-    result = subprocess.run(
-        [sys.executable, "-c", reader], capture_output=True, text=True, check=False
-    )
-    assert result.returncode == 0, result.stderr
+def test_two_workers_find_the_same_numbers(tmp_path: Path, whole: Path) -> None:
+    study = write_four_masses(tmp_path, SLIPPING)
+    finished(study, workers=2)
+    same(study, whole)
 
 
-def test_exit_code_tells_of_points_that_did_not_converge(
-    whole: tuple[Path, subprocess.CompletedProcess[str]],
-) -> None:
-    study, ended = whole
-    with xr.open_dataset(study.parent / "results/result.nc") as data:
-        failed = int(data.points_failed.sum())
-    assert ended.returncode == (1 if failed else 0)
-
-
-def test_run_writes_mesh_and_log(whole: tuple[Path, subprocess.CompletedProcess[str]]) -> None:
-    folder = whole[0].parent / "results"
-    assert (folder / "blades.vtu").stat().st_size > 0
-    assert (folder / "blades.msh").stat().st_size > 0
-    log = (folder / "run.log").read_text()
-    assert "stuck mode 5: full" in log
-    assert "F_CL/F_HE = 20: peak" in log
-
-
-def test_table_and_alert_are_told(whole: tuple[Path, subprocess.CompletedProcess[str]]) -> None:
-    said = whole[1].stdout
-    for column in (
-        "F_CL/F_HE",
-        "peak mm",
-        "at Hz",
-        "points",
-        "H = 1",
-        "H = 5",
-        "Newton",
-        "contact s",
-        "linear s",
-        "rest s",
-    ):
-        assert column in said
-    assert "asked for more harmonics" in said
-    assert "points repeated with 5 harmonics, at" in said
-    assert str(whole[0].parent / "results/result.nc") in said
-
-
+@pytest.mark.parametrize("workers", [1, 2])
 @pytest.mark.parametrize("how", list(STOPS))
 def test_stopped_run_goes_on_to_the_same_numbers(
-    tmp_path: Path, whole: tuple[Path, subprocess.CompletedProcess[str]], how: signal.Signals
+    tmp_path: Path, whole: Path, how: signal.Signals, workers: int
 ) -> None:
-    study = write_small_study(tmp_path / how.name, **SLIPPING)
-    code, said = stopped(study, how)
+    study = write_four_masses(tmp_path / how.name, SLIPPING)
+    code, said = stopped(study, how, workers)
     if how is signal.SIGINT:
         assert code == 130
         folder = study.parent.resolve() / "results"
-        assert (
-            said
-            == f"Interrupted. What is finished is kept in {folder}. The same command goes on from there.\n"
-        )
+        told = f"Interrupted. What is finished is kept in {folder}. The same command goes on from there.\n"
+        assert said == told
     else:
-        assert code == -9
+        assert code == -9, said
     before = journalled(study)
-    assert len(before) >= (6 if how is signal.SIGINT else 30)
-    assert len(before) < len(journalled(whole[0]))
-    ended = run(study)
-    assert ended.returncode == whole[1].returncode, ended.stderr
-    assert "reduced blades taken from the earlier start" in ended.stdout
+    points = sum(map(len, before.values()))
+    assert points >= (6 if how is signal.SIGINT else 25)
+    assert points < sum(map(len, journalled(whole).values()))
+    assert "goes on after" in finished(study, workers)
     after = journalled(study)
-    assert after[: len(before)] == before, "finished points were touched"
-    assert len(after) == len(journalled(whole[0]))
-    with (
-        xr.open_dataset(whole[0].parent / "results/result.nc") as expected,
-        xr.open_dataset(study.parent / "results/result.nc") as found,
-    ):
-        for name in expected.data_vars:
-            if "seconds" not in str(name):
-                np.testing.assert_array_equal(
-                    found[name].values, expected[name].values, err_msg=str(name)
-                )
+    assert all(after[key][: len(rows)] == rows for key, rows in before.items()), (
+        "points were touched"
+    )
+    same(study, whole)
 
 
-def test_finished_run_solves_nothing_again(
-    whole: tuple[Path, subprocess.CompletedProcess[str]],
+def test_finished_run_solves_nothing_again(whole: Path) -> None:
+    before = journalled(whole)
+    finished(whole, workers=1)
+    assert journalled(whole) == before
+
+
+def test_only_what_changes_is_built_and_solved_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    before = journalled(whole[0])
-    assert run(whole[0]).returncode == whole[1].returncode
-    assert journalled(whole[0]) == before
+    """Two tables of [vary] multiply: two masses, two numbers of modes; a part is made once for each mass."""
+    made: list[object] = []
+    lumped = parts.lumped
+
+    def counted(*arguments: object, **named: object) -> object:
+        made.append(arguments)
+        return lumped(*arguments, **named)
+
+    monkeypatch.setattr(parts, "lumped", counted)
+    text = write_four_masses(tmp_path / "text").read_text()
+    text = text[: text.index("[forced_response]")] + text[text.index("[output]") :]
+    varied = (
+        "[modes]\n[[vary]]\nmodes.number = [2, 3]\n"
+        "[[vary]]\npart.chain.masses_kg = [[1.0, 1.0, 1.0, 1.0], [2.0, 1.0, 1.0, 1.0]]\n"
+    )
+    path = tmp_path / "study.toml"
+    path.write_text(text + varied)
+    tree = run_study(read_study(path)).tree
+    assert tree["modes"].sizes["case"] == 4
+    assert len(made) == 2
+    assert list(tree["modes"].vary.values) == ["modes.number", "part.chain.masses_kg"]
+    # another case: one mass is made, and its two jobs are solved
+    path.write_text(text + varied.replace("[[1.0", "[[3.0, 1.0, 1.0, 1.0], [1.0"))
+    before = journalled(path)
+    tree = run_study(read_study(path)).tree
+    assert tree["modes"].sizes["case"] == 6
+    assert len(made) == 3
+    after = journalled(path)
+    assert len(after) == 6
+    assert before.items() <= after.items()

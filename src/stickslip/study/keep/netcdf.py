@@ -84,4 +84,4 @@ def _there(found: xr.Variable | xr.DataArray, dim: Hashable) -> BoolArray:
     values = np.moveaxis(found.values, found.dims.index(dim), 0)
     kind = values.dtype.kind
     missing = np.isnan(values) if kind in "fc" else values == _MISSING[kind]
-    return np.asarray(~missing.reshape(len(values), -1).all(axis=1))
+    return np.asarray(~missing.all(axis=tuple(range(1, values.ndim))))

@@ -68,7 +68,9 @@ def about(model: Model, contacts: ContactsAs, rpm: float, highest: float) -> dic
         "dofs": facts.dofs,
         "nodes": facts.nodes,
         "elements": facts.elements,
-        "warnings": np.array([*model.warnings, *static_doubts(state)], dtype=str),
+        "warnings": np.array(
+            [*model.warnings, *static_doubts(state, contacts=bool(model.contacts))], dtype=str
+        ),
     }
     return note | _static(state)
 

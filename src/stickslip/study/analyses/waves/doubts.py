@@ -24,12 +24,13 @@ def basis_doubts(waves: Sequence[WaveBranches]) -> tuple[str, ...]:
     )
 
 
-def static_doubts(state: StaticState | None) -> tuple[str, ...]:
-    """Say where displacements under the centrifugal load are too large for linear statics."""
+def static_doubts(state: StaticState | None, *, contacts: bool = False) -> tuple[str, ...]:
+    """Say where displacements under the centrifugal load are too large for linear statics; those that `contacts` hold back count whole."""
     if state is None or not state.too_large:
         return ()
+    alone = ", without what contacts hold back," if contacts else ""
     text = (
-        f"the static displacement at {state.speed / RPM:g} rpm is too large for linear statics: up to {1e3 * state.displacement:.4g} mm "
+        f"the static displacement at {state.speed / RPM:g} rpm{alone} is too large for linear statics: up to {1e3 * state.displacement:.4g} mm "
         f"at a radius of {1e3 * state.radius:.4g} mm, strains up to {100 * state.strain:.3g} %, rotations up to "
         f"{state.rotation:.3g} rad (the limits are {100 * MOST_DISPLACEMENT:g} % of the radius, {100 * MOST_STRAIN:g} %, "
         f"{MOST_ROTATION:g} rad); frequencies at this speed are in doubt: check the speed (rpm), the material (Young's modulus in Pa, density in kg/m3) and the supports"
