@@ -192,7 +192,7 @@ def reference() -> str:
     ten = list(ss.forced_response(*case, ss.Sweep(low=10, high=10, selection="always_low", **shared)))  # fmt: skip
     exact = {p.omega: p for p in ten}
     rows = []
-    for check, point in zip(ss.response.verify_reference(problem, points), points, strict=True):
+    for check, point in zip(ss.response.check_support(problem, points), points, strict=True):
         real = 100 * problem.real_error(point, exact[point.omega])
         rows.append(
             (hertz(check.omega), str(check.kept[-1]), number(100 * check.error), number(real), check.label)
