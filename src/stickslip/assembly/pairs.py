@@ -6,14 +6,13 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse
-from scipy.spatial import cKDTree
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.contact import GROUND, NEXT, Contact, Join
+from stickslip.assembly.frames import direction, whole, with_normals
 from stickslip.assembly.places import AXES, NO_FACETS, Places, Spot
-from stickslip.contact.law import ContactLaw, scaled
-from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
-from stickslip.contact.laws.unilateral_spring import UnilateralSpring
+from stickslip.assembly.shares import at_rest, shared
+from stickslip.contact.law import ContactLaw
 from stickslip.contact.pairing import (
     Pairing,
     node_to_node,
@@ -25,7 +24,6 @@ from stickslip.errors import InputError, input_error
 from stickslip.model.axis import Axis
 
 NEAR = 1e-6  # m: partners node to node
-SQUARE = 0.3  # sine of the angle with a normal, above which a direction will do for t
 ROWS = {"tangential": 0, "normal": 2}
 
 
@@ -139,13 +137,14 @@ def one_contact(places: Places, name: str, contact: Contact, turn: Turn | None) 
     """Pair the points of one contact."""
     key = f"contact.{name}"
     first, second, ahead = sides(places, key, contact, turn)
-    law = _at_rest(key, contact)
+    law = at_rest(key, contact)
     if first.surface is None or (second is not None and second.surface is None):
         return _single_dofs(places, name, contact, law, first, second, ahead)
     pairing = _paired(key, contact, law, first, second, ahead)
     n, p = places.n, pairing.n_points
     operator = scipy.sparse.csr_array(pairing.gap_operator)
-    has_area = contact.pairing == "segment_to_segment" or _whole(first.surface)
+    on_facets = contact.pairing == "segment_to_segment" and second is not None
+    has_area = on_facets or whole(first.surface)
     area = pairing.weights if has_area else np.full(p, np.nan)
     _refuse_held(key, operator)
     labels = first.labels if len(first.labels) == p else tuple(f"{name}.{i + 1}" for i in range(p))
@@ -160,7 +159,7 @@ def one_contact(places: Places, name: str, contact: Contact, turn: Turn | None) 
         operator[:, n:] if ahead else scipy.sparse.csr_array((3 * p, n)),
         labels,
         (name,) * p,
-        _shared(key, contact, law, area),
+        shared(key, contact, law, area),
         pairing.positions,
         pairing.frames,
         area,
@@ -174,8 +173,10 @@ def _nodes(places: Places, contact: Contact, first: Spot, own: Matrix) -> IntArr
     assert first.surface is not None
     p = own.shape[0] // 3
     found = np.full((p, 3), -1, dtype=np.int64)
+    if first.nodes is not None and contact.pairing != "segment_to_segment":
+        return first.nodes if p == len(first.nodes) else first.nodes[first.surface.used]
     if first.nodes is not None:
-        return found if contact.pairing == "segment_to_segment" else first.nodes[first.surface.used]
+        return found
     table = places.dofs
     for i in range(p):
         used = np.unique(own[3 * i : 3 * i + 3].indices)
@@ -215,15 +216,13 @@ def _paired(
     """Pair two surfaces; the dofs of the next sector follow those of this one where there is a turn."""
     assert first.surface is not None
     a, b = widened(first.surface, second, turn)
-    with_normals = _with_normals(key, contact, first, a, second, b)
-    along = _direction(key, contact, law, first, with_normals, second, b)
+    facing = with_normals(key, contact, first, a, second, b)
+    along = direction(key, contact, law, first, facing, second, b)
     if b is None:
-        empty = scipy.sparse.csr_array(with_normals.displacement.shape)
-        b = Surface(with_normals.points, empty, NO_FACETS)
-        return named(
-            key, contact, lambda: node_to_node(with_normals, b, tolerance=NEAR, direction=along)
-        )
-    return named(key, contact, lambda: match(contact, with_normals, b, along))
+        empty = scipy.sparse.csr_array(facing.displacement.shape)
+        b = Surface(facing.points, empty, NO_FACETS)
+        return named(key, contact, lambda: node_to_node(facing, b, tolerance=NEAR, direction=along))
+    return named(key, contact, lambda: match(contact, facing, b, along))
 
 
 def match(contact: Contact | Join, a: Surface, b: Surface, along: Any) -> Pairing:
@@ -267,73 +266,6 @@ def named(key: str, contact: Contact | Join, pair: Any) -> Pairing:
         one, two = contact.between
         raise error.inside(f"{key} (side A: {one}, side B: {two})") from None
     return found
-
-
-def _whole(surface: Surface) -> bool:
-    """Whether facets hold all points."""
-    return bool(len(surface.facets)) and len(surface.used) == len(surface.points)
-
-
-def _with_normals(
-    key: str, contact: Contact, first: Spot, a: Surface, second: Spot | None, b: Surface | None
-) -> Surface:
-    """Return side A with its normals: of its own frames or facets, or against those of side B."""
-    if first.frame is not None:
-        return replace(a, normals=first.frame[:, :, 2])
-    if _whole(a) or (len(a.facets) and contact.pairing != "node_to_node"):
-        return a
-    if len(
-        a.facets
-    ):  # some of the nodes span facets: the others take the normal of the nearest one
-        near = a.used[cKDTree(a.points[a.used]).query(a.points)[1]]
-        return replace(a, facets=NO_FACETS, normals=a.node_normals()[near])
-    theirs = None if second is None or b is None else _normals_of(second, b)
-    if theirs is None:
-        raise input_error(
-            f"{key}.between",
-            f"{first.name!r} spans no facet, and nothing else tells where its normal points",
-            "Name a set that holds whole facets of a mesh, let the first side be the body with known normals, or name single dofs "
-            "with acts.",
-        )
-    points, normals = theirs
-    return replace(a, normals=-normals[cKDTree(points).query(a.points)[1]])
-
-
-def _normals_of(spot: Spot, surface: Surface) -> tuple[FloatArray, FloatArray] | None:
-    if spot.frame is not None:
-        return surface.points, spot.frame[:, :, 2]
-    if not len(surface.facets):
-        return None
-    return surface.points[surface.used], surface.node_normals()[surface.used]
-
-
-def _direction(
-    key: str,
-    contact: Contact,
-    law: ContactLaw,
-    first: Spot,
-    a: Surface,
-    second: Spot | None,
-    b: Surface | None,
-) -> Any:
-    """Return the direction of t: the contact's, that of the frames, or any where that makes no difference."""
-    if contact.tangent is not None:
-        return contact.tangent
-    if first.frame is not None:
-        return first.frame[:, :, 0]
-    if second is not None and second.frame is not None and b is not None:
-        return second.frame[cKDTree(b.points).query(a.points)[1], :, 0]
-    stiffness = None if isinstance(law, RigidCoulomb) else law.stuck_stiffness()
-    if stiffness is not None and stiffness[0] != stiffness[1]:
-        raise input_error(
-            f"{key}.tangent",
-            f"is missing, and the law has {stiffness[0]:g} N/m along t and {stiffness[1]:g} N/m along w",
-            "Give the direction whose part in the contact plane is t.",
-        )
-    normals = a.node_normals()[a.used]
-    sines = [np.linalg.norm(np.cross(normals, axis), axis=1).min() for axis in np.eye(3)]
-    good = [i for i, sine in enumerate(sines) if sine > SQUARE] or [int(np.argmax(sines))]
-    return tuple(float(x) for x in np.eye(3)[good[0]])
 
 
 def _refuse_held(key: str, operator: Matrix) -> None:
@@ -385,54 +317,9 @@ def _single_dofs(
         theirs if turn is not None else rows(two[:0], 1.0),
         names,
         (name,) * p,
-        _shared(key, contact, law, area),
+        shared(key, contact, law, area),
         np.full((p, 3), np.nan),
         np.tile(np.eye(3), (p, 1, 1)),
         area,
         np.column_stack([one, np.full((p, 2), -1)]),
     )
-
-
-def _at_rest(key: str, contact: Contact) -> ContactLaw:
-    """Return the law with the contact's preload and gap in it."""
-    law: Any = contact.law
-    if contact.preload == 0.0 and contact.gap == 0.0:
-        return contact.law
-    if isinstance(law, RigidCoulomb) and contact.preload == 0.0:
-        return replace(law, initial_gap=law.initial_gap + contact.gap)
-    if getattr(law, "preload", None) is None or not hasattr(law, "k_n"):
-        what = "preload" if contact.preload else "gap"
-        raise input_error(
-            f"{key}.{what}",
-            f"the law {type(law).__name__} has none: its normal force does not depend on how far the bodies are apart",
-            "Choose a law that lifts off, such as elastic_coulomb, or leave it out.",
-        )
-    pressed = law.preload + contact.preload - law.k_n * contact.gap
-    if isinstance(law, UnilateralSpring) and pressed < 0.0:
-        return replace(law, preload=0.0, initial_gap=law.initial_gap - pressed / law.k_n)
-    found: ContactLaw = replace(law, preload=pressed)
-    return found
-
-
-def _shared(
-    key: str, contact: Contact, law: ContactLaw, area: FloatArray
-) -> tuple[ContactLaw, ...]:
-    """Return the law of each point."""
-    p, known = len(area), bool(np.all(np.isfinite(area)))
-    if contact.share == "point":
-        return (law,) * p
-    if contact.share == "interface":
-        factors = area / area.sum() if known else np.full(p, 1.0 / p)
-    elif known:
-        factors = area
-    else:
-        raise input_error(
-            f"{key}.law",
-            f"is given per area, and the points of {contact.between[0]!r} have none: they span no facets",
-            "Give the law of the whole interface or of a point, or name a set that holds whole facets.",
-        )
-    made: dict[float, ContactLaw] = {}
-    try:
-        return tuple(made.setdefault(f, scaled(law, f)) for f in map(float, factors))
-    except InputError as error:
-        raise error.inside(f"{key}.law") from None

@@ -1,0 +1,84 @@
+"""Normals and tangents of contact surfaces: those of their own frames or facets, or of the other side."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from stickslip.arrays import FloatArray
+from stickslip.assembly.contact import Contact
+from stickslip.assembly.places import NO_FACETS, Spot
+from stickslip.contact.law import ContactLaw
+from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
+from stickslip.contact.surface import Surface
+from stickslip.errors import input_error
+
+SQUARE = 0.3  # sine of the angle with a normal, above which a direction will do for t
+
+
+def whole(surface: Surface) -> bool:
+    """Whether facets hold all points."""
+    return bool(len(surface.facets)) and len(surface.used) == len(surface.points)
+
+
+def with_normals(
+    key: str, contact: Contact, first: Spot, a: Surface, second: Spot | None, b: Surface | None
+) -> Surface:
+    """Return side A with its normals: of its own frames or facets, or against those of side B."""
+    if first.frame is not None:
+        return replace(a, normals=first.frame[:, :, 2])
+    if whole(a) or (len(a.facets) and contact.pairing != "node_to_node"):
+        return a
+    if len(
+        a.facets
+    ):  # some of the nodes span facets: the others take the normal of the nearest one
+        near = a.used[cKDTree(a.points[a.used]).query(a.points)[1]]
+        return replace(a, facets=NO_FACETS, normals=a.node_normals()[near])
+    theirs = None if second is None or b is None else _normals_of(second, b)
+    if theirs is None:
+        raise input_error(
+            f"{key}.between",
+            f"{first.name!r} spans no facet, and nothing else tells where its normal points",
+            "Name a set that holds whole facets of a mesh, let the first side be the body with known normals, or name single dofs "
+            "with acts.",
+        )
+    points, normals = theirs
+    return replace(a, normals=-normals[cKDTree(points).query(a.points)[1]])
+
+
+def _normals_of(spot: Spot, surface: Surface) -> tuple[FloatArray, FloatArray] | None:
+    if spot.frame is not None:
+        return surface.points, spot.frame[:, :, 2]
+    if not len(surface.facets):
+        return None
+    return surface.points[surface.used], surface.node_normals()[surface.used]
+
+
+def direction(
+    key: str,
+    contact: Contact,
+    law: ContactLaw,
+    first: Spot,
+    a: Surface,
+    second: Spot | None,
+    b: Surface | None,
+) -> Any:
+    """Return the direction of t: the contact's, that of the frames, or any where that makes no difference."""
+    if contact.tangent is not None:
+        return contact.tangent
+    if first.frame is not None:
+        return first.frame[:, :, 0]
+    if second is not None and second.frame is not None and b is not None:
+        return second.frame[cKDTree(b.points).query(a.points)[1], :, 0]
+    stiffness = None if isinstance(law, RigidCoulomb) else law.stuck_stiffness()
+    if stiffness is not None and stiffness[0] != stiffness[1]:
+        raise input_error(
+            f"{key}.tangent",
+            f"is missing, and the law has {stiffness[0]:g} N/m along t and {stiffness[1]:g} N/m along w",
+            "Give the direction whose part in the contact plane is t.",
+        )
+    normals = a.node_normals()[a.used]
+    sines = [np.linalg.norm(np.cross(normals, axis), axis=1).min() for axis in np.eye(3)]
+    good = [i for i, sine in enumerate(sines) if sine > SQUARE] or [int(np.argmax(sines))]
+    return tuple(float(x) for x in np.eye(3)[good[0]])

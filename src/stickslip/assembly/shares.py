@@ -1,0 +1,56 @@
+"""What a point of a contact has of its law: the contact's preload and gap in it, and the point's share of the interface."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.assembly.contact import Contact
+from stickslip.contact.law import ContactLaw, scaled
+from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
+from stickslip.contact.laws.unilateral_spring import UnilateralSpring
+from stickslip.errors import InputError, input_error
+
+
+def at_rest(key: str, contact: Contact) -> ContactLaw:
+    """Return the law with the contact's preload and gap in it."""
+    law: Any = contact.law
+    if contact.preload == 0.0 and contact.gap == 0.0:
+        return contact.law
+    if isinstance(law, RigidCoulomb) and contact.preload == 0.0:
+        return replace(law, initial_gap=law.initial_gap + contact.gap)
+    if getattr(law, "preload", None) is None or not hasattr(law, "k_n"):
+        what = "preload" if contact.preload else "gap"
+        raise input_error(
+            f"{key}.{what}",
+            f"the law {type(law).__name__} has none: its normal force does not depend on how far the bodies are apart",
+            "Choose a law that lifts off, such as elastic_coulomb, or leave it out.",
+        )
+    pressed = law.preload + contact.preload - law.k_n * contact.gap
+    if isinstance(law, UnilateralSpring) and pressed < 0.0:
+        return replace(law, preload=0.0, initial_gap=law.initial_gap - pressed / law.k_n)
+    found: ContactLaw = replace(law, preload=pressed)
+    return found
+
+
+def shared(key: str, contact: Contact, law: ContactLaw, area: FloatArray) -> tuple[ContactLaw, ...]:
+    """Return the law of each point."""
+    p, known = len(area), bool(np.all(np.isfinite(area)))
+    if contact.share == "point":
+        return (law,) * p
+    if contact.share == "interface":
+        factors = area / area.sum() if known else np.full(p, 1.0 / p)
+    elif known:
+        factors = area
+    else:
+        raise input_error(
+            f"{key}.law",
+            f"is given per area, and the points of {contact.between[0]!r} have none: they span no facets",
+            "Give the law of the whole interface or of a point, or name a set that holds whole facets.",
+        )
+    made: dict[float, ContactLaw] = {}
+    try:
+        return tuple(made.setdefault(f, scaled(law, f)) for f in map(float, factors))
+    except InputError as error:
+        raise error.inside(f"{key}.law") from None
