@@ -14,7 +14,7 @@ from small_v2 import write_four_masses
 
 from stickslip.study.models import parts
 from stickslip.study.models.study import read_study
-from stickslip.study.runner import run_study
+from stickslip.study.run import run_study
 
 SECONDS = 120.0
 # two tables multiply; modes do not depend on the load's case
@@ -29,7 +29,7 @@ import logging, sys
 from pathlib import Path
 from stickslip.study.keep.progress import Interrupted
 from stickslip.study.models.study import read_study
-from stickslip.study.runner import run_study
+from stickslip.study.run import run_study
 if __name__ == "__main__":
     logging.basicConfig(level=logging.INFO, format="  %(message)s", stream=sys.stdout)
     try:

@@ -15,7 +15,7 @@ from stickslip.errors import InputError
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.keep.folder import locked_folder
 from stickslip.study.keep.progress import Interrupted
-from stickslip.study.runner import answer, run_study
+from stickslip.study.run import answer, run_study
 
 HERE = Path(__file__).parent
 
@@ -86,9 +86,7 @@ def test_workers_give_the_same_bits_and_their_lines_come_back(
 
 
 def test_model_of_python_gets_the_same_answer(tmp_path: Path, whole: ToyStudy) -> None:
-    from stickslip.study.keep.store import PartStore
-
-    made = answer(Toy(), study(tmp_path).cases(PartStore()))
+    made = answer(Toy(), study(tmp_path).cases())
     same(made.tree, result(whole))
     assert made.warnings == ("factor = 2.5: large",)
     assert list(tmp_path.iterdir()) == []
@@ -112,7 +110,7 @@ import sys
 sys.path.insert(0, {here!r})
 from pathlib import Path
 from stickslip.study.analyses import ANALYSES
-from stickslip.study.runner import run_study
+from stickslip.study.run import run_study
 from toy_analysis import ToyStudy
 if __name__ == "__main__":
     ANALYSES["toy"] = "toy_analysis:TOY"

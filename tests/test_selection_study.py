@@ -23,7 +23,7 @@ from stickslip.study.analyses.forced.retention import NO_SHIFT
 from stickslip.study.file.harmonics import SELECTIONS
 from stickslip.study.file.tables import json_schema
 from stickslip.study.models.study import Study, read_study
-from stickslip.study.runner import run_study
+from stickslip.study.run import run_study
 
 # a damper that slips around the peak, at few frequencies
 SLIPPING = {

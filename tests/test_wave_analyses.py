@@ -24,7 +24,7 @@ from stickslip.study.analyses.waves.solve import Question, solve_wave
 from stickslip.study.keep.netcdf import one_case
 from stickslip.study.models.study import Study, read_study
 from stickslip.study.outcome import Outcome
-from stickslip.study.runner import answer
+from stickslip.study.run import answer
 from stickslip.units import RPM
 
 STEEL = """

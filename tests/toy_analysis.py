@@ -17,7 +17,6 @@ from stickslip.errors import SingularError, input_error
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
 from stickslip.study.keep.netcdf import stacked, variable
 from stickslip.study.keep.progress import LOG, advance
-from stickslip.study.keep.store import PartStore
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,15 +43,16 @@ class Toy:
         toy = case.settings.toy
         if toy.terms < 1:
             raise input_error("toy.terms", f"must be above zero, got {toy.terms}", "Give more.")
-        return {"model": model, "toy": toy, "checks": case.checks}
+        kept = case.store(f"matrix {model.factor}", lambda: {"matrix": matrix(model.factor)})
+        return {"factor": model.factor, "toy": toy, "checks": case.checks, **kept}
 
     def solve(self, inputs: Any, done: Sequence[Term], notes: Notes) -> Iterator[Term]:
         toy, x = inputs["toy"], done[-1].value if done else np.ones(40)
-        notes.put("model", {"factor": inputs["model"].factor})
+        notes.put("model", {"factor": inputs["factor"]})
         for i in range(len(done), toy.terms):
             if i == toy.stop_at:
                 stop(toy.how)
-            x = inputs["model"].matrix @ x
+            x = inputs["matrix"] @ x
             advance((i + 1) / toy.terms, f"term {i}")
             yield Term(i, x, os.getpid())
         if "twice" in inputs["checks"] and notes.get("twice") is None:
@@ -112,13 +112,13 @@ class ToyStudy:
     def folder(self) -> Path:
         return self.path.parent / "results"
 
-    def cases(self, store: PartStore) -> list[Case]:
-        return [self._case(i, f, store) for i, f in enumerate(self.factors)]
+    def cases(self) -> list[Case]:
+        return [self._case(i, f) for i, f in enumerate(self.factors)]
 
-    def _case(self, index: int, factor: float, store: PartStore) -> Case:
+    def _case(self, index: int, factor: float) -> Case:
         stop_at = self.stop_at if index == self.stop_in else -1
         toy = SimpleNamespace(terms=self.terms, stop_at=stop_at, how=self.how)
-        build: Callable[[], Any] = partial(self._build, factor, store)
+        build: Callable[[], Any] = partial(self._build, factor)
         values = {"factor": factor}
         return Case(
             index,
@@ -130,10 +130,9 @@ class ToyStudy:
             self.path.parent,
         )
 
-    def _build(self, factor: float, store: PartStore) -> Any:
+    def _build(self, factor: float) -> Any:
         self.built.append(factor)
-        made = store.kept(f"matrix {factor}", lambda: {"matrix": matrix(factor)})
-        return SimpleNamespace(factor=factor, matrix=made["matrix"], parts={})
+        return SimpleNamespace(factor=factor, parts={})
 
 
 def matrix(factor: float) -> np.ndarray:

@@ -20,7 +20,7 @@ from stickslip.study.analyses.analysis import Case, named
 from stickslip.study.file.messages import told
 from stickslip.study.file.section import Section
 from stickslip.study.file.tables import Tables
-from stickslip.study.runner import answer
+from stickslip.study.run import answer
 from stickslip.units import RPM
 
 _SHARED = ("harmonics", "solver", "limits")  # tables that analyses share

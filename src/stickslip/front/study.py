@@ -14,7 +14,7 @@ from stickslip.study.analyses.forced.question import HARMONICS, IN_TIME
 from stickslip.study.check import check_study
 from stickslip.study.models.study import Study as Content
 from stickslip.study.models.study import read_study
-from stickslip.study.runner import run_study
+from stickslip.study.run import run_study
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from typing import Any
 
 from stickslip.assembly.model import Model
 from stickslip.study.keep.progress import LOG
-from stickslip.study.runner import asked_for, of_task
+from stickslip.study.run import asked_for, of_task
 
 WARNING = "WARNING: "
 

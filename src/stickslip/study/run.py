@@ -117,7 +117,7 @@ def _run(
 ) -> Outcome:
     book = Book(Provenance(study.title, study.text, library_versions()))
     store = PartStore(study.folder / PARTS, fresh=fresh)
-    cases = [replace(c, build=cache(c.build), store=store.kept) for c in study.cases(store)]
+    cases = [replace(c, build=cache(c.build), store=store.kept) for c in study.cases()]
     tasks = _tasks(study, asked, cases, checks, book.origin.versions)
     # tasks whose numbers depend on the same things share a job; those not asked for are shown where they are finished
     unfinished = {t.sealed: t for t in tasks if fresh or not t.finished()}
