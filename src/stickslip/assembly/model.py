@@ -27,9 +27,8 @@ from stickslip.model.fe.factorisation import factorise
 from stickslip.model.modes import with_springs
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure, join
+from stickslip.reduction.basis import in_coordinates, surviving_sets
 from stickslip.reduction.cyclic import travelling_wave
-from stickslip.reduction.projection import in_coordinates
-from stickslip.reduction.selection import surviving_sets
 from stickslip.reduction.waves import wave
 
 ContactsAs = Literal["static", "stuck", "open"]
@@ -125,15 +124,19 @@ class Model:
         return Places(self.parts)
 
     @cached_property
+    def _unjoined(self) -> Neighbours | None:
+        return neighbours(self.places, self.parts)
+
+    @cached_property
     def neighbours(self) -> Neighbours | None:
         """How its parts meet their neighbours on the wheel; None for a single structure."""
-        return with_joins(neighbours(self.places, self.parts), self.ties)
+        return with_joins(self._unjoined, self.ties)
 
     @cached_property
     def ties(self) -> Ties:
         """What its joins tie."""
-        alone = neighbours(self.places, self.parts) if self.joins else None
-        return tie_joins(self.places, self.joins, None if alone is None else alone.turn)
+        turn = None if self._unjoined is None else self._unjoined.turn
+        return tie_joins(self.places, self.joins, turn)
 
     @cached_property
     def pairs(self) -> Pairs:

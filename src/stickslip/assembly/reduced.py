@@ -14,10 +14,9 @@ from stickslip.model.damping import rayleigh_damping
 from stickslip.model.dofs import Dofs
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
+from stickslip.reduction.basis import surviving_sets, with_modal_dofs
 from stickslip.reduction.cache import content_hash
 from stickslip.reduction.fixed_interface import craig_bampton
-from stickslip.reduction.projection import with_modal_dofs
-from stickslip.reduction.selection import surviving_sets
 from stickslip.units import HZ
 
 Store = Callable[[str, Callable[[], Mapping[str, Any]]], Mapping[str, Any]]

@@ -19,10 +19,9 @@ from stickslip.assembly.wheel import (
 )
 from stickslip.errors import InputError
 from stickslip.model.structure import Structure, join
+from stickslip.reduction.basis import surviving_sets, with_modal_dofs
 from stickslip.reduction.cache import content_hash
 from stickslip.reduction.cyclic import CyclicSector
-from stickslip.reduction.projection import with_modal_dofs
-from stickslip.reduction.selection import surviving_sets
 
 REMEMBERED = 64  # waves kept in memory
 
@@ -54,31 +53,37 @@ def reduced_sector(
     needed = np.unique(np.concatenate([kept, whole]))
     needed = needed[~np.isin(needed, model.ties.followers)]
     kept = np.unique(partners(sector)[at.of_dofs(needed, model.places.dofs, "part")])
-    made: dict[int, tuple[Structure, Matrix]] = {}
+    content = content_hash(
+        "wave",
+        sector.structure,
+        sector.low,
+        sector.high,
+        sector.sectors,
+        sector.axis,
+        kept,
+        n_modes,
+        steady,
+    )
     memo = next(iter(model.parts.values())).memo
-    for k in wave_numbers(model.sectors, *order):
-        mirror = made.get(sector.sectors - k)
-        if mirror is not None and k > 0 and not sector.structure.is_complex:
-            made[k] = conjugate(mirror[0]), np.conj(mirror[1])
-            continue
-        key = content_hash(
-            "wave",
-            k,
-            sector.structure,
-            sector.low,
-            sector.high,
-            sector.sectors,
-            sector.axis,
-            kept,
-            n_modes,
-            steady,
-        )
+
+    def made(k: int) -> tuple[Structure, Matrix]:
+        key = f"{content} {k}"
         if key not in memo:
             memo[key] = _kept(sector, kept, k, n_modes, at.load(steady), (key, store))
             _forget(memo)
-        made[k] = memo[key]
+        found: tuple[Structure, Matrix] = memo[key]
+        return found
+
+    def wave(k: int) -> tuple[Structure, Matrix]:
+        # sectors of real matrices do not tell the two directions apart
+        if 2 * k <= sector.sectors or sector.structure.is_complex:
+            return made(k)
+        structure, load = made(sector.sectors - k)
+        return conjugate(structure), np.conj(load)
+
+    waves = {k: wave(k) for k in wave_numbers(model.sectors, *order)}
     stay = at.of_dofs(np.unique(stay), model.places.dofs, "output.points")
-    return wheel_of(sector, kept, made, order, pairs, stay)
+    return wheel_of(sector, kept, waves, order, pairs, stay)
 
 
 def _sector_at_speed(model: Model) -> tuple[Structure, FloatArray]:

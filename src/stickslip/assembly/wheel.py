@@ -14,10 +14,10 @@ from stickslip.assembly.ties import Ties
 from stickslip.errors import InputError, input_error
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
+from stickslip.reduction.basis import in_coordinates
 from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
 from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.reduction.nodal import nodal_coordinates
-from stickslip.reduction.projection import in_coordinates
 from stickslip.reduction.relative import in_relative_coordinates
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.reduction.waves import excited_wave, wave
