@@ -1,0 +1,228 @@
+"""What a Python user holds: studies, models and results; progress by the standard logging."""
+
+import io
+import logging
+from pathlib import Path
+
+import numpy as np
+import plotly.graph_objects as go
+import pytest
+import xarray as xr
+from rich.console import Console
+from small_v2 import write_four_masses, write_two_blades
+from synthetic_result import KEY, provenance, synthetic_result, tree_of
+from synthetic_wheel import campbell_result, modes_result, safe_result
+
+from stickslip.errors import InputError
+from stickslip.front.model import Model
+from stickslip.front.result import Result
+from stickslip.front.screen import LOG, Screen, by_default, on_screen
+from stickslip.front.study import Study
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="module")
+def everything() -> Result:
+    nodes = {"modes": modes_result(), "campbell": campbell_result(), "safe": safe_result(0.1)}
+    return Result(
+        tree_of(provenance(), forced_response=synthetic_result(ratios=(20, 5, 2), n=24), **nodes)
+    )
+
+
+@pytest.fixture(scope="module")
+def masses(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Result]:
+    """The smallest study, and its result."""
+    study = Study.from_file(write_four_masses(tmp_path_factory.mktemp("masses")))
+    return study, study.run()
+
+
+def test_every_figure_of_the_page_can_be_had_by_name(everything: Result) -> None:
+    assert everything.plots[0] == "response"
+    assert {
+        "optimisation",
+        "loops_t",
+        "energy",
+        "diameters",
+        "shapes",
+        "campbell",
+        "safe",
+        "mesh",
+    } <= set(everything.plots)
+    assert all(isinstance(everything.plot(name), go.Figure) for name in everything.plots)
+    with pytest.raises(
+        InputError,
+        match=r"plot\('respons'\): is no figure of this result\. Did you mean 'response'",
+    ):
+        everything.plot("respons")
+
+
+def test_peaks_are_a_table(everything: Result) -> None:
+    peaks = everything.peaks
+    assert peaks.keys() == [KEY, "excitation (N)", "frequency (Hz)", "amplitude (m)"]
+    data = everything.data["forced_response"]
+    np.testing.assert_array_equal(peaks["frequency (Hz)"], data["peak_frequency_hz"].values)
+    assert len(peaks) == 3
+    assert len(repr(peaks).splitlines()) == 4
+    assert peaks._repr_html_().count("<tr>") == 4
+    of_modes = Result(tree_of(modes=modes_result())).peaks
+    assert of_modes["mode 1 (Hz)"][1] == pytest.approx(float(modes_result().frequency_hz[0, 1, 0]))
+
+
+def test_a_saved_result_is_the_same_and_opens_with_xarray_alone(
+    everything: Result, tmp_path: Path
+) -> None:
+    again = Result.open(everything.save(tmp_path))
+    assert again.path == tmp_path / "result.nc"
+    xr.testing.assert_identical(again.data, everything.data)
+    assert Result.open(tmp_path).plots == everything.plots
+    with xr.open_datatree(tmp_path / "result.nc", engine="h5netcdf") as tree:
+        assert list(tree.children) == ["forced_response", "modes", "campbell", "safe"]
+        assert tree["forced_response"]["frequency_hz"].attrs["units"] == "Hz"
+    page = again.report()
+    assert page == tmp_path / "report.html"
+    assert "<h2>Natural frequencies and mode shapes</h2>" in page.read_text(encoding="utf-8")
+
+
+def test_a_result_says_what_it_is(everything: Result) -> None:
+    text = repr(everything)
+    assert text.startswith("Result: Two blades, one damper <synthetic>\n  file: in memory")
+    assert "forced_response: 3 cases, 81 points" in text
+    assert "<synthetic>" not in everything._repr_html_()
+
+
+def test_cases_of_waves_are_drawn_one_by_one() -> None:
+    data = modes_result()
+    two = xr.concat([data, data.assign(frequency_hz=2 * data["frequency_hz"])], "case")
+    two["case_label"] = "case", ["part.blade.span = 1", "part.blade.span = 2"]
+    two = two.assign(vary_value=(("case", "vary"), [[1.0], [2.0]])).assign_coords(
+        vary=["part.blade.span"]
+    )
+    result = Result(tree_of(modes=two))
+    assert result.plots == ("diameters", "shapes", "diameters_1", "shapes_1")
+    first, second = (result.plot(name).data[0].y for name in ("diameters", "diameters_1"))
+    np.testing.assert_allclose(second, 2 * np.asarray(first))
+
+
+def test_a_study_runs_and_goes_on_from_what_is_there(masses: tuple[Study, Result]) -> None:
+    study, result = masses
+    assert result.path == study.folder / "result.nc"
+    assert result.data["forced_response"].sizes["point"] > 10
+    again = study.run()
+    xr.testing.assert_equal(
+        again.data["forced_response"].to_dataset(), result.data["forced_response"].to_dataset()
+    )
+    assert "first.x" in str(result.plot("response").layout) or result.plots[0] == "response"
+
+
+def test_a_replaced_study_has_a_folder_of_its_own(masses: tuple[Study, Result]) -> None:
+    study, result = masses
+    soft = study.replace({"contact.brake.slip_limit_n": 1.0})
+    assert soft.folder != study.folder
+    assert soft.folder.parent == study.folder.parent
+    found = soft.run()
+    assert found.path == soft.folder / "result.nc"
+    assert found.peaks["amplitude (m)"][0] != result.peaks["amplitude (m)"][0]
+    assert "# contact.brake.slip_limit_n = 1.0" in found.data.attrs["study_toml"]
+    assert study.content.tables.contact["brake"] is not soft.content.tables.contact["brake"]
+    for key, said in (
+        ("contact.break.slip_limit_n", "contact.break"),
+        ("contact.brake.slip_limit", "slip_limit"),
+    ):
+        with pytest.raises(InputError) as caught:
+            study.replace({key: 1.0})
+        assert said in str(caught.value)
+    with pytest.raises(InputError, match=r"contact\.brake\.slip_limit_n"):
+        study.replace({"contact.brake.slip_limit_n": -1.0})
+
+
+def test_a_model_gives_the_numbers_of_its_study_without_files(
+    masses: tuple[Study, Result], tmp_path: Path
+) -> None:
+    study, result = masses
+    model = study.model()
+    assert isinstance(model, Model)
+    assert "contact stop: chain.m4 with ground, UnilateralSpring" in repr(model)
+    found = model.forced_response(hz=(8.0, 20.0), points=10, peak_points=2)
+    assert found.path is None
+    for name in ("frequency_hz", "amplitude", "contact_force"):
+        there, here = (r.data["forced_response"][name].values for r in (result, found))
+        np.testing.assert_array_equal(there, here)
+    kept = model.forced_response(hz=[9.0, 10.0, 11.0], peak_points=0, folder=tmp_path / "made")
+    assert kept.path == tmp_path / "made" / "result.nc"
+    with pytest.raises(
+        InputError,
+        match=r"forced_response: selektion: is no key of this question\. Did you mean 'selection'",
+    ):
+        model.forced_response(hz=(8, 20), selektion="always_high")
+    with pytest.raises(InputError, match=r"forced_response: low: .*got 0"):
+        model.forced_response(hz=(8, 20), low=0)
+    modes = model.modes(number=2, contacts="stuck")
+    known = found.data["forced_response"]["frequency_stuck_full_hz"].values[0, :2]
+    np.testing.assert_allclose(modes.data["modes"]["frequency_hz"].values[0, 0], known, rtol=1e-9)
+
+
+def test_two_blades_in_fifteen_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (ROOT / "examples" / "two_blades_python.py").read_text(encoding="utf-8")
+    code = [line for line in text.split('"""')[2].splitlines() if line.strip()]
+    assert len(code) <= 15
+    changes = {
+        "ss.BladePair()": "ss.BladePair(airfoil_size=0.012, platform_size=0.012, foot_size=0.016)",
+        "hz=(150, 184), high=5, peak_points=12": "hz=(185, 207), points=8, peak_points=2, samples=64",
+        "newton=22.1": "newton=0.221",
+    }
+    for old, new in changes.items():
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    exec(compile(text, "two_blades_python.py", "exec"), names)  # our own example
+    assert (tmp_path / "two_blades.html").is_file()
+    # the study file of the same job has the same contacts, retention and mesh
+    study = Study.from_file(write_two_blades(tmp_path / "study"))
+    here, there = (r.peaks["frequency (Hz)"][0] for r in (names["result"], study.run()))
+    assert here == pytest.approx(there, rel=1e-5)
+
+
+def said(width: int = 200, **options: bool) -> tuple[Screen, io.StringIO]:
+    stream = io.StringIO()
+    return Screen(Console(file=stream, width=width), **options), stream
+
+
+def test_the_screen_writes_lines_and_every_tenth_of_a_job() -> None:
+    screen, stream = said(warnings=False)
+    with on_screen(screen):
+        LOG.info("reading")
+        for step in range(101):
+            LOG.info(f"step {step}", extra={"fraction": step / 100, "job": "modes"})
+        LOG.warning("doubtful")
+    lines = stream.getvalue().splitlines()
+    assert lines[0] == "reading"
+    assert len(lines) == 1 + 11
+    assert lines[-1] == "  modes 100 %: step 100"
+    assert LOG.handlers == []
+
+
+def test_silence_is_a_matter_of_the_logging_level(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(logging.getLogger(), "handlers", [])
+    with by_default():
+        LOG.info("heard")
+    monkeypatch.setattr(LOG, "level", logging.WARNING)
+    LOG.setLevel(logging.WARNING)
+    try:
+        with by_default():
+            LOG.info("not heard")
+            LOG.warning("doubtful")
+    finally:
+        LOG.setLevel(logging.NOTSET)
+    told = capsys.readouterr().err
+    assert "heard" in told
+    assert "not heard" not in told
+    assert "WARNING: doubtful" in told
+
+
+def test_who_has_a_handler_of_his_own_gets_no_other() -> None:
+    with by_default():
+        assert LOG.handlers == []  # pytest has put one at the root
