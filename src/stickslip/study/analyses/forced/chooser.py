@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import BoolArray
 from stickslip.harmonic.selection import STRATEGIES
 from stickslip.harmonic.selection.strategy import Strategy, always_kept
 from stickslip.harmonic.support import Harmonics, named
@@ -197,7 +197,7 @@ def _kept(response: Response) -> str:
     return f"harmonics kept: {'; '.join(each)}{also} of {len(response.accepted)} points"
 
 
-def _listed(points: Sequence[ForcedPoint], over: FloatArray) -> str:
+def _listed(points: Sequence[ForcedPoint], over: BoolArray) -> str:
     """Return the ranges of neighbouring frequencies above the threshold as text."""
     found: list[tuple[float, float]] = []
     inside = False

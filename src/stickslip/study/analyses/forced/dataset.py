@@ -67,7 +67,8 @@ def _attributes(cases: Sequence[Values], labels: Sequence[str]) -> dict[str, Any
     both = list(zip(labels, cases, strict=True))
     told = [said(label, str(c["choice_sentence"])) for label, c in both if c["choice_sentence"]]
     doubts = [(label, text) for label, c in both for text in (*c["caveats"], *c.get("doubts", ()))]
-    return json.loads(cases[0]["attributes"]) | {
+    own: dict[str, Any] = json.loads(cases[0]["attributes"])
+    return own | {
         "alert_explanation": " ".join(told),
         "warnings": json.dumps([said(label, str(text)) for label, text in doubts]),
         "failed": sum(int(c["points_failed"]) for c in cases),
@@ -78,7 +79,7 @@ def _joined(each: Sequence[xr.Variable], along: str) -> xr.Variable:
     """Return the variable of all cases, one after the other; of what all cases share that of the first."""
     if along not in ("case", *ROWS):
         return each[0]
-    joined = xr.Variable.concat(each, along)
+    joined: xr.Variable = xr.Variable.concat(each, along)  # type: ignore[no-untyped-call]
     return joined.astype(str) if joined.dtype.kind == "O" else joined
 
 

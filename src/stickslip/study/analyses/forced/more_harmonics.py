@@ -6,7 +6,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.support import Harmonics, named
-from stickslip.response.verification import verify_reference
+from stickslip.response.verification import check_support
 from stickslip.study.analyses.forced.chooser import error_text
 from stickslip.study.analyses.forced.points import Response
 from stickslip.study.analyses.forced.question import FACTOR, Question
@@ -110,7 +110,7 @@ def check_harmonics(question: Question, response: Response) -> ReferenceDoubt:
         The model, and its finished response.
     """
     problem = question.problem
-    checks = verify_reference(problem, [a.point for a in response.accepted], FACTOR)
+    checks = check_support(problem, [a.point for a in response.accepted], FACTOR)
     solved = np.array([a.point.converged for a in response.accepted], dtype=bool)
     errors = np.full(solved.size, np.nan)
     errors[solved] = [c.error for c in checks]

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.response.forced.response import ForcedPoint
@@ -215,7 +216,7 @@ def _padded(values: ComplexArray | None, high: int, shape: tuple[int, ...]) -> C
     return out
 
 
-def texts(values: Iterable[str]) -> Values:
+def texts(values: Iterable[str]) -> npt.NDArray[np.str_]:
     """Return texts as an array, which may be empty."""
     return np.array(list(values), dtype=str)
 
