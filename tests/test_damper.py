@@ -4,18 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from small_v2 import write_two_blades
 
 from stickslip.errors import InputError
-from stickslip.model.fe.solid import assemble_solid
-from stickslip.model.mesh.blade_mesh import mesh_blade_pair
-from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.rigid.damper import FlatCurvedDamper, gap_operator
-from stickslip.reduction.fixed_interface import craig_bampton
-from stickslip.response.equilibrium import preload
-from stickslip.study.build import static_contact_force, static_load, system_of
-from stickslip.study.example import example_text
-from stickslip.study.schema import read_study
+from stickslip.study.models.study import read_study
 
 
 def test_nine_points_three_a_line():
@@ -126,24 +120,28 @@ def test_gap_opens_when_the_damper_moves_inward():
 
 
 def test_pressed_outward_all_nine_points_are_in_compression(tmp_path):
-    """The default case on a coarse mesh, its contacts free to slip and to open; no spring helps."""
-    (tmp_path / "study.toml").write_text(example_text())
-    tables = read_study(tmp_path / "study.toml").tables
-    damper = FlatCurvedDamper()
-    pair = BladePair(airfoil_size=0.02, platform_size=0.012, foot_size=0.02)
-    blades = assemble_solid(
-        mesh_blade_pair(pair, damper.contact_points()), tables.material.library()
+    """The example on a coarse mesh, its contacts free to slip and to open; no spring helps."""
+    path = write_two_blades(
+        tmp_path, {"reduction.fixed_interface_modes": "2", "retention.stiffness_n_per_m": "0.0"}
     )
-    keep = np.concatenate([blades.dof_set(name) for name in ("contact", "force", "output")])
-    system, _ = system_of(tables, craig_bampton(blades, keep, 2), damper)
-    load = static_load(system, tables.loads.centrifugal_n)
-    closing = system.interface.gap_operator[:, system.retained] @ preload(system, load)
-    force = static_contact_force(system.interface, closing.reshape(9, 3))
-    assert np.max(force[:, 2]) < -0.02 * tables.loads.centrifugal_n
-    held = system.interface.gap_operator.T @ force.ravel()
-    dofs = system.structure.dof_set("damper")
+    found = read_study(path).model().assembled(1)
+    pull = 442.0
+    assert found.contacts.names == (
+        "L1.1",
+        "L1.2",
+        "L1.3",
+        "L2.1",
+        "L2.2",
+        "L2.3",
+        "R.1",
+        "R.2",
+        "R.3",
+    )
+    assert np.max(found.static_force[:, 2]) < -0.02 * pull
+    held = found.system.interface.gap_operator.T @ found.static_force.ravel()
+    dofs = [i for i, part in enumerate(found.system.structure.dofs.part) if part == "damper"]
     # Newton's tolerance, 1e-10 of the load
-    np.testing.assert_allclose(held[dofs], load[dofs], atol=1e-9 * tables.loads.centrifugal_n)
+    np.testing.assert_allclose(held[dofs], [0.0, 0.0, pull, 0.0, 0.0, 0.0], atol=1e-9 * pull)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import json
 import math
 import tomllib
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector
 from stickslip.model.mesh.sector_parts import Shroud
 from stickslip.model.rigid.damper import FlatCurvedDamper
+from stickslip.study.file.example import Kind, example_text
 from stickslip.study.file.quantities import build, table_of
 from stickslip.study.file.study import read_file
 from stickslip.study.file.tables import json_schema
@@ -103,6 +105,22 @@ def test_the_schema_lists_tables_and_keys():
         schema["properties"]
     )
     assert "friction_coefficient" in schema["$defs"]["Contact"]["properties"]
+    assert schema["$defs"]["FlatCurved"]["properties"]["mass_kg"]["exclusiveMinimum"] == 0
+    described = [p for d in schema["$defs"].values() for p in d.get("properties", {}).values()]
+    assert all("description" in p for p in described)
+
+
+@pytest.mark.parametrize("kind", get_args(Kind))
+def test_the_examples_that_ship_are_those_of_the_repository(kind, tmp_path):
+    folders = {"blades": "two_blades", "sector": "shrouded_sector", "masses": "four_masses"}
+    if kind in folders:
+        written = (EXAMPLES / folders[kind] / "study.toml").read_text(encoding="utf-8")
+        assert example_text(kind) == written
+    else:
+        path = tmp_path / "study.toml"
+        path.write_text(example_text(kind), encoding="utf-8")
+        assert len(refused(path).splitlines()) == 1  # the deck is not there
+        assert "part.blade.file: there is no file" in refused(path)
 
 
 # examples
@@ -247,6 +265,21 @@ WRONG = [
     ({"campbell.speeds_rpm": "[0.0, 1.0]"}, "campbell.engine_orders: is missing. Add it: engine orders"),
     ({"schema_version": "1"}, "schema_version: this version of stickslip reads 2, got 1. The tables have changed: [blades]"),
     ({"schema_version": "3"}, "Write schema_version = 2, or install the stickslip that the file was written for."),
+    ({"load.pull.force_n": "nan"}, "load.pull.force_n: must be a finite number, got nan."),
+    ({"materiel.density_kg_per_m3": "1.0"}, "materiel: unknown key 'materiel'. Did you mean 'material'?"),
+    ({"part.blades.platform_gap_m": '"1 mm"'}, "part.blades.platform_gap_m: must be a number, got '1 mm'."),
+    ({"reduction.fixed_interface_modes": "2.5"}, "reduction.fixed_interface_modes: must be a whole number, got 2.5."),
+    ({"forced_response.peak_points": "true"}, "forced_response.peak_points: must be a whole number, got True."),
+    ({"harmonics.selection": '"always_hihg"'}, "harmonics.selection: is not known, got 'always_hihg'. Did you mean 'always_high'?"),
+    ({"solver.evaluator": '"event"'}, "solver.evaluator: is not known, got 'event'. Did you mean 'events'?"),
+    ({"harmonics.low": "7"}, "harmonics.high: must not be below low = 7, got 5. Raise it, or lower low."),
+    ({"harmonics.samples": "32"}, "harmonics.samples: must be at least 8 times high = 5, got 32."),
+    ({"harmonics.alert_over": '"contact"'}, "harmonics.alert_over: must be along, outputs, contacts or a list of labels, got 'contact'. Did you mean 'contacts'?"),
+    ({"part.damper.inertia_kg_m2": "[1.0e-5, 1.0e-6, 1.0e-6]"}, "part.damper.inertia_kg_m2: the largest moment exceeds the sum of the other two"),
+    ({"part.damper.inertia_kg_m2": "[1.0e-5, 1.0e-6]"}, "part.damper.inertia_kg_m2: has the wrong number of entries"),
+    ({"part.damper.flat_distances_m": "[0.0075, -0.0050]"}, "part.damper.flat_distances_m[1]: must be greater than 0, got -0.005."),
+    ({"part.blades.pitch_m": "0.009"}, "part.blades.pitch_m: 0.009 m leaves no room for platforms"),
+    ({"part.damper.mass_kg": f'"{"9" * 10_000}"'}, "part.damper.mass_kg: must be a number, got '999"),
     ({"vary.load.shaker.ratios": "[1, 2]"}, "vary.load.shaker.ratios: there is no key 'ratios'. Did you mean 'ratio'?"),
     ({"vary.part.damber.mass_kg": "[1.0]"}, "vary.part.damber.mass_kg: there is no key 'damber'. Did you mean 'damper'?"),
     ({"vary.part.blades.mass_kg": "[1.0]"}, "vary.part.blades.mass_kg: there is no key 'mass_kg'."),
@@ -340,6 +373,14 @@ def test_what_is_no_file_and_no_toml_is_told(tmp_path):
     assert "is not UTF-8 text" in refused(path)
     path.write_text("#" * 1_000_001, encoding="utf-8")
     assert "is larger than 1000000 bytes" in refused(path)
+
+
+def test_a_link_out_of_the_folder_is_refused(tmp_path):
+    home = tmp_path / "home"
+    path = write_four_masses(home)
+    (home / "results").symlink_to(tmp_path)
+    told = "output.folder: leads out of the study's folder, got 'results', which is"
+    assert f"{path}: {told} {tmp_path.resolve()}. Give a plain relative name" in refused(path)
 
 
 # what a study varies

@@ -128,7 +128,7 @@ def new(
 ) -> None:
     """Write a commented example study to NAME/study.toml."""
     with _errors_as_text():
-        from stickslip.study.example import example_text
+        from stickslip.study.file.example import example_text
 
         target = name / "study.toml"
         try:

@@ -34,18 +34,13 @@ class InputError(StickslipError):
         others: "tuple[InputError, ...]" = (),
     ) -> None:
         super().__init__(place, problem, remedy, words, others)  # what pickle makes it anew from
-        self.place, self.problem, self.words, self.others = (
-            place,
-            problem,
-            dict(words or {}),
-            others,
-        )
-        self._advice = remedy
+        self.place, self.problem, self.advice = place, problem, remedy
+        self.words, self.others = dict(words or {}), others
 
     @property
     def remedy(self) -> str:
         """What to do about it, arguments by their names."""
-        return Template(self._advice).safe_substitute(self.words) if self.words else self._advice
+        return Template(self.advice).safe_substitute(self.words) if self.words else self.advice
 
     @property
     def argument(self) -> str:
@@ -58,18 +53,18 @@ class InputError(StickslipError):
 
     def at(self, place: str) -> "InputError":
         """Return the same error at another place."""
-        return InputError(place, self.problem, self._advice, self.words, self.others)
+        return InputError(place, self.problem, self.advice, self.words, self.others)
 
     def inside(self, place: str) -> "InputError":
         """Return the same errors with `place` before the places they have."""
         others = tuple(other.inside(place) for other in self.others)
-        return InputError(f"{place}: {self.place}", self.problem, self._advice, self.words, others)
+        return InputError(f"{place}: {self.place}", self.problem, self.advice, self.words, others)
 
     def called(self, words: Mapping[str, str]) -> "InputError":
         """Return the same errors with the arguments under other names."""
         others = tuple(other.called(words) for other in self.others)
         own = {name: words.get(name, word) for name, word in self.words.items()}
-        return InputError(self.place, self.problem, self._advice, own, others)
+        return InputError(self.place, self.problem, self.advice, own, others)
 
 
 class SingularError(StickslipError):
@@ -85,7 +80,7 @@ def together(errors: Iterable[InputError]) -> InputError:
     """Return one error that tells of all `errors`, a line each; there is at least one."""
     first, *rest = errors
     others = (*first.others, *rest)
-    return InputError(*first.args[:-1], others)
+    return InputError(first.place, first.problem, first.advice, first.words, others)
 
 
 def did_you_mean(word: str, known: list[str]) -> str:

@@ -119,7 +119,11 @@ class Output(Section):
     """Where motion is reported, and where the results go."""
 
     folder: str = Field(
-        "results", min_length=1, max_length=200, description="a folder inside the study's folder"
+        "results",
+        min_length=1,
+        max_length=200,
+        validate_default=True,
+        description="a folder inside the study's folder",
     )
     points: dict[Name, Annotated[Point, BeforeValidator(_point)]] = Field(
         default_factory=dict,

@@ -40,7 +40,7 @@ def table_of(
     without
         Fields that are no keys.
     optional
-        Fields that may be left out and then come from elsewhere; the table is not judged as a whole where they are.
+        Fields that may be left out and then come from elsewhere.
     name
         Of the table's class; that of `cls` if empty.
     more
@@ -49,7 +49,7 @@ def table_of(
     columns = columns_of(cls, without=without, optional=optional)
 
     def fits(table: Section) -> Section:
-        if not without and all(_given(table, cls, name) for name in optional):
+        if not without:
             refused_by(cls, lambda: build(cls, table))
         return table
 
@@ -123,11 +123,6 @@ def key_path(cls: type, argument: str) -> str:
         keys.append(found[name].key_of(name))
         cls = _inner(get_type_hints(cls)[name])
     return ".".join(keys)
-
-
-def _given(table: Section, cls: type, name: str) -> bool:
-    key = next(q.key_of(entry.name) for entry, q in quantities_of(cls) if entry.name == name)
-    return getattr(table, key) is not None
 
 
 def _column(entry: Field[Any], q: Quantity, hint: Any, optional: bool, per_area: bool) -> Column:

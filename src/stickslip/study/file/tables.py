@@ -58,7 +58,13 @@ class Tables(Section):
     )
     load: dict[Name, LoadTable] = Field(default_factory=dict, description="the tables [load.NAME]")
     rotation: Rotation = Field(default_factory=Rotation, description="the table [rotation]")
-    output: Output = Field(default_factory=Output, description="the table [output]")
+    output: Output = (
+        Field(  # validated even if left out: its folder may be a link that leads elsewhere
+            {},
+            validate_default=True,
+            description="the table [output]",
+        )
+    )
     harmonics: Harmonics = Field(default_factory=Harmonics, description="the table [harmonics]")
     solver: Solver = Field(default_factory=Solver, description="the table [solver]")
     retention: Retention = Field(default_factory=Retention, description="the table [retention]")

@@ -64,7 +64,7 @@ class Study:
         """Names of the analyses that the file has tables of."""
         return asked_of(self.tables)
 
-    def cases(self, _store: Any = None) -> tuple[Case, ...]:
+    def cases(self) -> tuple[Case, ...]:
         """Return what [vary] spans; one case without it. Models are built when they are asked for."""
         return tuple(self._case(i, case) for i, case in enumerate(self.file.cases))
 
