@@ -283,6 +283,7 @@ def test_a_rigid_damper_between_blade_and_next_blade_answers_on_one_sector_as_on
         ),
         alert_over=("damper.x", "left.0.x"),
         speed=SPEED,
+        retention=1e5,
     )
     found = model.assembled(H)
     assert found.output_labels[3:9] == tuple(
@@ -328,7 +329,7 @@ def test_a_rigid_damper_between_blade_and_next_blade_answers_on_one_sector_as_on
         ]
     )
     free = np.concatenate([both.sets[f"b{s}"] for s in range(SECTORS)])
-    system = System(both, interface, seen, free=free)
+    system = System(both, interface, seen, free=free).with_retention(1e5)
     hertz = (1900.0, 2000.0)
     mine = answered(found.system, found.load, hertz)
     theirs = answered(system, HarmonicLoad(static, {1: force}), hertz)

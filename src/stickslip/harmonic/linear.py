@@ -7,6 +7,7 @@ from stickslip.errors import input_error
 from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.spectral import Blocks
+from stickslip.harmonic.support import Harmonics
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 
@@ -36,6 +37,10 @@ class LinearSide(Protocol):
         """Return the structure that temporal harmonic `harmonic` (0: the mean) vibrates as; the same object where it is the same."""
         ...
 
+    def grounded(self, stiffness: FloatArray) -> Self:
+        """Return the same with springs (n,) in N/m from its coordinates to the ground."""
+        ...
+
 
 def one_structure(side: LinearSide, analysis: str) -> Structure:
     """Return the structure that all harmonics vibrate as, for an `analysis` that knows no harmonics.
@@ -57,6 +62,53 @@ def one_structure(side: LinearSide, analysis: str) -> Structure:
             analysis, "needs real matrices", "The forced response takes complex ones."
         )
     return structure
+
+
+class Products(Protocol):
+    """A condensed dynamic stiffness and its load at one frequency, by its products.
+
+    Vectors are real and harmonic-major: (m, n) rows, the static one and two for each other harmonic of the support.
+    """
+
+    @property
+    def n(self) -> int:
+        """Number of retained coordinates."""
+        ...
+
+    @property
+    def harmonics(self) -> Harmonics:
+        """The support."""
+        ...
+
+    @property
+    def load(self) -> FloatArray:
+        """(m, n) load, N."""
+        ...
+
+    @property
+    def load_slope(self) -> FloatArray:
+        """(m, n) its derivative by ω."""
+        ...
+
+    def same(self, other: object) -> bool:
+        """Whether `other` has the same dynamic stiffness; loads may differ."""
+        ...
+
+    def product(self, rows: FloatArray) -> FloatArray:
+        """Return the rows of ``Z q`` for the `rows` of q."""
+        ...
+
+    def transposed_product(self, rows: FloatArray) -> FloatArray:
+        """Return the rows of the product with the transpose of the real form of Z."""
+        ...
+
+    def product_and_slope(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return ``Z q`` and ``∂Z/∂ω q``."""
+        ...
+
+    def block(self, harmonic: int) -> ComplexArray:
+        """Return ``Z_h``, (n, n) complex in Fortran order, to be changed at will."""
+        ...
 
 
 class DynamicStiffness(Protocol):
@@ -96,6 +148,10 @@ class DynamicStiffness(Protocol):
 
     def condensed(self, omega: float, order: int) -> Condensed:
         """Return stiffness, load and their ω-derivatives for harmonics 0..`order` at `omega` (rad/s)."""
+        ...
+
+    def products(self, omega: float, harmonics: Harmonics) -> Products:
+        """Return the same by its products, at `omega` (rad/s) and for the `harmonics` of a support."""
         ...
 
     def recover(self, omega: float, q: ComplexArray) -> ComplexArray:

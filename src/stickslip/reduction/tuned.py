@@ -5,22 +5,22 @@ Computational Methods in Engineering 24 (2017) 589-636, appendices 1 and 2.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from stickslip.arrays import IntArray, Matrix
+from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import InputError, input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave
 from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.reduction.nodal import nodal_coordinates
-from stickslip.reduction.projection import is_hermitian
 from stickslip.reduction.relative import in_relative_coordinates
 from stickslip.reduction.waves import excited_wave, wave
 from stickslip.reduction.whole_wheel import (
     Reduce,
+    goes_both_ways,
     kept_places,
     reduced_wave,
     refuse_reduced,
@@ -93,6 +93,11 @@ class TunedWheel:
     def n(self) -> int:
         """Number of coordinates."""
         return self.of_harmonic(0).n
+
+    def grounded(self, stiffness: FloatArray) -> "TunedWheel":
+        """Return the wheel with springs (n,) in N/m from its coordinates to the ground."""
+        waves = {k: wave.grounded(stiffness) for k, wave in self.waves.items()}
+        return replace(self, waves=waves)
 
     def project(self, load: Matrix, harmonic: int) -> Matrix:
         """Return the load on the coordinates of a load (n_full,) on the sector's dofs in a harmonic, N."""
@@ -226,11 +231,9 @@ def _gaps_of(sector: CyclicSector, wave_number: int, gaps: Gaps) -> Matrix:
 
 
 def _mirrored(sector: CyclicSector, waves: Mapping[int, Structure], k: int) -> bool:
-    """Whether wave k is the conjugate of one that is known: real matrices of a sector do not tell the two directions apart."""
+    """Whether wave k is the conjugate of one that is known."""
     other = waves.get(sector.sectors - k)
-    if other is None or k == 0 or sector.structure.is_complex:
-        return False
-    return is_hermitian(other.stiffness) and is_hermitian(other.mass)
+    return other is not None and k > 0 and goes_both_ways(sector, other)
 
 
 def _written(

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse
 
 from stickslip.arrays import IntArray
 from stickslip.contact.interface import Interface
@@ -80,21 +79,16 @@ class System:
         """
         if self.free is None or stiffness == 0.0:
             return self
-        structure = one_structure(self.structure, "System.with_retention")
+        structure = self.structure.of_harmonic(0)
         added = np.zeros(structure.n)
         dofs = structure.dofs
         turns = np.array([dofs.component[d].startswith("r") for d in self.free])
-        inertia = np.array([structure.mass[d, d] for d in self.free])
+        inertia = np.array([np.real(structure.mass[d, d]) for d in self.free])
         for dof, turn, own in zip(self.free, turns, inertia, strict=True):
             same_body = np.array([dofs.part[d] == dofs.part[dof] for d in self.free]) & ~turns
             mass = np.max(inertia[same_body], initial=0.0)
             added[dof] = stiffness * (own / mass if turn and mass > 0.0 else 1.0)
-        diagonal = (
-            scipy.sparse.diags_array(added)
-            if scipy.sparse.issparse(structure.stiffness)
-            else np.diag(added)
-        )
-        return replace(self, structure=replace(structure, stiffness=structure.stiffness + diagonal))
+        return replace(self, structure=self.structure.grounded(added))
 
     def stuck_structure(self) -> Structure:
         """Return the linear structure with every contact bonded through its springs."""
