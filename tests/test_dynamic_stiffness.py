@@ -16,7 +16,7 @@ from stickslip.harmonic.condensed_product import at_frequency
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded, to_complex, to_real
-from stickslip.harmonic.spectral import Modes, Poles, StateSpace
+from stickslip.harmonic.spectral import ModeTerms, Poles, StateSpace
 from stickslip.harmonic.structured import real_matrix
 from stickslip.harmonic.support import harmonics_of
 from stickslip.model.matrices import lumped
@@ -311,7 +311,7 @@ def test_sum_over_poles_is_the_schur_complement(seed, damping, dashpots, spread,
 def test_proportional_damping_sums_over_modes(kind):
     structure = structure_of(kind)
     _, terms = decomposed(structure)
-    assert isinstance(terms, Modes)
+    assert isinstance(terms, ModeTerms)
     assert_schur(structure, [1e-3, 0.5, OMEGA, 40.0, 1e3])
 
 

@@ -17,9 +17,9 @@ from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.matrices import chain
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.structure import join
+from stickslip.reduction.basis import in_coordinates
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.fixed_interface import craig_bampton
-from stickslip.reduction.projection import in_coordinates
 from stickslip.reduction.truncation import (
     FrequencyError,
     FrequencyErrors,

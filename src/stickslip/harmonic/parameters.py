@@ -19,7 +19,7 @@ from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.structured import StructuredJacobian
 
-Family = Callable[[float], HarmonicBalance]
+BalanceAt = Callable[[float], HarmonicBalance]
 LoadPart = Literal["excitation", "static_load"]
 
 DIFFERENCE = 1e-5  # of the parameter: about the cube root of rounding
@@ -53,7 +53,7 @@ class AtFrequency:
         Frequency, rad/s.
     """
 
-    family: Family
+    family: BalanceAt
     omega: float
 
     def linearise(self, x: FloatArray, p: float) -> ParameterLinearisation:
@@ -67,7 +67,7 @@ class AtFrequency:
         )
 
 
-def by_parameter(family: Family, x: FloatArray, omega: float, p: float) -> FloatArray:
+def by_parameter(family: BalanceAt, x: FloatArray, omega: float, p: float) -> FloatArray:
     """Return the (size,) derivative of the residual by the parameter at fixed `x` and `omega`."""
     return difference(lambda v: family(v).linearise(x, omega).residual, p)
 
@@ -80,7 +80,7 @@ def difference(function: Callable[[float], FloatArray], p: float) -> FloatArray:
     return (function(p + step) - function(p - step)) / (2.0 * step)
 
 
-def load_level(balance: HarmonicBalance, part: LoadPart) -> Family:
+def load_level(balance: HarmonicBalance, part: LoadPart) -> BalanceAt:
     """Return the family whose parameter is a factor on the harmonic or on the static load.
 
     Parameters
@@ -103,7 +103,9 @@ def load_level(balance: HarmonicBalance, part: LoadPart) -> Family:
     return member
 
 
-def law_field(balance: HarmonicBalance, name: str, contacts: Sequence[int] | None = None) -> Family:
+def law_field(
+    balance: HarmonicBalance, name: str, contacts: Sequence[int] | None = None
+) -> BalanceAt:
     """Return the family whose parameter is a field of the contact laws, such as ``mu``, ``preload``, ``limit``, ``k_n``, ``initial_gap``.
 
     Parameters
@@ -147,7 +149,7 @@ def law_field(balance: HarmonicBalance, name: str, contacts: Sequence[int] | Non
     return member
 
 
-def rebuilt(build: Family, first: float) -> Family:
+def rebuilt(build: BalanceAt, first: float) -> BalanceAt:
     """Return a family of balances that `build` makes anew for every value, all with the scales of the `first` one.
 
     Raises

@@ -18,7 +18,12 @@ import scipy.linalg
 
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation
-from stickslip.harmonic.parameters import Family, ParameterLinearisation, by_parameter, difference
+from stickslip.harmonic.parameters import (
+    BalanceAt,
+    ParameterLinearisation,
+    by_parameter,
+    difference,
+)
 
 Condition = Literal["horizontal_tangent", "phase_quadrature"]
 EVALUATIONS: dict[Condition, int] = {"horizontal_tangent": 3, "phase_quadrature": 1}
@@ -79,7 +84,7 @@ class PeakProblem:
         Typical ``|da / d ln ω| / |a|``, by which the slope is divided, so that the tolerance does not depend on the damping.
     """
 
-    family: Family
+    family: BalanceAt
     condition: Condition
     position: int
     phase: float

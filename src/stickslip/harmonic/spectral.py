@@ -40,7 +40,7 @@ class Sums:
 
 
 @dataclass(frozen=True, eq=False)
-class Modes:
+class ModeTerms:
     """Sum over modes: real, ``Z = Σ_k P_k p^k - left diag(w(p)) right``, ``w = p² (κ + p)² / d`` with ``d = 1 + p c + p² m``."""
 
     left: FloatArray  # (n, J)
@@ -145,7 +145,7 @@ class Poles:
         return np.flatnonzero(imaginary == 0.0), np.flatnonzero(imaginary > 0.0)
 
 
-Terms = Modes | Poles
+Terms = ModeTerms | Poles
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +226,7 @@ def _statically_condensed(
     return np.array(whole), c, m, back
 
 
-def _modes(nn: Blocks, nl: Blocks, ll: Blocks) -> Modes | None:
+def _modes(nn: Blocks, nl: Blocks, ll: Blocks) -> ModeTerms | None:
     whole, c, m, _ = _statically_condensed(nn, nl, ll)
     squares = np.sum(m * m, axis=0)
     ratio = np.sum(c * m, axis=0) / np.where(squares > 0.0, squares, 1.0)
@@ -235,7 +235,9 @@ def _modes(nn: Blocks, nl: Blocks, ll: Blocks) -> Modes | None:
         return None
     polynomial = np.concatenate([whole, np.zeros((1, *whole.shape[1:]))])
     damping, mass = np.diagonal(ll[1]), np.diagonal(ll[2])
-    return Modes(m, np.ascontiguousarray(m.T), polynomial, np.zeros_like(m), ratio, damping, mass)
+    return ModeTerms(
+        m, np.ascontiguousarray(m.T), polynomial, np.zeros_like(m), ratio, damping, mass
+    )
 
 
 def _poles(interior: Interior, states: StateSpace) -> Poles:

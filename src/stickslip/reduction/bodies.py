@@ -16,7 +16,7 @@ from stickslip.model.fe.factorisation import Say, Solve, factorise
 from stickslip.model.modes import SHIFT, connected_parts, lowest_modes, submatrix
 from stickslip.model.rigid.motion import refuse_unheld
 from stickslip.model.structure import Structure
-from stickslip.reduction.projection import BLOCK
+from stickslip.reduction.basis import BLOCK
 
 RIGID = 1e-4  # of the shift: squares of frequencies below are zero but for rounding
 FIRST_GUESS = 16  # modes tried first where a frequency limits them

@@ -16,9 +16,8 @@ from stickslip.errors import input_error
 from stickslip.model.axis import Axis
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
+from stickslip.reduction.basis import is_hermitian, ones_at, surviving_sets
 from stickslip.reduction.cyclic_faces import face, pair_faces, refuse_torn_axis
-from stickslip.reduction.projection import is_hermitian
-from stickslip.reduction.selection import selection, surviving_sets
 from stickslip.reduction.turning import dof_rotation, node_table
 from stickslip.reduction.waves import check_sectors, wave
 
@@ -126,11 +125,11 @@ class CyclicSector:
         """
         phase = wave(wave_number, self.sectors).phase
         n, free = self.structure.n, self.independent
-        own = selection(free, np.arange(free.size), (n, free.size))
+        own = ones_at(free, np.arange(free.size), (n, free.size))
         tied = self.low != self.high
         low, high = self.low[tied], self.high[tied]
         turn = phase * self._turn(low, 1)
-        into = selection(high, np.arange(high.size), (n, high.size))
+        into = ones_at(high, np.arange(high.size), (n, high.size))
         tie = own + into @ turn @ own[low]
         return scipy.sparse.hstack([tie, self._whirl(phase)], format="csr")
 

@@ -13,6 +13,7 @@ from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.fe.factorisation import Say, silent
 from stickslip.model.structure import Structure
+from stickslip.reduction.basis import in_basis, kept_dofs, surviving_sets, with_modal_dofs
 from stickslip.reduction.bodies import (
     Body,
     BodyModes,
@@ -21,8 +22,6 @@ from stickslip.reduction.bodies import (
     lowest_of,
     modes_up_to,
 )
-from stickslip.reduction.projection import kept_dofs, project, with_modal_dofs
-from stickslip.reduction.selection import surviving_sets
 from stickslip.reduction.truncation import (
     FrequencyError,
     FrequencyErrors,
@@ -127,15 +126,15 @@ def _reduced(structure: Structure, keep: IntArray, basis: Matrix, modes: BodyMod
     """Return the reduced structure, without the way back."""
     k, m = keep.size, modes.squares.size
     stiffness = np.zeros((k + m, k + m), dtype=basis.dtype)
-    stiffness[:k, :k] = project(structure.stiffness, basis[:, :k])
+    stiffness[:k, :k] = in_basis(structure.stiffness, basis[:, :k])
     stiffness[k:, k:] = np.diag(modes.squares)
     return Structure(
-        project(structure.mass, basis),
-        project(structure.damping, basis),
+        in_basis(structure.mass, basis),
+        in_basis(structure.damping, basis),
         stiffness,
         with_modal_dofs(structure.dofs.take(keep), m),
         surviving_sets(structure, keep) | {"modes": np.arange(k, k + m)},
-        loss=None if structure.loss is None else project(structure.loss, basis),
+        loss=None if structure.loss is None else in_basis(structure.loss, basis),
     )
 
 

@@ -16,9 +16,14 @@ from stickslip.errors import SingularError, input_error
 from stickslip.model.fe.factorisation import Say, Solve, factorise, silent
 from stickslip.model.modes import submatrix
 from stickslip.model.structure import Structure
+from stickslip.reduction.basis import (
+    BLOCK,
+    in_coordinates,
+    kept_dofs,
+    surviving_sets,
+    with_modal_dofs,
+)
 from stickslip.reduction.bodies import Body, BodyModes, loose_bodies, lowest_of, modes_up_to
-from stickslip.reduction.projection import BLOCK, in_coordinates, kept_dofs, with_modal_dofs
-from stickslip.reduction.selection import surviving_sets
 from stickslip.reduction.truncation import FrequencyError, ModesBelow
 
 DEPENDENT = 1e-8  # smallest eigenvalue of the scaled residual flexibility of the retained dofs

@@ -7,8 +7,8 @@ from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
+from stickslip.reduction.basis import ones_at, surviving_sets
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave
-from stickslip.reduction.selection import selection, surviving_sets
 from stickslip.reduction.turning import dof_rotation
 from stickslip.reduction.waves import wave
 
@@ -133,7 +133,7 @@ def _from_wheel(sector: CyclicSector, number: int) -> Matrix:
     tied = sector.low != sector.high
     column[sector.high[tied]] = following * free.size + place[sector.low[tied]]
     column[shared] = sector.sectors * free.size + np.arange(shared.size)
-    glob = selection(np.arange(structure.n), column, (structure.n, size))
+    glob = ones_at(np.arange(structure.n), column, (structure.n, size))
     return sector.turn(-number) @ glob
 
 

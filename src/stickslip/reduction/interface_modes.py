@@ -13,9 +13,9 @@ from stickslip.errors import input_error
 from stickslip.model.fe.factorisation import Say, silent
 from stickslip.model.modes import submatrix
 from stickslip.model.structure import Structure
+from stickslip.reduction.basis import kept_dofs
 from stickslip.reduction.bodies import Body, bodies_fixed_at, loose_bodies
 from stickslip.reduction.fixed_interface import fixed_interface_reduction
-from stickslip.reduction.projection import kept_dofs
 from stickslip.reduction.truncation import ModeChoice
 
 PLACE = "reduce_interface"

@@ -15,8 +15,8 @@ from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs, join_dofs
 from stickslip.model.structure import Structure
+from stickslip.reduction.basis import in_coordinates
 from stickslip.reduction.cyclic import CyclicSector
-from stickslip.reduction.projection import in_coordinates
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,7 @@ from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.reduction.projection import in_coordinates
-from stickslip.reduction.selection import surviving_sets
+from stickslip.reduction.basis import in_coordinates, surviving_sets
 
 RANK = 1e-9  # smallest singular value over largest, below which gaps depend on each other
 DIRECTIONS = ("t", "w", "n")

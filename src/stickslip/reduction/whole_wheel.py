@@ -13,9 +13,9 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
+from stickslip.reduction.basis import dof_indices, is_hermitian
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave
 from stickslip.reduction.fixed_interface import craig_bampton
-from stickslip.reduction.projection import dof_indices
 from stickslip.reduction.turning import dof_rotation
 from stickslip.reduction.waves import to_sectors, to_waves, wave
 
@@ -34,7 +34,8 @@ class ReducedWheel:
     sector
         What was reduced.
     waves
-        Reduced travelling waves of the wave numbers 0 to n_s/2; the others are their conjugates.
+        Reduced travelling waves of the wave numbers 0 to n_s/2, of which the others are the conjugates; of all wave numbers where
+        complex matrices tell the two directions apart.
     to_global
         (m, m) turn of a sector's coordinates by one pitch.
     """
@@ -67,7 +68,8 @@ class ReducedWheel:
         waves = to_waves(own)
         full = np.array([self._expanded(k, waves[k]) for k in range(self.sector.sectors)])
         sectors = to_sectors(full)
-        return sectors if np.iscomplexobj(vector) else sectors.real
+        both_ways = len(self.waves) <= self.sector.sectors // 2 + 1
+        return sectors.real if both_ways and np.isrealobj(vector) else sectors
 
     def load(self, force: Matrix, wave_number: int = 0) -> ComplexArray:
         """Return the (N,) load on the wheel's coordinates of a load that travels around it.
@@ -148,7 +150,7 @@ def reduced_wheel(
     Notes
     -----
     With the reduced ``A_k`` of wave number k, sectors n and m are coupled by ``Σ_k A_k exp(2πi k (n − m) / n_s) / n_s``
-    (Krack, Salles & Thouverez 2017, eq. 41); it is real, since ``A_{n_s−k}`` is the conjugate of ``A_k``.
+    (Krack, Salles & Thouverez 2017, eq. 41); it is real for real sectors, since ``A_{n_s−k}`` is then the conjugate of ``A_k``.
     """
     refuse_reduced("reduced_wheel", sector)
     keep = dof_indices("reduced_wheel", sector.structure, keep)
@@ -157,6 +159,12 @@ def reduced_wheel(
     waves = tuple(
         reduced_wave("reduced_wheel", reduce, sector, k, place, n_modes) for k in range(half)
     )
+    both_ways = all(goes_both_ways(sector, w) for w in waves)
+    if not both_ways:
+        rest = range(half, sector.sectors)
+        waves += tuple(
+            reduced_wave("reduced_wheel", reduce, sector, k, place, n_modes) for k in rest
+        )
     refuse_unequal("reduced_wheel", dict(enumerate(waves)))
     size = waves[0].n
     turn = np.eye(size)
@@ -165,8 +173,9 @@ def reduced_wheel(
         rotation = sector.axis.rotation(sector.pitch)
         turn[: keep.size, : keep.size] = dof_rotation(table, rotation, "reduced_wheel").toarray()
 
-    def physical(name: str) -> FloatArray:
-        return _circulant([getattr(w, name) for w in waves], sector.sectors, turn)
+    def physical(name: str) -> Matrix:
+        matrix = _circulant([getattr(w, name) for w in waves], sector.sectors, turn)
+        return matrix.real if both_ways else matrix
 
     has_loss = sector.structure.loss is not None
 
@@ -179,6 +188,12 @@ def reduced_wheel(
         loss=physical("loss") if has_loss else None,
     )
     return ReducedWheel(structure, sector, waves, turn)
+
+
+def goes_both_ways(sector: CyclicSector, moving: Structure) -> bool:
+    """Whether the wave that travels the other way is the conjugate of `moving`: real matrices do not tell the directions apart."""
+    own = (moving.stiffness, moving.mass)
+    return not sector.structure.is_complex and all(is_hermitian(matrix) for matrix in own)
 
 
 def refuse_reduced(who: str, sector: CyclicSector) -> None:
@@ -258,15 +273,15 @@ def kept_places(who: str, sector: CyclicSector, keep: IntArray) -> IntArray:
     return np.searchsorted(free, keep)
 
 
-def _circulant(blocks: list[Matrix], sectors: int, turn: FloatArray) -> FloatArray:
-    """Return the matrix of the wheel from its waves 0 to n_s/2, in global axes."""
+def _circulant(blocks: list[Matrix], sectors: int, turn: FloatArray) -> ComplexArray:
+    """Return the matrix of the wheel from its waves 0 to n_s/2 or from all, in global axes."""
     waves = np.array(
         [blocks[k] if k < len(blocks) else np.conj(blocks[sectors - k]) for k in range(sectors)]
     )
-    first = np.fft.ifft(waves, axis=0).real  # coupling of sector n with sector 0, in sector axes
+    first = np.fft.ifft(waves, axis=0)  # coupling of sector n with sector 0, in sector axes
     size = len(turn)
     turns = [np.linalg.matrix_power(turn, n) for n in range(sectors)]
-    matrix = np.empty((sectors, size, sectors, size))
+    matrix = np.empty((sectors, size, sectors, size), dtype=complex)
     for n in range(sectors):
         for m in range(sectors):
             matrix[n, :, m] = turns[n] @ first[(n - m) % sectors] @ turns[m].T

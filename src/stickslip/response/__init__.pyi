@@ -37,5 +37,5 @@ from .time.transient import start_from_harmonics as start_from_harmonics
 from .tracking import PeakPoint as PeakPoint
 from .tracking import smallest_peak as smallest_peak
 from .tracking import track_peak as track_peak
-from .verification import ReferenceCheck as ReferenceCheck
-from .verification import verify_reference as verify_reference
+from .verification import SupportCheck as SupportCheck
+from .verification import check_support as check_support

@@ -11,7 +11,7 @@ from stickslip.contact.compiled import Evaluator, check_evaluator
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.parameters import AtFrequency, Family, law_field, load_level, rebuilt
+from stickslip.harmonic.parameters import AtFrequency, BalanceAt, law_field, load_level, rebuilt
 from stickslip.response.equilibrium import bonded_start, preload
 from stickslip.response.system import System
 from stickslip.solve.continuation import (
@@ -115,7 +115,7 @@ def parameter_family(
     parameter: Parameter,
     first: float,
     made: Callable[[System, HarmonicLoad], HarmonicBalance],
-) -> Family:
+) -> BalanceAt:
     """Return the balances of `made` as a function of a parameter; see `branch_in_parameter` for what that may be."""
     if callable(parameter):
         build = parameter
@@ -233,7 +233,7 @@ def first_guess(
 
 
 def _parameter_point(
-    family: Family, omega: float, point: Point, *, growing: bool
+    family: BalanceAt, omega: float, point: Point, *, growing: bool
 ) -> ParameterPoint:
     balance = family(point.p)
     motion = balance.linear.recover(omega, balance.coefficients(point.x))

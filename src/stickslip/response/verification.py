@@ -13,7 +13,7 @@ SAMPLES_A_HARMONIC = 8
 
 
 @dataclass(frozen=True, slots=True)
-class ReferenceCheck:
+class SupportCheck:
     """What harmonics beyond those of a solved point would change.
 
     Attributes
@@ -42,12 +42,12 @@ class ReferenceCheck:
     seconds_contact: float
 
 
-def verify_reference(
+def check_support(
     problem: ForcedProblem,
     points: Sequence[ForcedPoint],
     factor: int = 2,
     form: Form = "newton",
-) -> tuple[ReferenceCheck, ...]:
+) -> tuple[SupportCheck, ...]:
     """Predict at every solved point what all harmonics up to a multiple of the reference order would change.
 
     One contact evaluation and one linear solution a point; nothing is iterated. It is a warning and no bound: one Newton step, which
@@ -68,7 +68,7 @@ def verify_reference(
 
     Returns
     -------
-    tuple of ReferenceCheck
+    tuple of SupportCheck
         One for each converged point, in their order. ``max(checks, key=lambda c: c.error)`` is the worst.
 
     Raises
@@ -78,7 +78,7 @@ def verify_reference(
     """
     if factor != int(factor) or factor < 2:
         raise input_error(
-            "verify_reference: factor",
+            "check_support: factor",
             f"must be an integer of at least 2, got {factor!r}",
             "2 asks for twice as many harmonics as the reference has.",
         )
@@ -97,7 +97,7 @@ def _enlarged(problem: ForcedProblem, factor: int) -> HarmonicBalance:
 
 def _check(
     problem: ForcedProblem, enlarged: HarmonicBalance, point: ForcedPoint, form: Form
-) -> ReferenceCheck:
+) -> SupportCheck:
     own = problem.balance(point.support)
     measure = problem.measure
     alert = jacobian_alert(
@@ -110,7 +110,7 @@ def _check(
         form,
     )
     dof = int(measure.dofs[alert.worst])
-    return ReferenceCheck(
+    return SupportCheck(
         point.omega, point.support, enlarged.harmonics, alert.error, alert.harmonic, dof,
         problem.system.structure.dofs.labels[dof], alert.seconds_contact,
     )  # fmt: skip

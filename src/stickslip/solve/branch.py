@@ -123,8 +123,8 @@ class Point:
     orientation
         Sign of the determinant of the Jacobian bordered by the tangent; it stays the same along a path. 0 where it was not asked for
         (secants), NaN where the linear solver cannot tell.
-    event
-        Name of the event that was located here; empty for the points of the steps themselves.
+    mark
+        Name of the mark that was located here; empty for the points of the steps themselves.
     """
 
     x: FloatArray
@@ -133,7 +133,7 @@ class Point:
     step: float
     solution: Solution
     orientation: float
-    event: str = ""
+    mark: str = ""
 
     @property
     def y(self) -> FloatArray:

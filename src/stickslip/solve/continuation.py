@@ -20,15 +20,15 @@ from stickslip.solve.branch import (
     reversed_point,
     tangent_at,
 )
-from stickslip.solve.events import FOLD, Event, between, located, with_tangent
+from stickslip.solve.marks import FOLD, Mark, between, located, with_tangent
 from stickslip.solve.newton_method import Solution, charged, newton
 from stickslip.solve.status import Rung
 from stickslip.solve.steps import SHARP_TURN, next_step, no_step, round_corner, take_step
 
 __all__ = [
     "FOLD",
-    "Event",
     "Following",
+    "Mark",
     "Measure",
     "ParameterEvaluation",
     "Parametrisation",
@@ -64,7 +64,7 @@ def trace(
     start: Point,
     end: float,
     following: Following,
-    events: Sequence[Event] = (),
+    marks: Sequence[Mark] = (),
 ) -> Iterator[Point]:
     """Follow a branch from `start`, in the direction of its tangent, until its parameter passes `end`.
 
@@ -78,23 +78,23 @@ def trace(
         Parameter value of the last point, which is solved exactly there.
     following
         Corrector, step control, weights.
-    events
+    marks
         What to locate on the way, `FOLD` among others.
 
     Yields
     ------
     Point
-        Each point that was reached, until the end or `max_points`; between two points the events located there, named in their `event`,
+        Each point that was reached, until the end or `max_points`; between two points the marks located there, named in their `mark`,
         which do not change the steps. If no step, however short, converges, a last point with status `Status.STEP_TOO_SMALL` and
         the state it came from.
     """
     point = start
-    seen = with_tangent(problem, point, following) if events else point
+    seen = with_tangent(problem, point, following) if marks else point
     for _ in range(following.control.max_points):
         point = advance(problem, point, end, following)
-        if events:
+        if marks:
             before, seen = seen, with_tangent(problem, point, following)
-            yield from between(problem, before, seen, events, following)
+            yield from between(problem, before, seen, marks, following)
         yield point
         if not point.solution.status.converged or point.p == end:
             return

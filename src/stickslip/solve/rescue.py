@@ -14,7 +14,7 @@ from stickslip.solve.newton_method import GLOBALISATIONS, Newton, Solution, char
 from stickslip.solve.status import Rung, Status
 
 Evaluate = Callable[[FloatArray], Evaluation]
-Family = Callable[[float], Evaluate]
+EvaluateAt = Callable[[float], Evaluate]
 
 PATIENCE = 30  # iterations of a corrector that has no neighbour to start from
 STEPS = StepControl(scale=1.0, first=0.1, largest=0.5, smallest=1e-5)
@@ -147,7 +147,7 @@ class ByDifference:
         Returns, for s from 0 to 1, an `evaluate` at that s. It is never asked outside.
     """
 
-    family: Family
+    family: EvaluateAt
 
     def linearise(self, x: FloatArray, p: float) -> ParameterEvaluation:
         """Return residual and derivatives at `x` and s = `p`."""

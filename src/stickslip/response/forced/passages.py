@@ -13,8 +13,8 @@ from stickslip.harmonic.selection.strategy import judged
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.equilibrium import bonded_start, preload
 from stickslip.response.forced.accepted import branch_end, reached
+from stickslip.response.forced.homotopies import homotopies
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
-from stickslip.response.forced.rescue import homotopies
 from stickslip.response.forced.sweep import Sweep
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to

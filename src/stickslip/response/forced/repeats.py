@@ -10,9 +10,9 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation
 from stickslip.harmonic.selection.strategy import judged
+from stickslip.response.forced.homotopies import homotopies
 from stickslip.response.forced.passages import along_branch
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
-from stickslip.response.forced.rescue import homotopies
 from stickslip.solve.linear import factorised
 from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Newton, Solution, charged, newton

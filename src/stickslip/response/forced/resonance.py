@@ -8,10 +8,10 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.selection.strategy import judged
+from stickslip.response.forced.homotopies import homotopies
 from stickslip.response.forced.passages import along_branch
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.forced.repeats import repeat
-from stickslip.response.forced.rescue import homotopies
 from stickslip.solve.continuation import start_point, step_to
 from stickslip.solve.newton_method import Solution, charged
 from stickslip.solve.rescue import solve_robustly

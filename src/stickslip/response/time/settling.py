@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
 
-Status = Literal["settled", "unsettled", "diverged"]
+SettlingStatus = Literal["settled", "unsettled", "diverged"]
 LONGEST_MEMORY = (
     1e4  # periods; a decay slower than this (damping ratio 1.6e-5) is not credited to any structure
 )
@@ -58,7 +58,7 @@ class Progress:
 
     harmonics: ComplexArray  # (n_h + 1, n_outputs) of the last period; NaN before the first
     unknown: FloatArray  # (n,) NaN: a drift that cannot be told
-    status: Status = "unsettled"
+    status: SettlingStatus = "unsettled"
     periods: int = 0
     failures: int = 0
     remaining: float = np.inf

@@ -23,7 +23,7 @@ from stickslip.response.time.propagator import (
     require_array,
     step_operators,
 )
-from stickslip.response.time.settling import Progress, Status, overflowed, period_harmonics
+from stickslip.response.time.settling import Progress, SettlingStatus, overflowed, period_harmonics
 from stickslip.response.time.time_step import (
     StepOperators,
     StepRecord,
@@ -130,7 +130,7 @@ class TransientResult:
         (steps, n_contacts, 3) gaps (m) and forces ``T_t, T_w, -N`` (N) at the same times.
     """
 
-    status: Status
+    status: SettlingStatus
     harmonics: ComplexArray
     average: ComplexArray
     scatter: float

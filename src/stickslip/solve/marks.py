@@ -1,4 +1,4 @@
-"""Folds and other events of a branch: where a function of its points changes sign, located between two points."""
+"""Folds and other marks of a branch: where a function of its points changes sign, located between two points."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -13,17 +13,17 @@ from stickslip.solve.steps import across
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Event:
-    """Something that happens where a function of the points of a branch changes its sign.
+class Mark:
+    """Something to find where a function of the points of a branch changes its sign.
 
     Parameters
     ----------
     name
-        Given to the points located, as their `event`.
+        Given to the points located, as their `mark`.
     value
         A number for a point of the branch; its tangent is the true one there, whatever the predictor.
     tolerance
-        Length along the branch to which the event is located.
+        Length along the branch to which the mark is located.
     """
 
     name: str
@@ -31,8 +31,8 @@ class Event:
     tolerance: float = 1e-10
 
 
-FOLD = Event(name="fold", value=lambda point: float(point.tangent[-1]))
-CLOSE = 10.0  # tolerances that the neighbours of an event may be apart
+FOLD = Mark(name="fold", value=lambda point: float(point.tangent[-1]))
+CLOSE = 10.0  # tolerances that the neighbours of a mark may be apart
 HALVINGS = 60  # of the way between them
 
 
@@ -45,9 +45,9 @@ class _LostError(Exception):
 
 
 def located(
-    problem: Problem, before: Point, after: Point, event: Event, following: Following
+    problem: Problem, before: Point, after: Point, mark: Mark, following: Following
 ) -> Point:
-    """Locate an event between two neighbouring points of a branch.
+    """Locate a mark between two neighbouring points of a branch.
 
     The branch between them is solved on planes normal to the chord. It meets all of these, whatever corners it has; where the function
     jumps, as the tangent does at a corner, the place of the jump is found.
@@ -58,7 +58,7 @@ def located(
         The equation.
     before, after
         Points with values of different sign, with their tangents.
-    event
+    mark
         What to look for.
     following
         Corrector and measure of length.
@@ -66,38 +66,38 @@ def located(
     Returns
     -------
     Point
-        The point where the value is zero or jumps, named after the event. If the corrector fails in between, a point with its status and
+        The point where the value is zero or jumps, named after the mark. If the corrector fails in between, a point with its status and
         the state it came from.
     """
     spent: list[Solution] = []
     try:
-        point, low, high = _narrowed(problem, before, after, event, following, spent)
-        side = np.sign(event.value(before))
+        point, low, high = _narrowed(problem, before, after, mark, following, spent)
+        side = np.sign(mark.value(before))
         for _ in range(HALVINGS):
             measure = measure_at(low.x, following)
-            if measure.of(high.y - low.y) <= CLOSE * event.tolerance:
+            if measure.of(high.y - low.y) <= CLOSE * mark.tolerance:
                 break
             # at a sharp corner planes meet both of its sides, and the neighbours found are far apart: each chord between the last
             # neighbours cuts off a part that has the corner in it
             point = _on_chord(problem, low, high, 0.5, following, spent)
-            if np.sign(event.value(point)) == side:
+            if np.sign(mark.value(point)) == side:
                 low = point
             else:
                 high = point
     except _LostError as lost:
         point = replace(before, solution=replace(lost.solution, x=before.x))
-    return replace(point, event=event.name, solution=charged(point.solution, spent))
+    return replace(point, mark=mark.name, solution=charged(point.solution, spent))
 
 
 def _narrowed(
     problem: Problem,
     before: Point,
     after: Point,
-    event: Event,
+    mark: Mark,
     following: Following,
     spent: list[Solution],
 ) -> tuple[Point, Point, Point]:
-    """Look for the event on planes across one chord (Brent 1973); return it and its neighbours on both sides."""
+    """Look for the mark on planes across one chord (Brent 1973); return it and its neighbours on both sides."""
     known = {0.0: before, 1.0: after}
 
     def value_at(share: float) -> float:
@@ -107,10 +107,10 @@ def _narrowed(
             part = (share - low) / (high - low)
             guess = known[low].y + part * (known[high].y - known[low].y)
             known[share] = _on_chord(problem, before, after, share, following, spent, guess)
-        return event.value(known[share])
+        return mark.value(known[share])
 
     length = measure_at(before.x, following).of(after.y - before.y)
-    xtol = event.tolerance / length
+    xtol = mark.tolerance / length
     root = float(scipy.optimize.brentq(lambda s: value_at(float(s)), 0.0, 1.0, xtol=xtol))
     value_at(root)
     side = np.sign(value_at(0.0))
@@ -156,19 +156,19 @@ def with_tangent(problem: Problem, point: Point, following: Following) -> Point:
 
 
 def between(
-    problem: Problem, before: Point, after: Point, events: Sequence[Event], following: Following
+    problem: Problem, before: Point, after: Point, marks: Sequence[Mark], following: Following
 ) -> list[Point]:
-    """Return the events between two neighbouring points of a branch, located, in the order of travel.
+    """Return the marks between two neighbouring points of a branch, located, in the order of travel.
 
-    An event that happens twice between two points leaves no change of sign and is not seen: take shorter steps.
+    A function that changes its sign twice between two points leaves no trace and no mark: take shorter steps.
     """
     if not after.solution.status.converged:
         return []
     measure = measure_at(before.x, following)
     found = []
-    for event in events:
-        first, last = event.value(before), event.value(after)
+    for mark in marks:
+        first, last = mark.value(before), mark.value(after)
         if first * last < 0.0 or (last == 0.0 and first != 0.0):
-            found.append(located(problem, before, after, event, following))
+            found.append(located(problem, before, after, mark, following))
     chord = measure.row(after.y - before.y)
     return sorted(found, key=lambda point: float(chord @ np.subtract(point.y, before.y)))

@@ -6,7 +6,7 @@ from evidence.strategies.cases import CASES, SelectionCase
 from evidence.validation.compare import Record, bound, record
 from stickslip.arrays import FloatArray
 from stickslip.response.forced.response import accepted_points, forced_problem, forced_response
-from stickslip.response.verification import verify_reference
+from stickslip.response.verification import check_support
 
 SOURCE = "own solution with ten harmonics"
 MATTERS = 1e-4  # errors below which a ratio says nothing
@@ -27,7 +27,7 @@ def predicted_and_real(case: SelectionCase) -> FloatArray:
     )
     exact = {p.omega: p for p in ten if p.converged}
     solved = [p for p in five if p.converged and p.omega in exact]
-    checks = verify_reference(problem, solved)
+    checks = check_support(problem, solved)
     real = [problem.real_error(p, exact[p.omega]) for p in solved]
     return np.array([[c.error, r] for c, r in zip(checks, real, strict=True)])
 

@@ -1,4 +1,4 @@
-"""Folds and events located on known curves; parametrisations and predictors that agree on where a branch leads."""
+"""Folds and marks located on known curves; parametrisations and predictors that agree on where a branch leads."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -9,8 +9,8 @@ import pytest
 from stickslip.errors import InputError
 from stickslip.solve.branch import Following, StepControl, reversed_point
 from stickslip.solve.continuation import advance, start_point, trace
-from stickslip.solve.events import FOLD, Event, located
 from stickslip.solve.linear import Dense
+from stickslip.solve.marks import FOLD, Mark, located
 from stickslip.solve.newton_method import Newton
 from stickslip.solve.status import Rung, Status
 
@@ -76,7 +76,7 @@ def begin(problem, x, p, following):
     return start
 
 
-# ---- events -------------------------------------------------------------------------------------------------------------
+# ---- marks -------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("parametrisation", "predictor"), WAYS)
@@ -84,8 +84,8 @@ def begin(problem, x, p, following):
 def test_folds_of_the_cubic_are_located(parametrisation, predictor, largest):
     following = along(parametrisation, predictor, largest=largest)
     points = list(trace(CUBIC, begin(CUBIC, -1.5, -1.875, following), 1.0, following, [FOLD]))
-    folds = [point for point in points if point.event]
-    assert [point.event for point in folds] == ["fold", "fold"]
+    folds = [point for point in points if point.mark]
+    assert [point.mark for point in folds] == ["fold", "fold"]
     for point, (x, p) in zip(folds, FOLDS, strict=True):
         assert point.solution.status.converged
         assert point.x[0] == pytest.approx(x, abs=1e-8)
@@ -101,57 +101,55 @@ def test_a_fold_at_a_corner_is_located(slope):
     points = list(
         trace(problem, begin(problem, -0.7 / slope, 0.3, following), 0.2, following, [FOLD])
     )
-    (fold,) = [point for point in points if point.event]
+    (fold,) = [point for point in points if point.mark]
     assert fold.x[0] == pytest.approx(0.0, abs=1e-8 / min(slope, 1.0))
     assert fold.p == pytest.approx(1.0, abs=1e-8)
 
 
 @pytest.mark.parametrize(("parametrisation", "predictor"), [*WAYS, ("natural", "tangent")])
-def test_an_event_of_the_user_is_located(parametrisation, predictor):
+def test_a_mark_of_the_user_is_located(parametrisation, predictor):
     following = along(parametrisation, predictor)
-    level = Event(name="level", value=lambda point: point.x[0] - 1.2)
+    level = Mark(name="level", value=lambda point: point.x[0] - 1.2)
     points = list(trace(CUBIC, begin(CUBIC, 0.8, -0.288, following), 2.0, following, [level]))
     assert points[-1].p == 2.0
-    (found,) = [point for point in points if point.event == "level"]
+    (found,) = [point for point in points if point.mark == "level"]
     assert found.x[0] == pytest.approx(1.2, abs=1e-9)
     assert found.p == pytest.approx(1.2**3 - 1.2, abs=1e-8)
 
 
-def test_events_come_in_the_order_of_travel_and_change_no_step():
+def test_marks_come_in_the_order_of_travel_and_change_no_step():
     following = along(first=0.25)
     start = begin(CUBIC, -1.5, -1.875, following)
-    events = [
-        Event(name=str(x), value=lambda point, x=x: point.x[0] - x) for x in (-0.9, -1.1, -1.0)
-    ]
-    with_events = list(trace(CUBIC, start, 1.0, following, [FOLD, *events]))
-    names = [point.event for point in with_events if point.event]
+    marks = [Mark(name=str(x), value=lambda point, x=x: point.x[0] - x) for x in (-0.9, -1.1, -1.0)]
+    with_marks = list(trace(CUBIC, start, 1.0, following, [FOLD, *marks]))
+    names = [point.mark for point in with_marks if point.mark]
     assert names == ["-1.1", "-1.0", "-0.9", "fold", "fold"]
-    x = [point.x[0] for point in with_events]
-    assert np.all(np.diff(x) > 0), "each event between its neighbours"
+    x = [point.x[0] for point in with_marks]
+    assert np.all(np.diff(x) > 0), "each mark between its neighbours"
     without = list(trace(CUBIC, start, 1.0, following))
-    steps = [point for point in with_events if not point.event]
+    steps = [point for point in with_marks if not point.mark]
     assert [point.p for point in steps] == [point.p for point in without]
 
 
 def test_a_branch_goes_on_from_a_located_fold():
     following = along()
     points = list(trace(CUBIC, begin(CUBIC, -1.5, -1.875, following), 1.0, following, [FOLD]))
-    fold = next(point for point in points if point.event)
+    fold = next(point for point in points if point.mark)
     onward = list(trace(CUBIC, fold, 1.0, following))
     assert onward[-1].p == 1.0
     assert onward[-1].x[0] == pytest.approx(points[-1].x[0], abs=1e-10)
 
 
-def test_an_event_that_cannot_be_located_says_why():
+def test_a_mark_that_cannot_be_located_says_why():
     # between the two points the residual is not a number
     hole = Curve(
         lambda x, p: np.nan if 0.1 < p < 0.9 else x - 1.0, lambda _x, _p: 1.0, lambda _x, _p: 0.0
     )
     following = along()
     before, after = begin(hole, 1.0, 0.0, following), begin(hole, 1.0, 1.0, following)
-    middle = Event(name="middle", value=lambda point: point.p - 0.4)
+    middle = Mark(name="middle", value=lambda point: point.p - 0.4)
     point = located(hole, before, after, middle, following)
-    assert point.event == "middle"
+    assert point.mark == "middle"
     assert point.solution.status is Status.NOT_FINITE
     assert np.array_equal(point.x, before.x)
 

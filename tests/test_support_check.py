@@ -35,7 +35,7 @@ def response(low, high, selection, span=HERTZ, count=11, **others):
 def test_error_of_five_harmonics_against_ten():
     """Half to twice the truth where it matters, and dead on where no contact changes its state."""
     problem, points = response(1, 5, "always_high")
-    checks = ss.response.verify_reference(problem, points)
+    checks = ss.response.check_support(problem, points)
     _, exact = response(10, 10, "always_high")
     real = np.array([problem.real_error(p, e) for p, e in zip(points, exact, strict=True)])
     found = np.array([c.error for c in checks])
@@ -55,7 +55,7 @@ def test_error_of_five_harmonics_against_ten():
 def test_points_with_few_harmonics_are_held_against_the_same():
     """As the alert, but with what lies beyond its reference; 163 Hz, its blind spot, is left out."""
     problem, points = response(1, 5, "jacobian_alert")
-    checks = ss.response.verify_reference(problem, points)
+    checks = ss.response.check_support(problem, points)
     few = [c for c in checks if c.kept == (0, 1)]
     assert few
     assert len(few) < len(checks)
@@ -67,7 +67,7 @@ def test_points_with_few_harmonics_are_held_against_the_same():
 
 def test_even_harmonics_that_the_reference_lacks_are_found_missing():
     problem, points = response((1, 3, 5), (1, 3, 5), "always_low", count=6)
-    checks = ss.response.verify_reference(problem, points)
+    checks = ss.response.check_support(problem, points)
     _, exact = response(10, 10, "always_high", count=6)
     worst = max(checks, key=lambda c: c.error)
     real = {p.omega: problem.real_error(p, e) for p, e in zip(points, exact, strict=True)}
@@ -79,7 +79,7 @@ def test_even_harmonics_that_the_reference_lacks_are_found_missing():
 def test_worst_dof_is_one_of_those_asked_for():
     problem, points = response(1, 5, "always_low", count=3)
     chosen = replace(problem, system=replace(problem.system, alert_dofs=np.array([4, 2])))
-    for check in ss.response.verify_reference(chosen, points):
+    for check in ss.response.check_support(chosen, points):
         assert check.dof in {4, 2}
         assert check.label == problem.system.structure.dofs.labels[check.dof]
         assert check.harmonic == 1
@@ -88,7 +88,7 @@ def test_worst_dof_is_one_of_those_asked_for():
 def test_more_samples_where_more_harmonics_ask_for_them():
     problem, points = response(1, 5, "always_high", count=3, samples=32)
     assert problem.high.samples == 32
-    checks = ss.response.verify_reference(problem, points, factor=4)
+    checks = ss.response.check_support(problem, points, factor=4)
     assert checks[0].harmonics == tuple(range(21))
     assert all(0.0 <= c.error < 0.05 for c in checks)
 
@@ -96,15 +96,15 @@ def test_more_samples_where_more_harmonics_ask_for_them():
 def test_what_was_not_solved_is_passed_over():
     problem, points = response(1, 5, "always_low", count=3)
     lost = [replace(points[0], status=Status.TOO_MANY_ITERATIONS), *points[1:]]
-    assert len(ss.response.verify_reference(problem, lost)) == 2
-    assert ss.response.verify_reference(problem, []) == ()
+    assert len(ss.response.check_support(problem, lost)) == 2
+    assert ss.response.check_support(problem, []) == ()
 
 
 @pytest.mark.parametrize("factor", [1, 0, 2.5])
 def test_factors_that_add_nothing_are_refused(factor):
     problem, points = response(1, 5, "always_low", count=2)
-    with pytest.raises(InputError, match="verify_reference: factor: must be an integer"):
-        ss.response.verify_reference(problem, points, factor=factor)
+    with pytest.raises(InputError, match="check_support: factor: must be an integer"):
+        ss.response.check_support(problem, points, factor=factor)
 
 
 def ring(waves, low, high):
@@ -134,7 +134,7 @@ def test_friction_ring_lacks_what_the_literature_says():
     reference, exact = ring(13, 13, 13)
     real = [reference.real_error(p, e) for p, e in zip(points, exact, strict=True)]
     for factor in (2, 4):
-        checks = ss.response.verify_reference(problem, points, factor)
+        checks = ss.response.check_support(problem, points, factor)
         for check, change, (_, three, many) in zip(checks, real, TABLE.values(), strict=True):
             assert check.error == pytest.approx(change, rel=0.15, abs=3e-4)
             assert check.error >= 0.9 * abs(many / three - 1.0)
@@ -144,4 +144,4 @@ def test_friction_ring_lacks_what_the_literature_says():
 def test_wheel_without_waves_for_the_check_is_refused():
     problem, points = ring(3, 3, 3)
     with pytest.raises(InputError, match="harmonics up to 3, asked for 4"):
-        ss.response.verify_reference(problem, points)
+        ss.response.check_support(problem, points)

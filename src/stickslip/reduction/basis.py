@@ -15,7 +15,7 @@ ROWS = 8192  # rows of the basis projected at a time, for the same reason
 SYMMETRY = 1e-12  # relative, below which a matrix counts as Hermitian
 
 
-def project(matrix: Matrix, basis: Matrix) -> Matrix:
+def in_basis(matrix: Matrix, basis: Matrix) -> Matrix:
     """Return ``basisᴴ matrix basis``, Hermitian to the last digit where `matrix` is.
 
     Parameters
@@ -55,13 +55,13 @@ def in_coordinates(
         Of the m new coordinates.
     """
     return Structure(
-        project(structure.mass, basis),
-        project(structure.damping, basis),
-        project(structure.stiffness, basis),
+        in_basis(structure.mass, basis),
+        in_basis(structure.damping, basis),
+        in_basis(structure.stiffness, basis),
         dofs,
         sets,
         structure.expand(basis),
-        None if structure.loss is None else project(structure.loss, basis),
+        None if structure.loss is None else in_basis(structure.loss, basis),
     )
 
 
@@ -146,3 +146,16 @@ def with_modal_dofs(kept: Dofs, n_modes: int) -> Dofs:
     """Return the kept rows followed by modal rows, with the parts the kept rows had."""
     table = join_dofs({"kept": kept, "modal": modal_dofs(n_modes)})
     return Dofs(table.node, table.component, table.position, kept.part + ("",) * n_modes)
+
+
+def ones_at(rows: IntArray, columns: IntArray, shape: tuple[int, int]) -> Matrix:
+    """Return the CSR matrix with ones at ``(rows, columns)``."""
+    return scipy.sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=shape)
+
+
+def surviving_sets(structure: Structure, keep: IntArray, offset: int = 0) -> dict[str, IntArray]:
+    """Return the sets whose dofs are all kept, by their places among `keep`, shifted by `offset`."""
+    place = np.full(structure.n, -1)
+    place[keep] = offset + np.arange(len(keep))
+    moved = {name: place[index] for name, index in structure.sets.items()}
+    return {name: index for name, index in moved.items() if np.all(index >= 0)}
