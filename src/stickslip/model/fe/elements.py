@@ -12,6 +12,7 @@ import scipy.sparse
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error, missing_package
+from stickslip.model.mesh.mesh_facets import HEX_EDGES, TET_EDGES
 from stickslip.model.mesh.solid_mesh import SolidMesh
 
 CHUNK = 200_000  # cells x quadrature points x nodes worked on at once: 20 to 100 MB
@@ -20,11 +21,6 @@ HEX_PLACES = np.array(
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]],
     dtype=float,
 )
-TET_EDGES = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]
-HEX_EDGES = [
-    *[(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6)],
-    *[(6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)],
-]
 
 
 @dataclass(frozen=True)

@@ -16,14 +16,13 @@ from stickslip.errors import did_you_mean, input_error
 from stickslip.model.dofs import nodal_dofs
 from stickslip.model.fe.elements import (
     EXACT,
-    HEX_EDGES,
-    TET_EDGES,
     Quadrature,
     check_jacobians,
     library,
     library_element,
     shape_functions,
 )
+from stickslip.model.mesh.mesh_facets import HEX_EDGES, TET_EDGES
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.structure import Structure
 from stickslip.units import quantity

@@ -7,6 +7,7 @@ import numpy as np
 
 from stickslip.arrays import IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.model.mesh.mesh_facets import HEX_EDGES, TET_EDGES
 from stickslip.model.readers.keywords import (
     Block,
     members,
@@ -21,13 +22,9 @@ NODES_OF = {
     "C3D8": 8, "C3D8I": 8, "C3D8R": 8, "C3D20": 20, "C3D20R": 20,
 }  # fmt: skip
 
-# corners of the faces S1, S2, … and ends of the edges that mid-side nodes stand on, counted from 0
+# corners of the faces S1, S2, …, counted from 0
 TET_FACES = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
 HEX_FACES = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
-TET_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
-HEX_EDGES = (
-    (0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7),
-)  # fmt: skip
 
 # Keywords that say nothing about mass, stiffness or supports: steps, output, loads of single nodes
 SILENT = {
