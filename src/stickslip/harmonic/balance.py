@@ -13,11 +13,9 @@ from stickslip.contact.event_integrals import Events
 from stickslip.contact.interface import Interface, SparseRows, add_contact_jacobian, sparse_rows
 from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces, forces_between
-from stickslip.harmonic.condensed_product import CondensedProduct, at_frequency
-from stickslip.harmonic.dynamic_stiffness import CondensedStiffness
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex, to_real
-from stickslip.harmonic.linear import DynamicStiffness
+from stickslip.harmonic.linear import DynamicStiffness, Products
 from stickslip.harmonic.structured import StructuredJacobian, real_matrix
 from stickslip.harmonic.support import (
     Harmonics,
@@ -66,8 +64,8 @@ def _linear_part(linear: DynamicStiffness, harmonics: Harmonics, omega: float) -
 
 
 @lru_cache(maxsize=2)
-def _product(linear: CondensedStiffness, harmonics: Harmonics, omega: float) -> CondensedProduct:
-    return at_frequency(linear, omega, harmonics)
+def _product(linear: DynamicStiffness, harmonics: Harmonics, omega: float) -> Products:
+    return linear.products(omega, harmonics)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,9 +103,7 @@ class HarmonicBalance:
 
     @property
     def structured(self) -> bool:
-        """Whether the Jacobian is given by its products; without harmonics, and for a tuned wheel, it is an array."""
-        if not isinstance(self.linear, CondensedStiffness):
-            return False
+        """Whether the Jacobian is given by its products; without harmonics it is an array."""
         large = self.size > CROSSOVER if self.jacobian == "auto" else self.jacobian == "structured"
         return large and self.order > 0
 
@@ -165,10 +161,8 @@ class HarmonicBalance:
             period = self.forces(x, omega)
         seconds = perf_counter() - start
         jac: FloatArray | StructuredJacobian
-        if isinstance(self.linear, CondensedStiffness) and (
-            self.size > CROSSOVER or self.structured
-        ):
-            linear, slope, jac = self._by_products(self.linear, x, omega, period)
+        if self.size > CROSSOVER or self.structured:
+            linear, slope, jac = self._by_products(x, omega, period)
         else:
             linear, slope, jac = self._by_matrices(x, omega, period)
         self.rows.add_forces(period.coefficients, linear)
@@ -197,10 +191,10 @@ class HarmonicBalance:
         return to_real(force[..., 0]), to_real(slope[..., 0]), jac
 
     def _by_products(
-        self, own: CondensedStiffness, x: FloatArray, omega: float, period: ContactPeriod
+        self, x: FloatArray, omega: float, period: ContactPeriod
     ) -> tuple[FloatArray, FloatArray, FloatArray | StructuredJacobian]:
         """Return the same without condensed matrices; the Jacobian by its products too if that was chosen."""
-        part = _product(own, self.harmonics, omega)
+        part = _product(self.linear, self.harmonics, omega)
         q = x.reshape(self.n_rows, self.linear.n) * self.displacement_scale
         linear, slope = part.product_and_slope(q)
         factor = self.displacement_scale / self.force_scale
@@ -209,16 +203,11 @@ class HarmonicBalance:
 
     def linear_load(self, omega: float) -> FloatArray:
         """Return the (m, n) real coefficients of the condensed load at `omega` (rad/s)."""
-        if isinstance(self.linear, CondensedStiffness):
-            return _product(self.linear, self.harmonics, omega).load
-        return real_rows(self.linear.condensed(omega, self.order).load, self.harmonics)
+        return _product(self.linear, self.harmonics, omega).load
 
     def linear_block(self, omega: float, harmonic: int) -> ComplexArray:
         """Return the (n, n) condensed dynamic stiffness of a harmonic at `omega` (rad/s), to be changed at will."""
-        if isinstance(self.linear, CondensedStiffness):
-            return _product(self.linear, self.harmonics, omega).block(harmonic)
-        stiffness = self.linear.condensed(omega, self.order).stiffness
-        return np.array(stiffness[harmonic], order="F")
+        return _product(self.linear, self.harmonics, omega).block(harmonic)
 
     def with_order(self, order: int) -> "HarmonicBalance":
         """Return the same problem with harmonics 0..`order`."""

@@ -6,15 +6,18 @@ condensation; one harmonic at a time is formed where it is to be factorised.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
-from stickslip.harmonic.dynamic_stiffness import CondensedStiffness
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.spectral import StateSpace
 from stickslip.harmonic.support import Harmonics
+
+if TYPE_CHECKING:
+    from stickslip.harmonic.dynamic_stiffness import CondensedStiffness
 
 Parts = tuple[FloatArray, FloatArray, FloatArray]  # K, C, M, or their products with the same rows
 Lossy = tuple[
@@ -32,7 +35,7 @@ class CondensedProduct:
     Vectors are real and harmonic-major: (m, n) rows, the static one and two for each other harmonic of the support.
     """
 
-    linear: CondensedStiffness
+    linear: "CondensedStiffness"
     omega: float
     harmonics: Harmonics
     frequencies: FloatArray  # (m, 1) h ω of each row, rad/s
@@ -40,12 +43,18 @@ class CondensedProduct:
     load: FloatArray  # (m, n), N
     load_slope: FloatArray  # (m, n), by ω
 
-    def same(self, other: "CondensedProduct") -> bool:
+    @property
+    def n(self) -> int:
+        """Number of retained coordinates."""
+        return self.linear.n
+
+    def same(self, other: object) -> bool:
         """Whether `other` has the same dynamic stiffness; loads may differ."""
         return (
-            self.omega == other.omega
+            isinstance(other, CondensedProduct)
+            and self.omega == other.omega
             and self.harmonics == other.harmonics
-            and (self.linear.nn is other.linear.nn)
+            and self.linear.nn is other.linear.nn
         )
 
     def product(self, rows: FloatArray) -> FloatArray:
@@ -106,7 +115,7 @@ class CondensedProduct:
 
 
 def at_frequency(
-    linear: CondensedStiffness, omega: float, harmonics: Harmonics
+    linear: "CondensedStiffness", omega: float, harmonics: Harmonics
 ) -> CondensedProduct:
     """Prepare the products of `linear` at one frequency.
 
@@ -142,7 +151,7 @@ def _with_inner_load(bare: CondensedProduct, inner_load: FloatArray) -> Condense
     )  # fmt: skip
 
 
-def _inner(linear: CondensedStiffness, omega: float, harmonics: Harmonics) -> Inner:
+def _inner(linear: "CondensedStiffness", omega: float, harmonics: Harmonics) -> Inner:
     k, c, m = linear.ll
     loss = None if linear.loss is None else linear.loss[2]
     s = omega * np.array(harmonics)
@@ -180,28 +189,28 @@ def _solve_one(inner: InnerOne, right: ComplexArray) -> ComplexArray:
     return np.asarray(scipy.linalg.lu_solve((first, second), right))
 
 
-def _near(linear: CondensedStiffness, rows: FloatArray) -> Lossy:
+def _near(linear: "CondensedStiffness", rows: FloatArray) -> Lossy:
     """Return the products of the retained coordinates' own matrices."""
     k, c, m = linear.nn
     loss = None if linear.loss is None else rows @ linear.loss[0]
     return rows @ k, rows @ (c if linear.ln is None else c.T), rows @ m, loss
 
 
-def _onto(linear: CondensedStiffness, rows: FloatArray) -> Lossy:
+def _onto(linear: "CondensedStiffness", rows: FloatArray) -> Lossy:
     """Return the products from retained coordinates to the interior."""
     k, c, m = linear.far
     loss = None if linear.loss is None else rows @ linear.loss[1]
     return rows @ k, rows @ c, rows @ m, loss
 
 
-def _back(linear: CondensedStiffness, rows: FloatArray) -> Lossy:
+def _back(linear: "CondensedStiffness", rows: FloatArray) -> Lossy:
     """Return the products from the interior to retained coordinates."""
     k, c, m = linear.nl
     loss = None if linear.loss is None else rows @ linear.loss[1].T
     return rows @ k.T, rows @ c.T, rows @ m.T, loss
 
 
-def _inner_parts(linear: CondensedStiffness, rows: FloatArray) -> Lossy:
+def _inner_parts(linear: "CondensedStiffness", rows: FloatArray) -> Lossy:
     """Return the products of the interior's own matrices, for their slope: structural damping has none."""
     if linear.diagonal:
         k, c, m = (rows * np.diagonal(a) for a in linear.ll)

@@ -12,19 +12,20 @@ from functools import cached_property
 
 import numpy as np
 import scipy.linalg
-import scipy.sparse
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
+from stickslip.harmonic.condensed_product import CondensedProduct, at_frequency
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded
+from stickslip.harmonic.matrices import SYMMETRY, asymmetry, real_symmetric
 from stickslip.harmonic.spectral import Blocks, Interior, Terms, summed
+from stickslip.harmonic.support import Harmonics
 from stickslip.model.structure import Structure
 
 DIAGONAL_TOLERANCE = (
     1e-10  # off-diagonal modal damping below this share of the largest counts as proportional
 )
-SYMMETRY = 1e-8  # share of the largest entry by which transposed entries may differ
 LARGEST_INTERIOR = 5000  # dense eigenproblem of the interior; reduce larger structures first
 
 
@@ -101,6 +102,10 @@ class CondensedStiffness:
         # the static problem alone is no reason to decompose the interior
         sums = self._sums if order > 0 and omega != 0.0 else None
         return self._factorised(omega, order) if sums is None else self._summed(sums, omega, order)
+
+    def products(self, omega: float, harmonics: Harmonics) -> CondensedProduct:
+        """Return the same by its products, at `omega` (rad/s) and for the `harmonics` of a support."""
+        return at_frequency(self, omega, harmonics)
 
     def _summed(self, sums: "_Sums", omega: float, order: int) -> Condensed:
         """Condense by the spectral decomposition of the interior."""
@@ -289,14 +294,14 @@ def condense(structure: Structure, retained: IntArray, load: HarmonicLoad) -> Co
             f"{interior.size} interior dofs",
             "Reduce the structure first (craig_bampton).",
         )
-    full = tuple(_dense(structure, name) for name in ("stiffness", "damping", "mass"))
+    full = tuple(real_symmetric(structure, name) for name in ("stiffness", "damping", "mass"))
     nn = _three(a[np.ix_(retained, retained)] for a in full)
     nl = tuple(a[np.ix_(retained, interior)] for a in full)
     ll = tuple(a[np.ix_(interior, interior)] for a in full)
     modes = _interior_modes(ll[0], ll[2])
     to_modes = _three(a @ modes for a in nl)
     back = None
-    if _asymmetry(full[1]) > SYMMETRY:
+    if asymmetry(full[1]) > SYMMETRY:
         back = to_modes[0], full[1].T[np.ix_(retained, interior)] @ modes, to_modes[2]
     damping = modes.T @ ll[1] @ modes
     loss = _loss(structure, retained, interior, modes)
@@ -314,7 +319,7 @@ def _loss(
     """Return structural damping on the retained coordinates, across, and on the interior's modes; None where there is none."""
     if structure.loss is None:
         return None
-    matrix = _dense(structure, "loss")
+    matrix = real_symmetric(structure, "loss")
     if not np.any(matrix):
         return None
     across, own = matrix[np.ix_(retained, interior)], matrix[np.ix_(interior, interior)]
@@ -365,51 +370,3 @@ def _is_diagonal(damping: FloatArray) -> bool:
     size = np.max(np.abs(damping), initial=0.0)
     off = np.max(np.abs(damping - np.diag(np.diagonal(damping))), initial=0.0)
     return bool(off <= DIAGONAL_TOLERANCE * size)
-
-
-def _asymmetry(matrix: Matrix) -> float:
-    """Return the largest difference from the transpose over the largest entry."""
-    if not matrix.shape[0]:
-        return 0.0
-    size = float(abs(matrix).max())
-    return float(abs(matrix - matrix.T).max()) / size if size else 0.0
-
-
-def is_real_symmetric(structure: Structure) -> bool:
-    """Whether all matrices but the damping are real and symmetric: then undamped modes of the interior decouple it."""
-    matrices = (structure.mass, structure.stiffness, structure.loss)
-    return not structure.is_complex and all(
-        _asymmetry(m) <= SYMMETRY for m in matrices if m is not None
-    )
-
-
-def checked_matrix(structure: Structure, name: str) -> FloatArray | ComplexArray:
-    """Return a matrix of a structure as an array, after checking that it is finite and whole."""
-    matrix = getattr(structure, name)
-    dense = np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
-    if not np.all(np.isfinite(dense)):
-        raise input_error(
-            f"Structure.{name}",
-            "contains NaN or infinite entries",
-            "Check the model that was read.",
-        )
-    if _asymmetry(dense) > SYMMETRY and not (np.any(np.triu(dense, 1)) and np.any(np.tril(dense, -1))):  # fmt: skip
-        raise input_error(f"Structure.{name}", "holds one triangle alone", "Give both triangles.")
-    return dense
-
-
-def _dense(structure: Structure, name: str) -> FloatArray:
-    dense = checked_matrix(structure, name)
-    if np.iscomplexobj(dense):
-        raise input_error(
-            f"Structure.{name}",
-            "is complex",
-            "Give structural damping as Structure.loss (structural_damping); a System takes other complex matrices.",
-        )
-    if name != "damping" and _asymmetry(dense) > SYMMETRY:
-        raise input_error(
-            f"Structure.{name}",
-            "is not symmetric",
-            "Coriolis terms belong into the damping; a System takes other unsymmetric matrices.",
-        )
-    return np.asarray(dense, dtype=float)

@@ -20,8 +20,8 @@ from stickslip.contact.product import (
     less_means,
     subtract_lower,
 )
-from stickslip.harmonic.condensed_product import CondensedProduct
 from stickslip.harmonic.factors import Factors, factorise
+from stickslip.harmonic.linear import Products
 
 Solve = Callable[[FloatArray], FloatArray]
 Product = Callable[[FloatArray, FloatArray], FloatArray]
@@ -41,7 +41,7 @@ class HarmonicFactors:
         Of each harmonic, in the scale of the Jacobian; harmonic 0 is real.
     """
 
-    linear: CondensedProduct
+    linear: Products
     means: ComplexArray
     factors: tuple[Factors, ...]
 
@@ -62,7 +62,7 @@ class StructuredJacobian:
         Displacement scale over force scale.
     """
 
-    linear: CondensedProduct
+    linear: Products
     blocks: FloatArray
     rows: SparseRows
     scale: float
@@ -75,7 +75,7 @@ class StructuredJacobian:
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns."""
-        size = self.linear.linear.n * len(self.linear.frequencies)
+        size = self.linear.n * (2 * len(self.linear.harmonics) - 1)
         return size, size
 
     def matvec(self, v: FloatArray) -> FloatArray:
@@ -91,7 +91,7 @@ class StructuredJacobian:
 
     def dense(self) -> FloatArray:
         """Return the Jacobian as an array."""
-        n = self.linear.linear.n
+        n = self.linear.n
         jac = self.scale * real_matrix([self.linear.block(h) for h in self.linear.harmonics])
         add_contact_jacobian(self.blocks, self.rows.columns, self.rows.values, n, self.scale, jac)
         return jac
@@ -150,7 +150,7 @@ class StructuredJacobian:
         return rows.reshape(-1)
 
     def _by_row(self, v: FloatArray) -> FloatArray:
-        return np.ascontiguousarray(v.reshape(len(self.linear.frequencies), -1))
+        return np.ascontiguousarray(v.reshape(-1, self.linear.n))
 
     def _add_contacts(
         self, blocks: FloatArray, q: FloatArray, transposed: bool, out: FloatArray

@@ -13,13 +13,14 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.dynamic_stiffness import (
     Condensed,
-    checked_matrix,
     condense,
-    is_real_symmetric,
 )
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.linear import DynamicStiffness, LinearSide
+from stickslip.harmonic.matrices import checked_matrix, is_real_symmetric
 from stickslip.harmonic.spectral import Blocks
+from stickslip.harmonic.support import Harmonics, real_rows
 from stickslip.model.structure import Structure
 
 Stack = ComplexArray  # (H+1, rows, columns)
@@ -70,6 +71,10 @@ class TravellingStiffness:
         derivative = _block(G, near, near) - y @ _block(G, far, near) - across @ x
         load = f[:, near] - (_block(D, near, far) @ x_load)[:, :, 0]
         return Condensed(stiffness, derivative, load, -(across @ x_load)[:, :, 0])
+
+    def products(self, omega: float, harmonics: Harmonics) -> "CondensedWaves":
+        """Return the same by its products, at `omega` (rad/s) and for the `harmonics` of a support."""
+        return CondensedWaves(self, omega, harmonics, self.condensed(omega, harmonics[-1]))
 
     def recover(self, omega: float, q: ComplexArray) -> ComplexArray:
         """Return the (H+1, n_all) coefficients of every dof from those of the retained ones (H+1, n)."""
@@ -132,6 +137,59 @@ class TravellingStiffness:
         return stacked("stiffness"), stacked("damping"), stacked("mass"), stacked("loss")
 
 
+@dataclass(frozen=True, eq=False)
+class CondensedWaves:
+    """The condensed matrices of the waves at one frequency, by their products."""
+
+    linear: TravellingStiffness
+    omega: float
+    harmonics: Harmonics
+    waves: Condensed
+
+    @property
+    def n(self) -> int:
+        """Number of retained coordinates."""
+        return self.linear.n
+
+    @property
+    def load(self) -> FloatArray:
+        """(m, n) load, N."""
+        return real_rows(self.waves.load, self.harmonics)
+
+    @property
+    def load_slope(self) -> FloatArray:
+        """(m, n) its derivative by ω."""
+        return real_rows(self.waves.load_derivative, self.harmonics)
+
+    def same(self, other: object) -> bool:
+        """Whether `other` has the same dynamic stiffness; loads may differ."""
+        return (
+            isinstance(other, CondensedWaves)
+            and self.omega == other.omega
+            and self.harmonics == other.harmonics
+            and self.linear.structures is other.linear.structures
+        )
+
+    def product(self, rows: FloatArray) -> FloatArray:
+        """Return the rows of ``Z q`` for the `rows` of q."""
+        return _times(self._own(self.waves.stiffness), rows)
+
+    def transposed_product(self, rows: FloatArray) -> FloatArray:
+        """Return the rows of the product with the transpose of the real form of Z, which is that of the conjugate transpose."""
+        return _times(self._own(self.waves.stiffness).conj().transpose(0, 2, 1), rows)
+
+    def product_and_slope(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return ``Z q`` and ``∂Z/∂ω q``."""
+        return self.product(rows), _times(self._own(self.waves.derivative), rows)
+
+    def block(self, harmonic: int) -> ComplexArray:
+        """Return ``Z_h``, (n, n) complex in Fortran order, to be changed at will."""
+        return np.array(self.waves.stiffness[harmonic], order="F")
+
+    def _own(self, stack: Stack) -> Stack:
+        return np.asarray(stack[list(self.harmonics)])
+
+
 def condense_side(
     side: LinearSide, retained: IntArray, load: HarmonicLoad, order: int
 ) -> DynamicStiffness:
@@ -183,6 +241,11 @@ def condense_waves(
         )
     retained = np.asarray(retained, dtype=np.int64)
     return TravellingStiffness(structures, retained, np.setdiff1d(np.arange(n), retained), load)
+
+
+def _times(stack: Stack, rows: FloatArray) -> FloatArray:
+    """Return the rows of the products of a matrix a harmonic."""
+    return to_real((stack @ to_complex(rows)[:, :, None])[:, :, 0])
 
 
 def _block(stack: Stack, rows: IntArray, columns: IntArray) -> Stack:

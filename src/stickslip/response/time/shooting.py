@@ -13,7 +13,7 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.contact.law import ContactLaw
-from stickslip.model.structure import Structure
+from stickslip.harmonic.linear import LinearSide, one_structure
 from stickslip.response.time.floquet import Floquet, floquet
 from stickslip.response.time.period_map import Derivative, Image, PeriodMap, period_map
 from stickslip.response.time.propagator import PeriodicLoad
@@ -109,7 +109,7 @@ class _Search:
 
 
 def shoot(
-    structure: Structure,
+    structure: LinearSide,
     gap_operator: Matrix,
     laws: Sequence[ContactLaw],
     load: PeriodicLoad,
@@ -142,6 +142,7 @@ def shoot(
     InputError
         If an argument has a wrong shape or value, a law is not elastic Coulomb, or the mass matrix is singular.
     """
+    structure = one_structure(structure, "shoot")
     stepping = stepping or TimeStepping(tolerance=TOLERANCE)
     start = start or rest(structure.n, laws, "shoot")
     check_arguments(structure.n, len(laws), outputs, start, "shoot")

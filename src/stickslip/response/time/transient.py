@@ -16,6 +16,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import input_error
+from stickslip.harmonic.linear import LinearSide, one_structure
 from stickslip.model.structure import Structure
 from stickslip.response.time.propagator import (
     ModalCoordinates,
@@ -192,7 +193,7 @@ def start_from_harmonics(
 
 
 def integrate(
-    structure: Structure,
+    structure: LinearSide,
     gap_operator: Matrix,
     laws: Sequence[ContactLaw],
     load: PeriodicLoad,
@@ -206,7 +207,7 @@ def integrate(
     Parameters
     ----------
     structure
-        Any linear structure with a regular mass matrix; free rigid bodies are welcome.
+        Any linear structure with a regular mass matrix; free rigid bodies are welcome. Of a wheel, that of all its sectors.
     gap_operator
         (3 n_contacts, n), dense or sparse: rows t, w, n of each contact; normal gap positive when open.
     laws
@@ -227,6 +228,7 @@ def integrate(
     InputError
         If an argument has a wrong shape or value, or the mass matrix is singular.
     """
+    structure = one_structure(structure, "integrate")
     stepping = stepping or TimeStepping()
     start = start or rest(structure.n, laws)
     check_arguments(structure.n, len(laws), outputs, start)

@@ -1,0 +1,59 @@
+"""Matrices of a structure as arrays, after a look at what the condensation needs of them."""
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import ComplexArray, FloatArray, Matrix
+from stickslip.errors import input_error
+from stickslip.model.structure import Structure
+
+SYMMETRY = 1e-8  # share of the largest entry by which transposed entries may differ
+
+
+def asymmetry(matrix: Matrix) -> float:
+    """Return the largest difference from the transpose over the largest entry."""
+    if not matrix.shape[0]:
+        return 0.0
+    size = float(abs(matrix).max())
+    return float(abs(matrix - matrix.T).max()) / size if size else 0.0
+
+
+def is_real_symmetric(structure: Structure) -> bool:
+    """Whether all matrices but the damping are real and symmetric: then undamped modes of the interior decouple it."""
+    matrices = (structure.mass, structure.stiffness, structure.loss)
+    return not structure.is_complex and all(
+        asymmetry(m) <= SYMMETRY for m in matrices if m is not None
+    )
+
+
+def checked_matrix(structure: Structure, name: str) -> FloatArray | ComplexArray:
+    """Return a matrix of a structure as an array, after checking that it is finite and whole."""
+    matrix = getattr(structure, name)
+    dense = np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
+    if not np.all(np.isfinite(dense)):
+        raise input_error(
+            f"Structure.{name}",
+            "contains NaN or infinite entries",
+            "Check the model that was read.",
+        )
+    if asymmetry(dense) > SYMMETRY and not (np.any(np.triu(dense, 1)) and np.any(np.tril(dense, -1))):  # fmt: skip
+        raise input_error(f"Structure.{name}", "holds one triangle alone", "Give both triangles.")
+    return dense
+
+
+def real_symmetric(structure: Structure, name: str) -> FloatArray:
+    """Return a matrix of a structure as an array, after checking that it is real, and symmetric but for the damping."""
+    dense = checked_matrix(structure, name)
+    if np.iscomplexobj(dense):
+        raise input_error(
+            f"Structure.{name}",
+            "is complex",
+            "Give structural damping as Structure.loss (structural_damping); a System takes other complex matrices.",
+        )
+    if name != "damping" and asymmetry(dense) > SYMMETRY:
+        raise input_error(
+            f"Structure.{name}",
+            "is not symmetric",
+            "Coriolis terms belong into the damping; a System takes other unsymmetric matrices.",
+        )
+    return np.asarray(dense, dtype=float)
