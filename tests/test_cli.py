@@ -1,4 +1,4 @@
-"""The commands: exit codes, messages without tracebacks, and a light start."""
+"""The commands: exit codes, messages without tracebacks, journeys of each kind of study, and a light start."""
 
 import json
 import shutil
@@ -8,28 +8,20 @@ from collections import namedtuple
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 import xarray as xr
-from small_study import write_small_study
+from small_v2 import write_four_masses, write_shrouded_deck, write_shrouded_sector, write_two_blades
 from typer.testing import CliRunner, Result
 
 import stickslip
 from stickslip.cli import app
 from stickslip.errors import InputError
-from stickslip.response.forced.response import ForcedPoint
-from stickslip.solve.status import Status
-from stickslip.study import threads
-from stickslip.study.chooser import Chooser
-from stickslip.study.collect import Accepted, CaseResult
-from stickslip.study.example import example_text
-from stickslip.study.folder import prepare_folder
-from stickslip.study.journal import Journal
-from stickslip.study.progress import library_versions
-from stickslip.study.reference_check import ReferenceDoubt
-from stickslip.study.run import fingerprint
-from stickslip.study.schema import read_study
-from stickslip.study.summary import choice_sentence
+from stickslip.front import result as front
+from stickslip.front.study import Study
+from stickslip.study.file.example import example_text
+from stickslip.study.keep import threads
+from stickslip.study.keep.folder import locked_folder
+from stickslip.study.keep.progress import Interrupted
 
 HEAVY = ("numpy", "scipy", "numba", "xarray", "pydantic", "plotly", "gmsh", "skfem", "meshio")
 
@@ -80,8 +72,34 @@ def test_unknown_command_and_option_are_bad_input() -> None:
     assert "No such option" in refused("run", "x.toml", "--quick")
 
 
+def done(*words: str) -> str:
+    """Return what a command prints that must end well, its lines joined."""
+    result = invoke(*words)
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
 def test_schema_is_printed_as_json() -> None:
-    assert json.loads(invoke("schema").output)["title"] == "StudyTables"
+    schema = json.loads(invoke("schema").output)
+    assert schema["title"] == "StudyTables"
+    assert {"part", "contact", "vary", "forced_response", "campbell"} <= set(schema["properties"])
+
+
+@pytest.mark.parametrize("command", ["modes", "campbell", "safe"])
+def test_commands_of_before_are_analyses_now(command: str) -> None:
+    assert f"No such command '{command}'" in refused(command, "study.toml")
+
+
+@pytest.mark.parametrize("kind", ["blades", "sector", "file", "masses"])
+def test_new_writes_the_example_of_a_kind(tmp_path: Path, kind: str) -> None:
+    said = done("new", str(tmp_path / "made"), "--kind", kind)
+    path = tmp_path / "made" / "study.toml"
+    assert path.read_text(encoding="utf-8") == example_text(kind)
+    assert ("stickslip check" if kind == "file" else "stickslip run") in said
+    if kind == "file":
+        assert "part.blade.file: there is no file" in refused("check", str(path))
+    else:
+        assert Study.from_file(path).content.asked
 
 
 def test_new_writes_the_example_and_overwrites_nothing(tmp_path: Path) -> None:
@@ -115,20 +133,26 @@ def test_missing_study(tmp_path: Path, command: str) -> None:
 
 
 def test_bad_study_is_told_line_by_line(tmp_path: Path) -> None:
-    path = write_small_study(tmp_path, mass_kg="-0.1", frequency_hz="[220.0, 150.0]")
+    wrong = {"part.damper.mass_kg": "-0.1", "forced_response.frequency_hz": "[220.0, 150.0]"}
+    path = write_two_blades(tmp_path, wrong)
     assert [line.split(": ")[1] for line in refused("check", str(path)).splitlines()] == [
-        "damper.mass_kg",
-        "sweep.frequency_hz",
+        "part.damper.mass_kg",
+        "forced_response.frequency_hz",
     ]
 
 
+def test_a_study_of_schema_one_is_refused_with_the_remedy(tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text("schema_version = 1\n[blades]\n")
+    said = refused("run", str(path))
+    assert "schema_version: this version of stickslip reads 2, got 1" in said
+    assert "stickslip new NAME" in said
+
+
 def test_output_folder_that_cannot_be_made(tmp_path: Path) -> None:
-    path = write_small_study(tmp_path)
+    path = write_four_masses(tmp_path)
     (tmp_path / "results").write_text("a file where the folder should be")
-    assert refused("run", str(path)) == (
-        f"output folder {tmp_path.resolve() / 'results'}: cannot be written (File exists). "
-        "Change its permissions, or name another folder under [output]."
-    )
+    assert "cannot be written" in refused("run", str(path))
 
 
 def test_full_disk_is_told_before_anything_is_computed(
@@ -136,203 +160,110 @@ def test_full_disk_is_told_before_anything_is_computed(
 ) -> None:
     usage = namedtuple("usage", "total used free")(10**9, 10**9 - 10**6, 10**6)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage)
-    with pytest.raises(
-        InputError, match=r"its disk has 1 MB free, a run needs up to 200 MB\. Make room"
+    with (
+        pytest.raises(
+            InputError, match=r"its disk has 1 MB free, a run needs up to 200 MB\. Make room"
+        ),
+        locked_folder(tmp_path / "results"),
     ):
-        prepare_folder(tmp_path / "results", fresh=False)
+        pass
 
 
-def test_fresh_removes_what_a_run_writes_and_nothing_else(tmp_path: Path) -> None:
-    folder = tmp_path / "results"
-    folder.mkdir()
-    for name in ("journal.sqlite", "result.nc", "notes.txt"):
-        (folder / name).write_text("")
-    prepare_folder(folder, fresh=True)
-    assert [p.name for p in folder.iterdir()] == ["notes.txt"]
-
-
-def leave_journal(path: Path) -> None:
-    """Leave what a run of this study leaves when it is stopped."""
-    study = read_study(path)
-    prepare_folder(study.folder, fresh=False)
-    mark = fingerprint(study, library_versions())
-    with Journal(study.folder / "journal.sqlite", mark, ForcedPoint) as journal:
-        journal.put("blades", {"n": 1})
-
-
-def test_results_of_another_study_are_not_mixed(tmp_path: Path) -> None:
-    path = write_small_study(tmp_path)
-    leave_journal(path)
-    write_small_study(tmp_path, centrifugal_n="440.0")
-    assert "what this command left here is of another or a changed study" in refused(
-        "run", str(path)
-    )
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "said"),
-    [
-        ("alert_over", '["tip3.x"]', "harmonics.alert_over: 'tip3.x' is neither an output"),
-        ("airfoil_size_m", "1e-5", "limits.memory_gb: the run is estimated at"),
-        ("sections_m", "[-0.2, 0.0, 0.016]", "non-matching node sets"),
-    ],
-)
-def test_what_needs_no_mesh_is_refused_before_the_folder_is_touched(
-    tmp_path: Path, key: str, value: str, said: str
-) -> None:
-    path = write_small_study(tmp_path, **{key: value})
-    assert said in refused("run", str(path))
+def test_masses_from_new_to_the_page(tmp_path: Path) -> None:
+    path = write_four_masses(tmp_path)
+    said = done("check", str(path))
+    assert "natural frequencies" in said
+    assert f"{path}: good to run" in said
     assert not (tmp_path / "results").exists()
-    leave_journal(path)
-    kept = tmp_path / "results" / "result.nc"
-    kept.write_text("of an earlier run")
-    assert said in refused("run", str(path), "--fresh")
-    assert kept.read_text() == "of an earlier run"
-    assert kept.with_name("journal.sqlite").is_file()
+    said = done("run", str(path))
+    results = tmp_path / "results"
+    for name in ("result.nc", "report.html", "run.log"):
+        assert str(results / name) in said
+    assert "Forced response" in said
+    (results / "report.html").unlink()
+    assert str(results / "report.html") in done("report", str(results))
+    page = (results / "report.html").read_text(encoding="utf-8")
+    # the terminal warns as the page does
+    found = front.Result.open(results)
+    for text in found.warnings:
+        assert text in " ".join(said.split())
+    assert page.count("<h2>") == 6  # no checks were asked for
+    assert "the response folds" in page or "No warnings" in page or found.warnings
+    # what is finished is not computed again, and --fresh computes it again
+    assert "jobs to do: 0" in done("run", str(path), "--no-report")
+    assert "jobs to do: 1" in done("run", str(path), "--no-report", "--fresh")
 
 
-def planar_friction(path: Path, *sides: str) -> Path:
-    """Give sides of a study's damper coupled_coulomb."""
-    text = path.read_text(encoding="utf-8")
-    for side in sides:
-        begin = text.index(f"[contact.{side}]")
-        end = text.index("\n\n", begin)
-        changed = text[begin:end].replace("elastic_coulomb", "coupled_coulomb")
-        changed = changed.replace("axial_stiffness_n_per_m = 450e6\n", "")
-        text = text[:begin] + changed + text[end:]
-    path.write_text(text, encoding="utf-8")
-    return path
+def test_two_blades_answer_and_can_be_read_without_this_package(tmp_path: Path) -> None:
+    path = write_two_blades(tmp_path, {"vary.load.shaker.ratio": "[2000, 1000]"})
+    said = done("run", str(path), "--workers", "2")
+    assert "load.shaker.ratio = 1000" in said
+    page = (tmp_path / "results" / "report.html").read_text(encoding="utf-8")
+    for key in ("response", "loops_t", "states", "motion_damper", "energy", "mesh"):
+        assert f'<figure id="fig-{key}"' in page
+    program = (
+        "import sys, xarray as xr\n"
+        f"tree = xr.open_datatree({str(tmp_path / 'results' / 'result.nc')!r}, engine='h5netcdf')\n"
+        "peak = tree['forced_response'].sel(vary='load.shaker.ratio')\n"
+        "print(peak.vary_value.values.tolist(), float(peak.peak_frequency_hz[0]) > 100, 'stickslip' in sys.modules)\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=tmp_path
+    )
+    assert ended.stdout.strip() == "[2000.0, 1000.0] True False"
 
 
-def test_other_law_and_evaluator_from_a_file_to_the_result(tmp_path: Path) -> None:
-    path = planar_friction(write_small_study(tmp_path, evaluator='"intervals"'), "flat")
-    ended = invoke("run", str(path), "--no-report")
-    assert ended.exit_code == 0, ended.output
-    with xr.open_dataset(tmp_path / "results" / "result.nc") as data:
-        assert data.attrs["evaluator"] == "intervals"
-        assert list(data.contact_law.values) == ["coupled_coulomb"] * 6 + ["elastic_coulomb"] * 3
-        assert int(data.points_failed.sum()) == 0
-        # the static force stands on the limit, along the radius of the disc
-        force = data.static_force.sel(contact=[f"L{i}.{j}" for i in (1, 2) for j in (1, 2, 3)])
-        friction = np.hypot(force.sel(direction="t"), force.sel(direction="w"))
-        np.testing.assert_allclose(friction, -0.6 * force.sel(direction="n"), rtol=1e-3)
-        # under so faint a harmonic force the contacts are springs: the peak is the mode with the springs of both laws
-        modes = data.frequency_stuck_reduced_hz.values
-        assert np.min(np.abs(modes / data.peak_frequency_hz.values[0] - 1.0)) < 1e-3
+def test_a_sector_answers_analysis_by_analysis_on_one_page(tmp_path: Path) -> None:
+    path = write_shrouded_sector(tmp_path)
+    said = done("run", str(path), "--only", "modes")
+    assert "Natural frequencies in Hz" in said
+    assert "Crossings" not in said
+    assert "Crossings" in done("run", str(path), "--only", "campbell", "--only", "safe")
+    with xr.open_datatree(tmp_path / "results" / "result.nc", engine="h5netcdf") as tree:
+        assert set(tree.children) == {"modes", "campbell", "safe"}
+    page = (tmp_path / "results" / "report.html").read_text(encoding="utf-8")
+    for key in ("diameters", "shapes", "campbell", "safe"):
+        assert f'<figure id="fig-{key}" class="all-cases">' in page
 
 
-@pytest.mark.parametrize("fresh", [(), ("--fresh",)])
-def test_time_integration_of_other_laws_is_refused_before_anything_is_done(
-    tmp_path: Path, fresh: tuple[str, ...]
+def test_a_deck_from_inspect_to_modes(tmp_path: Path) -> None:
+    path = write_shrouded_deck(tmp_path)
+    said = done("inspect", str(tmp_path / "sector.inp"), "--frequencies", "2")
+    assert "set " in said
+    assert "Natural frequencies in Hz" in done("run", str(path), "--only", "modes", "--no-report")
+    assert not (tmp_path / "results" / "report.html").exists()
+
+
+def test_only_names_what_there_is(tmp_path: Path) -> None:
+    path = write_four_masses(tmp_path)
+    assert "Did you mean 'forced_response'?" in refused(
+        "run", str(path), "--only", "force_response"
+    )
+    assert f"{path}: modes: is missing. Add the table [modes]" in refused(
+        "run", str(path), "--only", "modes"
+    )
+
+
+def test_exit_codes_tell_points_without_solution_and_interruptions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = planar_friction(write_small_study(tmp_path), "flat", "curved")
-    kept = tmp_path / "results" / "result.nc"
-    kept.parent.mkdir()
-    kept.write_text("of an earlier run")
-    said = refused("run", str(path), "--verify", *fresh).splitlines()
-    assert said == [
-        (
-            f"{path}: contact.{side}.law: --verify integrates in time, which knows elastic_coulomb alone, got 'coupled_coulomb'. "
-            "Run without --verify, or give the law elastic_coulomb."
-        )
-        for side in ("flat", "curved")
-    ]
-    assert [p.name for p in kept.parent.iterdir()] == ["result.nc"]
-    assert kept.read_text() == "of an earlier run"
+    path = write_four_masses(tmp_path)
+    good = front.Result(xr.DataTree(xr.Dataset(attrs={"title": "t"})))
+    monkeypatch.setattr(Study, "run", lambda *_, **__: replace(good, failed=2))
+    ended = invoke("run", str(path), "--no-report")
+    assert ended.exit_code == 1
+    assert "2 of the points: marked in the result and in the report, not filled in" in ended.output
 
+    def stopped(*_: object, **__: object) -> None:
+        text = "Interrupted. The same command goes on from there."
+        raise Interrupted(text)
 
-def test_results_of_another_law_or_evaluator_are_not_mixed(tmp_path: Path) -> None:
-    leave_journal(write_small_study(tmp_path))
-    for changed in (
-        write_small_study(tmp_path, evaluator='"march"'),
-        planar_friction(write_small_study(tmp_path), "curved"),
-    ):
-        assert "what this command left here is of another or a changed study" in refused(
-            "run", str(changed)
-        )
-
-
-def test_run_that_costs_too_much_is_refused_before_meshing(tmp_path: Path) -> None:
-    path = write_small_study(tmp_path, airfoil_size_m="1e-5")
-    said = refused("check", str(path))
-    assert f"{path}: limits.memory_gb: the run is estimated at" in said
-    assert (
-        "the limit is 4 GB. Take a coarser mesh, fewer points, ratios or harmonics, or raise the limit."
-        in said
-    )
-    path = write_small_study(tmp_path, work_s="1e-3")
-    said = refused("check", str(path))
-    assert f"{path}: limits.work_s: the run is estimated at" in said
-    assert "the limit is 0.001 s." in said
-
-
-def test_node_sets_that_do_not_match_are_named(tmp_path: Path) -> None:
-    path = write_small_study(tmp_path)
-    text = path.read_text().replace("[damper]\n", "[damper]\nflat_angle_deg = 40.0\n")
-    path.write_text(text)
-    said = refused("check", str(path))
-    assert f"{path}: [blades] with [damper]: " in said
-    assert (
-        "non-matching node sets: these contact points of the damper are not on a platform's underside: L1.1 at"
-        in said
-    )
-    assert "L2.3 at" in said
-    assert "R.1" not in said
+    monkeypatch.setattr(Study, "run", stopped)
+    ended = invoke("run", str(path))
+    assert ended.exit_code == 130
+    assert "The same command goes on" in ended.stderr
 
 
 def test_report_of_nothing(tmp_path: Path) -> None:
     said = refused("report", str(tmp_path))
     assert str(tmp_path / "result.nc") in said
-
-
-def first_passage(index: int, hertz: float, error: float) -> ForcedPoint:
-    """Return a point with a predicted error (a fraction)."""
-    return ForcedPoint(
-        "low", index, 2 * np.pi * hertz, np.zeros((2, 1), dtype=complex), np.zeros(2), 0.1, Status.CONVERGED,
-        3, error, 0.0, 0.0, 0.0, harmonics=np.arange(2), asked=np.arange(6 if error > 0.05 else 0),
-    )  # fmt: skip
-
-
-def told(errors: list[float]) -> str:
-    """Return what is said of a load case whose points over the threshold a branch with many harmonics replaced."""
-    passage = [first_passage(i, 100.0 + i, e) for i, e in enumerate(errors)]
-    branch = [replace(p, stage="branch", predicted_error=np.nan) for p in passage]
-    kept = tuple(Accepted(p, None, None, None, np.nan) for p in branch)
-    solved = (*passage, *branch)
-    result = CaseResult(4.0, 1.0, solved, kept, -1, None, 0, (0, 1))
-    alert = Chooser("jacobian_alert", False, (0, 1), tuple(range(6)), 0.05, True, ("tip1.x",))
-    return choice_sentence(result, alert)
-
-
-def test_alert_is_told_where_a_branch_took_the_place_of_the_points_it_was_asked_at() -> None:
-    assert told([0.01, 0.06, 0.31, 0.02]) == (
-        "F_CL/F_HE = 4: 2 of 4 points repeated with 5 harmonics, at 101.00 to 102.00 Hz, because leaving the higher harmonics out "
-        "was predicted to change the response by more than 5 % (largest: 31 % at 102.00 Hz)."
-    )
-    assert "no frequency needs more harmonics; the largest predicted error is 2 %" in told(
-        [0.01, np.nan, 0.02]
-    )
-    assert "(largest: over 100 % at 101.00 Hz)" in told([0.01, 11.3])
-    assert told([np.nan]) == "F_CL/F_HE = 4: jacobian_alert was not asked."
-    assert "(largest: over 100 % at 101.00 Hz)" in told([0.01, np.inf])
-
-
-@pytest.mark.parametrize(
-    ("harmonics", "high", "advice"),
-    [
-        (10, (0, 1, 2, 3, 4, 5), "Raise harmonics.high, for instance to 10, and compare; a solution then has 21 unknowns"),
-        (10, (0, 1, 3, 5), "harmonics.high leaves out 2, 4: keep them, and compare; a solution then has 11 unknowns"),
-        (40, tuple(range(21)), "Raise harmonics.high, for instance to 30, and compare; a solution then has 61 unknowns"),
-        (60, tuple(range(31)), "No study keeps more than 30 harmonics"),
-    ],
-)  # fmt: skip
-def test_advice_names_the_harmonics_that_a_study_can_keep(
-    harmonics: int, high: tuple[int, ...], advice: str
-) -> None:
-    errors = np.array([0.01, np.nan, 2.0])
-    doubt = ReferenceDoubt(4.0, harmonics, high, 0.05, errors, 178.0, "5", "tip1.x")
-    assert "the largest change is over 100 % of tip1.x at 178.00 Hz" in doubt.sentence
-    assert "1 of 2 solutions" in doubt.sentence
-    assert "complex amplitude, phase included" in doubt.sentence
-    assert advice in doubt.warning
-    assert replace(doubt, errors=errors[:2]).warning == ""

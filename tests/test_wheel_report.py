@@ -5,6 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
+from stickslip.report.figure_campbell import campbell_diagram
+from stickslip.report.figure_diameters import safe_diagram, zigzag
+from stickslip.report.wheel_tables import interference
+from synthetic_result import provenance, tree_of, write_result
 from synthetic_wheel import (
     SECTORS,
     campbell_result,
@@ -12,32 +17,40 @@ from synthetic_wheel import (
     safe_result,
     skin,
     variable,
-    write_results,
 )
 from test_report import marks, needs_browser, open_page, page_text
 
-from stickslip.errors import InputError
 from stickslip.report.coarse_skin import coarse_skin
-from stickslip.report.figure_campbell import campbell_diagram
-from stickslip.report.figure_diameters import safe_diagram, zigzag
-from stickslip.report.figure_shapes import mode_shapes
-from stickslip.report.wheel_page import write_wheel_report
-from stickslip.report.wheel_result import load_wheel
-from stickslip.report.wheel_tables import interference
+from stickslip.report.page import plots, report_file, report_html
+from stickslip.report.sections.campbell import campbell_diagram
+from stickslip.report.sections.safe import interference, safe_diagram, zigzag
+from stickslip.report.waves import Waves
+
+TITLE = "A <flat> ring & nothing else"
+
+
+def view(data: xr.Dataset) -> Waves:
+    """Return the first case of a node."""
+    return Waves(data.isel(case=0))
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = write_results(
-        tmp_path_factory.mktemp("wheel"), modes_result(), campbell_result(), safe_result(0.1)
+    made = tmp_path_factory.mktemp("wheel")
+    tree = tree_of(
+        provenance(title=TITLE),
+        modes=modes_result(),
+        campbell=campbell_result(),
+        safe=safe_result(0.1),
     )
-    write_wheel_report(made, made / "report.html")
+    write_result(tree, made / "result.nc")
+    report_file(made)
     return made
 
 
 # chooses ND 2, mode 1, phase 90 degrees on the whole wheel, and tells where the drawn points are
 PROBE = """<script>
-const form = document.getElementById("shapes-form");
+const form = document.querySelector("form.shapes");
 form.elements.wave.value = "2";
 form.elements.phase.value = "90";
 form.dispatchEvent(new Event("input"));
@@ -92,35 +105,37 @@ def test_page_needs_no_network_and_tells_the_numbers(folder: Path) -> None:
     assert "mass of the wheel2 kg" in text
 
 
-def test_results_of_another_model_are_left_out(tmp_path: Path) -> None:
-    other = campbell_result().assign_attrs(model_hash="b")
-    folder = write_results(tmp_path, other, modes_result())
-    assert list(load_wheel(folder)) == ["modes"]
-    assert list(load_wheel(folder / "campbell.nc")) == ["campbell"]
+def test_modes_without_shapes_have_a_map_alone() -> None:
+    assert list(plots(tree_of(modes=modes_result().drop_vars("shape")))) == ["diameters"]
 
 
-def test_what_is_no_result_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="there is no result of a bladed disk"):
-        load_wheel(tmp_path)
-    write_results(tmp_path, modes_result().drop_vars("frequency_hz"))
-    with pytest.raises(InputError, match=r"modes\.nc: variables frequency_hz are missing"):
-        load_wheel(tmp_path)
-    (tmp_path / "modes.nc").write_text("no netCDF")
-    with pytest.raises(InputError, match="not a netCDF-4 file"):
-        load_wheel(tmp_path)
+def test_each_case_has_its_chapter_and_buttons_choose(tmp_path: Path) -> None:
+    data = modes_result()
+    two = xr.concat([data, data.assign(frequency_hz=2 * data["frequency_hz"])], "case")
+    two["case_label"] = "case", ["span = 1", "span = 2"]
+    two = two.assign(vary_value=(("case", "vary"), [[1.0], [2.0]])).assign_coords(vary=["span"])
+    html = report_html(tree_of(provenance(), modes=two))
+    assert html.count("<h2>Natural frequencies and mode shapes</h2>") == 1
+    assert 'data-case="0" aria-pressed="true"' in html
+    assert '<div data-case="0"><figure id="fig-diameters"' in html
+    assert '<div data-case="1" hidden><figure id="fig-diameters_1"' in html
 
 
-def test_modes_without_shapes_say_so(tmp_path: Path) -> None:
-    folder = write_results(tmp_path, modes_result().drop_vars("shape"))
-    plot = mode_shapes(load_wheel(folder)["modes"])
-    assert plot.figure is None
-    assert "holds no mode shapes" in plot.caption
+@needs_browser
+def test_choosing_a_case_shows_its_chapter(tmp_path: Path) -> None:
+    data = modes_result()
+    two = xr.concat([data, data], "case")
+    two["case_label"] = "case", ["span = 1", "span = 2"]
+    write_result(tree_of(provenance(), modes=two), tmp_path / "result.nc")
+    probe = """<script>document.querySelector('.chooser button[data-case="1"]').click();</script>"""
+    opened = open_page(report_file(tmp_path), tmp_path, probe)
+    assert opened.errors == []
+    assert '<div data-case="0" hidden' in opened.dom
+    assert marks(opened.figure("diameters_1")) > 10
 
 
-def test_every_line_of_a_campbell_diagram_can_be_told_without_colours(tmp_path: Path) -> None:
-    folder = write_results(tmp_path, campbell_result())
-    plot = campbell_diagram(load_wheel(folder)["campbell"])
-    assert plot.figure is not None
+def test_every_line_of_a_campbell_diagram_can_be_told_without_colours() -> None:
+    plot = campbell_diagram(view(campbell_result()))
     lines = [t for t in plot.figure.data if t.mode == "lines+markers+text"]
     labels = [[text for text in line.text if text] for line in lines]
     assert labels == [[f"ND {k}, {m}"] for k in (2, 3) for m in (1, 2, 3)]
@@ -134,25 +149,26 @@ def test_every_line_of_a_campbell_diagram_can_be_told_without_colours(tmp_path: 
         assert all(i != j or abs(one - other) > 0.04 * top for j, other in heights[:n])
 
 
-def test_orders_that_leave_the_picture_or_the_modes_are_named(tmp_path: Path) -> None:
+def test_orders_that_leave_the_picture_or_the_modes_are_named() -> None:
     data = campbell_result()
-    orders = variable("unfollowed", [6]), variable("unfollowed", [4321.0])
+    orders = variable("case unfollowed", [[6]]), variable("case unfollowed", [[4321.0]])
     data = data.assign(unfollowed_engine_order=orders[0], unfollowed_from_rpm=orders[1])
     highest = float(data.frequency_hz.max())
     hidden = [m for m in (2, 3, 5, 6) if m * 200.0 > 1.06 * highest]  # at 12000 rpm
     assert hidden
-    plot = campbell_diagram(load_wheel(write_results(tmp_path, data))["campbell"])
+    plot = campbell_diagram(view(data))
     assert f"the lines of {', '.join(f'EO {m}' for m in hidden)}." in plot.caption
     assert "EO 6 from 4321 rpm" in plot.caption
 
 
-def test_orders_that_are_not_judged_are_crossed_out(tmp_path: Path) -> None:
+def test_orders_that_are_not_judged_are_crossed_out() -> None:
     data = safe_result(0.1)
     data["pair_judged"] = (data.pair_engine_order != 12).astype(int)
-    data["pair_resonance_rpm"] = variable("pair", np.full(data.sizes["pair"], np.inf), "rpm")
-    result = load_wheel(write_results(tmp_path, data))["safe"]
+    data["pair_resonance_rpm"] = variable(
+        "case pair", np.full((1, data.sizes["pair"]), np.inf), "rpm"
+    )
+    result = view(data)
     plot = safe_diagram(result)
-    assert plot.figure is not None
     orders = next(t for t in plot.figure.data if t.name == "engine orders asked")
     crossed = [
         t.strip() for t, s in zip(orders.text, orders.marker.symbol, strict=True) if "x" in s
