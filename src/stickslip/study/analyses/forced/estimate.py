@@ -14,10 +14,11 @@ from stickslip.response.forced.response import Sweep
 BYTES_A_NODE = 35e3  # assembly and factorisation of second-order tetrahedra, measured at 10 to 30 thousand nodes
 BASE_GB = 0.35  # interpreter and libraries
 POINTS = 1.7  # points of a branch for each one asked: more are taken where the response turns
-NEWTON_A_POINT = 10  # the two blades took 7, repeats and failed tries included
+NEWTON_A_POINT = 6  # repeats and failed tries included: the two blades took 1 to 19 in a case and 6 over all, four masses 11
 REPEATED = 0.6  # share of points that a strategy solves with many harmonics
+SECONDS_A_STEP = 1.5e-3  # of Newton, however few unknowns it has
 FLOPS = 2e9  # of a Newton step: a small dense factorisation on one core, and the contacts
-SECONDS_A_NODE = 1.2e-3  # assembly, reduction and the full model's frequencies
+SECONDS_A_NODE = 2e-3  # assembly, reduction and the full model's frequencies
 
 
 @dataclass(frozen=True)
@@ -62,9 +63,12 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
     kept = always_kept(sweep.strategy)
     share_high = {"low": 0.0, "high": 1.0}.get(kept or "", REPEATED)
     # each strategy looks at the larger space about once a point
-    steps_high = points * share_high * NEWTON_A_POINT + (points if kept is None else 0)
+    judged = points if kept is None else 0
+    steps_high = points * share_high * NEWTON_A_POINT
     steps_low = 0 if kept == "high" else points * NEWTON_A_POINT
-    seconds = (steps_low * low**3 + steps_high * high**3) * 4 / FLOPS + nodes * SECONDS_A_NODE
+    flops = 4 * (steps_low * low**3 + (steps_high + judged) * high**3)
+    steps = (steps_low + steps_high + judged) * SECONDS_A_STEP
+    seconds = flops / FLOPS + steps + nodes * SECONDS_A_NODE
     stored = points * (sweep.high_harmonics[-1] + 1) * 10 * coordinates * 16 / 1e9
     memory = BASE_GB + nodes * BYTES_A_NODE / 1e9 + stored + 6 * high**2 * 8 / 1e9
     return Estimate(nodes, high, memory, round(steps_low + steps_high), seconds)
