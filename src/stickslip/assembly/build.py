@@ -18,18 +18,19 @@ from stickslip.assembly.forces import (
     output_labels,
 )
 from stickslip.assembly.model import Model
+from stickslip.assembly.places import picked
 from stickslip.assembly.reduced import Store, in_memory, reduced_parts
 from stickslip.assembly.statics import pressed_by, static_contact_force
 from stickslip.assembly.waves import reduced_sector
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws import LAWS
-from stickslip.errors import input_error
+from stickslip.errors import InputError, input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
 from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.structure import Structure, join
 from stickslip.reduction.cache import content_hash
-from stickslip.reduction.waves import excited_wave
+from stickslip.reduction.waves import excited_wave, wave
 from stickslip.response.equilibrium import preload
 from stickslip.response.system import System
 
@@ -52,6 +53,9 @@ class Linear:
         From dofs of all parts to coordinates; the second argument is the key that asks.
     load
         From a force on the dofs of all parts, in a harmonic, to one on the coordinates.
+    of_wave
+        From a wave number to a structure whose modes are those of the reduced model, its gaps, and its coordinates of dofs of all
+        parts.
     """
 
     side: LinearSide
@@ -59,6 +63,7 @@ class Linear:
     steady: FloatArray
     of_dofs: Any
     load: Any
+    of_wave: Any
 
 
 def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
@@ -78,6 +83,7 @@ def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
         raise input_error(
             "contact", "there is none: no coordinate would be left to solve for", "Give a contact."
         )
+    _refuse_rigid(model)
     kept = np.concatenate([labels.dofs, watched, *(np.flatnonzero(f) for f in forces.values())])
     stay = np.concatenate([labels.dofs, watched])
     linear = linear_side(model, order or 0, harmonics, kept, stay, store)
@@ -91,7 +97,7 @@ def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
     load = _loads(model, linear, forces)
     held = system.with_retention(model.retention)
     gap, force = static_state(held, load.static)
-    checked = frequencies(model, system, order, store)
+    checked = frequencies(model, linear, system.interface.stuck_stiffness(), order, store)
     peak = labels.names.index(model.peak_output) if model.peak_output in labels.names else 0
     if model.peak_output and model.peak_output not in labels.names:
         labels.of((model.peak_output,), "output.peak")
@@ -119,6 +125,15 @@ def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
         },
         warnings=(*model.warnings, *checked.warnings()),
     )
+
+
+def _refuse_rigid(model: Model) -> None:
+    """Refuse laws whose force is no function of the gap."""
+    for law, group in dict(zip(model.pairs.laws, model.pairs.groups, strict=True)).items():
+        try:
+            law.stuck_stiffness()
+        except InputError as error:
+            raise error.inside(f"contact.{group}.law") from None
 
 
 def _refuse_beyond(model: Model, harmonics: int) -> None:
@@ -165,7 +180,7 @@ def linear_side(
     kept
         Dofs of all parts that stay physical beside those of contacts and joins.
     stay
-        Those that have to be coordinates of their own.
+        Outputs, which have to be coordinates of their own.
     store
         As in `Model.assembled`.
     """
@@ -177,8 +192,8 @@ def linear_side(
     kept = np.unique(np.concatenate([kept, *bodies]))
     if model.neighbours is None:
         return _of_one(model, kept, store)
-    stay = np.concatenate([stay, *bodies])
-    found = reduced_sector(model, (order, harmonics), kept, stay, store)
+    own = np.concatenate([kept[:0], *bodies])
+    found = reduced_sector(model, (order, harmonics), kept, (stay, own), store)
     at = model.coordinates
 
     def of_dofs(dofs: IntArray, place: str) -> IntArray:
@@ -188,7 +203,18 @@ def linear_side(
         number = excited_wave(order, model.sectors, harmonic)
         return found.load(at.load(force), number)
 
-    return Linear(found.wheel, found.gaps, found.steady, of_dofs, load)
+    def of_wave(number: int) -> tuple[Structure, Matrix, Any]:
+        own, following = (at.columns(m) for m in (model.pairs.own, model.pairs.following))
+        phase = wave(number, model.sectors).phase
+        gaps = found.on_wave(own + phase * following, number)
+
+        def place(dofs: IntArray) -> IntArray:
+            rows = at.columns(picked(dofs, model.places.n))
+            return np.asarray(found.on_wave(rows, number).indices, dtype=np.int64)
+
+        return found.waves[number][0], gaps, place
+
+    return Linear(found.wheel, found.gaps, found.steady, of_dofs, load, of_wave)
 
 
 def _of_one(model: Model, kept: IntArray, store: Store) -> Linear:
@@ -211,7 +237,12 @@ def _of_one(model: Model, kept: IntArray, store: Store) -> Linear:
     def load(force: Matrix, _harmonic: int) -> Matrix:
         return _on_kept(at, force)
 
-    return Linear(structure, at.columns(model.pairs.own), steady, of_dofs, load)
+    gaps = at.columns(model.pairs.own)
+
+    def of_wave(_number: int) -> tuple[Structure, Matrix, Any]:
+        return structure, gaps, lambda dofs: of_dofs(dofs, "part")
+
+    return Linear(structure, gaps, steady, of_dofs, load, of_wave)
 
 
 def _on_kept(at: Coordinates, force: Matrix) -> Matrix:
@@ -223,10 +254,15 @@ def _on_kept(at: Coordinates, force: Matrix) -> Matrix:
 
 def _free(model: Model, linear: Linear) -> IntArray | None:
     """Return the coordinates of rigid bodies that no join holds."""
+    dofs = _free_dofs(model)
+    return linear.of_dofs(dofs, "part") if dofs.size else None
+
+
+def _free_dofs(model: Model) -> IntArray:
     tied = np.unique(model.ties.weights.nonzero()[1])
     bodies = [model.places.own(name) for name, p in model.parts.items() if p.body is not None]
     dofs = [own for own in bodies if not np.isin(own, tied).any()]
-    return linear.of_dofs(np.concatenate(dofs), "part") if dofs else None
+    return np.concatenate([np.zeros(0, dtype=np.int64), *dofs])
 
 
 def _loads(model: Model, linear: Linear, forces: dict[str, Matrix]) -> HarmonicLoad:
@@ -290,13 +326,15 @@ def pressed_points(model: Model) -> BoolArray:
     return pressed_by(model.pairs.laws, force)
 
 
-def frequencies(model: Model, system: System, order: int | None, store: Store) -> Frequencies:
-    """Compare natural frequencies of the full and the reduced model, contacts open and stuck."""
-    number = 0 if order is None else order
-    reduced = system.structure.of_harmonic(1 if order is not None else 0)
-    springs = system.interface.stuck_stiffness()
-    free = reduced if system.free is None else _without(reduced, system.free)
-    stuck = with_springs(reduced, system.interface.gap_operator, springs)
+def frequencies(
+    model: Model, linear: Linear, springs: FloatArray, order: int | None, store: Store
+) -> Frequencies:
+    """Compare natural frequencies of the full and the reduced model, contacts open and stuck; of a wheel, of harmonic 1."""
+    number = 0 if order is None else excited_wave(order, model.sectors)
+    reduced, gaps, place = linear.of_wave(number)
+    bodies = _free_dofs(model)
+    free = _without(reduced, place(bodies)) if bodies.size else reduced
+    stuck = with_springs(reduced, gaps, springs)
     count = min(MODES, *(int(np.count_nonzero(s.mass.diagonal())) for s in (free, stuck)))
     full = [partial(model.at, model.speed, number, how) for how in ("open", "stuck")]
     found = [_lowest(model, at(), count, store) for at in full]

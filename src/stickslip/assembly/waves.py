@@ -27,7 +27,11 @@ REMEMBERED = 64  # waves kept in memory
 
 
 def reduced_sector(
-    model: Model, order: tuple[int, int], kept: IntArray, stay: IntArray, store: Store
+    model: Model,
+    order: tuple[int, int],
+    kept: IntArray,
+    stay: tuple[IntArray, IntArray],
+    store: Store,
 ) -> ReducedSector:
     """Reduce the waves that an engine order excites.
 
@@ -38,7 +42,7 @@ def reduced_sector(
     order
         Engine order and highest harmonic.
     kept, stay
-        Dofs of all parts that stay physical, and those that have to be coordinates of their own.
+        Dofs of all parts that stay physical, and those that have to be coordinates of their own: outputs, rigid bodies.
     store
         As in `Model.assembled`.
     """
@@ -82,8 +86,10 @@ def reduced_sector(
         return conjugate(structure), np.conj(load)
 
     waves = {k: wave(k) for k in wave_numbers(model.sectors, *order)}
-    stay = at.of_dofs(np.unique(stay), model.places.dofs, "output.points")
-    return wheel_of(sector, kept, waves, order, pairs, stay)
+    shown, bodies = (
+        at.of_dofs(np.unique(dofs), model.places.dofs, "output.points") for dofs in stay
+    )
+    return wheel_of(sector, kept, waves, order, pairs, (shown, bodies))
 
 
 def _sector_at_speed(model: Model) -> tuple[Structure, FloatArray]:

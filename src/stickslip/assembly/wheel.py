@@ -169,8 +169,10 @@ class ReducedSector:
         (k,) its dofs that the first coordinates of reduced waves are.
     ways
         Wave number -> (n0, n) from the coordinates to those of the reduced wave.
+    waves
+        Wave number -> reduced wave and load of steady rotation, as `reduced_wave` made them.
     wheel
-        Waves without their way back.
+        The same in these coordinates, without their way back.
     gaps
         (3 p, n) CSR.
     steady
@@ -180,6 +182,7 @@ class ReducedSector:
     sector: CyclicSector
     kept: IntArray
     ways: Mapping[int, Matrix]
+    waves: Mapping[int, tuple[Structure, Matrix]]
     wheel: TunedWheel
     gaps: Matrix
     steady: FloatArray
@@ -191,6 +194,13 @@ class ReducedSector:
         own = np.zeros(self.ways[k].shape[0], dtype=on_wave.dtype)
         own[: self.kept.size] = on_wave[np.searchsorted(self.sector.independent, self.kept)]
         return np.asarray(self.ways[k].conj().T @ own)
+
+    def on_wave(self, operator: Matrix, k: int) -> Matrix:
+        """Return an operator (m, n_sector) on kept dofs as one on the coordinates of the reduced wave as it was made."""
+        moved = scipy.sparse.csr_array(operator @ self.sector.wave_tie(k))
+        own = moved[:, np.searchsorted(self.sector.independent, self.kept)].tocoo()
+        shape = (own.shape[0], self.waves[k][0].n)
+        return scipy.sparse.csr_array((own.data, (own.row, own.col)), shape=shape)
 
     def of_dofs(self, dofs: IntArray, place: str) -> IntArray:
         """Return the coordinates that dofs of the sector are; `place` is the key that asks for them."""
@@ -246,7 +256,7 @@ def wheel_of(
     waves: Mapping[int, tuple[Structure, Matrix]],
     order: tuple[int, int],
     pairs: Pairs,
-    stay: IntArray,
+    stay: tuple[IntArray, IntArray],
 ) -> ReducedSector:
     """Put the waves together, in gaps where these do not depend on each other and no coordinate that has to stay is touched.
 
@@ -261,16 +271,19 @@ def wheel_of(
     pairs
         Contacts, on the dofs of the sector.
     stay
-        Dofs that have to stay coordinates: outputs, rigid bodies.
+        Dofs that have to stay coordinates: outputs, in the phase of this sector, and rigid bodies.
     """
     place = np.searchsorted(sector.independent, kept)
-    nodal = nodal_coordinates(sector, place, waves[0][0].n, (pairs.own, pairs.following))
+    shown = picked(stay[0], sector.structure.n)
+    following = scipy.sparse.vstack([pairs.following, scipy.sparse.csr_array(shown.shape)])
+    known = scipy.sparse.vstack([pairs.own, shown]), following
+    nodal = nodal_coordinates(sector, place, waves[0][0].n, known)
     phases = {k: wave(k, sector.sectors).phase for k in waves}
     written = {k: nodal.of_wave(structure, phases[k]) for k, (structure, _) in waves.items()}
     ways = {k: scipy.sparse.csr_array(structure.basis) for k, structure in written.items()}
-    gaps = nodal.operator
+    gaps = nodal.operator[: pairs.own.shape[0]]
     touched = np.unique(gaps.nonzero()[1])
-    hidden = np.isin(kept[touched[touched < kept.size]], partners(sector)[stay])
+    hidden = np.isin(kept[touched[touched < kept.size]], partners(sector)[np.concatenate(stay)])
     if touched.size and not hidden.any() and not nodal.multipliers.size:
         # the gaps are the same combinations in all waves, and so is what is beside them
         plain = {k: replace(structure, basis=None) for k, structure in written.items()}
@@ -286,4 +299,4 @@ def wheel_of(
     structures = {k: replace(structure, basis=None) for k, structure in written.items()}
     wheel = TunedWheel(structures, sector.sectors, *order, nodal.multipliers)
     steady = np.real(ways[0].conj().T @ waves[0][1])
-    return ReducedSector(sector, kept, ways, wheel, scipy.sparse.csr_array(gaps), steady)
+    return ReducedSector(sector, kept, ways, waves, wheel, scipy.sparse.csr_array(gaps), steady)
