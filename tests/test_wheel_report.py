@@ -6,9 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from stickslip.report.figure_campbell import campbell_diagram
-from stickslip.report.figure_diameters import safe_diagram, zigzag
-from stickslip.report.wheel_tables import interference
 from synthetic_result import provenance, tree_of, write_result
 from synthetic_wheel import (
     SECTORS,
