@@ -105,10 +105,8 @@ def nodes_of(model: Model) -> int:
 
 
 def retained_of(model: Model) -> int:
-    """Return how many coordinates stay unknown: those of contacts and free rigid bodies, of a wheel its gaps."""
+    """Return how many coordinates stay unknown: dofs under contacts and of free rigid bodies; of a wheel in gaps it is half as many."""
     pairs = (model.pairs.own, model.pairs.following)
-    if model.sectors > 1:
-        return np.unique(np.concatenate([p.nonzero()[0] for p in pairs])).size
     bodies = [model.places.own(name) for name, part in model.parts.items() if part.body is not None]
     return np.unique(np.concatenate([*bodies, *(p.nonzero()[1] for p in pairs)])).size
 
