@@ -262,6 +262,8 @@ def test_what_is_not_asked_for_is_told(tmp_path: Path) -> None:
         run_study(made, only=["modes"])
     with pytest.raises(InputError, match=r"asks for nothing\. Add a table of an analysis"):
         run_study(study(tmp_path, asked=()))
+    with pytest.raises(InputError, match=r"--workers: must be above zero, got 0"):
+        run_study(made, workers=0)
     assert not made.folder.exists()
 
 

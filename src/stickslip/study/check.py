@@ -1,15 +1,14 @@
 """Everything of a run but the computation: models, static state, natural frequencies, choices, cost. Nothing is written."""
 
-from typing import Any
-
 from stickslip.assembly.model import Model
 from stickslip.study.keep.progress import LOG
+from stickslip.study.models.study import Study
 from stickslip.study.run import asked_for, of_task
 
 WARNING = "WARNING: "
 
 
-def check_study(study: Any) -> tuple[str, ...]:
+def check_study(study: Study) -> tuple[str, ...]:
     """Build every model and refuse what a run would refuse; tell what is known beforehand, and return warnings.
 
     Raises

@@ -8,6 +8,7 @@ from typing import Any
 
 import xarray as xr
 
+from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.analysis import Analysis, Case, Solved, TextTable
 from stickslip.study.keep.journal import read_note, read_sealed
 from stickslip.study.keep.netcdf import variable
@@ -88,20 +89,25 @@ class Book:
         for text in doubts:
             if text not in self.warnings:
                 LOG.warning(text)
-        self.doubts[asked.name] = doubts
         failed = int(node.attrs.get("failed", 0)) + len(unsolved)
+        self.doubts[asked.name] = doubts
         self.nodes[asked.name] = node.assign_attrs(warnings=json.dumps(doubts), failed=failed)
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Those of all analyses, each once."""
-        return tuple(dict.fromkeys(text for own in self.doubts.values() for text in own))
+        return tuple(dict.fromkeys(text for name in self._names for text in self.doubts[name]))
+
+    @property
+    def _names(self) -> list[str]:
+        """Names of the nodes, in an order that does not depend on which job ended first."""
+        return sorted(self.nodes, key=[*ANALYSES, *self.nodes].index)
 
     def tree(self, *, complete: bool) -> xr.DataTree:
         """Return the tree of all nodes, with what it comes from."""
         attributes = self.origin.attributes(self.warnings, complete=complete)
         root = xr.Dataset(attrs=attributes)
-        return xr.DataTree.from_dict({"/": root, **self.nodes})
+        return xr.DataTree.from_dict({"/": root, **{n: self.nodes[n] for n in self._names}})
 
     def outcome(self, asked: Sequence[Analysis]) -> Outcome:
         """Return what a run has found that has answered everything it was asked."""

@@ -8,6 +8,7 @@ from contextlib import closing, contextmanager
 from dataclasses import fields, replace
 from functools import cache
 from hashlib import sha256
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -25,13 +26,14 @@ from stickslip.study.keep.progress import LOG, Interrupted, at_work, written_dow
 from stickslip.study.keep.provenance import Provenance, library_versions
 from stickslip.study.keep.store import PartStore
 from stickslip.study.keep.workers import executor
+from stickslip.study.models.study import Study
 from stickslip.study.outcome import CHECKED, UNSOLVED, Book, Outcome, Task, checked
 
 NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
 
 
 def run_study(
-    study: Any,
+    study: Study,
     *,
     only: Sequence[str] = (),
     workers: int = 1,
@@ -61,6 +63,10 @@ def run_study(
         If the user stops it; the message says how to go on.
     """
     asked = asked_for(study, only)
+    if workers < 1:
+        raise input_error(
+            "--workers", f"must be above zero, got {workers}", "Leave it out for one."
+        )
     with locked_folder(study.folder), written_down(study.folder / LOG_FILE):
         LOG.info(f"stickslip {__version__}, study {study.path}")
         try:
@@ -72,7 +78,7 @@ def run_study(
             ) from None
 
 
-def asked_for(study: Any, only: Sequence[str] = ()) -> list[Analysis]:
+def asked_for(study: Study, only: Sequence[str] = ()) -> list[Analysis]:
     """Return the analyses that a study asks for, in their order.
 
     Raises
@@ -113,7 +119,7 @@ def answer(asked: Analysis, cases: Sequence[Case], title: str = "") -> Outcome:
 
 
 def _run(
-    study: Any, asked: Sequence[Analysis], workers: int, fresh: bool, checks: frozenset[str]
+    study: Study, asked: Sequence[Analysis], workers: int, fresh: bool, checks: frozenset[str]
 ) -> Outcome:
     book = Book(Provenance(study.title, study.text, library_versions()))
     store = PartStore(study.folder / PARTS, fresh=fresh)
@@ -144,7 +150,7 @@ def _run(
 
 
 def _tasks(
-    study: Any,
+    study: Study,
     asked: Sequence[Analysis],
     cases: Sequence[Case],
     checks: frozenset[str],
@@ -167,7 +173,7 @@ def _task(asked: Analysis, case: Case, folder: Path, versions: Mapping[str, str]
 
 
 @contextmanager
-def of_task(study: Any, case: Case) -> Iterator[None]:
+def of_task(study: Study, case: Case) -> Iterator[None]:
     """Let a refusal name the study's file, and the case where there are several."""
     try:
         yield
@@ -176,7 +182,7 @@ def of_task(study: Any, case: Case) -> Iterator[None]:
         raise error.inside(place) from None
 
 
-def _inputs(study: Any, task: Task) -> Any:
+def _inputs(study: Study, task: Task) -> Any:
     model = task.case.build()
     with of_task(study, task.case):
         return task.analysis.inputs(task.case, model)
@@ -188,7 +194,9 @@ def _label(asked: Analysis, case: Case) -> str:
 
 
 def _meshes(cases: Iterable[Case]) -> dict[str, SolidMesh]:
-    """Return the meshes of the parts of the first case that is built, for pictures."""
+    """Return the meshes of the parts of the first case that is built, for pictures; none where nothing can write them."""
+    if find_spec("meshio") is None:
+        return {}
     for case in cases:
         parts = case.build().parts.items()
         return {name: part.mesh for name, part in parts if part.mesh is not None}
