@@ -9,7 +9,11 @@ from stickslip.arrays import FloatArray
 from stickslip.contact.element import element, element_step, slider_start
 from stickslip.contact.law import UNCOUPLED_TANGENTS
 from stickslip.contact.laws.parameter_checks import check_any_stiffness, check_not_negative
-from stickslip.units import quantity
+from stickslip.contact.laws.quantities import (
+    axial_stiffness,
+    normal_stiffness,
+    tangential_stiffness,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,15 +31,9 @@ class Bonded:
         If a stiffness is negative or not finite, or all are zero.
     """
 
-    k_t: float = quantity(
-        "stiffness along the tangent t", "n_per_m", key="tangential_stiffness", least=0, shared=True
-    )
-    k_w: float = quantity(
-        "stiffness along the tangent w", "n_per_m", key="axial_stiffness", least=0, shared=True
-    )
-    k_n: float = quantity(
-        "stiffness along the normal", "n_per_m", key="normal_stiffness", least=0, shared=True
-    )
+    k_t: float = tangential_stiffness()
+    k_w: float = axial_stiffness()
+    k_n: float = normal_stiffness()
 
     kernel: ClassVar[Any] = element_step
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS

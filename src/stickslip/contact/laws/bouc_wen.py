@@ -14,6 +14,11 @@ from stickslip.contact.laws.parameter_checks import (
     check_not_negative,
     check_positive,
 )
+from stickslip.contact.laws.quantities import (
+    axial_stiffness,
+    normal_stiffness,
+    tangential_stiffness,
+)
 from stickslip.errors import input_error
 from stickslip.units import quantity
 
@@ -168,9 +173,7 @@ class BoucWen:
         If a parameter is not finite or out of its range.
     """
 
-    k_t: float = quantity(
-        "stiffness along the tangent t", "n_per_m", key="tangential_stiffness", least=0, shared=True
-    )
+    k_t: float = tangential_stiffness()
     beta: float = quantity("shape of the loop β, m to the power of minus the exponent", above=0)
     gamma: float = quantity("shape of the loop γ, above -β and at most β")
     alpha: float = quantity(
@@ -178,22 +181,8 @@ class BoucWen:
     )
     a: float = quantity("slope of the hysteretic part at zero force", default=1.0, above=0)
     exponent: float = quantity("sharpness of the knee", default=1.0, least=1, most=20)
-    k_w: float = quantity(
-        "stiffness along the tangent w",
-        "n_per_m",
-        default=0.0,
-        key="axial_stiffness",
-        least=0,
-        shared=True,
-    )
-    k_n: float = quantity(
-        "stiffness along the normal",
-        "n_per_m",
-        default=0.0,
-        key="normal_stiffness",
-        least=0,
-        shared=True,
-    )
+    k_w: float = axial_stiffness(default=0.0)
+    k_n: float = normal_stiffness(default=0.0)
 
     kernel: ClassVar[Any] = law_kernel(_step)
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS

@@ -12,6 +12,7 @@ from stickslip.contact.laws.parameter_checks import (
     check_finite,
     check_not_negative,
 )
+from stickslip.contact.laws.quantities import friction_coefficient, normal_stiffness
 from stickslip.units import quantity
 
 
@@ -90,12 +91,8 @@ class CoupledCoulomb:
         least=0,
         shared=True,
     )
-    k_n: float = quantity(
-        "stiffness along the normal", "n_per_m", key="normal_stiffness", least=0, shared=True
-    )
-    mu: float = quantity(
-        "friction coefficient (steel on steel: 0.6)", key="friction_coefficient", least=0, most=5
-    )
+    k_n: float = normal_stiffness()
+    mu: float = friction_coefficient()
     preload: float = 0.0
 
     kernel: ClassVar[Any] = law_kernel(_step)

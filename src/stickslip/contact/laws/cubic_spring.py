@@ -13,6 +13,11 @@ from stickslip.contact.laws.parameter_checks import (
     check_not_negative,
 )
 from stickslip.contact.laws.polynomial_spring import polynomial_step
+from stickslip.contact.laws.quantities import (
+    axial_stiffness,
+    normal_stiffness,
+    tangential_stiffness,
+)
 from stickslip.units import quantity
 
 
@@ -54,30 +59,9 @@ class CubicSpring:
         default=0.0,
         shared=True,
     )
-    k_t: float = quantity(
-        "stiffness along the tangent t",
-        "n_per_m",
-        default=0.0,
-        key="tangential_stiffness",
-        least=0,
-        shared=True,
-    )
-    k_w: float = quantity(
-        "stiffness along the tangent w",
-        "n_per_m",
-        default=0.0,
-        key="axial_stiffness",
-        least=0,
-        shared=True,
-    )
-    k_n: float = quantity(
-        "stiffness along the normal",
-        "n_per_m",
-        default=0.0,
-        key="normal_stiffness",
-        least=0,
-        shared=True,
-    )
+    k_t: float = tangential_stiffness(default=0.0)
+    k_w: float = axial_stiffness(default=0.0)
+    k_n: float = normal_stiffness(default=0.0)
 
     kernel: ClassVar[Any] = polynomial_step
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS

@@ -12,7 +12,12 @@ from stickslip.contact.laws.parameter_checks import (
     check_not_negative,
     check_positive,
 )
-from stickslip.units import quantity
+from stickslip.contact.laws.quantities import (
+    axial_stiffness,
+    normal_stiffness,
+    slip_limit,
+    tangential_stiffness,
+)
 
 
 def _step(displacement, velocity, state, parameters, force, new_state, jac, status):  # type: ignore[no-untyped-def]
@@ -62,32 +67,10 @@ class Dahl:
         If a parameter is not finite or out of its range.
     """
 
-    k_t: float = quantity(
-        "stiffness along the tangent t", "n_per_m", key="tangential_stiffness", least=0, shared=True
-    )
-    limit: float = quantity(
-        "friction force at which all has slipped, along either tangent",
-        "n",
-        key="slip_limit",
-        least=0,
-        shared=True,
-    )
-    k_w: float = quantity(
-        "stiffness along the tangent w",
-        "n_per_m",
-        default=0.0,
-        key="axial_stiffness",
-        least=0,
-        shared=True,
-    )
-    k_n: float = quantity(
-        "stiffness along the normal",
-        "n_per_m",
-        default=0.0,
-        key="normal_stiffness",
-        least=0,
-        shared=True,
-    )
+    k_t: float = tangential_stiffness()
+    limit: float = slip_limit()
+    k_w: float = axial_stiffness(default=0.0)
+    k_n: float = normal_stiffness(default=0.0)
 
     kernel: ClassVar[Any] = law_kernel(_step)
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS

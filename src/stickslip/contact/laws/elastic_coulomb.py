@@ -13,6 +13,12 @@ from stickslip.contact.laws.parameter_checks import (
     check_finite,
     check_not_negative,
 )
+from stickslip.contact.laws.quantities import (
+    axial_stiffness,
+    friction_coefficient,
+    normal_stiffness,
+    tangential_stiffness,
+)
 from stickslip.errors import input_error
 from stickslip.units import quantity
 
@@ -45,18 +51,10 @@ class ElasticCoulomb:
         If a parameter is not finite or out of its range.
     """
 
-    k_t: float = quantity(
-        "stiffness along the tangent t", "n_per_m", key="tangential_stiffness", least=0, shared=True
-    )
-    k_w: float = quantity(
-        "stiffness along the tangent w", "n_per_m", key="axial_stiffness", least=0, shared=True
-    )
-    k_n: float = quantity(
-        "stiffness along the normal", "n_per_m", key="normal_stiffness", least=0, shared=True
-    )
-    mu: float = quantity(
-        "friction coefficient (steel on steel: 0.6)", key="friction_coefficient", least=0, most=5
-    )
+    k_t: float = tangential_stiffness()
+    k_w: float = axial_stiffness()
+    k_n: float = normal_stiffness()
+    mu: float = friction_coefficient()
     preload: float = 0.0
     residual_traction: float | None = quantity(
         "share of the friction limit that each tangential spring is stretched by before the first period; left out: unstretched at zero displacement",

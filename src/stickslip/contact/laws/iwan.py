@@ -10,7 +10,12 @@ from stickslip.contact.element import ROUND_OFF, element
 from stickslip.contact.law import SLIP, STICK, UNCOUPLED_TANGENTS, law_kernel
 from stickslip.contact.laws.iwan_populations import Population, UniformBand
 from stickslip.contact.laws.parameter_checks import check_any_stiffness, check_not_negative
-from stickslip.units import quantity
+from stickslip.contact.laws.quantities import (
+    axial_stiffness,
+    normal_stiffness,
+    slip_limit,
+    tangential_stiffness,
+)
 
 
 def _step(displacement, velocity, state, parameters, force, new_state, jac, status):  # type: ignore[no-untyped-def]
@@ -70,32 +75,10 @@ class Iwan:
         If a parameter is negative or not finite, or all stiffnesses are zero.
     """
 
-    k_t: float = quantity(
-        "stiffness along the tangent t", "n_per_m", key="tangential_stiffness", least=0, shared=True
-    )
-    limit: float = quantity(
-        "friction force at which all has slipped, along either tangent",
-        "n",
-        key="slip_limit",
-        least=0,
-        shared=True,
-    )
-    k_w: float = quantity(
-        "stiffness along the tangent w",
-        "n_per_m",
-        default=0.0,
-        key="axial_stiffness",
-        least=0,
-        shared=True,
-    )
-    k_n: float = quantity(
-        "stiffness along the normal",
-        "n_per_m",
-        default=0.0,
-        key="normal_stiffness",
-        least=0,
-        shared=True,
-    )
+    k_t: float = tangential_stiffness()
+    limit: float = slip_limit()
+    k_w: float = axial_stiffness(default=0.0)
+    k_n: float = normal_stiffness(default=0.0)
     population: Population = field(default_factory=UniformBand)
 
     kernel: ClassVar[Any] = law_kernel(_step)

@@ -9,7 +9,12 @@ from stickslip.arrays import FloatArray
 from stickslip.contact.element import element, element_step, slider_start
 from stickslip.contact.law import UNCOUPLED_TANGENTS
 from stickslip.contact.laws.parameter_checks import check_any_stiffness, check_not_negative
-from stickslip.units import quantity
+from stickslip.contact.laws.quantities import (
+    axial_stiffness,
+    normal_stiffness,
+    slip_limit,
+    tangential_stiffness,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,32 +40,10 @@ class Jenkins:
         If a parameter is negative or not finite, or all stiffnesses are zero.
     """
 
-    k_t: float = quantity(
-        "stiffness along the tangent t", "n_per_m", key="tangential_stiffness", least=0, shared=True
-    )
-    limit: float = quantity(
-        "friction force at which all has slipped, along either tangent",
-        "n",
-        key="slip_limit",
-        least=0,
-        shared=True,
-    )
-    k_w: float = quantity(
-        "stiffness along the tangent w",
-        "n_per_m",
-        default=0.0,
-        key="axial_stiffness",
-        least=0,
-        shared=True,
-    )
-    k_n: float = quantity(
-        "stiffness along the normal",
-        "n_per_m",
-        default=0.0,
-        key="normal_stiffness",
-        least=0,
-        shared=True,
-    )
+    k_t: float = tangential_stiffness()
+    limit: float = slip_limit()
+    k_w: float = axial_stiffness(default=0.0)
+    k_n: float = normal_stiffness(default=0.0)
 
     kernel: ClassVar[Any] = element_step
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS

@@ -12,6 +12,7 @@ from stickslip.contact.laws.parameter_checks import (
     check_not_negative,
     check_positive,
 )
+from stickslip.contact.laws.quantities import friction_coefficient, normal_stiffness
 from stickslip.units import quantity
 
 
@@ -57,20 +58,11 @@ class RegularisedCoulomb:
         If a parameter is not finite or out of its range.
     """
 
-    mu: float = quantity(
-        "friction coefficient (steel on steel: 0.6)", key="friction_coefficient", least=0, most=5
-    )
+    mu: float = friction_coefficient()
     transition_velocity: float = quantity(
         "velocity at which friction has reached 76 % of its limit", "m_per_s", above=0
     )
-    k_n: float = quantity(
-        "stiffness along the normal",
-        "n_per_m",
-        default=0.0,
-        key="normal_stiffness",
-        least=0,
-        shared=True,
-    )
+    k_n: float = normal_stiffness(default=0.0)
     preload: float = 0.0
 
     kernel: ClassVar[Any] = law_kernel(_step)

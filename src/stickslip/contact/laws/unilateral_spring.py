@@ -9,8 +9,8 @@ from stickslip.arrays import FloatArray
 from stickslip.contact.element import element, element_step, slider_start
 from stickslip.contact.law import UNCOUPLED_TANGENTS
 from stickslip.contact.laws.parameter_checks import check_not_negative, check_positive
+from stickslip.contact.laws.quantities import normal_stiffness
 from stickslip.errors import input_error
-from stickslip.units import quantity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,9 +32,7 @@ class UnilateralSpring:
         If a parameter is out of its range, or both a preload and an initial gap are given.
     """
 
-    k_n: float = quantity(
-        "stiffness along the normal", "n_per_m", key="normal_stiffness", least=0, shared=True
-    )
+    k_n: float = normal_stiffness()
     preload: float = 0.0
     initial_gap: float = 0.0
 

@@ -1,0 +1,37 @@
+"""Fields that several laws have: what a study file says of them."""
+
+from typing import Any
+
+from stickslip.units import quantity
+
+
+def tangential_stiffness(**given: Any) -> Any:
+    """Return the field of the stiffness along t; ``default=`` makes it optional, here and below."""
+    return _stiffness("tangent t", "tangential_stiffness", given)
+
+
+def axial_stiffness(**given: Any) -> Any:
+    """Return the field of the stiffness along w."""
+    return _stiffness("tangent w", "axial_stiffness", given)
+
+
+def normal_stiffness(**given: Any) -> Any:
+    """Return the field of the stiffness along the normal."""
+    return _stiffness("normal", "normal_stiffness", given)
+
+
+def friction_coefficient() -> Any:
+    """Return the field of the friction coefficient."""
+    about = "friction coefficient (steel on steel: 0.6)"
+    return quantity(about, key="friction_coefficient", least=0, most=5)
+
+
+def slip_limit() -> Any:
+    """Return the field of a constant friction limit."""
+    about = "friction force at which all has slipped, along either tangent"
+    return quantity(about, "n", key="slip_limit", least=0, shared=True)
+
+
+def _stiffness(where: str, key: str, given: dict[str, Any]) -> Any:
+    about = f"stiffness along the {where}"
+    return quantity(about, "n_per_m", key=key, least=0, shared=True, **given)
