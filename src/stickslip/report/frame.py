@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 from html import escape
+from importlib.resources import files
 from pathlib import Path
 
 from plotly.offline import get_plotlyjs
 
 from stickslip.errors import input_error
-from stickslip.report import shapes_page, style
 from stickslip.report.plot import Plot
 from stickslip.report.section import Card
 
@@ -71,10 +71,14 @@ def page_html(title: str, made: str, body: str) -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{title}</title><style>{style.STYLE}{shapes_page.STYLE}</style><script>{get_plotlyjs()}</script></head>"
+        f"<title>{title}</title><style>{_asset('page.css')}</style><script>{get_plotlyjs()}</script></head>"
         f'<body><main><header><h1>{title}</h1><p class="made">{made}</p></header>{body}</main>'
-        f"<script>{style.SCRIPT}{shapes_page.SCRIPT}</script></body></html>\n"
+        f"<script>{_asset('page.js')}{_asset('shapes.js')}</script></body></html>\n"
     )
+
+
+def _asset(name: str) -> str:
+    return files("stickslip.report").joinpath("assets", name).read_text(encoding="utf-8")
 
 
 def write_page(page: str, path: Path) -> None:

@@ -1,6 +1,6 @@
 """Mode shapes that turn in the page: one sector or the wheel, at any phase, coloured by displacement.
 
-The page holds the complex shapes of one sector; the script of `shapes_page` expands them to the wheel, sector n turned by
+The page holds the complex shapes of one sector; the script of ``assets/shapes.js`` expands them to the wheel, sector n turned by
 n times the pitch and multiplied by exp(i n theta).
 """
 

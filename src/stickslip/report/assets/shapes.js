@@ -1,16 +1,4 @@
-"""The script that draws mode shapes in the page, and its style; needs plotly.js and nothing else."""
-
-STYLE = """
-form.shapes { display: flex; flex-wrap: wrap; gap: 8px 18px; align-items: center; font-size: 14px; margin: 0 0 4px;
-  padding: 8px 12px; background: var(--soft); border: 1px solid var(--rule); }
-form.shapes label { display: flex; align-items: center; gap: 7px; }
-form.shapes select, form.shapes button { font: inherit; padding: 3px 8px; }
-form.shapes button { background: white; border: 1px solid var(--rule); border-radius: 4px; cursor: pointer; min-width: 62px; }
-form.shapes input[type="range"] { width: 120px; accent-color: var(--accent); }
-@media print { form.shapes { display: none; } }
-"""
-
-SCRIPT = """
+// draws mode shapes in the page; needs plotly.js and nothing else
 document.querySelectorAll("form.shapes").forEach(form => {
   const figure = form.closest("figure"), holder = figure.querySelector('script[type="application/json"]');
   const plot = figure.querySelector(".js-plotly-plot");
@@ -124,4 +112,3 @@ document.querySelectorAll("form.shapes").forEach(form => {
   });
   draw();
 });
-"""
