@@ -12,7 +12,6 @@ from models import table
 
 from stickslip.errors import InputError
 from stickslip.harmonic import spectral
-from stickslip.harmonic.condensed_product import at_frequency
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import padded, to_complex, to_real
@@ -206,7 +205,7 @@ def test_condensed_solution_and_recovery_are_the_full_solution(kind):
 def test_products_are_those_of_the_schur_complement(kind):
     structure, load = structure_of(kind, seed=5), loaded(5)
     linear = condense(structure, RETAINED, load)
-    products = at_frequency(linear, OMEGA, harmonics_of(ORDER))
+    products = linear.products(OMEGA, harmonics_of(ORDER))
     stiffness, force = schur(structure, load, OMEGA, ORDER)
     slope = linear.condensed(OMEGA, ORDER)  # itself compared with differences above
     size = 1e-9 * np.abs(stiffness).max()
@@ -404,7 +403,7 @@ def test_slope_at_zero_frequency_is_the_damping():
 def test_products_at_one_frequency_use_the_poles():
     linear, _ = decomposed(structure_of("general"))
     got = linear.condensed(OMEGA, ORDER)
-    products = at_frequency(linear, OMEGA, harmonics_of(ORDER))
+    products = linear.products(OMEGA, harmonics_of(ORDER))
     for h in range(ORDER + 1):
         np.testing.assert_allclose(products.block(h), got.stiffness[h], rtol=1e-11)
     assert all(isinstance(inner[0], StateSpace) for inner in products.inner)

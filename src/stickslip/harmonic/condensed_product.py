@@ -6,18 +6,14 @@ condensation; one harmonic at a time is formed where it is to be factorised.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.fourier import to_complex, to_real
-from stickslip.harmonic.spectral import StateSpace
-from stickslip.harmonic.support import Harmonics
-
-if TYPE_CHECKING:
-    from stickslip.harmonic.dynamic_stiffness import CondensedStiffness
+from stickslip.harmonic.spectral import Interior, StateSpace
+from stickslip.harmonic.support import Harmonics, real_rows
 
 Parts = tuple[FloatArray, FloatArray, FloatArray]  # K, C, M, or their products with the same rows
 Lossy = tuple[
@@ -35,7 +31,7 @@ class CondensedProduct:
     Vectors are real and harmonic-major: (m, n) rows, the static one and two for each other harmonic of the support.
     """
 
-    linear: "CondensedStiffness"
+    linear: Interior
     omega: float
     harmonics: Harmonics
     frequencies: FloatArray  # (m, 1) h ω of each row, rad/s
@@ -46,7 +42,7 @@ class CondensedProduct:
     @property
     def n(self) -> int:
         """Number of retained coordinates."""
-        return self.linear.n
+        return int(self.linear.nn[0].shape[0])
 
     def same(self, other: object) -> bool:
         """Whether `other` has the same dynamic stiffness; loads may differ."""
@@ -68,7 +64,9 @@ class CondensedProduct:
         """The product with the transposed Z; itself where damping is symmetric."""
         if self.linear.ln is None:
             return self
-        return at_frequency(self.linear.transposed, self.omega, self.harmonics)
+        sizes = (self.n, self.linear.ll[0].shape[0])
+        near, inner = (np.zeros((1, size), dtype=complex) for size in sizes)
+        return at_frequency(self.linear.transposed, (near, inner), self.omega, self.harmonics)
 
     def transposed_product(self, rows: FloatArray) -> FloatArray:
         """Return the rows of the product with the transpose of the real form of Z, the conjugate of the product of Zᵀ and the conjugate."""
@@ -115,25 +113,25 @@ class CondensedProduct:
 
 
 def at_frequency(
-    linear: "CondensedStiffness", omega: float, harmonics: Harmonics
+    linear: Interior, load: tuple[ComplexArray, ComplexArray], omega: float, harmonics: Harmonics
 ) -> CondensedProduct:
-    """Prepare the products of `linear` at one frequency.
+    """Prepare the products of a condensed structure at one frequency.
 
     Parameters
     ----------
     linear
-        Structure and load from `condense`.
+        Its matrices, the interior in modes.
+    load
+        Complex amplitudes on the retained coordinates (H+1, n) and on the modes of the interior (H+1, l), N.
     omega
         Frequency, rad/s.
     harmonics
         The harmonics, growing from 0.
     """
     frequencies = omega * _by_row(harmonics)
-    coefficients = linear.load.coefficients(harmonics[-1])[list(harmonics)]
-    load = to_real(coefficients[:, linear.retained])
-    inner_load = to_real(coefficients[:, linear.interior] @ linear.modes)
+    near, inner_load = (real_rows(part, harmonics) for part in load)
     inner = _inner(linear, omega, harmonics)
-    bare = CondensedProduct(linear, omega, harmonics, frequencies, inner, load, np.zeros_like(load))
+    bare = CondensedProduct(linear, omega, harmonics, frequencies, inner, near, np.zeros_like(near))
     if not np.any(inner_load):
         return bare
     return _with_inner_load(bare, inner_load)
@@ -151,14 +149,14 @@ def _with_inner_load(bare: CondensedProduct, inner_load: FloatArray) -> Condense
     )  # fmt: skip
 
 
-def _inner(linear: "CondensedStiffness", omega: float, harmonics: Harmonics) -> Inner:
+def _inner(linear: Interior, omega: float, harmonics: Harmonics) -> Inner:
     k, c, m = linear.ll
     loss = None if linear.loss is None else linear.loss[2]
     s = omega * np.array(harmonics)
     if linear.diagonal:
         k, c, m = np.diagonal(k), np.diagonal(c), np.diagonal(m)
         loss = None if loss is None else np.diagonal(loss)
-    states = linear.spectral.states if np.any(s) else None
+    states = linear.states if np.any(s) else None
     if states is not None:
         return tuple((states, 1j * w) for w in s)
     each = (k + 1j * w * c - w**2 * m for w in s)
@@ -189,28 +187,28 @@ def _solve_one(inner: InnerOne, right: ComplexArray) -> ComplexArray:
     return np.asarray(scipy.linalg.lu_solve((first, second), right))
 
 
-def _near(linear: "CondensedStiffness", rows: FloatArray) -> Lossy:
+def _near(linear: Interior, rows: FloatArray) -> Lossy:
     """Return the products of the retained coordinates' own matrices."""
     k, c, m = linear.nn
     loss = None if linear.loss is None else rows @ linear.loss[0]
     return rows @ k, rows @ (c if linear.ln is None else c.T), rows @ m, loss
 
 
-def _onto(linear: "CondensedStiffness", rows: FloatArray) -> Lossy:
+def _onto(linear: Interior, rows: FloatArray) -> Lossy:
     """Return the products from retained coordinates to the interior."""
     k, c, m = linear.far
     loss = None if linear.loss is None else rows @ linear.loss[1]
     return rows @ k, rows @ c, rows @ m, loss
 
 
-def _back(linear: "CondensedStiffness", rows: FloatArray) -> Lossy:
+def _back(linear: Interior, rows: FloatArray) -> Lossy:
     """Return the products from the interior to retained coordinates."""
     k, c, m = linear.nl
     loss = None if linear.loss is None else rows @ linear.loss[1].T
     return rows @ k.T, rows @ c.T, rows @ m.T, loss
 
 
-def _inner_parts(linear: "CondensedStiffness", rows: FloatArray) -> Lossy:
+def _inner_parts(linear: Interior, rows: FloatArray) -> Lossy:
     """Return the products of the interior's own matrices, for their slope: structural damping has none."""
     if linear.diagonal:
         k, c, m = (rows * np.diagonal(a) for a in linear.ll)

@@ -76,23 +76,6 @@ class CondensedStiffness:
         """Number of retained coordinates."""
         return int(self.retained.size)
 
-    @property
-    def far(self) -> Blocks:
-        """Transposed blocks from the retained coordinates to the forces on the interior."""
-        return self.nl if self.ln is None else self.ln
-
-    @cached_property
-    def transposed(self) -> "CondensedStiffness":
-        """The structure with the transposed damping, and no load."""
-        if self.ln is None:
-            return self.with_load(HarmonicLoad(np.zeros(self.load.static.size)))
-        nn, ll = (_turned(blocks) for blocks in (self.nn, self.ll))
-        return CondensedStiffness(
-            self.retained, self.interior, nn, self.ln, ll, self.modes, self.diagonal,
-            HarmonicLoad(np.zeros(self.load.static.size)),
-            Interior(nn, self.ln, ll, self.diagonal, self.nl, self.loss), self.nl, self.loss,
-        )  # fmt: skip
-
     def with_load(self, load: HarmonicLoad) -> "CondensedStiffness":
         """Return the same structure under another load."""
         return replace(self, load=load)
@@ -105,7 +88,7 @@ class CondensedStiffness:
 
     def products(self, omega: float, harmonics: Harmonics) -> CondensedProduct:
         """Return the same by its products, at `omega` (rad/s) and for the `harmonics` of a support."""
-        return at_frequency(self, omega, harmonics)
+        return at_frequency(self.spectral, self._loads(harmonics[-1]), omega, harmonics)
 
     def _summed(self, sums: "_Sums", omega: float, order: int) -> Condensed:
         """Condense by the spectral decomposition of the interior."""
@@ -151,7 +134,7 @@ class CondensedStiffness:
 
     def _back(self, s: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Return the transpose of D from the retained coordinates to the interior, and its derivative by s."""
-        return _dynamic(self.far, s, self.loss and self.loss[1])
+        return _dynamic(self.spectral.far, s, self.loss and self.loss[1])
 
     def recover(self, omega: float, q: ComplexArray) -> ComplexArray:
         """Return the (H+1, n_all) coefficients of every dof from those of the retained ones (eq. 5 with the sign mended).
@@ -246,11 +229,6 @@ class CondensedStiffness:
         if not np.any(s):
             return right  # modes of unit stiffness
         return np.linalg.solve(d_ll.transpose(0, 2, 1) if transposed else d_ll, right)
-
-
-def _turned(blocks: Blocks) -> Blocks:
-    k, c, m = blocks
-    return k, np.ascontiguousarray(c.T), m
 
 
 def _dynamic(

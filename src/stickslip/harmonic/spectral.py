@@ -159,6 +159,17 @@ class Interior:
     ln: Blocks | None = None  # transposes of the blocks back, where they differ
     loss: Blocks | None = None
 
+    @property
+    def far(self) -> Blocks:
+        """Transposed blocks from the retained coordinates to the forces on the interior."""
+        return self.nl if self.ln is None else self.ln
+
+    @cached_property
+    def transposed(self) -> "Interior":
+        """The structure with the transposed damping."""
+        nn, ll = ((k, np.ascontiguousarray(c.T), m) for k, c, m in (self.nn, self.ll))
+        return Interior(nn, self.far, ll, self.diagonal, self.nl, self.loss)
+
     @cached_property
     def states(self) -> StateSpace | None:
         """State-space eigenvectors, or None where damping is diagonal or structural, the interior too large or its eigenvectors ill-conditioned."""
