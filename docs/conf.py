@@ -48,7 +48,7 @@ sphinx_gallery_conf = {
     "examples_dirs": "../examples",
     "gallery_dirs": "auto_examples",
     "filename_pattern": r"/plot_",
-    "ignore_pattern": r"/(?!plot_)[^/]*\.py$",
+    "ignore_pattern": r"two_blades_python\.py$",  # stands on a page of its own
     "only_warn_on_example_error": False,
     "download_all_examples": False,
     "capture_repr": (),
