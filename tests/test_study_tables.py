@@ -8,6 +8,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from small_v2 import (
     EXAMPLES,
     write_four_masses,
@@ -18,11 +19,14 @@ from small_v2 import (
 
 from stickslip.contact.laws import LAWS
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.contact.laws.iwan import Iwan
+from stickslip.contact.laws.iwan_populations import FourParameter
 from stickslip.errors import InputError, input_error, together
 from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector
 from stickslip.model.mesh.sector_parts import Shroud
 from stickslip.model.rigid.damper import FlatCurvedDamper
+from stickslip.study.file.contacts import ContactTable, keys_of
 from stickslip.study.file.example import Kind, example_text
 from stickslip.study.file.quantities import build, table_of
 from stickslip.study.file.study import read_file
@@ -84,8 +88,6 @@ def test_tables_of_a_table_become_the_dataclass_of_a_field():
 
 @pytest.mark.parametrize("name", LAWS)
 def test_every_law_can_be_written_in_a_study(name, tmp_path):
-    from stickslip.study.file.contacts import ContactTable, keys_of
-
     needed = [key for key, need in keys_of(name, per_area=False).items() if need]
     values = {key: [1.0] if key.startswith("along") else 0.5 for key in needed}
     if name in ("cubic_spring", "polynomial_spring"):
@@ -97,6 +99,30 @@ def test_every_law_can_be_written_in_a_study(name, tmp_path):
         values["normal_stiffness_n_per_m"] = 1.0
     table = ContactTable.model_validate({"between": ["a.b", "c.d"], "law": name} | values)
     assert type(table.library()) is LAWS[name]
+
+
+def test_an_iwan_law_has_its_population():
+    given = {
+        "between": ["a.b", "c.d"],
+        "law": "iwan",
+        "tangential_stiffness_n_per_m": 1.0,
+        "slip_limit_n": 1.0,
+    }
+    made = ContactTable.model_validate(
+        given | {"population": {"kind": "four_parameter", "chi": -0.5, "beta": 0.1, "sliders": 5}}
+    ).library()
+    assert made.population == FourParameter(chi=-0.5, beta=0.1, n_sliders=5)
+    assert ContactTable.model_validate(given).library() == Iwan(k_t=1.0, limit=1.0)
+    with pytest.raises(
+        ValidationError, match=r"is not known, got 'four_paramter'. Did you mean 'four_parameter'"
+    ):
+        ContactTable.model_validate(given | {"population": {"kind": "four_paramter"}})
+    with pytest.raises(
+        ValidationError, match=r"is no parameter of the law jenkins.*it belongs to iwan"
+    ):
+        ContactTable.model_validate(
+            given | {"law": "jenkins", "population": {"kind": "uniform_band"}}
+        )
 
 
 def test_the_schema_lists_tables_and_keys():

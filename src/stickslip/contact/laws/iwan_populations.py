@@ -11,6 +11,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
+from stickslip.units import quantity
 
 
 class Population(Protocol):
@@ -40,9 +41,13 @@ class UniformBand:
         If a parameter is out of its range.
     """
 
-    n_sliders: int = 20
-    half_width: float = 1.0
-    elastic_share: float = 0.0
+    n_sliders: int = quantity("number of sliders", key="sliders", default=20, least=1, most=1000)
+    half_width: float = quantity(
+        "half of the band over the mean distance", default=1.0, above=0, most=1
+    )
+    elastic_share: float = quantity(
+        "share of the stiffness that never slips", default=0.0, least=0, below=1
+    )
 
     def __post_init__(self) -> None:
         _check_count(self, self.n_sliders)
@@ -91,9 +96,9 @@ class FourParameter:
         If a parameter is out of its range.
     """
 
-    chi: float
-    beta: float
-    n_sliders: int = 20
+    chi: float = quantity("exponent of the distribution", above=-1, most=0)
+    beta: float = quantity("stiffness of the last sliders over that of all others", least=0)
+    n_sliders: int = quantity("number of sliders", key="sliders", default=20, least=1, most=1000)
 
     def __post_init__(self) -> None:
         _check_count(self, self.n_sliders)
@@ -138,8 +143,8 @@ class FirstLoading:
         If the corners do not make such a curve.
     """
 
-    displacement: tuple[float, ...]
-    force: tuple[float, ...]
+    displacement: tuple[float, ...] = quantity("displacements of the corners after the origin")
+    force: tuple[float, ...] = quantity("forces of the corners after the origin")
 
     def __post_init__(self) -> None:
         x, f = self.displacement, self.force

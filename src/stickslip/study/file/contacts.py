@@ -3,16 +3,51 @@
 from functools import cache
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationInfo, create_model, field_validator, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    ValidationInfo,
+    create_model,
+    field_validator,
+    model_validator,
+)
 
 from stickslip.assembly.contact import GROUND, NEXT, PairingKind, Share
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws import LAWS
+from stickslip.contact.laws.iwan_populations import FirstLoading, FourParameter, UniformBand
 from stickslip.errors import did_you_mean
-from stickslip.study.file.parts import Triple
-from stickslip.study.file.quantities import build, columns_of, refused_by
+from stickslip.study.file.parts import Triple, union_of
+from stickslip.study.file.quantities import build, columns_of, refused_by, table_of
 from stickslip.study.file.section import Name, Positive, Section, custom_error, shown
 
+POPULATIONS: dict[str, type] = {
+    "uniform_band": UniformBand,
+    "four_parameter": FourParameter,
+    "first_loading": FirstLoading,
+}  # of the sliders of the law iwan
+_TABLES = {
+    name: table_of(
+        cls, name=cls.__name__, kind=(Literal[name], Field(description=f'kind = "{name}"'))
+    )
+    for name, cls in POPULATIONS.items()
+}
+
+
+def _kind(given: Any) -> str | None:
+    return given.get("kind") if isinstance(given, dict) else getattr(given, "kind", None)
+
+
+def _known_kind(given: Any) -> Any:
+    kind = _kind(given)
+    if isinstance(given, dict) and kind not in POPULATIONS:
+        raise custom_error(
+            f"is not known, got {shown(kind)}", did_you_mean(str(kind), list(POPULATIONS)), "kind"
+        )
+    return given
+
+
+PopulationTable: Any = Annotated[union_of(_TABLES, _kind), BeforeValidator(_known_kind)]
 Between = Annotated[list[Name], Field(min_length=2, max_length=2)]
 
 
@@ -110,7 +145,9 @@ class ContactBase(Pair):
 
     def library(self) -> ContactLaw:
         """Return the law, its parameters as given."""
-        law: ContactLaw = build(LAWS[self.law], self, per_area=self.per == "area")
+        table = getattr(self, "population", None)
+        given = {} if table is None else {"population": build(POPULATIONS[table.kind], table)}
+        law: ContactLaw = build(LAWS[self.law], self, per_area=self.per == "area", **given)
         return law
 
 
@@ -118,9 +155,10 @@ class ContactBase(Pair):
 def keys_of(law: str, *, per_area: bool) -> dict[str, bool]:
     """Return the keys of a law and whether each is needed."""
     columns = columns_of(LAWS[law], per_area=per_area)
-    return {key: field.is_required() for key, (_, field) in columns.items()} | {
-        "preload_pa" if per_area else "preload_n": False
-    }
+    others = ["preload_pa" if per_area else "preload_n", *(["population"] if law == "iwan" else [])]
+    return {key: field.is_required() for key, (_, field) in columns.items()} | dict.fromkeys(
+        others, False
+    )
 
 
 def _owners(key: str, *, per_area: bool) -> list[str]:
@@ -160,7 +198,10 @@ def _foreign(law: str, key: str, area: bool, value: Any) -> Exception:
 
 def _columns() -> dict[str, Any]:
     """Return the keys of all laws: each may be left out, and the law says which must not be."""
-    found: dict[str, Any] = {}
+    sliders = "how the sliders of iwan share stiffness and limit, a table with its kind"
+    found: dict[str, Any] = {
+        "population": (PopulationTable | None, Field(None, description=sliders))
+    }
     for area in (False, True):
         unit = "Pa" if area else "N"
         found[f"preload_{unit.lower()}"] = (

@@ -12,7 +12,8 @@ from stickslip.study.analyses.analysis import named
 from stickslip.study.file.contacts import ContactTable, JoinTable
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.file.loads import Limits, LoadTable, Output, Retention, Rotation
-from stickslip.study.file.parts import AnyPart, Damping, MaterialTable, Reduction
+from stickslip.study.file.material import Damping, MaterialTable, Reduction
+from stickslip.study.file.parts import AnyPart
 from stickslip.study.file.section import Name, Section
 
 VERSION = 2

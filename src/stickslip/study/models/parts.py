@@ -31,6 +31,7 @@ from stickslip.model.part import (
 )
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.rigid.damper import ContactPoints, FlatCurvedDamper
+from stickslip.study.file.material import Reduction
 from stickslip.study.file.parts import (
     AXES,
     BeamTable,
@@ -39,7 +40,6 @@ from stickslip.study.file.parts import (
     FlatCurved,
     Lumped,
     PrismBlades,
-    Reduction,
     RigidBodyTable,
     Sector,
     Surface,
