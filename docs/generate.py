@@ -90,14 +90,17 @@ class Keys:
 
     def _below(self, path: str, entry: dict[str, Any]) -> list[str]:
         """Return the table at `path`; one for each kind where it may be one of several."""
-        if path != "part.NAME":
+        options = _options(entry)
+        if not options:
             return self._table(f"`[{path}]`", self._resolved(entry), path=path)
+        common = self.common if path == "part.NAME" else ()
         lines: list[str] = []
-        for option in entry["oneOf"]:
+        for option in options:
             node = self._resolved(option)
-            shape = node["properties"].get("shape", {}).get("const")
-            mark = f'shape = "{shape}"' if shape else f'{next(iter(node["required"]))} = "..."'
-            lines += self._table(f"`[{path}]` with `{mark}`", node, path=path, without=self.common)
+            tags = {key: own["const"] for key, own in node["properties"].items() if "const" in own}
+            key, word = next(iter(tags.items()), (node["required"][0], "..."))
+            title = f'`[{path}]` with `{key} = "{word}"`'
+            lines += self._table(title, node, path=path, without=(*common, *tags))
         return lines
 
     def _table(
@@ -112,7 +115,7 @@ class Keys:
         rows, below = [], []
         laws = "law" in node["properties"]  # their keys have tables of their own
         for key, entry in node["properties"].items():
-            if key in (*without, "shape") or (laws and key in self._of_laws()):
+            if key in without or (laws and key in self._of_laws()):
                 continue
             inner, every = self._resolved(entry), entry.get("additionalProperties")
             nested = inner if "properties" in inner else None
@@ -122,6 +125,9 @@ class Keys:
                 below += self._table(
                     f"`[{path}.{key}.NAME]`", self._resolved(every), path=f"{path}.{key}.NAME"
                 )
+            if _options(entry) and not flat:
+                below += self._below(f"{path}.{key}", entry)
+                continue
             if nested is not None and not (path == "part.NAME" and key in self.common):
                 below += self._table(f"`[{path}.{key}]`", nested, path=f"{path}.{key}")
                 continue
@@ -139,10 +145,10 @@ class Keys:
 
     def _of_laws(self) -> set[str]:
         from stickslip.contact.laws import LAWS
-        from stickslip.study.file.contacts import keys_of
+        from stickslip.study.file.quantities import columns_of
 
-        each = (keys_of(law, per_area=area) for law in LAWS for area in (False, True))
-        return {key for found in each for key in found if not key.startswith("preload")}
+        each = (columns_of(law, per_area=area) for law in LAWS.values() for area in (False, True))
+        return {key for found in each for key in found}
 
     def _resolved(self, entry: dict[str, Any]) -> dict[str, Any]:
         parts = [
@@ -153,8 +159,14 @@ class Keys:
         return self.schema["$defs"][reference.rsplit("/", 1)[1]] if reference else entry
 
 
+def _options(entry: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the kinds that a table may be one of."""
+    every = [entry, *entry.get("anyOf", [])]
+    return next((one["oneOf"] for one in every if "oneOf" in one), [])
+
+
 def _is_table(entry: dict[str, Any]) -> bool:
-    return entry.get("description", "").startswith("the table")
+    return bool(entry.get("description", "").startswith("the table"))
 
 
 def _default(key: str, node: dict[str, Any]) -> str:
