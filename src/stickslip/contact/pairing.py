@@ -29,6 +29,7 @@ from stickslip.contact.surface import Surface
 from stickslip.errors import InputError, input_error
 
 PARALLEL = 1e-3  # sine of the smallest angle between the direction of t and a normal
+SKIP = "; or leave them out with outside='skip'"
 LISTED = 5  # points that a message names
 RIM = 1e-6  # overhang that is rounding, as a share of a facet's size
 
@@ -132,7 +133,7 @@ def node_to_node(
     if lost.any() and (outside == "error" or lost.all()):
         raise _without_partner(
             "node_to_node", a, nodes[lost], distance[lost], f"node of side B nearer than {tolerance:g} m",
-            "Raise the tolerance, match the meshes, pair by node_to_segment, or leave the nodes out with outside='skip'.",
+            "Raise the tolerance, match the meshes, or pair by node_to_segment$outside.",
         )  # fmt: skip
     nodes, partner = nodes[~lost], partner[~lost]
     twice, count = np.unique(partner, return_counts=True)
@@ -201,8 +202,8 @@ def node_to_segment(
         raise _without_partner(
             "node_to_segment", a, nodes[lost], beyond[lost],
             f"facet of side B that faces them within {reach:g} m and less than {tolerance:g} m beyond its rim",
-            "Check that both sides' normals point outward, raise reach or tolerance, make side B the larger one, or leave the nodes "
-            "out with outside='skip'.",
+            "Check that both sides' normals point outward, raise reach or tolerance, or make side B the larger "
+            "one$outside.",
         )  # fmt: skip
     kept, facet, reference = nodes[~lost], feet.facet[~lost], feet.reference[~lost]
     facets = b.facets[facet]
@@ -350,7 +351,10 @@ def _without_partner(
     ]
     more = "" if len(nodes) <= LISTED else f" and {len(nodes) - LISTED} more"
     return input_error(
-        place, f"{len(nodes)} nodes of side A have no {partner}: {'; '.join(listed)}{more}", remedy
+        place,
+        f"{len(nodes)} nodes of side A have no {partner}: {'; '.join(listed)}{more}",
+        remedy,
+        outside=SKIP,
     )
 
 
@@ -361,7 +365,8 @@ def _without_facet(a: Surface, left: IntArray, reach: float) -> InputError:
         "segment_to_segment",
         f"{len(left)} of {len(a.facets)} facets of side A have no facet of side B opposite to them within {reach:g} m, e.g. facet "
         f"{left[0]} at ({', '.join(f'{x:.6g}' for x in middle)}) m",
-        "Check that both sides' normals point outward, raise reach, or leave the facets out with outside='skip'.",
+        "Check that both sides' normals point outward, or raise reach$outside.",
+        outside=SKIP,
     )
 
 

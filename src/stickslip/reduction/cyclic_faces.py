@@ -179,18 +179,16 @@ def _unmatched(low: Face, high: Face, sectors: int, axis: Axis, reach: float) ->
                 f"cyclic_sector: {names}",
                 f"are swapped: {high.name!r} lies {pitch:.6g}° behind {low.name!r} about the axis "
                 f"{axis.direction}",
-                "$swap, or turn the axis round.",
-                swap="Swap them",
+                "Swap them, or turn the axis round.",
             )
         fits = round(360 / abs(degrees)) if degrees else 0
         near = fits > 0 and math.isclose(360 / fits, abs(degrees), rel_tol=1e-3)
         return input_error(
             f"cyclic_sector: {names}",
             f"are {degrees:.5g}° apart, {sectors} sectors need {pitch:.5g}°",
-            f"Say $sectors{', and swap them' if degrees < 0 else ''}, or check the axis {axis.direction}."
+            f"Say sectors={fits}{', and swap them' if degrees < 0 else ''}, or check the axis {axis.direction}."
             if near
             else "Check the number of sectors and the axis.",
-            sectors=f"sectors={fits}",
         )
     return input_error(
         f"cyclic_sector: {names}",

@@ -20,9 +20,9 @@ def check_study(study: Study) -> tuple[str, ...]:
     told: list[str] = []
     for case in study.cases():
         model = case.build()
-        lines = [_size(model), *(f"{WARNING}{text}" for text in model.warnings)]
-        for one in asked:
-            with of_task(study, case):
+        with of_task(study, case):
+            lines = [_size(model), *(f"{WARNING}{text}" for text in model.warnings)]
+            for one in asked:
                 lines += one.check(case, model)
         label = f"{case.label}: " if case.label else ""
         # what holds for all cases is said once

@@ -179,7 +179,7 @@ def of_task(study: Study, case: Case) -> Iterator[None]:
         yield
     except InputError as error:
         place = f"{study.path} ({case.label})" if case.label else str(study.path)
-        raise error.inside(place) from None
+        raise error.called({"outside": ""}).inside(place) from None
 
 
 def _inputs(study: Study, task: Task) -> Any:

@@ -60,7 +60,7 @@ def file_part(
             return _from_archive(key, table, path, material, others)
         return _from_matrices(key, table, home, others)
     except InputError as error:
-        raise error.called(_words(key, error)) from None
+        raise error.called(_words(key)) from None
 
 
 def with_companions(path: Path) -> list[Path]:
@@ -73,19 +73,10 @@ def with_companions(path: Path) -> list[Path]:
     return [path, *(p for p in beside if p.is_file())]
 
 
-def _words(key: str, error: InputError) -> dict[str, str]:
-    """Return the keys of the study for arguments of the readers and of what pairs faces."""
+def _words(key: str) -> dict[str, str]:
+    """Return the keys of the study for arguments of the readers."""
     words = {name: f"{key}.{name}" for name in ("units", "mesh", "mass", "nodes")}
-    words |= {"plausible": f"{key}.plausible = false", "ignore": "", "use": _KEPT}
-    return words | face_words(error)
-
-
-def face_words(error: InputError) -> dict[str, str]:
-    """Return what a study calls the arguments of what pairs cyclic faces."""
-    words = {"swap": "Swap low_face and high_face"}
-    if "sectors" in error.words:
-        words["sectors"] = error.words["sectors"].replace("=", " = ")
-    return words
+    return words | {"plausible": f"{key}.plausible = false", "ignore": "", "use": _KEPT}
 
 
 def _sectors(key: str, table: FileModel, of_deck: int | None = None) -> int:
