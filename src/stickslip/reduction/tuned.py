@@ -244,7 +244,7 @@ def _written(
     operators: dict[int, Matrix] = {}
     for k in wanted:
         if _mirrored(sector, {j: moving[j] for j in waves if j in moving}, k):
-            waves[k] = _conjugate(waves[sector.sectors - k])
+            waves[k] = conjugate(waves[sector.sectors - k])
         else:
             waves[k], operators[k] = write(k)
     common = operators[wanted[0]]
@@ -277,7 +277,7 @@ def _refuse_lost_contacts(
         )
 
 
-def _conjugate(structure: Structure) -> Structure:
+def conjugate(structure: Structure) -> Structure:
     """Return the wave that travels the other way."""
     parts = (structure.mass, structure.damping, structure.stiffness)
     mass, damping, stiffness = (matrix.conj() for matrix in parts)
