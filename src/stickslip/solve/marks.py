@@ -132,9 +132,10 @@ def _on_chord(
     measure = measure_at(before.x, following)
     chord = after.y - before.y
     length = measure.of(chord)
-    row = measure.row(chord) / length**2
+    # the condition is a length: a share of the chord would be lost in rounding once the chord is short
+    row = measure.row(chord / length)
     guess = before.y + share * chord if guess is None else guess
-    value = float(row @ before.y) + share
+    value = float(row @ before.y) + share * length
     solution = newton(lambda v: across(problem, v, row, value), guess, following.newton)
     spent.append(solution)
     if not solution.status.converged:
