@@ -223,7 +223,7 @@ def test_what_a_model_depends_on_changes_its_digest_and_nothing_else_does(tmp_pa
         "title": "another",
         "modes.number": 3,
         "output.folder": "elsewhere",
-        "limits.work_s": 1.0,
+        "limits.work_s": 100.0,
     }
     assert study.replace(same).cases()[0].digest == digest
     for key, value in {"rotation.speed_rpm": 1.0, "contact.shroud.gap_m": 1e-6}.items():
@@ -381,6 +381,19 @@ def test_a_speed_of_what_no_speed_changes_is_refused(tmp_path):
     study = read_study(write_four_masses(tmp_path, {"rotation.speed_rpm": "100.0"}))
     with pytest.raises(InputError, match=r"rotation.speed_rpm: is 100, but no part is a mesh"):
         study.model()
+
+
+@pytest.mark.parametrize("write", [write_two_blades, write_shrouded_sector, write_shrouded_deck])
+def test_what_is_too_large_is_refused_before_it_is_meshed(write, tmp_path):
+    study = read_study(write(tmp_path))
+    meshes = [part.mesh for part in study.model().parts.values() if part.mesh is not None]
+    nodes = sum(len(mesh.points) for mesh in meshes)
+    with pytest.raises(InputError, match=r"limits\.memory_gb: the parts have some") as error:
+        study.replace({"limits.memory_gb": 0.3})
+    told = float(str(error.value).partition("some ")[2].partition(" nodes")[0])
+    assert nodes / 2.5 < told < nodes * 2.5
+    with pytest.raises(InputError, match=r"limits\.work_s: the parts have some .* s, the limit"):
+        study.replace({"limits.work_s": 0.1})
 
 
 def test_a_campbell_diagram_of_masses_is_refused(tmp_path):

@@ -186,8 +186,10 @@ class Limits(Section):
     """What a run may cost; a study that is estimated above is refused before it starts."""
 
     memory_gb: Positive = Field(
-        4.0, description="memory in GB that a run may take, greater than zero"
+        4.0,
+        description="memory in GB that a run may take, greater than zero",
     )
     work_s: Positive = Field(
-        7200.0, description="estimated seconds that a run may take, greater than zero"
+        7200.0,
+        description="estimated seconds that one case of an analysis may take on one core, greater than zero",
     )

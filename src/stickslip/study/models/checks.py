@@ -18,6 +18,7 @@ from stickslip.study.file.parts import (
 )
 from stickslip.study.file.section import Section
 from stickslip.study.file.tables import Tables
+from stickslip.study.models.cost import too_large
 from stickslip.study.models.files import MESHES
 
 BLADES = ("root", "force", "tip1", "edge1", "tip2")
@@ -39,6 +40,8 @@ def refusals(tables: Tables, home: Path) -> Iterator[InputError]:
     wrong = [*_parts(tables, home)]
     yield from wrong
     if not wrong:  # else names mean nothing
+        large = too_large(tables, home)
+        yield from [large] if large else []
         yield from _surfaces(tables)
         yield from _loads(tables)
         yield from _outputs(tables)

@@ -10,15 +10,13 @@ from stickslip.errors import input_error
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.model.part import Part
 from stickslip.response.forced.response import Sweep
+from stickslip.study.models.cost import ADVICE, SECONDS_A_NODE, memory_gb
 
-BYTES_A_NODE = 35e3  # assembly and factorisation of second-order tetrahedra, measured at 10 to 30 thousand nodes
-BASE_GB = 0.35  # interpreter and libraries
 POINTS = 1.7  # points of a branch for each one asked: more are taken where the response turns
 NEWTON_A_POINT = 6  # repeats and failed tries included: the two blades took 1 to 19 in a case and 6 over all, four masses 11
 REPEATED = 0.6  # share of points that a strategy solves with many harmonics
 SECONDS_A_STEP = 1.5e-3  # of Newton, however few unknowns it has
 FLOPS = 2e9  # of a Newton step: a small dense factorisation on one core, and the contacts
-SECONDS_A_NODE = 2e-3  # assembly, reduction and the full model's frequencies
 
 
 @dataclass(frozen=True)
@@ -70,7 +68,7 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
     steps = (steps_low + steps_high + judged) * SECONDS_A_STEP
     seconds = flops / FLOPS + steps + nodes * SECONDS_A_NODE
     stored = points * (sweep.high_harmonics[-1] + 1) * 10 * coordinates * 16 / 1e9
-    memory = BASE_GB + nodes * BYTES_A_NODE / 1e9 + stored + 6 * high**2 * 8 / 1e9
+    memory = memory_gb(nodes) + stored + 6 * high**2 * 8 / 1e9
     return Estimate(nodes, high, memory, round(steps_low + steps_high), seconds)
 
 
@@ -82,20 +80,19 @@ def check_limits(limits: Any, cost: Estimate) -> None:
     InputError
         Naming the limit.
     """
-    advice = "Take a coarser mesh, fewer points, contacts or harmonics, or raise the limit."
     if cost.memory_gb > limits.memory_gb:
         raise input_error(
             "limits.memory_gb",
             f"the forced response is estimated at {cost.memory_gb:.1f} GB ({cost.nodes} nodes, {cost.unknowns} unknowns), the "
             f"limit is {limits.memory_gb:g} GB",
-            advice,
+            ADVICE,
         )
     if cost.seconds > limits.work_s:
         raise input_error(
             "limits.work_s",
             f"a case of the forced response is estimated at {cost.seconds:.0f} s ({cost.newton_steps} Newton steps), the limit "
             f"is {limits.work_s:g} s",
-            advice,
+            ADVICE,
         )
 
 

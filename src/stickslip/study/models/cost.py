@@ -1,0 +1,90 @@
+"""What a model costs by its size: told from the tables, before anything is meshed or read."""
+
+from math import prod
+from pathlib import Path
+from typing import Any
+
+from stickslip.errors import InputError, input_error
+from stickslip.model.mesh.blade_pair import BladePair
+from stickslip.model.mesh.sector import BladedSector
+from stickslip.study.file.parts import BeamTable, FileModel, Lumped, PrismBlades, Sector
+from stickslip.study.file.quantities import build
+from stickslip.study.file.tables import Tables
+from stickslip.study.models.files import MESHES
+
+BYTES_A_NODE = 35e3  # assembly and factorisation of second-order tetrahedra, measured at 10 to 30 thousand nodes
+BASE_GB = 0.35  # interpreter and libraries
+SECONDS_A_NODE = 2e-3  # assembly, reduction and the full model's frequencies
+NODES_A_CUBE = 8.0  # nodes of second-order tetrahedra in a cube of one element size, measured at 600 to 35000 nodes
+OF_A_MESH, OF_MATRICES = 95.0, 4000.0  # bytes of a file for each node
+PACKED = 3.5  # times smaller is a file with the ending .gz
+ADVICE = "Take a coarser mesh, fewer points, contacts or harmonics, or raise the limit."
+
+
+def memory_gb(nodes: float) -> float:
+    """Return the memory that building and reducing parts of so many nodes takes."""
+    return BASE_GB + nodes * BYTES_A_NODE / 1e9
+
+
+def too_large(tables: Tables, home: Path) -> InputError | None:
+    """Return the complaint about parts that take more than the study's limits allow; None if they do not."""
+    limits, nodes = tables.limits, sum(_nodes(table, home) for table in tables.part.values())
+    memory, seconds = memory_gb(nodes), nodes * SECONDS_A_NODE
+    if memory > limits.memory_gb:
+        problem = f"the parts have some {nodes:.2g} nodes, estimated at {memory:.1f} GB, the limit is {limits.memory_gb:g} GB"
+        return input_error("limits.memory_gb", problem, ADVICE)
+    if seconds > limits.work_s:
+        problem = f"the parts have some {nodes:.2g} nodes, estimated at {seconds:.0f} s, the limit is {limits.work_s:g} s"
+        return input_error("limits.work_s", problem, ADVICE)
+    return None
+
+
+def _nodes(table: Any, home: Path) -> float:
+    """Return about how many nodes a part will have; a copy shares those of its original."""
+    if isinstance(table, PrismBlades):
+        return blade_nodes(build(BladePair, table))
+    if isinstance(table, Sector):
+        return sector_nodes(build(BladedSector, table))
+    if isinstance(table, FileModel):
+        return file_nodes(home / table.file)
+    if isinstance(table, BeamTable):
+        return float(table.elements)  # type: ignore[attr-defined]
+    return len(table.masses_kg) / 3 if isinstance(table, Lumped) else 0.0
+
+
+def blade_nodes(b: BladePair) -> float:
+    """Return about how many nodes the mesh of both blades will have."""
+    chord, thickness = (b.hub_chord + b.tip_chord) / 2, (b.hub_thickness + b.tip_thickness) / 2
+    one = (
+        _block(b.airfoil_size, b.airfoil_length, chord, thickness)
+        + _block(b.platform_size, b.pitch, b.platform_depth, 2 * b.platform_edge)
+        + _block(b.foot_size, b.platform_height, b.platform_depth, b.shank_thickness)
+        + _block(b.foot_size, b.foot_width, b.foot_depth, b.foot_height)
+    )
+    return 2 * one
+
+
+def sector_nodes(sector: BladedSector) -> float:
+    """Return about how many nodes the mesh of a sector will have."""
+    d, a, p, s = sector.disk, sector.airfoil, sector.platform, sector.shroud
+    chord, thickness = (a.hub_chord + a.tip_chord) / 2, (a.hub_thickness + a.tip_thickness) / 2
+    middle, width = (d.rim_radius + d.bore_radius) / 2, (d.bore_width + d.web_width) / 2
+    around, top = sector.pitch * d.rim_radius, sector.platform_size
+    return (
+        _block(sector.disk_size, sector.pitch * middle, d.rim_radius - d.bore_radius, width)
+        + _block(sector.airfoil_size, a.airfoil_length, chord, thickness)
+        + (0.0 if p is None else _block(top, around, p.depth, 2 * p.thickness))
+        + (0.0 if s is None else _block(top, around, s.depth, s.thickness))
+    )
+
+
+def file_nodes(path: Path) -> float:
+    """Return about how many nodes a file holds, by its size."""
+    name = path.name.lower()
+    size = path.stat().st_size * (PACKED if name.endswith(".gz") else 1.0)
+    return size / (OF_A_MESH if name.endswith(MESHES) else OF_MATRICES)
+
+
+def _block(size: float, *lengths: float) -> float:
+    """Return about how many nodes a block has whose elements have a size: at least one across, and its faces have nodes, too."""
+    return NODES_A_CUBE * prod(max(length / size, 1.0) + 1.0 for length in lengths)
