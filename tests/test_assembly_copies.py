@@ -298,7 +298,8 @@ def test_what_is_wrong_with_surfaces_joins_and_copies_is_named():
     )
     weld = Join(between=("right.right", "left.right"), pairing="node_to_node")
     apart = replace(halves("node_to_node"), joins={"weld": weld})
-    with pytest.raises(InputError, match=r"join.weld .*node_to_node: 4 nodes of side A have no"):
+    told = r"join.weld .*node_to_node: 4 nodes of side A have no.*Use node_to_segment, or raise the tol"
+    with pytest.raises(InputError, match=told):
         apart.at(0.0)
     with pytest.raises(InputError, match="no rigid placement"):
         Place(2 * np.eye(3), np.zeros(3))

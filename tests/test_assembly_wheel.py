@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 import scipy.sparse
 
+from stickslip.assembly.build import linear_side
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.model import Model
+from stickslip.assembly.reduced import in_memory
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.pairing import node_to_segment
@@ -26,6 +28,7 @@ from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.part import BodyPoints, rigid_part, solid_part
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.structure import join
+from stickslip.reduction.cyclic import travelling_wave
 from stickslip.response.equilibrium import preload
 from stickslip.response.forced.response import Sweep, forced_problem, forced_response
 from stickslip.response.recovery import fields
@@ -201,6 +204,35 @@ def test_shrouds_that_do_not_match_answer_on_one_sector_as_on_all(touched):
             assert np.abs(there - phase[:, None] * own).max() < 1e-8 * np.abs(every.gaps).max()
 
 
+def test_waves_of_unsymmetric_parts_are_not_each_others_mirror():
+    """Matrices of an aerodynamic kind tell the two directions apart: wave 4 of five is no conjugate of wave 1."""
+    model = sector_model(shrouded_sector())
+    blade = model.parts["blade"]
+    free = blade.structure
+    more = scipy.sparse.random_array((free.n, free.n), density=0.01, rng=np.random.default_rng(3))
+    for aside in (0.3 * more, 0.3j * more):
+        stiffness = scipy.sparse.csr_array(free.stiffness + abs(free.stiffness).max() * aside)
+        part = replace(
+            blade, structure=replace(free, stiffness=stiffness), solid=None, damping_ratio=0.0
+        )
+        own = replace(model, parts={"blade": part}, speed=0.0)
+        side = linear_side(
+            own, ORDER, H, np.zeros(0, dtype=int), np.zeros(0, dtype=int), in_memory
+        ).side
+        sector = own.neighbours.sector(part.structure, own.coordinates)
+        for h, k in enumerate((0, 2, 4, 1)):
+            mine, theirs = (spectrum(s) for s in (side.of_harmonic(h), travelling_wave(sector, k)))
+            np.testing.assert_allclose(mine, theirs, rtol=1e-7, atol=1e-9 * abs(theirs).max())
+
+
+def spectrum(structure):
+    dense = [
+        m.toarray() if scipy.sparse.issparse(m) else m
+        for m in (structure.mass, structure.stiffness)
+    ]
+    return np.sort_complex(np.linalg.eigvals(np.linalg.solve(*dense)))
+
+
 def test_full_waves_have_the_frequencies_of_the_whole_wheel_with_its_contacts_stuck_open_or_pressed():
     model = sector_model(shrouded_sector())
     damped, gaps = whole_with_gaps(model)
@@ -361,6 +393,14 @@ def test_shrouds_joined_from_sector_to_sector_are_one_ring():
             )
         },
     )
+    for pairing in (
+        "node_to_segment",
+        "segment_to_segment",
+    ):  # nodes of the two faces lie elsewhere
+        other = {"ring": replace(joined.joins["ring"], pairing=pairing)}
+        unlike = replace(sector_model(shrouded_sector()), contacts={}, joins=other)
+        with pytest.raises(InputError, match="join them by node_to_node"):
+            unlike.at(SPEED)
     sets = dict(mesh.node_sets)
     for side in ("low", "high"):
         sets[f"cyclic_{side}"] = np.unique(

@@ -15,6 +15,7 @@ from stickslip.contact.surface import Surface
 from stickslip.errors import InputError, input_error
 
 TINY = 1e-12  # weights of partners below are rounding
+MATCH = "Mesh both sides alike and join them by node_to_node, with a tolerance that reaches: sectors are tied node to node."
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,14 +118,19 @@ def _followed(
             "Let it be the second side.",
         )
     if join.pairing == "segment_to_segment":
-        raise input_error(
-            f"{key}.pairing", "segment_to_segment ties no nodes", "Use node_to_segment."
-        )
+        remedy = MATCH if turn is not None else "Use node_to_segment, where each node follows."
+        raise input_error(f"{key}.pairing", "segment_to_segment ties no nodes", remedy)
     a, b = first.surface, second.surface
     if turn is not None:
         b = Surface(turn.points(b.points), b.displacement, b.facets, b.normals, b.numbers)
     a = _towards(a, b)
-    pairing = named(key, join, lambda: match(join, a, b, _across(a)))
+    try:
+        pairing = named(key, join, lambda: match(join, a, b, _across(a)))
+    except InputError as error:
+        if turn is None and join.pairing != "node_to_node":
+            raise
+        remedy = MATCH if turn is not None else "Use node_to_segment, or raise the tolerance."
+        raise input_error(error.place, error.problem, remedy) from None
     # gap = frameᵀ (u_b - u_a): back to global axes
     p = pairing.n_points
     blocks = (pairing.frames, np.arange(p), np.arange(p + 1))
@@ -175,7 +181,7 @@ def _between_sectors(
         raise input_error(
             f"{key}.pairing",
             f"{join.between[0]!r} and {join.between[1]!r} do not match node by node",
-            "Mesh both sides alike and join them by node_to_node: sectors are tied node to node.",
+            MATCH,
         )
     return (
         np.array([int(row.indices[0]) for row in found.values()], dtype=np.int64),

@@ -11,7 +11,6 @@ from stickslip.assembly.model import Model
 from stickslip.assembly.reduced import Store, at_speed, damped, steady_load
 from stickslip.assembly.wheel import (
     ReducedSector,
-    conjugate,
     partners,
     reduced_wave,
     wave_numbers,
@@ -22,6 +21,8 @@ from stickslip.model.structure import Structure, join
 from stickslip.reduction.basis import surviving_sets, with_modal_dofs
 from stickslip.reduction.cache import content_hash
 from stickslip.reduction.cyclic import CyclicSector
+from stickslip.reduction.tuned import conjugate
+from stickslip.reduction.whole_wheel import goes_both_ways
 
 REMEMBERED = 64  # waves kept in memory
 
@@ -78,9 +79,10 @@ def reduced_sector(
         found: tuple[Structure, Matrix] = memo[key]
         return found
 
+    mirrored = goes_both_ways(sector, sector.structure)
+
     def wave(k: int) -> tuple[Structure, Matrix]:
-        # sectors of real matrices do not tell the two directions apart
-        if 2 * k <= sector.sectors or sector.structure.is_complex:
+        if 2 * k <= sector.sectors or not mirrored:
             return made(k)
         structure, load = made(sector.sectors - k)
         return conjugate(structure), np.conj(load)

@@ -233,18 +233,6 @@ def _in_order(structure: Structure, order: IntArray) -> Structure:
     return in_coordinates(structure, into, structure.dofs.take(order), {})
 
 
-def conjugate(structure: Structure) -> Structure:
-    """Return the wave that travels the other way."""
-    loss = None if structure.loss is None else structure.loss.conj()
-    return replace(
-        structure,
-        mass=structure.mass.conj(),
-        damping=structure.damping.conj(),
-        stiffness=structure.stiffness.conj(),
-        loss=loss,
-    )
-
-
 def wave_numbers(sectors: int, engine_order: int, harmonics: int) -> list[int]:
     """Return the wave numbers of all harmonics, in rising order."""
     return sorted({excited_wave(engine_order, sectors, h) for h in range(harmonics + 1)})
