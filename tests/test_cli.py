@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections import namedtuple
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -33,6 +34,20 @@ def test_a_run_gives_blas_one_thread_unless_told_otherwise(monkeypatch, said):
     threads.one_blas_thread()
     one = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
     assert environment == (said or one)
+
+
+@pytest.mark.parametrize("said", [False, True])
+def test_loaded_blas_has_one_thread_for_a_while_unless_told_otherwise(monkeypatch, said):
+    """The order of sums, and so the bits, are then those of the command; NumPy's wheel keeps an OpenBLAS."""
+    counts = [5, 7]
+    own = [(partial(counts.__getitem__, i), partial(counts.__setitem__, i)) for i in range(2)]
+    assert len(threads._loaded()) == 2
+    assert all(get() >= 1 for get, _ in threads._loaded())
+    monkeypatch.setattr(threads, "_loaded", lambda: own)
+    monkeypatch.setattr(threads, "SAID", said)
+    with threads.one_loaded_blas_thread():
+        assert counts == ([5, 7] if said else [1, 1])
+    assert counts == [5, 7]
 
 
 def invoke(*words: str) -> Result:

@@ -20,6 +20,7 @@ from stickslip.study.analyses.analysis import Case, named
 from stickslip.study.file.messages import told
 from stickslip.study.file.section import Section
 from stickslip.study.file.tables import Tables
+from stickslip.study.keep.threads import one_loaded_blas_thread
 from stickslip.study.run import answer
 from stickslip.units import RPM
 
@@ -90,7 +91,7 @@ class Model(Assembly):
     ) -> Result:
         settings = SimpleNamespace(**_tables(name, keys))
         case = Case(0, "", {}, settings, lambda: self, "", Path.cwd(), checks)
-        with by_default():
+        with by_default(), one_loaded_blas_thread():
             outcome = answer(
                 named(name), [case], f"{name.replace('_', ' ').capitalize()} of a model"
             )

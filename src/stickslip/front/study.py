@@ -12,6 +12,7 @@ from stickslip.front.result import Result
 from stickslip.front.screen import by_default
 from stickslip.study.analyses.forced.question import HARMONICS, IN_TIME
 from stickslip.study.check import check_study
+from stickslip.study.keep.threads import one_loaded_blas_thread
 from stickslip.study.models.study import Study as Content
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
@@ -74,6 +75,9 @@ class Study:
     ) -> Result:
         """Answer the questions of the study, going on from what an interrupted run has finished.
 
+        BLAS takes one thread meanwhile, as in the command, so that the bits are the same: that of the wheels of NumPy and SciPy,
+        where no environment variable says otherwise. For another BLAS say OMP_NUM_THREADS=1 before NumPy is imported.
+
         Parameters
         ----------
         workers
@@ -98,7 +102,7 @@ class Study:
         content = self.content
         if folder is not None:
             content = _Elsewhere(content.file, content.memo, Path(folder).resolve())
-        with by_default(workers):
+        with by_default(workers), one_loaded_blas_thread():
             outcome = run_study(content, only=names, workers=workers, fresh=fresh, checks=checks)
         return Result.of(outcome)
 

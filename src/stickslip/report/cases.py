@@ -11,8 +11,8 @@ from stickslip.report.quantities import number
 
 
 @dataclass(frozen=True)
-class Case:
-    """One case; its texts are escaped for HTML.
+class ShownCase:
+    """A case as the page names it; its texts are escaped for HTML.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def _short(row: np.ndarray) -> str:
     )
 
 
-def cases_of(data: xr.Dataset) -> tuple[Case, ...]:
+def cases_of(data: xr.Dataset) -> tuple[ShownCase, ...]:
     """Return the cases of an analysis in the order of the study."""
     n = data.sizes.get("case", 1)
     values, numbers = _varied(data)[1], first_number(data)[1]
@@ -95,6 +95,6 @@ def cases_of(data: xr.Dataset) -> tuple[Case, ...]:
         np.asarray(data["excitation_n"].values) if "excitation_n" in data else np.full(n, np.nan)
     )
     return tuple(
-        Case(i, escape(labels[i]), _short(values[i]) or str(i + 1), float(numbers[i]), float(force[i]), colour)
+        ShownCase(i, escape(labels[i]), _short(values[i]) or str(i + 1), float(numbers[i]), float(force[i]), colour)
         for i, colour in enumerate(ramp(n))
     )  # fmt: skip

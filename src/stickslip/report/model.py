@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from html import escape
 
 import numpy as np
+import xarray as xr
 
 from stickslip.arrays import FloatArray
 from stickslip.report.node import Node
@@ -80,8 +81,8 @@ def contacts(nodes: Mapping[str, Node]) -> str | None:
 
 def facts(nodes: Mapping[str, Node]) -> str | None:
     """Return mass, centre, size and counts of the model."""
-    node = next((n for n in nodes.values() if n.stored("mass_kg") is not None), None)
-    if node is None:
+    node = _together(nodes)
+    if node.stored("mass_kg") is None:
         return None
     sectors = int(node.scalar("sectors", 1))
     mass, each = node.scalar("mass_kg"), " of a sector" if sectors > 1 else ""
@@ -97,6 +98,15 @@ def facts(nodes: Mapping[str, Node]) -> str | None:
         *_static(node),
     ]
     return "<h3>Facts</h3>" + html_table([], [row for row in rows if row[1] != NONE], numeric=False)
+
+
+def _together(nodes: Mapping[str, Node]) -> Node:
+    """Return what any analysis stores of the model: the first one that does."""
+    each = [node.data for node in reversed(nodes.values())]
+    told = {
+        n: v.variable for data in each for n, v in data.data_vars.items() if set(v.dims) <= {"xyz"}
+    }
+    return Node(xr.Dataset(told, attrs={k: v for data in each for k, v in data.attrs.items()}))
 
 
 _COUNTS = (

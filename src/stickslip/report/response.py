@@ -12,7 +12,7 @@ from stickslip.arrays import FloatArray, IntArray
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.support import named
-from stickslip.report.cases import Case, cases_of, varied
+from stickslip.report.cases import ShownCase, cases_of, varied
 from stickslip.report.node import Node
 from stickslip.report.quantities import Scale, number, predicted, scale_for
 from stickslip.report.tables import html_table
@@ -35,7 +35,7 @@ class Response(Node):
     """Accepted points of all cases; any variable but those of `NEEDED` may be missing."""
 
     @cached_property
-    def cases(self) -> tuple[Case, ...]:
+    def cases(self) -> tuple[ShownCase, ...]:
         """All cases, in the order of the study."""
         return cases_of(self.data)
 
@@ -50,12 +50,12 @@ class Response(Node):
             return np.full(self.data.sizes["point"], np.nan)
         return self.values(name)
 
-    def of_case(self, name: str, case: Case, *dimensions: str) -> FloatArray:
+    def of_case(self, name: str, case: ShownCase, *dimensions: str) -> FloatArray:
         """Return what a variable with the dimension ``case`` holds of one, its dimensions in the order named."""
         found = self.data[name].isel(case=case.index)
         return np.asarray(found.transpose(*dimensions).values, dtype=np.float64)
 
-    def number_of(self, name: str, case: Case) -> float:
+    def number_of(self, name: str, case: ShownCase) -> float:
         """Return the number that a variable along ``case`` holds of one; NaN where it is missing."""
         return float(self.values(name)[case.index]) if name in self.data else float("nan")
 
@@ -219,7 +219,7 @@ class Response(Node):
         cells = [list(row)[first:] for row in rows]
         return html_table([self.varied, *head][first:], cells, numeric=numeric)
 
-    def points(self, case: Case) -> IntArray:
+    def points(self, case: ShownCase) -> IntArray:
         """Points of a case in the order in which a curve joins them, the unconverged ones included.
 
         A branch that folds back keeps its order and leaves out the peak refinements, whose place on it is
@@ -232,22 +232,22 @@ class Response(Node):
             return index[~refined]
         return index[np.argsort(self.hz[index], kind="stable")]
 
-    def peak(self, case: Case) -> int:
+    def peak(self, case: ShownCase) -> int:
         """Position of the peak along ``point``; -1 if there is none."""
         value = self.number_of("peak_point", case)
         inside = np.isfinite(value) and 0 <= value < self.data.sizes["point"]
         return int(value) if inside else -1
 
-    def peak_response(self, case: Case) -> float:
+    def peak_response(self, case: ShownCase) -> float:
         """Response at the peak; NaN without a peak."""
         return float(self.response()[self.peak(case)]) if self.peak(case) >= 0 else float("nan")
 
-    def peak_hz(self, case: Case) -> float:
+    def peak_hz(self, case: ShownCase) -> float:
         """Frequency of the peak in Hz; NaN without a peak."""
         return float(self.hz[self.peak(case)]) if self.peak(case) >= 0 else float("nan")
 
     @cached_property
-    def peaked(self) -> tuple[Case, ...]:
+    def peaked(self) -> tuple[ShownCase, ...]:
         """The cases that have a peak."""
         return tuple(c for c in self.cases if self.peak(c) >= 0)
 

@@ -5,7 +5,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from stickslip.arrays import FloatArray
-from stickslip.report.cases import Case
+from stickslip.report.cases import ShownCase
 from stickslip.report.plot import Plot, colour, legend_above, log_ticks, styled
 from stickslip.report.quantities import Scale, number, percent, quantity, scale_for
 from stickslip.report.response import Response
@@ -29,7 +29,7 @@ def rigid_bodies(response: Response) -> dict[str, list[int]]:
 
 
 def body_motion(
-    response: Response, case: Case, at: list[int], samples: int = 128
+    response: Response, case: ShownCase, at: list[int], samples: int = 128
 ) -> tuple[FloatArray, FloatArray]:
     """Coordinates of a rigid body over one period at the peak.
 
@@ -57,7 +57,7 @@ def body_motion(
     return coefficients[0].real, np.real(coefficients[1:].T @ wave)
 
 
-def _caption(response: Response, case: Case, at: list[int]) -> str:
+def _caption(response: Response, case: ShownCase, at: list[int]) -> str:
     mean, motion = body_motion(response, case, at)
     largest = np.ptp(motion, axis=1) / 2
     move, turn = int(np.argmax(largest[:3])), int(np.argmax(largest[3:]))
@@ -72,7 +72,7 @@ def _caption(response: Response, case: Case, at: list[int]) -> str:
 
 
 def _traces(
-    figure: go.Figure, case: Case, motion: FloatArray, angle: Scale, orbit: tuple[int, int]
+    figure: go.Figure, case: ShownCase, motion: FloatArray, angle: Scale, orbit: tuple[int, int]
 ) -> None:
     """Add translation, rotation and orbit of one case."""
     time = np.linspace(0, 1, motion.shape[1])
@@ -144,7 +144,7 @@ def group_colours(response: Response) -> dict[str, str]:
     return {name: colour(k) for k, name in enumerate(response.groups)}
 
 
-def _energy_caption(response: Response, case: Case) -> str:
+def _energy_caption(response: Response, case: ShownCase) -> str:
     energy, names = (
         response.floats("dissipated_energy")[response.peak(case)],
         response.labels("contact"),

@@ -6,7 +6,7 @@ from html import escape
 import numpy as np
 
 from stickslip.harmonic.support import named
-from stickslip.report.cases import Case
+from stickslip.report.cases import ShownCase
 from stickslip.report.forced.contact import states
 from stickslip.report.quantities import number
 from stickslip.report.response import Response
@@ -15,7 +15,7 @@ from stickslip.study.analyses.forced.summary import cost_sentence
 _NAMED = 4  # sets of harmonics that a cell names
 
 
-def flagged_ranges(response: Response, case: Case) -> list[tuple[float, float]]:
+def flagged_ranges(response: Response, case: ShownCase) -> list[tuple[float, float]]:
     """Ranges of frequency in which the alert asked for more harmonics.
 
     Returns
@@ -31,7 +31,7 @@ def flagged_ranges(response: Response, case: Case) -> list[tuple[float, float]]:
     return [(float(hz[a:b].min()), float(hz[a:b].max())) for a, b in zip(starts, ends, strict=True)]
 
 
-def _harmonic_share(response: Response, case: Case) -> float:
+def _harmonic_share(response: Response, case: ShownCase) -> float:
     """Largest share of the contact forces' vibration that harmonics beyond the first passage's carry, in percent."""
     at = np.flatnonzero((response.point_case == case.index) & response.converged & response.more)
     if not at.size or not response.has("contact_force"):
@@ -45,7 +45,7 @@ def _harmonic_share(response: Response, case: Case) -> float:
     return float(100 * share.max())
 
 
-def _why(response: Response, case: Case) -> str:
+def _why(response: Response, case: ShownCase) -> str:
     """Say what the contact does at the peak of a case and what the higher harmonics carry."""
     reasons = []
     if response.has("peak_state") and response.peak(case) >= 0:
@@ -115,7 +115,7 @@ def _other_text(response: Response) -> str:
     )
 
 
-def _alert_row(response: Response, case: Case) -> tuple[str, str]:
+def _alert_row(response: Response, case: ShownCase) -> tuple[str, str]:
     """Say in which ranges a case was flagged, and how large its predicted error is at most."""
     ranges = (
         number(a, 5) + (f" to {number(b, 5)}" if a != b else "") + " Hz"
@@ -129,12 +129,12 @@ def _alert_row(response: Response, case: Case) -> tuple[str, str]:
     return "<br>".join(ranges) or "nowhere", largest
 
 
-def _other_row(response: Response, case: Case) -> tuple[str, str]:
+def _other_row(response: Response, case: ShownCase) -> tuple[str, str]:
     own = response.alert.error[response.alert.case == case.index]
     return _kept_where(response, case), response.shown(float(own.max())) if own.size else "–"
 
 
-def _kept_where(response: Response, case: Case | None = None) -> str:
+def _kept_where(response: Response, case: ShownCase | None = None) -> str:
     """Say which harmonics were kept how often, the most frequent ones first."""
     mine = (
         response.converged

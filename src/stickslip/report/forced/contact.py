@@ -5,7 +5,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.report.cases import Case
+from stickslip.report.cases import ShownCase
 from stickslip.report.plot import MUTED, STATE_COLOURS, STATE_NAMES, Plot, legend_above, styled
 from stickslip.report.quantities import counted, joined, percent, quantity
 from stickslip.report.response import Response
@@ -22,7 +22,7 @@ def chooser(response: Response) -> str | None:
     return case_buttons(response.varied, response.peaked, response.chosen)
 
 
-def case_buttons(heading: str, cases: tuple[Case, ...], chosen: int) -> str | None:
+def case_buttons(heading: str, cases: tuple[ShownCase, ...], chosen: int) -> str | None:
     """Return buttons that choose a case; None where there is no choice."""
     if len(cases) < 2:
         return None
@@ -54,17 +54,17 @@ def _wrapped(rows: list[list[int]]) -> list[list[int]]:
     return found
 
 
-def states(response: Response, case: Case) -> IntArray:
+def states(response: Response, case: ShownCase) -> IntArray:
     """(contact, tangent, sample) states of a case at its peak; 0 stick, 1 slip, 2 open."""
     return response.of_case("peak_state", case, "contact", "tangent", "sample").astype(np.int64)
 
 
-def period(response: Response, case: Case, name: str) -> FloatArray:
+def period(response: Response, case: ShownCase, name: str) -> FloatArray:
     """(contact, direction, sample) of ``peak_gap`` or ``peak_force`` of a case."""
     return response.of_case(name, case, "contact", "direction", "sample")
 
 
-def _drawn(response: Response, *names: str) -> tuple[Case, ...]:
+def _drawn(response: Response, *names: str) -> tuple[ShownCase, ...]:
     """Cases with a peak whose variables are there and finite."""
     if not response.has(*names):
         return ()
@@ -97,7 +97,7 @@ def _loop(gap: FloatArray, force: FloatArray, state: IntArray | None, name: str)
     )  # fmt: skip
 
 
-def _area(response: Response, case: Case, direction: int) -> FloatArray:
+def _area(response: Response, case: ShownCase, direction: int) -> FloatArray:
     """(contact,) areas of the loops: energy lost in a cycle, J; zero where rounding alone makes one."""
     gap, force = (period(response, case, name)[:, direction] for name in ("peak_gap", "peak_force"))
     work = 0.5 * (force + np.roll(force, -1, -1)) * (np.roll(gap, -1, -1) - gap)
@@ -105,7 +105,7 @@ def _area(response: Response, case: Case, direction: int) -> FloatArray:
     return np.where(area > _ROUNDING * np.ptp(gap, axis=-1) * np.ptp(force, axis=-1), area, 0.0)
 
 
-def _loop_caption(response: Response, case: Case, direction: int) -> str:
+def _loop_caption(response: Response, case: ShownCase, direction: int) -> str:
     area, names = _area(response, case, direction), response.labels("contact")
     if not area.any():
         return "No loop encloses an area: nothing is dissipated in this direction."
@@ -122,7 +122,7 @@ def _loop_caption(response: Response, case: Case, direction: int) -> str:
     )
 
 
-def _panels(response: Response, cases: tuple[Case, ...], direction: int) -> list[list[int]]:
+def _panels(response: Response, cases: tuple[ShownCase, ...], direction: int) -> list[list[int]]:
     """Return the contact points drawn, by row: those with a force, where they are many those that lose most in any case."""
     spans = [np.ptp(period(response, c, "peak_force")[:, direction], axis=-1) for c in cases]
     acting = np.flatnonzero(np.any(np.nan_to_num(spans) > 0, axis=0)).tolist()
@@ -189,7 +189,7 @@ def hysteresis_w(response: Response) -> Plot | None:
     return _hysteresis(response, "w")
 
 
-def _state_caption(response: Response, case: Case) -> str:
+def _state_caption(response: Response, case: ShownCase) -> str:
     state, names = states(response, case), response.labels("contact")
     slipping, open_ = ((state == k).any(axis=(1, 2)) for k in (1, 2))
     share = [100 * float((state == k).mean()) for k in range(3)]
@@ -205,7 +205,7 @@ def _state_caption(response: Response, case: Case) -> str:
     return text
 
 
-def _state_rows(response: Response, cases: tuple[Case, ...]) -> tuple[list[int], list[str]]:
+def _state_rows(response: Response, cases: tuple[ShownCase, ...]) -> tuple[list[int], list[str]]:
     """Return the rows of (contact, tangent) that are drawn and their names: one for a point that has no tangential motion."""
     names, tangents = response.labels("contact"), response.labels("tangent")
     n, rows, labels = len(tangents), [], []

@@ -6,7 +6,7 @@ from plotly.subplots import make_subplots
 
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.support import named
-from stickslip.report.cases import Case, first_number
+from stickslip.report.cases import ShownCase, first_number
 from stickslip.report.plot import ALARM, GRID, MUTED, Plot, key_marker, log_ticks, styled
 from stickslip.report.quantities import counted, joined, number, percent, scale_for
 from stickslip.report.response import Response
@@ -15,7 +15,7 @@ COMPARED = 3  # curves that stay legible in one panel
 _FEWEST = 3  # cases of an optimisation curve
 
 
-def most(response: Response, size: FloatArray) -> list[Case]:
+def most(response: Response, size: FloatArray) -> list[ShownCase]:
     """Return the `COMPARED` cases with the largest value of `size` (point,), those without a finite one left out."""
     largest = {
         c: float(np.nanmax(size[response.point_case == c.index], initial=-np.inf))
@@ -33,7 +33,7 @@ def _abscissa(response: Response) -> tuple[FloatArray, str, str]:
     return response.hz, "frequency", "Hz"
 
 
-def _curve(response: Response, case: Case) -> go.Scatter:
+def _curve(response: Response, case: ShownCase) -> go.Scatter:
     at, scale = response.points(case), response.scale
     x, _, unit = _abscissa(response)
     high = response.more[at]
@@ -156,7 +156,7 @@ def frequency_response(response: Response) -> Plot | None:
     return Plot("response", title, _caption(response), figure)
 
 
-def _low_caption(response: Response, cases: list[Case], low: FloatArray) -> str:
+def _low_caption(response: Response, cases: list[ShownCase], low: FloatArray) -> str:
     parts = []
     for case in cases:
         at = response.points(case)
@@ -210,7 +210,7 @@ def low_order(response: Response) -> Plot | None:
     return Plot("low_order", title, _low_caption(response, cases, low), figure)
 
 
-def _optimum_caption(cases: list[Case], peak: FloatArray, hz: FloatArray) -> str:
+def _optimum_caption(cases: list[ShownCase], peak: FloatArray, hz: FloatArray) -> str:
     best = int(np.nanargmin(peak))
     text = (
         f"Among the cases computed the peak is smallest{cases[best].where}: "
@@ -224,9 +224,9 @@ def _optimum_caption(cases: list[Case], peak: FloatArray, hz: FloatArray) -> str
     )
 
 
-def _families(cases: list[Case], key: str) -> dict[str, list[Case]]:
+def _families(cases: list[ShownCase], key: str) -> dict[str, list[ShownCase]]:
     """Group cases by all that is varied beside `key`: a curve each."""
-    found: dict[str, list[Case]] = {}
+    found: dict[str, list[ShownCase]] = {}
     for case in cases:
         others = ", ".join(t for t in case.label.split(", ") if not t.startswith(f"{key} = "))
         found.setdefault(others, []).append(case)

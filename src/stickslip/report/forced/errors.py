@@ -6,7 +6,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from stickslip.arrays import FloatArray
-from stickslip.report.cases import Case
+from stickslip.report.cases import ShownCase
 from stickslip.report.forced.curves import COMPARED, most
 from stickslip.report.plot import ALARM, INK, Plot, log_ticks, styled
 from stickslip.report.quantities import counted, number, percent
@@ -21,7 +21,7 @@ def _error_traces(figure: go.Figure, response: Response) -> None:
     asked, real = response.alert, response.floats("real_error_percent")
     both = most(response, real) if response.is_error else []
 
-    def add(case: Case, x: FloatArray, y: FloatArray, column: int, **style: object) -> None:
+    def add(case: ShownCase, x: FloatArray, y: FloatArray, column: int, **style: object) -> None:
         unit = " %" if response.is_error else ""
         hover = f"{case.named}<br>%{{x:.2f}} Hz: %{{y:.3g}}{unit}<extra></extra>"
         options = {"legendgroup": "cases", "hovertemplate": hover, "showlegend": False, **style}

@@ -5,7 +5,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from stickslip.arrays import IntArray
-from stickslip.report.cases import Case
+from stickslip.report.cases import ShownCase
 from stickslip.report.plot import ALARM, Plot, styled
 from stickslip.report.quantities import counted
 from stickslip.report.response import Response
@@ -43,7 +43,7 @@ def kept_harmonics(response: Response) -> Plot | None:
     return Plot("harmonics", "Harmonics kept at each frequency", _caption(response, cases), figure)
 
 
-def _marks(response: Response, case: Case) -> go.Scatter:
+def _marks(response: Response, case: ShownCase) -> go.Scatter:
     at = response.points(case)
     at = at[response.converged[at]]
     row, harmonic = np.nonzero(response.kept[at, 1:])
@@ -61,7 +61,7 @@ def _lost(response: Response, at: IntArray, highest: int) -> go.Scatter:
     )  # fmt: skip
 
 
-def _caption(response: Response, cases: list[Case]) -> str:
+def _caption(response: Response, cases: list[ShownCase]) -> str:
     good = response.converged
     text = (
         f"A mark stands for a harmonic that the accepted solution keeps, chosen by <code>{response.selection}</code>; the "
