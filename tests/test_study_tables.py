@@ -229,6 +229,12 @@ def test_what_a_model_depends_on_changes_its_digest_and_nothing_else_does(tmp_pa
     for key, value in {"rotation.speed_rpm": 1.0, "contact.shroud.gap_m": 1e-6}.items():
         other = {key: value} | ({"contact.shroud.preload_n": 0.0} if "gap" in key else {})
         assert study.replace(other).cases()[0].digest != digest
+    at_rest = study.cases()[0].digest_at_rest
+    for key, value in {"load.gas.force_n": 3.0, "output.peak": "tip.x"}.items():
+        driven = study.replace({key: value}).cases()[0]
+        assert driven.digest != digest
+        assert driven.digest_at_rest == at_rest
+    assert study.replace({"rotation.speed_rpm": 1.0}).cases()[0].digest_at_rest != at_rest
     deck = tmp_path / "sector.inp"
     deck.write_text(deck.read_text(encoding="ascii") + "** changed\n", encoding="ascii")
     assert study.cases()[0].digest != digest

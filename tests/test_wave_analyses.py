@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from small_v2 import changed, write_shrouded_sector, write_two_blades
+from small_v2 import changed, write_four_masses, write_shrouded_sector, write_two_blades
 
 from evidence.validation.case_calculix_materials import our_solid, write_decks
 from stickslip.errors import InputError
@@ -24,7 +24,7 @@ from stickslip.study.analyses.waves.solve import Question, solve_wave
 from stickslip.study.keep.netcdf import one_case
 from stickslip.study.models.study import Study, read_study
 from stickslip.study.outcome import Outcome
-from stickslip.study.run import answer
+from stickslip.study.run import answer, run_study
 from stickslip.units import RPM
 
 STEEL = """
@@ -457,3 +457,17 @@ def test_cases_of_different_sizes_stand_behind_each_other(tmp_path: Path) -> Non
     titles = [table.title for table in outcome.summaries["modes"]]
     assert titles == [f"modes.number = {n}: Natural frequencies in Hz at rest" for n in (3, 5)]
     assert [len(table.rows[0]) for table in outcome.summaries["modes"]] == [5, 7]
+
+
+def test_cases_that_differ_in_harmonic_loads_alone_are_computed_and_shown_once(
+    tmp_path: Path,
+) -> None:
+    asked = {"modes.number": "3", "vary.load.shaker.force_n": "[5.0, 8.0]"}
+    made = read_study(write_four_masses(tmp_path, asked))
+    outcome = run_study(made, only=["modes"])
+    assert len(list((made.folder / "jobs").glob("*.job"))) == 1
+    assert outcome.tree["modes"].sizes["case"] == 2
+    assert [t.title for t in outcome.summaries["modes"]] == ["Natural frequencies in Hz at rest"]
+    made = made.replace({"vary.part.chain.masses_kg": [[1.0] * 4, [2.0, 1.0, 1.0, 1.0]]})
+    titles = [t.title for t in run_study(made, only=["modes"]).summaries["modes"]]
+    assert len(list((made.folder / "jobs").glob("*.job"))) == len(titles) == 2

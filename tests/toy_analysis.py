@@ -34,6 +34,7 @@ class Toy:
     name = "toy"
     table = SimpleNamespace
     record = Term
+    linear = False
     checks = ("twice",)
 
     def key(self, case: Case) -> str:

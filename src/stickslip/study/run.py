@@ -167,7 +167,8 @@ def _tasks(
 def _task(asked: Analysis, case: Case, folder: Path, versions: Mapping[str, str]) -> Task:
     """Name the file of a job by all that its numbers depend on."""
     layout = [f.name for f in fields(asked.record)]
-    parts = [asked.name, asked.key(case), case.digest, versions, layout]
+    model = case.digest_at_rest if asked.linear else case.digest
+    parts = [asked.name, asked.key(case), model, versions, layout]
     key = sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
     return Task(asked, case, folder / JOBS / f"{key}{SEALED}")
 

@@ -38,6 +38,8 @@ class Case:
         Further checks that this run asks for, of those that the analysis names in `Analysis.checks`.
     store
         Keeps what is expensive of the model: for `Model.assembled`.
+    digest_at_rest
+        As `digest`, without harmonic loads and outputs.
     """
 
     index: int
@@ -49,6 +51,7 @@ class Case:
     home: Path
     checks: frozenset[str] = frozenset()
     store: Store = in_memory
+    digest_at_rest: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +112,9 @@ class Analysis(Protocol):
         pydantic section of the study file.
     record
         Dataclass of what `solve` yields: arrays, numbers, texts, enumerations and None.
+    linear
+        Whether it looks at small vibrations about the static state, of which harmonic loads and outputs are no part: cases that
+        differ in these alone then share a job.
     checks
         Names of checks that a run may ask for beside the answer (``verify``). A sealed job that has not had them is opened again:
         `solve` then finds all its records in `done`, and puts what the checks found into the notes.
@@ -117,6 +123,7 @@ class Analysis(Protocol):
     name: str
     table: type[Any]
     record: type[Any]
+    linear: bool
     checks: tuple[str, ...]
 
     def key(self, case: Case) -> str:

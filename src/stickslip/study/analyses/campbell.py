@@ -67,6 +67,7 @@ class Campbell:
     name = "campbell"
     table = CampbellTable
     record = WaveBranches
+    linear = True
     checks = ()
 
     def key(self, case: Case) -> str:

@@ -46,6 +46,7 @@ class ForcedResponseAnalysis:
     name = "forced_response"
     table = ForcedResponse
     record = ForcedPoint
+    linear = False
     checks = (IN_TIME, HARMONICS)
 
     def key(self, case: Case) -> str:

@@ -71,6 +71,7 @@ class Modes:
     name = "modes"
     table = ModesTable
     record = WaveModes
+    linear = True
     checks = ()
 
     def key(self, case: Case) -> str:

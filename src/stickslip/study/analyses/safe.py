@@ -56,6 +56,7 @@ class SafeDiagram:
     name = "safe"
     table = SafeTable
     record = WaveModes
+    linear = True
     checks = ()
 
     def key(self, case: Case) -> str:

@@ -155,7 +155,8 @@ def _annotation(kind: Any, q: Quantity) -> Any:
         ]
     if q.choices:
         return Literal[q.choices]
-    return Annotated[kind, pydantic.Field(gt=q.above, ge=q.least, lt=q.below, le=q.most)]
+    lowest, highest = q.in_files
+    return Annotated[kind, pydantic.Field(gt=q.above, ge=lowest, lt=q.below, le=highest)]
 
 
 def _inner(hint: Any) -> Any:
@@ -182,10 +183,11 @@ def _about(q: Quantity, per_area: bool) -> str:
 def _range(q: Quantity) -> str:
     if q.choices:
         return ", ".join(q.choices[:-1]) + f" or {q.choices[-1]}"
+    least, most = q.in_files
     low = f"above {q.above:g}" if q.above is not None else ""
-    low = f"from {q.least:g}" if q.least is not None else low
+    low = f"from {least:g}" if least is not None else low
     high = f"below {q.below:g}" if q.below is not None else ""
-    high = f"to {q.most:g}" if q.most is not None else high
+    high = f"to {most:g}" if most is not None else high
     return "greater than zero" if low == "above 0" and not high else f"{low} {high}".strip()
 
 

@@ -66,6 +66,20 @@ def _stack(found: Sequence[xr.Variable | None], sizes: Mapping[Hashable, int]) -
     return xr.Variable(("case", *like.dims), values, like.attrs)
 
 
+def alike(data: xr.Dataset) -> list[list[int]]:
+    """Return the cases of a dataset in groups of the same content, whatever they are called: what is varied may not concern it."""
+    plain = data.drop_vars(("case_label", "vary_value", "seconds"), errors="ignore")
+    groups: list[list[int]] = []
+    for i in range(data.sizes["case"]):
+        case = plain.isel(case=i)
+        twins = next((g for g in groups if plain.isel(case=g[0]).equals(case)), None)
+        if twins is None:
+            groups.append([i])
+        else:
+            twins.append(i)
+    return groups
+
+
 def one_case(data: xr.Dataset, index: int) -> xr.Dataset:
     """Return one case of a dataset, without what other cases have more of; single numbers and texts become attributes."""
     names = [name for name, v in data.variables.items() if "case" in v.dims]

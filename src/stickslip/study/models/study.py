@@ -1,7 +1,7 @@
 """A study: what is to be computed of which models."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from hashlib import sha256
@@ -15,7 +15,7 @@ from stickslip.study.file.study import StudyFile, TablesOfCase, read_file, valid
 from stickslip.study.file.tables import OF_THE_MODEL, Tables, asked_of
 from stickslip.study.file.vary import with_values
 from stickslip.study.models.checks import refusals
-from stickslip.study.models.model import model_of
+from stickslip.study.models.model import model_of, newton
 from stickslip.study.models.parts import Memo, digest
 
 
@@ -95,14 +95,16 @@ class Study:
         return _checked(Study(changed, self.memo))
 
     def _case(self, index: int, case: TablesOfCase) -> Case:
+        whole, at_rest = model_digests(case.tables, self.file.home)
         return Case(
             index=index,
             label=case.label,
             values=case.values,
             settings=case.tables,
             build=partial(self.model, index),
-            digest=model_digest(case.tables, self.file.home),
+            digest=whole,
             home=self.file.home,
+            digest_at_rest=at_rest,
         )
 
 
@@ -117,13 +119,22 @@ def read_study(path: Path) -> Study:
     return _checked(Study(read_file(path)))
 
 
-def model_digest(tables: Tables, home: Path) -> str:
-    """Return the hash of all that a model depends on: its tables and the content of its files."""
-    own = tables.model_dump(mode="json", include=set(OF_THE_MODEL))
+def model_digests(tables: Tables, home: Path) -> tuple[str, str]:
+    """Return the hash of all that a model depends on, and of what is left of it without harmonic loads and outputs."""
+    own = tables.model_dump(mode="json", include=set(OF_THE_MODEL) - {"load"})
+    parts = [digest(tables, name, home) for name in tables.part]
+    loads = {
+        name: [load.model_dump(mode="json"), newton(tables, load)]
+        for name, load in tables.load.items()
+    }
+    static = {name: loads[name] for name, load in tables.load.items() if load.harmonic == 0}
     output = tables.output.model_dump(mode="json", exclude={"folder"})
-    parts: Sequence[str] = [digest(tables, name, home) for name in tables.part]
-    content = json.dumps([own, output, tables.harmonics.alert_over, parts])
-    return sha256(content.encode()).hexdigest()
+    driven = [own, parts, loads, output, tables.harmonics.alert_over]
+    return _hash(driven), _hash([own, parts, static])
+
+
+def _hash(content: object) -> str:
+    return sha256(json.dumps(content).encode()).hexdigest()
 
 
 def _checked(study: Study) -> Study:

@@ -1,7 +1,7 @@
 """Datasets of the analyses by waves."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,18 +31,32 @@ def dataset(
     of_case
         Returns the variables of a case beside those of its model and waves, and what the user should know.
     """
-    cases, doubts = [], []
+    cases = []
+    doubts: dict[str, list[str]] = {}
     for one in solved:
         note = one.notes.get(ABOUT, {})
         own, said = of_case(one) if one.records else ({}, [])
         cases.append(told(note) | _of_waves(one.records, int(note.get("sectors", 1))) | own)
-        label = f"{one.case.label}: " if one.case.label else ""
-        doubts += [f"{label}{text}" for text in (*note.get("warnings", ()), *said)]
+        for text in (*note.get("warnings", ()), *said):
+            doubts.setdefault(str(text), []).append(one.case.label)
     data = stacked(cases)
     sizes = {dim: size for v in data.values() for dim, size in v.sizes.items()}
     coordinates: dict[str, Any] = {"mode": np.arange(1, sizes.get("mode", 0) + 1), **LABELS}
     used = {name: values for name, values in coordinates.items() if name in sizes}
-    return xr.Dataset(data, coords=used, attrs={"warnings": json.dumps(doubts)})
+    return xr.Dataset(
+        data, coords=used, attrs={"warnings": json.dumps(_labelled(doubts, len(solved)))}
+    )
+
+
+def _labelled(doubts: Mapping[str, Sequence[str]], n_cases: int) -> list[str]:
+    """Return sentences with the labels of the cases they are about; what is about all of several is said once."""
+    found = []
+    for text, labels in doubts.items():
+        everywhere = len(labels) == n_cases > 1
+        found += (
+            [text] if everywhere else [f"{label}: {text}" if label else text for label in labels]
+        )
+    return found
 
 
 def frequencies(waves: Waves) -> FloatArray:

@@ -7,7 +7,7 @@ import xarray as xr
 
 from stickslip.study.analyses.analysis import TextTable
 from stickslip.study.analyses.waves.numbers import label, wave_name
-from stickslip.study.keep.netcdf import one_case
+from stickslip.study.keep.netcdf import alike, one_case
 
 MOST_PAIRS = 30  # of an interference table on the screen
 NEARBY = 0.2  # margin up to which the tangent of a frequency over the speed is good to a digit after the point
@@ -16,13 +16,15 @@ NEARBY = 0.2  # margin up to which the tangent of a frequency over the speed is 
 def of_cases(
     data: xr.Dataset, tables: Callable[[xr.Dataset], Sequence[TextTable]]
 ) -> tuple[TextTable, ...]:
-    """Return the tables of each case, and what the centrifugal load does."""
+    """Return the tables of each case, and what the centrifugal load does; cases that are alike share theirs."""
     found = []
-    for i in range(data.sizes["case"]):
-        case = one_case(data, i)
+    groups = alike(data)
+    for group in groups:
+        case = one_case(data, group[0])
         if not case.sizes.get("wave"):
             continue
-        head = f"{case.attrs['case_label']}: " if case.attrs.get("case_label") else ""
+        labels = [str(data["case_label"].values[i]) for i in group if len(groups) > 1]
+        head = f"{'; '.join(labels)}: " if labels else ""
         made = (*tables(case), *_static(case))
         found += [TextTable(f"{head}{t.title}", t.head, t.rows) for t in made]
     return tuple(found)
