@@ -4,6 +4,7 @@ Keys are changed by their full names, with TOML text for values: ``write_two_bla
 """
 
 import math
+import shutil
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -31,6 +32,20 @@ TWO_BLADES = {
     "harmonics.samples": "64",
 }
 FOUR_MASSES = {"forced_response.points": "10", "forced_response.peak_points": "2"}
+
+SECTOR_DECK = {
+    "modes.number": "1",
+    "modes.nodal_diameters": "[6]",
+    "modes.shapes": "false",
+    "campbell.points": "2",
+    "campbell.engine_orders": "[6]",
+    "campbell.modes": "1",
+    "safe.modes": "1",
+    "harmonics.high": "1",
+    "harmonics.selection": '"always_low"',
+    "forced_response.frequencies": "4",
+    "forced_response.peak_points": "0",
+}
 
 SECTOR = """
 [part.blade]
@@ -106,8 +121,9 @@ def write_two_blades(folder: Path, changes: Mapping[str, str] | None = None) -> 
 
 
 def write_four_masses(folder: Path, changes: Mapping[str, str] | None = None) -> Path:
-    """J6: four masses, two friction elements and a gap."""
-    return _written(folder, _example("four_masses"), FOUR_MASSES | dict(changes or {}))
+    """J6: four masses, two friction elements and a gap, at one load."""
+    text = _example("four_masses").partition("[vary]")[0]
+    return _written(folder, text, FOUR_MASSES | dict(changes or {}))
 
 
 def write_shrouded_sector(folder: Path, changes: Mapping[str, str] | None = None) -> Path:
@@ -121,6 +137,13 @@ def write_shrouded_deck(folder: Path, changes: Mapping[str, str] | None = None) 
     write_sector_deck(folder / "sector.inp")
     own = {"contact.shroud.pairing": '"node_to_segment"'}
     return _written(folder, WHEEL + DECK, own | dict(changes or {}))
+
+
+def write_example_deck(folder: Path, changes: Mapping[str, str] | None = None) -> Path:
+    """J3 as it is shipped: its own deck, few points, one harmonic."""
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copy(EXAMPLES / "sector_deck" / "sector.inp", folder / "sector.inp")
+    return _written(folder, _example("sector_deck"), SECTOR_DECK | dict(changes or {}))
 
 
 def write_sector_deck(path: Path) -> None:

@@ -11,7 +11,13 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
-from small_v2 import write_four_masses, write_shrouded_deck, write_shrouded_sector, write_two_blades
+from small_v2 import (
+    write_example_deck,
+    write_four_masses,
+    write_shrouded_deck,
+    write_shrouded_sector,
+    write_two_blades,
+)
 from typer.testing import CliRunner, Result
 
 import stickslip
@@ -247,6 +253,25 @@ def test_a_deck_from_inspect_to_modes(tmp_path: Path) -> None:
     assert "set " in said
     assert "Natural frequencies in Hz" in done("run", str(path), "--only", "modes", "--no-report")
     assert not (tmp_path / "results" / "report.html").exists()
+
+
+def test_a_deck_with_friction_at_its_shrouds_answers_all_questions_on_one_page(
+    tmp_path: Path,
+) -> None:
+    path = write_example_deck(tmp_path)
+    said = done("run", str(path))
+    for table in ("Forced response", "Natural frequencies in Hz", "Crossings", "near resonances"):
+        assert table in said
+    with xr.open_datatree(tmp_path / "results" / "result.nc", engine="h5netcdf") as tree:
+        assert set(tree.children) == {"forced_response", "modes", "campbell", "safe"}
+        found = tree["forced_response"]
+        assert found.sizes["contact"] == 21
+        assert int(found.status.max()) == 0
+        slips = float(found.dissipated_energy.sum("contact").max())
+        assert slips > 1e-4  # J: shrouds slip
+    page = (tmp_path / "results" / "report.html").read_text(encoding="utf-8")
+    for key in ("response", "states", "diameters", "campbell", "safe"):
+        assert f'<figure id="fig-{key}"' in page
 
 
 def test_only_names_what_there_is(tmp_path: Path) -> None:
