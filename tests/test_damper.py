@@ -147,12 +147,12 @@ def test_pressed_outward_all_nine_points_are_in_compression(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"mass": -0.1}, "RigidBody.mass: must be positive, got -0.1"),
+        ({"mass": -0.1}, "FlatCurvedDamper.mass: must be positive, got -0.1"),
         ({"mass": math.nan}, "must be positive, got nan"),
-        ({"inertia": (1e-5, 0.0, 1e-5)}, "three positive moments"),
+        ({"inertia": (1e-5, 0.0, 1e-5)}, "FlatCurvedDamper.inertia: must be positive"),
         ({"inertia": (1e-6, 1e-6, 1e-5)}, "largest moment exceeds"),
-        ({"centre": (0.0, math.inf, 0.0)}, "three finite numbers"),
-        ({"flat_angle": 45.0}, "FlatCurvedDamper.flat_angle: must lie between 0 and pi/2"),
+        ({"centre": (0.0, math.inf, 0.0)}, "FlatCurvedDamper.centre: must be finite"),
+        ({"flat_angle": 45.0}, r"FlatCurvedDamper.flat_angle: must lie in \(0, 1.571\)"),
         ({"flat_distances": (0.009, 0.007)}, "need 0 < L1 < L2"),
         ({"curved_distance": 0.0}, "curved_distance: must be positive"),
         ({"sections": (0.01, 0.0)}, "in increasing order"),

@@ -1,8 +1,11 @@
-"""Units of engineers and the SI units of the library, and what a study file says of a dataclass's field."""
+"""Units of engineers and the SI units of the library; what a dataclass's field may be, in Python and in a study file."""
 
 import math
-from dataclasses import MISSING, Field, dataclass, field
+from dataclasses import MISSING, Field, dataclass, field, fields
+from numbers import Real
 from typing import Any
+
+from stickslip.errors import input_error
 
 HZ = 2 * math.pi  # rad/s
 RPM = 2 * math.pi / 60  # rad/s
@@ -10,7 +13,11 @@ DEG = math.pi / 180  # rad
 MM = 1e-3  # m
 
 TO_SI = {"hz": HZ, "rpm": RPM, "deg": DEG, "mm": MM}  # of units that keys end with; others are SI
-PER_AREA = {"n_per_m": "n_per_m3", "n": "pa", "n_per_m3": "n_per_m5"}  # of what is shared, given for a square metre
+PER_AREA = {
+    "n_per_m": "n_per_m3",
+    "n": "pa",
+    "n_per_m3": "n_per_m5",
+}  # of what is shared, given for a square metre
 _METADATA = "quantity"
 
 
@@ -28,6 +35,8 @@ class Quantity:
         Its key without the unit, where that differs from the field's name.
     above, least, below, most
         What the values, in the key's unit, must exceed, not fall short of, not reach, not exceed.
+    usual
+        Largest size that a study file takes, in the key's unit: more is a slip of the unit. Python takes more.
     entries
         Least and largest number of entries of a list; zeros for any.
     choices
@@ -43,6 +52,7 @@ class Quantity:
     least: float | None = None
     below: float | None = None
     most: float | None = None
+    usual: float | None = None
     entries: tuple[int, int] = (0, 0)
     choices: tuple[str, ...] = ()
     shared: bool = False
@@ -57,10 +67,73 @@ class Quantity:
         """What makes SI of a value in the key's unit."""
         return TO_SI.get(self.unit, 1.0)
 
+    @property
+    def in_files(self) -> tuple[float | None, float | None]:
+        """Least and largest value that a study file takes, in the key's unit."""
+        if self.usual is None:
+            return self.least, self.most
+        lowest = -self.usual if self.above is None and self.least is None else self.least
+        return lowest, self.usual
+
+    @property
+    def limits(self) -> str:
+        """What becomes of "must ...", in SI: ``be positive``, ``lie in [0, 1)``."""
+        if self.choices:
+            return f"be one of {', '.join(self.choices)}"
+        few, many = self.entries
+        count = f"{few}" if few == many else f"{few} to {many}"
+        if many:
+            return f"be {count} numbers, each {self._interval}"
+        return ("lie " if self._interval.startswith("in ") else "be ") + self._interval
+
+    @property
+    def _interval(self) -> str:
+        low, high = (
+            next((side * self.factor for side in sides if side is not None), None)
+            for sides in ((self.above, self.least), (self.below, self.most))
+        )
+        if low is not None and high is not None:
+            closing = "]" if self.below is None else ")"
+            return f"in {'[' if self.above is None else '('}{low:.4g}, {high:.4g}{closing}"
+        if low == 0.0:
+            return "finite and not negative" if self.above is None else "positive"
+        return "finite" if low is None else f"at least {low:.4g}"
+
+    def allows(self, value: Any) -> bool:
+        """Whether a value, in SI, or all entries of a list of them keep the limits."""
+        entries = value if isinstance(value, (tuple, list)) else (value,)
+        few, many = self.entries
+        return (not many or few <= len(entries) <= many) and all(map(self._allows_one, entries))
+
+    def _allows_one(self, value: Any) -> bool:
+        if self.choices or not isinstance(value, Real):
+            return not self.choices or value in self.choices
+        size, unit = float(value), self.factor
+        return (
+            math.isfinite(size)
+            and (self.above is None or size > self.above * unit)
+            and (self.least is None or size >= self.least * unit)
+            and (self.below is None or size < self.below * unit)
+            and (self.most is None or size <= self.most * unit)
+        )
+
+
+_ANY = Quantity(about="")
+
 
 def quantity(about: str, unit: str = "", *, default: Any = MISSING, **limits: Any) -> Any:
     """Return a dataclass field that a study file can make a key of; `limits` are further fields of `Quantity`."""
     return field(default=default, metadata={_METADATA: Quantity(about=about, unit=unit, **limits)})
+
+
+def length(about: str, default: Any = MISSING, *, usual: float = 100, **limits: Any) -> Any:
+    """Return the field of a length in metres, positive unless `limits` say otherwise."""
+    return quantity(about, "m", default=default, usual=usual, **(limits or {"above": 0}))
+
+
+def angle(about: str, degrees: float, **limits: Any) -> Any:
+    """Return the field of an angle in rad, with its default in degrees; so are the limits."""
+    return quantity(about, "deg", default=math.radians(degrees), **limits)
 
 
 def table(about: str) -> dict[str, Quantity]:
@@ -71,3 +144,22 @@ def table(about: str) -> dict[str, Quantity]:
 def quantity_of(entry: Field[Any]) -> Quantity | None:
     """Return what `quantity` put down of a dataclass's field; None for other fields."""
     return entry.metadata.get(_METADATA)
+
+
+def check_quantities(given: Any) -> None:
+    """Check the numbers of a dataclass: what its quantities allow; others are to be finite.
+
+    Raises
+    ------
+    InputError
+        For the first field that is not.
+    """
+    for entry in fields(given):
+        known, value = quantity_of(entry) or _ANY, getattr(given, entry.name)
+        if value is not None and not known.allows(value):
+            unit = {"": "", "deg": " in rad"}.get(known.unit, " in SI units")
+            raise input_error(
+                f"{type(given).__name__}.{entry.name}",
+                f"must {known.limits}, got {value}",
+                f"Meant is{unit}: {known.about or 'a number in SI units'}.",
+            )

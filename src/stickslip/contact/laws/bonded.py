@@ -8,12 +8,13 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.contact.element import element, element_step, slider_start
 from stickslip.contact.law import UNCOUPLED_TANGENTS
-from stickslip.contact.laws.parameter_checks import check_any_stiffness, check_not_negative
+from stickslip.contact.laws.parameter_checks import check_any_stiffness
 from stickslip.contact.laws.quantities import (
     axial_stiffness,
     normal_stiffness,
     tangential_stiffness,
 )
+from stickslip.units import check_quantities
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +40,7 @@ class Bonded:
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:
-        check_not_negative(self, "k_t", "k_w", "k_n")
+        check_quantities(self)
         check_any_stiffness(self, "k_t", "k_w", "k_n")
 
     def parameters(self) -> FloatArray:

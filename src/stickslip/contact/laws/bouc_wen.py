@@ -8,19 +8,14 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import SLIP, STICK, UNCOUPLED_TANGENTS, law_kernel
-from stickslip.contact.laws.parameter_checks import (
-    check_any_stiffness,
-    check_finite,
-    check_not_negative,
-    check_positive,
-)
+from stickslip.contact.laws.parameter_checks import check_any_stiffness
 from stickslip.contact.laws.quantities import (
     axial_stiffness,
     normal_stiffness,
     tangential_stiffness,
 )
 from stickslip.errors import input_error
-from stickslip.units import quantity
+from stickslip.units import check_quantities, quantity
 
 # Gauss-Legendre points and weights on [0, 1] after s = y v², which makes broken powers of s smooth
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(24)
@@ -188,25 +183,13 @@ class BoucWen:
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:
-        check_not_negative(self, "k_t", "alpha", "k_w", "k_n")
-        check_positive(self, "beta", "a")
-        check_finite(self, "gamma", "exponent")
+        check_quantities(self)
         check_any_stiffness(self, "k_t", "k_w", "k_n")
         if not -self.beta < self.gamma <= self.beta:
             raise input_error(
                 "BoucWen.gamma",
                 f"must be above -beta and at most beta = {self.beta}, got {self.gamma}",
                 "Outside, the law grows without limit or gives energy.",
-            )
-        if self.alpha > 1.0:
-            raise input_error(
-                "BoucWen.alpha", f"must be 0 to 1, got {self.alpha}", "It is a share of k_t."
-            )
-        if not 1.0 <= self.exponent <= 20.0:
-            raise input_error(
-                "BoucWen.exponent",
-                f"must be 1 to 20, got {self.exponent}",
-                "Jenkins is the law with a sharp knee.",
             )
 
     @property

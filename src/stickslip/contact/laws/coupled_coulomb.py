@@ -7,13 +7,9 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import COUPLED_TANGENTS, OPEN, SLIP, STICK, law_kernel
-from stickslip.contact.laws.parameter_checks import (
-    check_any_stiffness,
-    check_finite,
-    check_not_negative,
-)
+from stickslip.contact.laws.parameter_checks import check_any_stiffness
 from stickslip.contact.laws.quantities import friction_coefficient, normal_stiffness
-from stickslip.units import quantity
+from stickslip.units import check_quantities, quantity
 
 
 def _step(displacement, velocity, state, parameters, force, new_state, jac, status):  # type: ignore[no-untyped-def]
@@ -99,8 +95,7 @@ class CoupledCoulomb:
     pairs: ClassVar[int] = COUPLED_TANGENTS
 
     def __post_init__(self) -> None:
-        check_not_negative(self, "k_t", "k_n", "mu")
-        check_finite(self, "preload")
+        check_quantities(self)
         check_any_stiffness(self, "k_t", "k_n")
 
     def parameters(self) -> FloatArray:

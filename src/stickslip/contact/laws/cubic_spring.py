@@ -7,18 +7,14 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import UNCOUPLED_TANGENTS
-from stickslip.contact.laws.parameter_checks import (
-    check_any_stiffness,
-    check_finite,
-    check_not_negative,
-)
+from stickslip.contact.laws.parameter_checks import check_any_stiffness
 from stickslip.contact.laws.polynomial_spring import polynomial_step
 from stickslip.contact.laws.quantities import (
     axial_stiffness,
     normal_stiffness,
     tangential_stiffness,
 )
-from stickslip.units import quantity
+from stickslip.units import check_quantities, quantity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,8 +63,7 @@ class CubicSpring:
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:
-        check_finite(self, "cubic_t", "cubic_w", "cubic_n")
-        check_not_negative(self, "k_t", "k_w", "k_n")
+        check_quantities(self)
         check_any_stiffness(self, "cubic_t", "cubic_w", "cubic_n", "k_t", "k_w", "k_n")
 
     def parameters(self) -> FloatArray:

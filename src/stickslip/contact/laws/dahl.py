@@ -7,17 +7,14 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import SLIP, STICK, UNCOUPLED_TANGENTS, law_kernel
-from stickslip.contact.laws.parameter_checks import (
-    check_any_stiffness,
-    check_not_negative,
-    check_positive,
-)
+from stickslip.contact.laws.parameter_checks import check_any_stiffness
 from stickslip.contact.laws.quantities import (
     axial_stiffness,
     normal_stiffness,
     slip_limit,
     tangential_stiffness,
 )
+from stickslip.units import check_quantities
 
 
 def _step(displacement, velocity, state, parameters, force, new_state, jac, status):  # type: ignore[no-untyped-def]
@@ -68,7 +65,7 @@ class Dahl:
     """
 
     k_t: float = tangential_stiffness()
-    limit: float = slip_limit()
+    limit: float = slip_limit(least=None, above=0)
     k_w: float = axial_stiffness(default=0.0)
     k_n: float = normal_stiffness(default=0.0)
 
@@ -76,8 +73,7 @@ class Dahl:
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:
-        check_not_negative(self, "k_t", "k_w", "k_n")
-        check_positive(self, "limit")
+        check_quantities(self)
         check_any_stiffness(self, "k_t", "k_w", "k_n")
 
     def parameters(self) -> FloatArray:

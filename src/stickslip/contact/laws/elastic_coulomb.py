@@ -8,19 +8,14 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.contact.element import element, element_step, slider_start
 from stickslip.contact.law import UNCOUPLED_TANGENTS
-from stickslip.contact.laws.parameter_checks import (
-    check_any_stiffness,
-    check_finite,
-    check_not_negative,
-)
+from stickslip.contact.laws.parameter_checks import check_any_stiffness
 from stickslip.contact.laws.quantities import (
     axial_stiffness,
     friction_coefficient,
     normal_stiffness,
     tangential_stiffness,
 )
-from stickslip.errors import input_error
-from stickslip.units import quantity
+from stickslip.units import check_quantities, quantity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,16 +62,8 @@ class ElasticCoulomb:
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:
-        check_not_negative(self, "k_t", "k_w", "k_n", "mu")
-        check_finite(self, "preload")
+        check_quantities(self)
         check_any_stiffness(self, "k_t", "k_w", "k_n")
-        m = self.residual_traction
-        if m is not None and not -1.0 <= m <= 1.0:
-            raise input_error(
-                "ElasticCoulomb.residual_traction",
-                f"must lie in [-1, 1], got {m}",
-                "It is a share of mu N.",
-            )
 
     def parameters(self) -> FloatArray:
         """Return the (7,) row of the elementary contact."""

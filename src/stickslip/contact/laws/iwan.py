@@ -9,13 +9,14 @@ from stickslip.arrays import FloatArray
 from stickslip.contact.element import ROUND_OFF, element
 from stickslip.contact.law import SLIP, STICK, UNCOUPLED_TANGENTS, law_kernel
 from stickslip.contact.laws.iwan_populations import Population, UniformBand
-from stickslip.contact.laws.parameter_checks import check_any_stiffness, check_not_negative
+from stickslip.contact.laws.parameter_checks import check_any_stiffness
 from stickslip.contact.laws.quantities import (
     axial_stiffness,
     normal_stiffness,
     slip_limit,
     tangential_stiffness,
 )
+from stickslip.units import check_quantities
 
 
 def _step(displacement, velocity, state, parameters, force, new_state, jac, status):  # type: ignore[no-untyped-def]
@@ -85,7 +86,7 @@ class Iwan:
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:
-        check_not_negative(self, "k_t", "limit", "k_w", "k_n")
+        check_quantities(self)
         check_any_stiffness(self, "k_t", "k_w", "k_n")
 
     def _limits(self) -> FloatArray:

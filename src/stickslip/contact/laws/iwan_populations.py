@@ -11,7 +11,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
-from stickslip.units import quantity
+from stickslip.units import check_quantities, quantity
 
 
 class Population(Protocol):
@@ -41,7 +41,7 @@ class UniformBand:
         If a parameter is out of its range.
     """
 
-    n_sliders: int = quantity("number of sliders", key="sliders", default=20, least=1, most=1000)
+    n_sliders: int = quantity("number of sliders", key="sliders", default=20, least=1, usual=1000)
     half_width: float = quantity(
         "half of the band over the mean distance", default=1.0, above=0, most=1
     )
@@ -50,19 +50,7 @@ class UniformBand:
     )
 
     def __post_init__(self) -> None:
-        _check_count(self, self.n_sliders)
-        if not 0.0 < self.half_width <= 1.0:
-            raise input_error(
-                "UniformBand.half_width",
-                f"must be above 0 and at most 1, got {self.half_width}",
-                "It is a share of the mean break-free distance.",
-            )
-        if not 0.0 <= self.elastic_share < 1.0:
-            raise input_error(
-                "UniformBand.elastic_share",
-                f"must be at least 0 and below 1, got {self.elastic_share}",
-                "Use Bonded for a spring that never slips.",
-            )
+        check_quantities(self)
 
     def sliders(self) -> FloatArray:
         """Return (2, n) shares of stiffness and limit."""
@@ -98,22 +86,10 @@ class FourParameter:
 
     chi: float = quantity("exponent of the distribution", above=-1, most=0)
     beta: float = quantity("stiffness of the last sliders over that of all others", least=0)
-    n_sliders: int = quantity("number of sliders", key="sliders", default=20, least=1, most=1000)
+    n_sliders: int = quantity("number of sliders", key="sliders", default=20, least=1, usual=1000)
 
     def __post_init__(self) -> None:
-        _check_count(self, self.n_sliders)
-        if not -1.0 < self.chi <= 0.0:
-            raise input_error(
-                "FourParameter.chi",
-                f"must be above -1 and at most 0, got {self.chi}",
-                "Measured slopes of energy over amplitude lie between 2 and 3: chi is the slope less 3.",
-            )
-        if not (np.isfinite(self.beta) and self.beta >= 0.0):
-            raise input_error(
-                "FourParameter.beta",
-                f"must be finite and not negative, got {self.beta}",
-                "It is a ratio of stiffnesses.",
-            )
+        check_quantities(self)
 
     def sliders(self) -> FloatArray:
         """Return (2, n) shares of stiffness and limit."""
@@ -180,12 +156,3 @@ class FirstLoading:
             stiffness, limit = np.append(stiffness, slopes[-1]), np.append(limit, np.inf)
         finite = np.isfinite(limit)
         return np.array([stiffness / np.sum(stiffness), limit / np.sum(limit[finite])])
-
-
-def _check_count(population: object, n_sliders: int) -> None:
-    if n_sliders < 1:
-        raise input_error(
-            f"{type(population).__name__}.n_sliders",
-            f"must be at least 1, got {n_sliders}",
-            "Twenty make a smooth loop.",
-        )

@@ -8,13 +8,14 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.contact.element import element, element_step, slider_start
 from stickslip.contact.law import UNCOUPLED_TANGENTS
-from stickslip.contact.laws.parameter_checks import check_any_stiffness, check_not_negative
+from stickslip.contact.laws.parameter_checks import check_any_stiffness
 from stickslip.contact.laws.quantities import (
     axial_stiffness,
     normal_stiffness,
     slip_limit,
     tangential_stiffness,
 )
+from stickslip.units import check_quantities
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +50,7 @@ class Jenkins:
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:
-        check_not_negative(self, "k_t", "limit", "k_w", "k_n")
+        check_quantities(self)
         check_any_stiffness(self, "k_t", "k_w", "k_n")
 
     def parameters(self) -> FloatArray:

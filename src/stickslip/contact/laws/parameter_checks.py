@@ -1,42 +1,16 @@
 """Checks of law parameters, with one wording of their messages."""
 
-import numpy as np
-
 from stickslip.errors import input_error
 
 
-def check_finite(law: object, *names: str) -> None:
-    """Raise `InputError` if one of the named numbers of `law` is not finite."""
-    for name in names:
-        value = getattr(law, name)
-        if not np.isfinite(value):
-            raise input_error(
-                f"{type(law).__name__}.{name}",
-                f"must be finite, got {value}",
-                "Give it in SI units.",
-            )
-
-
 def check_not_negative(law: object, *names: str) -> None:
-    """Raise `InputError` if one of the named numbers of `law` is negative or not finite."""
+    """Raise `InputError` if one of the named numbers of `law` is negative; None is not."""
     for name in names:
         value = getattr(law, name)
-        if not np.isfinite(value) or value < 0:
+        if value is not None and value < 0:
             raise input_error(
                 f"{type(law).__name__}.{name}",
                 f"must be finite and not negative, got {value}",
-                "Give it in SI units.",
-            )
-
-
-def check_positive(law: object, *names: str) -> None:
-    """Raise `InputError` if one of the named numbers of `law` is not finite and greater than zero."""
-    for name in names:
-        value = getattr(law, name)
-        if not np.isfinite(value) or value <= 0:
-            raise input_error(
-                f"{type(law).__name__}.{name}",
-                f"must be finite and greater than zero, got {value}",
                 "Give it in SI units.",
             )
 

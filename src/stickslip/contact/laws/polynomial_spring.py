@@ -8,7 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import STICK, UNCOUPLED_TANGENTS, law_kernel
 from stickslip.errors import input_error
-from stickslip.units import quantity
+from stickslip.units import check_quantities, quantity
 
 
 def _step(displacement, velocity, state, parameters, force, new_state, jac, status):  # type: ignore[no-untyped-def]
@@ -64,14 +64,7 @@ class PolynomialSpring:
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:
-        for name in ("along_t", "along_w", "along_n"):
-            values = getattr(self, name)
-            if not all(np.isfinite(c) for c in values):
-                raise input_error(
-                    f"PolynomialSpring.{name}",
-                    f"must hold finite numbers, got {values}",
-                    "Give the coefficients in SI units.",
-                )
+        check_quantities(self)
         if not any(c for c in (*self.along_t, *self.along_w, *self.along_n)):
             raise input_error(
                 "PolynomialSpring",

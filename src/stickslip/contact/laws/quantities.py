@@ -23,15 +23,15 @@ def normal_stiffness(**given: Any) -> Any:
 def friction_coefficient() -> Any:
     """Return the field of the friction coefficient."""
     about = "friction coefficient (steel on steel: 0.6)"
-    return quantity(about, key="friction_coefficient", least=0, most=5)
+    return quantity(about, key="friction_coefficient", least=0, usual=5)
 
 
-def slip_limit() -> Any:
+def slip_limit(least: float | None = 0, **given: Any) -> Any:
     """Return the field of a constant friction limit."""
     about = "friction force at which all has slipped, along either tangent"
-    return quantity(about, "n", key="slip_limit", least=0, shared=True)
+    return quantity(about, "n", key="slip_limit", least=least, shared=True, **given)
 
 
 def _stiffness(where: str, key: str, given: dict[str, Any]) -> Any:
     about = f"stiffness along the {where}"
-    return quantity(about, "n_per_m", key=key, least=0, shared=True, **given)
+    return quantity(about, "n_per_m", key=key, shared=True, **{"least": 0, **given})

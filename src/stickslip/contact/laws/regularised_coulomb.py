@@ -7,13 +7,8 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import OPEN, SLIP, STICK, UNCOUPLED_TANGENTS, law_kernel
-from stickslip.contact.laws.parameter_checks import (
-    check_finite,
-    check_not_negative,
-    check_positive,
-)
 from stickslip.contact.laws.quantities import friction_coefficient, normal_stiffness
-from stickslip.units import quantity
+from stickslip.units import check_quantities, quantity
 
 
 def _step(displacement, velocity, state, parameters, force, new_state, jac, status):  # type: ignore[no-untyped-def]
@@ -69,9 +64,7 @@ class RegularisedCoulomb:
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:
-        check_not_negative(self, "mu", "k_n")
-        check_positive(self, "transition_velocity")
-        check_finite(self, "preload")
+        check_quantities(self)
 
     def parameters(self) -> FloatArray:
         """Return the (4,) k_n, mu, preload and transition velocity."""

@@ -3,14 +3,14 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar, NoReturn
 
-import numpy as np
-
 from stickslip.arrays import FloatArray
 from stickslip.contact.element import element_step
 from stickslip.contact.law import UNCOUPLED_TANGENTS
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.jenkins import Jenkins
+from stickslip.contact.laws.parameter_checks import check_not_negative
 from stickslip.errors import InputError, input_error
+from stickslip.units import check_quantities
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,19 +45,8 @@ class RigidCoulomb:
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:
-        for name, value in (("mu", self.mu), ("preload", self.preload)):
-            if value is not None and not (np.isfinite(value) and value >= 0.0):
-                raise input_error(
-                    f"RigidCoulomb.{name}",
-                    f"must be finite and not negative, got {value}",
-                    "Give it in SI units.",
-                )
-        if not np.isfinite(self.initial_gap):
-            raise input_error(
-                "RigidCoulomb.initial_gap",
-                f"must be finite, got {self.initial_gap}",
-                "Give it in metres.",
-            )
+        check_quantities(self)
+        check_not_negative(self, "mu", "preload")
         if self.preload is not None and self.initial_gap != 0.0:
             raise input_error(
                 "RigidCoulomb",

@@ -8,9 +8,10 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.contact.element import element, element_step, slider_start
 from stickslip.contact.law import UNCOUPLED_TANGENTS
-from stickslip.contact.laws.parameter_checks import check_not_negative, check_positive
+from stickslip.contact.laws.parameter_checks import check_not_negative
 from stickslip.contact.laws.quantities import normal_stiffness
 from stickslip.errors import input_error
+from stickslip.units import check_quantities
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +33,7 @@ class UnilateralSpring:
         If a parameter is out of its range, or both a preload and an initial gap are given.
     """
 
-    k_n: float = normal_stiffness()
+    k_n: float = normal_stiffness(least=None, above=0)
     preload: float = 0.0
     initial_gap: float = 0.0
 
@@ -40,7 +41,7 @@ class UnilateralSpring:
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:
-        check_positive(self, "k_n")
+        check_quantities(self)
         check_not_negative(self, "preload", "initial_gap")
         if self.preload > 0.0 and self.initial_gap > 0.0:
             raise input_error(

@@ -18,7 +18,7 @@ from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.fe.solid import Material
 from stickslip.model.structure import Structure
-from stickslip.units import quantity
+from stickslip.units import check_quantities, length, quantity
 
 End = Literal["clamped", "pinned", "sliding", "free"]
 Direction = Literal["y", "z"]
@@ -59,32 +59,25 @@ class Beam:
         If a size is not positive or an end unknown.
     """
 
-    length: float = quantity("length of the beam", "m", above=0, most=1e4)
+    length: float = length("length of the beam", usual=1e4)
     area: float = quantity("area of its section", "m2", above=0)
     second_moment: float = quantity("second moment of area for its bending", "m4", above=0)
-    material: Material = quantity("the table of its material")
+    material: Material = quantity("the table of its material")  # noqa: RUF009
     shear_coefficient: float | None = quantity(
         "shear coefficient κ, which makes a Timoshenko beam; left out: Euler-Bernoulli",
         default=None,
         above=0,
-        most=2,
+        usual=2,
     )
     ends: tuple[End, End] = quantity(
         "how the first and the last end are held",
         default=("clamped", "free"),
         choices=get_args(End),
+        entries=(2, 2),
     )
 
     def __post_init__(self) -> None:
-        for name in ("length", "area", "second_moment", "shear_coefficient"):
-            value = getattr(self, name)
-            if value is not None and not 0 < value < math.inf:
-                raise input_error(f"Beam.{name}", f"must be positive, got {value}", "SI units.")
-        given: Sequence[str] = self.ends
-        if len(given) != 2 or any(end not in get_args(End) for end in given):
-            raise input_error(
-                "Beam.ends", f"got {self.ends}", f"Two of {', '.join(get_args(End))}."
-            )
+        check_quantities(self)
 
 
 def beam(shape: Beam, elements: int, *, bending: Direction = "z", axial: bool = False) -> Structure:

@@ -3,7 +3,6 @@
 scikit-fem is imported only when a solid is assembled.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -25,7 +24,7 @@ from stickslip.model.fe.elements import (
 from stickslip.model.mesh.mesh_facets import HEX_EDGES, TET_EDGES
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.structure import Structure
-from stickslip.units import quantity
+from stickslip.units import check_quantities, quantity
 
 CUT_FACES = ("cyclic_low", "cyclic_high")  # these sets may lose nodes to a clamp
 
@@ -49,18 +48,7 @@ class Material:
     density: float = quantity("density (steel: 7850)", "kg_per_m3", default=7850.0, above=0)
 
     def __post_init__(self) -> None:
-        for name in ("young_modulus", "density"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise input_error(
-                    f"Material.{name}", f"must be positive, got {value}", "Use SI units."
-                )
-        if not 0 <= self.poisson_ratio < 0.5:
-            raise input_error(
-                "Material.poisson_ratio",
-                f"must be at least 0 and below 1/2, got {self.poisson_ratio}",
-                "Steel has about 0.3.",
-            )
+        check_quantities(self)
 
     @property
     def lame(self) -> tuple[float, float]:

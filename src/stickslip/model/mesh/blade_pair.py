@@ -5,10 +5,10 @@ x = 0, blade 2 at x = `pitch`.
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from stickslip.errors import InputError, input_error
-from stickslip.units import quantity
+from stickslip.units import angle, check_quantities, length, quantity
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,101 +56,42 @@ class BladePair:
         If a length is not positive or the parts do not fit together.
     """
 
-    pitch: float = quantity(
-        "distance of the two blades along x", "m", default=0.056, above=0, most=100
+    pitch: float = length("distance of the two blades along x", 0.056)
+    foot_width: float = length("extent of the foot along x", 0.034)
+    foot_depth: float = length("extent of the foot along y", 0.048)
+    foot_height: float = length(
+        "extent of the foot along z; its bottom and flanks are clamped", 0.020
     )
-    foot_width: float = quantity(
-        "extent of the foot along x", "m", default=0.034, above=0, most=100
+    shank_thickness: float = length("extent of the shank along x", 0.0132)
+    platform_gap: float = length("clearance between neighbouring platforms along x", 0.001)
+    platform_depth: float = length("extent of shank and platform along y", 0.048)
+    platform_height: float = length("height of the platform's top above the foot", 0.110)
+    platform_edge: float = length("thickness of the platform at its edges", 0.004)
+    flat_angle: float = angle(
+        "inclination from x of the underside of blade 1", 45, above=0, below=90
     )
-    foot_depth: float = quantity(
-        "extent of the foot along y", "m", default=0.048, above=0, most=100
+    curved_angle: float = angle(
+        "inclination from x of the underside of blade 2", 45, above=0, below=90
     )
-    foot_height: float = quantity(
-        "extent of the foot along z; its bottom and flanks are clamped",
-        "m",
-        default=0.020,
-        above=0,
-        most=100,
-    )
-    shank_thickness: float = quantity(
-        "extent of the shank along x", "m", default=0.0132, above=0, most=100
-    )
-    platform_gap: float = quantity(
-        "clearance between neighbouring platforms along x", "m", default=0.001, above=0, most=100
-    )
-    platform_depth: float = quantity(
-        "extent of shank and platform along y", "m", default=0.048, above=0, most=100
-    )
-    platform_height: float = quantity(
-        "height of the platform's top above the foot", "m", default=0.110, above=0, most=100
-    )
-    platform_edge: float = quantity(
-        "thickness of the platform at its edges", "m", default=0.004, above=0, most=100
-    )
-    flat_angle: float = quantity(
-        "inclination from x of the underside of blade 1",
-        "deg",
-        default=math.radians(45),
-        above=0,
-        below=90,
-    )
-    curved_angle: float = quantity(
-        "inclination from x of the underside of blade 2",
-        "deg",
-        default=math.radians(45),
-        above=0,
-        below=90,
-    )
-    airfoil_length: float = quantity(
-        "length of the airfoil from the platform to the tip", "m", default=0.160, above=0, most=100
-    )
-    hub_chord: float = quantity(
-        "chord of the airfoil at the platform", "m", default=0.046, above=0, most=100
-    )
-    tip_chord: float = quantity(
-        "chord of the airfoil at the tip", "m", default=0.040, above=0, most=100
-    )
-    hub_thickness: float = quantity(
-        "thickness of the airfoil at the platform", "m", default=0.0065, above=0, most=100
-    )
-    tip_thickness: float = quantity(
-        "thickness of the airfoil at the tip", "m", default=0.0055, above=0, most=100
-    )
-    camber: float = quantity(
-        "height of the camber line over the chord", default=0.04, least=-0.3, most=0.3
-    )
-    twist: float = quantity(
-        "rotation of the tip against the hub", "deg", default=math.radians(8), least=-90, most=90
-    )
+    airfoil_length: float = length("length of the airfoil from the platform to the tip", 0.160)
+    hub_chord: float = length("chord of the airfoil at the platform", 0.046)
+    tip_chord: float = length("chord of the airfoil at the tip", 0.040)
+    hub_thickness: float = length("thickness of the airfoil at the platform", 0.0065)
+    tip_thickness: float = length("thickness of the airfoil at the tip", 0.0055)
+    camber: float = quantity("height of the camber line over the chord", default=0.04, usual=0.3)
+    twist: float = angle("rotation of the tip against the hub", 8, usual=90)
     force_span: float = quantity(
         "place of the node set force on blade 1's airfoil, a fraction of the span from the hub",
         default=0.0,
         least=0,
         below=0.5,
     )
-    airfoil_size: float = quantity(
-        "element size in the airfoil", "m", default=0.0060, above=0, most=100
-    )
-    platform_size: float = quantity(
-        "element size in the platform", "m", default=0.0055, above=0, most=100
-    )
-    foot_size: float = quantity(
-        "element size in shank and foot", "m", default=0.0080, above=0, most=100
-    )
+    airfoil_size: float = length("element size in the airfoil", 0.0060)
+    platform_size: float = length("element size in the platform", 0.0055)
+    foot_size: float = length("element size in shank and foot", 0.0080)
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            free = field.name in {"twist", "camber", "force_span"}
-            if not math.isfinite(value) or not (free or value > 0):
-                raise _bad(field.name, f"must be positive and finite, got {value}", "Give metres.")
-        for name in ("flat_angle", "curved_angle"):
-            if not getattr(self, name) < math.pi / 2:
-                raise _bad(name, f"must be below pi/2 rad, got {getattr(self, name)}", "Use rad.")
-        if not 0.0 <= self.force_span < 0.5:
-            raise _bad(
-                "force_span", f"must lie in [0, 0.5), got {self.force_span}", "0 is the hub."
-            )
+        check_quantities(self)
         if self.shank_thickness >= 2 * self.half_width:
             raise _bad(
                 "pitch",

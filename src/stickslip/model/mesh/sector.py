@@ -12,7 +12,7 @@ import numpy as np
 from stickslip.arrays import BoolArray, FloatArray
 from stickslip.errors import InputError, input_error
 from stickslip.model.mesh.sector_parts import Airfoil, DiskProfile, Platform, Shroud
-from stickslip.units import quantity, table
+from stickslip.units import check_quantities, length, quantity, table
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +41,7 @@ class BladedSector:
     """
 
     sectors: int = quantity(
-        "number of sectors (blades) of the wheel", default=24, least=3, most=500
+        "number of sectors (blades) of the wheel", default=24, least=3, usual=500
     )
     disk: DiskProfile = field(default_factory=DiskProfile, metadata=table("the disk"))
     platform: Platform | None = field(
@@ -52,23 +52,14 @@ class BladedSector:
     shroud: Shroud | None = field(
         default=None, metadata=table("a ring segment on the blade; left out: none")
     )
-    disk_size: float = quantity("element size in the disk", "m", default=0.012, above=0, most=100)
-    platform_size: float = quantity(
-        "element size in platform and shroud", "m", default=0.008, above=0, most=100
-    )
-    airfoil_size: float = quantity(
-        "element size in the airfoil", "m", default=0.010, above=0, most=100
-    )
+    disk_size: float = length("element size in the disk", 0.012)
+    platform_size: float = length("element size in platform and shroud", 0.008)
+    airfoil_size: float = length("element size in the airfoil", 0.010)
 
     def __post_init__(self) -> None:
-        if self.sectors < 3 or self.sectors % 1:
-            raise _bad(
-                "sectors", f"must be a whole number from 3 on, got {self.sectors}", "Try 24."
-            )
-        for name in ("disk_size", "platform_size", "airfoil_size"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise _bad(name, f"must be positive and finite, got {value}", "Give metres.")
+        check_quantities(self)
+        if self.sectors % 1:
+            raise _bad("sectors", f"must be a whole number, got {self.sectors}", "Try 24.")
         self._check_platform()
         self._check_base()
         self._check_neighbours()

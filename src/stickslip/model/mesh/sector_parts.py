@@ -1,16 +1,15 @@
 """Parts of a bladed-disk sector: disk, platform, airfoil, shroud."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
-from stickslip.units import quantity
+from stickslip.units import angle, check_quantities, length, quantity
 
 SECTION_POINTS = 7  # on either face of the airfoil
-STEEPEST = math.radians(75)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,28 +35,16 @@ class DiskProfile:
         If a length is not positive, or the radii do not follow each other.
     """
 
-    bore_radius: float = quantity(
-        "inner radius; the bore is clamped", "m", default=0.060, above=0, most=100
-    )
-    hub_radius: float = quantity(
-        "radius where the hub has narrowed to the web", "m", default=0.095, above=0, most=100
-    )
-    rim_radius: float = quantity("outer radius of the disk", "m", default=0.170, above=0, most=100)
-    rim_height: float = quantity(
-        "extent of the rim along the radius", "m", default=0.014, above=0, most=100
-    )
-    bore_width: float = quantity(
-        "extent of the hub along the axis at the bore", "m", default=0.050, above=0, most=100
-    )
-    web_width: float = quantity(
-        "extent of the web along the axis", "m", default=0.014, above=0, most=100
-    )
-    rim_width: float = quantity(
-        "extent of the rim along the axis", "m", default=0.034, above=0, most=100
-    )
+    bore_radius: float = length("inner radius; the bore is clamped", 0.060)
+    hub_radius: float = length("radius where the hub has narrowed to the web", 0.095)
+    rim_radius: float = length("outer radius of the disk", 0.170)
+    rim_height: float = length("extent of the rim along the radius", 0.014)
+    bore_width: float = length("extent of the hub along the axis at the bore", 0.050)
+    web_width: float = length("extent of the web along the axis", 0.014)
+    rim_width: float = length("extent of the rim along the axis", 0.034)
 
     def __post_init__(self) -> None:
-        _check_lengths(self)
+        check_quantities(self)
         if not self.bore_radius < self.hub_radius < self.rim_radius - self.rim_height:
             raise input_error(
                 "DiskProfile",
@@ -102,30 +89,15 @@ class Platform:
         If a length is not positive, or the angle is too steep.
     """
 
-    top_radius: float = quantity(
-        "distance of the plane top from the axis", "m", default=0.187, above=0, most=100
-    )
-    thickness: float = quantity("thickness at the sides", "m", default=0.004, above=0, most=100)
-    neck_width: float = quantity(
-        "extent of the neck around the wheel", "m", default=0.018, above=0, most=100
-    )
-    depth: float = quantity(
-        "extent of neck and platform along the axis", "m", default=0.034, above=0, most=100
-    )
-    underside_angle: float = quantity(
-        "inclination of the undersides", "deg", default=math.radians(20), least=0, most=75
-    )
-    gap: float = quantity(
-        "clearance to the neighbour's platform; 0 lets them touch",
-        "m",
-        default=0.0008,
-        least=0,
-        most=100,
-    )
+    top_radius: float = length("distance of the plane top from the axis", 0.187)
+    thickness: float = length("thickness at the sides", 0.004)
+    neck_width: float = length("extent of the neck around the wheel", 0.018)
+    depth: float = length("extent of neck and platform along the axis", 0.034)
+    underside_angle: float = angle("inclination of the undersides", 20, least=0, most=75)
+    gap: float = length("clearance to the neighbour's platform; 0 lets them touch", 0.0008, least=0)
 
     def __post_init__(self) -> None:
-        _check_lengths(self, zero=("underside_angle", "gap"))
-        _check_steep("Platform.underside_angle", self.underside_angle)
+        check_quantities(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,33 +123,19 @@ class Airfoil:
         If a length is not positive, or a thickness exceeds its chord.
     """
 
-    airfoil_length: float = quantity(
-        "from the platform's top (without platform: from the rim) to the tip",
-        "m",
-        default=0.105,
-        above=0,
-        most=100,
+    airfoil_length: float = length(
+        "from the platform's top (without platform: from the rim) to the tip", 0.105
     )
-    hub_chord: float = quantity("chord at the hub", "m", default=0.030, above=0, most=100)
-    tip_chord: float = quantity("chord at the tip", "m", default=0.026, above=0, most=100)
-    hub_thickness: float = quantity("thickness at the hub", "m", default=0.0050, above=0, most=100)
-    tip_thickness: float = quantity("thickness at the tip", "m", default=0.0028, above=0, most=100)
-    camber: float = quantity(
-        "height of the camber line over the chord", default=0.08, least=-0.3, most=0.3
-    )
-    stagger: float = quantity(
-        "angle of the hub's chord from the axis",
-        "deg",
-        default=math.radians(15),
-        least=-90,
-        most=90,
-    )
-    twist: float = quantity(
-        "rotation of the tip against the hub", "deg", default=math.radians(25), least=-90, most=90
-    )
+    hub_chord: float = length("chord at the hub", 0.030)
+    tip_chord: float = length("chord at the tip", 0.026)
+    hub_thickness: float = length("thickness at the hub", 0.0050)
+    tip_thickness: float = length("thickness at the tip", 0.0028)
+    camber: float = quantity("height of the camber line over the chord", default=0.08, usual=0.3)
+    stagger: float = angle("angle of the hub's chord from the axis", 15, usual=90)
+    twist: float = angle("rotation of the tip against the hub", 25, usual=90)
 
     def __post_init__(self) -> None:
-        _check_lengths(self, free=("camber", "stagger", "twist"))
+        check_quantities(self)
         for end in ("hub", "tip"):
             chord, thickness = getattr(self, f"{end}_chord"), getattr(self, f"{end}_thickness")
             if thickness >= chord:
@@ -232,45 +190,12 @@ class Shroud:
     span: float = quantity(
         "place as a fraction of the airfoil's length; 1 is the tip", default=1.0, above=0, most=1
     )
-    thickness: float = quantity("extent along the radius", "m", default=0.004, above=0, most=100)
-    depth: float = quantity("extent along the axis", "m", default=0.026, above=0, most=100)
-    gap: float = quantity(
-        "clearance to the neighbour's shroud; 0 lets them touch",
-        "m",
-        default=0.0,
-        least=0,
-        most=100,
-    )
-    face_angle: float = quantity(
-        "inclination of the contact faces from the axial plane",
-        "deg",
-        default=math.radians(20),
-        least=-75,
-        most=75,
+    thickness: float = length("extent along the radius", 0.004)
+    depth: float = length("extent along the axis", 0.026)
+    gap: float = length("clearance to the neighbour's shroud; 0 lets them touch", 0.0, least=0)
+    face_angle: float = angle(
+        "inclination of the contact faces from the axial plane", 20, least=-75, most=75
     )
 
     def __post_init__(self) -> None:
-        _check_lengths(self, zero=("gap",), free=("face_angle",))
-        _check_steep("Shroud.face_angle", self.face_angle)
-        if self.span > 1:
-            raise input_error(
-                "Shroud.span", f"must lie in (0, 1], got {self.span}", "1 is the tip."
-            )
-
-
-def _check_lengths(part: object, zero: tuple[str, ...] = (), free: tuple[str, ...] = ()) -> None:
-    """Refuse numbers that are not finite or positive; those in `zero` may vanish, those in `free` may have any sign."""
-    for entry in fields(part):  # type: ignore[arg-type]
-        name, value = entry.name, getattr(part, entry.name)
-        low = value >= 0 if name in zero else value > 0
-        if not math.isfinite(value) or not (low or name in free):
-            raise input_error(
-                f"{type(part).__name__}.{name}",
-                f"must be positive and finite, got {value}",
-                "Give metres, and angles in rad.",
-            )
-
-
-def _check_steep(place: str, angle: float) -> None:
-    if abs(angle) > STEEPEST:
-        raise input_error(place, f"must be within ±{STEEPEST:.3g} rad, got {angle}", "Use rad.")
+        check_quantities(self)

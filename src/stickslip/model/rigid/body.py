@@ -1,6 +1,5 @@
 """Rigid bodies: six degrees of freedom and no stiffness of their own."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +8,7 @@ from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.units import quantity
+from stickslip.units import check_quantities, quantity
 
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
 
@@ -35,34 +34,19 @@ class RigidBody:
 
     mass: float = quantity("mass of the body", "kg", above=0)
     inertia: tuple[float, float, float] = quantity(
-        "moments of inertia [x, y, z] about the centre of mass", "kg_m2", above=0
+        "moments of inertia [x, y, z] about the centre of mass", "kg_m2", above=0, entries=(3, 3)
     )
     centre: tuple[float, float, float] = quantity(
-        "centre of mass [x, y, z]", "m", least=-100, most=100
+        "centre of mass [x, y, z]", "m", usual=100, entries=(3, 3)
     )
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.mass) and self.mass > 0):
-            raise input_error(
-                "RigidBody.mass", f"must be positive, got {self.mass}", "Give kilograms."
-            )
-        if np.shape(self.inertia) != (3,) or not all(
-            math.isfinite(i) and i > 0 for i in self.inertia
-        ):
-            raise input_error(
-                "RigidBody.inertia",
-                f"needs three positive moments of inertia, got {self.inertia}",
-                "Give them about x, y and z through the centre of mass, in kg m².",
-            )
+        check_quantities(self)
         if 2 * max(self.inertia) > sum(self.inertia) * (1 + 1e-9):
             raise input_error(
                 "RigidBody.inertia",
                 f"the largest moment exceeds the sum of the other two, got {self.inertia}",
                 "No distribution of mass has such moments: check their order and units (kg m²).",
-            )
-        if np.shape(self.centre) != (3,) or not all(math.isfinite(c) for c in self.centre):
-            raise input_error(
-                "RigidBody.centre", f"needs three finite numbers, got {self.centre}", "Give metres."
             )
 
     def structure(self) -> Structure:

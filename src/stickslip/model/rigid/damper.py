@@ -23,7 +23,7 @@ import numpy as np
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.model.rigid.body import RigidBody
-from stickslip.units import quantity
+from stickslip.units import angle, check_quantities, length, quantity
 
 CURVED_SEGMENTS = 24
 
@@ -86,42 +86,23 @@ class FlatCurvedDamper:
     """
 
     apex: tuple[float, float] = quantity(
-        "the point [x, z] where the contact planes meet",
-        "m",
-        default=(0.028, 0.1065),
-        least=-100,
-        most=100,
+        "the point [x, z] where the contact planes meet", "m", default=(0.028, 0.1065), usual=100
     )
-    flat_angle: float = quantity(
-        "inclination of the flat side from x", "deg", default=math.radians(45), above=0, below=90
+    flat_angle: float = angle("inclination of the flat side from x", 45, above=0, below=90)
+    curved_angle: float = angle(
+        "inclination from x of the plane that touches the curved side", 45, above=0, below=90
     )
-    curved_angle: float = quantity(
-        "inclination from x of the plane that touches the curved side",
-        "deg",
-        default=math.radians(45),
-        above=0,
-        below=90,
+    flat_distances: tuple[float, float] = length(
+        "distances of the lines [L1, L2] from the apex, the nearer first", (0.002, 0.029)
     )
-    flat_distances: tuple[float, float] = quantity(
-        "distances of the lines [L1, L2] from the apex, the nearer first",
-        "m",
-        default=(0.002, 0.029),
-        above=0,
-        most=100,
-    )
-    curved_distance: float = quantity(
-        "distance of the line R from the apex", "m", default=0.0045, above=0, most=100
-    )
-    curved_radius: float = quantity(
-        "radius of the curved side", "m", default=0.05, above=0, most=100
-    )
+    curved_distance: float = length("distance of the line R from the apex", 0.0045)
+    curved_radius: float = length("radius of the curved side", 0.05)
     sections: tuple[float, ...] = quantity(
         "axial positions y of the sections, growing; each holds one point a line",
         "m",
         default=(-0.016, 0.0, 0.016),
-        least=-100,
-        most=100,
-        entries=(1, 20),
+        entries=(1, 100),
+        usual=100,
     )
     mass: float = quantity("mass of the damper", "kg", default=0.12, above=0)
     inertia: tuple[float, float, float] = quantity(
@@ -131,39 +112,22 @@ class FlatCurvedDamper:
         above=0,
     )
     centre: tuple[float, float, float] = quantity(
-        "centre of mass [x, y, z], from the apex",
-        "m",
-        default=(-0.0014, 0.0, -0.0134),
-        least=-100,
-        most=100,
+        "centre of mass [x, y, z], from the apex", "m", default=(-0.0014, 0.0, -0.0134), usual=100
     )
 
     def __post_init__(self) -> None:
-        for name in ("flat_angle", "curved_angle"):
-            if not 0 < getattr(self, name) < math.pi / 2:
-                raise input_error(
-                    f"FlatCurvedDamper.{name}",
-                    f"must lie between 0 and pi/2 rad, got {getattr(self, name)}",
-                    "It is measured from the circumferential direction.",
-                )
-        for name in ("curved_distance", "curved_radius"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise input_error(
-                    f"FlatCurvedDamper.{name}",
-                    f"must be positive, got {getattr(self, name)}",
-                    "Give metres.",
-                )
+        check_quantities(self)
         first, second = self.flat_distances
-        if not 0 < first < second < math.inf:
+        if not first < second:
             raise input_error(
                 "FlatCurvedDamper.flat_distances",
                 f"need 0 < L1 < L2 (metres from the apex), got {self.flat_distances}",
                 "L1 is the line nearer to the apex.",
             )
-        if not self.sections or not np.all(np.diff(self.sections) > 0):
+        if not np.all(np.diff(self.sections) > 0):
             raise input_error(
                 "FlatCurvedDamper.sections",
-                f"need at least one axial position, in increasing order, got {self.sections}",
+                f"need axial positions in increasing order, got {self.sections}",
                 "Give metres.",
             )
         self.body()  # checks mass, inertia and centre
