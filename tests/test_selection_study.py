@@ -4,11 +4,12 @@ import json
 import sqlite3
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
-from small_v2 import write_two_blades
+from small_v2 import write_four_masses, write_two_blades
 
 from stickslip.errors import InputError
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
@@ -312,3 +313,18 @@ def test_what_does_not_fit_the_model_is_refused_with_a_remedy(
 def test_one_frequency_is_no_sweep(base: Study) -> None:
     with pytest.raises(InputError, match=r"forced_response.frequencies: must be greater than or equal to 2, got 1\."):  # fmt: skip
         changed(base, {}, "one", frequencies=1)
+
+
+def test_the_result_tells_the_facts_of_its_model_and_the_log_how_well_it_is_reduced(
+    tmp_path: Path,
+) -> None:
+    forces = {"vary.load.shaker.force_n": "[0.5, 0.6]"}
+    study = read_study(write_four_masses(tmp_path, forces))
+    outcome = run_study(study)
+    told = outcome.tree["forced_response"].attrs
+    assert told["mass_kg"] == pytest.approx(study.model().facts.mass)
+    assert told["dofs"] == 4
+    assert told["retained"] == 3
+    assert told["rotation"] == "matrices as read, unchanged by speed"
+    log = (study.folder / "run.log").read_text(encoding="utf-8")
+    assert log.count("free mode 1: full") == log.count("stuck mode 1: full") == 1

@@ -113,6 +113,8 @@ def _points(question: Question, done: Sequence[ForcedPoint], notes: Notes) -> It
         return
     _compile(question)
     model = question.model
+    for line in model.frequencies.lines() if question.first else ():
+        LOG.info(line)
     for point in forced_response(model.system, model.load, question.sweep, done=done):
         yield point
         advance(*progress(point, question.sweep))

@@ -1,7 +1,9 @@
 """What a job of the forced response is given, picklable, and what it is solved with."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +15,11 @@ from stickslip.errors import input_error, together
 from stickslip.harmonic.support import named
 from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
 from stickslip.study.analyses.analysis import Case
+from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.forced.chooser import Chooser, chooser_of
 from stickslip.study.analyses.forced.estimate import check_limits, estimate
 from stickslip.study.analyses.forced.section import sweep_of
+from stickslip.units import RPM
 
 IN_TIME, HARMONICS = "verify", "verify_harmonics"  # checks that a run may ask for
 INTEGRABLE = "elastic_coulomb"  # the law that the time integration knows
@@ -36,18 +40,24 @@ class Question:
         How the response is computed.
     limit
         Change that more harmonics may make before there is a warning, a fraction.
+    facts
+        What the result says of the model, see `facts_of`.
     key
         Of the table, that gives the range: ``speed_rpm`` where the frequencies are those of a range of speeds.
     checks
         Checks asked for beside the response.
+    first
+        Whether it is the first case, which says what all have in common.
     """
 
     label: str
     model: Assembled
     sweep: Sweep
     limit: float
+    facts: Mapping[str, Any] = field(default_factory=dict)
     key: str = "frequency_hz"
     checks: frozenset[str] = frozenset()
+    first: bool = True
 
     @property
     def over_speed(self) -> bool:
@@ -108,13 +118,16 @@ def question_of(case: Case, model: Model) -> Question:
     check_limits(settings.limits, estimate(model, sweep))
     # the guard and the check of the harmonics look at twice as many as are kept
     assembled = model.assembled(FACTOR * sweep.high_harmonics[-1], case.store)
+    counts = {name: assembled.counts[name] for name in ("reduced", "retained")}
     return Question(
         label=case.label,
         model=peak_first(assembled),
         sweep=sweep,
         limit=sweep.threshold,
+        facts=facts_of(model, model.speed / RPM) | counts,
         key=settings.forced_response.range_key,
         checks=case.checks,
+        first=case.index == 0,
     )
 
 

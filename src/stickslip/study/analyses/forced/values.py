@@ -49,8 +49,14 @@ def _attributes(question: Question) -> Values:
     """Return the attributes of the dataset: texts, numbers and lists of numbers."""
     model, sweep = question.model, question.sweep
     order = {} if model.engine_order is None else {"engine_order": model.engine_order}
-    own = {"samples": sweep.samples, "evaluator": sweep.evaluator, "sectors": model.sectors}
-    return question.chooser.attributes() | own | order | {"report_output": model.output_labels[0]}
+    own = {
+        "samples": sweep.samples,
+        "evaluator": sweep.evaluator,
+        "report_output": model.output_labels[0],
+        "sectors": model.sectors,
+    }
+    facts = {name: np.asarray(value).tolist() for name, value in question.facts.items()}
+    return question.chooser.attributes() | facts | own | order
 
 
 def of_response(question: Question, response: Response, shift: tuple[float, float]) -> Values:

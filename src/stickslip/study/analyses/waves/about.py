@@ -7,7 +7,8 @@ import numpy as np
 import xarray as xr
 
 from stickslip.assembly.model import ContactsAs, Model
-from stickslip.assembly.statics import StaticState, static_state
+from stickslip.assembly.statics import StaticState
+from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.waves.doubts import static_doubts
 from stickslip.study.keep.netcdf import variable
 from stickslip.units import RPM
@@ -52,25 +53,12 @@ def about(model: Model, contacts: ContactsAs, rpm: float, highest: float) -> dic
     highest
         Speed at which the static displacement is told, rad/s.
     """
-    moved = model.static_displacement(highest)
-    facts, state = model.facts, static_state(model.parts, moved, highest)
-    note = {
-        "sectors": model.sectors,
-        "axis_direction": np.asarray(model.axis.unit),
-        "axis_origin": np.asarray(model.axis.origin, dtype=float),
+    state = model.static_state(highest)
+    doubts = static_doubts(state, contacts=bool(model.contacts))
+    note = facts_of(model, rpm) | {
         "speed_rpm": rpm,
-        "rotation": _in_words(model, rpm),
         "contacts": contacts if model.contacts else "none",
-        "mass_kg": facts.mass,
-        "centre_m": np.asarray(facts.centre),
-        "box_low_m": np.asarray(facts.low),
-        "box_high_m": np.asarray(facts.high),
-        "dofs": facts.dofs,
-        "nodes": facts.nodes,
-        "elements": facts.elements,
-        "warnings": np.array(
-            [*model.warnings, *static_doubts(state, contacts=bool(model.contacts))], dtype=str
-        ),
+        "warnings": np.array([*model.warnings, *doubts], dtype=str),
     }
     return note | _static(state)
 
@@ -96,14 +84,3 @@ def told(note: Mapping[str, Any]) -> dict[str, xr.Variable]:
         for name, (dims, units, long_name) in NUMBERS.items()
         if name in note
     }
-
-
-def _in_words(model: Model, rpm: float) -> str:
-    """Say which effects of rotation are in the numbers."""
-    if not model.rotates:
-        return "matrices as read, unchanged by speed"
-    if rpm == 0:
-        return "at rest"
-    speed = "at each speed" if np.isnan(rpm) else f"{rpm:g} rpm"
-    coriolis = "with" if model.coriolis else "without"
-    return f"{speed}, {model.tangent} tangent, {coriolis} Coriolis forces"
