@@ -13,11 +13,10 @@ from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import AtFrequency, BalanceAt, law_field, load_level, rebuilt
 from stickslip.response.equilibrium import bonded_start, preload
+from stickslip.response.follow import following_vibration, steps_through
 from stickslip.response.system import System
 from stickslip.solve.continuation import (
-    Following,
     Point,
-    StepControl,
     reversed_point,
     start_point,
     trace,
@@ -29,7 +28,6 @@ Build = Callable[[float], tuple[System, HarmonicLoad]]
 Parameter = str | Build
 LoadName = Literal["excitation", "static_load"]
 RAMP = (0.1, 0.3, 0.6, 1.0)  # shares of the load where the first point does not converge at once
-LARGEST = 0.25  # arc length of the largest step: a quarter of the size of the vibration, or `1 / points` of the range
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -181,15 +179,8 @@ def branch_in_parameter(
     )
     problem = AtFrequency(family, omega)
     balance = family(first)
-    weights = np.ones(balance.size)
-    weights[: balance.linear.n] = 0.0  # the static part would hide the growth of the vibration
-    following = Following(
-        newton=how.newton,
-        control=StepControl(
-            scale=abs(last - first) / (points * LARGEST), first=0.05, largest=LARGEST
-        ),
-        weights=weights,
-    )
+    control = steps_through(abs(last - first), points)
+    following = following_vibration(balance, control, how.newton)
     changed = parameter(first) if callable(parameter) else (system, load)
     start = start_point(
         problem, first_guess(changed[0], balance, omega, how.newton), first, following

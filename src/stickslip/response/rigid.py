@@ -9,9 +9,10 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.dlft import DynamicLagrangian, dynamic_lagrangian
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response.parameter import LARGEST, Discretisation
+from stickslip.response.follow import following_vibration, steps_through
+from stickslip.response.parameter import Discretisation
 from stickslip.response.system import System
-from stickslip.solve.continuation import Following, Point, StepControl, start_point, trace
+from stickslip.solve.continuation import Following, Point, start_point, trace
 from stickslip.solve.newton_method import newton
 from stickslip.solve.status import Status
 
@@ -99,14 +100,8 @@ def rigid_response(
     problem = dynamic_lagrangian(
         linear, system.interface, how.order, how.samples, penalty, how.evaluator
     )
-    weights = np.ones(problem.size)
-    weights[: linear.n] = 0.0  # the static part would hide the growth of the vibration
     gap = (last - first) / points
-    following = Following(
-        newton=how.newton,
-        control=StepControl(scale=gap / LARGEST or first, first=0.05, largest=LARGEST),
-        weights=weights,
-    )
+    following = following_vibration(problem, steps_through(last - first, points), how.newton)
     omega, guess = first, np.zeros((1, linear.n), dtype=complex)
     while True:
         point = start = _begin(problem, guess, omega, following)

@@ -16,6 +16,7 @@ from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.peak import EVALUATIONS, Condition, PeakProblem
+from stickslip.response.follow import following_vibration, steps_through
 from stickslip.response.parameter import (
     Discretisation,
     Parameter,
@@ -23,7 +24,7 @@ from stickslip.response.parameter import (
     parameter_family,
 )
 from stickslip.response.system import System
-from stickslip.solve.continuation import Following, Point, StepControl, start_point, trace
+from stickslip.solve.continuation import Point, start_point, trace
 from stickslip.solve.newton_method import Newton, Solution, newton
 from stickslip.solve.status import Status
 
@@ -362,10 +363,7 @@ def _sweep(
         raise input_error(
             "omega_range", f"must be positive and growing, got {begin} to {end} rad/s", "Swap them."
         )
-    weights = np.ones(balance.size)
-    weights[: balance.linear.n] = 0.0
-    control = StepControl(scale=(end - begin) / (SWEEP_POINTS * 0.25), first=0.05)
-    following = Following(newton=options, control=control, weights=weights)
+    following = following_vibration(balance, steps_through(end - begin, SWEEP_POINTS), options)
     points = [start_point(balance, first_guess(system, balance, begin, options), begin, following)]
     if points[0].solution.status.converged:
         points += trace(balance, points[0], end, following)

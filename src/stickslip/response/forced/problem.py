@@ -18,6 +18,7 @@ from stickslip.harmonic.selection.strategy import (
     always_kept,
 )
 from stickslip.harmonic.support import Harmonics
+from stickslip.response.follow import following_vibration
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, Point
@@ -163,15 +164,12 @@ class ForcedProblem:
 
     def following(self, balance: HarmonicBalance) -> Following:
         """Return how a branch of `balance` is followed."""
-        weights = np.ones(balance.size)
-        # the static part is left out of the arc length, or it would hide the growth of the vibration
-        weights[: balance.linear.n] = 0.0
         # along a branch a shorter step is cheaper than a long correction
         few = replace(
             self.sweep.newton,
             max_iterations=min(BRANCH_ITERATIONS, self.sweep.newton.max_iterations),
         )
-        return Following(newton=few, control=self.sweep.control, weights=weights)
+        return following_vibration(balance, self.sweep.control, few)
 
     def alerted(self, point: ForcedPoint) -> bool:
         """Whether the alert asks for more harmonics at a point of the first passage."""

@@ -12,13 +12,12 @@ from stickslip.errors import input_error
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
 from stickslip.harmonic.selection.strategy import Strategy, always_kept, check_strategy
 from stickslip.harmonic.support import Harmonics, harmonics_of
+from stickslip.response.follow import steps_through
 from stickslip.solve.continuation import StepControl
 from stickslip.solve.newton_method import Newton
 
 Passages = Literal["double", "single"]
 Direction = Literal["up", "down"]
-# arc length: a quarter of the size of the vibration, or `1 / points` of the range
-LARGEST_STEP = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -176,9 +175,7 @@ class Sweep:
     def control(self) -> StepControl:
         """Step control of the branch: a step is at most a `points`-th of the range."""
         first, last = self.omega_range
-        return StepControl(
-            scale=(last - first) / (self.points * LARGEST_STEP), first=0.05, largest=LARGEST_STEP
-        )
+        return steps_through(last - first, self.points)
 
     @property
     def first_harmonics(self) -> Harmonics:
