@@ -1,6 +1,6 @@
 """The error types, and the shape of their messages: place, what is wrong, value got, remedy."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from string import Template
 
 
@@ -74,6 +74,16 @@ class SingularError(StickslipError):
 def input_error(place: str, problem: str, remedy: str, **words: str) -> InputError:
     """Build an `InputError`; `words` are the names of the arguments that the remedy calls ``$name``."""
     return InputError(place, problem, remedy, words)
+
+
+def check_choice(place: str, value: object, choices: Collection[str], hint: str = "") -> None:
+    """Raise an `InputError` unless `value` is one of the `choices`; a `hint` takes the place of the list as remedy."""
+    if value in choices:
+        return
+    known = ", ".join(choices)
+    if hint:
+        raise input_error(place, f"{value!r} is none of {known}", hint)
+    raise input_error(place, f"is {value!r}", f"Give one of {known}.")
 
 
 def together(errors: Iterable[InputError]) -> InputError:

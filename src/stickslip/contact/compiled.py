@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.law import UNCOUPLED_TANGENTS, ContactLaw, PiecewiseLinear
-from stickslip.errors import input_error
+from stickslip.errors import check_choice, input_error
 
 Evaluator = Literal["intervals", "march", "events"]
 
@@ -62,12 +62,7 @@ class CompiledContacts:
 
 def check_evaluator(evaluator: str) -> None:
     """Raise `InputError` unless there is such an evaluator."""
-    if evaluator not in get_args(Evaluator):
-        raise input_error(
-            "evaluator",
-            f"{evaluator!r} is none of {', '.join(get_args(Evaluator))}",
-            "'events' has no sampling error.",
-        )
+    check_choice("evaluator", evaluator, get_args(Evaluator), "'events' has no sampling error.")
 
 
 def checked_weights(weights: FloatArray, n: int) -> FloatArray:

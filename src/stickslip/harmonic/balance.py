@@ -11,7 +11,7 @@ from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.contact.compiled import CompiledContacts, Evaluator
 from stickslip.contact.event_integrals import Events
 from stickslip.contact.interface import Interface, SparseRows, add_contact_jacobian, sparse_rows
-from stickslip.errors import input_error
+from stickslip.errors import check_choice, input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces, forces_between
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex, to_real
@@ -253,19 +253,9 @@ def harmonic_balance(
     """
     harmonics = harmonics_of(order, "order")
     _check_load(linear.load, harmonics)
-    if jacobian not in get_args(JacobianForm):
-        raise input_error(
-            "harmonic_balance: jacobian",
-            f"{jacobian!r} is none of {', '.join(get_args(JacobianForm))}",
-            "'auto' takes what costs less.",
-        )
-    missing = np.setdiff1d(interface.coordinates(), linear.retained)
-    if missing.size:
-        raise input_error(
-            "harmonic_balance",
-            f"contact dofs {missing[:5].tolist()} are not retained",
-            "Retain all contact dofs.",
-        )
+    hint = "'auto' takes what costs less."
+    check_choice("harmonic_balance: jacobian", jacobian, get_args(JacobianForm), hint)
+    check_retained("harmonic_balance", linear, interface)
     local = interface.restricted(linear.retained)
     # a preload is no scale for the load: beside a large one the load's own equations would be solved coarsely
     force_scale = linear.load.scale or float(np.max(np.abs(local.resting_force()), initial=0.0))
@@ -290,6 +280,17 @@ def _typical_stiffness(contact: FloatArray, linear: DynamicStiffness) -> float:
     values = contact[contact > 0] if np.any(contact > 0) else np.abs(np.diagonal(linear.nn[0]))
     values = values[values > 0]
     return float(np.exp(np.mean(np.log(values)))) if values.size else 1.0
+
+
+def check_retained(place: str, linear: DynamicStiffness, interface: Interface) -> None:
+    """Raise `InputError` unless all dofs that the contacts touch are retained."""
+    missing = np.setdiff1d(interface.coordinates(), linear.retained)
+    if missing.size:
+        raise input_error(
+            place,
+            f"contact dofs {missing[:5].tolist()} are not retained",
+            "Retain all contact dofs.",
+        )
 
 
 def _check_load(load: HarmonicLoad, harmonics: Harmonics) -> None:

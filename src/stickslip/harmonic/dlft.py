@@ -21,7 +21,12 @@ from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.contact.rigid import RigidPeriod, project
 from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces
-from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_balance
+from stickslip.harmonic.balance import (
+    HarmonicBalance,
+    Linearisation,
+    check_retained,
+    harmonic_balance,
+)
 from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.rigid_contacts import NORMAL, RigidContacts, rigid_contacts
 from stickslip.harmonic.support import harmonics_of
@@ -278,13 +283,7 @@ def dynamic_lagrangian(
             f"must be positive and finite, got {penalty}",
             "Give it in N/m, or None.",
         )
-    missing = np.setdiff1d(interface.coordinates(), linear.retained)
-    if missing.size:
-        raise input_error(
-            "dynamic_lagrangian",
-            f"contact dofs {missing[:5].tolist()} are not retained",
-            "Retain all contact dofs.",
-        )
+    check_retained("dynamic_lagrangian", linear, interface)
     _checked_samples(samples, order)
     balance = harmonic_balance(
         linear, _without(interface, rigid), order, _samples_of_others(samples, order), evaluator

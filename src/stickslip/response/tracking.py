@@ -12,7 +12,7 @@ import numpy as np
 import scipy.optimize
 
 from stickslip.arrays import ComplexArray, FloatArray
-from stickslip.errors import input_error
+from stickslip.errors import check_choice, input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.peak import EVALUATIONS, Condition, PeakProblem
@@ -322,8 +322,7 @@ def _tracker(
     """Find the first peak by a sweep."""
     if not np.isfinite(first):
         raise input_error("values", "are empty or not finite", "Give numbers.")
-    if by not in get_args(Condition):
-        raise input_error("by", f"is {by!r}", f"Give one of {', '.join(get_args(Condition))}.")
+    check_choice("by", by, get_args(Condition))
     if not 0 <= output < system.outputs.size:
         have = system.outputs.size
         raise input_error("output", f"is {output}, of {have} outputs", f"Give 0 to {have - 1}.")

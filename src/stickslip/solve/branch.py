@@ -6,7 +6,7 @@ from typing import Literal, Protocol, get_args
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.errors import input_error
+from stickslip.errors import check_choice
 from stickslip.solve.linear import Jacobian
 from stickslip.solve.newton_method import Newton, Solution
 
@@ -97,12 +97,7 @@ class Following:
 
     def __post_init__(self) -> None:
         for name, choices in (("parametrisation", Parametrisation), ("predictor", Predictor)):
-            if getattr(self, name) not in get_args(choices):
-                raise input_error(
-                    f"Following.{name}",
-                    f"is {getattr(self, name)!r}",
-                    f"Give one of {', '.join(get_args(choices))}.",
-                )
+            check_choice(f"Following.{name}", getattr(self, name), get_args(choices))
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse.linalg
 
 from stickslip.arrays import FloatArray
-from stickslip.errors import input_error
+from stickslip.errors import check_choice, input_error
 from stickslip.solve.linear import Dense, Jacobian, JacobianOperator, LinearSolver
 
 Solve = Callable[[FloatArray], FloatArray]
@@ -98,10 +98,7 @@ class Krylov:
     )
 
     def __post_init__(self) -> None:
-        if self.method not in {"gmres", "bicgstab"}:
-            raise input_error(
-                "Krylov.method", f"is {self.method!r}", "Give one of gmres, bicgstab."
-            )
+        check_choice("Krylov.method", self.method, ("gmres", "bicgstab"))
 
     def __reduce__(self) -> tuple["partial[Krylov]", tuple[()]]:
         """Pickle the options alone: what is kept belongs to the problems of one process."""

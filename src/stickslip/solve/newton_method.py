@@ -2,12 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.errors import input_error
+from stickslip.errors import check_choice
 from stickslip.solve.dogleg import Dogleg
 from stickslip.solve.iterate import Evaluation, Globalisation, Iterate, Work
 from stickslip.solve.krylov import Automatic
@@ -47,12 +47,7 @@ class Newton:
     linear: LinearSolver = Automatic()  # noqa: RUF009  # frozen
 
     def __post_init__(self) -> None:
-        if self.globalisation not in GLOBALISATIONS:
-            raise input_error(
-                "Newton.globalisation",
-                f"is {self.globalisation!r}",
-                f"Give one of {', '.join(get_args(GlobalisationName))}.",
-            )
+        check_choice("Newton.globalisation", self.globalisation, GLOBALISATIONS)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.contact.event_integrals import Events
-from stickslip.errors import input_error
+from stickslip.errors import check_choice
 from stickslip.harmonic.aft import ContactPeriod
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.selection.strategy import ErrorMeasure, Solve
@@ -118,12 +118,8 @@ def solve_array(jac: FloatArray | StructuredJacobian, right: FloatArray) -> Floa
 
 def check_form(form: str) -> None:
     """Refuse a form of the prediction that does not exist."""
-    if form not in get_args(Form):
-        raise input_error(
-            "JacobianAlert: form",
-            f"{form!r} is none of {', '.join(get_args(Form))}",
-            "'newton' is right for every contact law.",
-        )
+    hint = "'newton' is right for every contact law."
+    check_choice("JacobianAlert: form", form, get_args(Form), hint)
 
 
 def _published(

@@ -6,7 +6,7 @@ from typing import ClassVar, get_args
 import numpy as np
 
 from stickslip.arrays import ComplexArray
-from stickslip.errors import input_error
+from stickslip.errors import check_choice, input_error
 from stickslip.harmonic.selection.adjoint import (
     Estimate,
     Goal,
@@ -52,12 +52,8 @@ class GoalOriented:
                 f"must lie from 0 to 1, got {self.left_out}",
                 "0.2 is usual.",
             )
-        if self.goal not in get_args(Goal):
-            raise input_error(
-                "GoalOriented.goal",
-                f"{self.goal!r} is none of {', '.join(get_args(Goal))}",
-                "'motion' is what the Jacobian Alert judges.",
-            )
+        hint = "'motion' is what the Jacobian Alert judges."
+        check_choice("GoalOriented.goal", self.goal, get_args(Goal), hint)
 
     def judge(self, step: Step) -> Verdict:
         """Estimate the error of the outputs, and choose the harmonics that make it."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.contact.compiled import Evaluator, check_evaluator
-from stickslip.errors import input_error
+from stickslip.errors import check_choice, input_error
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
 from stickslip.harmonic.selection.strategy import Strategy, always_kept, check_strategy
 from stickslip.harmonic.support import Harmonics, harmonics_of
@@ -85,21 +85,14 @@ class Sweep:
                 "Swap the two ends.",
             )
         check_evaluator(self.evaluator)
-        if isinstance(self.selection, str) and self.selection not in STRATEGIES:
-            raise input_error(
-                "Sweep.selection",
-                f"{self.selection!r} is none of {', '.join(STRATEGIES)}",
-                "'guarded_alert' repeats where it matters.",
-            )
-        if not isinstance(self.selection, str):
+        if isinstance(self.selection, str):
+            hint = "'guarded_alert' repeats where it matters."
+            check_choice("Sweep.selection", self.selection, STRATEGIES, hint)
+        else:
             check_strategy(self.selection)
         _check_steps(self)
-        if self.passages not in get_args(Passages):
-            raise input_error(
-                "Sweep.passages",
-                f"{self.passages!r} is none of {', '.join(get_args(Passages))}",
-                "'double' repeats what needs more harmonics.",
-            )
+        hint = "'double' repeats what needs more harmonics."
+        check_choice("Sweep.passages", self.passages, get_args(Passages), hint)
         if np.isnan(self.threshold):
             raise input_error("Sweep.threshold", "is not a number", "0.05 is 5 %.")
         for name in ("samples", "points", "frequencies", "peak_points"):
@@ -186,12 +179,8 @@ class Sweep:
 
 def _check_steps(sweep: Sweep) -> None:
     """Refuse frequencies that are no list to step through, and a direction that is none."""
-    if sweep.direction not in get_args(Direction):
-        raise input_error(
-            "Sweep.direction",
-            f"{sweep.direction!r} is none of {', '.join(get_args(Direction))}",
-            "'up' goes from the first frequency to the last.",
-        )
+    hint = "'up' goes from the first frequency to the last."
+    check_choice("Sweep.direction", sweep.direction, get_args(Direction), hint)
     if not sweep.at:
         return
     if sweep.frequencies:
