@@ -18,7 +18,7 @@ from stickslip.assembly.forces import (
     output_labels,
 )
 from stickslip.assembly.model import Model
-from stickslip.assembly.places import picked
+from stickslip.assembly.places import picked, stacked
 from stickslip.assembly.reduced import Store, in_memory, reduced_parts
 from stickslip.assembly.statics import pressed_by, static_contact_force
 from stickslip.assembly.waves import reduced_sector
@@ -84,8 +84,8 @@ def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
             "contact", "there is none: no coordinate would be left to solve for", "Give a contact."
         )
     _refuse_rigid(model)
-    kept = np.concatenate([labels.dofs, watched, *(np.flatnonzero(f) for f in forces.values())])
     stay = np.concatenate([labels.dofs, watched])
+    kept = np.concatenate([stay, *(np.flatnonzero(f) for f in forces.values())])
     linear = linear_side(model, order or 0, harmonics, kept, stay, store)
     system = System(
         linear.side,
@@ -160,9 +160,7 @@ def contact_labels(model: Model) -> Labels:
 
 
 def _body_labels(model: Model) -> Labels:
-    own = [model.places.own(name) for name, part in model.parts.items() if part.body is not None]
-    dofs = np.concatenate([np.zeros(0, dtype=np.int64), *own])
-    table = model.places.dofs
+    dofs, table = model.places.bodies(), model.places.dofs
     return Labels(tuple(f"{table.part[d]}.{table.component[d]}" for d in dofs), dofs)
 
 
@@ -186,14 +184,12 @@ def linear_side(
     """
     pairs, ties = model.pairs, model.ties
     operators = [pairs.own, pairs.following, ties.weights]
-    used = [kept, ties.followers, *(operator.nonzero()[1] for operator in operators)]
-    kept = np.unique(np.concatenate(used))
-    bodies = [model.places.own(name) for name, p in model.parts.items() if p.body is not None]
-    kept = np.unique(np.concatenate([kept, *bodies]))
+    used = [operator.nonzero()[1] for operator in operators]
+    bodies = model.places.bodies()
+    kept = np.unique(np.concatenate([kept, ties.followers, *used, bodies]))
     if model.neighbours is None:
         return _of_one(model, kept, store)
-    own = np.concatenate([kept[:0], *bodies])
-    found = reduced_sector(model, (order, harmonics), kept, (stay, own), store)
+    found = reduced_sector(model, (order, harmonics), kept, (stay, bodies), store)
     at = model.coordinates
 
     def of_dofs(dofs: IntArray, place: str) -> IntArray:
@@ -259,24 +255,22 @@ def _free(model: Model, linear: Linear) -> IntArray | None:
 
 
 def _free_dofs(model: Model) -> IntArray:
-    tied = np.unique(model.ties.weights.nonzero()[1])
-    bodies = [model.places.own(name) for name, p in model.parts.items() if p.body is not None]
-    dofs = [own for own in bodies if not np.isin(own, tied).any()]
-    return np.concatenate([np.zeros(0, dtype=np.int64), *dofs])
+    return model.places.bodies(model.ties.weights.nonzero()[1])
 
 
 def _loads(model: Model, linear: Linear, forces: dict[str, Matrix]) -> HarmonicLoad:
-    """Return all loads on the coordinates: static ones, that of steady rotation, and harmonics."""
+    """Return loads on the coordinates by their forces: static ones and harmonics; and that of steady rotation."""
     static = np.zeros(linear.side.n)
     if model.centrifugal and model.speed > 0:
         static = static + linear.steady + np.real(linear.load(centrifugal_of_bodies(model), 0))
     harmonics: dict[int, Matrix] = {}
-    for name, load in model.loads.items():
-        own = linear.load(forces[name], load.harmonic)
-        if load.harmonic == 0:
+    for name, force in forces.items():
+        h = model.loads[name].harmonic
+        own = linear.load(force, h)
+        if h == 0:
             static = static + np.real(own)
         else:
-            harmonics[load.harmonic] = harmonics.get(load.harmonic, 0) + own
+            harmonics[h] = harmonics.get(h, 0) + own
     return HarmonicLoad(static, harmonics)
 
 
@@ -312,17 +306,13 @@ def pressed_points(model: Model) -> BoolArray:
     """Return the contact points that the static loads at the model's own speed press, and those that cannot open."""
     static = {name: load for name, load in model.loads.items() if load.harmonic == 0}
     forces = {name: force_of(model.places, name, load) for name, load in static.items()}
-    empty = np.zeros(0, dtype=np.int64)
-    kept = np.concatenate([empty, *(np.flatnonzero(f) for f in forces.values())])
+    kept = stacked(np.flatnonzero(f) for f in forces.values())
+    empty = kept[:0]
     linear = linear_side(model, 0, 0, kept, empty, in_memory)
     interface = Interface(model.pairs.names, model.pairs.laws, linear.gaps)
     system = System(linear.side, interface, empty, free=_free(model, linear))
-    load = np.zeros(linear.side.n)
-    if model.centrifugal and model.speed > 0:
-        load = linear.steady + np.real(linear.load(centrifugal_of_bodies(model), 0))
-    for force in forces.values():
-        load = load + np.real(linear.load(force, 0))
-    _, force = static_state(system.with_retention(model.retention), load)
+    load = _loads(model, linear, forces)
+    _, force = static_state(system.with_retention(model.retention), load.static)
     return pressed_by(model.pairs.laws, force)
 
 

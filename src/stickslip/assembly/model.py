@@ -1,7 +1,7 @@
 """Parts, contacts and loads: a model. It does not know who asks."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -83,12 +83,7 @@ class Model:
 
     def __repr__(self) -> str:
         """Return what it is in a line."""
-        named = {
-            "parts": self.parts,
-            "contacts": self.contacts,
-            "joins": self.joins,
-            "loads": self.loads,
-        }
+        named = {what: getattr(self, what) for what in ("parts", "contacts", "joins", "loads")}
         words = [f"{what} {', '.join(own)}" for what, own in named.items() if own]
         if self.sectors > 1:
             words.append(f"one of {self.sectors} sectors")
@@ -113,10 +108,9 @@ class Model:
     @property
     def axis(self) -> Axis:
         """Axis of rotation: that of the first part that turns."""
-        turning = [
-            part for part in self.parts.values() if part.solid is not None or part.sectors > 1
-        ]
-        return (turning or list(self.parts.values()))[0].axis
+        every = list(self.parts.values())
+        turning = [part for part in every if part.solid is not None or part.sectors > 1]
+        return (turning or every)[0].axis
 
     @cached_property
     def places(self) -> Places:
@@ -238,7 +232,7 @@ class Model:
         stiffness = np.where(np.repeat(holds, 3), self._springs(holds), 0.0)
         if holds.any():
             structure = with_springs(structure, operators[0] + phase * operators[1], stiffness)
-        structure = structure if tie is None else _leading(structure, tie)
+        structure = structure if tie is None else replace(structure, basis=tie)
         return self._without(structure, self._loose(holds))
 
     def _holding(self, contacts: ContactsAs) -> BoolArray:
@@ -258,12 +252,7 @@ class Model:
         """Return the dofs of rigid bodies that no contact or join holds."""
         rows = np.repeat(holds, 3)
         touched = [m[rows].nonzero()[1] for m in (self.pairs.own, self.pairs.following)]
-        held = np.unique(np.concatenate([*touched, self.ties.weights.nonzero()[1]]))
-        bodies = [
-            self.places.own(name) for name, part in self.parts.items() if part.body is not None
-        ]
-        loose = [own for own in bodies if not np.isin(own, held).any()]
-        return np.concatenate([np.zeros(0, dtype=np.int64), *loose])
+        return self.places.bodies(np.concatenate([*touched, self.ties.weights.nonzero()[1]]))
 
     def _without(self, structure: Structure, dofs: IntArray) -> Structure:
         """Return a structure without coordinates that are some of the dofs of rigid bodies."""
@@ -281,7 +270,7 @@ class Model:
             )
         into = picked(np.where(stays, np.cumsum(stays) - 1, -1), index.size)
         if structure.basis is None:
-            structure = _leading(structure, picked(np.arange(structure.n), structure.n))
+            structure = replace(structure, basis=picked(np.arange(structure.n), structure.n))
         return in_coordinates(structure, into, table.take(index), surviving_sets(structure, index))
 
     @cached_property
@@ -325,10 +314,3 @@ class Model:
         from stickslip.assembly.build import assemble
 
         return assemble(self, harmonics, in_memory if store is None else store)
-
-
-def _leading(structure: Structure, basis: Matrix) -> Structure:
-    """Return a structure whose way back is `basis`."""
-    return Structure(
-        structure.mass, structure.damping, structure.stiffness, structure.dofs, structure.sets, basis, structure.loss,
-    )  # fmt: skip

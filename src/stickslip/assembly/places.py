@@ -1,7 +1,7 @@
 """What the names of a model mean: surfaces, node sets, nodes, single dofs, as places on the dofs of all parts."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -84,6 +84,11 @@ class Places:
         """Return the dofs of a part."""
         first = self.offset(name)
         return np.arange(first, first + self.parts[name].structure.n)
+
+    def bodies(self, held: IntArray | None = None) -> IntArray:
+        """Return the dofs of rigid bodies; without those of bodies of which a dof is among `held`."""
+        own = [self.own(name) for name, part in self.parts.items() if part.body is not None]
+        return stacked(o for o in own if held is None or not np.isin(o, held).any())
 
     def part_of(self, name: str, place: str) -> Part:
         """Return a part by name; `place` is the key that names it."""
@@ -206,6 +211,11 @@ def node_rows(table: Dofs, numbers: IntArray) -> IntArray:
     known = which >= 0
     out[at[known], which[known]] = mine[known]
     return out
+
+
+def stacked(arrays: Iterable[IntArray]) -> IntArray:
+    """Return arrays of whole numbers, maybe none, one after the other."""
+    return np.concatenate([np.zeros(0, dtype=np.int64), *arrays])
 
 
 def picked(index: IntArray, n: int) -> Matrix:

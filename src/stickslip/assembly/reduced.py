@@ -196,16 +196,22 @@ def _reduced(
             made = make()
         else:
             content = _content(part, spin, rest, kept)
-            made = _unpacked(store(content, lambda: _packed(make())), part, kept)
-        _forget(part.memo)
+            values = store(content, lambda: _packed(make()))
+            structure, steady = unpacked(values, part.structure, kept)
+            made = ReducedPart(structure, kept, steady)
         part.memo[key] = made
+        forget(part.memo, ReducedPart, REMEMBERED)
     found: ReducedPart = part.memo[key]
     return found
 
 
-def _forget(memo: dict[Any, Any]) -> None:
-    reductions = [key for key, value in memo.items() if isinstance(value, ReducedPart)]
-    for key in reductions[: len(reductions) - REMEMBERED + 1]:
+def _packed(made: ReducedPart) -> dict[str, Any]:
+    return packed(made.structure, made.steady)
+
+
+def forget(memo: dict[Any, Any], kind: type, most: int) -> None:
+    """Leave `most` values of a kind in memory: the last ones."""
+    for key in [key for key, value in memo.items() if isinstance(value, kind)][:-most]:
         del memo[key]
 
 
@@ -243,22 +249,25 @@ def _content(part: Part, spin: Spin, rest: Steady, kept: IntArray) -> str:
     return content_hash("craig_bampton", part.structure, kept, part.n_modes, damping, turning)
 
 
-def _packed(made: ReducedPart) -> dict[str, Any]:
-    s = made.structure
+def packed(structure: Structure, steady: Matrix) -> dict[str, Any]:
+    """Return a reduced structure and its load of steady rotation as named arrays."""
+    s = structure
     arrays = {"mass": s.mass, "damping": s.damping, "stiffness": s.stiffness, "loss": s.loss}
     own = {name: _dense(matrix) for name, matrix in arrays.items() if matrix is not None}
-    return own | {"steady": made.steady}
+    return own | {"steady": steady}
 
 
-def _unpacked(values: Mapping[str, Any], part: Part, kept: IntArray) -> ReducedPart:
-    """Return a reduced part from its matrices: the table of its dofs and its sets follow from the part."""
-    mass = np.asarray(values["mass"])
-    modes = len(mass) - kept.size
-    dofs = with_modal_dofs(part.structure.dofs.take(kept), modes)
-    sets = surviving_sets(part.structure, kept)
-    loss = values.get("loss")
-    structure = Structure(mass, values["damping"], values["stiffness"], dofs, sets, None, loss)
-    return ReducedPart(structure, kept, np.asarray(values["steady"]))
+def unpacked(
+    values: Mapping[str, Any], full: Structure, kept: IntArray
+) -> tuple[Structure, Matrix]:
+    """Return both from the arrays: the table of its dofs and its sets follow from the full structure."""
+    mass, loss = np.asarray(values["mass"]), values.get("loss")
+    dofs, sets = (
+        with_modal_dofs(full.dofs.take(kept), len(mass) - kept.size),
+        surviving_sets(full, kept),
+    )
+    own = mass, values["damping"], values["stiffness"]
+    return Structure(*own, dofs, sets, None, loss), np.asarray(values["steady"])
 
 
 def _dense(matrix: Matrix) -> FloatArray:

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from stickslip.arrays import IntArray, Matrix
 from stickslip.assembly.contact import Join
 from stickslip.assembly.pairs import Turn, match, named, sides
-from stickslip.assembly.places import NO_FACETS, Places, Spot, picked
+from stickslip.assembly.places import NO_FACETS, Places, Spot, picked, stacked
 from stickslip.contact.surface import Surface
 from stickslip.errors import InputError, input_error
 
@@ -88,21 +88,18 @@ def tie_joins(places: Places, joins: Mapping[str, Join], turn: Turn | None) -> T
             )
         found = _followed(key, join, first, second, ahead)
         if ahead is not None:
-            pair = _between_sectors(key, join, first, second, found)
-            low.append(pair[0])
-            high.append(pair[1])
+            _refuse_unlike(key, join, found)
+            low.append(np.array([int(row.indices[0]) for row in found.values()], dtype=np.int64))
+            high.append(np.array(list(found), dtype=np.int64))
             continue
-        for dof, row in found.items():
-            if dof in rows:
-                raise _twice(places, key, dof)
-            rows[dof] = row
+        _refuse_twice(places, key, found, rows)
+        rows |= found
     followers = np.array(sorted(rows), dtype=np.int64)
     weights = scipy.sparse.vstack(
         [scipy.sparse.csr_array((0, n)), *(rows[d] for d in followers)], format="csr"
     )
     weights = _resolved(places, followers, weights, len(joins))
-    empty = np.zeros(0, dtype=np.int64)
-    return Ties(followers, weights, np.concatenate([empty, *low]), np.concatenate([empty, *high]))
+    return Ties(followers, weights, stacked(low), stacked(high))
 
 
 def _followed(
@@ -173,28 +170,22 @@ def _refuse_clamped(key: str, first: Spot, dofs: IntArray, theirs: Matrix) -> No
         )
 
 
-def _between_sectors(
-    key: str, join: Join, first: Spot, second: Spot, found: dict[int, Matrix]
-) -> tuple[IntArray, IntArray]:
-    """Return the pairs of dofs on both sides, node to node."""
+def _refuse_unlike(key: str, join: Join, found: Mapping[int, Matrix]) -> None:
     if any(row.nnz != 1 or abs(row.data[0] - 1.0) > TINY for row in found.values()):
-        raise input_error(
-            f"{key}.pairing",
-            f"{join.between[0]!r} and {join.between[1]!r} do not match node by node",
-            MATCH,
-        )
-    return (
-        np.array([int(row.indices[0]) for row in found.values()], dtype=np.int64),
-        np.array(list(found), dtype=np.int64),
-    )
+        one, two = join.between
+        raise input_error(f"{key}.pairing", f"{one!r} and {two!r} do not match node by node", MATCH)
 
 
-def _twice(places: Places, key: str, dof: int) -> InputError:
-    return input_error(
-        f"{key}.between",
-        f"{places.dofs.labels[dof]} follows another surface already",
-        "Tie it once: take the node out of one of the sets.",
-    )
+def _refuse_twice(
+    places: Places, key: str, found: Mapping[int, Matrix], rows: Mapping[int, Matrix]
+) -> None:
+    for dof in found:
+        if dof in rows:
+            raise input_error(
+                f"{key}.between",
+                f"{places.dofs.labels[dof]} follows another surface already",
+                "Tie it once: take the node out of one of the sets.",
+            )
 
 
 def _resolved(places: Places, followers: IntArray, weights: Matrix, rounds: int) -> Matrix:

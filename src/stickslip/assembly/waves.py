@@ -1,14 +1,20 @@
 """The sector that a model is, reduced wave by wave; waves that were reduced before are taken from memory or store."""
 
-from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.model import Model
-from stickslip.assembly.reduced import Store, at_speed, damped, steady_load
+from stickslip.assembly.reduced import (
+    Store,
+    at_speed,
+    damped,
+    forget,
+    packed,
+    steady_load,
+    unpacked,
+)
 from stickslip.assembly.wheel import (
     ReducedSector,
     partners,
@@ -18,7 +24,6 @@ from stickslip.assembly.wheel import (
 )
 from stickslip.errors import InputError
 from stickslip.model.structure import Structure, join
-from stickslip.reduction.basis import surviving_sets, with_modal_dofs
 from stickslip.reduction.cache import content_hash
 from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.tuned import conjugate
@@ -58,24 +63,15 @@ def reduced_sector(
     needed = np.unique(np.concatenate([kept, whole]))
     needed = needed[~np.isin(needed, model.ties.followers)]
     kept = np.unique(partners(sector)[at.of_dofs(needed, model.places.dofs, "part")])
-    content = content_hash(
-        "wave",
-        sector.structure,
-        sector.low,
-        sector.high,
-        sector.sectors,
-        sector.axis,
-        kept,
-        n_modes,
-        steady,
-    )
+    wheel = (sector.structure, sector.low, sector.high, sector.sectors, sector.axis)
+    content = content_hash("wave", *wheel, kept, n_modes, steady)
     memo = next(iter(model.parts.values())).memo
 
     def made(k: int) -> tuple[Structure, Matrix]:
         key = f"{content} {k}"
         if key not in memo:
             memo[key] = _kept(sector, kept, k, n_modes, at.load(steady), (key, store))
-            _forget(memo)
+            forget(memo, tuple, REMEMBERED)
         found: tuple[Structure, Matrix] = memo[key]
         return found
 
@@ -136,28 +132,5 @@ def _kept(
 
     if n_modes is None:
         return make()
-    values = where[1](where[0], lambda: _packed(make))
-    return _unpacked(values, sector, kept)
-
-
-def _packed(make: Callable[[], tuple[Structure, Matrix]]) -> dict[str, Any]:
-    s, steady = make()
-    own = {"mass": s.mass, "damping": s.damping, "stiffness": s.stiffness, "steady": steady}
-    return own if s.loss is None else own | {"loss": s.loss}
-
-
-def _unpacked(
-    values: Mapping[str, Any], sector: CyclicSector, kept: IntArray
-) -> tuple[Structure, Matrix]:
-    mass = np.asarray(values["mass"])
-    dofs = with_modal_dofs(sector.structure.dofs.take(kept), len(mass) - kept.size)
-    sets = surviving_sets(sector.structure, kept)
-    own = mass, values["damping"], values["stiffness"]
-    structure = Structure(*own, dofs, sets, None, values.get("loss"))
-    return structure, np.asarray(values["steady"])
-
-
-def _forget(memo: dict[Any, Any]) -> None:
-    waves = [key for key, value in memo.items() if isinstance(value, tuple)]
-    for key in waves[:-REMEMBERED]:
-        del memo[key]
+    values = where[1](where[0], lambda: packed(*make()))
+    return unpacked(values, sector.structure, kept)

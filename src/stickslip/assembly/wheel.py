@@ -9,7 +9,7 @@ import scipy.sparse
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.coordinates import Coordinates
 from stickslip.assembly.pairs import Pairs, Turn
-from stickslip.assembly.places import Places, picked
+from stickslip.assembly.places import Places, picked, stacked
 from stickslip.assembly.ties import Ties
 from stickslip.errors import InputError, input_error
 from stickslip.model.part import Part
@@ -95,10 +95,7 @@ def neighbours(places: Places, parts: Mapping[str, Part]) -> Neighbours | None:
             "part", "turn about different axes", "Give all parts of a wheel one axis."
         )
     turn = Turn(next(iter(counts.values())), axis)
-    empty = np.zeros(0, dtype=np.int64)
-    return Neighbours(
-        turn, np.concatenate([empty, *low]), np.concatenate([empty, *high]), ties, tuple(warnings)
-    )
+    return Neighbours(turn, stacked(low), stacked(high), ties, tuple(warnings))
 
 
 def with_joins(found: Neighbours | None, ties: Ties) -> Neighbours | None:
