@@ -267,7 +267,7 @@ def segment_to_segment(
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     frames = contact_frames(normal, direction)
     on_b, missed_b = meet(b.points, facets_b, places, frames[:, :, :2].transpose(0, 2, 1))
-    _refuse_warped(a, found.facet_a[np.union1d(missed_a, missed_b)])
+    _refuse_warped(found.facet_a[np.union1d(missed_a, missed_b)])
     partner = positions(b.points, facets_b, on_b)
     near = np.linalg.norm(partner - places, axis=1) <= reach
     left = np.setdiff1d(np.arange(len(a.facets)), found.facet_a[near])
@@ -378,7 +378,7 @@ def _need_facets(place: str, *sides: Surface) -> None:
             )
 
 
-def _refuse_warped(a: Surface, facets: IntArray) -> None:
+def _refuse_warped(facets: IntArray) -> None:
     if facets.size:
         raise input_error(
             "segment_to_segment",

@@ -5,7 +5,7 @@ means the same displacement for every value. Residual and Jacobian are those of 
 parameter is a central difference, which is exact for loads and enters the direction of a branch only, never a solution.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from typing import Literal
@@ -103,9 +103,7 @@ def load_level(balance: HarmonicBalance, part: LoadPart) -> BalanceAt:
     return member
 
 
-def law_field(
-    balance: HarmonicBalance, name: str, contacts: Sequence[int] | None = None
-) -> BalanceAt:
+def law_field(balance: HarmonicBalance, name: str) -> BalanceAt:
     """Return the family whose parameter is a field of the contact laws, such as ``mu``, ``preload``, ``limit``, ``k_n``, ``initial_gap``.
 
     Parameters
@@ -115,34 +113,25 @@ def law_field(
     name
         Field of the laws. A law without a field ``initial_gap`` that has a normal stiffness and a preload takes it as the preload
         ``-k_n initial_gap``.
-    contacts
-        Contacts whose laws are varied; None: all that have the field.
 
     Raises
     ------
     InputError
-        If no law has the field, or one of the contacts named has not.
+        If no law has the field.
     """
     laws = balance.interface.laws
-    chosen = [i for i, law in enumerate(laws) if _has(law, name)] if contacts is None else contacts
-    lacking = [i for i in chosen if not _has(laws[i], name)]
-    if not chosen or lacking:
+    if not any(_has(law, name) for law in laws):
         known = sorted({f for law in laws for f in _fields(law)})
         raise input_error(
             "parameter",
-            f"{name!r} is no field of the contact laws{f' of contacts {lacking}' if lacking else ''}",
+            f"{name!r} is no field of the contact laws",
             f"Give 'excitation', 'static_load', or one of {', '.join(known)}.",
         )
-    varied = set(chosen)
 
     @lru_cache(maxsize=KEPT)
     def member(value: float) -> HarmonicBalance:
-        interface = replace(
-            balance.interface,
-            laws=tuple(
-                _with(law, name, value) if i in varied else law for i, law in enumerate(laws)
-            ),
-        )
+        varied = tuple(_with(law, name, value) if _has(law, name) else law for law in laws)
+        interface = replace(balance.interface, laws=varied)
         compiled = interface.compiled(balance.compiled.evaluator)
         return replace(balance, interface=interface, compiled=compiled)
 

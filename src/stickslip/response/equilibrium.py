@@ -34,7 +34,7 @@ class _Held:
         )
 
 
-def preload(system: System, static_load: FloatArray, options: Newton | None = None) -> FloatArray:
+def preload(system: System, static_load: FloatArray) -> FloatArray:
     """Place the structure under a static load, its contacts sticking, slipping or open.
 
     Parameters
@@ -43,8 +43,6 @@ def preload(system: System, static_load: FloatArray, options: Newton | None = No
         Structure and contacts.
     static_load
         (n,) static forces on all dofs, N.
-    options
-        Newton options.
 
     Returns
     -------
@@ -61,7 +59,7 @@ def preload(system: System, static_load: FloatArray, options: Newton | None = No
     resting = float(np.max(np.abs(interface.resting_force()), initial=0.0))
     if not np.any(static_load) and resting == 0.0:
         return np.zeros(system.retained.size)
-    options = options or Newton(max_iterations=60)
+    options = Newton(max_iterations=60)
     linear = system.condensed(HarmonicLoad(static_load), 0)
     balance = harmonic_balance(linear, interface, 0, 1)
     # a faint static load beside a large preload cannot be resolved better than the preload's own rounding

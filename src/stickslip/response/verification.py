@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
-from stickslip.harmonic.selection.alert import Form, jacobian_alert
+from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.support import Harmonics, harmonics_of
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 
@@ -46,7 +46,6 @@ def check_support(
     problem: ForcedProblem,
     points: Sequence[ForcedPoint],
     factor: int = 2,
-    form: Form = "newton",
 ) -> tuple[SupportCheck, ...]:
     """Predict at every solved point what all harmonics up to a multiple of the reference order would change.
 
@@ -63,8 +62,6 @@ def check_support(
         are passed over.
     factor
         Highest harmonic of the check over that of the reference, at least 2.
-    form
-        Form of the prediction; see `jacobian_alert`.
 
     Returns
     -------
@@ -83,7 +80,7 @@ def check_support(
             "2 asks for twice as many harmonics as the reference has.",
         )
     enlarged = _enlarged(problem, int(factor))
-    return tuple(_check(problem, enlarged, point, form) for point in points if point.converged)
+    return tuple(_check(problem, enlarged, point) for point in points if point.converged)
 
 
 def _enlarged(problem: ForcedProblem, factor: int) -> HarmonicBalance:
@@ -95,9 +92,7 @@ def _enlarged(problem: ForcedProblem, factor: int) -> HarmonicBalance:
     return replace(high, linear=linear, samples=samples).with_harmonics(harmonics)
 
 
-def _check(
-    problem: ForcedProblem, enlarged: HarmonicBalance, point: ForcedPoint, form: Form
-) -> SupportCheck:
+def _check(problem: ForcedProblem, enlarged: HarmonicBalance, point: ForcedPoint) -> SupportCheck:
     own = problem.balance(point.support)
     measure = problem.measure
     alert = jacobian_alert(
@@ -107,7 +102,6 @@ def _check(
         point.omega,
         measure,
         problem.alert_solve,
-        form,
     )
     dof = int(measure.dofs[alert.worst])
     return SupportCheck(

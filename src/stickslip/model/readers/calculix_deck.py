@@ -161,22 +161,20 @@ def read_deck(
     )
 
 
-def assemble_deck(deck: Deck, *, quadrature: Quadrature | None = None) -> Structure:
+def assemble_deck(deck: Deck) -> Structure:
     """Assemble mass and stiffness of a deck at rest, supports applied, cyclic faces untied.
 
     Parameters
     ----------
     deck
         With one material or several.
-    quadrature
-        The rules; `Deck.quadrature` by default.
 
     Returns
     -------
     Structure
         Sparse, undamped. Each node set becomes a set of dofs, without those that are supported.
     """
-    rules = deck.quadrature if quadrature is None else quadrature
+    rules = deck.quadrature
     n = 3 * len(deck.mesh.points)
     mass, stiffness = scipy.sparse.csr_array((n, n)), scipy.sparse.csr_array((n, n))
     of_cell = np.array(deck.cell_material)

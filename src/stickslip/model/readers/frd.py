@@ -114,7 +114,7 @@ def read_frd(path: Path | str, *, units: Units = SI) -> FrdResults:
     nodes = reader.nodes()
     nodes = replace(nodes, points=units.length * nodes.points)
     fields = tuple(_in_si(field, modal, units) for field, modal in reader.fields)
-    return FrdResults(_mesh(nodes, reader.cells, path), nodes, fields)
+    return FrdResults(_mesh(nodes, reader.cells), nodes, fields)
 
 
 def frd_nodes(path: Path) -> NodeTable:
@@ -124,7 +124,7 @@ def frd_nodes(path: Path) -> NodeTable:
     return reader.nodes()
 
 
-def _mesh(nodes: NodeTable, cells: dict[int, list[list[int]]], path: Path) -> SolidMesh | None:
+def _mesh(nodes: NodeTable, cells: dict[int, list[list[int]]]) -> SolidMesh | None:
     if len(cells) != 1 or not set(cells) <= set(CELLS):
         return None
     ((kind, rows),) = cells.items()

@@ -44,7 +44,7 @@ def resolve_peak(
     heights = [problem.amplitude(p) for p in known]
     for index in range(problem.sweep.peak_points):
         top = int(np.argmax(heights)) if heights else 0
-        seam = _on_seam(problem, known, top)
+        seam = _on_seam(known, top)
         omega = known[top].omega if seam else _vertex(known, heights)
         if omega is None:
             return
@@ -64,7 +64,7 @@ def resolve_peak(
         heights[place : place + seam] = [problem.amplitude(point)]
 
 
-def _on_seam(problem: ForcedProblem, known: list[ForcedPoint], top: int) -> bool:
+def _on_seam(known: list[ForcedPoint], top: int) -> bool:
     """Whether the highest point has few harmonics and a neighbour many: then it may be highest because it has few."""
     few = known[top].harmonics.size if known else 0
     return any(p.harmonics.size > few for p in known[max(top - 1, 0) : top + 2] if few)

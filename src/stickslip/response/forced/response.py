@@ -100,7 +100,7 @@ def _double_passage(
     branches: list[ForcedPoint] = []
     for first, last in runs_of_repeats(high):
         branch = branch_points(done, first, last)
-        if _nothing_known(low, high, first, last) and tried[first] == LAST_TRY:
+        if _nothing_known(low, high, first) and tried[first] == LAST_TRY:
             high[first] = repeat(problem, low[first], {}, static)
             tried[first] += 1
             yield high[first]
@@ -170,9 +170,7 @@ def _branch_begin(
     return failed[0] if failed[0] > first else None
 
 
-def _nothing_known(
-    low: Sequence[ForcedPoint], high: Mapping[int, ForcedPoint], first: int, last: int
-) -> bool:
+def _nothing_known(low: Sequence[ForcedPoint], high: Mapping[int, ForcedPoint], first: int) -> bool:
     """Whether a run of repeats failed from its first one on, and no point before it is known from which a branch could begin."""
     return not high[first].converged and not any(p.converged for p in low[:first])
 

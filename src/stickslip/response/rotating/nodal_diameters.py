@@ -1,6 +1,6 @@
 """Natural frequencies of a bladed disk by nodal diameter."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,7 +75,6 @@ def nodal_diameter_map(
     *,
     coriolis: bool = False,
     shapes: bool = False,
-    progress: Callable[[int], None] | None = None,
 ) -> NodalDiameterMap:
     """Return the lowest natural frequencies of a wheel by nodal diameter.
 
@@ -91,8 +90,6 @@ def nodal_diameter_map(
         Whether the skew part of the sector's damping counts, which parts backward from forward waves.
     shapes
         Whether to keep the mode shapes of `frequencies_hz`.
-    progress
-        Called with each nodal diameter when it is done.
 
     Raises
     ------
@@ -115,8 +112,6 @@ def nodal_diameter_map(
         if coriolis and 0 < 2 * diameter < sector.sectors:
             hertz, _ = _wave_modes(travelling_wave(sector, -diameter), n_modes, True)
         forward.append(hertz)
-        if progress is not None:
-            progress(diameter)
     return NodalDiameterMap(
         sector.sectors,
         diameters.astype(np.int64),
