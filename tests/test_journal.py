@@ -153,3 +153,18 @@ def test_kill_in_the_middle_of_an_insert_leaves_whole_records(tmp_path: Path) ->
     check = sqlite3.connect(path)
     assert check.execute("pragma integrity_check").fetchone() == ("ok",)
     check.close()
+
+
+def test_any_wrong_byte_of_an_archive_is_a_value_error_or_harmless():
+    whole = encode({"a": np.arange(40.0), "name": "x"})
+    rng = np.random.default_rng(3)
+    for _ in range(400):
+        payload = bytearray(whole)
+        payload[int(rng.integers(len(payload)))] = int(rng.integers(256))
+        start = int(rng.integers(len(payload)))
+        if rng.random() < 0.3:
+            payload[start : start + 30] = bytes(30)
+        try:
+            decode(bytes(payload))
+        except ValueError:
+            continue

@@ -1,12 +1,26 @@
 """Named arrays, numbers and texts as NumPy archives, without pickle."""
 
 import io
+import zlib
 from collections.abc import Mapping
 from dataclasses import fields
 from enum import Enum
 from typing import Any, get_type_hints
+from zipfile import BadZipFile
 
 import numpy as np
+
+# what zipfile, zlib and NumPy say of a few wrong bytes: bad directories, compressions and encryptions that are none
+DAMAGED = (
+    BadZipFile,
+    zlib.error,
+    EOFError,
+    KeyError,
+    NotImplementedError,
+    OSError,
+    RuntimeError,
+    TypeError,
+)
 
 
 def encode(values: Mapping[str, Any]) -> bytes:
@@ -18,9 +32,18 @@ def encode(values: Mapping[str, Any]) -> bytes:
 
 
 def decode(payload: bytes) -> dict[str, Any]:
-    """Return what `encode` wrote; zero-dimensional arrays come back as Python scalars."""
-    with np.load(io.BytesIO(payload), allow_pickle=False) as archive:
-        found = {name: archive[name] for name in archive.files}
+    """Return what `encode` wrote; zero-dimensional arrays come back as Python scalars.
+
+    Raises
+    ------
+    ValueError
+        If it is damaged.
+    """
+    try:
+        with np.load(io.BytesIO(payload), allow_pickle=False) as archive:
+            found = {name: archive[name] for name in archive.files}
+    except DAMAGED as error:
+        raise ValueError(f"damaged archive: {error}") from error
     return {k: v.item() if v.ndim == 0 else v for k, v in found.items()}
 
 

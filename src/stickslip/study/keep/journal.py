@@ -5,7 +5,6 @@ leaves whole records only. While the job is at work its file is called ``<key>.p
 """
 
 import sqlite3
-import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -170,7 +169,7 @@ def _named(path: Path) -> Iterator[None]:
         yield
     except InputError:
         raise
-    except (sqlite3.DatabaseError, zipfile.BadZipFile, ValueError, KeyError, TypeError) as error:
+    except (sqlite3.DatabaseError, ValueError, KeyError, TypeError) as error:
         if "locked" in str(error):
             raise input_error(
                 str(path.parent.parent), "another run is at work in it", "Wait for it, or stop it."

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 from stickslip.study.keep.archive import decode, encode
 from stickslip.study.keep.progress import LOG
@@ -37,7 +36,7 @@ class PartStore:
         if path.is_file() and (path in self.written or not self.fresh):
             try:
                 return decode(path.read_bytes())
-            except (BadZipFile, ValueError, OSError, EOFError) as error:
+            except (ValueError, OSError) as error:
                 LOG.info(f"{path} is damaged and made anew ({error})")
         # what is computed and what is read are the same to the last bit, and of the same kinds
         payload = encode(make())
