@@ -393,7 +393,7 @@ def test_contact_equations_without_a_solution_are_counted_as_failed() -> None:
     [
         ("max_periods", -3, r"TimeStepping\.max_periods: must be at least 2, got -3"),
         ("steps_per_period", 4, r"TimeStepping\.steps_per_period: must be at least 16, got 4"),
-        ("tolerance", 0.0, r"TimeStepping\.tolerance: must lie between 0 and 1, got 0\.0"),
+        ("tolerance", 0.0, r"TimeStepping\.tolerance: must lie in \(0, 1\), got 0\.0"),
         ("harmonics", 600, r"TimeStepping\.harmonics: 600 are too many for 1024 steps a period"),
     ],
 )

@@ -23,6 +23,7 @@ from stickslip.solve.continuation import (
 )
 from stickslip.solve.newton_method import Newton, newton
 from stickslip.solve.status import Status
+from stickslip.units import check_quantities, quantity
 
 Build = Callable[[float], tuple[System, HarmonicLoad]]
 Parameter = str | Build
@@ -51,20 +52,14 @@ class Discretisation:
         If the evaluator is unknown, or there is no harmonic or no sample.
     """
 
-    order: int = 5
-    samples: int = 256
+    order: int = quantity("highest harmonic", default=5, least=1)
+    samples: int = quantity("samples per period", default=256, least=1)
     evaluator: Evaluator = "events"
     newton: Newton = Newton()  # noqa: RUF009  # frozen
 
     def __post_init__(self) -> None:
         check_evaluator(self.evaluator)
-        for name in ("order", "samples"):
-            if getattr(self, name) < 1:
-                raise input_error(
-                    f"Discretisation.{name}",
-                    f"must be at least 1, got {getattr(self, name)}",
-                    "Give a count.",
-                )
+        check_quantities(self)
 
     def balance(self, system: System, load: HarmonicLoad, more: IntArray) -> HarmonicBalance:
         """Set up the periodic problem, the dofs `more` retained beside those of the contacts."""

@@ -1,6 +1,5 @@
 """Unit systems of finite-element models, and their conversion to SI: the one place where it happens."""
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +9,7 @@ from stickslip.arrays import FloatArray, Matrix
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
+from stickslip.units import check_quantities, quantity
 
 INCH = 0.0254  # m, exact
 POUND = 0.45359237  # kg, exact
@@ -44,18 +44,13 @@ class Units:
         If a unit is not positive.
     """
 
-    length: float
-    mass: float
-    time: float
+    length: float = quantity("unit of length, in m", above=0)
+    mass: float = quantity("unit of mass, in kg", above=0)
+    time: float = quantity("unit of time, in s", above=0)
     name: str = "own units"
 
     def __post_init__(self) -> None:
-        for name in ("length", "mass", "time"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise input_error(
-                    f"Units.{name}", f"must be positive, got {value}", "Give the unit in SI."
-                )
+        check_quantities(self)
 
     @staticmethod
     def si() -> "Units":

@@ -32,6 +32,7 @@ from stickslip.response.time.time_step import (
     run_period,
     step_workspace,
 )
+from stickslip.units import check_quantities, quantity
 
 DRIFT_THRESHOLD = 1e-4  # of a coordinate's own swing, per period
 
@@ -53,22 +54,13 @@ class TimeStepping:
         Highest harmonic reported.
     """
 
-    steps_per_period: int = 1024
-    max_periods: int = 3000
-    tolerance: float = 1e-5
-    harmonics: int = 7
+    steps_per_period: int = quantity("steps in a period", default=1024, least=16)
+    max_periods: int = quantity("periods at most", default=3000, least=2)
+    tolerance: float = quantity("relative change, 1e-5 is usual", default=1e-5, above=0, below=1)
+    harmonics: int = quantity("highest harmonic reported", default=7, least=1)
 
     def __post_init__(self) -> None:
-        bounds = {"steps_per_period": 16, "max_periods": 2, "harmonics": 1}
-        for name, least in bounds.items():
-            value = getattr(self, name)
-            if value < least:
-                raise input_error(
-                    f"TimeStepping.{name}", f"must be at least {least}, got {value}", "Raise it."
-                )
-        if not 0.0 < self.tolerance < 1.0:
-            problem = f"must lie between 0 and 1, got {self.tolerance}"
-            raise input_error("TimeStepping.tolerance", problem, "1e-5 is usual.")
+        check_quantities(self)
         if 2 * self.harmonics >= self.steps_per_period:
             problem = f"{self.harmonics} are too many for {self.steps_per_period} steps a period"
             raise input_error(
