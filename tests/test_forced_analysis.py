@@ -400,10 +400,10 @@ def test_what_cannot_be_answered_is_refused_by_key() -> None:
         "part.disk.sectors: --verify integrates one structure in time"
     )
     assert refused(model(), memory_gb=0.1).startswith(
-        "limits.memory_gb: the forced response is estimated at 0."
+        "limits.memory_gb: a case of the forced response (1 nodes, 21 unknowns, "
     )
     assert refused(model(), work_s=1e-9).startswith(
-        "limits.work_s: a case of the forced response is estimated at"
+        "limits.work_s: a case of the forced response (1 nodes, 21 unknowns, "
     )
 
 

@@ -1,22 +1,22 @@
 """Natural frequencies against rotor speed, and where engine orders cross them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, Self
 
 import numpy as np
-import xarray as xr
 from pydantic import Field, model_validator
 
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
-from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
-from stickslip.study.analyses.waves.dataset import Variables, dataset, frequencies
+from stickslip.study.analyses.analysis import Case, Solved
+from stickslip.study.analyses.waves.analysis import WaveAnalysis
+from stickslip.study.analyses.waves.dataset import Variables, frequencies
 from stickslip.study.analyses.waves.doubts import basis_doubts, campbell_doubts, unfollowed_from
 from stickslip.study.analyses.waves.numbers import Wheel
 from stickslip.study.analyses.waves.results import WaveBranches
-from stickslip.study.analyses.waves.solve import Question, each_wave, follow_wave
+from stickslip.study.analyses.waves.solve import Question, follow_wave
 from stickslip.study.analyses.waves.tables import Diameter, Order, Speed, WaveTable
-from stickslip.study.analyses.waves.texts import campbell_tables, of_cases
+from stickslip.study.analyses.waves.texts import campbell_tables
 from stickslip.study.file.section import once, rising_pair
 from stickslip.study.keep.netcdf import variable
 from stickslip.units import RPM
@@ -61,67 +61,11 @@ class CampbellTable(WaveTable):
         return tuple(sorted({wheel.diagram(m) for m in self.engine_orders}))
 
 
-class Campbell:
-    """The analysis ``campbell``."""
-
-    name = "campbell"
-    table = CampbellTable
-    record = WaveBranches
-    linear = True
-    checks = ()
-
-    def key(self, case: Case) -> str:
-        """Return all that the records depend on."""
-        asked: CampbellTable = case.settings.campbell
-        return asked.model_dump_json()
-
-    def inputs(self, case: Case, model: Model) -> Question:
-        """Return what is solved."""
-        asked: CampbellTable = case.settings.campbell
-        if not model.rotates:
-            raise input_error(
-                "campbell",
-                "the model is matrices, which no speed changes",
-                "Bring the mesh (a deck or an archive of one material) instead of matrices.",
-            )
-        wheel = Wheel(model.sectors, model.coriolis)
-        wheel.require(asked.nodal_diameters, "campbell.nodal_diameters")
-        return Question(
-            model,
-            asked.contacts,
-            wheel,
-            asked.numbers(wheel),
-            asked.modes,
-            asked.speeds,
-            engine_orders=tuple(asked.engine_orders),
-        )
-
-    def solve(
-        self, inputs: Question, done: Sequence[WaveBranches], notes: Notes
-    ) -> Iterator[WaveBranches]:
-        """Yield the branches of each wave."""
-        notes.put("directions", {"parted": inputs.wheel.parted})
-        return each_wave(follow_wave, inputs, done, notes)
-
-    def dataset(self, solved: Sequence[Solved]) -> xr.Dataset:
-        """Return branches and crossings."""
-        return dataset(solved, _of_case)
-
-    def check(self, case: Case, model: Model) -> tuple[str, ...]:
-        """Say how many modes of how many waves are followed."""
-        asked = self.inputs(case, model)
-        return (f"campbell: {asked.n_modes} modes of each of {len(asked.numbers)} waves",)
-
-    def summary(self, data: xr.Dataset) -> tuple[TextTable, ...]:
-        """Return the ends of the branches, and the crossings."""
-        return of_cases(data, campbell_tables)
-
-
 def _of_case(solved: Solved) -> tuple[Variables, list[str]]:
     asked: CampbellTable = solved.case.settings.campbell
     waves: Sequence[WaveBranches] = solved.records
-    parted = bool(solved.notes["directions"]["parted"])
-    wheel = Wheel(int(solved.notes["model"]["sectors"]), parted)
+    told = solved.notes["model"]
+    wheel = Wheel(int(told["sectors"]), bool(told["parted"]))
     beyond = _unfollowed(waves, wheel, asked)
     unseen = sorted(m for m in asked.engine_orders if wheel.diagram(m) not in asked.numbers(wheel))
     doubts = [*basis_doubts(waves), *campbell_doubts(beyond, unseen, waves)]
@@ -179,6 +123,38 @@ def _beyond(unfollowed: Sequence[tuple[int, float]]) -> Variables:
         "unfollowed_engine_order": variable("unfollowed", orders, "1", about),
         "unfollowed_from_rpm": variable("unfollowed", speeds, "rpm", "speed from which it does"),
     }
+
+
+class Campbell(WaveAnalysis):
+    """The analysis ``campbell``."""
+
+    name = "campbell"
+    table = CampbellTable
+    record = WaveBranches
+    of_wave = staticmethod(follow_wave)
+    of_case = staticmethod(_of_case)
+    of_text = staticmethod(campbell_tables)
+
+    def inputs(self, case: Case, model: Model) -> Question:
+        """Return what is solved."""
+        asked: CampbellTable = self.asked(case)
+        if not model.rotates:
+            raise input_error(
+                "campbell",
+                "the model is matrices, which no speed changes",
+                "Bring the mesh (a deck or an archive of one material) instead of matrices.",
+            )
+        wheel = Wheel(model.sectors, model.coriolis)
+        wheel.require(asked.nodal_diameters, "campbell.nodal_diameters")
+        return Question(
+            model,
+            asked.contacts,
+            wheel,
+            asked.numbers(wheel),
+            asked.modes,
+            asked.speeds,
+            engine_orders=tuple(asked.engine_orders),
+        )
 
 
 CAMPBELL = Campbell()

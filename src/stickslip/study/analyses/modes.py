@@ -1,23 +1,23 @@
 """Natural frequencies and mode shapes: of each nodal diameter of a wheel, or of a structure as a whole."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Self
 
 import numpy as np
-import xarray as xr
 from pydantic import Field, model_validator
 
 from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
-from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
-from stickslip.study.analyses.waves.dataset import Variables, dataset, frequencies, growth
+from stickslip.study.analyses.analysis import Case, Solved
+from stickslip.study.analyses.waves.analysis import WaveAnalysis
+from stickslip.study.analyses.waves.dataset import Variables, frequencies, growth
 from stickslip.study.analyses.waves.numbers import Wheel
 from stickslip.study.analyses.waves.reference import Reference, read_reference
 from stickslip.study.analyses.waves.results import WaveModes
-from stickslip.study.analyses.waves.solve import Question, each_wave, solve_wave
+from stickslip.study.analyses.waves.solve import Question, solve_wave
 from stickslip.study.analyses.waves.tables import Diameter, WaveTable
-from stickslip.study.analyses.waves.texts import modes_tables, of_cases
+from stickslip.study.analyses.waves.texts import modes_tables
 from stickslip.study.file.section import FilePath, custom_error, once
 from stickslip.study.keep.netcdf import variable
 from stickslip.units import RPM
@@ -65,60 +65,6 @@ class ModesTable(WaveTable):
         return read_reference(home / self.reference, self.reference_case)
 
 
-class Modes:
-    """The analysis ``modes``."""
-
-    name = "modes"
-    table = ModesTable
-    record = WaveModes
-    linear = True
-    checks = ()
-
-    def key(self, case: Case) -> str:
-        """Return all that the records depend on; what they are compared with is not among it."""
-        asked: ModesTable = case.settings.modes
-        return asked.model_dump_json(exclude={"reference", "reference_case"})
-
-    def inputs(self, case: Case, model: Model) -> Question:
-        """Return what is solved."""
-        asked: ModesTable = case.settings.modes
-        wheel = Wheel(model.sectors, model.coriolis and model.rotates and model.speed > 0)
-        wheel.require(asked.nodal_diameters, "modes.nodal_diameters")
-        numbers = wheel.numbers(asked.nodal_diameters)
-        known = asked.compared_with(case.home)
-        if known is not None:
-            known.of_waves(numbers, asked.number, model.sectors)
-        return Question(
-            model,
-            asked.contacts,
-            wheel,
-            numbers,
-            asked.number,
-            (model.speed,),
-            rpm=float(f"{model.speed / RPM:.12g}"),
-            shapes=asked.shapes and model.skin is not None,
-        )
-
-    def solve(
-        self, inputs: Question, done: Sequence[WaveModes], notes: Notes
-    ) -> Iterator[WaveModes]:
-        """Yield the modes of each wave."""
-        return each_wave(solve_wave, inputs, done, notes)
-
-    def dataset(self, solved: Sequence[Solved]) -> xr.Dataset:
-        """Return frequencies, shapes and what they are compared with."""
-        return dataset(solved, _of_case)
-
-    def check(self, case: Case, model: Model) -> tuple[str, ...]:
-        """Say how many modes of how many waves there will be."""
-        asked = self.inputs(case, model)
-        return (f"modes: {asked.n_modes} of each of {len(asked.numbers)} waves",)
-
-    def summary(self, data: xr.Dataset) -> tuple[TextTable, ...]:
-        """Return the frequencies, and their differences from the reference."""
-        return of_cases(data, modes_tables)
-
-
 def _of_case(solved: Solved) -> tuple[Variables, list[str]]:
     waves: Sequence[WaveModes] = solved.records
     hertz = frequencies(waves)
@@ -150,6 +96,38 @@ def _shapes(waves: Sequence[WaveModes]) -> Variables:
     parts = np.stack([shapes.real, shapes.imag], axis=-1).astype(np.float32)
     about = "displacement of sector 0, largest is 1"
     return {"shape": variable("wave mode skin_point xyz part", parts, "1", about)}
+
+
+class Modes(WaveAnalysis):
+    """The analysis ``modes``."""
+
+    name = "modes"
+    table = ModesTable
+    record = WaveModes
+    compared = frozenset({"reference", "reference_case"})
+    of_wave = staticmethod(solve_wave)
+    of_case = staticmethod(_of_case)
+    of_text = staticmethod(modes_tables)
+
+    def inputs(self, case: Case, model: Model) -> Question:
+        """Return what is solved."""
+        asked: ModesTable = self.asked(case)
+        wheel = Wheel(model.sectors, model.coriolis and model.rotates and model.speed > 0)
+        wheel.require(asked.nodal_diameters, "modes.nodal_diameters")
+        numbers = wheel.numbers(asked.nodal_diameters)
+        known = asked.compared_with(case.home)
+        if known is not None:
+            known.of_waves(numbers, asked.number, model.sectors)
+        return Question(
+            model,
+            asked.contacts,
+            wheel,
+            numbers,
+            asked.number,
+            (model.speed,),
+            rpm=float(f"{model.speed / RPM:.12g}"),
+            shapes=asked.shapes and model.skin is not None,
+        )
 
 
 MODES = Modes()

@@ -1,10 +1,9 @@
 """Which modes engine orders can excite at one speed: the SAFE or interference diagram."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
-import xarray as xr
 from pydantic import Field, model_validator
 
 from stickslip.arrays import FloatArray
@@ -12,14 +11,15 @@ from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 from stickslip.response.rotating.nodal_diameters import NodalDiameterMap
 from stickslip.response.rotating.safe import Safe, safe
-from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
-from stickslip.study.analyses.waves.dataset import Variables, dataset, frequencies, growth
+from stickslip.study.analyses.analysis import Case, Solved
+from stickslip.study.analyses.waves.analysis import WaveAnalysis
+from stickslip.study.analyses.waves.dataset import Variables, frequencies, growth
 from stickslip.study.analyses.waves.doubts import safe_doubts
 from stickslip.study.analyses.waves.numbers import Wheel
 from stickslip.study.analyses.waves.results import WaveModes
-from stickslip.study.analyses.waves.solve import Question, each_wave, solve_wave
+from stickslip.study.analyses.waves.solve import Question, solve_wave
 from stickslip.study.analyses.waves.tables import Order, Speed, WaveTable
-from stickslip.study.analyses.waves.texts import of_cases, safe_tables
+from stickslip.study.analyses.waves.texts import safe_tables
 from stickslip.study.file.section import once
 from stickslip.study.keep.netcdf import variable
 from stickslip.units import HZ, RPM
@@ -48,60 +48,6 @@ class SafeTable(WaveTable):
     def _differ(self) -> Self:
         once(self.engine_orders, "engine_orders")
         return self
-
-
-class SafeDiagram:
-    """The analysis ``safe``."""
-
-    name = "safe"
-    table = SafeTable
-    record = WaveModes
-    linear = True
-    checks = ()
-
-    def key(self, case: Case) -> str:
-        """Return all that the records depend on; engine orders and margin are compared with them later."""
-        asked: SafeTable = case.settings.safe
-        return asked.model_dump_json(exclude={"engine_orders", "margin_percent"})
-
-    def inputs(self, case: Case, model: Model) -> Question:
-        """Return what is solved."""
-        asked: SafeTable = case.settings.safe
-        if model.sectors == 1:
-            raise input_error(
-                "safe",
-                "the model is a whole structure, not a sector",
-                "An interference diagram needs cyclic symmetry; give the sector and the number of sectors.",
-            )
-        rpm = float(f"{model.speed / RPM:.12g}") if asked.speed_rpm is None else asked.speed_rpm
-        if rpm <= 0:
-            raise input_error(
-                "safe.speed_rpm",
-                f"must be above zero, got {rpm:g}",
-                "Give the speed at which the engine orders act.",
-            )
-        at = rpm * RPM if model.rotates else 0.0
-        wheel = Wheel(model.sectors, model.coriolis and model.rotates)
-        return Question(model, asked.contacts, wheel, wheel.numbers(), asked.modes, (at,), rpm=rpm)
-
-    def solve(
-        self, inputs: Question, done: Sequence[WaveModes], notes: Notes
-    ) -> Iterator[WaveModes]:
-        """Yield the modes of each wave."""
-        return each_wave(solve_wave, inputs, done, notes)
-
-    def dataset(self, solved: Sequence[Solved]) -> xr.Dataset:
-        """Return every pair of an engine order and a mode that it can excite."""
-        return dataset(solved, _of_case)
-
-    def check(self, case: Case, model: Model) -> tuple[str, ...]:
-        """Say how many modes of how many waves there will be."""
-        asked = self.inputs(case, model)
-        return (f"safe: {asked.n_modes} modes of each of {len(asked.numbers)} waves",)
-
-    def summary(self, data: xr.Dataset) -> tuple[TextTable, ...]:
-        """Return the pairs, the nearest first."""
-        return of_cases(data, safe_tables)
 
 
 def _of_case(solved: Solved) -> tuple[Variables, list[str]]:
@@ -155,6 +101,38 @@ def _pairs(waves: Sequence[WaveModes], met: Safe) -> Variables:
         "judged": (judged, "1", unjudged),
     }
     return {f"pair_{name}": variable("pair", *of) for name, of in found.items()}
+
+
+class SafeDiagram(WaveAnalysis):
+    """The analysis ``safe``."""
+
+    name = "safe"
+    table = SafeTable
+    record = WaveModes
+    compared = frozenset({"engine_orders", "margin_percent"})
+    of_wave = staticmethod(solve_wave)
+    of_case = staticmethod(_of_case)
+    of_text = staticmethod(safe_tables)
+
+    def inputs(self, case: Case, model: Model) -> Question:
+        """Return what is solved."""
+        asked: SafeTable = self.asked(case)
+        if model.sectors == 1:
+            raise input_error(
+                "safe",
+                "the model is a whole structure, not a sector",
+                "An interference diagram needs cyclic symmetry; give the sector and the number of sectors.",
+            )
+        rpm = float(f"{model.speed / RPM:.12g}") if asked.speed_rpm is None else asked.speed_rpm
+        if rpm <= 0:
+            raise input_error(
+                "safe.speed_rpm",
+                f"must be above zero, got {rpm:g}",
+                "Give the speed at which the engine orders act.",
+            )
+        at = rpm * RPM if model.rotates else 0.0
+        wheel = Wheel(model.sectors, model.coriolis and model.rotates)
+        return Question(model, asked.contacts, wheel, wheel.numbers(), asked.modes, (at,), rpm=rpm)
 
 
 SAFE = SafeDiagram()

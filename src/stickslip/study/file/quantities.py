@@ -1,6 +1,6 @@
 """Tables made from the dataclasses that they become: keys, units, ranges and defaults are told once, by the dataclass."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache
 from types import NoneType
@@ -189,8 +189,3 @@ def _range(q: Quantity) -> str:
     high = f"below {q.below:g}" if q.below is not None else ""
     high = f"to {most:g}" if most is not None else high
     return "greater than zero" if low == "above 0" and not high else f"{low} {high}".strip()
-
-
-def shared_fields(cls: type) -> Mapping[str, Quantity]:
-    """Return the quantities of a law that are shared among the points of an interface."""
-    return {entry.name: q for entry, q in quantities_of(cls) if q.shared}

@@ -9,7 +9,6 @@ from pydantic_core import PydanticCustomError
 LONGEST_VALUE = 60  # characters of a value that a message shows
 
 Positive = Annotated[float, Field(gt=0)]
-Count = Annotated[int, Field(ge=1, le=1000)]
 FilePath = Annotated[str, Field(min_length=1, max_length=500)]  # relative to the study's folder
 Name = Annotated[str, Field(min_length=1, max_length=100)]
 

@@ -7,6 +7,7 @@ from typing import Any
 from stickslip.errors import InputError, input_error
 from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector
+from stickslip.study.file.loads import Limits
 from stickslip.study.file.parts import BeamTable, FileModel, Lumped, PrismBlades, Sector
 from stickslip.study.file.quantities import build
 from stickslip.study.file.tables import Tables
@@ -28,14 +29,19 @@ def memory_gb(nodes: float) -> float:
 
 def too_large(tables: Tables, home: Path) -> InputError | None:
     """Return the complaint about parts that take more than the study's limits allow; None if they do not."""
-    limits, nodes = tables.limits, sum(_nodes(table, home) for table in tables.part.values())
-    memory, seconds = memory_gb(nodes), nodes * SECONDS_A_NODE
-    if memory > limits.memory_gb:
-        problem = f"the parts have some {nodes:.2g} nodes, estimated at {memory:.1f} GB, the limit is {limits.memory_gb:g} GB"
-        return input_error("limits.memory_gb", problem, ADVICE)
-    if seconds > limits.work_s:
-        problem = f"the parts have some {nodes:.2g} nodes, estimated at {seconds:.0f} s, the limit is {limits.work_s:g} s"
-        return input_error("limits.work_s", problem, ADVICE)
+    nodes = sum(_nodes(table, home) for table in tables.part.values())
+    what = f"the parts, some {nodes:.2g} nodes, are estimated"
+    return above(tables.limits, what, memory_gb(nodes), nodes * SECONDS_A_NODE)
+
+
+def above(limits: Limits, what: str, memory: float, seconds: float) -> InputError | None:
+    """Return the complaint about the limit that an estimate exceeds, None if it exceeds none; `what` begins the sentence."""
+    found = {"memory_gb": (memory, ".1f", "GB"), "work_s": (seconds, ".0f", "s")}
+    for key, (needed, digits, unit) in found.items():
+        allowed = getattr(limits, key)
+        if needed > allowed:
+            problem = f"{what} at {needed:{digits}} {unit}, the limit is {allowed:g} {unit}"
+            return input_error(f"limits.{key}", problem, ADVICE)
     return None
 
 

@@ -1,16 +1,15 @@
 """What the response of a case will cost, told before anything long is computed."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from stickslip.assembly.model import Model
-from stickslip.errors import input_error
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.model.part import Part
 from stickslip.response.forced.response import Sweep
-from stickslip.study.models.cost import ADVICE, SECONDS_A_NODE, memory_gb
+from stickslip.study.file.loads import Limits
+from stickslip.study.models.cost import SECONDS_A_NODE, above, memory_gb
 
 POINTS = 1.7  # points of a branch for each one asked: more are taken where the response turns
 NEWTON_A_POINT = 6  # repeats and failed tries included: the two blades took 1 to 19 in a case and 6 over all, four masses 11
@@ -72,7 +71,7 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
     return Estimate(nodes, high, memory, round(steps_low + steps_high), seconds)
 
 
-def check_limits(limits: Any, cost: Estimate) -> None:
+def check_limits(limits: Limits, cost: Estimate) -> None:
     """Refuse a case that is estimated above the study's limits.
 
     Raises
@@ -80,20 +79,13 @@ def check_limits(limits: Any, cost: Estimate) -> None:
     InputError
         Naming the limit.
     """
-    if cost.memory_gb > limits.memory_gb:
-        raise input_error(
-            "limits.memory_gb",
-            f"the forced response is estimated at {cost.memory_gb:.1f} GB ({cost.nodes} nodes, {cost.unknowns} unknowns), the "
-            f"limit is {limits.memory_gb:g} GB",
-            ADVICE,
-        )
-    if cost.seconds > limits.work_s:
-        raise input_error(
-            "limits.work_s",
-            f"a case of the forced response is estimated at {cost.seconds:.0f} s ({cost.newton_steps} Newton steps), the limit "
-            f"is {limits.work_s:g} s",
-            ADVICE,
-        )
+    what = (
+        f"a case of the forced response ({cost.nodes} nodes, {cost.unknowns} unknowns, {cost.newton_steps} Newton steps) is "
+        "estimated"
+    )
+    refusal = above(limits, what, cost.memory_gb, cost.seconds)
+    if refusal is not None:
+        raise refusal
 
 
 def nodes_of(model: Model) -> int:

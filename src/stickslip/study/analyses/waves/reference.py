@@ -1,19 +1,27 @@
 """Frequencies to compare with, from a CSV file."""
 
 import csv
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
+from pydantic import BaseModel, Field, ValidationError
 
 from stickslip.arrays import FloatArray
-from stickslip.errors import InputError, input_error
+from stickslip.errors import input_error
 from stickslip.reduction.waves import wave
 
-COLUMNS = ("nodal_diameter", "mode", "frequency_hz")
 MOST_ROWS = 100_000
+
+
+class Row(BaseModel):
+    """A line of the file."""
+
+    nodal_diameter: int = Field(ge=0, description="a whole number")
+    mode: int = Field(ge=0, description="a whole number")
+    frequency_hz: float = Field(gt=0, allow_inf_nan=False, description="a frequency above zero")
 
 
 @dataclass(frozen=True)
@@ -76,30 +84,15 @@ def _rows(path: Path, case: str | None) -> dict[tuple[int, int], float]:
     found: dict[tuple[int, int], float] = {}
     try:
         with path.open(encoding="utf-8", newline="") as stream:
-            reader = csv.DictReader(stream)
-            needed = COLUMNS if case is None else (*COLUMNS, "case")
-            missing = [name for name in needed if name not in (reader.fieldnames or [])]
-            if missing:
-                raise input_error(
-                    str(path),
-                    f"has no column {', '.join(missing)}",
-                    f"The first line names the columns: {','.join(needed)}.",
-                )
-            for row in reader:
-                if reader.line_num > MOST_ROWS:
-                    raise input_error(
-                        str(path), f"has more than {MOST_ROWS} lines", "Cut it to what is compared."
-                    )
-                if case is not None and row["case"] != case:
-                    continue
-                key = _whole(path, reader.line_num, row, 0), _whole(path, reader.line_num, row, 1)
+            for line, row in _lines(path, stream, case):
+                key = row.nodal_diameter, row.mode
                 if key in found:
                     raise input_error(
-                        f"{path}: line {reader.line_num}",
+                        f"{path}: line {line}",
                         f"nodal diameter {key[0]}, mode {key[1]} is there twice",
                         "Choose the rows by a column 'case' and modes.reference_case.",
                     )
-                found[key] = _hertz(path, reader.line_num, row)
+                found[key] = row.frequency_hz
     except (UnicodeDecodeError, csv.Error) as error:
         raise input_error(
             str(path), f"is not a CSV file in UTF-8 ({error})", "Save it as CSV."
@@ -107,25 +100,33 @@ def _rows(path: Path, case: str | None) -> dict[tuple[int, int], float]:
     return found
 
 
-def _whole(path: Path, line: int, row: dict[str, str], column: int) -> int:
-    text = row[COLUMNS[column]]
-    if not (text or "").strip().isdigit():
-        raise _unreadable(path, line, COLUMNS[column], text, "a whole number")
-    return int(text)
+def _lines(path: Path, stream: TextIO, case: str | None) -> Iterator[tuple[int, Row]]:
+    """Yield the rows that are compared with and the numbers of their lines."""
+    reader = csv.DictReader(stream)
+    needed = [*Row.model_fields, *(["case"] if case is not None else [])]
+    missing = [name for name in needed if name not in (reader.fieldnames or [])]
+    if missing:
+        raise input_error(
+            str(path),
+            f"has no column {', '.join(missing)}",
+            f"The first line names the columns: {','.join(needed)}.",
+        )
+    for row in reader:
+        if reader.line_num > MOST_ROWS:
+            raise input_error(
+                str(path), f"has more than {MOST_ROWS} lines", "Cut it to what is compared."
+            )
+        if case is None or row["case"] == case:
+            yield reader.line_num, _row(f"{path}: line {reader.line_num}", row)
 
 
-def _hertz(path: Path, line: int, row: dict[str, str]) -> float:
-    text = row[COLUMNS[2]]
+def _row(place: str, row: dict[str, str]) -> Row:
     try:
-        value = float(text)
-    except (TypeError, ValueError):
-        raise _unreadable(path, line, COLUMNS[2], text, "a number in Hz") from None
-    if not (math.isfinite(value) and value > 0):
-        raise _unreadable(path, line, COLUMNS[2], text, "a frequency above zero")
-    return value
-
-
-def _unreadable(path: Path, line: int, column: str, text: object, wanted: str) -> InputError:
-    return input_error(
-        f"{path}: line {line}: {column}", f"cannot be read, got {text!r}", f"Give {wanted}."
-    )
+        return Row.model_validate(row)
+    except ValidationError as error:
+        column = str(error.errors()[0]["loc"][0])
+        raise input_error(
+            f"{place}: {column}",
+            f"cannot be read, got {row[column]!r}",
+            f"Give {Row.model_fields[column].description}.",
+        ) from None

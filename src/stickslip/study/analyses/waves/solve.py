@@ -71,6 +71,7 @@ def each_wave(
     """Yield what `solve` finds for the waves that are not done; what is told of the model goes into the notes first."""
     if notes.get(ABOUT) is None:
         note = about(asked.model, asked.contacts, asked.rpm, asked.speeds[-1])
+        note |= {"parted": asked.wheel.parted}
         notes.put(ABOUT, note | (skin_note(asked.model) if asked.shapes else {}))
     known = {w.wave_number for w in done}
     for i, number in enumerate(asked.numbers):
