@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 from models import lifting, table
 from pydantic import ValidationError
+from small_v2 import write_four_masses
 
 from stickslip.assembly.assembled import Assembled, ContactTable, Frequencies
 from stickslip.assembly.contact import Contact
@@ -34,13 +35,14 @@ from stickslip.response.recovery import fields
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton
 from stickslip.study.analyses.analysis import Case, Solved
-from stickslip.study.analyses.forced.caveats import mixed_places, no_resonance
+from stickslip.study.analyses.forced.caveats import mixed_places, no_resonance, nothing_pressed
 from stickslip.study.analyses.forced.estimate import estimate, retained_of
 from stickslip.study.analyses.forced.question import Question, question_of
 from stickslip.study.analyses.forced.section import ForcedResponse, sweep_of
 from stickslip.study.analyses.forced_response import FORCED_RESPONSE
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.keep.journal import JobJournal
+from stickslip.study.models.study import read_study
 from stickslip.study.outcome import case_variables
 from stickslip.units import HZ, RPM
 
@@ -411,3 +413,33 @@ def test_static_loads_need_no_harmonic_of_their_own() -> None:
     pull = Load(on="blade.tip", newton=1.0, direction=(1.0, 0.0, 0.0), harmonic=0)
     assert estimate(model(loads={"pull": pull}), lifted().sweep).nodes == 1
     assert retained_of(model()) == 3
+
+
+def test_what_a_run_would_refuse_is_refused_before_any_job(tmp_path: Path):
+    pull = {"load.pull.on": '"chain.m4"', "load.pull.force_n": "3.0", "load.pull.harmonic": "0"}
+    path = write_four_masses(tmp_path, pull | {"vary.load.shaker.force_n": "[1e-9]"})
+    case = read_study(path).cases()[0]
+    with pytest.raises(
+        InputError, match=r"load \(load.shaker.force_n = 1e-09\): the excitation of 1e-09 N"
+    ):
+        FORCED_RESPONSE.inputs(case, case.build())
+
+
+def test_friction_that_nothing_presses_is_told(tmp_path: Path):
+    law = {
+        "contact.rub.between": '["chain.m2", "ground"]',
+        "contact.rub.law": '"elastic_coulomb"',
+        "contact.rub.acts": '"normal"',
+    }
+    keys = {
+        "normal_stiffness_n_per_m": "1e4",
+        "friction_coefficient": "0.3",
+        "axial_stiffness_n_per_m": "0.0",
+        "tangential_stiffness_n_per_m": "1e4",
+    }
+    path = write_four_masses(
+        tmp_path, law | {f"contact.rub.{key}": value for key, value in keys.items()}
+    )
+    case = read_study(path).cases()[0]
+    said = nothing_pressed(FORCED_RESPONSE.inputs(case, case.build()))
+    assert said[0].startswith("all 1 contact points with friction are open in the static state")

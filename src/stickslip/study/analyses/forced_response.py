@@ -14,7 +14,13 @@ from stickslip.harmonic.support import named
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.response import ForcedPoint, Sweep, forced_response
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
-from stickslip.study.analyses.forced.caveats import caveats, inside, mixed_places, no_resonance
+from stickslip.study.analyses.forced.caveats import (
+    caveats,
+    inside,
+    mixed_places,
+    no_resonance,
+    nothing_pressed,
+)
 from stickslip.study.analyses.forced.dataset import put_together
 from stickslip.study.analyses.forced.estimate import estimate
 from stickslip.study.analyses.forced.in_time import Check, check_in_time, chosen
@@ -91,7 +97,8 @@ class ForcedResponseAnalysis:
         """Return the estimated cost, where resonances are to be expected, and how harmonics will be chosen."""
         question = self.inputs(case, model)
         chooser, passages = question.chooser, case.settings.harmonics.passages
-        doubts = [*no_resonance(question), *mixed_places(question.model.error_labels)]
+        labels = question.model.error_labels
+        doubts = [*no_resonance(question), *nothing_pressed(question), *mixed_places(labels)]
         return (
             str(estimate(model, question.sweep)),
             *(f"harmonics: {line}" for line in chooser.lines(passages)),

@@ -11,6 +11,11 @@ from stickslip.study.analyses.forced.question import Question
 from stickslip.units import HZ
 
 ROTATIONS = ("rx", "ry", "rz")
+COULOMB = (
+    "elastic_coulomb",
+    "coupled_coulomb",
+    "regularised_coulomb",
+)  # friction under the normal force
 LISTED = 5  # natural frequencies that a line names
 
 
@@ -27,6 +32,7 @@ def caveats(question: Question, response: Response, shift: tuple[float, float]) 
     return [
         *question.model.warnings,
         *mixed_places(question.model.error_labels),
+        *nothing_pressed(question),
         *_of_points(question, response),
         *_of_shape(question, response),
         *_of_drift(question, response),
@@ -56,9 +62,25 @@ def inside(question: Question) -> list[str]:
         near = [f"{f:.2f}" for f in hertz if f <= highest][-LISTED:]
         beyond = [f"{f:.2f}" for f in hertz if f > highest][:1]
         told += [f"natural frequencies, contacts {state}: {', '.join([*near, *beyond])} Hz"] * bool(near or beyond)  # fmt: skip
-    if normal.size:
-        told.append(f"static equilibrium: normal forces {normal.min():.3g} to {normal.max():.3g} N")
+    if np.any(normal):
+        pressed = np.count_nonzero(normal > 0)
+        told.append(
+            f"static equilibrium: {pressed} of {normal.size} contact points are pressed, normal forces up to {normal.max():.3g} N"
+        )
     return told
+
+
+def nothing_pressed(question: Question) -> list[str]:
+    """Return a warning where friction under a normal force finds none in the static state."""
+    laws, normal = question.model.contacts.laws, -question.model.static_force[:, 2]
+    rubs = np.array([law in COULOMB for law in laws], dtype=bool)
+    if not rubs.any() or np.any(normal[rubs] > 0):
+        return []
+    text = (
+        f"all {np.count_nonzero(rubs)} contact points with friction are open in the static state: they act only where the vibration "
+        "closes them. Check gaps, preloads, static loads and the direction in which the speed moves the surfaces."
+    )
+    return [text]
 
 
 def no_resonance(question: Question) -> list[str]:

@@ -26,159 +26,139 @@ class Quantity:
     about: str
 
 
-def _table(dims: str, **each: tuple[str, str]) -> dict[str, Quantity]:
-    return {name: Quantity(tuple(dims.split()), *of) for name, of in each.items()}
-
-
-OF_CASES = _table(
-    "case",
-    excitation_n=("N", "amplitude of the largest harmonic force, NaN without one"),
-    peak_amplitude=("m", "largest first-harmonic amplitude of the report output"),
-    peak_frequency_hz=("Hz", "frequency of the peak"),
-    peak_point=("1", "index of the peak into point, -1 if none"),
-    points=("1", "accepted points"),
-    points_low=("1", "accepted points with the harmonics of the first passage"),
-    points_high=("1", "accepted points with other harmonics"),
-    points_failed=("1", "points that did not converge"),
-    unknowns_solved=("1", "real unknowns of all solutions together, those not accepted included"),
-    newton_steps=("1", "Newton iterations"),
-    seconds_contact=("s", "time in contact forces"),
-    seconds_linear=("s", "time in linear algebra"),
-    seconds_rest=("s", "other time of the solver"),
-    choice_sentence=("1", "where and why more harmonics were asked for, empty where nothing was decided"),
-    retention_peak_shift=("1", "relative change of the peak amplitude with a tenth of the retention stiffness"),
-    retention_frequency_shift_hz=("Hz", "change of the peak frequency with a tenth of the retention stiffness"),
-)  # fmt: skip
-OF_POINTS = _table(
-    "point",
-    frequency_hz=("Hz", "excitation frequency"),
-    speed_rpm=("1/min", "speed of rotation"),
-    point_case=("1", "case"),
-    order=("1", "highest harmonic kept"),
-    unknowns=("1", "real unknowns of the accepted solution"),
-    status=("1", "how the solver ended"),
-    indicator=(
-        "1",
-        "what the strategy compared with its threshold: of an error at the first solution of the frequency, else at the accepted one",
-    ),
-    predicted_error_percent=(
-        "percent",
-        "error of the first solution that an alert predicted, NaN where the indicator is no error",
-    ),
-    real_error_percent=(
-        "percent",
-        "difference of the first and the accepted solution where the frequency was solved again",
-    ),
-    newton_iterations=("1", "Newton iterations"),
-    seconds=("s", "time of the point"),
-    refinement=("1", "1 if the point was added to resolve the peak"),
-)
-OF_FIELDS = (
-    _table("point harmonic", harmonic_kept=("1", "1 if the solution keeps the harmonic"))
-    | _table(
-        "point output",
-        amplitude=("m", "first-harmonic amplitude"),
-        amplitude_low=("m", "first-harmonic amplitude with the harmonics of the first passage"),
-    )
-    | _table("point harmonic output part", output_displacement=("m", "displacement of the outputs"))
-    | _table(
-        "point harmonic retained part",
-        retained_displacement=("m", "displacement of contact coordinates and free bodies, rotations in rad"),
-    )
-    | _table(
-        "point harmonic contact direction part",
-        gap=("m", "relative displacement at the contacts"),
-        contact_force=("N", "contact force"),
-    )
-    | _table("point contact", dissipated_energy=("J", "energy dissipated in a cycle"))
-)  # fmt: skip
-OF_PEAKS = (
-    _table("case sample", peak_time=("s", "time within the period at the peak"))
-    | _table(
-        "case contact direction sample",
-        peak_gap=("m", "contact gap at the peak"),
-        peak_force=("N", "contact force at the peak"),
-    )
-    | _table("case contact tangent sample", peak_state=("1", "contact state at the peak, -1 if none"))
-)  # fmt: skip
-OF_ATTEMPTS = (
-    _table(
-        "attempt",
-        attempt_case=("1", "case of a solution"),
-        attempt_frequency_hz=("Hz", "frequency of a solution"),
-        attempt_stage=("1", "when it was made"),
-        attempt_unknowns=("1", "real unknowns"),
-        attempt_indicator=("1", "what the strategy compared with its threshold, NaN where it was not asked"),
-        attempt_repeated=("1", "1 if it asked for more"),
-        attempt_status=("1", "how it ended"),
-        attempt_newton_iterations=("1", "Newton iterations"),
-        attempt_seconds=("s", "time it took"),
-    )
-    | _table("attempt harmonic", attempt_kept=("1", "1 if the solution keeps the harmonic"))
-    | _table(
-        "alert_point",
-        alert_case=("1", "case of a first solution that an alert was asked about"),
-        alert_frequency_hz=("Hz", "frequency at which the alert was asked"),
-        alert_error_percent=("percent", "error of the first solution that the alert predicted"),
-        alert_repeated=("1", "1 if it asked for more"),
-    )
-)  # fmt: skip
-OF_CHECKS = _table(
-    "check",
-    verify_case=("1", "case"),
-    verify_frequency_hz=("Hz", "frequency"),
-    verify_transient=("m", "first-harmonic amplitude by time integration"),
-    verify_balance=("m", "first-harmonic amplitude by harmonic balance"),
-    verify_difference_percent=("percent", "their difference"),
-    verify_settled=("1", "1 if it became periodic"),
-    verify_periods=("1", "periods integrated"),
-    verify_scatter=("1", "scatter about the average of a motion that did not become periodic"),
-    verify_refined=("m", "amplitude by harmonic balance with three times the harmonics"),
-    verify_sentence=("1", "what happened, in words"),
-)
-OF_DOUBTS = _table(
-    "point",
-    reference_error_percent=(
-        "percent",
-        "change of the complex amplitude that twice as many harmonics are predicted to make, NaN without a solution",
-    ),
-) | _table(
-    "case",
-    reference_worst_percent=("percent", "largest such change"),
-    reference_worst_hz=("Hz", "where it is"),
-    reference_above=("1", "solutions above the threshold"),
-    reference_sentence=("1", "what the check says, in words"),
-)
-OF_MODELS = (
-    _table(
-        "case mode",
-        frequency_full_hz=("Hz", "natural frequency, full model, contacts open"),
-        frequency_reduced_hz=("Hz", "natural frequency, reduced model, contacts open"),
-        frequency_stuck_full_hz=("Hz", "natural frequency, full model, contacts stuck"),
-        frequency_stuck_reduced_hz=("Hz", "natural frequency, reduced model, contacts stuck"),
-    )
-    | _table(
-        "case contact direction",
-        static_gap=("m", "contact gap under the static loads"),
-        static_force=("N", "contact force under the static loads"),
-    )
-    | _table(
-        "contact",
-        contact_law=("1", "law of the contact"),
-        contact_group=("1", "name of the contact in the model"),
-    )
-    | _table(
-        "contact",
-        contact_area=("m2", "area that belongs to the contact, NaN where there are no facets"),
-    )
-    | _table("contact xyz", contact_position=("m", "position of the contact points"))
-    | _table("contact xyz direction", contact_frame=("1", "axes t, w, n of the contact frames"))
-    | _table("surface_node xyz", surface_point=("m", "skin of the meshed parts"))
-    | _table("face corner", surface_triangle=("1", "triangles of the skin"))
-)
-QUANTITIES: Mapping[str, Quantity] = (
-    OF_CASES | OF_POINTS | OF_FIELDS | OF_PEAKS | OF_ATTEMPTS | OF_CHECKS | OF_DOUBTS | OF_MODELS
-)
+_OF = {
+    "case": {
+        "excitation_n": ("N", "amplitude of the largest harmonic force, NaN without one"),
+        "peak_amplitude": ("m", "largest first-harmonic amplitude of the report output"),
+        "peak_frequency_hz": ("Hz", "frequency of the peak"),
+        "peak_point": ("1", "index of the peak into point, -1 if none"),
+        "points": ("1", "accepted points"),
+        "points_low": ("1", "accepted points with the harmonics of the first passage"),
+        "points_high": ("1", "accepted points with other harmonics"),
+        "points_failed": ("1", "points that did not converge"),
+        "unknowns_solved": ("1", "real unknowns of all solutions together, those not accepted included"),
+        "newton_steps": ("1", "Newton iterations"),
+        "seconds_contact": ("s", "time in contact forces"),
+        "seconds_linear": ("s", "time in linear algebra"),
+        "seconds_rest": ("s", "other time of the solver"),
+        "choice_sentence": ("1", "where and why more harmonics were asked for, empty where nothing was decided"),
+        "retention_peak_shift": ("1", "relative change of the peak amplitude with a tenth of the retention stiffness"),
+        "retention_frequency_shift_hz": ("Hz", "change of the peak frequency with a tenth of the retention stiffness"),
+        "reference_worst_percent": ("percent", "largest such change"),
+        "reference_worst_hz": ("Hz", "where it is"),
+        "reference_above": ("1", "solutions above the threshold"),
+        "reference_sentence": ("1", "what the check says, in words"),
+    },
+    "point": {
+        "frequency_hz": ("Hz", "excitation frequency"),
+        "speed_rpm": ("1/min", "speed of rotation"),
+        "point_case": ("1", "case"),
+        "order": ("1", "highest harmonic kept"),
+        "unknowns": ("1", "real unknowns of the accepted solution"),
+        "status": ("1", "how the solver ended"),
+        "indicator": ("1", "what the strategy compared with its threshold: of an error at the first solution of the frequency, else at the accepted one"),
+        "predicted_error_percent": ("percent", "error of the first solution that an alert predicted, NaN where the indicator is no error"),
+        "real_error_percent": ("percent", "difference of the first and the accepted solution where the frequency was solved again"),
+        "newton_iterations": ("1", "Newton iterations"),
+        "seconds": ("s", "time of the point"),
+        "refinement": ("1", "1 if the point was added to resolve the peak"),
+        "reference_error_percent": ("percent", "change of the complex amplitude that twice as many harmonics are predicted to make, NaN without a solution"),
+    },
+    "point harmonic": {
+        "harmonic_kept": ("1", "1 if the solution keeps the harmonic"),
+    },
+    "point output": {
+        "amplitude": ("m", "first-harmonic amplitude"),
+        "amplitude_low": ("m", "first-harmonic amplitude with the harmonics of the first passage"),
+    },
+    "point harmonic output part": {
+        "output_displacement": ("m", "displacement of the outputs"),
+    },
+    "point harmonic retained part": {
+        "retained_displacement": ("m", "displacement of contact coordinates and free bodies, rotations in rad"),
+    },
+    "point harmonic contact direction part": {
+        "gap": ("m", "relative displacement at the contacts"),
+        "contact_force": ("N", "contact force"),
+    },
+    "point contact": {
+        "dissipated_energy": ("J", "energy dissipated in a cycle"),
+    },
+    "case sample": {
+        "peak_time": ("s", "time within the period at the peak"),
+    },
+    "case contact direction sample": {
+        "peak_gap": ("m", "contact gap at the peak"),
+        "peak_force": ("N", "contact force at the peak"),
+    },
+    "case contact tangent sample": {
+        "peak_state": ("1", "contact state at the peak, -1 if none"),
+    },
+    "attempt": {
+        "attempt_case": ("1", "case of a solution"),
+        "attempt_frequency_hz": ("Hz", "frequency of a solution"),
+        "attempt_stage": ("1", "when it was made"),
+        "attempt_unknowns": ("1", "real unknowns"),
+        "attempt_indicator": ("1", "what the strategy compared with its threshold, NaN where it was not asked"),
+        "attempt_repeated": ("1", "1 if it asked for more"),
+        "attempt_status": ("1", "how it ended"),
+        "attempt_newton_iterations": ("1", "Newton iterations"),
+        "attempt_seconds": ("s", "time it took"),
+    },
+    "attempt harmonic": {
+        "attempt_kept": ("1", "1 if the solution keeps the harmonic"),
+    },
+    "alert_point": {
+        "alert_case": ("1", "case of a first solution that an alert was asked about"),
+        "alert_frequency_hz": ("Hz", "frequency at which the alert was asked"),
+        "alert_error_percent": ("percent", "error of the first solution that the alert predicted"),
+        "alert_repeated": ("1", "1 if it asked for more"),
+    },
+    "check": {
+        "verify_case": ("1", "case"),
+        "verify_frequency_hz": ("Hz", "frequency"),
+        "verify_transient": ("m", "first-harmonic amplitude by time integration"),
+        "verify_balance": ("m", "first-harmonic amplitude by harmonic balance"),
+        "verify_difference_percent": ("percent", "their difference"),
+        "verify_settled": ("1", "1 if it became periodic"),
+        "verify_periods": ("1", "periods integrated"),
+        "verify_scatter": ("1", "scatter about the average of a motion that did not become periodic"),
+        "verify_refined": ("m", "amplitude by harmonic balance with three times the harmonics"),
+        "verify_sentence": ("1", "what happened, in words"),
+    },
+    "case mode": {
+        "frequency_full_hz": ("Hz", "natural frequency, full model, contacts open"),
+        "frequency_reduced_hz": ("Hz", "natural frequency, reduced model, contacts open"),
+        "frequency_stuck_full_hz": ("Hz", "natural frequency, full model, contacts stuck"),
+        "frequency_stuck_reduced_hz": ("Hz", "natural frequency, reduced model, contacts stuck"),
+    },
+    "case contact direction": {
+        "static_gap": ("m", "contact gap under the static loads"),
+        "static_force": ("N", "contact force under the static loads"),
+    },
+    "contact": {
+        "contact_law": ("1", "law of the contact"),
+        "contact_group": ("1", "name of the contact in the model"),
+        "contact_area": ("m2", "area that belongs to the contact, NaN where there are no facets"),
+    },
+    "contact xyz": {
+        "contact_position": ("m", "position of the contact points"),
+    },
+    "contact xyz direction": {
+        "contact_frame": ("1", "axes t, w, n of the contact frames"),
+    },
+    "surface_node xyz": {
+        "surface_point": ("m", "skin of the meshed parts"),
+    },
+    "face corner": {
+        "surface_triangle": ("1", "triangles of the skin"),
+    },
+}  # fmt: skip
+QUANTITIES: Mapping[str, Quantity] = {
+    name: Quantity(tuple(dims.split()), *of)
+    for dims, own in _OF.items()
+    for name, of in own.items()
+}
 
 
 def flags(name: str) -> dict[str, IntArray | str]:

@@ -11,7 +11,7 @@ from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws import LAWS
-from stickslip.errors import input_error, together
+from stickslip.errors import InputError, input_error, together
 from stickslip.harmonic.support import named
 from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
 from stickslip.study.analyses.analysis import Case
@@ -118,6 +118,10 @@ def question_of(case: Case, model: Model) -> Question:
     check_limits(settings.limits, estimate(model, sweep))
     # the guard and the check of the harmonics look at twice as many as are kept
     assembled = model.assembled(FACTOR * sweep.high_harmonics[-1], case.store)
+    try:
+        forced_problem(assembled.system, assembled.load, sweep)
+    except InputError as error:
+        raise error.at(f"load ({case.label})" if case.label else "load") from None
     counts = {name: assembled.counts[name] for name in ("reduced", "retained")}
     return Question(
         label=case.label,
