@@ -437,3 +437,11 @@ def test_what_is_wrong_with_a_wheel_is_named():
     ):
         with pytest.raises(InputError, match=match):
             replace(model, **changes).assembled(H)
+
+
+def test_an_output_on_the_high_face_is_refused_by_name():
+    # it moves as the neighbour's low face, in the neighbour's axes: no coordinate of this sector says so
+    model = sector_model(shrouded_sector())
+    behind = Output(name="behind", on="blade.cyclic_high")
+    with pytest.raises(InputError, match="output.points: .* lies on the high cyclic face"):
+        replace(model, outputs=(*model.outputs, behind)).assembled(H)

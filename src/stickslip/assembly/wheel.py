@@ -81,9 +81,8 @@ def neighbours(places: Places, parts: Mapping[str, Part]) -> Neighbours | None:
         part = parts[name]
         sector = _faces(name, part)
         if sector is None:
-            warnings.append(
-                f"part.{name}: has no cyclic faces; only contacts and joins lead to its neighbours."
-            )
+            why = "has no cyclic faces; only contacts and joins lead to its neighbours."
+            warnings.append(f"part.{name}: {why}")
             continue
         ties[name] = sector.tie
         axes.append(sector.axis)
@@ -201,6 +200,13 @@ class ReducedSector:
 
     def of_dofs(self, dofs: IntArray, place: str) -> IntArray:
         """Return the coordinates that dofs of the sector are; `place` is the key that asks for them."""
+        behind = dofs[partners(self.sector)[dofs] != dofs]
+        if behind.size and place == "output.points":
+            raise input_error(
+                place,
+                f"{self.sector.structure.dofs.labels[int(behind[0])]} lies on the high cyclic face, which moves as the neighbour's low face",
+                "Take its partner on the low face, or a place beside the faces.",
+            )
         rows = self.ways[0][np.searchsorted(self.kept, partners(self.sector)[dofs])]
         single = np.diff(rows.indptr) == 1
         if not single.all():
