@@ -39,7 +39,7 @@ run: $(INSTALLED)  ## solve the example of two blades and a damper, and write it
 	if [ -e "$$page" ]; then echo "Open $$page in a browser."; fi; exit $$status
 
 test: $(INSTALLED)  ## run the tests and report their coverage
-	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --cov --cov-report=term:skip-covered
+	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --durations=20 --cov --cov-report=term:skip-covered
 
 readers: $(READERS_INSTALLED)  ## install what reads Nastran's binary files, and files of ANSYS to test with
 
