@@ -100,7 +100,7 @@ def did_you_mean(word: str, known: list[str]) -> str:
     near = get_close_matches(word, known, n=1, cutoff=0.6)
     if near:
         return f"Did you mean {near[0]!r}?"
-    return "Known: " + ", ".join(sorted(known)) + "."
+    return f"Known: {', '.join(sorted(known))}." if known else "There is none."
 
 
 def missing_package(package: str, error: Exception, extra: str) -> StickslipError:

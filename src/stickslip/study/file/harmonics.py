@@ -60,6 +60,7 @@ class Harmonics(Section):
     )
     alert_harmonics: list[Annotated[int, Field(ge=0, le=HIGHEST)]] | None = Field(
         None,
+        min_length=1,
         description="harmonics of which the error is taken, 0 for the static part; left out: those that the excitation drives",
     )
 
@@ -68,7 +69,7 @@ class Harmonics(Section):
     def _is_support(cls, given: Any) -> Any:
         one = isinstance(given, int) and not isinstance(given, bool)
         entries = [given] if one else given
-        if isinstance(entries, list) and entries and all(_harmonic(h, 1) for h in entries):
+        if isinstance(entries, list) and entries and all(map(_harmonic, entries)):
             return given
         raise custom_error(
             f"must be a harmonic from 1 to {HIGHEST} or a list of them, got {shown(given)}",
@@ -86,16 +87,6 @@ class Harmonics(Section):
         )
         raise custom_error(
             f"must be {', '.join(PLACES)} or a list of labels, got {shown(given)}", remedy
-        )
-
-    @field_validator("alert_harmonics", mode="before")
-    @classmethod
-    def _are_harmonics(cls, given: Any) -> Any:
-        if isinstance(given, list) and given and all(_harmonic(h, 0) for h in given):
-            return given
-        raise custom_error(
-            f"must be a list of harmonics from 0 to {HIGHEST}, got {shown(given)}",
-            "[1] is the vibration at the excitation's frequency, [0, 1] counts the static part, too.",
         )
 
     @model_validator(mode="after")
@@ -146,8 +137,8 @@ class Harmonics(Section):
         return decides and (self.passages == "single" or not strategy.verifies)
 
 
-def _harmonic(given: Any, least: int) -> bool:
-    return isinstance(given, int) and not isinstance(given, bool) and least <= given <= HIGHEST
+def _harmonic(given: Any) -> bool:
+    return isinstance(given, int) and not isinstance(given, bool) and 1 <= given <= HIGHEST
 
 
 def _check_supports(table: Harmonics) -> None:

@@ -61,7 +61,6 @@ def sectors_of(tables: Tables) -> int | None:
 
 
 def _parts(tables: Tables, home: Path) -> Iterator[InputError]:
-
     for name, table in tables.part.items():
         if "." in name or name in (GROUND, NEXT.rstrip(".")):
             yield input_error(f"part.{name}", "is no name of a part", "Give one without dots.")
@@ -99,7 +98,9 @@ def _nodes_at(tables: Tables, place: str, table: Any) -> Iterator[InputError]:
     for word in table.nodes_at:
         if word not in known:
             yield input_error(
-                place, f"there is no surface {word!r} of a flat_curved part", _near(word, known)
+                place,
+                f"there is no surface {word!r} of a flat_curved part",
+                did_you_mean(word, known),
             )
     if len({word.partition(".")[0] for word in table.nodes_at}) > 1:
         yield input_error(place, "names surfaces of several parts", "Name those of one damper.")
@@ -134,7 +135,9 @@ def _refused(tables: Tables, place: str, word: str, what: tuple[str, ...]) -> It
     """Yield the complaint about a name that no part has, as far as that is known without a mesh."""
     head, _, rest = word.removeprefix(NEXT).partition(".")
     if head not in tables.part:
-        yield input_error(place, f"there is no part {head!r}", _near(head, list(tables.part)))
+        yield input_error(
+            place, f"there is no part {head!r}", did_you_mean(head, list(tables.part))
+        )
         return
     known = names_of(tables, head)
     if known is None or not rest or rest in known:
@@ -144,7 +147,7 @@ def _refused(tables: Tables, place: str, word: str, what: tuple[str, ...]) -> It
         return
     ahead = NEXT if word.startswith(NEXT) else ""
     own = [f"{ahead}{head}.{name}" for name in known]
-    yield input_error(place, f"there is no {' or '.join(what)} {word!r}", _near(word, own))
+    yield input_error(place, f"there is no {' or '.join(what)} {word!r}", did_you_mean(word, own))
 
 
 def names_of(tables: Tables, part: str) -> tuple[str, ...] | None:
@@ -190,7 +193,7 @@ def _loads(tables: Tables) -> Iterator[InputError]:
                 yield input_error(
                     f"{place}.ratio_of",
                     f"{table.ratio_of!r} {problem}",
-                    _near(table.ratio_of, known),
+                    did_you_mean(table.ratio_of, known),
                 )
         if table.engine_order is not None:
             orders.add(table.engine_order)
@@ -222,7 +225,9 @@ def _outputs(tables: Tables) -> Iterator[InputError]:
         if head not in tables.output.points or direction not in COMPONENTS:
             usual = tables.output.directions or COMPONENTS[:3]
             known = [f"{name}.{d}" for name in tables.output.points for d in usual]
-            yield input_error("output.peak", f"there is no output {peak!r}", _near(peak, known))
+            yield input_error(
+                "output.peak", f"there is no output {peak!r}", did_you_mean(peak, known)
+            )
 
 
 def _questions(tables: Tables) -> Iterator[InputError]:
@@ -280,7 +285,3 @@ def _diameters(name: str, table: Any, sectors: int | None) -> Iterator[InputErro
                 f"{order} excites the nodal diameter {excited}, which is not computed",
                 "Add it to nodal_diameters, or leave those out: then all that are excited are computed.",
             )
-
-
-def _near(word: str, known: list[str]) -> str:
-    return did_you_mean(word, known) if known else "There is none."

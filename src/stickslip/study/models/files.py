@@ -233,7 +233,7 @@ def _known(place: str, name: str, sets: Mapping[str, IntArray]) -> str:
     raise input_error(
         place,
         f"the file has no set {name!r} of free nodes",
-        did_you_mean(name, list(sets)) if sets else "It has no sets.",
+        did_you_mean(name, list(sets)),
     )
 
 
