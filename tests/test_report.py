@@ -21,6 +21,7 @@ from stickslip.report.forced.curves import frequency_response, optimisation
 from stickslip.report.forced.errors import errors
 from stickslip.report.forced.head import cards
 from stickslip.report.page import plots, report_file, report_html, warnings_of
+from stickslip.report.plot import log_ticks
 from stickslip.report.quantities import number, percent, quantity, scale_for
 from stickslip.report.response import NEEDED, Response
 from stickslip.report.skin import edges
@@ -567,3 +568,11 @@ def test_engineering_prefixes() -> None:
     assert quantity(4.2e-20, "J").startswith("4.20·10")
     assert scale_for(np.array([np.nan, 2e-3, 5.0]), "J").unit == "J"
     assert percent(2e-6) == "< 0.0001 %"
+
+
+@pytest.mark.parametrize("ends", [(10.53, 10.68), (136.0, 249.0), (1.0, 8.0), (0.1, 900.0)])
+def test_every_logarithmic_axis_has_ticks(ends):
+    ticks = log_ticks(np.array(ends))
+    inside = [t for t in ticks["tickvals"] if ends[0] <= t <= ends[1]]
+    assert len(inside) >= 3
+    assert len(set(ticks["ticktext"])) == len(ticks["tickvals"]) <= 14

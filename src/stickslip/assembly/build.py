@@ -98,9 +98,9 @@ def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
     held = system.with_retention(model.retention)
     gap, force = static_state(held, load.static)
     checked = frequencies(model, linear, system.interface.stuck_stiffness(), order, store)
-    peak = labels.names.index(model.peak_output) if model.peak_output in labels.names else 0
-    if model.peak_output and model.peak_output not in labels.names:
+    if model.peak_output:
         labels.of((model.peak_output,), "output.peak")
+    peak = labels.names.index(model.peak_output) if model.peak_output else 0
     return Assembled(
         system=held,
         bare=system,

@@ -30,9 +30,7 @@ def with_normals(
         return replace(a, normals=first.frame[:, :, 2])
     if whole(a) or (len(a.facets) and contact.pairing != "node_to_node"):
         return a
-    if len(
-        a.facets
-    ):  # some of the nodes span facets: the others take the normal of the nearest one
+    if len(a.facets):  # nodes that span no facet take the normal of the nearest one that does
         near = a.used[cKDTree(a.points[a.used]).query(a.points)[1]]
         return replace(a, facets=NO_FACETS, normals=a.node_normals()[near])
     theirs = None if second is None or b is None else _normals_of(second, b)

@@ -86,11 +86,6 @@ class Pairs:
     nodes: IntArray
     warnings: tuple[str, ...] = ()
 
-    @property
-    def circles(self) -> bool:
-        """Whether a contact leads to the next sector."""
-        return bool(self.following.nnz)
-
 
 def pair_contacts(places: Places, contacts: Mapping[str, Contact], turn: Turn | None) -> Pairs:
     """Pair the points of all contacts.

@@ -114,15 +114,9 @@ def turned_structure(structure: Structure, place: Place) -> Structure:
         return scipy.sparse.csr_array(found) if scipy.sparse.issparse(matrix) else np.asarray(found)
 
     dofs = replace(structure.dofs, position=place.put(structure.dofs.position))
-    return replace(
-        structure,
-        mass=turned(structure.mass),
-        damping=turned(structure.damping),
-        stiffness=turned(structure.stiffness),
-        loss=turned(structure.loss),
-        dofs=dofs,
-        basis=None,
-    )
+    names = ("mass", "damping", "stiffness", "loss")
+    own = {name: turned(getattr(structure, name)) for name in names}
+    return replace(structure, dofs=dofs, basis=None, **own)
 
 
 def _moved_points(points: BodyPoints, place: Place) -> BodyPoints:

@@ -68,14 +68,12 @@ class Screen(logging.Handler):
                 self._line(text if step == 0 else f"  {job} {100 * fraction:.0f} %: {text}")
             return
         if job not in self._tasks:
-            while (
-                len(self._tasks) >= self._bars
-            ):  # the oldest is done: a worker does one job after the other
+            # the oldest is done: a worker does one job after the other
+            while len(self._tasks) >= self._bars:
                 self._progress.remove_task(self._tasks.pop(next(iter(self._tasks))))
             self._tasks[job] = self._progress.add_task(job or "model", total=1.0, state="")
-        self._progress.update(
-            self._tasks[job], completed=fraction, state="" if text == job else text
-        )
+        state = "" if text == job else text
+        self._progress.update(self._tasks[job], completed=fraction, state=state)
 
 
 @contextmanager

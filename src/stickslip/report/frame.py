@@ -31,6 +31,10 @@ def figure_html(plot: Plot, number: int) -> str:
         full_html=False, include_plotlyjs=False, div_id=f"plot-{plot.key}", config=_CONFIG
     )
     kind = "by-case" if plot.case_captions else "all-cases"
+    ends = [axis.domain[1] for axis in plot.figure.select_xaxes() if axis.domain]
+    if min(ends, default=1.0) < 0.9 or len(list(plot.figure.select_scenes())) > 1:
+        # panels beside each other scroll on a narrow screen
+        drawing = f'<div class="wide panels">{drawing}</div>'
     return f'<figure id="fig-{plot.key}" class="{kind}">{plot.controls}{drawing}{caption}</figure>'
 
 

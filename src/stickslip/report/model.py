@@ -22,19 +22,13 @@ _CHECKED = (
 
 def picture(nodes: Mapping[str, Node]) -> Plot | None:
     """Return the picture of the skin with the contacts, where an analysis holds them."""
-    found = (
-        skin_picture(node)
-        for node in nodes.values()
-        if node.has("surface_point", "surface_triangle")
-    )
-    return next(found, None)
+    found = (skin_picture(node) for node in nodes.values())
+    return next((plot for plot in found if plot is not None), None)
 
 
 def reduction(nodes: Mapping[str, Node]) -> str | None:
     """Frequencies of the full against the reduced model."""
-    node = next(
-        (n for n in nodes.values() if n.has("frequency_full_hz", "frequency_reduced_hz")), None
-    )
+    node = next((n for n in nodes.values() if n.has(*_CHECKED[0][1:])), None)
     if node is None:
         return None
     rows, off = [], []
@@ -52,11 +46,8 @@ def reduction(nodes: Mapping[str, Node]) -> str | None:
             off += np.abs(difference[np.isfinite(difference)]).tolist()
     worst = percent(100 * max(off)) if off else NONE
     text = f"<h3>Reduction</h3><p>The reduced model reproduces the frequencies of the full one within {worst}.</p>"
-    return (
-        text + html_table(["mode", "full (Hz)", "reduced (Hz)", "difference"], rows)
-        if rows
-        else None
-    )
+    head = ["mode", "full (Hz)", "reduced (Hz)", "difference"]
+    return text + html_table(head, rows) if rows else None
 
 
 def _first(node: Node, name: str) -> FloatArray:
@@ -102,7 +93,7 @@ def facts(nodes: Mapping[str, Node]) -> str | None:
 
 def _together(nodes: Mapping[str, Node]) -> Node:
     """Return what any analysis stores of the model: the first one that does."""
-    each = [node.data for node in reversed(nodes.values())]
+    each = [node.data for node in reversed(list(nodes.values()))]
     told = {
         n: v.variable for data in each for n, v in data.data_vars.items() if set(v.dims) <= {"xyz"}
     }
@@ -120,10 +111,8 @@ def _static(node: Node) -> list[list[str]]:
     displacement = node.scalar("static_displacement_m")
     if not np.isfinite(displacement):
         return []
-    rpm, strain = (
-        number(node.scalar("static_rpm"), 5),
-        percent(100 * node.scalar("static_strain"), 3),
-    )
+    rpm = number(node.scalar("static_rpm"), 5)
+    strain = percent(100 * node.scalar("static_strain"), 3)
     degrees = number(float(np.degrees(node.scalar("static_rotation_rad"))), 3)
     return [
         [f"largest static displacement at {rpm} rpm", f"{number(1e3 * displacement, 4)} mm"],

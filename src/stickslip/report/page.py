@@ -97,28 +97,22 @@ def _nodes(tree: xr.DataTree) -> dict[str, Node]:
 def _provenance(tree: xr.DataTree) -> str:
     """Who made this, with what, from which study."""
     node = Node(tree.to_dataset())
+    used = versions(node.text("versions", "{}"))
     rows = [
         ["created", escape(node.text("created", NONE))],
         ["stickslip", escape(node.text("stickslip_version", NONE))],
-        *(
-            [escape(name), escape(version)]
-            for name, version in versions(node.text("versions", "{}")).items()
-            if name != "stickslip"
-        ),
+        *([escape(name), escape(used[name])] for name in used if name != "stickslip"),
         ["wall time", quantity(node.scalar("wall_seconds"), "s")],
     ]
     for section, data in _shown(tree):
         own = Node(data)
         if own.text("selection"):
-            rows.append(
-                [f"{section.name}: harmonics", f"chosen by {escape(own.text('selection'))}"]
-            )
-            rows.append([f"{section.name}: samples per period", fixed(own.scalar("samples"), 0)])
-    study = escape(node.text("study_toml"))
-    text = html_table([], rows, numeric=False)
-    return text + (
-        f"<details><summary>The study file</summary><pre>{study}</pre></details>" if study else ""
-    )
+            chosen, samples = escape(own.text("selection")), fixed(own.scalar("samples"), 0)
+            rows.append([f"{section.name}: harmonics", f"chosen by {chosen}"])
+            rows.append([f"{section.name}: samples per period", samples])
+    study, text = escape(node.text("study_toml")), html_table([], rows, numeric=False)
+    more = f"<details><summary>The study file</summary><pre>{study}</pre></details>"
+    return text + more if study else text
 
 
 def warnings_of(tree: xr.DataTree) -> list[str]:
@@ -132,16 +126,13 @@ def warnings_of(tree: xr.DataTree) -> list[str]:
 
 def plots(tree: xr.DataTree) -> dict[str, go.Figure]:
     """Return every figure of the page by its name, in the order of the page."""
-    found = [
-        shown
-        for section, data in _shown(tree)
-        for view in _views(section, data)
-        for block in section.blocks
-        for part in block.parts
-        for shown in _as_list(part(view))
-    ]
-    every = [*found, model.picture(_nodes(tree))]
-    return {plot.key: plot.figure for plot in every if isinstance(plot, Plot)}
+    found: list[Plot | str | None] = []
+    for section, data in _shown(tree):
+        parts = [part for block in section.blocks for part in block.parts]
+        for view in _views(section, data):
+            found += [shown for part in parts for shown in _as_list(part(view))]
+    found.append(model.picture(_nodes(tree)))
+    return {plot.key: plot.figure for plot in found if isinstance(plot, Plot)}
 
 
 def report_html(tree: xr.DataTree) -> str:

@@ -13,11 +13,29 @@ INK, MUTED, GRID, ALARM = "#1c2530", "#5b6673", "#e4e8ed", "#c0262d"
 # Okabe and Ito's colours, distinct for colour-blind readers and in grey
 STATE_COLOURS = ("#0072b2", "#e69f00", "#d8dce2")
 STATE_NAMES = ("stick", "slip", "open")
+_NARROW = 0.5  # decades: below, 1-2-5 ticks may leave an axis without any
 _FEW_DECADES = 2.5  # up to here 1-2-5 ticks are far enough apart
 # Okabe and Ito's colours without black and yellow, then darker ones: readable on white, distinct side by side
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7b3294", "#8c564b")
 # from navy over purple and red to dark gold, in grey as well
 _STOPS = ((20, 24, 96), (112, 30, 158), (200, 44, 110), (232, 100, 40), (212, 156, 0))
+
+# what all figures share
+_LAYOUT = {
+    "template": "none", "autosize": True, "paper_bgcolor": "white", "plot_bgcolor": "white",
+    "font": {"family": FONT, "size": 13, "color": INK}, "hoverlabel": {"font": {"family": FONT, "size": 12}},
+    "legend": {
+        "title": {"font": {"size": 12}}, "font": {"size": 12}, "x": 1.02, "y": 1, "tracegroupgap": 12, "groupclick": "toggleitem",
+    },
+}  # fmt: skip
+_AXIS = {
+    "showline": True, "mirror": True, "linecolor": MUTED, "gridcolor": GRID, "zeroline": False, "automargin": True,
+    "ticks": "outside", "ticklen": 4, "tickcolor": MUTED, "tickfont": {"size": 12}, "exponentformat": "power",
+    "title": {"standoff": 8, "font": {"size": 14}},
+}  # fmt: skip
+_ROW_ABOVE = {
+    "orientation": "h", "x": 0, "xanchor": "left", "yref": "container", "y": 0.995, "yanchor": "top",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,15 +90,13 @@ def ramp(n: int) -> list[str]:
 
 def legend_above(figure: go.Figure) -> None:
     """Put the legend in a row above the panels, away from the tool bar on the right."""
-    row = {
-        "orientation": "h",
-        "x": 0,
-        "xanchor": "left",
-        "yref": "container",
-        "y": 0.995,
-        "yanchor": "top",
-    }
-    figure.update_layout(legend=row, margin={"t": 74})
+    figure.update_layout(legend=_ROW_ABOVE, margin={"t": 74})
+
+
+def ring(colour: object, size: float, width: float = 1.4) -> dict[str, object]:
+    """Return an open circle as a marker."""
+    line = {"width": width}
+    return {"symbol": "circle-open", "size": size, "color": colour, "line": line}
 
 
 def log_ticks(values: FloatArray) -> dict[str, object]:
@@ -89,66 +105,36 @@ def log_ticks(values: FloatArray) -> dict[str, object]:
     if not positive.size:
         return {}
     low, high = np.log10(positive.min()), np.log10(positive.max())
-    steps = (1, 2, 5) if high - low < _FEW_DECADES else (1,)
-    ticks = [
-        step * 10.0**k for k in range(int(np.floor(low)), int(np.ceil(high)) + 1) for step in steps
-    ]
+    if 0 < high - low < _NARROW:
+        ticks = _even_ticks(float(positive.min()), float(positive.max()))
+    else:
+        steps = (1, 2, 5) if high - low < _FEW_DECADES else (1,)
+        decades = range(int(np.floor(low)), int(np.ceil(high)) + 1)
+        ticks = [step * 10.0**k for k in decades for step in steps]
     return {"tickmode": "array", "tickvals": ticks, "ticktext": [f"{t:.12g}" for t in ticks]}
+
+
+def _even_ticks(low: float, high: float) -> list[float]:
+    """Return about five round numbers from `low` to `high`, equally far apart."""
+    size = 10.0 ** np.floor(np.log10((high - low) / 5))
+    size *= next((k for k in (5, 2) if k * size <= (high - low) / 5), 1)
+    return [float(k * size) for k in range(int(low // size), int(high // size) + 2)]
 
 
 def styled(figure: go.Figure, height: int, *, legend_title: str = "") -> go.Figure:
     """Give `figure` the look of the page; returns it."""
-    figure.update_layout(
-        template="none",
-        height=height,
-        autosize=True,
-        font={"family": FONT, "size": 13, "color": INK},
-        margin={"l": 70, "r": 20, "t": 56 if figure.layout.annotations else 40, "b": 55},
-        paper_bgcolor="white",
-        plot_bgcolor="white",
-        hoverlabel={"font": {"family": FONT, "size": 12}},
-        legend={
-            "title": {"text": legend_title, "font": {"size": 12}},
-            "font": {"size": 12},
-            "x": 1.02,
-            "y": 1,
-            "tracegroupgap": 12,
-            "groupclick": "toggleitem",
-        },
-    )
-    axis = {
-        "showline": True,
-        "linecolor": MUTED,
-        "mirror": True,
-        "ticks": "outside",
-        "ticklen": 4,
-        "tickcolor": MUTED,
-        "gridcolor": GRID,
-        "zeroline": False,
-        "automargin": True,
-        "title": {"standoff": 8, "font": {"size": 14}},
-        "exponentformat": "power",
-        "tickfont": {"size": 12},
-    }
-    figure.update_xaxes(**axis)
-    figure.update_yaxes(**axis)
+    margin = {"l": 70, "r": 20, "t": 56 if figure.layout.annotations else 40, "b": 55}
+    figure.update_layout(_LAYOUT, height=height, margin=margin)
+    figure.update_layout(legend_title_text=legend_title)
+    figure.update_xaxes(**_AXIS)
+    figure.update_yaxes(**_AXIS)
     figure.update_annotations(font_size=13)
     return figure
 
 
 def key_marker(name: str, symbol: str, group: str, group_title: str = "") -> go.Scatter:
     """Return a legend entry that explains a marker and draws nothing."""
-    return go.Scatter(
-        x=[None],
-        y=[None],
-        mode="markers",
-        name=name,
-        legendgroup=group,
-        legendgrouptitle={"text": group_title} if group_title else None,
-        marker={
-            "symbol": symbol,
-            "size": 9,
-            "color": MUTED,
-            "line": {"width": 1.4, "color": MUTED},
-        },
-    )
+    mark = {"symbol": symbol, "size": 9, "color": MUTED, "line": {"width": 1.4, "color": MUTED}}
+    title = {"text": group_title} if group_title else None
+    shared = {"x": [None], "y": [None], "mode": "markers", "legendgroup": group}
+    return go.Scatter(name=name, marker=mark, legendgrouptitle=title, **shared)

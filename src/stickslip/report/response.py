@@ -114,11 +114,8 @@ class Response(Node):
     def alert(self) -> Alert:
         """Where the strategy was asked; the accepted points that have an indicator in files which do not say."""
         if "alert_error_percent" in self.data:
-            return Alert(
-                self.integers("alert_case"),
-                self.values("alert_frequency_hz"),
-                self.values("alert_error_percent"),
-            )
+            found = (self.values(f"alert_{name}") for name in ("frequency_hz", "error_percent"))
+            return Alert(self.integers("alert_case"), *found)
         error = self.floats("predicted_error_percent" if self.is_error else "indicator")
         at = np.flatnonzero(~np.isnan(error))
         return Alert(self.point_case[at], self.hz[at], error[at])  # fmt: skip

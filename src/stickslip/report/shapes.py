@@ -12,11 +12,11 @@ import numpy as np
 import numpy.typing as npt
 import plotly.graph_objects as go
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.coarse_skin import coarse_skin
 from stickslip.report.plot import FONT, MUTED, Plot, styled
 from stickslip.report.quantities import counted
-from stickslip.report.skin import edges
+from stickslip.report.skin import edges, segments, surface
 from stickslip.report.waves import Waves
 
 _SHAPE_BYTES = 3_200_000  # of all shapes together, before they become text
@@ -31,51 +31,33 @@ def mode_shapes(view: Waves) -> Plot | None:
     """Show the mode shapes on the skin, with controls for wave, mode, phase and size."""
     if not view.has("shape", "skin_point", "skin_triangle"):
         return None
-    waves, modes, _ = _selection(view)
+    waves, there = view.data.sizes["wave"], view.data.sizes["mode"]
+    room = _SHAPE_BYTES // (_POINT_BYTES * _FEWEST_POINTS * waves)
+    modes = max(1, min(there, room))
     points, triangles = view.floats("skin_point") * _MM, view.integers("skin_triangle")
     most = max(_FEWEST_POINTS, _SHAPE_BYTES // (_POINT_BYTES * waves * modes))
     kept, faces = coarse_skin(points, triangles, most)
     data = _payload(view, modes, kept, faces)
     fine = "" if len(kept) == len(np.unique(triangles)) else ", coarser than the mesh"
+    left_out = "" if modes == there else f"The first {modes} of {there} modes are in the page."
     caption = (
         f"Displacement over its largest value, on {counted(len(kept), 'point')} of the skin of a sector{fine}. Choose nodal "
         f"diameter and mode, drag to turn, scroll to zoom; the camera button saves a PNG. Sector n moves as sector 0 turned by "
-        f"n pitches, n phase angles ahead: play shows which way the wave travels. {_shown_modes(view, modes)}"
+        f"n pitches, n phase angles ahead: play shows which way the wave travels. {left_out}"
     )
     drawn, controls = _figure(points[kept], faces), _controls(view, modes, data)
     return Plot(f"shapes{view.key}", "Mode shapes", caption, drawn, controls=controls)
 
 
-def _selection(view: Waves) -> tuple[int, int, int]:
-    """Return how many waves and modes are shown, and how many modes there are."""
-    waves, there = view.data.sizes["wave"], view.data.sizes["mode"]
-    room = _SHAPE_BYTES // (_POINT_BYTES * _FEWEST_POINTS * waves)
-    return waves, max(1, min(there, room)), there
-
-
-def _shown_modes(view: Waves, modes: int) -> str:
-    there = view.data.sizes["mode"]
-    return "" if modes == there else f"The first {modes} of {there} modes are in the page."
-
-
-def _figure(points: FloatArray, triangles: npt.NDArray[np.int64]) -> go.Figure:
+def _figure(points: FloatArray, triangles: IntArray) -> go.Figure:
     """Return the sector at rest; the script puts the shape onto it."""
-    x, y, z = points.astype(np.float32).T
-    i, j, k = triangles.astype(np.int32).T
     light = {"ambient": 0.78, "diffuse": 0.5, "specular": 0.08, "roughness": 0.9}
     bar = {"title": {"text": "displacement<br>/ largest"}, "len": 0.55, "thickness": 14}
-    skin = go.Mesh3d(
-        x=x, y=y, z=z, i=i, j=j, k=k, intensity=np.zeros(len(points), dtype=np.float32), cmin=0.0, cmax=1.0,
-        colorscale="Viridis", colorbar=bar, lighting=light, flatshading=True, hoverinfo="skip",
-    )  # fmt: skip
+    still = np.zeros(len(points), dtype=np.float32)
+    colours = {"intensity": still, "cmin": 0.0, "cmax": 1.0, "colorscale": "Viridis"}
+    skin = surface(points, triangles, colorbar=bar, lighting=light, **colours)
     pairs, sharp = edges(points, triangles)
-    path = np.full((int(sharp.sum()), 3, 3), np.nan, dtype=np.float32)
-    path[:, :2] = points[pairs[sharp]]
-    x, y, z = path.reshape(-1, 3).T
-    rest = go.Scatter3d(
-        x=x, y=y, z=z, mode="lines", line={"color": MUTED, "width": 1.5}, hoverinfo="skip", showlegend=False
-    )  # fmt: skip
-    figure = styled(go.Figure([skin, rest]), 640)
+    figure = styled(go.Figure([skin, segments(points, pairs[sharp], MUTED, 1.5)]), 640)
     axis = {"visible": False, "showspikes": False}
     figure.update_layout(
         margin={"l": 0, "r": 0, "t": 44, "b": 0},
@@ -88,19 +70,14 @@ def _figure(points: FloatArray, triangles: npt.NDArray[np.int64]) -> go.Figure:
     return figure
 
 
-def _payload(
-    view: Waves,
-    modes: int,
-    kept: npt.NDArray[np.int64],
-    faces: npt.NDArray[np.int64],
-) -> dict[str, object]:
+def _payload(view: Waves, modes: int, kept: IntArray, faces: IntArray) -> dict[str, object]:
     """Return what the script needs, arrays as text."""
     points = view.floats("skin_point")[kept] * _MM
     shape = view.data["shape"].values[:, :modes, kept]
     largest = np.abs(shape).max(axis=(2, 3, 4), keepdims=True)
     whole = np.round(shape / np.where(largest > 0, largest, 1.0) * _FULL).astype("<i2")
     hz = view.floats("frequency_hz")
-    inside = _outside_of_wheel(view, kept, faces)
+    inside = _outside_of_wheel(view, faces)
     wheel, wheel_faces = coarse_skin(points, inside, max(60, _WHEEL_POINTS // view.sectors))
     origin = view.numbers("axis_origin_m") * _MM
     return {
@@ -121,9 +98,7 @@ def _payload(
     }
 
 
-def _outside_of_wheel(
-    view: Waves, kept: npt.NDArray[np.int64], faces: npt.NDArray[np.int64]
-) -> npt.NDArray[np.int64]:
+def _outside_of_wheel(view: Waves, faces: IntArray) -> IntArray:
     """Leave out the faces between neighbouring sectors, where the skin was not made coarser already."""
     cut = view.integers("skin_cut") if view.has("skin_cut") else np.zeros(0, dtype=np.int64)
     same = len(cut) == len(faces) and view.sectors > 1
@@ -141,11 +116,9 @@ def _text(values: npt.NDArray[np.generic]) -> str:
 
 def _controls(view: Waves, modes: int, data: dict[str, object]) -> str:
     """Return the form above the picture and the data behind it, as HTML."""
-    kinds = view.data["wave_kind"].values
-    waves = "".join(
-        f'<option value="{k}">{escape(name)} ({escape(str(kinds[k]))})</option>'
-        for k, name in enumerate(view.waves)
-    )
+    pairs = enumerate(zip(view.waves, view.kinds, strict=True))
+    names = [(k, f"{escape(name)} ({escape(kind)})") for k, (name, kind) in pairs]
+    waves = "".join(f'<option value="{k}">{name}</option>' for k, name in names)
     numbers = "".join(f'<option value="{m}">{m + 1}</option>' for m in range(modes))
     views = (
         '<label>show <select name="view"><option value="wheel">whole wheel</option>'

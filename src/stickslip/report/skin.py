@@ -1,5 +1,7 @@
 """Picture of the skin of the model with the contact points; it turns with the mouse."""
 
+from typing import Any
+
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
@@ -14,7 +16,7 @@ from stickslip.report.response import Response
 
 _MANY_EDGES = 40_000  # above it only the sharp edges are drawn, to keep the page small
 _SHARP = np.cos(np.radians(30.0))
-_STEEL = "#b9c4d0"
+_STEEL, _EDGES = "#b9c4d0", "#6f7f91"
 _MOST_NAMES = 30  # of contact points that do not cover each other
 
 
@@ -45,7 +47,7 @@ def edges(points: FloatArray, triangles: IntArray) -> tuple[IntArray, np.ndarray
     return pairs, (start == end) | (angle < _SHARP)
 
 
-def _lines(points: FloatArray, pairs: IntArray, colour: str, width: float) -> go.Scatter3d:
+def segments(points: FloatArray, pairs: IntArray, colour: str, width: float) -> go.Scatter3d:
     """Draw separate segments as one trace, with gaps between them."""
     path = np.full((len(pairs), 3, 3), np.nan, dtype=np.float32)
     path[:, :2] = points[pairs]
@@ -54,14 +56,17 @@ def _lines(points: FloatArray, pairs: IntArray, colour: str, width: float) -> go
     return go.Scatter3d(x=x, y=y, z=z, mode="lines", line=line, hoverinfo="skip", showlegend=False)
 
 
-def _skin(points: FloatArray, triangles: IntArray, opacity: float) -> go.Mesh3d:
+def surface(points: FloatArray, triangles: IntArray, **look: Any) -> go.Mesh3d:
+    """Draw a triangulated surface."""
     x, y, z = points.astype(np.float32).T
     i, j, k = triangles.astype(np.int32).T
+    shared = {"flatshading": True, "hoverinfo": "skip", "showlegend": False}
+    return go.Mesh3d(x=x, y=y, z=z, i=i, j=j, k=k, **shared, **look)
+
+
+def _skin(points: FloatArray, triangles: IntArray, opacity: float) -> go.Mesh3d:
     light = {"ambient": 0.65, "diffuse": 0.6, "specular": 0.1, "roughness": 0.9}
-    return go.Mesh3d(
-        x=x, y=y, z=z, i=i, j=j, k=k, color=_STEEL, opacity=opacity, flatshading=True,
-        lighting=light, hoverinfo="skip", name="skin", showlegend=False,
-    )  # fmt: skip
+    return surface(points, triangles, color=_STEEL, opacity=opacity, lighting=light, name="skin")
 
 
 def _inside(points: FloatArray, parts: IntArray, low: FloatArray, high: FloatArray) -> IntArray:
@@ -98,17 +103,8 @@ def _sections(response: Response, position: FloatArray) -> go.Scatter3d:
     gap = np.full((1, 3), np.nan)
     paths = [np.vstack([position[[*row, row[0]]], gap]) for row in rows.values() if len(row) == 3]
     x, y, z = np.vstack([*paths, gap]).T
-    line = {"color": INK, "width": 3}
-    return go.Scatter3d(
-        x=x,
-        y=y,
-        z=z,
-        mode="lines",
-        line=line,
-        hoverinfo="skip",
-        name="sections",
-        showlegend=bool(paths),
-    )
+    drawn = {"mode": "lines", "line": {"color": INK, "width": 3}, "hoverinfo": "skip"}
+    return go.Scatter3d(x=x, y=y, z=z, name="sections", showlegend=bool(paths), **drawn)
 
 
 def _neighbourhood(position: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -119,11 +115,9 @@ def _neighbourhood(position: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _scene(low: FloatArray, high: FloatArray, *, close: bool) -> dict[str, object]:
     """Axes of a view of the box between two corners; equal lengths on all axes."""
-    eye, size = (
-        ({"x": 0.32, "y": -1.5, "z": -0.8}, 1.3)
-        if close
-        else ({"x": 1.0, "y": -1.5, "z": 0.55}, 1.65)
-    )
+    eye, size = {"x": 1.0, "y": -1.5, "z": 0.55}, 1.65
+    if close:
+        eye, size = {"x": 0.32, "y": -1.5, "z": -0.8}, 1.3
     span = size * (high - low) / (high - low).max()
     axes = {
         f"{name}axis": {
@@ -134,13 +128,8 @@ def _scene(low: FloatArray, high: FloatArray, *, close: bool) -> dict[str, objec
     }  # fmt: skip
     camera = {"eye": eye, "projection": {"type": "orthographic"}}
     ratio = dict(zip("xyz", span.tolist(), strict=True))
-    return {
-        **axes,
-        "aspectmode": "manual",
-        "aspectratio": ratio,
-        "camera": camera,
-        "dragmode": "orbit",
-    }
+    shown = {"aspectmode": "manual", "aspectratio": ratio, "camera": camera, "dragmode": "orbit"}
+    return {**axes, **shown}
 
 
 def _caption(node: Node, points: FloatArray, triangles: IntArray) -> str:
@@ -169,18 +158,15 @@ def skin_picture(node: Node) -> Plot | None:
     pairs, sharp = edges(points, triangles)
     drawn = pairs if len(pairs) <= _MANY_EDGES else pairs[sharp]
     titles = ("whole", "near the contacts")[: 1 + contacts]
-    specs = [[{"type": "scene"}] * len(titles)]
-    figure = make_subplots(
-        1, len(titles), specs=specs, horizontal_spacing=0.02, subplot_titles=titles
-    )
-    figure.add_traces(
-        [_skin(points, triangles, 1.0), _lines(points, drawn, "#6f7f91", 1.0)], rows=1, cols=1
-    )
+    panels = {"specs": [[{"type": "scene"}] * len(titles)], "subplot_titles": titles}
+    figure = make_subplots(1, len(titles), horizontal_spacing=0.02, **panels)
+    whole = [_skin(points, triangles, 1.0), segments(points, drawn, _EDGES, 1.0)]
+    figure.add_traces(whole, rows=1, cols=1)
     if contacts and isinstance(node, Response):
         low, high = _neighbourhood(position)
-        near = [_skin(points, _inside(points, triangles, low, high), 0.35)]
-        near += [
-            _lines(points, _inside(points, drawn, low, high), "#6f7f91", 1.0),
+        near = [
+            _skin(points, _inside(points, triangles, low, high), 0.35),
+            segments(points, _inside(points, drawn, low, high), _EDGES, 1.0),
             _sections(node, position),
         ]
         figure.add_traces(_contacts(node, position, named=False), rows=1, cols=1)
@@ -188,7 +174,7 @@ def skin_picture(node: Node) -> Plot | None:
         figure.update_layout(scene2=_scene(low, high, close=True))
     styled(figure, 620)
     legend = {"orientation": "h", "x": 1, "xanchor": "right", "y": 0, "yanchor": "bottom"}
-    whole = _scene(points.min(axis=0), points.max(axis=0), close=False)
-    figure.update_layout(scene=whole, margin={"l": 0, "r": 0, "t": 40, "b": 10}, legend=legend)
+    scene = _scene(points.min(axis=0), points.max(axis=0), close=False)
+    figure.update_layout(scene=scene, margin={"l": 0, "r": 0, "t": 40, "b": 10}, legend=legend)
     title = "The mesh and the contact points" if contacts else "The mesh"
     return Plot("mesh", title, _caption(node, points, triangles), figure)

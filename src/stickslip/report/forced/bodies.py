@@ -77,28 +77,15 @@ def _traces(
     """Add translation, rotation and orbit of one case."""
     time = np.linspace(0, 1, motion.shape[1])
     for name, line, move, turn in zip("xyz", _AXIS_LINES, motion[:3], motion[3:], strict=True):
-        shared = {
-            "line": line,
-            "legendgroup": name,
-            "meta": case.index,
-            "mode": "lines",
-            "name": name,
-        }
-        figure.add_scatter(x=time, y=move * 1e6, row=1, col=1, **shared)
-        figure.add_scatter(x=time, y=turn * angle.factor, row=1, col=2, showlegend=False, **shared)
+        drawn = go.Scatter(
+            x=time, name=name, mode="lines", line=line, legendgroup=name, meta=case.index
+        )
+        figure.add_trace(go.Scatter(drawn, y=move * 1e6), 1, 1)
+        figure.add_trace(go.Scatter(drawn, y=turn * angle.factor, showlegend=False), 1, 2)
     x, y = (motion[k] * 1e6 for k in orbit)
     line = {"color": case.colour, "width": 2}
-    figure.add_scatter(
-        x=x,
-        y=y,
-        mode="lines",
-        line=line,
-        name="orbit",
-        row=1,
-        col=3,
-        meta=case.index,
-        showlegend=False,
-    )
+    path = go.Scatter(x=x, y=y, mode="lines", line=line, name="orbit", meta=case.index)
+    figure.add_trace(path.update(showlegend=False), 1, 3)
 
 
 def _body(response: Response, name: str, at: list[int]) -> Plot:
@@ -122,14 +109,8 @@ def _body(response: Response, name: str, at: list[int]) -> Plot:
     )
     caption = f"Rigid-body motion of {name} about its mean position, in the axes of the model."
     captions = {c.index: _caption(response, c, at) for c in response.peaked}
-    return Plot(
-        f"motion_{name}",
-        f"Motion of {name} at the peak",
-        caption,
-        figure,
-        captions,
-        response.chosen,
-    )
+    title = f"Motion of {name} at the peak"
+    return Plot(f"motion_{name}", title, caption, figure, captions, response.chosen)
 
 
 def bodies(response: Response) -> list[Plot]:
@@ -145,10 +126,8 @@ def group_colours(response: Response) -> dict[str, str]:
 
 
 def _energy_caption(response: Response, case: ShownCase) -> str:
-    energy, names = (
-        response.floats("dissipated_energy")[response.peak(case)],
-        response.labels("contact"),
-    )
+    names = response.labels("contact")
+    energy = response.floats("dissipated_energy")[response.peak(case)]
     total = float(np.nansum(energy))
     if total <= _NOTHING:
         return "At the peak nothing is dissipated: every point sticks."
@@ -180,17 +159,8 @@ def _energy_traces(
             )  # fmt: skip
         line = {"color": case.colour, "width": 1.6}
         y = np.where(total[at] > 0, total[at], np.nan)
-        several = len(response.cases) > 1
-        figure.add_scatter(
-            x=response.hz[at],
-            y=y,
-            mode="lines",
-            name=case.short,
-            line=line,
-            showlegend=several,
-            row=1,
-            col=2,
-        )
+        curve = go.Scatter(x=response.hz[at], y=y, mode="lines", name=case.short, line=line)
+        figure.add_trace(curve.update(showlegend=len(response.cases) > 1), 1, 2)
 
 
 def energy(response: Response) -> Plot | None:
@@ -216,9 +186,8 @@ def energy(response: Response) -> Plot | None:
     key = ", ".join(f'<b style="color:{c}">{g}</b>' for g, c in group_colours(response).items())
     caption = f"Work of the friction forces in one cycle. Left: coloured by contact ({key}). {_widest_range(response, total)}"
     captions = {c.index: _energy_caption(response, c) for c in response.peaked}
-    return Plot(
-        "energy", "Energy dissipated in a cycle", caption, figure, captions, response.chosen
-    )
+    title = "Energy dissipated in a cycle"
+    return Plot("energy", title, caption, figure, captions, response.chosen)
 
 
 def _widest_range(response: Response, total: FloatArray) -> str:

@@ -51,12 +51,9 @@ def _why(response: Response, case: ShownCase) -> str:
     if response.has("peak_state") and response.peak(case) >= 0:
         state = states(response, case)
         slipping, open_ = (int((state == k).any(axis=(1, 2)).sum()) for k in (1, 2))
-        if slipping or open_:
-            reasons.append(
-                f"at the peak {slipping} of {len(state)} contacts slip, {open_} lift off"
-            )
-        else:
-            reasons.append("at the peak all contacts stick: the system is linear")
+        said = f"{slipping} of {len(state)} contacts slip, {open_} lift off"
+        still = "all contacts stick: the system is linear"
+        reasons.append(f"at the peak {said if slipping or open_ else still}")
     share = _harmonic_share(response, case)
     if np.isfinite(share):
         reasons.append(
@@ -93,12 +90,9 @@ _REASON = (
 
 def _alert_text(response: Response) -> str:
     over = escape(response.text("error_over")) or "the output"
-    single = response.text("passages") == "single"
-    first = (
-        "Each frequency is settled before the next one, beginning"
-        if single
-        else "Each point is first solved"
-    )
+    first = "Each point is first solved"
+    if response.text("passages") == "single":
+        first = "Each frequency is settled before the next one, beginning"
     return (
         f"<p>{first} with H = {response.low_name}. <code>{response.selection}</code> then predicts how far the motion of {over} would "
         f"change with H = {response.high_name}; where that exceeds {response.shown(response.threshold)}, the point is solved again "
@@ -136,11 +130,9 @@ def _other_row(response: Response, case: ShownCase) -> tuple[str, str]:
 
 def _kept_where(response: Response, case: ShownCase | None = None) -> str:
     """Say which harmonics were kept how often, the most frequent ones first."""
-    mine = (
-        response.converged
-        if case is None
-        else response.converged & (response.point_case == case.index)
-    )
+    mine = response.converged
+    if case is not None:
+        mine = mine & (response.point_case == case.index)
     counts = Counter(named(np.flatnonzero(row)) for row in response.kept[mine])
     each = [f"H = {own} at {n}" for own, n in counts.most_common(_NAMED)]
     rest = sum(counts.values()) - sum(n for _, n in counts.most_common(_NAMED))

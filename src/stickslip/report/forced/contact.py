@@ -143,13 +143,8 @@ def _hysteresis(response: Response, direction: str) -> Plot | None:
         return None
     width = max(len(r) for r in rows)
     titles = [names[r[k]] if k < len(r) else "" for r in rows for k in range(width)]
-    figure = make_subplots(
-        len(rows),
-        width,
-        subplot_titles=titles,
-        horizontal_spacing=0.21 / width,
-        vertical_spacing=0.23 / len(rows),
-    )
+    space = {"horizontal_spacing": 0.21 / width, "vertical_spacing": 0.23 / len(rows)}
+    figure = make_subplots(len(rows), width, subplot_titles=titles, **space)
     for case in cases:
         gap, force = period(response, case, "peak_gap"), period(response, case, "peak_force")
         state = states(response, case) if response.has("peak_state") else None
@@ -189,13 +184,14 @@ def hysteresis_w(response: Response) -> Plot | None:
     return _hysteresis(response, "w")
 
 
-def _state_caption(response: Response, case: ShownCase) -> str:
+def _state_caption(response: Response, case: ShownCase, rows: list[int]) -> str:
     state, names = states(response, case), response.labels("contact")
     slipping, open_ = ((state == k).any(axis=(1, 2)) for k in (1, 2))
-    share = [100 * float((state == k).mean()) for k in range(3)]
+    drawn = state.reshape(-1, state.shape[-1])[rows]
+    share = [100 * float((drawn == k).mean()) for k in range(3)]
     text = (
         f"{int(slipping.sum())} of {counted(len(names), 'point')} slip during the cycle and {int(open_.sum())} "
-        f"lift off; over all points and directions the contact sticks for {percent(share[0])}, slips for "
+        f"lift off; over all rows the contact sticks for {percent(share[0])}, slips for "
         f"{percent(share[1])} and is open for {percent(share[2])} of the time."
     )
     lifting = [n for n, o in zip(names, open_, strict=True) if o]
@@ -242,6 +238,6 @@ def state_map(response: Response) -> Plot | None:
     figure.update_xaxes(title_text="time / period", range=[0, 1], showgrid=False)
     figure.update_yaxes(autorange="reversed", showgrid=False, ticks="", tickfont={"size": 12})
     caption = "Each row is a contact point in one tangential direction; read from left to right through one cycle."
-    captions = {c.index: _state_caption(response, c) for c in cases}
+    captions = {c.index: _state_caption(response, c, rows) for c in cases}
     title = "Contact states over one period at the peak"
     return Plot("states", title, caption, figure, captions, response.chosen)

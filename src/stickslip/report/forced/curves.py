@@ -13,6 +13,10 @@ from stickslip.report.response import Response
 
 COMPARED = 3  # curves that stay legible in one panel
 _FEWEST = 3  # cases of an optimisation curve
+_BUTTONS = {
+    "type": "buttons", "direction": "right", "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom", "pad": {"t": 0, "b": 4},
+    "font": {"size": 11}, "showactive": True, "bordercolor": GRID,
+}  # fmt: skip
 
 
 def most(response: Response, size: FloatArray) -> list[ShownCase]:
@@ -73,27 +77,11 @@ def _failures(response: Response) -> go.Scatter:
 
 
 def _scale_buttons(*, logarithmic: bool) -> list[dict[str, object]]:
-    ticks = {"log": "array", "linear": "auto"}
-    buttons = [
-        {
-            "label": f"{kind} scale",
-            "method": "relayout",
-            "args": [{"yaxis.type": kind, "yaxis.tickmode": mode, "yaxis.autorange": True}],
-        }
-        for kind, mode in ticks.items()
-    ]
-    place = {"x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom", "pad": {"t": 0, "b": 4}}
-    look = {"font": {"size": 11}, "showactive": True, "bordercolor": GRID}
-    return [
-        {
-            "type": "buttons",
-            "direction": "right",
-            "active": 0 if logarithmic else 1,
-            "buttons": buttons,
-            **place,
-            **look,
-        }
-    ]
+    buttons = []
+    for kind, ticks in (("log", "array"), ("linear", "auto")):
+        axis = {"yaxis.type": kind, "yaxis.tickmode": ticks, "yaxis.autorange": True}
+        buttons.append({"label": f"{kind} scale", "method": "relayout", "args": [axis]})
+    return [_BUTTONS | {"active": 0 if logarithmic else 1, "buttons": buttons}]
 
 
 def _peaks(response: Response) -> str:
@@ -117,11 +105,8 @@ def _caption(response: Response) -> str:
         text += f"All points keep the same harmonics (<code>{response.selection}</code>)."
     else:
         n = counted(int(converged.sum()), "accepted point")
-        where = (
-            f", from {number(hz[high].min(), 4)} to {number(hz[high].max(), 4)} Hz"
-            if high.any()
-            else ""
-        )
+        ends = [number(float(f), 4) for f in (hz[high].min(), hz[high].max())] if high.any() else []
+        where = f", from {' to '.join(ends)} Hz" if ends else ""
         text += (
             f"{int(high.sum())} of {n} keep {response.more_name} (filled diamonds){where}; the rest keep "
             f"H = {response.low_name} (open circles)."
@@ -145,9 +130,8 @@ def frequency_response(response: Response) -> Plot | None:
     if not response.converged.all():
         figure.add_trace(_failures(response))
     styled(figure, 540)
-    figure.update_layout(
-        updatemenus=_scale_buttons(logarithmic=True), showlegend=len(figure.data) > 1
-    )
+    buttons = _scale_buttons(logarithmic=True)
+    figure.update_layout(updatemenus=buttons, showlegend=len(figure.data) > 1)
     _, name, unit = _abscissa(response)
     figure.update_xaxes(title_text=f"{name} ({unit})")
     ticks = log_ticks(response.accepted * scale.factor)
@@ -164,9 +148,8 @@ def _low_caption(response: Response, cases: list[ShownCase], low: FloatArray) ->
         if both.size:
             off = low[both] / response.accepted[both] - 1
             worst = int(np.argmax(np.abs(off)))
-            parts.append(
-                f"{percent(100 * float(off[worst]))} at {number(float(response.hz[both[worst]]), 5)} Hz{case.where}"
-            )
+            hz = number(float(response.hz[both[worst]]), 5)
+            parts.append(f"{percent(100 * float(off[worst]))} at {hz} Hz{case.where}")
     return (
         f"Solid: accepted; dashed: H = {response.low_name} alone, where that was solved. The largest difference of the "
         f"low-order amplitude is {joined(parts)}."
@@ -190,15 +173,8 @@ def low_order(response: Response) -> Plot | None:
             (at, accepted, "accepted", {"width": 2}),
             (only, low, f"H = {response.low_name} alone", {"width": 1.6, "dash": "dash"}),
         ):
-            style = {**line, "color": case.colour}
-            figure.add_scatter(
-                x=response.hz[x],
-                y=y[x] * scale.factor,
-                mode="lines",
-                name=name,
-                line=style,
-                **group,
-            )
+            drawn = {"mode": "lines", "name": name, "line": {**line, "color": case.colour}, **group}
+            figure.add_scatter(x=response.hz[x], y=y[x] * scale.factor, **drawn)
     styled(figure, 440)
     figure.update_layout(updatemenus=_scale_buttons(logarithmic=False))
     figure.update_xaxes(title_text="frequency (Hz)")
@@ -210,11 +186,12 @@ def low_order(response: Response) -> Plot | None:
     return Plot("low_order", title, _low_caption(response, cases, low), figure)
 
 
-def _optimum_caption(cases: list[ShownCase], peak: FloatArray, hz: FloatArray) -> str:
-    best = int(np.nanargmin(peak))
+def _optimum_caption(response: Response, cases: list[ShownCase]) -> str:
+    peak, hz = ([of(c) for c in cases] for of in (response.peak_response, response.peak_hz))
+    best = int(np.argmin(peak))
     text = (
         f"Among the cases computed the peak is smallest{cases[best].where}: "
-        f"{percent(100 * peak[best] / np.nanmax(peak))} of the largest one. "
+        f"{percent(100 * peak[best] / max(peak))} of the largest one. "
     )
     if best in (0, len(peak) - 1):
         text += "That is the end of the range: the optimum may lie beyond it. "
@@ -236,21 +213,16 @@ def _families(cases: list[ShownCase], key: str) -> dict[str, list[ShownCase]]:
 def optimisation(response: Response) -> Plot | None:
     """Peak amplitude and frequency against the first varied number (Gastaldi and Berruti 2017, fig. 9)."""
     key = first_number(response.data)[0]
-    cases = sorted(
-        (c for c in response.peaked if np.isfinite(response.peak_response(c))),
-        key=lambda c: c.value,
-    )
+    known = (c for c in response.peaked if np.isfinite(response.peak_response(c)))
+    cases = sorted(known, key=lambda c: c.value)
     if not key or len(cases) < _FEWEST:
         return None
     peak = {c: response.peak_response(c) for c in cases}
     scale = scale_for(np.array(list(peak.values())), response.unit)
     figure, families = make_subplots(1, 2, horizontal_spacing=0.12), _families(cases, key)
     for name, family in families.items():
-        mark = {
-            "size": 10,
-            "color": [c.colour for c in family],
-            "line": {"width": 1, "color": "white"},
-        }
+        edge = {"width": 1, "color": "white"}
+        mark = {"size": 10, "color": [c.colour for c in family], "line": edge}
         curves = (
             (scale.unit, [peak[c] * scale.factor for c in family]),
             ("Hz", [response.peak_hz(c) for c in family]),
@@ -273,7 +245,5 @@ def optimisation(response: Response) -> Plot | None:
         title_text=f"peak {response.quantity} ({scale.unit})", type="log", **log_ticks(drawn), col=1
     )
     figure.update_yaxes(title_text="peak frequency (Hz)", col=2)
-    found = _optimum_caption(
-        cases, np.array(list(peak.values())), np.array([response.peak_hz(c) for c in cases])
-    )
-    return Plot("optimisation", "Optimisation curves", found, figure)
+    caption = _optimum_caption(response, cases)
+    return Plot("optimisation", "Optimisation curves", caption, figure)

@@ -8,7 +8,7 @@ from plotly.subplots import make_subplots
 from stickslip.arrays import FloatArray
 from stickslip.report.cases import ShownCase
 from stickslip.report.forced.curves import COMPARED, most
-from stickslip.report.plot import ALARM, INK, Plot, log_ticks, styled
+from stickslip.report.plot import ALARM, INK, Plot, log_ticks, ring, styled
 from stickslip.report.quantities import counted, number, percent
 from stickslip.report.response import Response
 
@@ -17,7 +17,7 @@ _SMALLEST_ERROR = 1e-3  # percent; below it the axis would only show rounding
 
 
 def _error_traces(figure: go.Figure, response: Response) -> None:
-    """Add predicted errors of all cases (left) and both errors of some (right)."""
+    """Add predicted errors of all cases (left) and both errors of some (right; in the same panel where there is one case)."""
     asked, real = response.alert, response.floats("real_error_percent")
     both = most(response, real) if response.is_error else []
 
@@ -34,16 +34,13 @@ def _error_traces(figure: go.Figure, response: Response) -> None:
         drawn = {"mode": "lines", "name": case.short, "line": {"color": case.colour, "width": 1.6}}
         add(case, x, y, 1, **drawn, showlegend=named, legendgrouptitle={"text": response.varied})
         if case in both:
+            column = 1 + named
             at = response.points(case)
             at = at[np.isfinite(real[at])]
-            mark = {
-                "color": case.colour,
-                "size": 6,
-                "symbol": "circle-open",
-                "line": {"width": 1.4},
-            }
-            add(case, x, y, 2, **drawn)
-            add(case, response.hz[at], real[at], 2, mode="markers", name="real", marker=mark)
+            if named:
+                add(case, x, y, column, **drawn)
+            mark = {"mode": "markers", "name": "real", "marker": ring(case.colour, 6)}
+            add(case, response.hz[at], real[at], column, **mark)
 
 
 def _caption(response: Response) -> str:
@@ -64,17 +61,17 @@ def _caption(response: Response) -> str:
     where = response.cases[asked.case[worst]].where
     text += f"The largest, {response.shown(float(error[worst]))}, is at {number(float(asked.hz[worst]), 5)} Hz{where}. "
     if real.any() and response.is_error:
+        several = len(response.cases) > 1
+        right, some = " (right)" * several, f"; at most {COMPARED} cases are drawn" * several
         text += (
-            "Right: the real error (open circles), the difference to the accepted solution, where a point was "
-            f"solved again ({counted(int(real.sum()), 'point')}; at most {COMPARED} cases are drawn). "
+            f"Open circles{right}: the real error, the difference to the accepted solution, where a point was solved again "
+            f"({counted(int(real.sum()), 'point')}{some}). "
         )
     floor = _floor(response)
     hidden, endless = int((error < floor).sum()), int(np.isinf(error).sum())
     if hidden:
-        text += f"{counted(hidden, 'point')} below {response.shown(floor)} lie under the axis. "
-    return text + (
-        f"{counted(endless, 'point')} beyond all bounds are not drawn." if endless else ""
-    )
+        text += f"Under the axis, below {response.shown(floor)}: {counted(hidden, 'point')}. "
+    return text + (f"Not drawn, beyond all bounds: {counted(endless, 'point')}." if endless else "")
 
 
 def _floor(response: Response) -> float:
@@ -88,7 +85,9 @@ def errors(response: Response) -> Plot | None:
     if not error.size or not response.decides:
         return None
     two = response.is_error and bool(np.isfinite(real).any())
-    titles = ["predicted, all cases", "predicted (line) and real (circles)"] if two else [""]
+    titles = ["predicted (line) and real (circles)"] if two else [""]
+    if two and len(response.cases) > 1:
+        titles.insert(0, "predicted, all cases")
     figure = make_subplots(
         1, len(titles), shared_yaxes=True, horizontal_spacing=0.04, subplot_titles=titles
     )
@@ -117,14 +116,8 @@ def _scatter(
     for case in response.cases:
         at = np.flatnonzero(known & (response.point_case == case.index))
         if at.size:
-            mark = {
-                "color": case.colour,
-                "size": 7,
-                "symbol": "circle-open",
-                "line": {"width": 1.5},
-            }
             figure.add_scatter(
-                x=x[at], y=y[at], mode="markers", name=case.short, marker=mark, customdata=response.hz[at],
+                x=x[at], y=y[at], mode="markers", marker=ring(case.colour, 7), name=case.short if case.label else "points", customdata=response.hz[at],
                 hovertemplate="predicted %{x:.3g} %<br>real %{y:.3g} %<br>%{customdata:.2f} Hz<extra></extra>",
             )  # fmt: skip
     return figure
@@ -132,10 +125,7 @@ def _scatter(
 
 def error_scatter(response: Response) -> Plot | None:
     """Real against predicted error (Gastaldi and Berruti 2017, fig. 7a)."""
-    predicted, real = (
-        response.floats("predicted_error_percent"),
-        response.floats("real_error_percent"),
-    )
+    predicted, real = (response.floats(f"{which}_error_percent") for which in ("predicted", "real"))
     known = np.isfinite(predicted) & np.isfinite(real) & (predicted > 0) & (real > 0)
     if not response.is_error or not known.any():
         return None
@@ -148,12 +138,9 @@ def error_scatter(response: Response) -> Plot | None:
     dash = {"dash": "dash", "color": ALARM, "width": 1.2}
     figure.add_hline(y=response.threshold, line=dash)
     figure.add_vline(x=response.threshold, line=dash)
-    axis = {
-        "type": "log",
-        "range": np.log10(ends).tolist(),
-        "constrain": "domain",
-        **log_ticks(values),
-    }
+    axis = {"type": "log", "range": np.log10(ends).tolist(), "constrain": "domain"} | log_ticks(
+        values
+    )
     figure.update_xaxes(title_text="predicted error (%)", **axis)
     figure.update_yaxes(title_text="real error (%)", scaleanchor="x", **axis)
     larger = int((real[known] > predicted[known]).sum())
@@ -162,6 +149,5 @@ def error_scatter(response: Response) -> Plot | None:
         f"exact. In {larger} of them the real error is larger than predicted. Points below the threshold of "
         f"{percent(response.threshold)} (dashed) were not solved twice, so that errors which the alert missed cannot show here."
     )
-    return Plot(
-        "error_scatter", "Does the prediction hold? Real against predicted error", caption, figure
-    )
+    title = "Does the prediction hold? Real against predicted error"
+    return Plot("error_scatter", title, caption, figure)

@@ -2,7 +2,15 @@
 
 import numpy as np
 
-from stickslip.report.quantities import counted, number, percent, predicted, quantity, scale_for
+from stickslip.report.quantities import (
+    NONE,
+    counted,
+    number,
+    percent,
+    predicted,
+    quantity,
+    scale_for,
+)
 from stickslip.report.response import Response
 from stickslip.report.section import Card
 
@@ -13,22 +21,16 @@ _LARGE_DIFFERENCE = 1.0  # percent between time integration and balance (Gastald
 def _peak_card(response: Response) -> Card:
     cases = [c for c in response.peaked if np.isfinite(response.peak_response(c))]
     if not cases:
-        return Card("–", "peak", "no case has its peak yet")
+        return Card(NONE, "peak", "no case has its peak yet")
     peaks = np.array([response.peak_response(c) for c in cases])
     best = int(np.argmin(peaks))
     scale = scale_for(peaks[best : best + 1], response.unit)
     size = f"{number(float(peaks[best]) * scale.factor)} {scale.unit}"
     if len(cases) == 1:
-        more = (
-            f", {quantity(float(peaks[0]) * cases[0].excitation, response.length)}"
-            if response.per_force
-            else ""
-        )
-        return Card(
-            size,
-            f"peak of {response.output_name}",
-            f"at {number(response.peak_hz(cases[0]), 5)} Hz{more}",
-        )
+        whole = quantity(float(peaks[0]) * cases[0].excitation, response.length)
+        more = f", {whole}" if response.per_force else ""
+        at = f"at {number(response.peak_hz(cases[0]), 5)} Hz{more}"
+        return Card(size, f"peak of {response.output_name}", at)
     end = "; at the end of the range" if best in (0, len(cases) - 1) else ""
     note = f"smallest peak of the cases, {percent(100 * float(peaks[best] / peaks.max()))} of the largest{end}"
     return Card(size, cases[best].label, note)
@@ -40,72 +42,56 @@ def _shift_card(response: Response) -> Card | None:
     first, last = response.peaked[0], response.peaked[-1]
     a, b = response.peak_hz(first), response.peak_hz(last)
     note = f"from {number(a, 5)} Hz{first.where} to {number(b, 5)} Hz{last.where}"
-    return Card(
-        f"{number(b - a)} Hz",
-        f"shift of the peak over the cases ({percent(100 * (b / a - 1))})",
-        note,
-    )
+    label = f"shift of the peak over the cases ({percent(100 * (b / a - 1))})"
+    return Card(f"{number(b - a)} Hz", label, note)
 
 
 def _loss_card(response: Response) -> Card | None:
     """Return what one case loses at its peak; several have their shift instead."""
     if len(response.peaked) != 1 or not response.has("dissipated_energy"):
         return None
-    energy = float(
-        np.nansum(response.floats("dissipated_energy")[response.peak(response.peaked[0])])
-    )
-    return Card(
-        quantity(energy if energy > 1e-12 else 0.0, "J"),
-        "lost in a cycle at the peak",
-        "by all contacts together",
-    )
+    own = response.floats("dissipated_energy")[response.peak(response.peaked[0])]
+    energy = float(np.nansum(own))
+    lost = quantity(energy if energy > 1e-12 else 0.0, "J")
+    return Card(lost, "lost in a cycle at the peak", "by all contacts together")
 
 
-def _choice_card(response: Response) -> Card | None:
-    error, n = response.alert.error, int(response.converged.sum())
-    if not response.is_error or not response.decides:
+def _alert_cards(response: Response) -> list[Card]:
+    """Return how often more harmonics were asked for, and how wrong few would have been."""
+    asked = response.alert
+    if not asked.error.size:
+        return []
+    above, at = int(np.sum(asked.error > response.threshold)), int(np.argmax(asked.error))
+    share = f"{number(100 * above / asked.error.size, 2)} %"
+    note = f"{above} of {counted(asked.error.size, 'checked point')} above {percent(response.threshold)}"
+    where = f"at {number(float(asked.hz[at]), 5)} Hz{response.cases[asked.case[at]].where}"
+    worst = predicted(float(asked.error[at]))
+    return [
+        Card(share, "of points asked for more harmonics", note),
+        Card(worst, f"worst predicted error with H = {response.low_name}", where),
+    ]
+
+
+def _work_cards(response: Response) -> list[Card]:
+    """Return how often more harmonics were kept, where anything chose, and what that cost."""
+    n, found = int(response.converged.sum()), []
+    if response.decides:
         more = int(np.sum(response.more & response.converged))
         note = f"{more} of {counted(n, 'accepted point')}, chosen by {response.selection}"
         label = f"of points keep other harmonics than H = {response.low_name}"
-        return (
-            Card(f"{number(100 * more / n, 2)} %" if n else "–", label, note)
-            if response.decides
-            else None
-        )
-    if not error.size:
-        return None
-    asked = int(np.sum(error > response.threshold))
-    note = f"{asked} of {counted(error.size, 'checked point')} above {percent(response.threshold)}"
-    return Card(
-        f"{number(100 * asked / error.size, 2)} %", "of points asked for more harmonics", note
-    )
-
-
-def _worst_card(response: Response) -> Card | None:
-    asked = response.alert
-    if not response.is_error or not response.decides:
-        if not response.has("unknowns_solved", "newton_steps"):
-            return None
-        work, steps = (
-            int(response.floats(name).sum()) for name in ("unknowns_solved", "newton_steps")
-        )
+        found = [Card(f"{number(100 * more / n, 2)} %" if n else NONE, label, note)]
+    if response.has("unknowns_solved", "newton_steps"):
+        work, steps = (int(response.floats(w).sum()) for w in ("unknowns_solved", "newton_steps"))
         note = f"of all solutions together, in {counted(steps, 'Newton step')}"
-        return Card(number(work, 6), "unknowns solved", note)
-    if not asked.error.size:
-        return None
-    at = int(np.argmax(asked.error))
-    note = f"at {number(float(asked.hz[at]), 5)} Hz{response.cases[asked.case[at]].where}"
-    return Card(
-        predicted(float(asked.error[at])),
-        f"worst predicted error with H = {response.low_name}",
-        note,
-    )
+        found.append(Card(number(work, 6), "unknowns solved", note))
+    return found
 
 
 def cards(response: Response) -> list[Card]:
     """Return the numbers that sum the response up."""
-    found = (_peak_card, _shift_card, _loss_card, _choice_card, _worst_card)
-    return [card for card in (make(response) for make in found) if card is not None]
+    first = (_peak_card(response), _shift_card(response), _loss_card(response))
+    rest = _alert_cards if response.is_error and response.decides else _work_cards
+    return [card for card in first if card is not None] + rest(response)
 
 
 def warnings(response: Response) -> list[str]:
@@ -119,12 +105,8 @@ def warnings(response: Response) -> list[str]:
                 "of rigid bodies is ten times smaller: it depends on a stiffness that is not physical."
             )
     if response.has("verify_difference_percent"):
-        large = int(
-            (
-                np.abs(np.nan_to_num(response.floats("verify_difference_percent")))
-                > _LARGE_DIFFERENCE
-            ).sum()
-        )
+        off = np.abs(np.nan_to_num(response.floats("verify_difference_percent")))
+        large = int((off > _LARGE_DIFFERENCE).sum())
         if large:
             found.append(
                 f"Time integration and harmonic balance differ by more than {percent(_LARGE_DIFFERENCE)} in "

@@ -16,14 +16,12 @@ def peaks(response: Response) -> str:
         "excitation", "peak", f"peak / force ({scale.unit})", "at (Hz)", "points", f"with H = {response.low_name}",
         f"with {response.more_name}", "failed", "Newton steps", "unknowns solved", "contact (s)", "linear (s)", "rest (s)",
     ]  # fmt: skip
-    counts = (
+    counts = [
         "points",
-        "points_low",
-        "points_high",
-        "points_failed",
+        *(f"points_{k}" for k in ("low", "high", "failed")),
         "newton_steps",
         "unknowns_solved",
-    )
+    ]
     clocks = ("seconds_contact", "seconds_linear", "seconds_rest")
     rows = []
     for case in response.cases:
@@ -106,13 +104,8 @@ def more_harmonics(response: Response) -> str | None:
 
 def time_integration(response: Response) -> str | None:
     """Time integration against harmonic balance."""
-    names = (
-        "verify_case",
-        "verify_frequency_hz",
-        "verify_transient",
-        "verify_balance",
-        "verify_difference_percent",
-    )
+    words = ("case", "frequency_hz", "transient", "balance", "difference_percent")
+    names = [f"verify_{word}" for word in words]
     if not response.has(*names):
         return None
     columns = [response.floats(name) for name in names]
@@ -128,14 +121,8 @@ def time_integration(response: Response) -> str | None:
     ]  # fmt: skip
     finite = np.abs(columns[-1][np.isfinite(columns[-1])])
     worst = percent(float(finite.max())) if finite.size else NONE
-    head = [
-        "frequency (Hz)",
-        "by time integration",
-        "by harmonic balance",
-        "difference",
-        "settled",
-        "periods",
-    ]
+    ways = ["by time integration", "by harmonic balance"]
+    head = ["frequency (Hz)", *ways, "difference", "settled", "periods"]
     text = (
         f"<h3>Time integration</h3><p>First-harmonic amplitude of {response.output_name}: the two independent ways differ by at most "
         f"{worst}.</p>"
@@ -145,26 +132,16 @@ def time_integration(response: Response) -> str | None:
 
 def retention(response: Response) -> str | None:
     """How much the small retention stiffness of rigid bodies moves the peak."""
-    shift = (
-        response.floats("retention_peak_shift")
-        if response.has("retention_peak_shift")
-        else np.array([])
-    )
-    if not np.isfinite(shift).any():
+    shift = {c: response.number_of("retention_peak_shift", c) for c in response.cases}
+    known = [c for c in response.cases if np.isfinite(shift[c])]
+    if not known:
         return None
-    known = [c for c in response.cases if np.isfinite(shift[c.index])]
-    worst = max(known, key=lambda c: abs(shift[c.index]))
-    rows = [
-        [
-            c.short,
-            percent(100 * float(shift[c.index])),
-            number(response.number_of("retention_frequency_shift_hz", c)),
-        ]
-        for c in known
-    ]
+    worst = max(known, key=lambda c: abs(shift[c]))
+    moved = {c: number(response.number_of("retention_frequency_shift_hz", c)) for c in known}
+    rows = [[c.short, percent(100 * shift[c]), moved[c]] for c in known]
     rows += [[c.short, "no periodic motion found", NONE] for c in response.cases if c not in known]
     text = (
         "<h3>Retention</h3><p>With a retention stiffness ten times smaller the peak changes most"
-        f"{worst.where}: by {percent(100 * float(shift[worst.index]))}.</p>"
+        f"{worst.where}: by {percent(100 * shift[worst])}.</p>"
     )
     return text + response.table(["change of the peak", "change of its frequency (Hz)"], rows)

@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.report.plot import INK, MUTED, Plot, styled
+from stickslip.report.plot import INK, MUTED, Plot, ring, styled
 from stickslip.report.quantities import counted, number
 from stickslip.report.section import Block, Card, Section
 from stickslip.report.tables import shortened
@@ -81,19 +81,13 @@ def _orders(view: Waves, top: float) -> list[go.Scatter]:
 
 def _crossings(view: Waves) -> go.Scatter:
     names = view.waves
-    text = [
-        f"EO {order} meets {names[w]}, mode {mode + 1}"
-        for order, w, mode in zip(
-            view.integers("crossing_engine_order"),
-            view.integers("crossing_wave"),
-            view.integers("crossing_mode"),
-            strict=True,
-        )
-    ]
+    each = (view.integers(f"crossing_{name}") for name in ("engine_order", "wave", "mode"))
+    found = zip(*each, strict=True)
+    text = [f"EO {order} meets {names[w]}, mode {mode + 1}" for order, w, mode in found]
     return go.Scatter(
         x=view.floats("crossing_speed_rpm"), y=view.floats("crossing_frequency_hz"), text=text,
         mode="markers", name="crossings",
-        marker={"symbol": "circle-open", "size": 12, "color": INK, "line": {"width": 2}},
+        marker=ring(INK, 12, 2),
         hovertemplate="%{text}: %{y:.6g} Hz at %{x:.6g} rpm<extra></extra>",
     )  # fmt: skip
 
@@ -101,21 +95,16 @@ def _crossings(view: Waves) -> go.Scatter:
 def _not_shown(view: Waves, top: float) -> str:
     """Say which engine orders leave the picture, and from where on their crossings are not known."""
     last, first = float(view.floats("speed_rpm").max()), float(view.floats("speed_rpm").min())
-    orders = [int(m) for m in view.numbers("engine_orders")]
-    cut = [f"EO {m}" for m in orders if first < top * 60 / m < last]
-    outside = [f"EO {m}" for m in orders if top * 60 / m <= first]
+    asked = [int(m) for m in view.numbers("engine_orders")]
+    cut = [f"EO {m}" for m in asked if first < top * 60 / m < last]
+    outside = [f"EO {m}" for m in asked if top * 60 / m <= first]
     text = f" Cut at the upper edge of the picture: the lines of {', '.join(cut)}." if cut else ""
     if outside:
         text += f" Above the picture at all speeds: {', '.join(outside)}."
     if view.has("unfollowed_engine_order", "unfollowed_from_rpm"):
-        named = [
-            f"EO {order} from {rpm:.4g} rpm"
-            for order, rpm in zip(
-                view.integers("unfollowed_engine_order"),
-                view.floats("unfollowed_from_rpm"),
-                strict=True,
-            )
-        ]
+        orders, lowest = (view.numbers(f"unfollowed_{k}") for k in ("engine_order", "from_rpm"))
+        each = zip(orders, lowest, strict=True)
+        named = [f"EO {order:.0f} from {rpm:.4g} rpm" for order, rpm in each]
         text += (
             " <b>Not judged</b>, because they lie above the followed modes of the nodal diameters that they excite: "
             f"{', '.join(named)}."
@@ -157,19 +146,12 @@ def crossings(view: Waves) -> str:
     order, wave, mode = (
         view.integers(f"crossing_{name}") for name in ("engine_order", "wave", "mode")
     )
-    rows = [
-        [
-            number(float(rpm[i]), 6),
-            number(float(hz[i]), 6),
-            f"{order[i]}",
-            escape(view.waves[wave[i]]),
-            str(mode[i] + 1),
-        ]
-        for i in np.argsort(rpm, kind="stable")
-    ]
-    return title + shortened(
-        ["speed (rpm)", "frequency (Hz)", "engine order", "wave", "mode"], rows, "crossings"
-    )
+    rows = []
+    for i in np.argsort(rpm, kind="stable"):
+        met = [number(float(v), 6) for v in (rpm[i], hz[i])]
+        rows.append([*met, f"{order[i]}", escape(view.waves[wave[i]]), str(mode[i] + 1)])
+    head = ["speed (rpm)", "frequency (Hz)", "engine order", "wave", "mode"]
+    return title + shortened(head, rows, "crossings")
 
 
 def _cards(view: Waves) -> list[Card]:
@@ -178,11 +160,6 @@ def _cards(view: Waves) -> list[Card]:
     return [Card(str(view.data.sizes.get("crossing", 0)), "crossings with engine orders", note)]
 
 
-SECTION: Section = Section(
-    "campbell",
-    (*NEEDED, "speed_rpm"),
-    Waves,
-    (Block("campbell", "Frequencies against speed", (campbell_diagram, crossings)),),
-    by_case=True,
-    cards=_cards,
-)
+_NEEDS = (*NEEDED, "speed_rpm")
+_BLOCK = Block("campbell", "Frequencies against speed", (campbell_diagram, crossings))
+SECTION: Section = Section("campbell", _NEEDS, Waves, (_BLOCK,), by_case=True, cards=_cards)

@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.report.diameters import diameter_axes, mode_lines
-from stickslip.report.plot import INK, Plot, styled
+from stickslip.report.plot import INK, Plot, ring, styled
 from stickslip.report.quantities import NONE, counted, number, percent
 from stickslip.report.section import Block, Card, Section
 from stickslip.report.shapes import mode_shapes
@@ -24,7 +24,7 @@ def diameter_map(view: Waves) -> Plot:
             go.Scatter(
                 x=view.integers("nodal_diameter")[known], y=view.floats("reference_hz")[known, mode],
                 mode="markers", name="reference", hovertemplate="reference: %{y:.6g} Hz<extra></extra>",
-                marker={"size": 12, "symbol": "circle-open", "color": INK, "line": {"width": 1.2}},
+                marker=ring(INK, 12, 1.2),
             )
         )  # fmt: skip
         reference = " Open circles are the frequencies to compare with."
@@ -76,9 +76,8 @@ def comparison(view: Waves) -> str | None:
         f"<p>{known} {'frequency' if known == 1 else 'frequencies'} compared; the largest relative difference is "
         f"{_share(float(off[worst]))}, at {escape(view.waves[worst[0]])}, mode {worst[1] + 1}.</p>"
     )
-    return (
-        title + text + html_table(["wave", *(f"mode {m + 1}" for m in range(off.shape[1]))], rows)
-    )
+    head = ["wave", *(f"mode {m + 1}" for m in range(off.shape[1]))]
+    return title + text + html_table(head, rows)
 
 
 def _share(value: float) -> str:
@@ -91,35 +90,16 @@ def _share(value: float) -> str:
 def _cards(view: Waves) -> list[Card]:
     hz = view.floats("frequency_hz")
     over = counted(len(hz), "wave") if view.sectors > 1 else "a whole structure"
-    found = [
-        Card(
-            f"{number(float(np.nanmin(hz)), 5)} Hz",
-            "lowest natural frequency",
-            f"{hz.size} modes, {over}",
-        )
-    ]
+    lowest = f"{number(float(np.nanmin(hz)), 5)} Hz"
+    found = [Card(lowest, "lowest natural frequency", f"{hz.size} modes, {over}")]
     if view.has("difference") and np.isfinite(view.floats("difference")).any():
         off = np.abs(view.floats("difference"))
         note = f"of {np.count_nonzero(np.isfinite(off))} frequencies"
-        found.append(
-            Card(
-                percent(100 * float(np.nanmax(off))), "largest difference from the reference", note
-            )
-        )
+        worst = percent(100 * float(np.nanmax(off)))
+        found.append(Card(worst, "largest difference from the reference", note))
     return found
 
 
-SECTION: Section = Section(
-    "modes",
-    NEEDED,
-    Waves,
-    (
-        Block(
-            "modes",
-            "Natural frequencies and mode shapes",
-            (diameter_map, mode_shapes, frequencies, comparison),
-        ),
-    ),
-    by_case=True,
-    cards=_cards,
-)
+_TITLE = "Natural frequencies and mode shapes"
+_BLOCK = Block("modes", _TITLE, (diameter_map, mode_shapes, frequencies, comparison))
+SECTION: Section = Section("modes", NEEDED, Waves, (_BLOCK,), by_case=True, cards=_cards)

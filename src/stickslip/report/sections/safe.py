@@ -7,7 +7,7 @@ import plotly.graph_objects as go
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.diameters import diameter_axes, mode_lines
-from stickslip.report.plot import ALARM, INK, MUTED, Plot, styled
+from stickslip.report.plot import ALARM, INK, MUTED, Plot, ring, styled
 from stickslip.report.quantities import NONE, counted, number, percent
 from stickslip.report.section import Block, Card, Section
 from stickslip.report.tables import shortened
@@ -119,7 +119,7 @@ def _near(view: Waves, near: np.ndarray) -> go.Scatter:
     return go.Scatter(
         x=view.integers("nodal_diameter")[wave], y=view.floats("pair_frequency_hz")[near], text=text,
         mode="markers", name="near resonance", hovertemplate="%{text}<extra></extra>",
-        marker={"symbol": "circle-open", "size": 17, "color": ALARM, "line": {"width": 2.4}},
+        marker=ring(ALARM, 17, 2.4),
     )  # fmt: skip
 
 
@@ -129,16 +129,12 @@ def interference(view: Waves) -> str:
     order, wave, mode = (view.integers(f"pair_{name}") for name in ("engine_order", "wave", "mode"))
     own, excitation = view.floats("pair_frequency_hz"), view.floats("pair_excitation_hz")
     judged = view.integers("pair_judged") if view.has("pair_judged") else np.ones_like(near)
-    meeting = (
-        view.floats("pair_resonance_rpm")
-        if view.has("pair_resonance_rpm")
-        else np.full(len(margin), np.nan)
-    )
+    known = view.has("pair_resonance_rpm")
+    meeting = view.floats("pair_resonance_rpm") if known else np.full(len(margin), np.nan)
     rows = []
     for i in np.argsort(np.abs(margin), kind="stable"):
-        verdict = (
-            "<b>near resonance</b>" if near[i] else "clear" if judged[i] else "order not judged"
-        )
+        verdict = "clear" if judged[i] else "order not judged"
+        verdict = "<b>near resonance</b>" if near[i] else verdict
         rows.append(
             [f"{order[i]}", escape(view.waves[wave[i]]), str(mode[i] + 1), number(float(own[i]), 6), number(float(excitation[i]), 6),
              _rpm(float(meeting[i]), float(margin[i])), percent(100 * float(margin[i]), 3) if np.isfinite(margin[i]) else NONE, verdict]
@@ -147,9 +143,8 @@ def interference(view: Waves) -> str:
     head = [
         "engine order", "wave", "mode", f"mode {at} (Hz)", f"excitation {at} (Hz)", "resonance at (rpm)", "margin in speed", "",
     ]  # fmt: skip
-    return "<h3>Engine orders and the modes that they can excite</h3>" + shortened(
-        head, rows, "pairs"
-    )
+    title = "<h3>Engine orders and the modes that they can excite</h3>"
+    return title + shortened(head, rows, "pairs")
 
 
 def _rpm(value: float, margin: float) -> str:
@@ -161,20 +156,10 @@ def _rpm(value: float, margin: float) -> str:
 
 def _cards(view: Waves) -> list[Card]:
     near, rpm = int(view.integers("pair_near").sum()), number(view.scalar("speed_rpm"), 5)
-    return [
-        Card(
-            str(near),
-            f"near resonances at {rpm} rpm",
-            f"margin {number(view.scalar('margin_percent'))} %",
-        )
-    ]
+    note = f"margin {number(view.scalar('margin_percent'))} %"
+    return [Card(str(near), f"near resonances at {rpm} rpm", note)]
 
 
-SECTION: Section = Section(
-    "safe",
-    (*NEEDED, "pair_margin"),
-    Waves,
-    (Block("safe", "Interference with engine orders", (safe_diagram, interference)),),
-    by_case=True,
-    cards=_cards,
-)
+_NEEDS = (*NEEDED, "pair_margin")
+_BLOCK = Block("safe", "Interference with engine orders", (safe_diagram, interference))
+SECTION: Section = Section("safe", _NEEDS, Waves, (_BLOCK,), by_case=True, cards=_cards)
