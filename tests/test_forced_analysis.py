@@ -57,10 +57,10 @@ def question(system: System, load: HarmonicLoad, sweep: Sweep, **others: object)
         np.full((n, 3), np.nan), np.tile(np.eye(3), (n, 1, 1)), np.full(n, np.nan),
     )  # fmt: skip
     labels = tuple(f"out{i}.x" for i in range(len(system.outputs)))
-    none = np.zeros((n, 3))
+    none, pressed = np.zeros((n, 3)), np.tile([0.0, 0.0, -1.0], (n, 1))
     force = max(float(np.abs(f).max()) for f in load.harmonics.values())
     model = Assembled(
-        system, system, load, contacts, labels, 0, labels, 0.0, force, none, none,
+        system, system, load, contacts, labels, 0, labels, 0.0, force, none, pressed,
         Frequencies(*(np.array([30.0, 50.0]),) * 4), None, 1, None, {},
     )  # fmt: skip
     asked = {"label": "", "limit": 0.05} | others
@@ -402,10 +402,10 @@ def test_what_cannot_be_answered_is_refused_by_key() -> None:
         "part.disk.sectors: --verify integrates one structure in time"
     )
     assert refused(model(), memory_gb=0.1).startswith(
-        "limits.memory_gb: a case of the forced response (1 nodes, 21 unknowns, "
+        "limits.memory_gb: a case of the forced response (1 nodes, 33 unknowns, "
     )
     assert refused(model(), work_s=1e-9).startswith(
-        "limits.work_s: a case of the forced response (1 nodes, 21 unknowns, "
+        "limits.work_s: a case of the forced response (1 nodes, 33 unknowns, "
     )
 
 

@@ -56,29 +56,13 @@ _OF = {
         "order": ("1", "highest harmonic kept"),
         "unknowns": ("1", "real unknowns of the accepted solution"),
         "status": ("1", "how the solver ended"),
-        "indicator": (
-            "1",
-            "what the strategy compared with its threshold: of an error at the first solution of the frequency, else "
-            "at the accepted one",
-        ),
-        "predicted_error_percent": (
-            "percent",
-            "error of the first solution that an alert predicted, NaN where the indicator is no error "
-            "",
-        ),
-        "real_error_percent": (
-            "percent",
-            "difference of the first and the accepted solution where the frequency was solved again "
-            "",
-        ),
+        "indicator": ("1", "what the strategy compared with its threshold; of an error: at the first solution, else at the accepted one"),
+        "predicted_error_percent": ("percent", "error of the first solution that an alert predicted, NaN where the indicator is no error"),
+        "real_error_percent": ("percent", "difference of the first and the accepted solution where the frequency was solved again"),
         "newton_iterations": ("1", "Newton iterations"),
         "seconds": ("s", "time of the point"),
         "refinement": ("1", "1 if the point was added to resolve the peak"),
-        "reference_error_percent": (
-            "percent",
-            "change of the complex amplitude that twice as many harmonics are predicted to make, NaN without a "
-            "solution",
-        ),
+        "reference_error_percent": ("percent", "change of the complex amplitude that twice as many harmonics would make, NaN where unsolved"),
     },
     "point harmonic": {
         "harmonic_kept": ("1", "1 if the solution keeps the harmonic"),
