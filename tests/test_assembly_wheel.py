@@ -443,5 +443,5 @@ def test_an_output_on_the_high_face_is_refused_by_name():
     # it moves as the neighbour's low face, in the neighbour's axes: no coordinate of this sector says so
     model = sector_model(shrouded_sector())
     behind = Output(name="behind", on="blade.cyclic_high")
-    with pytest.raises(InputError, match="output.points: .* lies on the high cyclic face"):
+    with pytest.raises(InputError, match=r"output\.points: .* lies on the high cyclic face"):
         replace(model, outputs=(*model.outputs, behind)).assembled(H)
