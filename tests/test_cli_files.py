@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_v2 import write_example_deck
 from test_cli import done, refused
 
 from stickslip.model.readers.calculix_deck import read_deck
@@ -140,3 +141,45 @@ def test_matrices_with_the_mesh_of_another_job(tmp_path: Path, *, plausible: boo
         assert "or part.stub.plausible = false where they are right" in said
     else:
         done("check", str(study))
+
+
+def without_tie(path: Path) -> Path:
+    """Take the cyclic tie out of the deck of a study, so that the study has to name faces and sectors."""
+    deck = path.parent / "sector.inp"
+    lines, kept = iter(deck.read_text().splitlines()), []
+    for line in lines:
+        if line.startswith(("*TIE", "*CYCLIC SYMMETRY MODEL")):
+            next(lines)
+        else:
+            kept.append(line)
+    deck.write_text("\n".join(kept) + "\n")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "sectors", "said"),
+    [
+        ("CYCLIC_LOW", "CYCLIC_HIGH", 23, "15.6522°"),
+        ("CYCLIC_LOW", "CYCLIC_HIHG", 24, "Did you mean 'CYCLIC_HIGH'?"),
+    ],
+)
+def test_faces_that_do_not_match_are_told_by_the_keys_of_the_study(
+    tmp_path: Path, low: str, high: str, sectors: int, said: str
+) -> None:
+    faces = {
+        "part.blade.low_face": f'"{low}"',
+        "part.blade.high_face": f'"{high}"',
+        "part.blade.sectors": str(sectors),
+    }
+    text = refused("check", str(without_tie(write_example_deck(tmp_path, faces))))
+    assert "study.toml: part.blade" in text
+    assert said in text
+
+
+def test_a_cyclic_tie_without_a_number_of_sectors_is_refused(tmp_path: Path) -> None:
+    path = write_example_deck(tmp_path)
+    deck = tmp_path / "sector.inp"
+    lines = deck.read_text().splitlines()
+    at = next(i for i, line in enumerate(lines) if line.startswith("*CYCLIC SYMMETRY MODEL"))
+    deck.write_text("\n".join(lines[:at] + lines[at + 2 :]) + "\n")
+    assert "nothing says how many sectors there are" in refused("check", str(path))
