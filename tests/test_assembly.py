@@ -211,7 +211,7 @@ def test_what_is_wrong_with_a_model_is_named():
         contacts={"a": replace(one, between=("chain.m1", "ground"), acts=None)},
     )
     refused(
-        "contact.a.gap: the law Jenkins has none",
+        r"contact.a.gap_m: is given, and the law jenkins has a normal force that does not depend on how far",
         contacts={"a": replace(one, between=("chain.m1", "ground"), gap=1e-3)},
     )
     refused("contact: there is none", contacts={})

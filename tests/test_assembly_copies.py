@@ -10,6 +10,7 @@ from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.model import Model
 from stickslip.assembly.placing import copy_of, place_of
+from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError
 from stickslip.model.axis import Axis
@@ -284,7 +285,16 @@ def test_what_is_wrong_with_surfaces_joins_and_copies_is_named():
             replace(model, **changes).assembled(3)
 
     uneven = replace(stop, tangent=None, law=replace(LAW, k_w=1e6))
-    refused("contact.stop.tangent: is missing, and the law has 3e", contacts={"stop": uneven})
+    refused(
+        r"contact.stop.tangent: is missing, and the law is not the same along t and w: "
+        r"tangential_stiffness_n_per_m = 3e\+06, axial_stiffness_n_per_m = 1e\+06\.",
+        contacts={"stop": uneven},
+    )
+    cubic = CubicSpring(k_t=1.0, k_w=1.0, cubic_t=2.0)
+    refused(
+        r"cubic_tangential_n_per_m5 = 2, cubic_axial_n_per_m5 = 0\.",
+        contacts={"stop": replace(uneven, law=cubic, share="area")},
+    )
     refused(
         "contact.stop.between: no point of the contact can move",
         contacts={"stop": replace(stop, between=("bar.root", "ground"))},

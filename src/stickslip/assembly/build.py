@@ -23,7 +23,7 @@ from stickslip.assembly.reduced import Store, in_memory, reduced_parts
 from stickslip.assembly.statics import pressed_by, static_contact_force
 from stickslip.assembly.waves import reduced_sector
 from stickslip.contact.interface import Interface
-from stickslip.contact.laws import LAWS
+from stickslip.contact.laws import law_name
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
@@ -355,6 +355,5 @@ def _lowest(model: Model, structure: Structure, count: int, store: Store) -> Flo
 
 def _table(model: Model) -> ContactTable:
     pairs = model.pairs
-    names = {law: name for name, law in LAWS.items()}
-    laws = tuple(names.get(type(law), type(law).__name__) for law in pairs.laws)
+    laws = tuple(law_name(law) for law in pairs.laws)
     return ContactTable(pairs.names, pairs.groups, laws, pairs.position, pairs.frame, pairs.area)

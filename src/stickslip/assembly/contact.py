@@ -35,7 +35,7 @@ class Contact:
     tolerance
         Distance of partners node to node, reach of a segment, m; None: the pairing's own.
     gap
-        Clearance at rest, m.
+        Clearance at rest, m; negative for an interference: so far the bodies would overlap if nothing gave way.
     preload
         Normal force at rest of what `share` says, N or Pa.
     """

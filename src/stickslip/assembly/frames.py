@@ -1,6 +1,6 @@
 """Normals and tangents of contact surfaces: those of their own frames or facets, or of the other side."""
 
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,9 +10,9 @@ from stickslip.arrays import FloatArray
 from stickslip.assembly.contact import Contact
 from stickslip.assembly.places import NO_FACETS, Spot
 from stickslip.contact.law import ContactLaw
-from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.contact.surface import Surface
 from stickslip.errors import input_error
+from stickslip.units import quantity_of
 
 SQUARE = 0.3  # sine of the angle with a normal, above which a direction will do for t
 
@@ -69,14 +69,33 @@ def direction(
         return first.frame[:, :, 0]
     if second is not None and second.frame is not None and b is not None:
         return second.frame[cKDTree(b.points).query(a.points)[1], :, 0]
-    stiffness = None if isinstance(law, RigidCoulomb) else law.stuck_stiffness()
-    if stiffness is not None and stiffness[0] != stiffness[1]:
+    unlike = told_apart(law, per_area=contact.share == "area")
+    if unlike:
         raise input_error(
             f"{key}.tangent",
-            f"is missing, and the law has {stiffness[0]:g} N/m along t and {stiffness[1]:g} N/m along w",
-            "Give the direction whose part in the contact plane is t.",
+            f"is missing, and the law is not the same along t and w: {unlike}",
+            "Give the direction whose part in the contact plane is t, or make both alike.",
         )
     normals = a.node_normals()[a.used]
     sines = [np.linalg.norm(np.cross(normals, axis), axis=1).min() for axis in np.eye(3)]
     good = [i for i, sine in enumerate(sines) if sine > SQUARE] or [int(np.argmax(sines))]
     return tuple(float(x) for x in np.eye(3)[good[0]])
+
+
+def told_apart(law: Any, *, per_area: bool) -> str:
+    """Say in what a law differs along t and w: parameters ``NAME_t`` and ``NAME_w``, by their keys; empty where it does not."""
+    known = {entry.name: entry for entry in fields(law)} if is_dataclass(law) else {}
+    said = []
+    for name, entry in known.items():
+        other = known.get(f"{name[:-1]}w") if name.endswith("_t") else None
+        if other is None or getattr(law, name) == getattr(law, other.name):
+            continue
+        for one in (entry, other):
+            told = quantity_of(one)
+            word = one.name if told is None else told.key_of(one.name, per_area=per_area)
+            said.append(f"{word} = {_short(getattr(law, one.name))}")
+    return ", ".join(said)
+
+
+def _short(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

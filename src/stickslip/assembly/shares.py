@@ -8,6 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.assembly.contact import Contact
 from stickslip.contact.law import ContactLaw, scaled
+from stickslip.contact.laws import law_name
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError, input_error
@@ -21,17 +22,27 @@ def at_rest(key: str, contact: Contact) -> ContactLaw:
     if isinstance(law, RigidCoulomb) and contact.preload == 0.0:
         return replace(law, initial_gap=law.initial_gap + contact.gap)
     if getattr(law, "preload", None) is None or not hasattr(law, "k_n"):
-        what = "preload" if contact.preload else "gap"
-        raise input_error(
-            f"{key}.{what}",
-            f"the law {type(law).__name__} has none: its normal force does not depend on how far the bodies are apart",
-            "Choose a law that lifts off, such as elastic_coulomb, or leave it out.",
+        raise _at_rest_alike(
+            key, contact, "has a normal force that does not depend on how far the bodies are apart"
         )
+    if contact.gap != 0.0 and law.k_n == 0.0:
+        raise _at_rest_alike(key, contact, "has no normal stiffness here: its pressure is constant")
     pressed = law.preload + contact.preload - law.k_n * contact.gap
     if isinstance(law, UnilateralSpring) and pressed < 0.0:
         return replace(law, preload=0.0, initial_gap=law.initial_gap - pressed / law.k_n)
     found: ContactLaw = replace(law, preload=pressed)
     return found
+
+
+def _at_rest_alike(key: str, contact: Contact, why: str) -> InputError:
+    """Refuse a preload, gap or interference that makes no difference."""
+    preload = "preload_pa" if contact.share == "area" else "preload_n"
+    word = preload if contact.preload else "gap_m" if contact.gap > 0.0 else "interference_m"
+    return input_error(
+        f"{key}.{word}",
+        f"is given, and the law {law_name(contact.law)} {why}",
+        "Choose a law that is pressed and lifts off, such as elastic_coulomb, or leave it out.",
+    )
 
 
 def shared(key: str, contact: Contact, law: ContactLaw, area: FloatArray) -> tuple[ContactLaw, ...]:

@@ -37,3 +37,9 @@ LAWS: Mapping[str, type] = _Registry(
         "iwan": "Iwan",
     }
 )
+
+
+def law_name(law: object) -> str:
+    """Return the name that a study file has for a law, of one of your own its class."""
+    package, _, name = type(law).__module__.rpartition(".")
+    return name if package == __name__ and name in LAWS else type(law).__name__

@@ -106,6 +106,13 @@ class ContactBase(Pair):
         description="for single dofs, which have no normal: whether their motion is tangential or normal to the contact",
     )
     gap_m: float = Field(0.0, ge=0, le=10, description="clearance at rest in m, 0 for none")
+    interference_m: float = Field(
+        0.0,
+        ge=0,
+        le=1,
+        description="how far the surfaces would overlap at rest if nothing gave way, in m, 0 for none: it presses them "
+        "by the normal stiffness times itself",
+    )
     law: Law = Field(description="the contact law: " + ", ".join(LAWS))
     per: Share = Field(
         "interface",
@@ -114,12 +121,13 @@ class ContactBase(Pair):
 
     @model_validator(mode="after")
     def _is_one(self) -> Self:
-        key = self._preload_key
-        if self.gap_m > 0 and getattr(self, key):
+        keys = ("gap_m", "interference_m", self._preload_key)
+        given = [key for key in keys if getattr(self, key)]
+        if len(given) > 1:
             raise custom_error(
-                "is given together with a clearance",
-                "A contact at rest is either pressed or open: give one of them.",
-                key,
+                f"is given together with {given[0]}",
+                "A contact at rest is open, pressed by what overlaps, or pressed by a force: give one of them.",
+                given[1],
             )
         refused_by(LAWS[self.law], self.library)
         return self
@@ -127,6 +135,11 @@ class ContactBase(Pair):
     @property
     def _preload_key(self) -> str:
         return "preload_pa" if self.per == "area" else "preload_n"
+
+    @property
+    def gap(self) -> float:
+        """Clearance at rest, m; negative for an interference."""
+        return self.gap_m - self.interference_m
 
     @property
     def preload(self) -> float:
@@ -196,7 +209,7 @@ def _columns() -> dict[str, Any]:
         unit = "Pa" if area else "N"
         found[f"preload_{unit.lower()}"] = (
             float | None,
-            Field(None, description=f"normal force at rest in {unit}, 0 for none"),
+            Field(None, ge=0, description=f"normal force at rest in {unit}, 0 for none"),
         )
         for law in LAWS:
             for key, (annotation, field) in columns_of(LAWS[law], per_area=area).items():

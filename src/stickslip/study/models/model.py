@@ -86,7 +86,7 @@ def _contact(tables: Tables, parts: Mapping[str, Part], table: Any) -> Contact:
         tangent=None if table.tangent is None else tuple(table.tangent),
         acts=table.acts or _acts(tables, table),
         tolerance=table.tolerance_m,
-        gap=table.gap_m,
+        gap=table.gap,
         preload=table.preload,
     )
 

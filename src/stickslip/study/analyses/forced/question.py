@@ -9,8 +9,7 @@ import numpy as np
 
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
-from stickslip.contact.law import ContactLaw
-from stickslip.contact.laws import LAWS
+from stickslip.contact.laws import law_name
 from stickslip.errors import InputError, input_error, together
 from stickslip.harmonic.support import named
 from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
@@ -163,16 +162,11 @@ def _require_integrable(model: Model) -> None:
     found = [
         input_error(
             f"contact.{name}.law",
-            f"--verify integrates in time, which knows {INTEGRABLE} alone, got {_law(contact.law)!r}",
+            f"--verify integrates in time, which knows {INTEGRABLE} alone, got {law_name(contact.law)!r}",
             f"Run without --verify, or give the law {INTEGRABLE}.",
         )
         for name, contact in model.contacts.items()
-        if _law(contact.law) != INTEGRABLE
+        if law_name(contact.law) != INTEGRABLE
     ]
     if found:
         raise together(found)
-
-
-def _law(law: ContactLaw) -> str:
-    """Return the name that a study file has for a law, of one of your own its class."""
-    return next((name for name, kind in LAWS.items() if kind is type(law)), type(law).__name__)
