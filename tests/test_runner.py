@@ -14,7 +14,8 @@ from toy_analysis import Toy, ToyStudy
 from stickslip.errors import InputError
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.keep.folder import locked_folder
-from stickslip.study.keep.progress import Interrupted
+from stickslip.study.keep.progress import LOG, Interrupted
+from stickslip.study.keep.workers import executor
 from stickslip.study.run import answer, run_study
 
 HERE = Path(__file__).parent
@@ -135,6 +136,56 @@ def test_killed_run_goes_on_to_the_same_numbers(
     again = study(tmp_path)
     run_study(again)
     same(result(again), result(whole))
+
+
+TALKING = """
+import logging, threading
+from stickslip.study.keep.progress import LOG
+from stickslip.study.keep.workers import executor
+
+def talk():
+    while True:
+        LOG.info("x" * 200)
+
+class Ear(logging.Handler):
+    def emit(self, record):
+        heard.set()
+
+if __name__ == "__main__":
+    heard = threading.Event()
+    LOG.addHandler(Ear())
+    LOG.setLevel(logging.INFO)
+    for _ in range(4):
+        heard.clear()
+        try:
+            with executor(2) as pool:
+                pool.submit(talk), pool.submit(talk)
+                heard.wait()
+                raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            print("ended", flush=True)
+"""
+
+
+def test_run_ends_though_its_workers_were_speaking(tmp_path: Path) -> None:
+    # a lock that a worker holds when it is ended would never be given back
+    script = tmp_path / "run.py"
+    script.write_text(TALKING)
+    ended = subprocess.run(
+        [sys.executable, str(script)], check=False, capture_output=True, text=True, timeout=120
+    )
+    assert ended.stdout == "ended\n" * 4, ended.stderr
+
+
+def test_long_line_of_a_worker_is_cut_between_letters(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.WARNING, "stickslip"), executor(2) as pool:
+        pool.submit(LOG.warning, "é" * 5000).result()
+    (told,) = caplog.records
+    assert told.levelno == logging.WARNING
+    assert set(told.getMessage()) == {"é"}
+    assert 1000 < len(told.getMessage()) < 2000
 
 
 def test_finished_run_computes_nothing_again(tmp_path: Path) -> None:
