@@ -16,7 +16,7 @@ from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.model.damping import rayleigh_damping
+from stickslip.model.damping import Damping, rayleigh_damping
 from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.matrices import lumped
 from stickslip.model.mesh.blade_mesh import mesh_blade_pair
@@ -24,6 +24,7 @@ from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.part import flat_curved_part, solid_part, structure_part
 from stickslip.model.rigid.damper import FlatCurvedDamper, gap_operator
 from stickslip.model.structure import join
+from stickslip.reduction.choice import Reduction
 from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.response.forced.response import Sweep, forced_problem, forced_response
 from stickslip.response.recovery import fields
@@ -57,7 +58,10 @@ def blades():
     damper = FlatCurvedDamper()
     mesh = mesh_blade_pair(BladePair(**COARSE), damper.contact_points())
     part = solid_part(
-        mesh, Material(), n_modes=10, damping_ratio=0.003, between=(150 * HZ, 300 * HZ)
+        mesh,
+        Material(),
+        reduction=Reduction(10),
+        damping=Damping(ratio=0.003, between_hz=(150, 300)),
     )
     return damper, mesh, part
 

@@ -14,6 +14,7 @@ from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError
 from stickslip.model.axis import Axis
+from stickslip.model.damping import Damping
 from stickslip.model.fe.solid import Material
 from stickslip.model.matrices import lumped
 from stickslip.model.mesh.mesh_facets import facets_of
@@ -21,9 +22,11 @@ from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.part import BodyPoints, Place, rigid_part, solid_part, structure_part
 from stickslip.model.rigid.body import RigidBody
+from stickslip.reduction.choice import Reduction
 from stickslip.response.forced.response import Sweep, forced_problem, forced_response
 from stickslip.response.recovery import fields
 
+DAMPING = Damping(ratio=0.01, between_hz=(160.0, 1400.0))
 STEEL = Material()
 LAW = ElasticCoulomb(k_t=3e6, k_w=3e6, k_n=5e6, mu=0.3, preload=30.0)
 OBLIQUE = Axis(direction=(0.3, -0.5, 1.0), origin=(0.1, 0.2, 0.0))
@@ -132,7 +135,7 @@ PLACES = {
 @pytest.mark.parametrize("n_modes", [None, 6])
 @pytest.mark.parametrize("speed", [0.0, 200.0])
 def test_a_copy_is_the_part_assembled_in_place(how, n_modes, speed):
-    place, own = PLACES[how], {"n_modes": n_modes, "damping_ratio": 0.01, "between": (1e3, 9e3)}
+    place, own = PLACES[how], {"reduction": n_modes and Reduction(n_modes), "damping": DAMPING}
     mesh = bar()
     there = replace(mesh, points=mesh.points @ place.turn.T + place.move)
     if np.linalg.det(place.turn) < 0:
@@ -160,7 +163,7 @@ def natural_sizes(matrix):
 
 
 def test_copies_share_one_reduction_and_answer_as_parts_of_their_own():
-    mesh, own = bar(), {"n_modes": 8, "damping_ratio": 0.01, "between": (1e3, 9e3)}
+    mesh, own = bar(), {"reduction": Reduction(8), "damping": DAMPING}
     place = place_of(mirror=(0.0, 1.0, 0.0), move=(0.0, 0.06, 0.0))
     first = solid_part(mesh, STEEL, **own)
     there = place.put(mesh.points)
@@ -189,7 +192,7 @@ def test_a_turned_rigid_body_has_its_points_and_inertia_turned():
 
 
 def halves(pairing, cells=(2, 1, 1), n_modes=None):
-    own = {"n_modes": n_modes, "damping_ratio": 0.01, "between": (1e3, 9e3)}
+    own = {"reduction": n_modes and Reduction(n_modes), "damping": DAMPING}
     left = solid_part(bar((2, 1, 1), length=0.2), STEEL, **own)
     right = solid_part(bar(cells, start=0.2, length=0.2, clamp=False), STEEL, **own)
     return Model(
@@ -201,7 +204,7 @@ def halves(pairing, cells=(2, 1, 1), n_modes=None):
 
 
 def whole_bar():
-    own = {"damping_ratio": 0.01, "between": (1e3, 9e3)}
+    own = {"damping": DAMPING}
     return Model(
         parts={"bar": solid_part(bar((4, 1, 1), length=0.4), STEEL, **own)},
         contacts={"stop": Contact(between=("bar.right", "ground"), law=LAW, tangent=(0, 0, 1))},

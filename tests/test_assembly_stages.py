@@ -8,13 +8,13 @@ from test_assembly_copies import LAW, STEEL, bar, pair, place_of
 from test_assembly_wheel import STEEL as SAME
 from test_assembly_wheel import sector_model, shrouded_sector
 
-import stickslip.assembly.reduced
-import stickslip.assembly.wheel
 from stickslip.assembly.placing import copy_of
+from stickslip.model.damping import Damping
 from stickslip.model.part import solid_part
+from stickslip.reduction.choice import METHODS, Reduction
 from stickslip.reduction.fixed_interface import craig_bampton
 
-OWN = {"n_modes": 6, "damping_ratio": 0.01, "between": (1e3, 9e3)}
+OWN = {"reduction": Reduction(6), "damping": Damping(ratio=0.01, between_hz=(160.0, 1400.0))}
 
 
 @pytest.fixture
@@ -26,8 +26,7 @@ def reductions(monkeypatch):
         sizes.append(structure.n)
         return craig_bampton(structure, *others, **more)
 
-    for module in (stickslip.assembly.reduced, stickslip.assembly.wheel):
-        monkeypatch.setattr(module, "craig_bampton", counted)
+    monkeypatch.setitem(METHODS, "craig_bampton", counted)
     return sizes
 
 
@@ -104,5 +103,9 @@ def reduced_sector_model():
     model = sector_model(shrouded_sector())
     return replace(
         model,
-        parts={"blade": solid_part(shrouded_sector(), STEEL, sectors=5, **OWN | {"n_modes": 20})},
+        parts={
+            "blade": solid_part(
+                shrouded_sector(), STEEL, sectors=5, **OWN | {"reduction": Reduction(20)}
+            )
+        },
     )

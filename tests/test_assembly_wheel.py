@@ -19,7 +19,7 @@ from stickslip.contact.surface import nodal_surface
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.axis import Axis
-from stickslip.model.damping import rayleigh_damping
+from stickslip.model.damping import Damping, rayleigh_damping
 from stickslip.model.fe.rotation import rotating_solid
 from stickslip.model.fe.solid import Material
 from stickslip.model.mesh.mesh_facets import facets_of
@@ -121,7 +121,7 @@ def answered(system, load, hertz):
 
 
 def sector_model(mesh, **changes):
-    own = {"damping_ratio": 0.003, "between": (2 * math.pi * 500, 2 * math.pi * 3000)}
+    own = {"damping": Damping(ratio=0.003, between_hz=(500, 3000))}
     return Model(
         parts={"blade": solid_part(mesh, STEEL, sectors=SECTORS, **own)},
         contacts={
@@ -213,7 +213,7 @@ def test_waves_of_unsymmetric_parts_are_not_each_others_mirror():
     for aside in (0.3 * more, 0.3j * more):
         stiffness = scipy.sparse.csr_array(free.stiffness + abs(free.stiffness).max() * aside)
         part = replace(
-            blade, structure=replace(free, stiffness=stiffness), solid=None, damping_ratio=0.0
+            blade, structure=replace(free, stiffness=stiffness), solid=None, damping=None
         )
         own = replace(model, parts={"blade": part}, speed=0.0)
         side = linear_side(
@@ -305,7 +305,12 @@ def test_a_rigid_damper_between_blade_and_next_blade_answers_on_one_sector_as_on
     model = Model(
         parts={
             "blade": solid_part(
-                mesh, STEEL, sectors=SECTORS, damping_ratio=0.003, between=(3000.0, 20000.0)
+                mesh,
+                STEEL,
+                sectors=SECTORS,
+                damping=Damping(
+                    ratio=0.003, between_hz=(3000 / (2 * math.pi), 20000 / (2 * math.pi))
+                ),
             ),
             "damper": rigid_part(body, surfaces),
         },

@@ -256,7 +256,7 @@ def test_modal_dofs_need_no_position(tmp_path):
         ("%%MatrixMarket matrix coordinate real symmetric\n3 3 2\n1 2 1.0\n2 1 1.0\n", "both sides of the diagonal"),
         ("%%MatrixMarket matrix coordinate real symmetric\n3 3 1\n1 1 nan\n", "'nan' is no finite number"),
         ("%%MatrixMarket matrix coordinate pattern symmetric\n3 3 1\n1 1\n", "no Matrix Market matrix of numbers"),
-        ("%%MatrixMarket matrix array real general\n2 2\n1\n0\n0\n1\n", "is of 2 x 2, the table lists 3 dofs"),
+        ("%%MatrixMarket matrix array real general\n2 2\n1\n0\n0\n1\n", "is of 2 x 2, the model has 3 dofs"),
         ("%%MatrixMarket matrix coordinate real symmetric", r"line 2: needs 3 counts"),
     ],
 )  # fmt: skip
@@ -439,7 +439,7 @@ def test_unsymmetric_matrices_are_told(tmp_path):
         ("job", "a file without suffix"),
         ("job.op4", "read_nastran_op4"),
         ("job.inp", "no such file"),
-        ("K.mtx", r"is one matrix, not a whole model. Give nodes="),
+        ("K.mtx", r"is one matrix, not a whole model. Give mass="),
         ("A_STIF1.mtx", r"is one matrix, not a whole model. Give mass="),
         ("K.npz", "not of a structure"),
     ],

@@ -10,14 +10,11 @@ from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.places import node_rows
 from stickslip.assembly.placing import turned_dofs, turned_structure
 from stickslip.errors import InputError, SingularError
-from stickslip.model.damping import rayleigh_damping
 from stickslip.model.dofs import Dofs
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
 from stickslip.reduction.basis import surviving_sets, with_modal_dofs
 from stickslip.reduction.cache import content_hash
-from stickslip.reduction.fixed_interface import craig_bampton
-from stickslip.units import HZ
 
 Store = Callable[[str, Callable[[], Mapping[str, Any]]], Mapping[str, Any]]
 REMEMBERED = 4  # reductions of a part that are kept in memory
@@ -112,12 +109,12 @@ def steady_load(part: Part, spin: Spin, structure: Structure, rest: Steady = ALO
 
 
 def damped(name: str, part: Part, structure: Structure) -> Structure:
-    """Return a structure of a part with its damping."""
-    if part.damping_ratio == 0.0:
+    """Return a structure of a part with the damping that follows from its matrices."""
+    if part.damping is None:
         return structure
-    low, high = part.between
     try:
-        return rayleigh_damping(structure, part.damping_ratio, (low / HZ, high / HZ))
+        # neither tension nor spin softening dissipates
+        return part.damping.of_matrices(structure, part.structure.stiffness)
     except InputError as error:
         raise error.inside(f"part.{name}") from None
 
@@ -192,7 +189,7 @@ def _reduced(
         def make() -> ReducedPart:
             return _reduce(name, part, kept, spin, rest)
 
-        if part.n_modes is None or part.body is not None:
+        if part.reduction is None or part.body is not None:
             made = make()
         else:
             content = _content(part, spin, rest, kept)
@@ -219,10 +216,13 @@ def _reduce(name: str, part: Part, kept: IntArray, spin: Spin, rest: Steady) -> 
     full = at_speed(name, part, spin, rest)
     steady = steady_load(part, spin, full, rest)
     full = damped(name, part, full)
-    if part.n_modes is None or part.body is not None:
-        return ReducedPart(full, np.arange(full.n), steady)
     try:
-        small = craig_bampton(full, kept, part.n_modes)
+        if part.reduction is None or part.body is not None:
+            whole = full if part.damping is None else part.damping.of_modes(full)
+            return ReducedPart(whole, np.arange(full.n), steady)
+        small = part.reduction.of(full, kept)
+        if part.damping is not None:
+            small = part.damping.of_modes(small)
     except InputError as error:
         raise error.inside(f"part.{name}") from None
     except SingularError as error:
@@ -245,8 +245,7 @@ def _content(part: Part, spin: Spin, rest: Steady, kept: IntArray) -> str:
         mesh, material = solid.mesh, solid.material
         given = (material,) if not isinstance(material, list | tuple) else tuple(material)
         turning = (spin, rest.unit, mesh.points, mesh.cells, given, solid.axis, solid.quadrature)
-    damping = (part.damping_ratio, *part.between)
-    return content_hash("craig_bampton", part.structure, kept, part.n_modes, damping, turning)
+    return content_hash("reduced", part.structure, kept, part.reduction, part.damping, turning)
 
 
 def packed(structure: Structure, steady: Matrix) -> dict[str, Any]:

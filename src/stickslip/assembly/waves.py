@@ -1,6 +1,8 @@
 """The sector that a model is, reduced wave by wave; waves that were reduced before are taken from memory or store."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -22,9 +24,12 @@ from stickslip.assembly.wheel import (
     wave_numbers,
     wheel_of,
 )
-from stickslip.errors import InputError
+from stickslip.errors import InputError, input_error
+from stickslip.model.damping import Damping
+from stickslip.model.part import Part
 from stickslip.model.structure import Structure, join
 from stickslip.reduction.cache import content_hash
+from stickslip.reduction.choice import Reduction
 from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.tuned import conjugate
 from stickslip.reduction.whole_wheel import goes_both_ways
@@ -59,18 +64,18 @@ def reduced_sector(
     pairs = replace(
         model.pairs, own=at.columns(model.pairs.own), following=at.columns(model.pairs.following)
     )
-    n_modes, whole = _modes(model)
+    reduction, damping, whole = _reduction(model)
     needed = np.unique(np.concatenate([kept, whole]))
     needed = needed[~np.isin(needed, model.ties.followers)]
     kept = np.unique(partners(sector)[at.of_dofs(needed, model.places.dofs, "part")])
     wheel = (sector.structure, sector.low, sector.high, sector.sectors, sector.axis)
-    content = content_hash("wave", *wheel, kept, n_modes, steady)
+    content = content_hash("wave", *wheel, kept, reduction, damping, steady)
     memo = next(iter(model.parts.values())).memo
 
     def made(k: int) -> tuple[Structure, Matrix]:
         key = f"{content} {k}"
         if key not in memo:
-            memo[key] = _kept(sector, kept, k, n_modes, at.load(steady), (key, store))
+            memo[key] = _kept(sector, kept, k, (reduction, damping), at.load(steady), (key, store))
             forget(memo, tuple, REMEMBERED)
         found: tuple[Structure, Matrix] = memo[key]
         return found
@@ -102,35 +107,76 @@ def _sector_at_speed(model: Model) -> tuple[Structure, FloatArray]:
     return join(**own), np.concatenate(steady)
 
 
-def _modes(model: Model) -> tuple[int | None, IntArray]:
-    """Return the number of modes kept of each wave, and the dofs of parts that are not reduced."""
-    counts = [part.n_modes for part in model.parts.values() if part.body is None]
-    if all(count is None for count in counts):
-        return None, np.zeros(0, dtype=np.int64)
-    high = np.zeros(0, dtype=np.int64) if model.neighbours is None else model.neighbours.high
+def _reduction(model: Model) -> tuple[Reduction | None, Damping | None, IntArray]:
+    """Return how all waves are reduced and damped by their modes, and the dofs of parts that are not reduced.
+
+    Raises
+    ------
+    InputError
+        If parts are to be reduced in different ways: a wave goes through all of them.
+    """
+    bodies = {name: part for name, part in model.parts.items() if part.body is None}
+    ways = {name: part.reduction for name, part in bodies.items() if part.reduction is not None}
+    empty = np.zeros(0, dtype=np.int64)
+    damping = _of_modes(bodies)
+    if not ways:
+        return None, damping, empty
+    high = empty if model.neighbours is None else model.neighbours.high
     whole = [
         np.setdiff1d(model.places.own(name), high)
         for name, part in model.parts.items()
-        if part.n_modes is None
+        if part.reduction is None
     ]
-    return sum(count or 0 for count in counts), np.concatenate([high[:0], *whole])
+    return _one_of(ways), damping, np.concatenate([empty, *whole])
+
+
+def _one_of(ways: Mapping[str, Any]) -> Reduction:
+    """Return the reduction of all parts together: numbers of modes add up, anything else must be alike."""
+    (first, one), *others = ways.items()
+    total = one.n_modes
+    for name, other in others:
+        counts = isinstance(total, int) and isinstance(other.n_modes, int)
+        if other.method != one.method or (not counts and other.n_modes != one.n_modes):
+            raise input_error(
+                f"part.{name}.reduction",
+                f"differs from that of part.{first}, and on a wheel all parts of a sector are reduced together, wave by wave",
+                "Give them the same method, and the same frequency or numbers of modes, which are added.",
+            )
+        if counts:
+            total += other.n_modes
+    return Reduction(total, one.method)
+
+
+def _of_modes(parts: Mapping[str, Part]) -> Damping | None:
+    """Return the damping by modes of the waves of a sector; None for none."""
+    found = [
+        part.damping if part.damping and part.damping.is_modal else None for part in parts.values()
+    ]
+    for name, own in zip(parts, found, strict=True):
+        if own != found[0]:
+            raise input_error(
+                f"part.{name}.damping",
+                "differs, and on a wheel modes are those of all parts of a sector together",
+                "Give all parts the same damping by modes, or another form.",
+            )
+    return found[0] if found else None
 
 
 def _kept(
     sector: CyclicSector,
     kept: IntArray,
     k: int,
-    n_modes: int | None,
+    how: tuple[Reduction | None, Damping | None],
     steady: FloatArray,
     where: tuple[str, Store],
 ) -> tuple[Structure, Matrix]:
     def make() -> tuple[Structure, Matrix]:
         try:
-            return reduced_wave(sector, kept, k, n_modes, steady)
+            return reduced_wave(sector, kept, k, how, steady)
         except InputError as error:
             raise error.inside(f"wave {k}") from None
 
-    if n_modes is None:
+    if how[0] is None:
         return make()
     values = where[1](where[0], lambda: packed(*make()))
     return unpacked(values, sector.structure, kept)

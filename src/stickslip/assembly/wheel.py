@@ -12,11 +12,12 @@ from stickslip.assembly.pairs import Pairs, Turn
 from stickslip.assembly.places import Places, picked, stacked
 from stickslip.assembly.ties import Ties
 from stickslip.errors import InputError, input_error
+from stickslip.model.damping import Damping
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
 from stickslip.reduction.basis import in_coordinates
+from stickslip.reduction.choice import Reduction
 from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
-from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.reduction.nodal import nodal_coordinates
 from stickslip.reduction.relative import in_relative_coordinates
 from stickslip.reduction.tuned import TunedWheel
@@ -218,16 +219,26 @@ class ReducedSector:
 
 
 def reduced_wave(
-    sector: CyclicSector, kept: IntArray, k: int, n_modes: int | None, steady: FloatArray
+    sector: CyclicSector,
+    kept: IntArray,
+    k: int,
+    how: tuple[Reduction | None, Damping | None],
+    steady: FloatArray,
 ) -> tuple[Structure, Matrix]:
-    """Return a reduced wave, its first coordinates the kept dofs, without its way back, and the load of steady rotation on it."""
+    """Return a wave, its first coordinates the kept dofs, without its way back, and the load of steady rotation on it.
+
+    It is reduced, and damped by its modes, as the two of `how` say; None: not.
+    """
+    reduction, damping = how
     place = np.searchsorted(sector.independent, kept)
     moving = travelling_wave(sector, k)
-    if n_modes is not None:
-        moving = craig_bampton(moving, place, n_modes)
+    if reduction is not None:
+        moving = reduction.of(moving, place)
     else:
         rest = np.setdiff1d(np.arange(moving.n), place)
         moving = _in_order(moving, np.concatenate([place, rest]))
+    if damping is not None:
+        moving = damping.of_modes(moving)
     return replace(moving, basis=None), moving.project(steady)
 
 

@@ -1,6 +1,7 @@
 """Public names of `stickslip.model`, written once."""
 
 from .axis import Axis as Axis
+from .damping import Damping as Damping
 from .damping import modal_damping as modal_damping
 from .damping import rayleigh_damping as rayleigh_damping
 from .damping import structural_damping as structural_damping

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse
@@ -14,6 +14,99 @@ from stickslip.model.structure import Structure
 
 ROUNDING = 1e-12  # share of a damping matrix below which its skew part is rounding
 LARGEST = 5000  # dofs of a full damping matrix: 0.2 GB
+
+
+@dataclass(frozen=True, kw_only=True)
+class Damping:
+    """How a part is damped; `loss_factor` may stand beside one of the others.
+
+    Parameters
+    ----------
+    ratio, between_hz
+        Damping ratio at two frequencies in Hz, proportional to mass and stiffness.
+    alpha, beta
+        The same by its factors, ``C = α M + β K``, in 1/s and s.
+    modal
+        Damping ratios of the part's modes, lowest first, or one for all of them: modes of the part by itself, its contacts open.
+    loss_factor
+        η of the complex stiffness ``K (1 + i η)``.
+
+    Raises
+    ------
+    InputError
+        If two forms of viscous damping are given, a number is missing or out of range.
+    """
+
+    ratio: float | None = None
+    between_hz: tuple[float, float] | None = None
+    alpha: float = 0.0
+    beta: float = 0.0
+    modal: float | tuple[float, ...] | None = None
+    loss_factor: float = 0.0
+
+    def __post_init__(self) -> None:
+        factors = bool(self.alpha or self.beta)
+        if (self.ratio is None) != (self.between_hz is None):
+            lacking = "between_hz" if self.between_hz is None else "ratio"
+            raise input_error(
+                f"damping.{lacking}",
+                "is missing, the other of ratio and between_hz is given",
+                "A ratio holds at two frequencies. One ratio of all modes is modal.",
+            )
+        if (self.ratio is not None) + factors + (self.modal is not None) > 1:
+            raise input_error(
+                "damping",
+                "is given in several forms",
+                "Give ratio and between_hz, or alpha and beta, or modal.",
+            )
+        given: dict[str, tuple[float, ...]] = {
+            "alpha": (self.alpha,),
+            "beta": (self.beta,),
+            "loss_factor": (self.loss_factor,),
+        }
+        given["modal"] = self.modal if isinstance(self.modal, tuple) else (self.modal or 0.0,)
+        for name, values in given.items():
+            if not all(0 <= value < math.inf for value in values):
+                raise input_error(
+                    f"damping.{name}", f"must not be negative, got {values}", "0 is none."
+                )
+        if self.ratio is not None and self.between_hz is not None:
+            _check_rayleigh(self.ratio, self.between_hz)
+
+    @property
+    def is_modal(self) -> bool:
+        """Whether modes have to be known."""
+        return self.modal is not None and self.modal != 0.0
+
+    def of_matrices(self, structure: Structure, elastic: Matrix | None = None) -> Structure:
+        """Return a structure with what follows from its matrices; `elastic` as in `structural_damping`."""
+        if self.ratio is not None and self.between_hz is not None:
+            structure = rayleigh_damping(structure, self.ratio, self.between_hz)
+        elif self.alpha or self.beta:
+            proportional = self.alpha * structure.mass + self.beta * structure.stiffness
+            structure = _with_dissipation(structure, proportional)
+        if self.loss_factor:
+            structure = structural_damping(structure, self.loss_factor, elastic=elastic)
+        return structure
+
+    def of_modes(self, structure: Structure) -> Structure:
+        """Return a structure with the damping of its modes; more ratios than it has modes are of no meaning."""
+        if self.modal is None or not self.is_modal:
+            return structure
+        if isinstance(self.modal, float):
+            return modal_damping(structure, self.modal)
+        movable = int(np.count_nonzero(structure.mass.diagonal()))
+        return modal_damping(structure, self.modal[:movable])
+
+
+def _check_rayleigh(ratio: float, between_hz: tuple[float, float]) -> None:
+    low, high = between_hz
+    if not (math.isfinite(ratio) and ratio >= 0):
+        raise input_error("damping ratio", f"must not be negative, got {ratio}", "0.001 is 0.1 %.")
+    if not 0 < low < high < math.inf:
+        raise input_error(
+            "damping between_hz", f"needs 0 < low < high, got {between_hz}", "Give hertz."
+        )
 
 
 def rayleigh_damping(
@@ -30,13 +123,8 @@ def rayleigh_damping(
     between_hz
         Two different frequencies in Hz.
     """
+    _check_rayleigh(ratio, between_hz)
     low, high = between_hz
-    if not (math.isfinite(ratio) and ratio >= 0):
-        raise input_error("damping ratio", f"must not be negative, got {ratio}", "0.001 is 0.1 %.")
-    if not 0 < low < high < math.inf:
-        raise input_error(
-            "damping between_hz", f"needs 0 < low < high, got {between_hz}", "Give hertz."
-        )
     total = 2 * math.pi * (low + high)
     alpha = 2 * ratio * (2 * math.pi) ** 2 * low * high / total
     beta = 2 * ratio / total
@@ -125,6 +213,15 @@ def structural_damping(
             "Give the stiffness in the coordinates of the structure.",
         )
     return replace(structure, loss=loss_factor * source)
+
+
+def dissipates(structure: Structure) -> bool:
+    """Tell whether a structure has damping of its own, Coriolis terms aside."""
+    own = structure.damping
+    symmetric = (own + own.conj().T) / 2
+    return structure.loss is not None or bool(
+        structure.n and abs(symmetric).max() > ROUNDING * abs(own).max()
+    )
 
 
 def _with_dissipation(structure: Structure, damping: Matrix) -> Structure:

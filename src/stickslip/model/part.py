@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from stickslip.arrays import BoolArray, FloatArray
+from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
+from stickslip.model.damping import Damping
 from stickslip.model.fe.elements import EXACT, Quadrature
 from stickslip.model.fe.rotation import RotatingSolid, rotating_solid
 from stickslip.model.fe.solid import Materials
@@ -19,6 +20,19 @@ from stickslip.model.structure import Structure
 
 FACES = ("cyclic_low", "cyclic_high")
 Z_AXIS = Axis()
+
+
+class Reducing(Protocol):
+    """What reduces a structure to some of its dofs and a few modes: `reduction.Reduction`."""
+
+    def of(self, structure: Structure, keep: IntArray) -> Structure:
+        """Return a structure reduced to the dofs `keep` and its modes."""
+        ...
+
+    @property
+    def in_words(self) -> str:
+        """What is kept, for a line about the part."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,10 +139,10 @@ class Part:
         Names of the sets of the low and the high cyclic face.
     axis
         Of rotation.
-    n_modes
-        Fixed-interface modes kept in the reduction; None: the part is not reduced.
-    damping_ratio, between
-        Rayleigh damping: the ratio at two circular frequencies (rad/s); zero: the structure's own damping.
+    reduction
+        How it is reduced; None: not at all.
+    damping
+        How it is damped, instead of by the structure's own damping matrix; None: by that alone.
     template, place
         Of a copy: the part it copies, whose reduction it shares, and where it stands; `copy_of` makes one.
     warnings
@@ -143,9 +157,8 @@ class Part:
     sectors: int = 1
     faces: tuple[str, str] = FACES
     axis: Axis = field(default_factory=Axis)
-    n_modes: int | None = None
-    damping_ratio: float = 0.0
-    between: tuple[float, float] = (1.0, 2.0)
+    reduction: Reducing | None = None
+    damping: Damping | None = None
     template: "Part | None" = None
     place: Place | None = None
     warnings: tuple[str, ...] = ()
@@ -159,8 +172,8 @@ class Part:
             words.append(f"one of {self.sectors} sectors")
         if self.template is not None:
             words.append("a copy")
-        if self.n_modes is not None:
-            words.append(f"{self.n_modes} modes kept")
+        if self.reduction is not None:
+            words.append(self.reduction.in_words)
         names = self.names
         more = ", ..." if len(names) > 8 else ""
         return f"<Part: {'; '.join(words)}; {', '.join(names[:8])}{more}>"
@@ -194,7 +207,7 @@ def solid_part(
     mesh, material, axis, clamped, held, quadrature
         As in `rotating_solid`.
     **others
-        Further fields of `Part`: ``sectors``, ``faces``, ``n_modes``, ``damping_ratio``, ``between``, ``warnings``.
+        Further fields of `Part`: ``sectors``, ``faces``, ``reduction``, ``damping``, ``warnings``.
     """
     solid = rotating_solid(mesh, material, axis, clamped=clamped, held=held, quadrature=quadrature)
     return Part(structure=solid.structure, mesh=mesh, solid=solid, axis=axis, **others)

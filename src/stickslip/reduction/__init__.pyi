@@ -1,6 +1,7 @@
 """Public names of `stickslip.reduction`, written once."""
 
 from .cache import cached as cached
+from .choice import Reduction as Reduction
 from .cyclic import CyclicSector as CyclicSector
 from .cyclic import cyclic_sector as cyclic_sector
 from .cyclic import travelling_wave as travelling_wave

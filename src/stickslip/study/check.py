@@ -1,5 +1,7 @@
 """Everything of a run but the computation: models, static state, natural frequencies, choices, cost. Nothing is written."""
 
+import math
+
 from stickslip.assembly.model import Model
 from stickslip.study.keep.progress import LOG
 from stickslip.study.models.study import Study
@@ -37,7 +39,8 @@ def check_study(study: Study) -> tuple[str, ...]:
 def _size(model: Model) -> str:
     facts = model.facts
     wheel = f"one of {model.sectors} sectors, " if model.sectors > 1 else ""
+    mass = f"mass {facts.mass:.6g} kg, " if math.isfinite(facts.mass) else ""
     return (
-        f"{wheel}{facts.nodes} nodes, {facts.elements} elements, {facts.dofs} free dofs, mass {facts.mass:.6g} kg, "
+        f"{wheel}{facts.nodes} nodes, {facts.elements} elements, {facts.dofs} free dofs, {mass}"
         f"{len(model.pairs.names)} contact points"
     )

@@ -1,5 +1,7 @@
 """Matrices in neutral files: Matrix Market, SciPy's ``.npz``, HDF5; with a CSV file of their dofs."""
 
+import zipfile
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +12,7 @@ from stickslip.errors import input_error, missing_package
 from stickslip.model.dofs import Dofs
 from stickslip.model.npz import BROKEN, DEFLATE_RATIO, Arrays, read_npz
 from stickslip.model.readers.entries import check_symmetric, check_unique
-from stickslip.model.readers.matrix_market import read_matrix_market
+from stickslip.model.readers.matrix_market import MOST_EMPTY, read_matrix_market
 from stickslip.model.readers.node_table import COMPONENTS, csv_columns, csv_numbers
 from stickslip.model.readers.text import whole_numbers
 from stickslip.model.readers.units import SI, Units, check_units, in_si
@@ -29,7 +31,7 @@ def read_matrix_files(
     stiffness: Path | str,
     mass: Path | str,
     *,
-    nodes: Path | str,
+    nodes: Path | str | None = None,
     damping: Path | str | None = None,
     units: Units = SI,
     plausible: bool = True,
@@ -39,11 +41,12 @@ def read_matrix_files(
     Parameters
     ----------
     stiffness, mass, damping
-        Matrix Market (``.mtx``, ``.mtx.gz``), `scipy.sparse.save_npz` or a dense array in ``.npz``, or HDF5 (``.h5``), in
+        Matrix Market (``.mtx``, ``.mtx.gz``), `scipy.sparse.save_npz` or dense arrays in ``.npz``, or HDF5 (``.h5``), in
         which the matrix is the group or dataset called ``stiffness``, ``mass`` or ``damping``.
     nodes
         CSV file, one line a dof in the order of the equations, with the columns ``node, component, x, y, z``; components
-        are x, y, z, rx, ry, rz and mode. A further column ``set`` names sets, separated by blanks.
+        are x, y, z, rx, ry, rz and mode. A further column ``set`` names sets, separated by blanks. None: the dofs are called
+        ``dof1``, ``dof2`` and so on, and have no place.
     units
         Unit system of matrices and positions.
     plausible
@@ -59,12 +62,20 @@ def read_matrix_files(
     InputError
         If a file is damaged, sizes differ, or mass or stiffness is not symmetric.
     """
-    dofs, sets = read_dof_table(Path(nodes))
     files = {"stiffness": Path(stiffness), "mass": Path(mass)}
     if damping is not None:
         files["damping"] = Path(damping)
+    found: dict[str, Matrix] = {}
+    sets: dict[str, IntArray] = {}
+    if nodes is None:
+        found["stiffness"] = read_matrix(files["stiffness"], "stiffness", None)
+        dofs = numbered_dofs(found["stiffness"].shape[0])
+    else:
+        dofs, sets = read_dof_table(Path(nodes))
     n = len(dofs)
-    found = {name: read_matrix(path, name, n) for name, path in files.items()}
+    for name, path in files.items():
+        if name not in found:
+            found[name] = read_matrix(path, name, n)
     for name in ("stiffness", "mass"):
         check_symmetric(found[name], str(files[name]))
     none = scipy.sparse.csr_array((n, n))
@@ -73,6 +84,43 @@ def read_matrix_files(
     if plausible:
         check_units(structure, units, str(stiffness))
     return structure
+
+
+def names_in(path: Path) -> tuple[str, ...]:
+    """Return the names of stiffness, mass and damping that a file holds; none of a file of one matrix, or none at all."""
+    suffix = path.suffix.lower()
+    found: Collection[str] = ()
+    if suffix == ".npz":
+        found = _names_in_npz(path)
+    elif suffix in HDF5:
+        found = _names_in_hdf5(path)
+    if "format" in found:  # a structure, or one sparse matrix
+        return ()
+    return tuple(name for name in ("stiffness", "mass", "damping") if name in found)
+
+
+def _names_in_npz(path: Path) -> Collection[str]:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return {name.removesuffix(".npy") for name in archive.namelist()}
+    except (OSError, ValueError, RuntimeError, zipfile.BadZipFile):  # told when it is read
+        return ()
+
+
+def _names_in_hdf5(path: Path) -> Collection[str]:
+    try:
+        import h5py
+
+        with h5py.File(path, "r") as file:
+            return set(file)
+    except (ModuleNotFoundError, OSError, RuntimeError):  # told when its matrices are read
+        return ("mass",)
+
+
+def numbered_dofs(n: int) -> Dofs:
+    """Return the table of `n` dofs of which nothing is known: ``dof1``, ``dof2`` and so on."""
+    names = tuple(f"dof{i + 1}" for i in range(n))
+    return Dofs(np.full(n, -1), names, np.full((n, 3), np.nan))
 
 
 def read_dof_table(path: Path) -> tuple[Dofs, dict[str, IntArray]]:
@@ -102,8 +150,8 @@ def read_dof_table(path: Path) -> tuple[Dofs, dict[str, IntArray]]:
     return Dofs(node, components, position), {k: np.array(v) for k, v in sets.items()}
 
 
-def read_matrix(path: Path, name: str, n: int) -> Matrix:
-    """Return one (n, n) matrix, sparse as CSR; `name` picks it from a file that holds several.
+def read_matrix(path: Path, name: str, n: int | None) -> Matrix:
+    """Return one (n, n) matrix, of any size if that is None, sparse as CSR; `name` picks it from a file that holds several.
 
     Raises
     ------
@@ -131,11 +179,19 @@ def read_matrix(path: Path, name: str, n: int) -> Matrix:
     return matrix
 
 
-def _check_size(shape: tuple[int, int], n: int, place: str) -> None:
+def _check_size(shape: tuple[int, int], n: int | None, stored: int, place: str) -> None:
+    if n is None and shape[0] == shape[1] and 0 < shape[0] <= MOST_EMPTY * stored:
+        return
+    if n is None:
+        raise input_error(
+            place,
+            f"is of {shape[0]} x {shape[1]} with {stored} entries, no stiffness of a model",
+            "Give a square matrix.",
+        )
     if shape != (n, n):
         raise input_error(
             place,
-            f"is of {shape[0]} x {shape[1]}, the table lists {n} dofs",
+            f"is of {shape[0]} x {shape[1]}, the model has {n} dofs",
             "Give matrices and dofs of the same model.",
         )
 
@@ -181,7 +237,7 @@ def _dataset(dataset: Matrix, path: Path) -> Matrix:
     return dataset[()]
 
 
-def _from_arrays(arrays: Arrays, name: str, n: int, place: str) -> Matrix:
+def _from_arrays(arrays: Arrays, name: str, n: int | None, place: str) -> Matrix:
     """Return a matrix from its arrays: dense, or in one of SciPy's sparse layouts."""
     if name not in arrays and len(arrays) == 1:
         name = next(iter(arrays))
@@ -191,7 +247,7 @@ def _from_arrays(arrays: Arrays, name: str, n: int, place: str) -> Matrix:
             raise input_error(
                 place, f"{name} is an array of {dense.shape}, no matrix of numbers", "Check it."
             )
-        _check_size((dense.shape[0], dense.shape[1]), n, place)
+        _check_size((dense.shape[0], dense.shape[1]), n, dense.size, place)
         return dense
     layout = arrays.get("format", np.array("csr"))
     kind = layout.item() if layout.shape == () else ""
@@ -210,7 +266,8 @@ def _from_arrays(arrays: Arrays, name: str, n: int, place: str) -> Matrix:
         raise input_error(place, "has indices that are no integers, or no numbers", BROKEN)
     if shape.shape != (2,):
         raise input_error(place, "has a shape that is no pair", BROKEN)
-    _check_size((int(shape[0]), int(shape[1])), n, place)
+    _check_size((int(shape[0]), int(shape[1])), n, data.size, place)
+    n = int(shape[0])
     try:
         if kind == "coo":
             matrix = scipy.sparse.coo_array((data, (first, second)), shape=(n, n))

@@ -10,11 +10,12 @@ from stickslip.errors import InputError, input_error
 from stickslip.model.readers.entries import check_range, check_unique
 from stickslip.model.readers.text import CUT_SHORT, SHOWN, number_table, read_text, whole_numbers
 
+MOST_EMPTY = 10  # rows an entry above which a size is not believed
 FIELDS = {"real": 1, "integer": 1, "double": 1, "complex": 2}  # numbers of a value
 SYMMETRIES = ("general", "symmetric", "hermitian", "skew-symmetric")
 
 
-def read_matrix_market(path: Path, n: int) -> Matrix:
+def read_matrix_market(path: Path, n: int | None) -> Matrix:
     """Return the (n, n) matrix of a Matrix Market file, CSR for the layout ``coordinate``, dense for ``array``.
 
     Parameters
@@ -22,7 +23,7 @@ def read_matrix_market(path: Path, n: int) -> Matrix:
     path
         The file, or the same gzipped.
     n
-        Its size, so that nothing is made before the file has said the same.
+        Its size, so that nothing is made before the file has said the same; None: the one that it says, if its entries fill it.
 
     Raises
     ------
@@ -45,10 +46,12 @@ def read_matrix_market(path: Path, n: int) -> Matrix:
     at = next((i for i, line in enumerate(lines) if line.strip()), 0)
     sparse, width = words[2] == "coordinate", FIELDS[words[3]]
     counts = _counts(path, lines[at] if lines else "", at + 2, 3 if sparse else 2)
+    if n is None:
+        n = _own_size(path, counts)
     if counts[:2] != [n, n]:
         raise input_error(
             str(path),
-            f"is of {counts[0]} x {counts[1]}, the table lists {n} dofs",
+            f"is of {counts[0]} x {counts[1]}, the model has {n} dofs",
             "Give matrices and dofs of the same model.",
         )
     columns = 2 + width if sparse else width
@@ -73,6 +76,19 @@ def _counts(path: Path, line: str, number: int, count: int) -> list[int]:
     if len(found) != count or min(found, default=-1) < 0:
         raise _bad_counts(path, line, number, count)
     return found
+
+
+def _own_size(path: Path, counts: list[int]) -> int:
+    """Return the size that a file says, which its entries must fill as those of a stiffness do."""
+    n, columns = counts[:2]
+    stored = counts[2] if len(counts) > 2 else n * columns
+    if n != columns or not 0 < n <= MOST_EMPTY * stored:
+        raise input_error(
+            str(path),
+            f"is of {n} x {columns} with {stored} entries, no stiffness of a model",
+            "Give a square matrix.",
+        )
+    return n
 
 
 def _bad_counts(path: Path, line: str, number: int, count: int) -> InputError:

@@ -16,7 +16,7 @@ from stickslip.model.readers.ansys_results import AnsysResults, read_ansys_resul
 from stickslip.model.readers.calculix import read_calculix_matrices
 from stickslip.model.readers.calculix_deck import Deck, assemble_deck, read_deck
 from stickslip.model.readers.frd import FrdResults, read_frd
-from stickslip.model.readers.matrix_files import read_matrix_files
+from stickslip.model.readers.matrix_files import names_in, read_matrix_files
 from stickslip.model.readers.nastran import NastranResults, read_nastran_op2
 from stickslip.model.readers.summary import (
     ModelSummary,
@@ -175,7 +175,9 @@ def _calculix(files: _Files) -> Structure:
 
 
 def _npz(files: _Files) -> Structure:
-    return load_structure(files.path) if files.mass is None else _neutral(files)
+    if files.mass is None and "stiffness" not in names_in(files.path):
+        return load_structure(files.path)
+    return _neutral(files)
 
 
 def _mtx(files: _Files) -> Structure:
@@ -196,14 +198,13 @@ def _mtx(files: _Files) -> Structure:
 
 
 def _neutral(files: _Files) -> Structure:
-    if files.nodes is None:
-        raise _lacks(files.path, "$nodes, a CSV file node, component, x, y, z with one line a dof")
-    # HDF5 may hold all matrices in one file
-    mass = files.mass or (files.path if files.path.suffix.lower() in (".h5", ".hdf5") else None)
+    here = names_in(files.path)  # one file may hold all matrices
+    mass = files.mass or (files.path if "mass" in here else None)
+    damping = files.damping or (files.path if "damping" in here else None)
     if mass is None:
         raise _lacks(files.path, "$mass, the matrix of the mass")
     return read_matrix_files(
-        files.path, mass, nodes=files.nodes, damping=files.damping, units=files.units,
+        files.path, mass, nodes=files.nodes, damping=damping, units=files.units,
         plausible=files.plausible,
     )  # fmt: skip
 

@@ -1,14 +1,20 @@
 """The tables [material], [damping] and [reduction], of the whole study or of a part."""
 
-from typing import Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from stickslip.model.damping import Damping
 from stickslip.model.fe.solid import Material
 from stickslip.model.readers.units import MODULI, SOLIDS
+from stickslip.reduction.choice import Reduction
+from stickslip.reduction.truncation import FrequencyError, ModeChoice, ModesBelow
 from stickslip.study.file.quantities import table_of
 from stickslip.study.file.section import Positive, Section, custom_error, rising_pair
 
+FEW = 25  # fixed-interface modes where the study does not say
+OWN_MODES = {"craig_bampton": "fixed_interface_modes", "rubin": "free_interface_modes"}
+MODES_OF = tuple(OWN_MODES.values())
 # what a number may have been meant in, for messages
 STRESSES = {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3}
 DENSITIES = {"g/cm³": 1e3, "kg/mm³": 1e9, "t/mm³": 1e12}
@@ -44,28 +50,153 @@ class _PlausibleMaterial(Section):
 MaterialTable: Any = table_of(Material, base=_PlausibleMaterial, name="MaterialTable")
 
 
-class Reduction(Section):
-    """Craig-Bampton reduction of a part: what contacts, loads and outputs need stays physical."""
+class ReductionTable(Section):
+    """Reduction of a part: what contacts, loads and outputs need stays physical, the rest becomes a few modes."""
 
-    fixed_interface_modes: int = Field(
-        25,
-        ge=1,
-        le=500,
-        description="number of fixed-interface modes kept beside the static ones, 1 to 500",
+    method: Literal["craig_bampton", "rubin", "none"] = Field(
+        "craig_bampton",
+        description="craig_bampton (modes with the physical dofs fixed), rubin (with them free; exact free modes), or none: the part "
+        "is kept whole",
     )
-
-
-class Damping(Section):
-    """Structural damping, proportional to mass and stiffness."""
-
-    ratio: float = Field(
-        ge=0, lt=1, description="damping ratio at the two frequencies of between_hz, 0 to 1"
+    fixed_interface_modes: Annotated[int, Field(ge=1, le=500)] | None = Field(
+        None,
+        description=f"of craig_bampton: number of modes kept, 1 to 500; left out: {FEW}. A part with fewer keeps all",
     )
-    between_hz: list[Positive] = Field(
-        min_length=2, max_length=2, description="two frequencies in Hz, the lower first"
+    free_interface_modes: Annotated[int, Field(ge=1, le=500)] | None = Field(
+        None, description="of rubin: number of modes kept, rigid motions among them, 1 to 500"
+    )
+    up_to_hz: Positive | None = Field(
+        None,
+        description="instead of a number: highest frequency in Hz that the reduced part is meant for; modes below factor times that "
+        "are kept",
+    )
+    factor: Annotated[float, Field(ge=1, le=20)] | None = Field(
+        None,
+        description="with up_to_hz: modes up to factor times it are kept, 1 to 20; left out: 1.5",
+    )
+    frequency_error: Annotated[float, Field(gt=0, lt=0.5)] | None = Field(
+        None,
+        description="of craig_bampton, with up_to_hz and instead of factor: as many modes as it takes for the part's natural "
+        "frequencies to be right to this share, such as 1e-4",
     )
 
     @model_validator(mode="after")
-    def _rises(self) -> Self:
-        rising_pair(self.between_hz, "between_hz")
+    def _agrees(self) -> Self:
+        own = OWN_MODES.get(self.method)
+        for key in MODES_OF:
+            if key != own and getattr(self, key) is not None:
+                raise _not_of(self.method, key)
+        if self.method != "craig_bampton" and self.frequency_error is not None:
+            raise _not_of(self.method, "frequency_error")
+        if self.method == "none" and self.up_to_hz is not None:
+            raise _not_of(self.method, "up_to_hz")
+        if own is not None and self.up_to_hz is not None and getattr(self, own) is not None:
+            raise custom_error(
+                f"is given together with {own}",
+                "Give a number of modes or a frequency.",
+                "up_to_hz",
+            )
+        for key in ("factor", "frequency_error"):
+            if getattr(self, key) is not None and self.up_to_hz is None:
+                raise custom_error(
+                    "goes together with up_to_hz", "Give the highest frequency of interest.", key
+                )
+        if self.factor is not None and self.frequency_error is not None:
+            raise custom_error(
+                "is given together with factor",
+                "Give one: the error decides how many modes are kept.",
+                "frequency_error",
+            )
+        if self.method == "rubin" and self.free_interface_modes is None and self.up_to_hz is None:
+            raise custom_error(
+                "is missing with rubin",
+                "Give a number of modes, or up_to_hz.",
+                "free_interface_modes",
+            )
         return self
+
+    def library(self) -> Reduction | None:
+        """Return the reduction; None for none."""
+        if self.method == "none":
+            return None
+        return Reduction(self._n_modes(), self.method)
+
+    def _n_modes(self) -> ModeChoice:
+        if self.up_to_hz is None:
+            return getattr(self, OWN_MODES[self.method]) or FEW
+        if self.frequency_error is not None:
+            return FrequencyError(self.frequency_error, self.up_to_hz)
+        return ModesBelow(self.up_to_hz, self.factor or 1.5)
+
+
+def _not_of(method: str, key: str) -> Exception:
+    return custom_error(
+        f"is no key of the method {method}", "Remove it, or choose the method that has it.", key
+    )
+
+
+class DampingTable(Section):
+    """Damping of a part: ratio and between_hz, or alpha_per_s and beta_s, or modal_ratio, or modal_ratios; and a loss factor."""
+
+    ratio: Annotated[float, Field(ge=0, lt=1)] | None = Field(
+        None, description="damping ratio at the two frequencies of between_hz, 0 to 1"
+    )
+    between_hz: list[Positive] | None = Field(
+        None, min_length=2, max_length=2, description="two frequencies in Hz, the lower first"
+    )
+    alpha_per_s: float | None = Field(
+        None, ge=0, le=1e6, description="damping proportional to the mass: C = α M + β K, α in 1/s"
+    )
+    beta_s: float | None = Field(
+        None, ge=0, le=1, description="damping proportional to the stiffness: β in s"
+    )
+    modal_ratio: Annotated[float, Field(ge=0, lt=1)] | None = Field(
+        None,
+        description="one damping ratio of all modes of the part by itself, its contacts open, 0 to 1",
+    )
+    modal_ratios: list[Annotated[float, Field(ge=0, lt=1)]] | None = Field(
+        None,
+        min_length=1,
+        max_length=500,
+        description="damping ratios of these modes, lowest first, 0 to 1 each; higher modes are not damped",
+    )
+    loss_factor: Annotated[float, Field(ge=0, lt=1)] | None = Field(
+        None,
+        description="loss factor η of the material, stiffness K (1 + i η), twice the damping ratio of a resonance, 0 to 1; alone or "
+        "beside another form",
+    )
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        rising_pair(self.between_hz or [], "between_hz")
+        if (self.ratio is None) != (self.between_hz is None):
+            raise custom_error(
+                "is missing, the other of ratio and between_hz is given",
+                "A ratio holds at two frequencies; one of all modes is modal_ratio.",
+                "between_hz" if self.between_hz is None else "ratio",
+            )
+        forms = [
+            self.ratio is not None,
+            self.alpha_per_s is not None or self.beta_s is not None,
+            self.modal_ratio is not None,
+            self.modal_ratios is not None,
+        ]
+        if sum(forms) > 1 or (not any(forms) and self.loss_factor is None):
+            found = "several forms" if any(forms) else "no number"
+            raise custom_error(
+                f"is given in {found}",
+                "Give ratio and between_hz, or alpha_per_s and beta_s, or modal_ratio, or modal_ratios; or loss_factor.",
+            )
+        return self
+
+    def library(self) -> Damping:
+        """Return the damping."""
+        low, high = self.between_hz or (0.0, 0.0)
+        return Damping(
+            ratio=self.ratio,
+            between_hz=None if self.between_hz is None else (low, high),
+            alpha=self.alpha_per_s or 0.0,
+            beta=self.beta_s or 0.0,
+            modal=self.modal_ratio if self.modal_ratios is None else tuple(self.modal_ratios),
+            loss_factor=self.loss_factor or 0.0,
+        )

@@ -18,7 +18,7 @@ from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.rigid.damper import FlatCurvedDamper
-from stickslip.study.file.material import Damping, MaterialTable, Reduction
+from stickslip.study.file.material import DampingTable, MaterialTable, ReductionTable
 from stickslip.study.file.quantities import table_of
 from stickslip.study.file.section import (
     FilePath,
@@ -41,10 +41,10 @@ class PartTable(Section):
     material: MaterialTable | None = Field(
         None, description="the table of its material; left out: the table [material]"
     )
-    damping: Damping | None = Field(
+    damping: DampingTable | None = Field(
         None, description="the table of its damping; left out: the table [damping]"
     )
-    reduction: Reduction | None = Field(
+    reduction: ReductionTable | None = Field(
         None, description="the table of its reduction; left out: the table [reduction]"
     )
 

@@ -12,7 +12,7 @@ from stickslip.study.analyses.analysis import named
 from stickslip.study.file.contacts import ContactTable, JoinTable
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.file.loads import Limits, LoadTable, Output, Retention, Rotation
-from stickslip.study.file.material import Damping, MaterialTable, Reduction
+from stickslip.study.file.material import DampingTable, MaterialTable, ReductionTable
 from stickslip.study.file.parts import AnyPart
 from stickslip.study.file.section import Name, Section
 
@@ -45,10 +45,10 @@ class Tables(Section):
     material: MaterialTable | None = Field(
         None, description="the table [material], of all parts without their own"
     )
-    damping: Damping | None = Field(
+    damping: DampingTable | None = Field(
         None, description="the table [damping], of all parts without their own"
     )
-    reduction: Reduction | None = Field(
+    reduction: ReductionTable | None = Field(
         None, description="the table [reduction], of all parts without their own"
     )
     contact: dict[Name, ContactTable] = Field(  # type: ignore[valid-type]

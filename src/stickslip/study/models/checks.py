@@ -1,5 +1,6 @@
 """What can be refused without a mesh: names that are not there, files that are not there, questions without what they need."""
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ BLADES = ("root", "force", "tip1", "edge1", "tip2")
 SECTOR = ("root", "cyclic_low", "cyclic_high", "tip")
 SIDES = ("flat", "curved")
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
+NUMBERED = re.compile(r"dof[1-9]\d*")  # dofs of matrices without a table
 
 
 def refusals(tables: Tables, home: Path) -> Iterator[InputError]:
@@ -222,7 +224,8 @@ def _outputs(tables: Tables) -> Iterator[InputError]:
     peak = tables.output.peak
     if peak:
         head, _, direction = peak.partition(".")
-        if head not in tables.output.points or direction not in COMPONENTS:
+        known_direction = direction in COMPONENTS or NUMBERED.fullmatch(direction)
+        if head not in tables.output.points or not known_direction:
             usual = tables.output.directions or COMPONENTS[:3]
             known = [f"{name}.{d}" for name in tables.output.points for d in usual]
             yield input_error(

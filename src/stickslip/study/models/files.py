@@ -10,6 +10,7 @@ import numpy as np
 from stickslip.arrays import IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.axis import Axis
+from stickslip.model.damping import dissipates
 from stickslip.model.fe.elements import EXACT, Quadrature
 from stickslip.model.fe.solid import Material, Materials
 from stickslip.model.mesh.solid_mesh import SolidMesh
@@ -173,6 +174,10 @@ def _from_matrices(key: str, table: FileModel, home: Path, others: dict[str, Any
     mesh = None
     if "mesh" in files and files["mesh"].name.lower().endswith(DECKS):
         mesh = read_deck(files["mesh"], units=_units(table), plausible=table.plausible).mesh
+    if table.damping is None and dissipates(
+        structure
+    ):  # its own is meant, not that of the whole study
+        others = {name: value for name, value in others.items() if name != "damping"}
     faces = _faces(key, table, structure.sets, sectors)
     return structure_part(
         structure, mesh=mesh, sectors=sectors, faces=faces, axis=table.axis() or Axis(), **others

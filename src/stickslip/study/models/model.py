@@ -10,7 +10,6 @@ from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 from stickslip.model.part import Part
 from stickslip.study.file.loads import LoadTable
-from stickslip.study.file.parts import BeamTable, Lumped
 from stickslip.study.file.tables import Tables
 from stickslip.study.models.files import alike
 from stickslip.study.models.parts import Memo, Workshop
@@ -40,7 +39,7 @@ def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
     rotation = tables.rotation
     model = Model(
         parts=parts,
-        contacts={name: _contact(tables, parts, table) for name, table in tables.contact.items()},
+        contacts={name: _contact(parts, table) for name, table in tables.contact.items()},
         joins={
             name: Join(
                 between=_between(parts, table.between),
@@ -77,25 +76,22 @@ def newton(tables: Tables, table: LoadTable) -> float:
     return newton(tables, other) / table.ratio
 
 
-def _contact(tables: Tables, parts: Mapping[str, Part], table: Any) -> Contact:
+def _contact(parts: Mapping[str, Part], table: Any) -> Contact:
     return Contact(
         between=_between(parts, table.between),
         law=table.library(),
         share=table.per,
         pairing=table.pairing,
         tangent=None if table.tangent is None else tuple(table.tangent),
-        acts=table.acts or _acts(tables, table),
+        acts=table.acts or _acts(table),
         tolerance=table.tolerance_m,
         gap=table.gap,
         preload=table.preload,
     )
 
 
-def _acts(tables: Tables, table: Any) -> Any:
-    """Return the direction of a contact that the motion of single dofs is; None for surfaces, which have normals."""
-    part = tables.part[table.between[0].partition(".")[0]]
-    if not isinstance(part, Lumped | BeamTable):
-        return None
+def _acts(table: Any) -> Any:
+    """Return the direction of a contact that the motion of single dofs is where the study does not say; surfaces have normals."""
     return "normal" if table.law in NORMAL_ALONE else "tangential"
 
 

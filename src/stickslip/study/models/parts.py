@@ -31,7 +31,7 @@ from stickslip.model.part import (
 )
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.rigid.damper import ContactPoints, FlatCurvedDamper
-from stickslip.study.file.material import Reduction
+from stickslip.study.file.material import ReductionTable
 from stickslip.study.file.parts import (
     AXES,
     BeamTable,
@@ -48,7 +48,7 @@ from stickslip.study.file.quantities import build
 from stickslip.study.file.section import Section
 from stickslip.study.file.tables import Tables
 from stickslip.study.models.files import file_part, with_companions
-from stickslip.units import DEG, HZ
+from stickslip.units import DEG
 
 LOG = logging.getLogger("stickslip")
 REMEMBERED = 16  # parts that are kept in memory
@@ -120,14 +120,13 @@ class Workshop:
 
     def others(self, table: Any, *, reduced: bool = True) -> dict[str, Any]:
         """Return how a part is damped and reduced; `reduced`: whether it is where the study does not say."""
-        reduction = table.reduction or self.tables.reduction or Reduction()
+        reduction = table.reduction or self.tables.reduction or ReductionTable()
         found: dict[str, Any] = {}
         if reduced or table.reduction is not None:
-            found["n_modes"] = reduction.fixed_interface_modes
+            found["reduction"] = reduction.library()
         damping = table.damping or self.tables.damping
         if damping is not None:
-            low, high = damping.between_hz
-            found |= {"damping_ratio": damping.ratio, "between": (HZ * low, HZ * high)}
+            found["damping"] = damping.library()
         return found
 
     def blades(self, name: str, table: Any) -> Part:
@@ -160,7 +159,7 @@ class Workshop:
         structure = lumped(np.array(table.masses_kg), stiffness, damping, table.labels)
         others = self.others(table, reduced=False)
         if table.dashpots_n_s_per_m and table.damping is None:  # has its own
-            others = {key: value for key, value in others.items() if key == "n_modes"}
+            others.pop("damping", None)
         return structure_part(structure, **others)
 
     def rigid(self, name: str, table: Any) -> Part:

@@ -44,7 +44,7 @@ class Estimate:
 
     def __str__(self) -> str:
         return (
-            f"estimate: {self.nodes} nodes, {self.unknowns} unknowns at most, {self.memory_gb:.1f} GB of memory, "
+            f"estimate: {self.unknowns} unknowns at most, {self.memory_gb:.1f} GB of memory, "
             f"{self.newton_steps} Newton steps, {self.seconds:.0f} s"
         )
 

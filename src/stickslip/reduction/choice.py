@@ -1,0 +1,66 @@
+"""How a part is reduced: the method, and how many modes it keeps."""
+
+from dataclasses import dataclass
+from typing import Literal, Protocol, get_args
+
+from stickslip.arrays import IntArray
+from stickslip.errors import input_error
+from stickslip.model.structure import Structure
+from stickslip.reduction.fixed_interface import craig_bampton
+from stickslip.reduction.free_interface import rubin
+from stickslip.reduction.truncation import FrequencyError, ModeChoice
+
+Method = Literal["craig_bampton", "rubin"]
+
+
+class _Reduces(Protocol):
+    def __call__(self, structure: Structure, keep: IntArray, n_modes: ModeChoice) -> Structure: ...
+
+
+METHODS: dict[str, _Reduces] = {"craig_bampton": craig_bampton, "rubin": rubin}  # type: ignore[dict-item]
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """A method of reduction with its number of modes.
+
+    Parameters
+    ----------
+    n_modes
+        Modes kept beside the static shapes: a number (a structure with fewer keeps all), `ModesBelow` a frequency, or, with
+        Craig-Bampton, `FrequencyError`.
+    method
+        ``craig_bampton``: modes with the kept dofs fixed; ``rubin``: modes with them free, rigid motions among them.
+
+    Raises
+    ------
+    InputError
+        If the method is unknown or cannot tell its error.
+    """
+
+    n_modes: ModeChoice = 25
+    method: Method = "craig_bampton"
+
+    def __post_init__(self) -> None:
+        if self.method not in get_args(Method):
+            known = " or ".join(METHODS)
+            raise input_error("Reduction.method", f"is {self.method!r}", f"Give {known}.")
+        if self.method == "rubin" and isinstance(self.n_modes, FrequencyError):
+            raise input_error(
+                "Reduction.n_modes",
+                "is an error of frequencies, and modes that rubin keeps are exact",
+                "Give a number of modes, or ModesBelow a frequency.",
+            )
+
+    def of(self, structure: Structure, keep: IntArray) -> Structure:
+        """Return a structure reduced to the dofs `keep` and its modes; see `craig_bampton` and `rubin`."""
+        n_modes = self.n_modes
+        if isinstance(n_modes, int):
+            n_modes = min(n_modes, structure.n - len(keep))
+        return METHODS[self.method](structure, keep, n_modes)
+
+    @property
+    def in_words(self) -> str:
+        """What is kept, for a line about the part."""
+        modes = f"{self.n_modes} modes" if isinstance(self.n_modes, int) else repr(self.n_modes)
+        return f"{self.method}, {modes}"

@@ -1,0 +1,118 @@
+"""J5: matrices of one's own from .npz or Matrix Market, contacts named by dof, against the same model from masses and springs."""
+
+import runpy
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+import scipy.sparse
+from small_v2 import EXAMPLES, changed
+from test_cli import done, refused
+
+from stickslip.front.result import Result
+
+EXAMPLE = EXAMPLES / "own_matrices"
+FEW = {"forced_response.points": "8", "forced_response.peak_points": "0"}
+FEW["part.chain.reduction.method"] = (
+    '"none"'  # else its modes are coordinates, and round off otherwise
+)
+TABLE = "node,component,x,y,z\n" + "".join(f"{i + 1},x,0,0,0\n" for i in range(20))
+SPRINGS = ", ".join(f'["{f"m{i}" if i else "ground"}", "m{i + 1}", 2e5]' for i in range(20))
+LUMPED = f'shape = "lumped"\nmasses_kg = {[0.5] * 20}\nsprings_n_per_m = [{SPRINGS}]\n'
+OF_THE_FILE = 'file = "chain.npz"', 'units = "SI"'
+
+
+def write(folder: Path, part: str, dof: str) -> Path:
+    """Write the study of the example about another part, whose dofs have other names."""
+    folder.mkdir(parents=True, exist_ok=True)
+    text = (EXAMPLE / "study.toml").read_text()
+    lines = [line for line in text.splitlines() if not line.startswith(OF_THE_FILE)]
+    text = "\n".join(lines).replace("[part.chain]", f"[part.chain]\n{part}")
+    for i in range(20, 0, -1):
+        text = text.replace(f"chain.dof{i}", f"chain.{dof.format(i)}")
+    path = folder / "study.toml"
+    path.write_text(changed(text, FEW | {"output.peak": '""'}))
+    return path
+
+
+def response(path: Path) -> np.ndarray:
+    done("run", str(path), "--no-report")
+    data = Result.open(path.parent / "results").data["forced_response"]
+    return np.column_stack([data["frequency_hz"], data["amplitude"]])
+
+
+@pytest.fixture(scope="module")
+def chain(tmp_path_factory: pytest.TempPathFactory):
+    path = write(tmp_path_factory.mktemp("lumped"), LUMPED, "m{}")
+    return response(path)
+
+
+def matrices() -> tuple[np.ndarray, np.ndarray]:
+    with np.load(EXAMPLE / "chain.npz") as arrays:
+        return arrays["mass"], arrays["stiffness"]
+
+
+def test_the_script_of_the_example_writes_its_matrices(tmp_path: Path) -> None:
+    shutil.copy(EXAMPLE / "make_matrices.py", tmp_path)
+    runpy.run_path(str(tmp_path / "make_matrices.py"))
+    assert (tmp_path / "chain.npz").read_bytes() != b""
+    with np.load(tmp_path / "chain.npz") as arrays:
+        for name, kept in zip(("mass", "stiffness"), matrices(), strict=True):
+            assert np.array_equal(arrays[name], kept)
+
+
+@pytest.mark.parametrize("kind", ["npz", "mtx", "sparse npz with a table"])
+def test_own_matrices_give_the_response_of_the_same_masses_and_springs(tmp_path, chain, kind):
+    mass, stiffness = matrices()
+    part, dof = '\nunits = "SI"', "dof{}"
+    if kind == "npz":
+        shutil.copy(EXAMPLE / "chain.npz", tmp_path)
+        part = 'file = "chain.npz"' + part
+    elif kind == "mtx":
+        for name, matrix in (("K", stiffness), ("M", mass)):
+            scipy.io.mmwrite(tmp_path / f"{name}.mtx", scipy.sparse.coo_array(matrix))
+        part = 'file = "K.mtx"\nmass = "M.mtx"' + part
+    else:
+        for name, matrix in (("K", stiffness), ("M", mass)):
+            scipy.sparse.save_npz(tmp_path / f"{name}.npz", scipy.sparse.csr_array(matrix))
+        (tmp_path / "dofs.csv").write_text(TABLE)
+        part, dof = 'file = "K.npz"\nmass = "M.npz"\nnodes = "dofs.csv"' + part, "node{}.x"
+    found = response(write(tmp_path, part, dof))
+    assert found.shape == chain.shape
+    assert np.all(np.abs(found - chain) < 1e-10 * np.max(np.abs(chain), axis=0))
+
+
+def test_damping_in_the_file_is_kept_and_a_table_of_the_part_replaces_it(tmp_path: Path) -> None:
+    from stickslip.study.models.study import read_study
+
+    mass, stiffness = matrices()
+    np.savez(tmp_path / "chain.npz", mass=mass, stiffness=stiffness, damping=1e-4 * stiffness)
+    shutil.copy(EXAMPLE / "study.toml", tmp_path)
+    part = read_study(tmp_path / "study.toml").model().parts["chain"]
+    assert part.damping is None
+    assert np.array_equal(part.structure.damping, 1e-4 * stiffness)
+    own = "[part.chain.damping]\nmodal_ratio = 0.01\n[contact.brake]"
+    text = (EXAMPLE / "study.toml").read_text().replace("[contact.brake]", own)
+    (tmp_path / "study.toml").write_text(text)
+    part = read_study(tmp_path / "study.toml").model().parts["chain"]
+    assert part.damping is not None
+    assert part.damping.modal == 0.01
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"load.shaker.on": '"chain.dof21"'}, "there is no surface or set 'chain.dof21'"),
+        ({"part.chain.file": '"none.npz"'}, "there is no file"),
+        ({"part.chain.mass": '"M.mtx"'}, "is of 3 x 3, the model has 20 dofs"),
+    ],
+)
+def test_what_does_not_fit_is_refused_by_name(tmp_path: Path, changes, message) -> None:
+    for name in ("chain.npz", "study.toml"):
+        shutil.copy(EXAMPLE / name, tmp_path)
+    scipy.io.mmwrite(tmp_path / "M.mtx", scipy.sparse.eye_array(3).tocoo())
+    path = tmp_path / "study.toml"
+    path.write_text(changed(path.read_text(), changes))
+    assert message in refused("check", str(path))
