@@ -4,8 +4,7 @@ import stickslip as ss
 
 damper = ss.FlatCurvedDamper()
 mesh = ss.model.mesh_blade_pair(ss.BladePair(), damper.contact_points())
-blades = ss.model.solid_part(mesh, ss.Material(), reduction=ss.reduction.Reduction(25),
-                             damping=ss.model.Damping(ratio=0.003, between_hz=(150, 300)))  # fmt: skip
+blades = ss.model.solid_part(mesh, ss.Material(), reduction=ss.reduction.Reduction(25), damping=ss.model.Damping(ratio=0.003, between_hz=(150, 300)))  # fmt: skip
 flat = ss.ElasticCoulomb(k_t=450e6, k_w=450e6, k_n=520e6, mu=0.6)
 curved = ss.ElasticCoulomb(k_t=20e6, k_w=450e6, k_n=25e6, mu=0.6)
 model = ss.Model(
