@@ -190,6 +190,14 @@ def test_full_disk_is_told_before_anything_is_computed(
         pass
 
 
+def test_check_says_once_what_holds_for_all_cases(tmp_path: Path) -> None:
+    path = write_four_masses(tmp_path, {"vary.load.shaker.force_n": "[5.0, 8.0, 9.0]"})
+    said = done("check", str(path)).splitlines()
+    assert said.count("load.shaker.force_n = 5") == 1
+    assert len([line for line in said if "natural frequencies, contacts open" in line]) == 1
+    assert "the same holds for: load.shaker.force_n = 8, load.shaker.force_n = 9" in said
+
+
 def test_masses_from_new_to_the_page(tmp_path: Path) -> None:
     path = write_four_masses(tmp_path)
     said = done("check", str(path))

@@ -20,20 +20,30 @@ def check_study(study: Study) -> tuple[str, ...]:
     """
     asked = asked_for(study)
     told: list[str] = []
+    alike: list[str] = []
     for case in study.cases():
         model = case.build()
         with of_task(study, case):
             lines = [_size(model), *(f"{WARNING}{text}" for text in model.warnings)]
             for one in asked:
                 lines += one.check(case, model)
-        label = f"{case.label}: " if case.label else ""
         # what holds for all cases is said once
         new = [line for line in lines if line not in told]
         told += new
-        for line in new:
-            if not line.startswith(WARNING):
-                LOG.info(f"{label}{line}")
+        _tell(case.label, [line for line in new if not line.startswith(WARNING)])
+        if not new:
+            alike.append(case.label)
+    if alike:
+        LOG.info(f"the same holds for: {', '.join(alike)}")
     return tuple(t.removeprefix(WARNING) for t in told if t.startswith(WARNING))
+
+
+def _tell(label: str, lines: list[str]) -> None:
+    """Tell lines, under the label of their case where the study has several."""
+    if label and lines:
+        LOG.info(label)
+    for line in lines:
+        LOG.info(f"  {line}" if label else line)
 
 
 def _size(model: Model) -> str:
