@@ -144,10 +144,12 @@ class Keys:
         ]  # fmt: skip
 
     def _of_laws(self) -> set[str]:
-        from stickslip.contact.laws import LAWS
+        from stickslip.contact.laws import ALL_LAWS
         from stickslip.study.file.quantities import columns_of
 
-        each = (columns_of(law, per_area=area) for law in LAWS.values() for area in (False, True))
+        each = (
+            columns_of(law, per_area=area) for law in ALL_LAWS.values() for area in (False, True)
+        )
         return {key for found in each for key in found}
 
     def _resolved(self, entry: dict[str, Any]) -> dict[str, Any]:
@@ -180,11 +182,11 @@ def _default(key: str, node: dict[str, Any]) -> str:
 
 def laws() -> str:
     """Return one table of keys for each contact law, from the fields of its dataclass."""
-    from stickslip.contact.laws import LAWS
+    from stickslip.contact.laws import ALL_LAWS
     from stickslip.study.file.quantities import columns_of
 
     lines: list[str] = []
-    for name, law in LAWS.items():
+    for name, law in ALL_LAWS.items():
         whole, area = (columns_of(law, per_area=flag) for flag in (False, True))
         rows = []
         for (key, (_, column)), of_area in zip(whole.items(), area, strict=True):

@@ -20,11 +20,12 @@ from stickslip.assembly.forces import (
 from stickslip.assembly.model import Model
 from stickslip.assembly.places import picked, stacked
 from stickslip.assembly.reduced import Store, in_memory, reduced_parts
+from stickslip.assembly.rigid import held_gaps, in_gaps, refuse_mixed_gaps, refuse_rigid
 from stickslip.assembly.statics import pressed_by, static_contact_force
 from stickslip.assembly.waves import reduced_sector
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws import law_name
-from stickslip.errors import InputError, input_error
+from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
 from stickslip.model.modes import natural_frequencies, with_springs
@@ -83,10 +84,11 @@ def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
         raise input_error(
             "contact", "there is none: no coordinate would be left to solve for", "Give a contact."
         )
-    _refuse_rigid(model)
+    refuse_rigid(model)
     stay = np.concatenate([labels.dofs, watched])
     kept = np.concatenate([stay, *(np.flatnonzero(f) for f in forces.values())])
     linear = linear_side(model, order or 0, harmonics, kept, stay, store)
+    refuse_mixed_gaps(model, linear.gaps)
     system = System(
         linear.side,
         Interface(model.pairs.names, model.pairs.laws, linear.gaps),
@@ -97,7 +99,7 @@ def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
     load = _loads(model, linear, forces)
     held = system.with_retention(model.retention)
     gap, force = static_state(held, load.static)
-    checked = frequencies(model, linear, system.interface.stuck_stiffness(), order, store)
+    checked = frequencies(model, linear, system.springs.stuck_stiffness(), order, store)
     if model.peak_output:
         labels.of((model.peak_output,), "output.peak")
     peak = labels.names.index(model.peak_output) if model.peak_output else 0
@@ -125,15 +127,6 @@ def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
         },
         warnings=(*model.warnings, *checked.warnings()),
     )
-
-
-def _refuse_rigid(model: Model) -> None:
-    """Refuse laws whose force is no function of the gap."""
-    for law, group in dict(zip(model.pairs.laws, model.pairs.groups, strict=True)).items():
-        try:
-            law.stuck_stiffness()
-        except InputError as error:
-            raise error.inside(f"contact.{group}.law") from None
 
 
 def _refuse_beyond(model: Model, harmonics: int) -> None:
@@ -226,19 +219,19 @@ def _of_one(model: Model, kept: IntArray, store: Store) -> Linear:
     at = coordinates(np.concatenate(ids), model.ties)
     structure = at.tied(join(**{name: part.structure for name, part in parts.items()}))
     steady = at.load(np.concatenate([part.steady for part in parts.values()]))
+    found = in_gaps(model, structure, at.columns(model.pairs.own))
+    structure, gaps = found.structure, found.gaps
 
     def of_dofs(dofs: IntArray, place: str) -> IntArray:
-        return at.of_dofs(dofs, model.places.dofs, place)
+        return found.of(at.of_dofs(dofs, model.places.dofs, place), place)
 
     def load(force: Matrix, _harmonic: int) -> Matrix:
-        return _on_kept(at, force)
-
-    gaps = at.columns(model.pairs.own)
+        return found.load(_on_kept(at, force))
 
     def of_wave(_number: int) -> tuple[Structure, Matrix, Any]:
         return structure, gaps, lambda dofs: of_dofs(dofs, "part")
 
-    return Linear(structure, gaps, steady, of_dofs, load, of_wave)
+    return Linear(structure, gaps, found.load(steady), of_dofs, load, of_wave)
 
 
 def _on_kept(at: Coordinates, force: Matrix) -> Matrix:
@@ -299,7 +292,7 @@ def static_state(system: System, static_load: FloatArray) -> tuple[FloatArray, F
         )
     moved = preload(system, static_load)
     gap = (system.interface.gap_operator[:, system.retained] @ moved).reshape(-1, 3)
-    return gap, static_contact_force(system.interface, gap)
+    return gap, static_contact_force(system.springs, gap)
 
 
 def pressed_points(model: Model) -> BoolArray:
@@ -313,7 +306,7 @@ def pressed_points(model: Model) -> BoolArray:
     system = System(linear.side, interface, empty, free=_free(model, linear))
     load = _loads(model, linear, forces)
     _, force = static_state(system.with_retention(model.retention), load.static)
-    return pressed_by(model.pairs.laws, force)
+    return pressed_by(system.springs.laws, force)
 
 
 def frequencies(
@@ -325,7 +318,8 @@ def frequencies(
     bodies = _free_dofs(model)
     free = _without(reduced, place(bodies)) if bodies.size else reduced
     stuck = with_springs(reduced, gaps, springs)
-    count = min(MODES, *(int(np.count_nonzero(s.mass.diagonal())) for s in (free, stuck)))
+    moving = [int(np.count_nonzero(s.mass.diagonal())) for s in (free, stuck)]
+    count = min(MODES, moving[0], max(moving[1] - held_gaps(model, gaps), 1))
     full = [partial(model.at, model.speed, number, how) for how in ("open", "stuck")]
     found = [_lowest(model, at(), count, store) for at in full]
     return Frequencies(

@@ -20,7 +20,9 @@ from stickslip.assembly.skin import on_skin, skin_of
 from stickslip.assembly.statics import StaticState, static_state
 from stickslip.assembly.ties import Ties, tie_joins
 from stickslip.assembly.wheel import Neighbours, neighbours, with_joins
+from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.errors import input_error
+from stickslip.harmonic.rigid_contacts import STIFF
 from stickslip.model.axis import Axis
 from stickslip.model.facts import Facts, facts_of_parts
 from stickslip.model.fe.factorisation import factorise
@@ -229,7 +231,8 @@ class Model:
             operators = [operator @ way for operator in operators]
             tie = way if tie is None else tie @ way
         holds = self._holding(contacts)
-        stiffness = np.where(np.repeat(holds, 3), self._springs(holds), 0.0)
+        largest = float(np.abs(structure.stiffness.diagonal()).max())
+        stiffness = np.where(np.repeat(holds, 3), self._springs(holds, STIFF * largest), 0.0)
         if holds.any():
             structure = with_springs(structure, operators[0] + phase * operators[1], stiffness)
         structure = structure if tie is None else replace(structure, basis=tie)
@@ -241,10 +244,14 @@ class Model:
             return self.pressed
         return np.full(p, contacts == "stuck")
 
-    def _springs(self, holds: BoolArray) -> FloatArray:
+    def _springs(self, holds: BoolArray, stiff: float) -> FloatArray:
+        """Return the (3 p,) stiffnesses t, w, n of contacts that hold; `stiff` of rigid ones."""
+        laws = [
+            law.softened(stiff) if isinstance(law, RigidCoulomb) else law for law in self.pairs.laws
+        ]
         rows = [
             law.stuck_stiffness() if hold else np.zeros(3)
-            for law, hold in zip(self.pairs.laws, holds, strict=True)
+            for law, hold in zip(laws, holds, strict=True)
         ]
         return np.array(rows, dtype=float).reshape(-1)
 

@@ -19,7 +19,9 @@ def at_rest(key: str, contact: Contact) -> ContactLaw:
     law: Any = contact.law
     if contact.preload == 0.0 and contact.gap == 0.0:
         return contact.law
-    if isinstance(law, RigidCoulomb) and contact.preload == 0.0:
+    if isinstance(law, RigidCoulomb):
+        if contact.preload > 0.0:
+            return replace(law, preload=contact.preload)
         return replace(law, initial_gap=law.initial_gap + contact.gap)
     if getattr(law, "preload", None) is None or not hasattr(law, "k_n"):
         raise _at_rest_alike(
@@ -48,7 +50,8 @@ def _at_rest_alike(key: str, contact: Contact, why: str) -> InputError:
 def shared(key: str, contact: Contact, law: ContactLaw, area: FloatArray) -> tuple[ContactLaw, ...]:
     """Return the law of each point."""
     p, known = len(area), bool(np.all(np.isfinite(area)))
-    if contact.share == "point":
+    alike = isinstance(law, RigidCoulomb) and law.preload is None  # nothing of it is shared
+    if contact.share == "point" or alike:
         return (law,) * p
     if contact.share == "interface":
         factors = area / area.sum() if known else np.full(p, 1.0 / p)

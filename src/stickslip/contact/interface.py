@@ -15,6 +15,7 @@ from stickslip.contact.compiled import (
     compile_contacts,
 )
 from stickslip.contact.law import PAIRS, ContactLaw
+from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.errors import input_error
 
 _PAIRS = np.array(PAIRS)
@@ -97,6 +98,18 @@ class Interface:
                 rest, rest, state, law.parameters(), force, np.empty_like(state), jac, status
             )
         return (self.factors[:, None] * out).reshape(-1)
+
+    @property
+    def rigid(self) -> bool:
+        """Whether a contact is rigid, so that its force is no function of its gap."""
+        return any(isinstance(law, RigidCoulomb) for law in self.laws)
+
+    def sprung(self, stiffness: float) -> "Interface":
+        """Return the interface with springs of a stiffness (N/m) in place of rigid contacts."""
+        laws = (
+            law.softened(stiffness) if isinstance(law, RigidCoulomb) else law for law in self.laws
+        )
+        return replace(self, laws=tuple(laws))
 
     def coordinates(self) -> IntArray:
         """Return the structure's dofs that take part in a gap."""

@@ -92,6 +92,11 @@ class HarmonicBalance:
         return self.harmonics[-1]
 
     @property
+    def springs(self) -> Interface:
+        """What stands for the contacts where nothing slips or opens."""
+        return self.interface
+
+    @property
     def n_rows(self) -> int:
         """Real coefficients a coordinate."""
         return 2 * len(self.harmonics) - 1

@@ -6,14 +6,14 @@ correction returns Λ, whatever ε is: a penalty of the method, not a stiffness 
 """
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from time import perf_counter
 
 import numpy as np
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from stickslip.contact.compiled import Evaluator, compile_contacts
-from stickslip.contact.interface import Interface
+from stickslip.contact.compiled import CompiledContacts, Evaluator, compile_contacts
+from stickslip.contact.interface import Interface, SparseRows, sparse_rows
 from stickslip.contact.intervals import prefix_sums
 from stickslip.contact.law import TN, TT, UNCOUPLED_TANGENTS
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
@@ -28,8 +28,8 @@ from stickslip.harmonic.balance import (
     harmonic_balance,
 )
 from stickslip.harmonic.linear import DynamicStiffness
-from stickslip.harmonic.rigid_contacts import NORMAL, RigidContacts, rigid_contacts
-from stickslip.harmonic.support import harmonics_of
+from stickslip.harmonic.rigid_contacts import NORMAL, STIFF, RigidContacts, rigid_contacts
+from stickslip.harmonic.support import Harmonics, harmonics_of
 
 SAMPLES_OF_OTHERS = 8  # per harmonic, least number at which contacts with stiffness are evaluated
 
@@ -46,6 +46,27 @@ class DynamicLagrangian:
     rigid: RigidContacts
     samples: int
     penalty: float | None
+
+    @property
+    def harmonics(self) -> Harmonics:
+        """Harmonics kept: all up to the highest."""
+        return self.balance.harmonics
+
+    @property
+    def compiled(self) -> CompiledContacts:
+        """The contacts that have a stiffness."""
+        return self.balance.compiled
+
+    @cached_property
+    def rows(self) -> SparseRows:
+        """Gap operator of all contacts by contact."""
+        return sparse_rows(self.interface.gap_operator)
+
+    @cached_property
+    def springs(self) -> Interface:
+        """What stands for the contacts where nothing slips or opens: springs, stiff ones for rigid contacts."""
+        stiffness = np.abs(np.diagonal(self.linear.nn[0]))[self.interface.coordinates()]
+        return self.interface.sprung(STIFF * float(stiffness.max()))
 
     @property
     def size(self) -> int:
@@ -79,6 +100,18 @@ class DynamicLagrangian:
     def unknowns(self, coefficients: ComplexArray) -> FloatArray:
         """Return the scaled unknowns of complex `coefficients`, padded or cut to `order`."""
         return self.balance.unknowns(coefficients)
+
+    def linear_load(self, omega: float) -> FloatArray:
+        """Return the (m, n) real coefficients of the condensed load at `omega` (rad/s)."""
+        return self.balance.linear_load(omega)
+
+    def linear_block(self, omega: float, harmonic: int) -> ComplexArray:
+        """Return the (n, n) condensed dynamic stiffness of a harmonic at `omega` (rad/s), to be changed at will."""
+        return self.balance.linear_block(omega, harmonic)
+
+    def with_harmonics(self, harmonics: Harmonics) -> "DynamicLagrangian":
+        """Return the same problem with all harmonics up to the highest of `harmonics`."""
+        return self.with_order(harmonics[-1])
 
     def with_order(self, order: int) -> "DynamicLagrangian":
         """Return the same problem with harmonics 0..`order`."""

@@ -11,6 +11,7 @@ from stickslip.errors import InputError, input_error
 from stickslip.harmonic.balance import HarmonicBalance
 
 NORMAL = 2
+STIFF = 1e5  # of springs in place of rigid contacts, over the structure's largest stiffness at a contact: off by 1e-5
 PENALTY_SHARE = 0.25  # of the structure's stiffness, per harmonic
 
 

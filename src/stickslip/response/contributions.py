@@ -8,7 +8,7 @@ from stickslip.arrays import ComplexArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.selection.adjoint import Goal, contributions, estimate, outputs_of
 from stickslip.harmonic.support import Harmonics
-from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_stiffness
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ def harmonic_contributions(
             f"at {point.omega:g} rad/s is not a solution, its status is {point.status.name}",
             "Give one of accepted_points(...) that converged.",
         )
-    own, high = problem.balance(point.support), problem.high
+    own, high = (with_stiffness(b) for b in (problem.balance(point.support), problem.high))
     x = own.unknowns(point.coefficients)
     outputs = outputs_of(problem.measure, own.linear.recover(point.omega, point.coefficients), goal)
     missing = tuple(h for h in high.harmonics if h not in own.harmonics)

@@ -10,6 +10,7 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.product import add_stiffness
 from stickslip.errors import SingularError
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_balance
+from stickslip.harmonic.dlft import DynamicLagrangian
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex
 from stickslip.response.system import System
@@ -55,7 +56,7 @@ def preload(system: System, static_load: FloatArray) -> FloatArray:
         If nothing holds a body (the message names the coordinate) or no equilibrium is found.
     """
     # a residual traction is a force without a stiffness: it chooses a mean of the vibration, not the seat of the damper
-    interface = replace(system.interface, laws=tuple(map(_unstretched, system.interface.laws)))
+    interface = replace(system.springs, laws=tuple(map(_unstretched, system.springs.laws)))
     resting = float(np.max(np.abs(interface.resting_force()), initial=0.0))
     if not np.any(static_load) and resting == 0.0:
         return np.zeros(system.retained.size)
@@ -102,7 +103,9 @@ def _released(balance: HarmonicBalance, options: Newton) -> Solution:
     return last.solution
 
 
-def bonded_start(balance: HarmonicBalance, omega: float, system: System) -> FloatArray:
+def bonded_start(
+    balance: HarmonicBalance | DynamicLagrangian, omega: float, system: System
+) -> FloatArray:
     """Return the scaled solution with every contact bonded: the start of all that follows.
 
     Raises
@@ -112,7 +115,7 @@ def bonded_start(balance: HarmonicBalance, omega: float, system: System) -> Floa
     """
     load = to_complex(balance.linear_load(omega))
     rows = balance.rows
-    springs = balance.interface.stuck_stiffness().reshape(-1, 3, 1) * np.eye(3)
+    springs = balance.springs.stuck_stiffness().reshape(-1, 3, 1) * np.eye(3)
     q = np.zeros((balance.order + 1, balance.linear.n), dtype=complex)
     for place, h in enumerate(balance.harmonics):
         if h > 0 and not np.any(load[place]):

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
-from stickslip.harmonic.aft import contact_forces
+from stickslip.harmonic.aft import ContactPeriod, contact_forces
+from stickslip.harmonic.dlft import DynamicLagrangian
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 
@@ -59,7 +60,7 @@ def fields(problem: ForcedProblem, point: ForcedPoint) -> Fields:
     linear, interface = problem.low.linear, problem.low.interface
     outputs = linear.recover(point.omega, point.coefficients)[:, problem.system.outputs]
     gaps = point.coefficients @ interface.gap_operator.T
-    period = contact_forces(to_real(gaps), problem.low.compiled, problem.sweep.samples, point.omega)
+    period = _period(problem, point)
     forces = to_complex(period.coefficients)
     h = np.arange(gaps.shape[0])[:, None]
     work = np.pi * np.sum(h * np.imag(np.conj(gaps) * forces), axis=0)
@@ -70,8 +71,16 @@ def fields(problem: ForcedProblem, point: ForcedPoint) -> Fields:
 
 def signals(problem: ForcedProblem, point: ForcedPoint) -> Signals:
     """Return one period of gaps, forces and states at the contacts, at the samples of the sweep."""
-    gaps = point.coefficients @ problem.low.interface.gap_operator.T
-    period = contact_forces(to_real(gaps), problem.low.compiled, problem.sweep.samples, point.omega)
+    period = _period(problem, point)
     samples = problem.sweep.samples
     time = np.arange(samples) / samples * 2.0 * np.pi / point.omega
     return Signals(time, period.gap, period.force, period.state)
+
+
+def _period(problem: ForcedProblem, point: ForcedPoint) -> ContactPeriod:
+    """Return the contacts over the period of a point."""
+    own = problem.balance(point.support)
+    if isinstance(own, DynamicLagrangian):  # rigid contacts follow from equilibrium
+        return own.contacts(own.unknowns(point.coefficients), point.omega)
+    gaps = point.coefficients @ own.interface.gap_operator.T
+    return contact_forces(to_real(gaps), own.compiled, problem.sweep.samples, point.omega)

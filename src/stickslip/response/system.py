@@ -9,6 +9,7 @@ from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import DynamicStiffness, LinearSide, one_structure
+from stickslip.harmonic.rigid_contacts import STIFF
 from stickslip.harmonic.travelling import condense_side
 from stickslip.model.modes import with_springs
 from stickslip.model.structure import Structure
@@ -50,10 +51,20 @@ class System:
 
     @property
     def retained(self) -> IntArray:
-        """Dofs that stay unknown: those of the contacts, of free bodies and of constraints, sorted."""
+        """Dofs that stay unknown: those of the contacts, of free bodies and of constraints, sorted; outputs beside rigid contacts."""
         free = NO_DOFS if self.free is None else self.free
         held = np.union1d(free, self.structure.multipliers).astype(np.int64)
+        if self.interface.rigid:  # where all of them stick, contacts are no measure of a motion
+            held = np.union1d(held, self.outputs)
         return np.union1d(self.interface.coordinates(), held)
+
+    @property
+    def springs(self) -> Interface:
+        """The contacts with stiff springs in place of rigid ones: for static states and small vibrations."""
+        if not self.interface.rigid:
+            return self.interface
+        stiffness = np.abs(self.structure.of_harmonic(0).stiffness.diagonal())
+        return self.interface.sprung(STIFF * float(stiffness[self.interface.coordinates()].max()))
 
     @property
     def retained_labels(self) -> tuple[str, ...]:
@@ -94,4 +105,4 @@ class System:
         """Return the linear structure with every contact bonded through its springs."""
         b = self.interface.gap_operator
         structure = one_structure(self.structure, "System.stuck_structure")
-        return with_springs(structure, b, self.interface.stuck_stiffness())
+        return with_springs(structure, b, self.springs.stuck_stiffness())

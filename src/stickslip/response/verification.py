@@ -7,7 +7,7 @@ from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.support import Harmonics, harmonics_of
-from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_stiffness
 
 SAMPLES_A_HARMONIC = 8
 
@@ -85,7 +85,7 @@ def check_support(
 
 def _enlarged(problem: ForcedProblem, factor: int) -> HarmonicBalance:
     """Return the problem with all harmonics up to `factor` times the reference order, with samples enough for them."""
-    high = problem.high
+    high = with_stiffness(problem.high)
     harmonics = harmonics_of(factor * high.order)
     linear = problem.system.condensed(high.linear.load, harmonics[-1])
     samples = max(high.samples, SAMPLES_A_HARMONIC * harmonics[-1])
@@ -93,7 +93,7 @@ def _enlarged(problem: ForcedProblem, factor: int) -> HarmonicBalance:
 
 
 def _check(problem: ForcedProblem, enlarged: HarmonicBalance, point: ForcedPoint) -> SupportCheck:
-    own = problem.balance(point.support)
+    own = with_stiffness(problem.balance(point.support))
     measure = problem.measure
     alert = jacobian_alert(
         own,

@@ -21,25 +21,26 @@ class _Registry(Mapping[str, type]):
         return len(self._classes)
 
 
-# file → class: the laws that give a force for a gap; `rigid_coulomb` does not, see `harmonic.dlft`
-LAWS: Mapping[str, type] = _Registry(
-    {
-        "bonded": "Bonded",
-        "unilateral_spring": "UnilateralSpring",
-        "cubic_spring": "CubicSpring",
-        "polynomial_spring": "PolynomialSpring",
-        "jenkins": "Jenkins",
-        "elastic_coulomb": "ElasticCoulomb",
-        "coupled_coulomb": "CoupledCoulomb",
-        "regularised_coulomb": "RegularisedCoulomb",
-        "dahl": "Dahl",
-        "bouc_wen": "BoucWen",
-        "iwan": "Iwan",
-    }
-)
+# file → class: the laws that give a force for a gap
+_OF_THE_GAP = {
+    "bonded": "Bonded",
+    "unilateral_spring": "UnilateralSpring",
+    "cubic_spring": "CubicSpring",
+    "polynomial_spring": "PolynomialSpring",
+    "jenkins": "Jenkins",
+    "elastic_coulomb": "ElasticCoulomb",
+    "coupled_coulomb": "CoupledCoulomb",
+    "regularised_coulomb": "RegularisedCoulomb",
+    "dahl": "Dahl",
+    "bouc_wen": "BoucWen",
+    "iwan": "Iwan",
+}
+LAWS: Mapping[str, type] = _Registry(_OF_THE_GAP)
+# what a study file may name: also the law whose force is no function of the gap, see `harmonic.dlft`
+ALL_LAWS: Mapping[str, type] = _Registry(_OF_THE_GAP | {"rigid_coulomb": "RigidCoulomb"})
 
 
 def law_name(law: object) -> str:
     """Return the name that a study file has for a law, of one of your own its class."""
     package, _, name = type(law).__module__.rpartition(".")
-    return name if package == __name__ and name in LAWS else type(law).__name__
+    return name if package == __name__ and name in ALL_LAWS else type(law).__name__

@@ -9,6 +9,7 @@ from stickslip.contact.law import UNCOUPLED_TANGENTS
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.contact.laws.parameter_checks import check_not_negative
+from stickslip.contact.laws.quantities import friction_coefficient
 from stickslip.errors import InputError, input_error
 from stickslip.units import check_quantities
 
@@ -37,7 +38,7 @@ class RigidCoulomb:
         If a parameter is not finite or out of its range, or both a constant load and a gap are given.
     """
 
-    mu: float
+    mu: float = friction_coefficient()
     preload: float | None = None
     initial_gap: float = 0.0
 
@@ -46,7 +47,7 @@ class RigidCoulomb:
 
     def __post_init__(self) -> None:
         check_quantities(self)
-        check_not_negative(self, "mu", "preload")
+        check_not_negative(self, "preload")
         if self.preload is not None and self.initial_gap != 0.0:
             raise input_error(
                 "RigidCoulomb",

@@ -7,6 +7,7 @@ from typing import Any
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import ContactLaw
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation
+from stickslip.harmonic.dlft import DynamicLagrangian
 from stickslip.solve.rescue import ByDifference, Evaluate, Homotopy
 
 # shares of the excitation at which contacts hardly change: the problem is linear there
@@ -54,7 +55,9 @@ def _with_friction(law: ContactLaw, factor: float) -> ContactLaw:
     return changed
 
 
-def homotopies(balance: HarmonicBalance, omega: float, static: FloatArray) -> Iterator[Homotopy]:
+def homotopies(
+    balance: HarmonicBalance | DynamicLagrangian, omega: float, static: FloatArray
+) -> Iterator[Homotopy]:
     """Yield ways from an easy problem to the balance at one frequency.
 
     First the excitation grows from next to nothing: there nothing changes its state and the problem is linear. As damping bounds the
@@ -71,6 +74,8 @@ def homotopies(balance: HarmonicBalance, omega: float, static: FloatArray) -> It
     static
         (n_retained,) static equilibrium, m.
     """
+    if isinstance(balance, DynamicLagrangian):  # its residual is not linear in the excitation
+        return
     at_rest = balance.unknowns(static[None].astype(complex))
     yield Homotopy((growing_load(balance, omega),), at_rest, FAINT, BACK * FAINT[-1])
     if not any(hasattr(law, "mu") for law in balance.interface.laws):

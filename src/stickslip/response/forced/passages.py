@@ -7,14 +7,14 @@ from time import perf_counter
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.harmonic.balance import HarmonicBalance, Linearisation
+from stickslip.harmonic.balance import Linearisation
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.selection.strategy import judged
+from stickslip.harmonic.selection.strategy import always_kept, judged
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.equilibrium import bonded_start, preload
 from stickslip.response.forced.accepted import branch_end, reached
 from stickslip.response.forced.homotopies import homotopies
-from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
+from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.forced.sweep import Sweep
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to
@@ -170,7 +170,7 @@ def _low_point(
     error = np.nan
     asked: Harmonics = ()
     start = np.zeros((0, 0), dtype=complex)
-    if point.solution.status.converged:
+    if point.solution.status.converged and always_kept(problem.strategy) is None:
         known = latest.known(point.x, point.p)
         left = known.events if isinstance(known, Linearisation) else None
         verdict = judged(problem.strategy, problem.step(problem.low, point.x, point.p, left=left))
@@ -261,7 +261,7 @@ def _goes_down(sweep: Sweep, point: ForcedPoint) -> bool:
 
 
 def along_branch(
-    problem: ForcedProblem, point: ForcedPoint, omega: float, balance: HarmonicBalance | None = None
+    problem: ForcedProblem, point: ForcedPoint, omega: float, balance: Balance | None = None
 ) -> Point:
     """Go from an accepted point to another frequency on the branch with many harmonics, or on that of `balance`."""
     balance = problem.high if balance is None else balance

@@ -9,7 +9,9 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.contact.event_integrals import Events
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
+from stickslip.harmonic.dlft import DynamicLagrangian, dynamic_lagrangian
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.selection.strategy import (
     ErrorMeasure,
     Solve,
@@ -17,7 +19,7 @@ from stickslip.harmonic.selection.strategy import (
     Strategy,
     always_kept,
 )
-from stickslip.harmonic.support import Harmonics
+from stickslip.harmonic.support import Harmonics, is_full
 from stickslip.response.follow import following_vibration
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
@@ -26,6 +28,7 @@ from stickslip.solve.krylov import to_tolerance
 from stickslip.solve.newton_method import Solution
 from stickslip.solve.status import Rung, Status
 
+Balance = HarmonicBalance | DynamicLagrangian
 Stage = Literal["low", "high", "branch", "peak"]
 FAINTEST = 1e-6  # excitation over static load: below, the residual tolerance swallows the vibration
 ALERT_TOLERANCE = 1e-6  # relative residual of the alert's step where it is found by iteration
@@ -108,9 +111,9 @@ class ForcedProblem:
 
     system: System
     sweep: Sweep
-    low: HarmonicBalance
-    high: HarmonicBalance
-    others: dict[Harmonics, HarmonicBalance] = field(default_factory=dict)  # made when first needed
+    low: Balance
+    high: Balance
+    others: dict[Harmonics, Balance] = field(default_factory=dict)  # made when first needed
 
     @property
     def strategy(self) -> Strategy:
@@ -130,7 +133,7 @@ class ForcedProblem:
         """Solver of the alert's enlarged system: that of Newton, but exact enough for an error of a thousandth."""
         return to_tolerance(self.sweep.newton.linear, ALERT_TOLERANCE).solve
 
-    def balance(self, harmonics: Harmonics) -> HarmonicBalance:
+    def balance(self, harmonics: Harmonics) -> Balance:
         """Return the periodic problem with these harmonics."""
         for own in (self.low, self.high):
             if own.harmonics == harmonics:
@@ -141,7 +144,7 @@ class ForcedProblem:
 
     def step(
         self,
-        balance: HarmonicBalance,
+        balance: Balance,
         x: FloatArray,
         omega: float,
         next_omega: float | None = None,
@@ -151,8 +154,8 @@ class ForcedProblem:
         smallest = self.sweep.low_harmonics
         following = omega if next_omega is None else next_omega
         return Step(
-            balance,
-            self.high,
+            with_stiffness(balance),
+            with_stiffness(self.high),
             smallest,
             x,
             omega,
@@ -162,7 +165,7 @@ class ForcedProblem:
             left=left,
         )
 
-    def following(self, balance: HarmonicBalance) -> Following:
+    def following(self, balance: Balance) -> Following:
         """Return how a branch of `balance` is followed."""
         # along a branch a shorter step is cheaper than a long correction
         few = replace(
@@ -216,7 +219,7 @@ def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedPr
                 f"Give Sweep(low={h}, high={max(h, reference[-1])}) or more.",
             )
     linear = system.condensed(load, reference[-1])
-    low = harmonic_balance(linear, system.interface, first, sweep.samples, sweep.evaluator)
+    low = _periodic(system, linear, sweep)
     dynamic = max(
         (float(np.max(np.abs(f), initial=0.0)) for f in load.harmonics.values()), default=0.0
     )
@@ -230,8 +233,44 @@ def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedPr
     return ForcedProblem(system, sweep, low, low.with_harmonics(reference))
 
 
+def with_stiffness(balance: Balance) -> HarmonicBalance:
+    """Return a periodic problem whose contact forces are functions of the gaps.
+
+    Raises
+    ------
+    InputError
+        If a contact is rigid.
+    """
+    if isinstance(balance, DynamicLagrangian):
+        raise input_error(
+            "rigid contacts",
+            "have forces that are no functions of the gaps, from which no error of missing harmonics follows",
+            "Keep more harmonics and compare, or give the contacts a stiffness.",
+        )
+    return balance
+
+
+def _periodic(system: System, linear: DynamicStiffness, sweep: Sweep) -> Balance:
+    """Return the periodic problem of the first passage; rigid contacts ask for all harmonics everywhere."""
+    first, interface = sweep.first_harmonics, system.interface
+    if not interface.rigid:
+        return harmonic_balance(linear, interface, first, sweep.samples, sweep.evaluator)
+    if always_kept(sweep.strategy) is None:
+        raise input_error(
+            "Sweep.selection",
+            "chooses harmonics from forces that are functions of the gap, and a contact is rigid",
+            "Give selection='always_high'.",
+        )
+    if not (is_full(first) and is_full(sweep.high_harmonics)):
+        raise input_error(
+            "Sweep", "leaves out harmonics, and a contact is rigid", "Keep all up to the highest."
+        )
+    order = first[-1]
+    return dynamic_lagrangian(linear, interface, order, sweep.samples, None, sweep.evaluator)
+
+
 def forced_point(
-    balance: HarmonicBalance,
+    balance: Balance,
     solution: Solution,
     stage: Stage,
     index: int,

@@ -8,11 +8,11 @@ from time import perf_counter
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.harmonic.balance import HarmonicBalance, Linearisation
+from stickslip.harmonic.balance import Linearisation
 from stickslip.harmonic.selection.strategy import judged
 from stickslip.response.forced.homotopies import homotopies
 from stickslip.response.forced.passages import along_branch
-from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
+from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
 from stickslip.solve.linear import factorised
 from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Newton, Solution, charged, newton
@@ -90,7 +90,7 @@ def repeat(
 
 
 def _nearest_first(
-    balance: HarmonicBalance,
+    balance: Balance,
     omega: float,
     q: FloatArray,
     others: Sequence[FloatArray],
@@ -115,7 +115,7 @@ def _nearest_first(
 
 
 def _from_start(
-    balance: HarmonicBalance,
+    balance: Balance,
     omega: float,
     start: tuple[Linearisation, FloatArray],
     options: Newton,

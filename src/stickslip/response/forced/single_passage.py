@@ -7,13 +7,13 @@ from time import perf_counter
 import numpy as np
 
 from stickslip.arrays import ComplexArray
-from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection.strategy import Step, Verdict, judged
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.forced.passages import along_branch, fresh_point
 from stickslip.response.forced.problem import (
     BRANCH_ITERATIONS,
+    Balance,
     ForcedPoint,
     ForcedProblem,
     Stage,
@@ -101,7 +101,7 @@ def _from_behind(
 def _solution(
     problem: ForcedProblem,
     load: HarmonicLoad,
-    balance: HarmonicBalance,
+    balance: Balance,
     tried: Sequence[ForcedPoint],
     omega: float,
     start: ComplexArray | None,

@@ -14,7 +14,7 @@ from pydantic import (
 
 from stickslip.assembly.contact import GROUND, NEXT, PairingKind, Share
 from stickslip.contact.law import ContactLaw
-from stickslip.contact.laws import LAWS
+from stickslip.contact.laws import ALL_LAWS
 from stickslip.contact.laws.iwan_populations import FirstLoading, FourParameter, UniformBand
 from stickslip.errors import did_you_mean
 from stickslip.study.file.parts import Triple, union_of
@@ -48,7 +48,7 @@ def _known_kind(given: Any) -> Any:
 
 
 PopulationTable: Any = Annotated[union_of(_TABLES, _kind), BeforeValidator(_known_kind)]
-Law: Any = Literal[tuple(LAWS)]
+Law: Any = Literal[tuple(ALL_LAWS)]
 Between = Annotated[list[Name], Field(min_length=2, max_length=2)]
 
 
@@ -113,7 +113,7 @@ class ContactBase(Pair):
         description="how far the surfaces would overlap at rest if nothing gave way, in m, 0 for none: it presses them "
         "by the normal stiffness times itself",
     )
-    law: Law = Field(description="the contact law: " + ", ".join(LAWS))
+    law: Law = Field(description="the contact law: " + ", ".join(ALL_LAWS))
     per: Share = Field(
         "interface",
         description="what stiffnesses and forces are of: interface (shared among its points), point, or area (N/m³ and Pa)",
@@ -129,7 +129,7 @@ class ContactBase(Pair):
                 "A contact at rest is open, pressed by what overlaps, or pressed by a force: give one of them.",
                 given[1],
             )
-        refused_by(LAWS[self.law], self.library)
+        refused_by(ALL_LAWS[self.law], self.library)
         return self
 
     @property
@@ -150,14 +150,14 @@ class ContactBase(Pair):
         """Return the law, its parameters as given."""
         table = getattr(self, "population", None)
         given = {} if table is None else {"population": build(POPULATIONS[table.kind], table)}
-        law: ContactLaw = build(LAWS[self.law], self, per_area=self.per == "area", **given)
+        law: ContactLaw = build(ALL_LAWS[self.law], self, per_area=self.per == "area", **given)
         return law
 
 
 @cache
 def keys_of(law: str, *, per_area: bool) -> dict[str, bool]:
     """Return the keys of a law and whether each is needed."""
-    columns = columns_of(LAWS[law], per_area=per_area)
+    columns = columns_of(ALL_LAWS[law], per_area=per_area)
     others = ["preload_pa" if per_area else "preload_n", *(["population"] if law == "iwan" else [])]
     return {key: field.is_required() for key, (_, field) in columns.items()} | dict.fromkeys(
         others, False
@@ -165,7 +165,7 @@ def keys_of(law: str, *, per_area: bool) -> dict[str, bool]:
 
 
 def _owners(key: str, *, per_area: bool) -> list[str]:
-    return [law for law in LAWS if key in keys_of(law, per_area=per_area)]
+    return [law for law in ALL_LAWS if key in keys_of(law, per_area=per_area)]
 
 
 def _is_of_the_law(cls: type[Section], value: Any, info: ValidationInfo) -> Any:
@@ -211,8 +211,8 @@ def _columns() -> dict[str, Any]:
             float | None,
             Field(None, ge=0, description=f"normal force at rest in {unit}, 0 for none"),
         )
-        for law in LAWS:
-            for key, (annotation, field) in columns_of(LAWS[law], per_area=area).items():
+        for law in ALL_LAWS:
+            for key, (annotation, field) in columns_of(ALL_LAWS[law], per_area=area).items():
                 about = Field(None, validate_default=True, description=field.description)
                 found.setdefault(key, (annotation | None, about))
     return found

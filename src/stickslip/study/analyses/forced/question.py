@@ -11,7 +11,8 @@ from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
 from stickslip.contact.laws import law_name
 from stickslip.errors import InputError, input_error, together
-from stickslip.harmonic.support import named
+from stickslip.harmonic.selection.strategy import always_kept
+from stickslip.harmonic.support import is_full, named
 from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
 from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.facts import facts_of
@@ -21,6 +22,7 @@ from stickslip.study.analyses.forced.section import sweep_of
 from stickslip.units import RPM
 
 IN_TIME, HARMONICS = "verify", "verify_harmonics"  # checks that a run may ask for
+RIGID = "rigid_coulomb"  # the law that the balance solves without springs
 INTEGRABLE = "elastic_coulomb"  # the law that the time integration knows
 FACTOR = 2  # times the highest harmonic that is kept: what solutions are held against
 
@@ -114,6 +116,7 @@ def question_of(case: Case, model: Model) -> Question:
     _require_driven(model, sweep)
     if IN_TIME in case.checks:
         _require_integrable(model)
+    _refuse_for_rigid(model, sweep, case.checks)
     check_limits(settings.limits, estimate(model, sweep))
     # the guard and the check of the harmonics look at twice as many as are kept
     assembled = model.assembled(FACTOR * sweep.high_harmonics[-1], case.store)
@@ -170,3 +173,30 @@ def _require_integrable(model: Model) -> None:
     ]
     if found:
         raise together(found)
+
+
+def _refuse_for_rigid(model: Model, sweep: Sweep, checks: frozenset[str]) -> None:
+    """Refuse what needs contact forces that are functions of the gaps, where a contact is rigid."""
+    found = [name for name, contact in model.contacts.items() if law_name(contact.law) == RIGID]
+    if not found:
+        return
+    because = f"and contact.{found[0]} is {RIGID}, whose force is no function of the gap"
+    if always_kept(sweep.strategy) is None:
+        raise input_error(
+            "harmonics.selection",
+            f"is {sweep.selection!r}, which predicts from contact forces what harmonics would change, {because}",
+            'Give selection = "always_high": harmonics up to high are kept at every frequency.',
+        )
+    for key, own in (("low", sweep.low_harmonics), ("high", sweep.high_harmonics)):
+        if not is_full(own):
+            raise input_error(
+                f"harmonics.{key}",
+                f"leaves harmonics out, got {named(own)}, {because}",
+                f"Give {own[-1]}: all harmonics up to it.",
+            )
+    if HARMONICS in checks:
+        raise input_error(
+            f"contact.{found[0]}.law",
+            f"--verify-harmonics predicts from contact forces what more harmonics would change, {because}",
+            "Run without it, and compare with a larger harmonics.high.",
+        )
