@@ -118,10 +118,20 @@ def test_each_case_has_its_chapter_and_buttons_choose(tmp_path: Path) -> None:
     assert '<div data-case="1" hidden><figure id="fig-diameters_1"' in html
 
 
+def test_cases_that_are_alike_are_drawn_once() -> None:
+    data = modes_result()
+    two = xr.concat([data, data], "case")
+    two["case_label"] = "case", ["force = 1", "force = 2"]
+    html = report_html(tree_of(provenance(), modes=two))
+    assert html.count('<figure id="fig-diameters') == 1
+    assert "The same in all 2 cases." in html
+    assert "<div data-case" not in html
+
+
 @needs_browser
 def test_choosing_a_case_shows_its_chapter(tmp_path: Path) -> None:
     data = modes_result()
-    two = xr.concat([data, data], "case")
+    two = xr.concat([data, data.assign(frequency_hz=2 * data["frequency_hz"])], "case")
     two["case_label"] = "case", ["span = 1", "span = 2"]
     write_result(tree_of(provenance(), modes=two), tmp_path / "result.nc")
     probe = """<script>document.querySelector('.chooser button[data-case="1"]').click();</script>"""

@@ -28,7 +28,7 @@ from stickslip.report.result import analysis, open_result, stored_warnings, vers
 from stickslip.report.section import Card, Part, Section, Shown
 from stickslip.report.sections import campbell, forced_response, modes, safe
 from stickslip.report.tables import html_table
-from stickslip.study.keep.netcdf import one_case
+from stickslip.study.keep.netcdf import alike, one_case
 
 SECTIONS: tuple[Section, ...] = (
     forced_response.SECTION,
@@ -47,11 +47,12 @@ def _shown(tree: xr.DataTree) -> Iterator[tuple[Section, xr.Dataset]]:
 
 
 def _views(section: Section, data: xr.Dataset) -> list[Any]:
-    """Return what a section draws: all cases at once, or one after the other."""
+    """Return what a section draws: all cases at once, or one after the other; the first for all where they are alike."""
     if not section.by_case:
         return [section.view(data)]
     n = data.sizes["case"]
-    each = [one_case(data, k) for k in range(n)] if n > 1 else [data.isel(case=0)]
+    drawn = range(n) if len(alike(data)) > 1 else [0]
+    each = [one_case(data, k) for k in drawn] if n > 1 else [data.isel(case=0)]
     views = [section.view(own) for own in each]
     return [views[0], *(replace(view, key=f"_{k}") for k, view in enumerate(views[1:], 1))]
 
@@ -79,10 +80,11 @@ class _Numbered:
         return figure_html(shown, self._count)
 
 
-def _by_case(data: xr.Dataset, bodies: Sequence[str]) -> str:
+def _by_case(section: Section, data: xr.Dataset, bodies: Sequence[str]) -> str:
     """Return the same chapter for each case, and the buttons that choose between them."""
     if len(bodies) == 1:
-        return bodies[0]
+        n = data.sizes["case"] if section.by_case else 1
+        return (f"<p>The same in all {n} cases.</p>" if n > 1 else "") + bodies[0]
     each = "".join(
         f'<div data-case="{k}"{" hidden" if k else ""}>{body}</div>'
         for k, body in enumerate(bodies)
@@ -151,7 +153,7 @@ def report_html(tree: xr.DataTree) -> str:
         for block in section.blocks:
             bodies = [numbered.html(block.parts, view) for view in views]
             if any(bodies):
-                chapters.append(chapter(block.key, block.title, _by_case(data, bodies)))
+                chapters.append(chapter(block.key, block.title, _by_case(section, data, bodies)))
     body = numbered.html(model.PARTS, _nodes(tree))
     chapters += [chapter("model", "Model", body)] if body else []
     chapters.append(chapter("provenance", "Provenance", _provenance(tree)))
