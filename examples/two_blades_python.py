@@ -8,7 +8,7 @@ blades = ss.model.solid_part(mesh, ss.Material(), reduction=ss.reduction.Reducti
 flat = ss.ElasticCoulomb(k_t=450e6, k_w=450e6, k_n=520e6, mu=0.6)
 curved = ss.ElasticCoulomb(k_t=20e6, k_w=450e6, k_n=25e6, mu=0.6)
 model = ss.Model(
-    parts={"blades": blades, "damper": ss.model.flat_curved_part(damper)},
+    parts={"blades": blades, "damper": ss.model.damper_part(damper)},
     contacts={side: ss.Contact(between=(f"damper.{side}", f"blades.underside_{n}"), law=law, share="interface")
               for n, side, law in ((1, "flat", flat), (2, "curved", curved))},
     loads={"pull": ss.Load(on="damper", newton=442.0, direction=(0, 0, 1), harmonic=0),

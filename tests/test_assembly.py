@@ -21,7 +21,7 @@ from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.matrices import lumped
 from stickslip.model.mesh.blade_mesh import mesh_blade_pair
 from stickslip.model.mesh.blade_pair import BladePair
-from stickslip.model.part import flat_curved_part, solid_part, structure_part
+from stickslip.model.part import damper_part, solid_part, structure_part
 from stickslip.model.rigid.damper import FlatCurvedDamper, gap_operator
 from stickslip.model.structure import join
 from stickslip.reduction.choice import Reduction
@@ -68,7 +68,7 @@ def blades():
 
 def two_blades(damper, part):
     return Model(
-        parts={"blades": part, "damper": flat_curved_part(damper)},
+        parts={"blades": part, "damper": damper_part(damper)},
         contacts={
             "flat": Contact(
                 between=("damper.flat", "blades.underside_1"), law=FLAT, share="interface"

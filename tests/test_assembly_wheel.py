@@ -284,7 +284,6 @@ def test_a_rigid_damper_between_blade_and_next_blade_answers_on_one_sector_as_on
     mesh = replace(mesh, node_sets={**mesh.node_sets, "left": high, "right": low})
     axis, pitch = Axis(), 2 * math.pi / SECTORS
     tilt = axis.rotation(pitch / 2)
-    out = np.array([1.0, 0.0, 0.0])
     frames = {}
     for side, sign in (("left", -1), ("right", 1)):
         normal = tilt @ np.array([math.cos(0.6), sign * math.sin(0.6), 0.0])
@@ -299,8 +298,7 @@ def test_a_rigid_damper_between_blade_and_next_blade_answers_on_one_sector_as_on
         )
         for side in frames
     }
-    x, y, z = tilt @ (out * 0.185)
-    body = replace(BODY, centre=(float(x), float(y), float(z)))
+    body = replace(BODY, centre=(0.185, 0.0, 0.0)).moved(tilt, np.zeros(3))
     law = replace(LAW, preload=0.0, mu=0.4)
     model = Model(
         parts={
@@ -340,10 +338,11 @@ def test_a_rigid_damper_between_blade_and_next_blade_answers_on_one_sector_as_on
     solid = rotating_solid(whole, STEEL)
     turning = solid.at_speed(SPEED)
     damped = rayleigh_damping(turning, 0.003, (3000.0 / (2 * math.pi), 20000.0 / (2 * math.pi)))
-    bodies = [
-        replace(body, centre=tuple(axis.rotation(pitch * s) @ body.centre)) for s in range(SECTORS)
-    ]
-    both = join(wheel=damped, **{f"b{s}": b.structure() for s, b in enumerate(bodies)})
+    bodies = [body.moved(axis.rotation(pitch * s), np.zeros(3)) for s in range(SECTORS)]
+    turning_bodies = {f"b{s}": b.at_speed(SPEED, axis) for s, b in enumerate(bodies)}
+    softening = -body.mass * SPEED**2 * np.diag([1.0, 1.0, 0.0])
+    np.testing.assert_allclose(turning_bodies["b1"].stiffness[:3, :3], softening, atol=1e-9)
+    both = join(wheel=damped, **turning_bodies)
     n = both.n
     static, force = np.zeros(n), np.zeros(n, dtype=complex)
     static[: damped.n] = turning.stiffness @ solid.displacement(SPEED)

@@ -268,13 +268,11 @@ def _loads(model: Model, linear: Linear, forces: dict[str, Matrix]) -> HarmonicL
 
 
 def centrifugal_of_bodies(model: Model) -> FloatArray:
-    """Return the (N,) centrifugal forces on rigid bodies at their centres of mass, N."""
+    """Return the (N,) centrifugal forces (N) and moments (N m) on rigid bodies at their centres of mass."""
     force = np.zeros(model.places.n)
-    axis = model.axis
     for name, part in model.parts.items():
         if part.body is not None:
-            arm = axis.arm(np.array([part.body.centre], dtype=float))[0]
-            force[model.places.own(name)[:3]] = part.body.mass * model.speed**2 * arm
+            force[model.places.own(name)] = part.body.centrifugal(model.speed, model.axis)
     return force
 
 

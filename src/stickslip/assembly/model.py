@@ -161,7 +161,7 @@ class Model:
 
     def spin(self, speed: float) -> Spin:
         """Return how it turns at a speed in rad/s."""
-        return Spin(float(speed), self.tangent, self.coriolis)
+        return Spin(float(speed), self.tangent, self.coriolis, self.axis)
 
     def full(self, speed: float) -> Structure:
         """Return all parts side by side at a speed in rad/s, before joins and cyclic faces tie them."""

@@ -13,7 +13,7 @@ from stickslip.model.dofs import Dofs
 from stickslip.model.fe.rotation import RotatingSolid
 from stickslip.model.mesh.mesh_facets import mirrored_cells
 from stickslip.model.mesh.solid_mesh import SolidMesh
-from stickslip.model.part import BodyPoints, Part, Place
+from stickslip.model.part import BodyPoints, Part, Place, rigid_part
 from stickslip.model.structure import Structure
 from stickslip.reduction.turning import dof_rotation
 
@@ -70,7 +70,7 @@ def copy_of(part: Part, place: Place, **others: Any) -> Part:
     template = part if part.template is None else part.template
     whole = place
     if part.place is not None and part.template is not None:
-        whole = Place(place.turn @ part.place.turn, place.turn @ part.place.move + place.move)
+        whole = part.place.then(place)
     mesh = None if template.mesh is None else moved_mesh(template.mesh, whole)
     structure = turned_structure(template.structure, whole)
     solid = None
@@ -79,13 +79,19 @@ def copy_of(part: Part, place: Place, **others: Any) -> Part:
         mesh = solid.mesh
     body = template.body
     if body is not None:
-        x, y, z = (float(v) for v in whole.put(np.array([body.centre]))[0])
-        body = replace(body, centre=(x, y, z))
+        body = body.moved(whole.turn, whole.move)
     surfaces = {name: _moved_points(points, whole) for name, points in template.surfaces.items()}
     return replace(
         part, structure=structure, mesh=mesh, solid=solid, body=body, surfaces=surfaces,
         template=template, place=whole, **others,
     )  # fmt: skip
+
+
+def placed_body(part: Part, place: Place) -> Part:
+    """Return a rigid part whose body axes are put in `place`: a part of its own, no copy."""
+    assert part.body is not None
+    surfaces = {name: _moved_points(points, place) for name, points in part.surfaces.items()}
+    return rigid_part(part.body.moved(place.turn, place.move), surfaces)
 
 
 def moved_mesh(mesh: SolidMesh, place: Place) -> SolidMesh:

@@ -10,6 +10,7 @@ from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.places import node_rows
 from stickslip.assembly.placing import turned_dofs, turned_structure
 from stickslip.errors import InputError, SingularError
+from stickslip.model.axis import Axis
 from stickslip.model.dofs import Dofs
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
@@ -30,11 +31,14 @@ class Spin:
         In rad/s.
     tangent, coriolis
         As in `RotatingSolid.at_speed`.
+    axis
+        That rigid bodies turn about; solids have their own.
     """
 
     speed: float = 0.0
     tangent: Literal["consistent", "textbook"] = "consistent"
     coriolis: bool = False
+    axis: Axis = Axis()  # noqa: RUF009  # frozen
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +93,8 @@ def in_memory(_content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[s
 
 def at_speed(name: str, part: Part, spin: Spin, rest: Steady = ALONE) -> Structure:
     """Return the full structure of a part at a speed."""
+    if part.body is not None and spin.speed != 0.0:
+        return part.body.at_speed(spin.speed, spin.axis, coriolis=spin.coriolis)
     if part.solid is None or spin.speed == 0.0:
         return part.structure
     try:
@@ -171,7 +177,7 @@ def reduced_parts(
 
 def _root(part: Part, spin: Spin, rest: Steady) -> Part:
     """Return the part whose reduction a part shares."""
-    if part.template is None or part.place is None:
+    if part.template is None or part.place is None or part.body is not None:
         return part
     turns = part.solid is not None and spin.speed != 0.0
     alike = part.place.keeps(part.axis) and rest.unit is None
@@ -181,7 +187,8 @@ def _root(part: Part, spin: Spin, rest: Steady) -> Part:
 def _reduced(
     name: str, part: Part, kept: IntArray, turning: tuple[Spin, Steady], store: Store
 ) -> ReducedPart:
-    spin, rest = turning if part.solid is not None else (Spin(), ALONE)
+    changes = part.solid is not None or part.body is not None
+    spin, rest = turning if changes else (Spin(), ALONE)
     shared = None if rest.unit is None else rest.unit.tobytes()
     key = (spin, shared, kept.tobytes())
     if key not in part.memo:

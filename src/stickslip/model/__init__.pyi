@@ -34,7 +34,7 @@ from .modes import normal_modes as normal_modes
 from .modes import with_springs as with_springs
 from .part import BodyPoints as BodyPoints
 from .part import Place as Place
-from .part import flat_curved_part as flat_curved_part
+from .part import damper_part as damper_part
 from .part import rigid_part as rigid_part
 from .part import solid_part as solid_part
 from .part import structure_part as structure_part
@@ -58,8 +58,11 @@ from .readers.nastran import read_nastran_op4 as read_nastran_op4
 from .readers.nastran_dmig import read_nastran_dmig as read_nastran_dmig
 from .readers.open_model import model_summary as model_summary
 from .readers.summary import ModelSummary as ModelSummary
-from .rigid.damper import ContactPoints as ContactPoints
+from .rigid.body import body_of_tensor as body_of_tensor
 from .rigid.damper import gap_operator as gap_operator
+from .rigid.prisms import CylinderDamper as CylinderDamper
+from .rigid.prisms import WedgeDamper as WedgeDamper
+from .rigid.sides import ContactPoints as ContactPoints
 from .structure import join as join
 from .structure_file import load_structure as load_structure
 from .structure_file import save_structure as save_structure

@@ -16,9 +16,11 @@ from stickslip.model.fe.solid import Materials
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.rigid.damper import FlatCurvedDamper
+from stickslip.model.rigid.prisms import CylinderDamper, WedgeDamper
 from stickslip.model.structure import Structure
 
 FACES = ("cyclic_low", "cyclic_high")
+Damper = FlatCurvedDamper | WedgeDamper | CylinderDamper
 Z_AXIS = Axis()
 
 
@@ -70,7 +72,7 @@ class BodyPoints:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """How a copy is put in its place: mirrored, turned, then moved: ``x = turn @ x0 + move``.
+    """How a part is put in its place: mirrored, turned, then moved: ``x = turn @ x0 + move``.
 
     Parameters
     ----------
@@ -102,6 +104,10 @@ class Place:
     def put(self, points: FloatArray) -> FloatArray:
         """Return where points (n, 3) come to."""
         return np.asarray(points @ self.turn.T + self.move)
+
+    def then(self, after: "Place") -> "Place":
+        """Return the place of what is put here first, and then as `after` says."""
+        return Place(after.turn @ self.turn, after.turn @ self.move + after.move)
 
     @property
     def mirrors(self) -> bool:
@@ -225,11 +231,11 @@ def rigid_part(
     return Part(structure=body.structure(), body=body, surfaces=dict(surfaces or {}), **others)
 
 
-def flat_curved_part(damper: FlatCurvedDamper, **others: Any) -> Part:
-    """Return a damper with the surfaces ``flat`` (points L1 and L2) and ``curved`` (points R)."""
+def damper_part(damper: Damper, **others: Any) -> Part:
+    """Return a rigid damper with its sides as surfaces: ``flat`` and ``curved``, or ``left`` and ``right``."""
     points = damper.contact_points()
     surfaces = {}
-    for side in ("flat", "curved"):
+    for side in dict.fromkeys(points.side):
         own = [i for i, word in enumerate(points.side) if word == side]
         names = tuple(points.names[i] for i in own)
         surfaces[side] = BodyPoints(names, points.position[own], points.frame[own])

@@ -10,7 +10,7 @@ from stickslip.errors import StickslipError, input_error
 from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.gmsh_session import gmsh_session, quadratic_tetrahedra
 from stickslip.model.mesh.solid_mesh import SolidMesh
-from stickslip.model.rigid.damper import ContactPoints
+from stickslip.model.rigid.sides import ContactPoints
 
 MATCH = 1e-9  # m: a contact point and its node may differ by this much
 
@@ -32,7 +32,7 @@ def mesh_blade_pair(geometry: BladePair, contacts: ContactPoints) -> SolidMesh:
     -------
     SolidMesh
         With the sets ``root``, ``underside_1`` and ``underside_2`` (nodes at the contact points on the flat and on the
-        curved side, in their order), ``force`` (on blade 1's airfoil, at `force_span`), ``tip1``, ``edge1`` (tip and
+        curved side, in their order; all nodes of the face where a side has no points), ``force`` (on blade 1's airfoil, at `force_span`), ``tip1``, ``edge1`` (tip and
         mid-span leading edge of blade 1) and ``tip2`` (of blade 2). Further ``contact`` (in the order of `contacts`),
         ``contact_L1`` and so on (one a line) and ``output``.
 
@@ -62,7 +62,14 @@ def mesh_blade_pair(geometry: BladePair, contacts: ContactPoints) -> SolidMesh:
     for line in dict.fromkeys(name.split(".")[0] for name in contacts.names):
         sets[f"contact_{line}"] = contact[contacts.on_line(line)]
     sets |= {"force": np.array([force]), "output": np.array([tip, edge, tip + n])}
-    sets |= {"underside_1": contact[~on_second], "underside_2": contact[on_second]}
+    faces = (_underside(geometry, points, 1), _underside(geometry, points, -1) + n)
+    for name, own, face in zip(
+        ("underside_1", "underside_2"),
+        (contact[~on_second], contact[on_second]),
+        faces,
+        strict=True,
+    ):
+        sets[name] = own if own.size else face
     sets |= {"tip1": np.array([tip]), "edge1": np.array([edge]), "tip2": np.array([tip + n])}
     return SolidMesh(np.vstack([points, points + offset]), np.vstack([cells, cells + n]), sets)
 
@@ -126,6 +133,16 @@ def _clamped(geometry: BladePair, points: FloatArray) -> IntArray:
     bottom = z < -geometry.foot_height + MATCH
     flank = (np.abs(x) > geometry.foot_width / 2 - MATCH) & (z < MATCH)
     return np.flatnonzero(bottom | flank)
+
+
+def _underside(geometry: BladePair, points: FloatArray, side: int) -> IntArray:
+    """Return the nodes of the underside of blade 1 that faces +x (`side` 1: the flat one) or -x (-1: the curved one)."""
+    g = geometry
+    angle = g.flat_angle if side > 0 else g.curved_angle
+    inward, z = side * points[:, 0], points[:, 2]
+    off = (z - g.platform_height + g.platform_edge) * math.cos(angle)
+    off = off + (g.half_width - inward) * math.sin(angle)
+    return np.flatnonzero((np.abs(off) < MATCH) & (inward > g.shank_thickness / 2 - MATCH))
 
 
 def _match(points: FloatArray, targets: FloatArray) -> IntArray:

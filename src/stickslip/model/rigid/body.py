@@ -1,35 +1,41 @@
 """Rigid bodies: six degrees of freedom and no stiffness of their own."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
+from stickslip.model.axis import Axis
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.units import check_quantities, quantity
 
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
+Triple = tuple[float, float, float]
+ALONG_XYZ: tuple[Triple, Triple, Triple] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+SKEW = 1e-12  # of the largest moment: a product of inertia below is rounding
 
 
 @dataclass(frozen=True, kw_only=True)
 class RigidBody:
-    """A rigid body whose principal axes are x, y, z.
+    """A rigid body: mass, principal moments of inertia, centre of mass.
 
     Parameters
     ----------
     mass
         Mass in kg.
     inertia
-        Moments of inertia about the axes x, y, z through `centre`, in kg m².
+        Moments of inertia about the principal axes through `centre`, in kg m².
     centre
         Centre of mass in metres.
+    axes
+        Unit vectors along the three principal axes; x, y, z unless the body is turned.
 
     Raises
     ------
     InputError
-        If mass or inertia are not positive, or no body can have these moments of inertia.
+        If mass or inertia are not positive, no body can have these moments of inertia, or the axes are not square to each other.
     """
 
     mass: float = quantity("mass of the body", "kg", above=0)
@@ -39,6 +45,7 @@ class RigidBody:
     centre: tuple[float, float, float] = quantity(
         "centre of mass [x, y, z]", "m", usual=100, entries=(3, 3)
     )
+    axes: tuple[Triple, Triple, Triple] = ALONG_XYZ
 
     def __post_init__(self) -> None:
         check_quantities(self)
@@ -48,12 +55,68 @@ class RigidBody:
                 f"the largest moment exceeds the sum of the other two, got {self.inertia}",
                 "No distribution of mass has such moments: check their order and units (kg m²).",
             )
+        axes = np.array(self.axes, dtype=float)
+        if axes.shape != (3, 3) or not np.allclose(axes @ axes.T, np.eye(3)):
+            raise input_error(
+                "RigidBody.axes",
+                f"are no three unit vectors square to each other, got {self.axes}",
+                "Give the principal axes, or leave them out where they are x, y, z.",
+            )
+
+    @property
+    def tensor(self) -> FloatArray:
+        """(3, 3) inertia about the centre of mass along x, y, z, in kg m²."""
+        axes = np.array(self.axes, dtype=float)
+        return np.asarray(axes.T * self.inertia @ axes)
+
+    def moved(self, turn: FloatArray, move: FloatArray) -> "RigidBody":
+        """Return the body at ``turn @ x + move``; `turn` is orthogonal (3, 3), `move` in metres."""
+        axes = np.array(self.axes, dtype=float) @ turn.T
+        first, second, third = (_triple(axis) for axis in axes)
+        centre = _triple(turn @ np.array(self.centre) + move)
+        return replace(self, centre=centre, axes=(first, second, third))
 
     def structure(self) -> Structure:
         """Return six dofs ``x y z rx ry rz`` at the centre of mass: no stiffness, no damping."""
         dofs = Dofs(np.full(6, -1), COMPONENTS, np.tile(self.centre, (6, 1)))
-        mass = np.diag([self.mass] * 3 + list(self.inertia)).astype(float)
+        mass = np.diag([self.mass] * 3 + [0.0] * 3).astype(float)
+        mass[3:, 3:] = self.tensor
         return Structure(mass, np.zeros((6, 6)), np.zeros((6, 6)), dofs)
+
+    def at_speed(self, speed: float, axis: Axis, *, coriolis: bool = False) -> Structure:
+        r"""Return the body in axes that turn at a speed: spin softening, and with `coriolis` the gyroscopic matrix.
+
+        With the tensor J and the angular velocity Ω, the potential of the centrifugal forces is
+        ``-(m |Ω x r|² + Ω·J(θ)Ω) / 2``; its second derivatives are the stiffness. The gyroscopic matrix is ``2 m Ω̂`` for
+        translations and ``tr(J) Ω̂ - 2 (JΩ)^`` for rotations (linearised Newton-Euler equations).
+
+        Parameters
+        ----------
+        speed
+            In rad/s.
+        axis
+            Of rotation.
+        coriolis
+            Whether the gyroscopic matrix is added to the damping.
+        """
+        rest, spin = self.structure(), speed * axis.unit
+        tensor, cross = self.tensor, speed * axis.cross
+        moment = tensor @ spin
+        stiffness, gyroscopic = np.zeros((6, 6)), np.zeros((6, 6))
+        stiffness[:3, :3] = self.mass * cross @ cross
+        mixed = np.outer(moment, spin)
+        stiffness[3:, 3:] = (
+            cross @ tensor @ cross - (mixed + mixed.T) / 2 + (spin @ moment) * np.eye(3)
+        )
+        gyroscopic[:3, :3] = 2 * self.mass * cross
+        gyroscopic[3:, 3:] = np.trace(tensor) * cross - 2 * _cross(moment)
+        return replace(rest, stiffness=stiffness, damping=gyroscopic if coriolis else rest.damping)
+
+    def centrifugal(self, speed: float, axis: Axis) -> FloatArray:
+        """Return the (6,) centrifugal force (N) at the centre and moment (N m) at a speed in rad/s."""
+        spin = speed * axis.unit
+        force = self.mass * speed**2 * axis.arm(np.array([self.centre], dtype=float))[0]
+        return np.concatenate([force, -np.cross(spin, self.tensor @ spin)])
 
     def displacement_operator(self, points: FloatArray) -> FloatArray:
         """Return the (p, 3, 6) operator to the displacement ``u_G + θ × r`` of material points.
@@ -70,3 +133,23 @@ class RigidBody:
         operator[:, 1, 3], operator[:, 1, 5] = -z, x
         operator[:, 2, 3], operator[:, 2, 4] = y, -x
         return operator
+
+
+def body_of_tensor(mass: float, tensor: FloatArray, centre: FloatArray) -> RigidBody:
+    """Return the body with the inertia `tensor` (3, 3) in kg m² about its `centre` (3,) in metres."""
+    tilted = np.abs(tensor - np.diag(np.diag(tensor))).max() > SKEW * np.abs(tensor).max()
+    moments, columns = np.linalg.eigh(tensor) if tilted else (np.diag(tensor), np.eye(3))
+    first, second, third = (_triple(axis) for axis in columns.T)
+    return RigidBody(
+        mass=mass, inertia=_triple(moments), centre=_triple(centre), axes=(first, second, third)
+    )
+
+
+def _triple(vector: FloatArray) -> Triple:
+    x, y, z = (float(v) for v in vector)
+    return x, y, z
+
+
+def _cross(vector: FloatArray) -> FloatArray:
+    """Return the (3, 3) matrix of the product ``vector x``."""
+    return np.cross(vector, np.eye(3)).T

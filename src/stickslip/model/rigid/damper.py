@@ -15,7 +15,6 @@ this family of dampers: Gola & Gastaldi, "Understanding complexities in underpla
 mechanics", ASME Turbo Expo 2014.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,39 +22,10 @@ import numpy as np
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.model.rigid.body import RigidBody
+from stickslip.model.rigid.sides import ContactPoints, Line, points_of_lines, side_frame
 from stickslip.units import angle, check_quantities, length, quantity
 
 CURVED_SEGMENTS = 24
-
-
-@dataclass(frozen=True, eq=False)
-class ContactPoints:
-    """Contact points on a damper.
-
-    Parameters
-    ----------
-    names
-        n names such as ``L1.1`` (line and section).
-    side
-        n words ``flat`` (touches the left blade) or ``curved`` (touches the right blade).
-    position
-        (n, 3) positions in metres.
-    frame
-        (n, 3, 3) frames; columns t, w, n: two tangents and the outward normal of the damper,
-        which points into the blade.
-    """
-
-    names: tuple[str, ...]
-    side: tuple[str, ...]
-    position: FloatArray
-    frame: FloatArray
-
-    def __len__(self) -> int:
-        return len(self.names)
-
-    def on_line(self, line: str) -> IntArray:
-        """Return the indices of the points of ``L1``, ``L2`` or ``R``, in order of y."""
-        return np.array([i for i, name in enumerate(self.names) if name.split(".")[0] == line])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,12 +105,12 @@ class FlatCurvedDamper:
     @property
     def flat_normal(self) -> FloatArray:
         """Outward normal (3,) of the flat side: into the left blade."""
-        return np.array([-math.sin(self.flat_angle), 0.0, math.cos(self.flat_angle)])
+        return np.asarray(side_frame(self.flat_angle, left=True)[:, 2])
 
     @property
     def curved_normal(self) -> FloatArray:
         """Outward normal (3,) of the curved side at R: into the right blade."""
-        return np.array([math.sin(self.curved_angle), 0.0, math.cos(self.curved_angle)])
+        return np.asarray(side_frame(self.curved_angle, left=False)[:, 2])
 
     @property
     def centre_of_mass(self) -> FloatArray:
@@ -158,23 +128,12 @@ class FlatCurvedDamper:
         The tangent t points towards the apex on both sides, so w = +y on the flat side and −y on
         the curved one.
         """
-        flat_t = _cross([0.0, 1.0, 0.0], self.flat_normal)
-        curved_t = _cross([0.0, -1.0, 0.0], self.curved_normal)
-        flat = np.column_stack([flat_t, [0.0, 1.0, 0.0], self.flat_normal])
-        curved = np.column_stack([curved_t, [0.0, -1.0, 0.0], self.curved_normal])
-        lines = (
-            ("L1", "flat", self.flat_distances[0], flat),
-            ("L2", "flat", self.flat_distances[1], flat),
-            ("R", "curved", self.curved_distance, curved),
-        )
-        names, sides, positions, frames = [], [], [], []
-        for line, side, distance, frame in lines:
-            for i, y in enumerate(self.sections):
-                names.append(f"{line}.{i + 1}")
-                sides.append(side)
-                positions.append(self._apex_at(y) - distance * frame[:, 0])
-                frames.append(frame)
-        return ContactPoints(tuple(names), tuple(sides), np.array(positions), np.array(frames))
+        lines = [
+            Line("L1", "flat", self.flat_angle, True, self.flat_distances[0]),
+            Line("L2", "flat", self.flat_angle, True, self.flat_distances[1]),
+            Line("R", "curved", self.curved_angle, False, self.curved_distance),
+        ]
+        return points_of_lines(lines, self.sections, self.apex)
 
     def outline(self) -> FloatArray:
         """Return the section's polygon (k, 2) in x and z, metres, from L1 clockwise.
@@ -193,13 +152,6 @@ class FlatCurvedDamper:
         arc = centre + self.curved_radius * np.column_stack([np.cos(angle), np.sin(angle)])
         inside = (arc - first) @ self.flat_normal[[0, 2]] < 0.0
         return np.vstack([first, arc[inside], second])
-
-    def _apex_at(self, y: float) -> FloatArray:
-        return np.array([self.apex[0], y, self.apex[1]])
-
-
-def _cross(a: list[float], b: FloatArray) -> FloatArray:
-    return np.array(np.cross(np.array(a), b))
 
 
 def gap_operator(

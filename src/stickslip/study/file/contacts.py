@@ -17,7 +17,8 @@ from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws import ALL_LAWS
 from stickslip.contact.laws.iwan_populations import FirstLoading, FourParameter, UniformBand
 from stickslip.errors import did_you_mean
-from stickslip.study.file.parts import Triple, union_of
+from stickslip.study.file.bodies import Triple
+from stickslip.study.file.parts import union_of
 from stickslip.study.file.quantities import build, columns_of, refused_by, table_of
 from stickslip.study.file.section import Name, Positive, Section, custom_error, shown
 

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
-from stickslip.study.file.parts import AXES, Triple
+from stickslip.study.file.bodies import AXES, Triple
 from stickslip.study.file.section import Name, Positive, Section, custom_error, once, shown
 
 Component = Literal["x", "y", "z", "rx", "ry", "rz"]

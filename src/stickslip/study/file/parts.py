@@ -16,8 +16,15 @@ from stickslip.model.axis import Axis
 from stickslip.model.fe.beam import Beam, Direction
 from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector
-from stickslip.model.rigid.body import RigidBody
-from stickslip.model.rigid.damper import FlatCurvedDamper
+from stickslip.study.file.bodies import (
+    Cylinder,
+    FlatCurved,
+    RigidBodyTable,
+    Steps,
+    Triple,
+    Wedge,
+    shape,
+)
 from stickslip.study.file.material import DampingTable, MaterialTable, ReductionTable
 from stickslip.study.file.quantities import table_of
 from stickslip.study.file.section import (
@@ -29,10 +36,6 @@ from stickslip.study.file.section import (
     once,
     shown,
 )
-
-Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
-Triple = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
-AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 class PartTable(Section):
@@ -53,15 +56,11 @@ class PartTable(Section):
         return {}
 
 
-def _shape(name: str) -> tuple[Any, Any]:
-    return Literal[name], Field(description=f'shape = "{name}"')
-
-
 PrismBlades = table_of(
     BladePair,
     base=PartTable,
     name="PrismBlades",
-    shape=_shape("prism_blades"),
+    shape=shape("prism_blades"),
     nodes_at=(
         Annotated[list[Name], Field(max_length=20)],
         Field(
@@ -70,58 +69,16 @@ PrismBlades = table_of(
         ),
     ),
 )
-Sector = table_of(BladedSector, base=PartTable, name="BladedSector", shape=_shape("bladed_sector"))
+Sector = table_of(BladedSector, base=PartTable, name="BladedSector", shape=shape("bladed_sector"))
 BeamTable = table_of(
     Beam,
     base=PartTable,
     name="Beam",
     without=("material",),
-    shape=_shape("beam"),
+    shape=shape("beam"),
     elements=(int, Field(20, ge=1, le=10_000, description="number of equal elements, 1 to 10000")),
     bending=(Direction, Field("z", description="direction of the deflection: y or z")),
     axial=(bool, Field(False, description="whether it stretches too: true or false")),
-)
-FlatCurved = table_of(
-    FlatCurvedDamper,
-    name="FlatCurved",
-    optional=("apex", "flat_angle", "curved_angle"),
-    shape=_shape("flat_curved"),
-)
-
-
-class Surface(Section):
-    """Points of a rigid body that touch something."""
-
-    points_m: list[Triple] = Field(
-        min_length=1, max_length=10_000, description="positions [x, y, z] of its points in m"
-    )
-    normal: Triple = Field(
-        description="direction [x, y, z] out of the body, the same at all points"
-    )
-    tangent: Triple | None = Field(
-        None,
-        description="direction whose part in the contact plane is the tangent t; left out: the axis nearest to the plane",
-    )
-
-    @model_validator(mode="after")
-    def _has_directions(self) -> Self:
-        for key in ("normal", "tangent"):
-            if getattr(self, key) is not None and not any(getattr(self, key)):
-                raise custom_error("has no length", "Along z it is [0, 0, 1].", key)
-        return self
-
-
-RigidBodyTable = table_of(
-    RigidBody,
-    name="RigidBody",
-    shape=_shape("rigid_body"),
-    surfaces=(
-        dict[Name, Surface],
-        Field(
-            default_factory=dict,
-            description="the tables surfaces.NAME, points that touch something",
-        ),
-    ),
 )
 
 
@@ -281,24 +238,13 @@ class FileModel(PartTable):
         return Axis((a, b, c), (x, y, z))
 
 
-class Placed(Section):
-    """How a copy is put in its place: mirrored, then turned, then moved."""
-
-    mirror: Literal["x", "y", "z"] | None = Field(
-        None, description="direction that a mirror through the origin turns round: x, y or z"
-    )
-    turn_deg: float = Field(0.0, ge=-360, le=360, description="turn about the axis in degrees")
-    axis: Literal["x", "y", "z"] = Field(
-        "z", description="axis through the origin of the turn: x, y or z"
-    )
-    move_m: Triple = Field([0.0, 0.0, 0.0], description="displacement [x, y, z] in m")
-
-
 class Copy(Section):
     """A copy of another part, whose reduction it shares."""
 
     of: Name = Field(description="name of the part that is copied")
-    placed: Placed = Field(description="the table placed: mirror, turn_deg, axis, move_m")
+    placed: Steps = Field(
+        description="the table placed: mirror, axes, turn_deg, axis, move_m; or a list of such tables, one step after the other"
+    )
 
 
 SHAPES: dict[str, type[Section]] = {
@@ -308,6 +254,8 @@ SHAPES: dict[str, type[Section]] = {
     "lumped": Lumped,
     "rigid_body": RigidBodyTable,
     "flat_curved": FlatCurved,
+    "wedge": Wedge,
+    "cylinder": Cylinder,
 }
 KINDS: dict[str, type[Section]] = {**SHAPES, "file": FileModel, "of": Copy}
 

@@ -7,14 +7,13 @@ from typing import Any
 
 from stickslip.assembly.contact import GROUND, NEXT
 from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.study.file.bodies import Cylinder, FlatCurved, RigidBodyTable, Wedge
 from stickslip.study.file.parts import (
     BeamTable,
     Copy,
     FileModel,
-    FlatCurved,
     Lumped,
     PrismBlades,
-    RigidBodyTable,
     Sector,
 )
 from stickslip.study.file.section import Section
@@ -75,13 +74,7 @@ def _parts(tables: Tables, home: Path) -> Iterator[InputError]:
                         "Check the name; it is relative to the study's folder.",
                     )
         if isinstance(table, Copy):
-            original = tables.part.get(table.of)
-            if original is None or isinstance(original, Copy):
-                problem = "is a copy itself" if original is not None else "is no part"
-                originals = [n for n, t in tables.part.items() if not isinstance(t, Copy)]
-                yield input_error(
-                    f"part.{name}.of", f"{table.of!r} {problem}", did_you_mean(table.of, originals)
-                )
+            yield from _copied(tables, name, table.of)
         if isinstance(table, PrismBlades):
             yield from _nodes_at(tables, f"part.{name}.nodes_at", table)
         if isinstance(table, PrismBlades | Sector | BeamTable) and not (
@@ -94,6 +87,30 @@ def _parts(tables: Tables, home: Path) -> Iterator[InputError]:
             )
 
 
+def _copied(tables: Tables, name: str, of: str) -> Iterator[InputError]:
+    place = f"part.{name}.of"
+    if of not in tables.part:
+        yield input_error(place, f"{of!r} is no part", did_you_mean(of, list(tables.part)))
+        return
+    line = [name]
+    while of in tables.part and of not in line:
+        line.append(of)
+        table: Any = tables.part[of]
+        if not isinstance(table, Copy):
+            return
+        of = table.of
+    if of == name:
+        yield input_error(
+            place, f"{' is a copy of '.join([*line, of])}", "Let one of them be no copy."
+        )
+
+
+def original(tables: Tables, name: str) -> Any:
+    """Return the table of a part; of a copy, the one of what is copied."""
+    table = tables.part[name]
+    return original(tables, table.of) if isinstance(table, Copy) else table
+
+
 def _nodes_at(tables: Tables, place: str, table: Any) -> Iterator[InputError]:
     dampers = [name for name, other in tables.part.items() if isinstance(other, FlatCurved)]
     known = [f"{name}.{side}" for name in dampers for side in SIDES]
@@ -102,7 +119,16 @@ def _nodes_at(tables: Tables, place: str, table: Any) -> Iterator[InputError]:
             yield input_error(
                 place,
                 f"there is no surface {word!r} of a flat_curved part",
-                did_you_mean(word, known),
+                did_you_mean(word, known)
+                + ' Other bodies need no nodes: pairing = "node_to_segment" takes the body\'s points first and the set '
+                '"underside_1" or "underside_2" second.',
+            )
+    for name in dict.fromkeys(word.partition(".")[0] for word in table.nodes_at):
+        if getattr(tables.part.get(name), "placed", None):
+            yield input_error(
+                f"part.{name}.placed",
+                f"moves points that {place} makes nodes of",
+                "Leave placed out: apex_m puts this body in its place. Or leave nodes_at out.",
             )
     if len({word.partition(".")[0] for word in table.nodes_at}) > 1:
         yield input_error(place, "names surfaces of several parts", "Name those of one damper.")
@@ -121,10 +147,7 @@ def _surfaces(tables: Tables) -> Iterator[InputError]:
 
 def _no_sector(tables: Tables, place: str, word: str) -> Iterator[InputError]:
     head = word.removeprefix(NEXT).partition(".")[0]
-    table: Any = tables.part.get(head)
-    if isinstance(table, Copy):
-        table = tables.part[table.of]
-    alone = table is not None and sectors_of(tables) == 1
+    alone = head in tables.part and sectors_of(tables) == 1
     if alone:
         yield input_error(
             place,
@@ -154,16 +177,12 @@ def _refused(tables: Tables, place: str, word: str, what: tuple[str, ...]) -> It
 
 def names_of(tables: Tables, part: str) -> tuple[str, ...] | None:
     """Return the names of surfaces and sets that a part will have; None where only a file knows them."""
-    table: Any = tables.part[part]
-    if isinstance(table, Copy):
-        return names_of(tables, table.of)
+    table = original(tables, part)
     return None if isinstance(table, FileModel) else _NAMES[type(table)](table)
 
 
-def _of_blades(table: Any) -> tuple[str, ...]:
-    sides = {word.partition(".")[2] for word in table.nodes_at}
-    undersides = [f"underside_{i + 1}" for i, side in enumerate(SIDES) if side in sides]
-    return (*undersides, *BLADES)
+def _of_blades(_table: Any) -> tuple[str, ...]:
+    return ("underside_1", "underside_2", *BLADES)
 
 
 def _of_sector(table: Any) -> tuple[str, ...]:
@@ -179,6 +198,8 @@ _NAMES: dict[type[Section], Callable[[Any], tuple[str, ...]]] = {
     Lumped: lambda table: tuple(table.labels),
     RigidBodyTable: lambda table: tuple(table.surfaces),
     FlatCurved: lambda _: SIDES,
+    Wedge: lambda _: ("left", "right"),
+    Cylinder: lambda _: ("left", "right"),
 }
 
 
@@ -253,7 +274,9 @@ def _questions(tables: Tables) -> Iterator[InputError]:
                     f"is missing on a wheel of {sectors} sectors",
                     "Say how many periods the force has around the circumference.",
                 )
-    if getattr(asked, "campbell", None) is not None and not any(map(_turns, tables.part.values())):
+    if getattr(asked, "campbell", None) is not None and not any(
+        _turns(original(tables, name)) for name in tables.part
+    ):
         yield input_error(
             "campbell",
             "needs a part that a speed changes, and none is a mesh",
@@ -266,7 +289,7 @@ def _questions(tables: Tables) -> Iterator[InputError]:
 def _turns(table: Any) -> bool:
     if isinstance(table, FileModel):
         return table.file.lower().endswith(MESHES)
-    return isinstance(table, PrismBlades | Sector | Copy)
+    return isinstance(table, PrismBlades | Sector)
 
 
 def _diameters(name: str, table: Any, sectors: int | None) -> Iterator[InputError]:

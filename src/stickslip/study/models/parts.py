@@ -2,7 +2,7 @@
 
 import json
 import logging
-from collections.abc import Callable, MutableMapping
+from collections.abc import Callable, MutableMapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.assembly.placing import copy_of, place_of
+from stickslip.assembly.placing import copy_of, place_of, placed_body
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
 from stickslip.model.fe.beam import Beam, beam
@@ -24,25 +24,34 @@ from stickslip.model.mesh.sector_mesh import mesh_sector
 from stickslip.model.part import (
     BodyPoints,
     Part,
-    flat_curved_part,
+    Place,
+    damper_part,
     rigid_part,
     solid_part,
     structure_part,
 )
 from stickslip.model.rigid.body import RigidBody
-from stickslip.model.rigid.damper import ContactPoints, FlatCurvedDamper
+from stickslip.model.rigid.damper import FlatCurvedDamper
+from stickslip.model.rigid.prisms import CylinderDamper, WedgeDamper
+from stickslip.model.rigid.sides import ContactPoints
+from stickslip.study.file.bodies import (
+    AXES,
+    BODIES,
+    Cylinder,
+    FlatCurved,
+    Placed,
+    RigidBodyTable,
+    Surface,
+    Wedge,
+)
 from stickslip.study.file.material import ReductionTable
 from stickslip.study.file.parts import (
-    AXES,
     BeamTable,
     Copy,
     FileModel,
-    FlatCurved,
     Lumped,
     PrismBlades,
-    RigidBodyTable,
     Sector,
-    Surface,
 )
 from stickslip.study.file.quantities import build
 from stickslip.study.file.section import Section
@@ -91,17 +100,11 @@ class Workshop:
 
     def _made(self, name: str, table: Any) -> Part:
         if isinstance(table, Copy):
-            placed = table.placed
-            mirror = None if placed.mirror is None else AXES[placed.mirror]
-            x, y, z = placed.move_m
-            place = place_of(
-                mirror=mirror,
-                turn=placed.turn_deg * DEG,
-                axis=Axis(AXES[placed.axis]),
-                move=(x, y, z),
-            )
-            return copy_of(self.part(table.of), place)
-        return _MAKERS[type(table)](self, name, table)
+            return copy_of(self.part(table.of), place_in_steps(table.placed))
+        made = _MAKERS[type(table)](self, name, table)
+        if isinstance(table, BODIES) and table.placed:  # type: ignore[attr-defined]
+            return placed_body(made, place_in_steps(table.placed))  # type: ignore[attr-defined]
+        return made
 
     def material(self, table: Any) -> Material | None:
         """Return the material of a part; None where the study names none."""
@@ -169,7 +172,15 @@ class Workshop:
 
     def flat_curved(self, name: str, table: Any) -> Part:
         """Make a damper with a flat and a curved side."""
-        return flat_curved_part(damper_of(self.tables, name))
+        return damper_part(damper_of(self.tables, name))
+
+    def wedge(self, name: str, table: Any) -> Part:
+        """Make a wedge."""
+        return damper_part(build(WedgeDamper, table))
+
+    def cylinder(self, name: str, table: Any) -> Part:
+        """Make a cylinder."""
+        return damper_part(build(CylinderDamper, table))
 
     def from_file(self, name: str, table: FileModel) -> Part:
         """Read a part."""
@@ -185,8 +196,22 @@ _MAKERS: dict[type[Section], Callable[[Workshop, str, Any], Part]] = {
     Lumped: Workshop.lumped,
     RigidBodyTable: Workshop.rigid,
     FlatCurved: Workshop.flat_curved,
+    Wedge: Workshop.wedge,
+    Cylinder: Workshop.cylinder,
     FileModel: Workshop.from_file,
 }
+
+
+def place_in_steps(steps: Sequence[Placed]) -> Place:
+    """Return where a part comes to that is mirrored, turned and moved step by step."""
+    place = Place(np.eye(3), np.zeros(3))
+    for step in steps:
+        x, y, z = step.move_m
+        mirrored = place_of(mirror=None if step.mirror is None else AXES[step.mirror])
+        turned = place_of(turn=step.turn_deg * DEG, axis=Axis(AXES[step.axis]), move=(x, y, z))
+        whole = mirrored.then(Place(step.new_axes, np.zeros(3))).then(turned)
+        place = place.then(whole)
+    return place
 
 
 def damper_of(tables: Tables, name: str) -> FlatCurvedDamper:
@@ -298,14 +323,14 @@ def _links(links: list[list[Any]], labels: list[str], n: int) -> FloatArray:
 
 
 def _body_points(name: str, surface: Surface) -> BodyPoints:
-    """Return the points of a body's surface, their frames made of normal and tangent."""
-    normal = np.array(surface.normal, dtype=float)
-    normal /= np.linalg.norm(normal)
-    along = np.eye(3)[np.argmin(np.abs(normal))] if surface.tangent is None else surface.tangent
-    tangent = np.asarray(along, dtype=float)
-    tangent = tangent - (tangent @ normal) * normal
-    tangent /= np.linalg.norm(tangent)
-    frame = np.column_stack([tangent, np.cross(normal, tangent), normal])
-    count = len(surface.points_m)
-    names = tuple(f"{name}.{i + 1}" for i in range(count))
-    return BodyPoints(names, np.array(surface.points_m, dtype=float), np.tile(frame, (count, 1, 1)))
+    """Return the points of a body's surface, their frames made of normals and tangent."""
+    normals = surface.directions
+    frames = []
+    for normal in normals:
+        along = np.eye(3)[np.argmin(np.abs(normal))] if surface.tangent is None else surface.tangent
+        tangent = np.asarray(along, dtype=float)
+        tangent = tangent - (tangent @ normal) * normal
+        tangent /= np.linalg.norm(tangent)
+        frames.append(np.column_stack([tangent, np.cross(normal, tangent), normal]))
+    names = surface.names or [f"{name}.{i + 1}" for i in range(len(normals))]
+    return BodyPoints(tuple(names), np.array(surface.points_m, dtype=float), np.array(frames))
