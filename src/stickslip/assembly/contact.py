@@ -30,6 +30,8 @@ class Contact:
     tangent
         Direction whose part in the contact plane is t; None: that of the surface's own frames, or any where the law does not tell
         its tangents apart.
+    normal
+        Direction out of the first surface, for nodes that span no facet, such as the tip of a beam; None: that of the surfaces.
     acts
         For surfaces of single dofs, which have no normal: the direction of the contact that their relative motion is.
     tolerance
@@ -45,6 +47,7 @@ class Contact:
     share: Share = "point"
     pairing: PairingKind = "node_to_node"
     tangent: tuple[float, float, float] | None = None
+    normal: tuple[float, float, float] | None = None
     acts: Literal["tangential", "normal"] | None = None
     tolerance: float | None = None
     gap: float = 0.0

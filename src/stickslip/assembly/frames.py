@@ -25,7 +25,9 @@ def whole(surface: Surface) -> bool:
 def with_normals(
     key: str, contact: Contact, first: Spot, a: Surface, second: Spot | None, b: Surface | None
 ) -> Surface:
-    """Return side A with its normals: of its own frames or facets, or against those of side B."""
+    """Return side A with its normals: of its own frames or facets, those that the contact names, or against those of side B."""
+    if contact.normal is not None:
+        return replace(a, facets=NO_FACETS, normals=_named(key, contact.normal, first, a))
     if first.frame is not None:
         return replace(a, normals=first.frame[:, :, 2])
     if whole(a) or (len(a.facets) and contact.pairing != "node_to_node"):
@@ -38,11 +40,25 @@ def with_normals(
         raise input_error(
             f"{key}.between",
             f"{first.name!r} spans no facet, and nothing else tells where its normal points",
-            "Name a set that holds whole facets of a mesh, let the first side be the body with known normals, or name single dofs "
-            "with acts.",
+            "Name a set that holds whole facets of a mesh, let the first side be the body with known normals, give the normal of the "
+            "contact, or name single dofs with acts.",
         )
     points, normals = theirs
     return replace(a, normals=-normals[cKDTree(points).query(a.points)[1]])
+
+
+def _named(key: str, normal: tuple[float, float, float], first: Spot, a: Surface) -> FloatArray:
+    """Return the normal that a contact names at each point; refuse it where the surface has its own."""
+    length = float(np.linalg.norm(normal))
+    if first.frame is not None or len(a.facets):
+        raise input_error(
+            f"{key}.normal",
+            f"is given, and {first.name!r} has normals of its own",
+            "Leave it out; it is for nodes that span no facet.",
+        )
+    if not 0 < length < np.inf:
+        raise input_error(f"{key}.normal", "has no length", "Along z it is [0, 0, 1].")
+    return np.tile(np.asarray(normal, dtype=float) / length, (len(a.points), 1))
 
 
 def _normals_of(spot: Spot, surface: Surface) -> tuple[FloatArray, FloatArray] | None:

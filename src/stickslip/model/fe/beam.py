@@ -1,6 +1,6 @@
 """Straight uniform beams, slender or with shear, at rest or turning about an axis across them.
 
-Bending is in one plane. With shear the elements interpolate deflection and rotation of the section by the solutions of the static
+Bending is in one plane, or in both, which a straight uniform beam does not couple. With shear the elements interpolate deflection and rotation of the section by the solutions of the static
 equations, so that they do not lock: Z. Friedman and J. B. Kosmatka, "An improved two-node Timoshenko beam finite element", Computers &
 Structures 47 (1993) 473-481. Rotation: D. H. Hodges and M. J. Rutkowski, "Free-vibration analysis of rotating beams by a variable-order
 finite-element method", AIAA Journal 19 (1981) 1459-1466.
@@ -8,20 +8,23 @@ finite-element method", AIAA Journal 19 (1981) 1459-1466.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
+import scipy.linalg
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error
-from stickslip.model.dofs import Dofs
+from stickslip.model.dofs import Dofs, join_dofs
 from stickslip.model.fe.solid import Material
 from stickslip.model.structure import Structure
 from stickslip.units import check_quantities, length, quantity
 
 End = Literal["clamped", "pinned", "sliding", "free"]
 Direction = Literal["y", "z"]
+Bending = Literal["y", "z", "both"]
+COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
 # deflection, rotation, axial displacement held; an end that slides moves across the beam
 HELD = {
     "clamped": (True, True, True),
@@ -46,6 +49,8 @@ class Beam:
         Of the section, m².
     second_moment
         Of area, for the bending considered, m⁴.
+    second_moment_y
+        The same for deflections along y where the beam bends both ways; None: it is the same.
     material
         Linear elastic.
     shear_coefficient
@@ -69,6 +74,12 @@ class Beam:
         above=0,
         usual=2,
     )
+    second_moment_y: float | None = quantity(
+        'second moment of area for deflections along y, with bending = "both"; left out: the same',
+        "m4",
+        default=None,
+        above=0,
+    )
     ends: tuple[End, End] = quantity(
         "how the first and the last end are held",
         default=("clamped", "free"),
@@ -80,7 +91,7 @@ class Beam:
         check_quantities(self)
 
 
-def beam(shape: Beam, elements: int, *, bending: Direction = "z", axial: bool = False) -> Structure:
+def beam(shape: Beam, elements: int, *, bending: Bending = "z", axial: bool = False) -> Structure:
     """Return the finite-element model of a beam along x.
 
     Parameters
@@ -90,7 +101,7 @@ def beam(shape: Beam, elements: int, *, bending: Direction = "z", axial: bool = 
     elements
         Number of equal elements.
     bending
-        Direction of the deflection; the rotation is about the other one (``ry`` is minus the slope of z).
+        Direction of the deflection; the rotation is about the other one (``ry`` is minus the slope of z). ``both``: y and z.
     axial
         Whether the beam stretches too.
 
@@ -98,7 +109,7 @@ def beam(shape: Beam, elements: int, *, bending: Direction = "z", axial: bool = 
     -------
     Structure
         Dense. Sets ``deflection``, ``rotation`` and ``axial`` hold the free dofs along the beam, ``tip`` the deflection of the last
-        node, if free.
+        node, if free; with both bendings, ``tip`` holds all its displacements, so that it is a point in space.
 
     Raises
     ------
@@ -114,7 +125,7 @@ def rotating_beam(
     speed: float,
     *,
     hub_radius: float = 0.0,
-    bending: Direction = "z",
+    bending: Bending = "z",
     axial: bool = False,
     coriolis: bool = False,
 ) -> Structure:
@@ -134,7 +145,7 @@ def rotating_beam(
     hub_radius
         Distance of the clamped end from the axis, m.
     bending
-        ``z``: flap, along the axis of rotation; ``y``: lag, in the plane of rotation.
+        ``z``: flap, along the axis of rotation; ``y``: lag, in the plane of rotation; ``both``.
     axial
         Whether the beam stretches too.
     coriolis
@@ -145,9 +156,9 @@ def rotating_beam(
     InputError
         If the beam turns and is not clamped and free, the hub's radius is negative, or Coriolis terms are asked for without axial motion.
     """
-    if elements < 1 or bending not in get_args(Direction):
+    if elements < 1 or bending not in get_args(Bending):
         raise input_error(
-            "beam", f"got {elements} elements and bending {bending!r}", "One or more, y or z."
+            "beam", f"got {elements} elements and bending {bending!r}", "One or more, y, z or both."
         )
     if not 0 <= hub_radius < math.inf or not math.isfinite(speed):
         raise input_error(
@@ -165,6 +176,8 @@ def rotating_beam(
             "acts between deflection and stretching, and the beam does not stretch",
             "Give axial=True.",
         )
+    if bending == "both":
+        return _both(shape, elements, speed, hub_radius, axial, coriolis)
     size = shape.length / elements
     starts = size * np.arange(elements)
     blocks = [_element(shape, size, start, speed, hub_radius, bending) for start in starts]
@@ -180,6 +193,39 @@ def rotating_beam(
     square = np.ix_(kept, kept)
     dofs = _dofs(shape, elements, hub_radius, bending).take(kept)
     return Structure(mass[square], damping[square], stiffness[square], dofs, _sets(dofs, bending, elements))  # fmt: skip
+
+
+def _both(
+    shape: Beam, elements: int, speed: float, hub_radius: float, axial: bool, coriolis: bool
+) -> Structure:
+    """Return the beam that bends in both planes, node by node; stretching goes with the lag, which Coriolis forces couple to it."""
+    across = replace(shape, second_moment=shape.second_moment_y or shape.second_moment)
+    lag = rotating_beam(
+        across, elements, speed, hub_radius=hub_radius, bending="y", axial=axial, coriolis=coriolis
+    )
+    flap = rotating_beam(shape, elements, speed, hub_radius=hub_radius, bending="z")
+    table = join_dofs({"lag": lag.dofs, "flap": flap.dofs})
+    rank = np.array([COMPONENTS.index(component) for component in table.component])
+    order = np.lexsort((rank, table.node))
+    square = np.ix_(order, order)
+    mass, damping, stiffness = (
+        scipy.linalg.block_diag(getattr(lag, name), getattr(flap, name))[square]
+        for name in ("mass", "damping", "stiffness")
+    )
+    dofs = replace(table.take(order), part=())
+    component = np.array(dofs.component)
+    sets = {
+        name: np.flatnonzero(np.isin(component, kinds))
+        for name, kinds in (
+            ("deflection", ("y", "z")),
+            ("rotation", ("ry", "rz")),
+            ("axial", ("x",)),
+        )
+    }
+    moves = np.isin(component, ("x", "y", "z"))
+    sets["tip"] = np.flatnonzero(moves & (dofs.node == elements))
+    found = {name: index for name, index in sets.items() if index.size}
+    return Structure(mass, damping, stiffness, dofs, found)
 
 
 def _element(

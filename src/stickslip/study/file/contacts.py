@@ -102,6 +102,11 @@ class ContactBase(Pair):
         None,
         description="direction [x, y, z] whose part in the contact plane is the tangent t; left out: that of the surface",
     )
+    normal: Triple | None = Field(
+        None,
+        description="direction [x, y, z] out of the first surface where it is nodes that span no facet, such as the tip of a beam; "
+        "left out: that of the surfaces",
+    )
     acts: Literal["tangential", "normal"] | None = Field(
         None,
         description="for single dofs, which have no normal: whether their motion is tangential or normal to the contact",

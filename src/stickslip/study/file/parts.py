@@ -13,7 +13,7 @@ from pydantic import (
 
 from stickslip.errors import did_you_mean
 from stickslip.model.axis import Axis
-from stickslip.model.fe.beam import Beam, Direction
+from stickslip.model.fe.beam import Beam, Bending
 from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector
 from stickslip.study.file.bodies import (
@@ -77,7 +77,7 @@ BeamTable = table_of(
     without=("material",),
     shape=shape("beam"),
     elements=(int, Field(20, ge=1, le=10_000, description="number of equal elements, 1 to 10000")),
-    bending=(Direction, Field("z", description="direction of the deflection: y or z")),
+    bending=(Bending, Field("z", description="direction of the deflection: y, z or both")),
     axial=(bool, Field(False, description="whether it stretches too: true or false")),
 )
 

@@ -83,6 +83,7 @@ def _contact(parts: Mapping[str, Part], table: Any) -> Contact:
         share=table.per,
         pairing=table.pairing,
         tangent=None if table.tangent is None else tuple(table.tangent),
+        normal=None if table.normal is None else tuple(table.normal),
         acts=table.acts or _acts(table),
         tolerance=table.tolerance_m,
         gap=table.gap,
