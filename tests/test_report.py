@@ -422,7 +422,7 @@ def test_bad_input_names_file_and_remedy(tmp_path: Path) -> None:
         report_file(tmp_path / "none.nc")
     text = tmp_path / "text.nc"
     text.write_text("not a dataset", encoding="utf-8")
-    with pytest.raises(InputError, match=r"text\.nc: not a netCDF-4 file"):
+    with pytest.raises(InputError, match=r"text\.nc: is no netCDF-4 file, or a damaged one"):
         report_file(text)
     other = write_result(
         tree_of(forced_response=synthetic_result().drop_vars("status")), tmp_path / "other.nc"

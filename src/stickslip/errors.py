@@ -1,7 +1,15 @@
 """The error types, and the shape of their messages: place, what is wrong, value got, remedy."""
 
+import re
 from collections.abc import Collection, Iterable, Mapping
 from string import Template
+
+# controls, marks of direction, and what is no character
+_STEERING = re.compile(
+    r"[\x00-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff\ud800-\udfff]"
+)
+LONGEST_MESSAGE = 1900  # bytes
+LONGEST_TEXT = 600  # characters of a place, a problem or a remedy
 
 
 class StickslipError(Exception):
@@ -48,8 +56,12 @@ class InputError(StickslipError):
         return self.place.partition(".")[2]
 
     def __str__(self) -> str:
-        own = f"{self.place}: {self.problem}. {self.remedy}"
-        return "\n".join([own, *map(str, self.others)])
+        return "\n".join(_capped(list(map(_line, self.each()))))
+
+    def each(self) -> "list[InputError]":
+        """Return the errors one by one."""
+        alone = InputError(self.place, self.problem, self.advice, self.words)
+        return [alone, *(one for other in self.others for one in other.each())]
 
     def at(self, place: str) -> "InputError":
         """Return the same error at another place."""
@@ -84,6 +96,31 @@ def check_choice(place: str, value: object, choices: Collection[str], hint: str 
     if hint:
         raise input_error(place, f"{value!r} is none of {known}", hint)
     raise input_error(place, f"is {value!r}", f"Give one of {known}.")
+
+
+def printable(text: str) -> str:
+    """Return the text with control characters as escapes: names in files must not steer a terminal."""
+    return _STEERING.sub(lambda found: ascii(found[0])[1:-1], text)
+
+
+def _line(error: InputError) -> str:
+    return printable(f"{_cut(error.place)}: {_cut(error.problem)}. {_cut(error.remedy)}")
+
+
+def _cut(text: str) -> str:
+    """Return the ends of a text of which nobody reads the middle."""
+    half = LONGEST_TEXT // 2
+    return text if len(text) <= LONGEST_TEXT else f"{text[:half]} ... {text[-half:]}"
+
+
+def _capped(lines: list[str]) -> list[str]:
+    """Return as many lines as a screen holds, at least one, and how many there are more."""
+    size = 0
+    for n, line in enumerate(lines):
+        size += len(line.encode(errors="replace")) + 1
+        if size > LONGEST_MESSAGE and n:
+            return [*lines[:n], f"... and {len(lines) - n} more."]
+    return lines
 
 
 def together(errors: Iterable[InputError]) -> InputError:

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from plotly.offline import get_plotlyjs
 
-from stickslip.errors import input_error
 from stickslip.report.plot import Plot
 from stickslip.report.section import Card
+from stickslip.study.keep.whole import write_whole
 
 _CONFIG = {
     "responsive": True,
@@ -86,12 +86,5 @@ def _asset(name: str) -> str:
 
 
 def write_page(page: str, path: Path) -> None:
-    """Write a page; an `InputError` says why it cannot be."""
-    try:
-        path.write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise input_error(
-            str(path),
-            f"cannot be written ({error.strerror})",
-            "Choose a folder that exists and is writable.",
-        ) from error
+    """Write a page whole or not at all; an `InputError` says why it cannot be."""
+    write_whole(path, page.encode("utf-8", errors="replace"))

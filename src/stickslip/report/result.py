@@ -8,6 +8,7 @@ import xarray as xr
 
 from stickslip.errors import input_error
 from stickslip.report.node import Node
+from stickslip.study.keep.netcdf import read_tree
 
 RESULT = "result.nc"
 
@@ -20,15 +21,11 @@ def open_result(path: Path) -> xr.DataTree:
     path
         The file that ``stickslip run`` wrote, finished or not, or the folder that holds it.
     """
-    remedy = f"Give the {RESULT} that 'stickslip run' wrote, or its folder."
     file = path / RESULT if path.is_dir() else path
     if not file.is_file():
+        remedy = f"Give the {RESULT} that 'stickslip run' wrote, or its folder."
         raise input_error(str(file), "no such file", remedy)
-    try:
-        with xr.open_datatree(file, engine="h5netcdf", decode_times=False) as tree:
-            return tree.load()
-    except (OSError, ValueError) as error:
-        raise input_error(str(file), f"not a netCDF-4 file ({error})", remedy) from error
+    return read_tree(file)
 
 
 def analysis(tree: xr.DataTree, name: str) -> xr.Dataset:

@@ -20,11 +20,12 @@ from stickslip.model.mesh.solid_mesh import SolidMesh, write_mesh
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.analysis import Analysis, Case, Job, Solved, named
 from stickslip.study.keep.folder import JOBS, LOG_FILE, PARTS, RESULT, empty_folder, locked_folder
-from stickslip.study.keep.journal import AT_WORK, SEALED, JobJournal
+from stickslip.study.keep.journal import AT_WORK, SEALED, JobJournal, read_sealed
 from stickslip.study.keep.netcdf import write_tree
 from stickslip.study.keep.progress import LOG, Interrupted, at_work, written_down
 from stickslip.study.keep.provenance import Provenance, library_versions
 from stickslip.study.keep.store import PartStore
+from stickslip.study.keep.whole import whole_file
 from stickslip.study.keep.workers import executor
 from stickslip.study.models.study import Study
 from stickslip.study.outcome import CHECKED, UNSOLVED, Book, Outcome, Task, checked
@@ -131,11 +132,15 @@ def _run(
     LOG.info(f"jobs to do: {len(to_do)}, answers: {len(tasks)}")
     # all refusals come before any long computation, and before anything is given up
     jobs = [(t, _inputs(study, t)) for t in to_do]
+    if not fresh:
+        _check_files(to_do)
+        book.read(tasks, unfinished)
     meshes = _meshes(t.case for t in to_do)
     if fresh:
         empty_folder(study.folder, [f"{name}.vtu" for name in meshes], store.written)
     for name, mesh in meshes.items():
-        write_mesh(mesh, study.folder / f"{name}.vtu")
+        with whole_file(study.folder / f"{name}.vtu") as temporary:
+            write_mesh(mesh, temporary)
     target = study.folder / RESULT
     with closing(_worked(jobs, workers)) as finished:
         for sealed in finished:
@@ -187,6 +192,18 @@ def _inputs(study: Study, task: Task) -> Any:
     model = task.case.build()
     with of_task(study, task.case):
         return task.analysis.inputs(task.case, model)
+
+
+def _check_files(tasks: Iterable[Task]) -> None:
+    """Refuse damaged files of jobs that are to go on, before anything else is computed."""
+    for task in tasks:
+        at_work_file = task.sealed.with_suffix(AT_WORK)
+        if task.sealed.exists():
+            read_sealed(task.sealed, task.analysis.record)
+        elif at_work_file.exists():
+            with JobJournal(at_work_file, task.analysis.record) as journal:
+                journal.records()
+                journal.notes()
 
 
 def _label(asked: Analysis, case: Case) -> str:

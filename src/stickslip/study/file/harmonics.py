@@ -1,9 +1,11 @@
 """The table [harmonics] of a study file: which harmonics are kept, and what chooses them at each frequency."""
 
+from collections.abc import Iterator
 from dataclasses import fields
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
+from pydantic_core import PydanticCustomError
 
 from stickslip.errors import InputError, did_you_mean
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
@@ -11,7 +13,7 @@ from stickslip.harmonic.selection.strategy import Strategy, always_kept
 from stickslip.harmonic.support import Harmonics as Support
 from stickslip.harmonic.support import harmonics_of
 from stickslip.response.forced.sweep import Passages, Sweep
-from stickslip.study.file.section import Positive, Section, custom_error, shown
+from stickslip.study.file.section import Positive, Section, custom_error, refuse_all, shown
 
 HIGHEST = 30  # harmonic that a study may keep
 SELECTIONS = tuple(STRATEGIES)
@@ -91,16 +93,7 @@ class Harmonics(Section):
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
-        _check_supports(self)
-        _check_threshold(self)
-        first = self.low_harmonics
-        missing = [h for h in self.alert_harmonics or () if h not in first]
-        if missing:
-            raise custom_error(
-                f"names harmonic {missing[0]}, which low = {self.low} does not keep: nothing is known of its error",
-                "Add it to low, or leave it out.",
-                "alert_harmonics",
-            )
+        refuse_all([*_of_supports(self), *_of_threshold(self), *_of_alert(self)])
         return self
 
     @property
@@ -141,46 +134,56 @@ def _harmonic(given: Any) -> bool:
     return isinstance(given, int) and not isinstance(given, bool) and 1 <= given <= HIGHEST
 
 
-def _check_supports(table: Harmonics) -> None:
+def _of_supports(table: Harmonics) -> Iterator[PydanticCustomError]:
     low, high = table.low_harmonics, table.high_harmonics
     if isinstance(table.low, int) and isinstance(table.high, int) and table.high < table.low:
-        raise custom_error(
+        yield custom_error(
             f"must not be below low = {table.low}, got {table.high}",
             "Raise it, or lower low.",
             "high",
         )
-    if not set(low) <= set(high):
+    elif not set(low) <= set(high):
         lacking = ", ".join(str(h) for h in low if h not in high)
-        raise custom_error(
+        yield custom_error(
             f"must hold every harmonic of low = {table.low}, got {table.high}",
             f"Add {lacking}, or leave that out of low.",
             "high",
         )
     if table.samples < 8 * high[-1]:
-        raise custom_error(
+        yield custom_error(
             f"must be at least 8 times high = {high[-1]}, got {table.samples}",
             f"Give at least {8 * high[-1]}, better a power of two.",
             "samples",
         )
 
 
-def _check_threshold(table: Harmonics) -> None:
-    if table.strategy_threshold is not None:
-        if always_kept(strategy_named(table.selection)):
-            raise custom_error(
-                f"has no meaning for selection = {table.selection!r}, got {table.strategy_threshold:g}",
-                "Remove it: nothing is decided.",
-                "strategy_threshold",
-            )
-        if strategy_named(table.selection).verifies:
-            raise custom_error(
-                f"is not for {table.selection}, which predicts an error, got {table.strategy_threshold:g}",
-                "Give alert_threshold_percent instead.",
-                "strategy_threshold",
-            )
-    try:
-        _ = table.strategy
-    except InputError as error:  # a strategy's own limits
-        percent = strategy_named(table.selection).verifies
-        key = "alert_threshold_percent" if percent else "strategy_threshold"
-        raise custom_error(error.problem, error.remedy, key) from None
+def _of_threshold(table: Harmonics) -> Iterator[PydanticCustomError]:
+    verifies = strategy_named(table.selection).verifies
+    if table.strategy_threshold is not None and always_kept(strategy_named(table.selection)):
+        yield custom_error(
+            f"has no meaning for selection = {table.selection!r}, got {table.strategy_threshold:g}",
+            "Remove it: nothing is decided.",
+            "strategy_threshold",
+        )
+    elif table.strategy_threshold is not None and verifies:
+        yield custom_error(
+            f"is not for {table.selection}, which predicts an error, got {table.strategy_threshold:g}",
+            "Give alert_threshold_percent instead.",
+            "strategy_threshold",
+        )
+    else:
+        try:
+            _ = table.strategy
+        except InputError as error:  # a strategy's own limits
+            key = "alert_threshold_percent" if verifies else "strategy_threshold"
+            yield custom_error(error.problem, error.remedy, key)
+
+
+def _of_alert(table: Harmonics) -> Iterator[PydanticCustomError]:
+    missing = [h for h in table.alert_harmonics or () if h not in table.low_harmonics]
+    if missing:
+        yield custom_error(
+            f"names harmonic {missing[0]}, which low = {table.low} does not keep: nothing is known of its error",
+            "Add it to low, or leave it out.",
+            "alert_harmonics",
+        )

@@ -1,6 +1,6 @@
 """From what pydantic found to sentences that name the file, the key, the value got and a remedy."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, get_args, get_origin
 
@@ -52,9 +52,18 @@ def told(
         Keys that come from elsewhere: ``load.shaker.ratio`` -> ``vary.load.shaker.ratio``.
     """
     found = (
-        _told(place, model, details, renamed or {}) for details in error.errors(include_url=False)
+        _told(place, model, one, renamed or {})
+        for details in error.errors(include_url=False)
+        for one in _each(details)
     )
     return together({str(one): one for one in found}.values())
+
+
+def _each(details: ErrorDetails) -> Iterator[ErrorDetails]:
+    """Yield the errors that a validator of ours has found, or the one of pydantic."""
+    yield details
+    for context in details.get("ctx", {}).get("others", ()):
+        yield {**details, "ctx": context}
 
 
 def _told(

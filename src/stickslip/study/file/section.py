@@ -1,6 +1,6 @@
 """What all tables of a study file have in common."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -25,9 +25,23 @@ def custom_error(problem: str, remedy: str, key: str = "") -> PydanticCustomErro
     return PydanticCustomError("stickslip", "{problem}. {remedy}", context)
 
 
+def refuse_all(errors: Iterable[PydanticCustomError]) -> None:
+    """Raise one error that tells of all `errors`, if there are any: a validator can raise no more."""
+    found = list(errors)
+    if found:
+        first, *others = [dict(error.context or {}) for error in found]
+        context = {**first, "others": others}
+        raise PydanticCustomError("stickslip", "{problem}. {remedy}", context)
+
+
 def shown(value: object) -> str:
     """Return `value` as a message shows it: cut when long."""
-    text = repr(value)
+    try:
+        text = repr(value)
+    except ValueError:  # Python writes no number of thousands of digits
+        return "a number of thousands of digits"
+    except RecursionError:
+        return "what is nested too deeply to be shown"
     return text if len(text) <= LONGEST_VALUE else text[: LONGEST_VALUE - 3] + "..."
 
 

@@ -1,6 +1,5 @@
 """The study file: TOML, read and validated whole for each case that [vary] spans."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,12 +7,11 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from stickslip.errors import input_error
+from stickslip.errors import InputError, input_error, together
 from stickslip.study.file.messages import told
 from stickslip.study.file.tables import VERSION, Tables, study_tables
+from stickslip.study.file.toml import LARGEST_FILE, parsed
 from stickslip.study.file.vary import cases_of, label_of, with_values
-
-LARGEST_FILE = 1_000_000  # bytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,12 +74,7 @@ def read_file(path: Path) -> StudyFile:
         Naming every problem of the file, one a line.
     """
     text = _text(path)
-    try:
-        raw = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise input_error(
-            str(path), f"is not valid TOML: {error}", "Correct the line named."
-        ) from None
+    raw = parsed(path, text)
     return StudyFile(path, text, raw, validated(path, raw))
 
 
@@ -95,7 +88,16 @@ def validated(path: Path, raw: Mapping[str, Any]) -> tuple[TablesOfCase, ...]:
     """
     _check_version(path, raw.get("schema_version"))
     model = study_tables()
-    return tuple(_case(path, raw, values) for values in cases_of(str(path), raw, model))
+    found: list[TablesOfCase] = []
+    errors: dict[str, InputError] = {}
+    for values in cases_of(str(path), raw, model):
+        try:
+            found.append(_case(path, raw, values))
+        except InputError as error:  # what is wrong in many cases is told once
+            errors |= {str(one): one for one in error.each()}
+    if errors:
+        raise together(errors.values())
+    return tuple(found)
 
 
 def _case(path: Path, raw: Mapping[str, Any], values: Mapping[str, Any]) -> TablesOfCase:
@@ -130,7 +132,7 @@ def _text(path: Path) -> str:
                 "A study file is a few kilobytes of TOML.",
             )
         # TOML allows both line ends; one form keeps hashes and provenance the same
-        return content.decode("utf-8").replace("\r\n", "\n")
+        return content.decode("utf-8-sig").replace("\r\n", "\n")  # some editors mark UTF-8
     except OSError as error:
         raise input_error(
             place, f"cannot be read ({error.strerror})", "Check its permissions."

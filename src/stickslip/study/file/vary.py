@@ -41,8 +41,11 @@ def cases_of(place: str, raw: Mapping[str, Any], model: type[BaseModel]) -> list
     tables = given if isinstance(given, list) else [given]
     if not all(isinstance(table, dict) for table in tables):
         raise input_error(f"{place}: vary", f"must be a table, got {shown(given)}", EXAMPLE)
-    flat = [dict(_flat(place, table)) for table in tables]
-    _check(place, flat, raw, model)
+    errors: list[InputError] = []
+    flat = [dict(_flat(place, table, errors)) for table in tables]
+    errors += _wrong(place, flat, raw, model)
+    if errors:
+        raise together(errors)
     count = prod(len(next(iter(lists.values()))) for lists in flat if lists)
     if count > MOST_CASES:
         raise input_error(
@@ -79,48 +82,48 @@ def _text(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _flat(place: str, table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, list[Any]]]:
-    """Yield the keys of nested tables, joined by dots, and their lists."""
+def _flat(
+    place: str, table: Mapping[str, Any], errors: list[InputError], above: str = ""
+) -> Iterator[tuple[str, list[Any]]]:
+    """Yield the keys of nested tables, joined by dots, and their lists; what is no list goes to the errors."""
     for name, value in table.items():
         key = f"{above}{name}"
         if isinstance(value, dict):
-            yield from _flat(place, value, f"{key}.")
+            yield from _flat(place, value, errors, f"{key}.")
         elif isinstance(value, list) and value:
             yield key, value
-        else:
-            raise input_error(
-                f"{place}: vary.{key}", f"must be a list of values, got {shown(value)}", EXAMPLE
+        elif value == []:
+            problem, remedy = (
+                "is an empty list: there is nothing to compute",
+                "Give one value or more.",
             )
+            errors.append(input_error(f"{place}: vary.{key}", problem, remedy))
+        else:
+            problem = f"must be a list of values, got {shown(value)}"
+            errors.append(input_error(f"{place}: vary.{key}", problem, EXAMPLE))
 
 
-def _check(
+def _wrong(
     place: str,
     tables: Sequence[Mapping[str, list[Any]]],
     raw: Mapping[str, Any],
     model: type[BaseModel],
-) -> None:
-    errors: list[InputError] = []
+) -> Iterator[InputError]:
     seen: set[str] = set()
     for lists in tables:
         for key in lists:
-            errors += _unknown(place, key, raw, model)
+            yield from _unknown(place, key, raw, model)
             if key in seen:
-                errors.append(
-                    input_error(f"{place}: vary.{key}", "is varied twice", "Give one list.")
-                )
+                yield input_error(f"{place}: vary.{key}", "is varied twice", "Give one list.")
             seen.add(key)
         lengths = {key: len(values) for key, values in lists.items()}
         if len(set(lengths.values())) > 1:
             told = ", ".join(f"{key} has {n}" for key, n in lengths.items())
-            errors.append(
-                input_error(
-                    f"{place}: vary",
-                    f"lists of one table run together and must be of one length: {told}",
-                    "Make them equally long, or give each a [[vary]] of its own: then all combinations are run.",
-                )
+            yield input_error(
+                f"{place}: vary",
+                f"lists of one table run together and must be of one length: {told}",
+                "Make them equally long, or give each a [[vary]] of its own: then all combinations are run.",
             )
-    if errors:
-        raise together(errors)
 
 
 def _unknown(

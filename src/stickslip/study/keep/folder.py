@@ -4,23 +4,24 @@ import os
 import shutil
 import sqlite3
 from collections.abc import Container, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 from stickslip.errors import InputError, input_error
 from stickslip.study.keep.journal import AT_WORK, SEALED
+from stickslip.study.keep.whole import beside, unwritable
 
 NEEDED_BYTES = 200_000_000  # results, jobs and parts of a usual run
 RESULT, REPORT, LOG_FILE, LOCK = "result.nc", "report.html", "run.log", "run.lock"
 JOBS, PARTS = "jobs", "parts"
+TRIAL = ".stickslip-trial"
+WHOLE = (RESULT, REPORT, f"{PARTS}/*.npz")  # files that have another name until they are whole
 OWN = (
-    RESULT,
-    f"{RESULT}.part",
-    REPORT,
-    *(f"{JOBS}/*{end}" for end in (AT_WORK, SEALED, f"{AT_WORK}-journal")),
-    f"{PARTS}/*.npz",
-    f"{PARTS}/*.npz.part",
+    *WHOLE,
+    *map(beside, WHOLE),
+    *(f"{JOBS}/*{end}{more}" for end in (AT_WORK, SEALED) for more in ("", "-journal")),
 )
+HELD = (LOCK, f"{LOCK}-journal", LOG_FILE, TRIAL)  # of every run, whatever it keeps
 
 
 @contextmanager
@@ -35,14 +36,18 @@ def locked_folder(folder: Path) -> Iterator[None]:
     try:
         for inner in (folder, folder / JOBS, folder / PARTS):
             inner.mkdir(parents=True, exist_ok=True)
+        _refuse_strangers(folder)
         _try_out(folder)
     except OSError as error:
         raise _unwritable(folder, error) from None
-    lock = _lock(folder)
     try:
+        lock = _locked(folder / LOCK, folder)
+    except sqlite3.DatabaseError as error:
+        raise input_error(
+            str(folder / LOCK), f"is no lock of a run ({error})", "Delete it."
+        ) from None
+    with closing(lock):
         yield
-    finally:
-        lock.close()
 
 
 def empty_folder(folder: Path, own: Sequence[str] = (), spared: Container[Path] = ()) -> None:
@@ -56,16 +61,44 @@ def empty_folder(folder: Path, own: Sequence[str] = (), spared: Container[Path] 
         Names of further files that runs of this study write.
     spared
         Files that this run has written already.
+
+    Raises
+    ------
+    InputError
+        If a process of an earlier run is still at work on one of them; nothing is removed then.
     """
-    for pattern in (*OWN, *own):
-        for path in folder.glob(pattern):
-            if path not in spared:
-                path.unlink()
+    patterns = (*OWN, *own, *map(beside, own))
+    found = [path for pattern in patterns for path in _found(folder, pattern)]
+    for path in folder.glob(f"{JOBS}/*{AT_WORK}"):  # a worker may outlive the run that was killed
+        with suppress(sqlite3.DatabaseError):
+            _locked(path, folder).close()
+    for path in found:
+        if path not in spared:
+            try:
+                path.unlink(missing_ok=True)
+            except OSError as error:
+                raise unwritable(path, error) from None
+
+
+def _refuse_strangers(folder: Path) -> None:
+    """Refuse links, folders and devices under names of ours: a run would write or delete through them."""
+    inner = [folder / name for name in (JOBS, PARTS)]
+    files = [path for pattern in (*OWN, *HELD) for path in _found(folder, pattern)]
+    for path in [*inner, *files]:
+        if path.is_symlink():
+            raise _stranger(path, "is a link, which a run does not follow")
+        if path not in inner and not path.is_file():
+            raise _stranger(path, "is no file, but a run writes a file of that name")
+
+
+def _stranger(path: Path, problem: str) -> InputError:
+    return input_error(str(path), problem, "Remove it, or name another folder under [output].")
 
 
 def _try_out(folder: Path) -> None:
-    trial = folder / ".stickslip-trial"
-    with trial.open("wb") as stream:
+    trial = folder / TRIAL
+    trial.unlink(missing_ok=True)
+    with trial.open("xb") as stream:
         stream.write(b"x")
         os.fsync(stream.fileno())
     trial.unlink()
@@ -78,9 +111,17 @@ def _try_out(folder: Path) -> None:
         )
 
 
-def _lock(folder: Path) -> sqlite3.Connection:
-    """Return what holds the folder until it is closed or the process ends: SQLite locks files alike on all systems."""
-    db = sqlite3.connect(folder / LOCK, isolation_level=None, timeout=0.5)
+def _locked(path: Path, folder: Path) -> sqlite3.Connection:
+    """Return what holds a file until it is closed or the process ends: SQLite locks files alike on all systems.
+
+    Raises
+    ------
+    InputError
+        If another process holds it.
+    sqlite3.DatabaseError
+        If it is no such file.
+    """
+    db = sqlite3.connect(path, isolation_level=None, timeout=0.5)
     try:
         db.execute("begin exclusive")
     except sqlite3.DatabaseError as error:
@@ -89,10 +130,16 @@ def _lock(folder: Path) -> sqlite3.Connection:
             raise input_error(
                 str(folder), "another run is at work in it", "Wait for it, or stop it."
             ) from None
-        raise input_error(
-            str(folder / LOCK), f"is no lock of a run ({error})", "Delete it."
-        ) from None
+        raise
     return db
+
+
+def _found(folder: Path, pattern: str) -> Iterator[Path]:
+    """Yield the entries of a folder that a pattern names, also links that lead nowhere."""
+    if "*" in pattern:
+        yield from folder.glob(pattern)
+    elif os.path.lexists(folder / pattern):
+        yield folder / pattern
 
 
 def _unwritable(folder: Path, error: OSError) -> InputError:

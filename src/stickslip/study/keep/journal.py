@@ -13,9 +13,11 @@ from typing import Any, Self
 
 from stickslip.errors import InputError, input_error
 from stickslip.study.keep.archive import decode, decode_record, encode, encode_record
+from stickslip.study.keep.whole import unwritable
 
-FORMAT = 5  # raised whenever the tables or the archives change
+FORMAT = 6  # raised whenever the tables or the archives change
 AT_WORK, SEALED = ".part", ".job"
+WHOLE = "whole"  # what a file says of itself that has been sealed
 FRESH = (
     "If its disk is full, make room. Otherwise delete it, or start over with --fresh, which removes what runs wrote into the "
     "folder and no other file."
@@ -58,6 +60,7 @@ class JobJournal:
                 self._db.execute("pragma synchronous = full")
                 self._db.executescript(TABLES)
                 self._db.execute("insert or ignore into meta values ('file', ?)", (_mark(path),))
+                self._db.execute("delete from meta where key = ?", (WHOLE,))
                 self._db.execute("update meta set value = value")  # takes the lock
                 _check_mark(self._db, path)
             except BaseException:
@@ -104,8 +107,10 @@ class JobJournal:
 
     def seal(self) -> None:
         """Close the file and give it the name of a finished job."""
-        self._db.close()
-        self._path.replace(self._path.with_suffix(SEALED))
+        with _named(self._path):
+            self._db.execute("insert into meta values (?, 'yes')", (WHOLE,))
+            self._db.close()
+            self._path.replace(self._path.with_suffix(SEALED))
 
 
 def read_sealed(path: Path, record_type: type[Any]) -> tuple[list[Any], dict[str, dict[str, Any]]]:
@@ -128,9 +133,11 @@ def read_note(path: Path, name: str) -> dict[str, Any] | None:
 
 @contextmanager
 def _reading(path: Path) -> Iterator[sqlite3.Connection]:
-    db = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro&immutable=1", uri=True)
+    db = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)
     try:
         _check_mark(db, path)
+        if db.execute("select value from meta where key = ?", (WHOLE,)).fetchone() is None:
+            raise input_error(str(path), "is the file of a job that has not ended", FRESH)
         yield db
     finally:
         db.close()
@@ -148,8 +155,12 @@ def _check_mark(db: sqlite3.Connection, path: Path) -> None:
 
 
 def _records(db: sqlite3.Connection, kind: type[Any]) -> list[Any]:
-    rows = db.execute("select payload from record order by id")
-    return [decode_record(payload, kind) for (payload,) in rows]
+    """Return the records, none of which is missing: they are numbered without gaps, and the last number is kept apart."""
+    rows = db.execute("select id, payload from record order by id").fetchall()
+    last = db.execute("select seq from sqlite_sequence where name = 'record'").fetchone()
+    if [number for number, _ in rows] != list(range(1, (last[0] if last else 0) + 1)):
+        raise ValueError("records are missing")
+    return [decode_record(payload, kind) for _, payload in rows]
 
 
 def _notes(db: sqlite3.Connection) -> dict[str, dict[str, Any]]:
@@ -169,7 +180,9 @@ def _named(path: Path) -> Iterator[None]:
         yield
     except InputError:
         raise
-    except (sqlite3.DatabaseError, ValueError, KeyError, TypeError) as error:
+    except OSError as error:
+        raise unwritable(path, error) from error
+    except (sqlite3.Error, ValueError, KeyError, TypeError, OverflowError) as error:
         if "locked" in str(error):
             raise input_error(
                 str(path.parent.parent), "another run is at work in it", "Wait for it, or stop it."

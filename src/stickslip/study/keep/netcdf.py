@@ -1,37 +1,98 @@
 """Labelled variables, and files of them that are always whole."""
 
+import errno
+import os
 from collections.abc import Hashable, Mapping, Sequence
+from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
+import h5netcdf
 import numpy as np
 import xarray as xr
 
 from stickslip.arrays import BoolArray, IntArray
 from stickslip.errors import input_error
+from stickslip.study.keep.whole import whole_file
 
+CHECKSUM = "checksum"  # attribute of the root
+_AGAIN = (
+    "Give the result.nc that 'stickslip run' wrote, or its folder. Of a damaged one, run the study again: no finished point is "
+    "computed anew. With --fresh everything is, after what runs wrote into the folder is removed, and no other file."
+)
 _TOLD = {"xyz", "order"}  # dimensions of what one case tells of itself
 _MISSING: dict[str, object] = {"f": np.nan, "c": np.nan, "i": -1, "U": "", "O": ""}
 
 
 def write_tree(tree: xr.DataTree, path: Path) -> None:
-    """Write netCDF-4 under a temporary name and put it in place, so that `path` is always a whole file.
+    """Write netCDF-4 under another name, with the sum of what can be read from it, and put it in place: `path` is always whole.
 
     Raises
     ------
     InputError
-        If the folder cannot be written.
+        If the file cannot be written.
     """
-    temporary = path.with_name(path.name + ".part")
+    with whole_file(path) as temporary:
+        try:
+            tree.to_netcdf(temporary, format="NETCDF4", engine="h5netcdf")
+            found = checksum(_read(temporary))
+            with h5netcdf.File(temporary, "a") as stream:
+                stream.attrs[CHECKSUM] = found
+        # the HDF5 libraries tell of a full disk by RuntimeError, and name no reason
+        except RuntimeError as error:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)) from error
+
+
+def read_tree(path: Path) -> xr.DataTree:
+    """Read a file that `write_tree` wrote, or another of its kind, into memory.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is not what was written.
+    """
     try:
-        tree.to_netcdf(temporary, format="NETCDF4", engine="h5netcdf")
-        temporary.replace(path)
-    # the HDF5 libraries tell of a full disk by RuntimeError
-    except (OSError, RuntimeError) as error:
+        tree = _read(path)
+        damaged = tree.attrs.pop(CHECKSUM, None) not in (None, checksum(tree))
+    except MemoryError:
+        raise
+    except Exception as error:  # h5netcdf, h5py and xarray say it of wrong bytes in a dozen ways
+        said = " ".join(str(error).split())
+        raise input_error(
+            str(path), f"is no netCDF-4 file, or a damaged one ({said})", _AGAIN
+        ) from error
+    if damaged:
         raise input_error(
             str(path),
-            f"cannot be written ({error})",
-            "Make room and run the same command again: no finished point is lost.",
-        ) from error
+            "holds other values than were written: it is damaged, or was changed",
+            f"{_AGAIN} Whoever changed it on purpose takes out the attribute {CHECKSUM}.",
+        )
+    return tree
+
+
+def checksum(tree: xr.DataTree) -> str:
+    """Return a hash of all values, labels and attributes of a tree but its own."""
+    found = sha256()
+    for node in tree.subtree:
+        own = node.to_dataset(inherit=False)
+        told: list[object] = [node.path, _plain(own.attrs)]
+        for name, v in own.variables.items():
+            told += [name, v.dims, v.shape, _plain(v.attrs)]
+            values = np.ascontiguousarray(v.values)
+            found.update(
+                repr(values.tolist()).encode() if values.dtype == object else values.tobytes()
+            )
+        found.update(repr(told).encode())
+    return found.hexdigest()
+
+
+def _plain(attributes: Mapping[Any, Any]) -> list[tuple[str, object]]:
+    return sorted((str(k), np.asarray(v).tolist()) for k, v in attributes.items() if k != CHECKSUM)
+
+
+def _read(path: Path) -> xr.DataTree:
+    with xr.open_datatree(path, engine="h5netcdf", decode_times=False) as tree:
+        return tree.load()
 
 
 def variable(dims: str, values: object, units: str, long_name: str) -> xr.Variable:

@@ -4,13 +4,15 @@ Records of progress carry ``fraction`` (0 to 1) and ``job`` (what is being compu
 """
 
 import logging
+import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 
 from stickslip.errors import StickslipError
+from stickslip.study.keep.whole import unwritable
 
 LOG = logging.getLogger("stickslip")
 _JOB = ContextVar("job", default="")
@@ -38,8 +40,17 @@ def at_work(job: str) -> Iterator[None]:
 
 @contextmanager
 def written_down(path: Path) -> Iterator[None]:
-    """Write all lines of a run to a file; what tells progress alone stays out."""
-    handler = logging.FileHandler(path, encoding="utf-8")
+    """Write all lines of a run to a file; what tells progress alone stays out.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written, at any time.
+    """
+    try:
+        handler = _LogFile(path, encoding="utf-8")
+    except OSError as error:
+        raise unwritable(path, error) from None
     formatter = logging.Formatter("%(asctime)s %(warning)s%(message)s", "%Y-%m-%dT%H:%M:%S+00:00")
     formatter.converter = time.gmtime
     handler.setFormatter(formatter)
@@ -52,7 +63,19 @@ def written_down(path: Path) -> Iterator[None]:
     finally:
         LOG.setLevel(level)
         LOG.removeHandler(handler)
-        handler.close()
+        with suppress(OSError):  # what was not written has been told
+            handler.close()
+
+
+class _LogFile(logging.FileHandler):
+    """A log that stops the run when it cannot be written, where that of the library prints a traceback and goes on."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Refuse a full disk."""
+        error = sys.exc_info()[1]
+        if isinstance(error, OSError):
+            raise unwritable(Path(self.baseFilename), error) from None
+        super().handleError(record)
 
 
 def _line(record: logging.LogRecord) -> bool:

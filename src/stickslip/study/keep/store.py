@@ -8,6 +8,7 @@ from typing import Any
 
 from stickslip.study.keep.archive import decode, encode
 from stickslip.study.keep.progress import LOG
+from stickslip.study.keep.whole import write_whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +41,6 @@ class PartStore:
                 LOG.info(f"{path} is damaged and made anew ({error})")
         # what is computed and what is read are the same to the last bit, and of the same kinds
         payload = encode(make())
-        temporary = path.with_name(f"{path.name}.part")
-        temporary.write_bytes(payload)
-        temporary.replace(path)
+        write_whole(path, payload)
         self.written.add(path)
         return decode(payload)

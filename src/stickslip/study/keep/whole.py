@@ -1,0 +1,74 @@
+"""Files that are written whole or not at all, and what is said when they cannot be."""
+
+import errno
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from stickslip.errors import InputError, input_error
+
+_ROOM = "Make room and run the same command again: no finished point is lost."
+_REMEDIES = {
+    errno.ENOSPC: _ROOM,
+    errno.EDQUOT: _ROOM,
+    errno.EFBIG: "Raise the limit of the size of files, or choose another disk.",
+    errno.EIO: "Look after the disk: it may be broken.",
+    errno.ENOENT: "Make its folder first, or give another place.",
+    errno.EISDIR: "A folder has that name: remove it, or give another name.",
+    errno.ENOTDIR: "A file stands where a folder has to be: give another place.",
+    errno.ELOOP: "Remove the link, which leads to itself.",
+    errno.ENAMETOOLONG: "Give a shorter name.",
+}
+
+
+def unwritable(path: Path, error: OSError) -> InputError:
+    """Return the refusal of a file that the system does not let us write."""
+    remedy = _REMEDIES.get(error.errno or 0, "Give a place that you may write to.")
+    return input_error(str(path), f"cannot be written ({error.strerror or error})", remedy)
+
+
+def beside(name: str) -> str:
+    """Return what a file is called until it is whole: libraries go by what a name ends in."""
+    path = Path(name)
+    return str(path.with_name(f"{path.stem}.part{path.suffix}"))
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Give the name to write to; the file is put in place when the block has ended, so that `path` is always whole.
+
+    A link in the way is replaced, not followed.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    temporary = Path(beside(str(path)))
+    try:
+        _refuse_folder(path)
+        # left by a kill, or a link, through which we would write elsewhere
+        temporary.unlink(missing_ok=True)
+        temporary.open("xb").close()
+        yield temporary
+        with temporary.open("rb+") as stream:
+            os.fsync(stream.fileno())
+        temporary.replace(path)
+    except BaseException as error:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise unwritable(path, error) from error
+        raise
+
+
+def _refuse_folder(path: Path) -> None:
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all; as `whole_file`."""
+    with whole_file(path) as temporary:
+        temporary.write_bytes(content)
