@@ -1,5 +1,6 @@
 """The commands. Everything heavy is imported inside them, so that ``--help`` is quick."""
 
+import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -11,7 +12,8 @@ from rich.console import Console
 from rich.table import Table
 
 from stickslip import __version__
-from stickslip.errors import InputError, StickslipError, input_error
+from stickslip.errors import InputError, StickslipError, input_error, printable
+from stickslip.front.output import TRACEBACK, output_that_may_fail, unforeseen
 from stickslip.front.screen import Screen, on_screen
 
 if TYPE_CHECKING:
@@ -41,7 +43,8 @@ StudyKind = Annotated[
 
 def main() -> None:
     """Entry point of the ``stickslip`` command."""
-    app()
+    with output_that_may_fail():
+        app()
 
 
 @app.callback(invoke_without_command=True)
@@ -91,9 +94,13 @@ def run(
 ) -> None:
     """Answer the questions of a study; an interrupted run goes on where it stopped."""
     with _errors_as_text():
+        from stickslip.study.file.toml import read_toml
         from stickslip.study.keep.threads import one_blas_thread
 
         one_blas_thread()
+        read_toml(
+            study
+        )  # what is no TOML is refused before the libraries are loaded, which takes some seconds
         from stickslip.front.study import Study
 
         with on_screen(Screen(_console(), workers, warnings=False)):
@@ -113,6 +120,9 @@ def run(
 def check(study: StudyFile) -> None:
     """Do everything but the computation: read, mesh, reduce, find the static state and the natural frequencies."""
     with _errors_as_text():
+        from stickslip.study.file.toml import read_toml
+
+        read_toml(study)
         from stickslip.front.study import Study
 
         with on_screen(Screen(_console(), warnings=False)):
@@ -129,22 +139,18 @@ def new(
     """Write a commented example study to NAME/study.toml."""
     with _errors_as_text():
         from stickslip.study.file.example import example_text
+        from stickslip.study.keep.whole import unwritable, write_whole
 
         target = name / "study.toml"
-        try:
-            name.mkdir(parents=True, exist_ok=True)
-            with target.open("x", encoding="utf-8", newline="\n") as stream:
-                stream.write(example_text(kind))
-        except FileExistsError:
+        if os.path.lexists(target):
             raise input_error(
                 str(target), "exists already", "Give another name: nothing is overwritten."
-            ) from None
+            )
+        try:
+            name.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise input_error(
-                str(target),
-                f"cannot be written ({error.strerror})",
-                "Give a folder you may write to.",
-            ) from None
+            raise unwritable(target, error) from None
+        write_whole(target, example_text(kind).encode())
         step = "name your model's file in it, " if kind == "file" else ""
         command = "check" if kind == "file" else "run"
         typer.echo(f"{target} written. Next: {step}stickslip {command} {target}")
@@ -206,6 +212,11 @@ def _errors_as_text() -> Iterator[None]:
     except KeyboardInterrupt:
         typer.echo("Interrupted.", err=True)
         raise typer.Exit(INTERRUPTED) from None
+    except Exception as error:
+        if TRACEBACK in os.environ:
+            raise
+        typer.echo(unforeseen(error), err=True)
+        raise typer.Exit(NOT_CONVERGED) from None
 
 
 def _code(error: StickslipError) -> int:
@@ -220,7 +231,7 @@ def _console() -> Console:
 
 
 def _say(text: str) -> None:
-    _console().print(text, markup=False, highlight=False, soft_wrap=True)
+    _console().print(printable(text), markup=False, highlight=False, soft_wrap=True)
 
 
 def _print_result(result: "Result", files: Sequence[Path]) -> None:

@@ -6,7 +6,7 @@ from string import Template
 
 # controls, marks of direction, and what is no character
 _STEERING = re.compile(
-    r"[\x00-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff\ud800-\udfff]"
+    r"[\x00-\x09\x0b-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff\ud800-\udfff]"
 )
 LONGEST_MESSAGE = 1900  # bytes
 LONGEST_TEXT = 600  # characters of a place, a problem or a remedy
@@ -104,7 +104,8 @@ def printable(text: str) -> str:
 
 
 def _line(error: InputError) -> str:
-    return printable(f"{_cut(error.place)}: {_cut(error.problem)}. {_cut(error.remedy)}")
+    text = f"{_cut(error.place)}: {_cut(error.problem)}. {_cut(error.remedy)}"
+    return printable(text.replace("\n", "\\n"))
 
 
 def _cut(text: str) -> str:

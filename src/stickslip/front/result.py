@@ -55,16 +55,42 @@ class Result:
         path = outcome.files[0] if outcome.files else None
         return cls(outcome.tree, path, outcome.files, outcome.failed, outcome.summaries)
 
+    def __getitem__(self, name: str) -> xr.Dataset:
+        """Return the dataset of an analysis.
+
+        Raises
+        ------
+        InputError
+            If the result has none of that name.
+        """
+        if name not in self.data.children:
+            known = [str(child) for child in self.data.children]
+            raise input_error(
+                f"result[{name!r}]", "is no analysis of this result", did_you_mean(name, known)
+            )
+        return self.data[name].to_dataset()
+
     def save(self, path: str | Path) -> Path:
         """Write the result as netCDF-4; return the file.
 
         Parameters
         ----------
         path
-            The file, or a folder that exists.
+            The file, such as ``out.nc``, or a folder that exists.
+
+        Raises
+        ------
+        InputError
+            If it is neither, or cannot be written.
         """
         path = Path(path)
         target = path / RESULT if path.is_dir() else path
+        if not target.suffix:
+            raise input_error(
+                str(path),
+                "is no folder that exists, and a file's name has an ending",
+                f"Give {path}.nc, or make the folder first: it gets a {RESULT}.",
+            )
         write_tree(self.data, target)
         return target
 

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
+from stickslip.errors import printable
+
 LOG = logging.getLogger("stickslip")
 STEPS = 10  # plain lines that a job writes on its way
 
@@ -58,7 +60,7 @@ class Screen(logging.Handler):
             self._line(f"WARNING: {text}")
 
     def _line(self, text: str) -> None:
-        self._console.print(text, markup=False, highlight=False, soft_wrap=True)
+        self._console.print(printable(text), markup=False, highlight=False, soft_wrap=True)
 
     def _advance(self, job: str, fraction: float, text: str) -> None:
         if self._progress is None:

@@ -69,7 +69,7 @@ def _each(details: ErrorDetails) -> Iterator[ErrorDetails]:
 def _told(
     place: str, model: type[BaseModel], details: ErrorDetails, renamed: Mapping[str, str]
 ) -> InputError:
-    spot = spot_at(model, details["loc"])
+    spot = spot_at(model, [part for part in details["loc"] if part != "[key]"])
     context: dict[str, Any] = details.get("ctx", {})
     keys = spot.keys
     if details["type"] == "stickslip":

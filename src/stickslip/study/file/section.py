@@ -3,14 +3,26 @@
 from collections.abc import Iterable, Sequence
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
+_NO_NAME = "/\\:*?[]<>|\"'`$"  # what is no part of a file's name everywhere
 LONGEST_VALUE = 60  # characters of a value that a message shows
 
 Positive = Annotated[float, Field(gt=0)]
 FilePath = Annotated[str, Field(min_length=1, max_length=500)]  # relative to the study's folder
-Name = Annotated[str, Field(min_length=1, max_length=100)]
+
+
+def _plain_name(given: str) -> str:
+    if given.isprintable() and not set(given) & set(_NO_NAME) and given == given.strip():
+        return given
+    raise custom_error(
+        f"is no name, got {shown(given)}",
+        "Use letters, digits, '_' and '-': files are named after parts.",
+    )
+
+
+Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_plain_name)]
 
 
 class Section(BaseModel):

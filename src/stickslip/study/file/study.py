@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from stickslip.errors import InputError, input_error, together
 from stickslip.study.file.messages import told
 from stickslip.study.file.tables import VERSION, Tables, study_tables
-from stickslip.study.file.toml import LARGEST_FILE, parsed
+from stickslip.study.file.toml import read_toml
 from stickslip.study.file.vary import cases_of, label_of, with_values
 
 
@@ -73,8 +73,7 @@ def read_file(path: Path) -> StudyFile:
     InputError
         Naming every problem of the file, one a line.
     """
-    text = _text(path)
-    raw = parsed(path, text)
+    text, raw = read_toml(path)
     return StudyFile(path, text, raw, validated(path, raw))
 
 
@@ -108,39 +107,6 @@ def _case(path: Path, raw: Mapping[str, Any], values: Mapping[str, Any]) -> Tabl
         renamed = {key: f"vary.{key}" for key in values}
         raise told(str(path), model, error, renamed) from None
     return TablesOfCase(label_of(values), values, tables)
-
-
-def _text(path: Path) -> str:
-    place = str(path)
-    if not path.exists():
-        raise input_error(
-            place,
-            "there is no such file",
-            "Check the name, or write an example with 'stickslip new NAME'.",
-        )
-    if not path.is_file():
-        raise input_error(
-            place, "is not a file", "Name the study file itself, for example two_blades/study.toml."
-        )
-    try:
-        with path.open("rb") as stream:
-            content = stream.read(LARGEST_FILE + 1)
-        if len(content) > LARGEST_FILE:
-            raise input_error(
-                place,
-                f"is larger than {LARGEST_FILE} bytes",
-                "A study file is a few kilobytes of TOML.",
-            )
-        # TOML allows both line ends; one form keeps hashes and provenance the same
-        return content.decode("utf-8-sig").replace("\r\n", "\n")  # some editors mark UTF-8
-    except OSError as error:
-        raise input_error(
-            place, f"cannot be read ({error.strerror})", "Check its permissions."
-        ) from None
-    except UnicodeDecodeError as error:
-        raise input_error(
-            place, f"is not UTF-8 text (byte {error.start})", "Save it as UTF-8."
-        ) from None
 
 
 def _check_version(path: Path, found: object) -> None:

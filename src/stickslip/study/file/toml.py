@@ -26,27 +26,54 @@ _COMMA = re.compile(r"=\s*[+-]?\d+,\d+\s*(#.*)?$")
 _LINE = re.compile(r"line (\d+)")
 
 
-def parsed(path: Path, text: str) -> dict[str, Any]:
-    """Return what a TOML file holds.
-
-    Parameters
-    ----------
-    path
-        The file, for messages.
-    text
-        Its content.
+def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
+    """Return the text of a TOML file and what it holds.
 
     Raises
     ------
     InputError
-        If it is no TOML, or larger in any way than studies are.
+        If it cannot be read, is no TOML, or is larger in any way than studies are.
     """
+    text = _text(path)
     _check_size(path, text)
     try:
-        return tomllib.loads(text)
+        return text, tomllib.loads(text)
     # the parser leaves impossible dates and numbers to the types that they become
     except (ValueError, RecursionError) as error:
         raise _no_toml(path, text, str(error)) from None
+
+
+def _text(path: Path) -> str:
+    place = str(path)
+    if not path.exists():
+        raise input_error(
+            place,
+            "there is no such file",
+            "Check the name, or write an example with 'stickslip new NAME'.",
+        )
+    if not path.is_file():
+        raise input_error(
+            place, "is not a file", "Name the study file itself, for example two_blades/study.toml."
+        )
+    try:
+        with path.open("rb") as stream:
+            content = stream.read(LARGEST_FILE + 1)
+        if len(content) > LARGEST_FILE:
+            raise input_error(
+                place,
+                f"is larger than {LARGEST_FILE} bytes",
+                "A study file is a few kilobytes of TOML.",
+            )
+        # TOML allows both line ends; one form keeps hashes and provenance the same
+        return content.decode("utf-8-sig").replace("\r\n", "\n")  # some editors mark UTF-8
+    except OSError as error:
+        raise input_error(
+            place, f"cannot be read ({error.strerror})", "Check its permissions."
+        ) from None
+    except UnicodeDecodeError as error:
+        raise input_error(
+            place, f"is not UTF-8 text (byte {error.start})", "Save it as UTF-8."
+        ) from None
 
 
 def _check_size(path: Path, text: str) -> None:
