@@ -141,7 +141,8 @@ def test_new_in_a_place_that_cannot_be(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     said = refused("new", str(tmp_path / "file" / "two"))
     assert (
-        "study.toml: cannot be written (Not a directory). A file stands where a folder has to be" in said
+        "study.toml: cannot be written (Not a directory). A file stands where a folder has to be"
+        in said
     )
 
 

@@ -5,6 +5,7 @@ Records of progress carry ``fraction`` (0 to 1) and ``job`` (what is being compu
 
 import logging
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -71,11 +72,12 @@ class _LogFile(logging.FileHandler):
     """A log that stops the run when it cannot be written, where that of the library prints a traceback and goes on."""
 
     def handleError(self, record: logging.LogRecord) -> None:
-        """Refuse a full disk."""
+        """Refuse a full disk; where a thread hands on what workers say, this process's next line does."""
         error = sys.exc_info()[1]
-        if isinstance(error, OSError):
+        if not isinstance(error, OSError):
+            super().handleError(record)
+        elif threading.current_thread() is threading.main_thread():
             raise unwritable(Path(self.baseFilename), error) from None
-        super().handleError(record)
 
 
 def _line(record: logging.LogRecord) -> bool:
