@@ -16,7 +16,7 @@ LOCK_FLAGS := --quiet --generate-hashes --strip-extras \
 # Two test workers on two cores: a threaded BLAS under each would only make them wait for each other.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help install run test readers test-readers sparse test-sparse lint docs figures bench bench-rival validate baseline strategies alarms lock clean
+.PHONY: help install run test readers test-readers sparse test-sparse lint docs figures bench bench-rival calculix validate baseline strategies alarms lock clean
 .DELETE_ON_ERROR:
 
 help:  ## list the targets
@@ -91,6 +91,10 @@ strategies: $(DOCS_INSTALLED)  ## compare all ways of choosing harmonics; writes
 
 alarms: $(INSTALLED)  ## count missed and false alarms of the strategies that verify; writes docs/strategies_alarms.md (ten to twenty minutes)
 	$(ONE_THREAD) $(BIN)/python -m evidence.strategies alarms
+
+calculix:  ## install CalculiX with apt, for the comparisons of `make validate` that need it (as root)
+	apt-get update -qq
+	DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends calculix-ccx
 
 validate: $(INSTALLED)  ## compare with closed forms, other codes and the literature
 	@tests=pass; list=holds; \

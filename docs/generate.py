@@ -236,7 +236,7 @@ def validation() -> str:
     if not RESULTS.exists():
         return "*This build has no results: run `make validate`, then `make docs`.*\n"
     records = json.loads(RESULTS.read_text(encoding="utf-8"))
-    holding = sum(bool(record["holds"]) for record in records)
+    holding = sum(record["holds"] is True for record in records)
     lines = [
         f"{holding} of {len(records)} comparisons hold.",
         "",
@@ -247,7 +247,10 @@ def validation() -> str:
         cells = [
             _number(record[key]) for key in ("case", "quantity", "ours", "reference", "tolerance")
         ]
-        cells += ["yes" if record["holds"] else "**no**", _escaped(record["source"])]
+        cells += [
+            {True: "yes", False: "**no**"}.get(record["holds"], record["holds"]),
+            _escaped(record["source"]),
+        ]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 

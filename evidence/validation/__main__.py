@@ -2,7 +2,7 @@
 
 A case is a module ``evidence/validation/case_*.py`` with a function ``run()`` that returns a list of records: the ``case``,
 the ``quantity`` with its unit, the value that is ``ours``, the ``reference``, the ``tolerance`` (relative unless the quantity
-says otherwise), whether it ``holds``, and the ``source`` of the reference. A case that breaks off counts as one comparison
+says otherwise), whether it ``holds`` or was left out, and the ``source`` of the reference. A case that breaks off counts as one comparison
 that does not hold, and does not end the others. The page ``docs/validation.md`` shows the list.
 
     python -m evidence.validation            # all
@@ -30,10 +30,13 @@ SUITE = Suite("evidence.validation", "case_", "Validation", {key: key for key in
 def main() -> int:
     """Run, print, and end with counts and with what does not hold; 1 when there is any."""
     records = SUITE.main()
-    failed = [record for record in records if not record["holds"]]
+    failed = [record for record in records if record["holds"] is False]
     if failed:
         console().print(SUITE.table(failed), style="bold")
-    console().print(f"{len(records) - len(failed)} of {len(records)} comparisons hold.")
+    holding = sum(record["holds"] is True for record in records)
+    left_out = len(records) - holding - len(failed)
+    more = f", {left_out} left out" if left_out else ""
+    console().print(f"{holding} of {len(records)} comparisons hold{more}.")
     return 1 if failed else 0
 
 

@@ -27,6 +27,11 @@ def record(
     }
 
 
+def left_out(case: str, reason: str, source: str) -> Record:
+    """Return what stands for comparisons that cannot be made on this machine."""
+    return {**record(case, reason, 0.0, 0.0, 0.0, source), "quantity": reason, "holds": "left out"}
+
+
 def digits(
     case: str, quantity: str, ours: float, printed: str, source: str, least: float = 0.0
 ) -> Record:

@@ -2,4 +2,8 @@
 
 import lazy_loader
 
+from stickslip.contact.cache import allow_no_cache
+
+allow_no_cache()  # before any function is compiled
+
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
