@@ -191,12 +191,13 @@ def test_a_turned_rigid_body_has_its_points_and_inertia_turned():
     np.testing.assert_allclose(mirrored[:, 0], [-1, 0, 0])
 
 
-def halves(pairing, cells=(2, 1, 1), n_modes=None):
+def halves(pairing, cells=(2, 1, 1), n_modes=None, **more):
     own = {"reduction": n_modes and Reduction(n_modes), "damping": DAMPING}
     left = solid_part(bar((2, 1, 1), length=0.2), STEEL, **own)
     right = solid_part(bar(cells, start=0.2, length=0.2, clamp=False), STEEL, **own)
     return Model(
         parts={"left": left, "right": right},
+        **more,
         joins={"weld": Join(between=("right.left", "left.right"), pairing=pairing)},
         contacts={"stop": Contact(between=("right.right", "ground"), law=LAW, tangent=(0, 0, 1))},
         loads={"shake": Load(on="right.right", newton=60.0, direction=(0, 0.3, 1))},

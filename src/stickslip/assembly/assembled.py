@@ -90,7 +90,7 @@ class Frequencies:
             if np.any(error > AGREEMENT):
                 found.append(
                     f"the reduced model misses a {what} natural frequency by {100 * error.max():.3g} % (mode "
-                    f"{int(np.argmax(error)) + 1}, more than {100 * AGREEMENT:g} %): raise reduction.fixed_interface_modes."
+                    f"{int(np.argmax(error)) + 1}, more than {100 * AGREEMENT:g} %): keep more modes in [reduction]."
                 )
         return found
 

@@ -17,6 +17,7 @@ from stickslip.assembly.forces import (
     force_of,
     output_labels,
 )
+from stickslip.assembly.joined import KEY, on_shapes
 from stickslip.assembly.model import Model
 from stickslip.assembly.places import picked, stacked
 from stickslip.assembly.reduced import Store, in_memory, reduced_parts
@@ -179,9 +180,14 @@ def linear_side(
     operators = [pairs.own, pairs.following, ties.weights]
     used = [operator.nonzero()[1] for operator in operators]
     bodies = model.places.bodies()
-    kept = np.unique(np.concatenate([kept, ties.followers, *used, bodies]))
+    needed = np.unique(np.concatenate([kept, *used[:2], bodies]))
+    kept = np.unique(np.concatenate([needed, ties.followers, used[2]]))
     if model.neighbours is None:
-        return _of_one(model, kept, store)
+        return _of_one(model, kept, needed, store)
+    if model.interface_modes is not None:
+        raise input_error(
+            KEY, "is for single structures: waves hold no joined nodes", "Leave it out on a wheel."
+        )
     found = reduced_sector(model, (order, harmonics), kept, (stay, bodies), store)
     at = model.coordinates
 
@@ -206,7 +212,7 @@ def linear_side(
     return Linear(found.wheel, found.gaps, found.steady, of_dofs, load, of_wave)
 
 
-def _of_one(model: Model, kept: IntArray, store: Store) -> Linear:
+def _of_one(model: Model, kept: IntArray, needed: IntArray, store: Store) -> Linear:
     own = {
         name: kept[np.isin(kept, model.places.own(name))] - model.places.offset(name)
         for name in model.parts
@@ -219,19 +225,20 @@ def _of_one(model: Model, kept: IntArray, store: Store) -> Linear:
     at = coordinates(np.concatenate(ids), model.ties)
     structure = at.tied(join(**{name: part.structure for name, part in parts.items()}))
     steady = at.load(np.concatenate([part.steady for part in parts.values()]))
-    found = in_gaps(model, structure, at.columns(model.pairs.own))
+    few = on_shapes(model, structure, at, needed)
+    found = in_gaps(model, few.structure, few.columns(at.columns(model.pairs.own)))
     structure, gaps = found.structure, found.gaps
 
     def of_dofs(dofs: IntArray, place: str) -> IntArray:
-        return found.of(at.of_dofs(dofs, model.places.dofs, place), place)
+        return found.of(few.place[at.of_dofs(dofs, model.places.dofs, place)], place)
 
     def load(force: Matrix, _harmonic: int) -> Matrix:
-        return found.load(_on_kept(at, force))
+        return found.load(few.load(_on_kept(at, force)))
 
     def of_wave(_number: int) -> tuple[Structure, Matrix, Any]:
         return structure, gaps, lambda dofs: of_dofs(dofs, "part")
 
-    return Linear(structure, gaps, found.load(steady), of_dofs, load, of_wave)
+    return Linear(structure, gaps, found.load(few.load(steady)), of_dofs, load, of_wave)
 
 
 def _on_kept(at: Coordinates, force: Matrix) -> Matrix:

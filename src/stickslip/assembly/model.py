@@ -57,6 +57,9 @@ class Model:
         As in `RotatingSolid.at_speed`.
     centrifugal
         Whether the centrifugal load of rotating parts is a static load of the response.
+    interface_modes
+        Of a single structure: number of characteristic shapes that stand for the nodes of joined surfaces in the forced response;
+        None: the nodes themselves.
     retention
         Stiffness that holds the mean position of free rigid bodies, N/m.
 
@@ -77,6 +80,7 @@ class Model:
     tangent: Literal["consistent", "textbook"] = "consistent"
     coriolis: bool = False
     centrifugal: bool = True
+    interface_modes: int | None = None
     retention: float = 0.0
 
     def __post_init__(self) -> None:

@@ -69,26 +69,31 @@ def reduced_sector(
     needed = needed[~np.isin(needed, model.ties.followers)]
     kept = np.unique(partners(sector)[at.of_dofs(needed, model.places.dofs, "part")])
     wheel = (sector.structure, sector.low, sector.high, sector.sectors, sector.axis)
-    content = content_hash("wave", *wheel, kept, reduction, damping, steady)
+    content = content_hash("wave", *wheel, kept, damping, steady)
     memo = next(iter(model.parts.values())).memo
+    mirrored = goes_both_ways(sector, sector.structure)
 
-    def made(k: int) -> tuple[Structure, Matrix]:
-        key = f"{content} {k}"
+    def made(k: int, reduction: Reduction | None) -> tuple[Structure, Matrix]:
+        key = f"{content} {reduction} {k}"
         if key not in memo:
             memo[key] = _kept(sector, kept, k, (reduction, damping), at.load(steady), (key, store))
             forget(memo, tuple, REMEMBERED)
         found: tuple[Structure, Matrix] = memo[key]
         return found
 
-    mirrored = goes_both_ways(sector, sector.structure)
-
-    def wave(k: int) -> tuple[Structure, Matrix]:
+    def wave(k: int, reduction: Reduction | None) -> tuple[Structure, Matrix]:
         if 2 * k <= sector.sectors or not mirrored:
-            return made(k)
-        structure, load = made(sector.sectors - k)
+            return made(k, reduction)
+        structure, load = made(sector.sectors - k, reduction)
         return conjugate(structure), np.conj(load)
 
-    waves = {k: wave(k) for k in wave_numbers(model.sectors, *order)}
+    numbers = wave_numbers(model.sectors, *order)
+    waves = {k: wave(k, reduction) for k in numbers}
+    most = max(structure.n for structure, _ in waves.values())
+    if reduction is not None and any(structure.n < most for structure, _ in waves.values()):
+        # all waves have the coordinates of the one that needs most
+        alike = replace(reduction, n_modes=most - kept.size)
+        waves = {k: wave(k, alike) for k in numbers}
     shown, bodies = (
         at.of_dofs(np.unique(dofs), model.places.dofs, "output.points") for dofs in stay
     )

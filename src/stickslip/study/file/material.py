@@ -129,6 +129,16 @@ class ReductionTable(Section):
         return ModesBelow(self.up_to_hz, self.factor or 1.5)
 
 
+class StudyReduction(ReductionTable):
+    """Reduction of all parts without their own, and of the surfaces that joins tie."""
+
+    interface_modes: Annotated[int, Field(ge=1, le=2000)] | None = Field(
+        None,
+        description="of a single structure with joins, in the forced response: number of characteristic shapes that stand for the "
+        "nodes of joined surfaces, 1 to 2000; nodes of contacts, loads and outputs stay; left out: all nodes stay",
+    )
+
+
 def _not_of(method: str, key: str) -> Exception:
     return custom_error(
         f"is no key of the method {method}", "Remove it, or choose the method that has it.", key

@@ -12,7 +12,7 @@ from stickslip.study.analyses.analysis import named
 from stickslip.study.file.contacts import ContactTable, JoinTable
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.file.loads import Limits, LoadTable, Output, Retention, Rotation
-from stickslip.study.file.material import DampingTable, MaterialTable, ReductionTable
+from stickslip.study.file.material import DampingTable, MaterialTable, StudyReduction
 from stickslip.study.file.parts import AnyPart
 from stickslip.study.file.section import Name, Section
 
@@ -48,7 +48,7 @@ class Tables(Section):
     damping: DampingTable | None = Field(
         None, description="the table [damping], of all parts without their own"
     )
-    reduction: ReductionTable | None = Field(
+    reduction: StudyReduction | None = Field(
         None, description="the table [reduction], of all parts without their own"
     )
     contact: dict[Name, ContactTable] = Field(  # type: ignore[valid-type]

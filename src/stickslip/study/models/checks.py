@@ -44,6 +44,7 @@ def refusals(tables: Tables, home: Path) -> Iterator[InputError]:
         large = too_large(tables, home)
         yield from [large] if large else []
         yield from _surfaces(tables)
+        yield from _shapes_of_joins(tables)
         yield from _loads(tables)
         yield from _outputs(tables)
         yield from _questions(tables)
@@ -143,6 +144,19 @@ def _surfaces(tables: Tables) -> Iterator[InputError]:
                     yield from _refused(tables, place, word, ("surface", "set"))
                 if word.startswith(NEXT):
                     yield from _no_sector(tables, place, word)
+
+
+def _shapes_of_joins(tables: Tables) -> Iterator[InputError]:
+    """Yield the complaint about shapes of joined surfaces where there are none."""
+    count = None if tables.reduction is None else tables.reduction.interface_modes
+    wheel = (sectors_of(tables) or 1) > 1
+    if count is not None and (wheel or not tables.join):
+        why = "waves of a wheel hold no joined nodes" if wheel else "nothing is joined"
+        yield input_error(
+            "reduction.interface_modes",
+            f"is {count}, and {why}",
+            "Leave it out; it is for joins of a single structure.",
+        )
 
 
 def _no_sector(tables: Tables, place: str, word: str) -> Iterator[InputError]:

@@ -56,6 +56,7 @@ def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
         tangent=rotation.tangent,
         coriolis=rotation.coriolis,
         centrifugal=rotation.centrifugal,
+        interface_modes=None if tables.reduction is None else tables.reduction.interface_modes,
         retention=tables.retention.stiffness_n_per_m,
     )
     if rotation.speed_rpm > 0 and not model.rotates:

@@ -162,6 +162,13 @@ def _require_integrable(model: Model) -> None:
                 "--verify integrates one structure in time, and the harmonics of a wheel are different travelling waves",
                 "Run without --verify; --verify-harmonics works.",
             )
+    for name, part in model.parts.items():
+        if part.structure.loss is not None or (part.damping and part.damping.loss_factor):
+            raise input_error(
+                f"part.{name}.damping.loss_factor",
+                "--verify integrates in time, and structural damping is defined for vibration at one frequency",
+                "Run without --verify, or take a modal ratio of half the loss factor, which is the same at resonance.",
+            )
     found = [
         input_error(
             f"contact.{name}.law",
