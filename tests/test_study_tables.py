@@ -153,7 +153,8 @@ def test_the_examples_that_ship_are_those_of_the_repository(kind, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "most"), [("two_blades", 80), ("four_masses", 24), ("shrouded_sector", 80)]
+    ("name", "most"),
+    [("two_blades", 80), ("four_masses", 24), ("shrouded_sector", 80), ("root_joint", 60)],
 )
 def test_the_examples_are_short_and_good(name, most):
     path = EXAMPLES / name / "study.toml"

@@ -1,8 +1,8 @@
 """Contacts of a model as pairs of points, on the dofs of all parts: gaps, frames, areas, and each point's share of the law."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.sparse
@@ -24,6 +24,7 @@ from stickslip.errors import InputError, input_error
 from stickslip.model.axis import Axis
 
 NEAR = 1e-6  # m: partners node to node
+Found = TypeVar("Found")
 ROWS = {"tangential": 0, "normal": 2}
 
 
@@ -253,10 +254,10 @@ def widened(
     )
 
 
-def named(key: str, contact: Contact | Join, pair: Any) -> Pairing:
+def named(key: str, contact: Contact | Join, pair: Callable[[], Found]) -> Found:
     """Say of which contact a complaint is."""
     try:
-        found: Pairing = pair()
+        found = pair()
     except InputError as error:
         one, two = contact.between
         raise error.inside(f"{key} (side A: {one}, side B: {two})") from None

@@ -11,9 +11,11 @@ from stickslip.arrays import IntArray, Matrix
 from stickslip.assembly.contact import Join
 from stickslip.assembly.pairs import Turn, match, named, sides
 from stickslip.assembly.places import NO_FACETS, Places, Spot, picked, stacked
+from stickslip.contact.mortar import mortar_tie
 from stickslip.contact.surface import Surface
 from stickslip.errors import InputError, input_error
 
+MEAN = "segment_to_segment"
 TINY = 1e-12  # weights of partners below are rounding
 MATCH = "Mesh both sides alike and join them by node_to_node, with a tolerance that reaches: sectors are tied node to node."
 
@@ -114,13 +116,23 @@ def _followed(
             f"the points of {first.name!r} are those of a rigid body, which cannot follow",
             "Let it be the second side.",
         )
-    if join.pairing == "segment_to_segment":
-        remedy = MATCH if turn is not None else "Use node_to_segment, where each node follows."
-        raise input_error(f"{key}.pairing", "segment_to_segment ties no nodes", remedy)
     a, b = first.surface, second.surface
     if turn is not None:
         b = Surface(turn.points(b.points), b.displacement, b.facets, b.normals, b.numbers)
-    a = _towards(a, b)
+    theirs = (
+        _in_the_mean(key, join, a, b, turn)
+        if join.pairing == MEAN
+        else _by_nodes(key, join, _towards(a, b), b, turn)
+    )
+    theirs.data[np.abs(theirs.data) < TINY] = 0.0
+    theirs.eliminate_zeros()
+    dofs = first.nodes.ravel()
+    _refuse_clamped(key, first, dofs, theirs)
+    return {int(d): theirs[[i]] for i, d in enumerate(dofs) if d >= 0}
+
+
+def _by_nodes(key: str, join: Join, a: Surface, b: Surface, turn: Turn | None) -> Matrix:
+    """Return the motion (3 n_A, N) of the partners of all nodes of side A."""
     try:
         pairing = named(key, join, lambda: match(join, a, b, _across(a)))
     except InputError as error:
@@ -132,12 +144,15 @@ def _followed(
     p = pairing.n_points
     blocks = (pairing.frames, np.arange(p), np.arange(p + 1))
     back = scipy.sparse.bsr_array(blocks, shape=(3 * p, 3 * p)).tocsr()
-    theirs = scipy.sparse.csr_array(back @ pairing.gap_operator + a.displacement)
-    theirs.data[np.abs(theirs.data) < TINY] = 0.0
-    theirs.eliminate_zeros()
-    dofs = first.nodes.ravel()
-    _refuse_clamped(key, first, dofs, theirs)
-    return {int(d): theirs[[i]] for i, d in enumerate(dofs) if d >= 0}
+    return scipy.sparse.csr_array(back @ pairing.gap_operator + a.displacement)
+
+
+def _in_the_mean(key: str, join: Join, a: Surface, b: Surface, turn: Turn | None) -> Matrix:
+    """Return the motion (3 n_A, N) that side B gives the nodes of side A in the mean."""
+    if turn is not None:
+        raise input_error(f"{key}.pairing", f"{MEAN} ties no nodes one to one", MATCH)
+    weights = named(key, join, lambda: mortar_tie(a, b, reach=join.tolerance))
+    return scipy.sparse.csr_array(scipy.sparse.kron(weights, np.eye(3)) @ b.displacement)
 
 
 def _across(a: Surface) -> tuple[float, float, float]:

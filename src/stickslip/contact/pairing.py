@@ -6,7 +6,6 @@ Krack, Salles & Thouverez 2017, section 2.2).
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import scipy.sparse
@@ -14,26 +13,19 @@ from scipy.spatial import cKDTree
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.contact.facets import (
-    DEGREE,
-    interpolation,
-    kinds_of,
-    normals,
     positions,
 )
 from stickslip.contact.interface import Interface
 from stickslip.contact.law import ContactLaw
-from stickslip.contact.projection import facet_balls, meet, project
-from stickslip.contact.quadrature import HIGHEST_DEGREE
-from stickslip.contact.segmentation import segments
+from stickslip.contact.projection import facet_balls, project
+from stickslip.contact.segment_points import SKIP, Outside, need_facets, segment_points
 from stickslip.contact.surface import Surface
 from stickslip.errors import InputError, input_error
 
 PARALLEL = 1e-3  # sine of the smallest angle between the direction of t and a normal
-SKIP = "; or leave them out with outside='skip'"
 LISTED = 5  # points that a message names
 RIM = 1e-6  # overhang that is rounding, as a share of a facet's size
 
-Outside = Literal["error", "skip"]
 Direction = FloatArray | tuple[float, float, float]
 
 
@@ -188,7 +180,7 @@ def node_to_segment(
     InputError
         If a node has no partner on side B.
     """
-    _need_facets("node_to_segment", b)
+    need_facets("node_to_segment", b)
     radius_b = facet_balls(b)[1]
     radius_a = facet_balls(a)[1] if len(a.facets) else radius_b
     reach = float(max(radius_a.max(), radius_b.max())) if reach is None else reach
@@ -251,39 +243,15 @@ def segment_to_segment(
     InputError
         If a facet has no partner on side B, or the sides are too warped to be projected.
     """
-    _need_facets("segment_to_segment", a, b)
-    radius_a, radius_b = facet_balls(a)[1], facet_balls(b)[1]
-    reach = float(max(radius_a.max(), radius_b.max())) if reach is None else reach
-    if degree is None:
-        highest = [max(DEGREE[int(kind)] for kind in kinds_of(side.facets)) for side in (a, b)]
-        degree = min(sum(highest), HIGHEST_DEGREE)
-    found = segments(a, b, reach, degree)
-    facets_a, facets_b = a.facets[found.facet_a], b.facets[found.facet_b]
-    on_a, missed_a = meet(a.points, facets_a, found.place, found.axes)
-    places = positions(a.points, facets_a, on_a)
-    normal = np.einsum(
-        "pk,pkc->pc", interpolation(facets_a, on_a), a.corner_normals()[found.facet_a]
-    )
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    frames = contact_frames(normal, direction)
-    on_b, missed_b = meet(b.points, facets_b, places, frames[:, :, :2].transpose(0, 2, 1))
-    _refuse_warped(found.facet_a[np.union1d(missed_a, missed_b)])
-    partner = positions(b.points, facets_b, on_b)
-    near = np.linalg.norm(partner - places, axis=1) <= reach
-    left = np.setdiff1d(np.arange(len(a.facets)), found.facet_a[near])
-    if left.size and (outside == "error" or not near.any()):
-        raise _without_facet(a, left, reach)
-    # the plane of a cell and the curved facet above it differ in area
-    own = normals(a.points, facets_a, on_a)
-    plane = np.cross(found.axes[:, 0], found.axes[:, 1])
-    tilt = np.einsum("pc,pc->p", own, plane) / np.linalg.norm(own, axis=1)
+    found = segment_points(a, b, reach=reach, degree=degree, outside=outside)
+    frames = contact_frames(found.normal, direction)
     return _pairing(
-        frames[near],
-        places[near],
-        partner[near],
-        (a.at(found.facet_a[near], on_a[near]), b.at(found.facet_b[near], on_b[near])),
-        (found.weight / tilt)[near],
-        left,
+        frames,
+        found.place,
+        found.partner,
+        (a.at(found.facet_a, found.on_a), b.at(found.facet_b, found.on_b)),
+        found.weight,
+        found.unpaired,
     )
 
 
@@ -356,32 +324,3 @@ def _without_partner(
         remedy,
         outside=SKIP,
     )
-
-
-def _without_facet(a: Surface, left: IntArray, reach: float) -> InputError:
-    row = a.facets[left[0]]
-    middle = a.points[row[row >= 0]].mean(axis=0)
-    return input_error(
-        "segment_to_segment",
-        f"{len(left)} of {len(a.facets)} facets of side A have no facet of side B opposite to them within {reach:g} m, e.g. facet "
-        f"{left[0]} at ({', '.join(f'{x:.6g}' for x in middle)}) m",
-        "Check that both sides' normals point outward, or raise reach$outside.",
-        outside=SKIP,
-    )
-
-
-def _need_facets(place: str, *sides: Surface) -> None:
-    for name, side in zip("AB"[-len(sides) :], sides, strict=True):
-        if len(side.facets) == 0:
-            raise input_error(
-                place, f"side {name} has no facets", "Give facets, or pair by node_to_node."
-            )
-
-
-def _refuse_warped(facets: IntArray) -> None:
-    if facets.size:
-        raise input_error(
-            "segment_to_segment",
-            f"points of {np.unique(facets).size} facets of side A, e.g. facet {facets[0]}, cannot be projected on both sides",
-            "Facets are folded or too warped there: refine the mesh.",
-        )

@@ -1,0 +1,69 @@
+"""Two surfaces tied in the mean: the nodes of one follow those of the other (mortar method, standard multipliers; Puso 2004)."""
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.contact.facets import interpolation, lumped_areas
+from stickslip.contact.segment_points import segment_points
+from stickslip.contact.surface import Surface
+from stickslip.errors import input_error
+
+COVERED = 1e-3  # share of side A that may stand beyond side B
+TINY = 1e-14  # weights below are rounding
+
+
+def mortar_tie(a: Surface, b: Surface, *, reach: float | None = None) -> Matrix:
+    """Return the weights by which the nodes of side A follow those of side B.
+
+    The difference of both sides' displacements vanishes in the mean over side A, weighted by each of its shape functions:
+    ``D u_A = M u_B`` with ``D = ∫ N_A N_Aᵀ`` and ``M = ∫ N_A N_Bᵀ``. On plane surfaces a constant stress passes exactly through any two
+    meshes of triangles and parallelograms.
+
+    Parameters
+    ----------
+    a, b
+        The two sides; all nodes of A belong to facets, and all of A is opposite to B.
+    reach
+        Largest distance of partners, m; None: the radius of the largest facet.
+
+    Returns
+    -------
+    Matrix
+        (n_A, n_B) CSR; each row adds up to one.
+
+    Raises
+    ------
+    InputError
+        If nodes of A span no facet, or A reaches beyond B.
+    """
+    loose = np.setdiff1d(np.arange(len(a.points)), a.used)
+    if loose.size or not len(a.facets):
+        assert a.numbers is not None
+        named = (
+            f"node {a.numbers[loose[0]]} of side A spans no facet, {loose.size} such nodes in all"
+        )
+        raise input_error(
+            "segment_to_segment",
+            named if loose.size else "side A has no facets",
+            "Take such nodes out of the set, or use node_to_segment, where each node follows.",
+        )
+    found = segment_points(a, b, reach=reach)
+    whole, covered = float(lumped_areas(a.points, a.facets).sum()), float(found.weight.sum())
+    if covered < (1.0 - COVERED) * whole:
+        raise input_error(
+            "segment_to_segment",
+            f"{100 * (1 - covered / whole):.2g} % of side A have nothing of side B opposite to them",
+            "Let the smaller surface be the first, which follows.",
+        )
+
+    def shapes(side: Surface, facet: IntArray, at: FloatArray) -> Matrix:
+        facets = side.facets[facet]
+        row = np.repeat(np.arange(len(facets)), facets.shape[1])
+        entries = (interpolation(facets, at).ravel(), (row, np.maximum(facets, 0).ravel()))
+        return scipy.sparse.csr_array(entries, shape=(len(facets), len(side.points)))
+
+    on_a, on_b = shapes(a, found.facet_a, found.on_a), shapes(b, found.facet_b, found.on_b)
+    weighted = (on_a * found.weight[:, None]).T
+    weights = np.linalg.solve((weighted @ on_a).toarray(), (weighted @ on_b).toarray())
+    return scipy.sparse.csr_array(np.where(np.abs(weights) > TINY, weights, 0.0))

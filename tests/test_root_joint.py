@@ -1,0 +1,214 @@
+"""Bodies pressed together or tied on faces that do not match, from decks and a study file (journey J8)."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from blocks import two_planes
+from hypothesis import given
+from hypothesis import strategies as st
+from small_v2 import changed
+from typer.testing import CliRunner
+
+from stickslip.cli import app
+from stickslip.contact.facets import KINDS
+from stickslip.contact.mortar import mortar_tie
+from stickslip.errors import InputError
+from stickslip.model.deck import write_deck
+from stickslip.model.fe.solid import Material
+from stickslip.study.models.study import read_study
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "root_joint"
+_spec = importlib.util.spec_from_file_location("make_decks", EXAMPLE / "make_decks.py")
+make_decks = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(make_decks)
+
+YOUNG, LENGTH, STIFFNESS = 2e11, 0.02, 5e13
+# of two bars against each other and a contact: an overlap d presses by d / (2 L / E + 1 / k_n)
+EXACT = 1e-6 / (2 * LENGTH / YOUNG + 1 / STIFFNESS)
+STEEL = Material(young_modulus=YOUNG, poisson_ratio=0.0)  # one-dimensional under uniform pressure
+LAW = f"""
+law = "elastic_coulomb"
+per = "area"
+normal_stiffness_n_per_m3 = {STIFFNESS}
+tangential_stiffness_n_per_m3 = {STIFFNESS}
+axial_stiffness_n_per_m3 = {STIFFNESS}
+friction_coefficient = 0.3
+"""
+PARTS = """
+schema_version = 2
+title = "Two blocks"
+[part.lower]
+file = "lower.inp"
+units = "SI"
+[part.upper]
+file = "upper.inp"
+units = "SI"
+"""
+SHAKEN = """
+[load.shaker]
+on = "upper.bottom"
+force_n = 1.0
+direction = "z"
+[forced_response]
+frequencies_hz = [1000.0, 1100.0]
+peak_points = 0
+[harmonics]
+low = 1
+high = 1
+selection = "always_low"
+[output]
+points = { shaken = "upper.bottom" }
+"""
+COARSE = ([0.0, 0.4, 1.0], [0.0, 0.5, 1.0])
+FINE = ([0.0, 0.3, 0.7, 1.0], [0.0, 0.35, 0.6, 1.0])
+
+
+def deck(path, grid, low, held, quadratic=False):
+    """Write a block on a grid over the unit of 10 mm, from the height `low`; a face of it is held."""
+    heights = np.linspace(low, low + LENGTH, 3)
+    lines = (0.01 * np.asarray(grid[0]), 0.01 * np.asarray(grid[1]), heights)
+    faces = {
+        "bottom": lambda at: at[:, 2] == heights[0],
+        "top": lambda at: at[:, 2] == heights[-1],
+    }
+    mesh = make_decks.block(lines, sets=faces, quadratic=quadratic)
+    write_deck(mesh, STEEL, path, clamped=held)
+
+
+def blocks(folder, lower, upper, more, held=("top",), quadratic=False):
+    deck(folder / "lower.inp", lower, 0.0, ("bottom",), quadratic)
+    deck(folder / "upper.inp", upper, LENGTH, held, quadratic)
+    path = folder / "study.toml"
+    path.write_text(PARTS + more, encoding="utf-8")
+    return path
+
+
+def answered(path, analysis="forced_response"):
+    found = CliRunner().invoke(app, ["run", str(path), "--no-report"])
+    assert found.exit_code == 0, found.output
+    return xr.load_datatree(path.parent / "results" / "result.nc", engine="h5netcdf")[analysis]
+
+
+def misses(folder, pairing, more, held, quadratic=False):
+    """Return how far the pressure of the contact points is off, as a share of the exact one."""
+    study = blocks(folder, COARSE, FINE, more.format(pairing) + SHAKEN, held, quadratic)
+    found = read_study(study).model().assembled(1)
+    return np.abs(-found.static_force[:, 2] / found.contacts.area / EXACT - 1.0).max()
+
+
+CONTACT = (
+    '[contact.joint]\nbetween = ["lower.top", "upper.bottom"]\npairing = "{}"\ninterference_m = 1e-6\n'
+    + LAW
+)
+JOINED = (
+    '[join.joint]\nbetween = ["lower.top", "upper.bottom"]\npairing = "{}"\n'
+    '[contact.press]\nbetween = ["upper.top", "ground"]\ninterference_m = 1e-6\n' + LAW
+)
+
+
+def test_uniform_pressure_passes_through_faces_that_do_not_match(tmp_path):
+    data = answered(blocks(tmp_path, COARSE, FINE, CONTACT.format("segment_to_segment") + SHAKEN))
+    assert data.sizes["contact"] >= 50
+    pressure = -data["static_force"].values[0, :, 2] / data["contact_area"].values
+    np.testing.assert_allclose(pressure, EXACT, rtol=1e-10)
+    np.testing.assert_allclose(data["contact_area"].sum(), 1e-4, rtol=1e-12)
+
+
+def test_quadratic_faces_pass_it_and_contacts_of_nodes_do_not(tmp_path):
+    assert misses(tmp_path, "segment_to_segment", CONTACT, ("top",), quadratic=True) < 1e-10
+    assert 0.1 < misses(tmp_path, "node_to_segment", CONTACT, ("top",)) < 0.3
+
+
+def test_a_join_in_the_mean_passes_constant_stress_and_one_of_nodes_does_not(tmp_path):
+    """The end of a joined bar is pressed by an overlap with the ground; only a uniform stress presses it uniformly."""
+    assert misses(tmp_path, "segment_to_segment", JOINED, ()) < 1e-10
+    assert 1e-3 < misses(tmp_path, "node_to_segment", JOINED, ()) < 0.1
+
+
+def stuck(folder, joint):
+    folder.mkdir()
+    study = blocks(folder, FINE, FINE, joint + "[modes]\nnumber = 5\ncontacts = 'stuck'\n", ())
+    return answered(study, "modes")["frequency_hz"].values.ravel()
+
+
+def test_a_stuck_contact_tends_to_the_join_as_it_stiffens(tmp_path):
+    """On faces that match: first order in the flexibility of the contact. There a join of nodes is one in the mean."""
+    between = 'between = ["upper.bottom", "lower.top"]\n'
+    tied, nodes = (
+        stuck(tmp_path / way, f'[join.joint]\n{between}pairing = "{way}"\n')
+        for way in ("segment_to_segment", "node_to_node")
+    )
+    np.testing.assert_allclose(tied, nodes, rtol=1e-9)
+    errors = []
+    for k in (1e15, 1e16, 1e17):
+        own = LAW.replace(str(STIFFNESS), str(k))
+        joint = f'[contact.joint]\n{between}pairing = "segment_to_segment"\n{own}'
+        errors.append(np.abs(stuck(tmp_path / f"{k:g}", joint) / tied - 1.0).max())
+    assert errors[2] < 1e-3
+    np.testing.assert_allclose(np.divide(errors[:2], errors[1:]), 10.0, rtol=0.2)
+
+
+def command(*words):
+    found = CliRunner().invoke(app, [str(word) for word in words])
+    assert found.exit_code == 0, found.output
+    return " ".join(found.output.split())
+
+
+def test_a_root_in_its_slot_from_decks_to_the_page(tmp_path):
+    """The example on a coarser mesh: pressed by the pull, its resonance falls as the flanks begin to slip."""
+    blade = make_decks.blade(across=1, along=2, up=1, above=2)
+    write_deck(blade, Material(), tmp_path / "blade.inp", clamped=())
+    lugs = make_decks.joined(make_decks.lug(-1), make_decks.lug(1))
+    write_deck(lugs, Material(), tmp_path / "disk.inp", clamped=("held",))
+    text = changed(
+        (EXAMPLE / "study.toml").read_text(encoding="utf-8"),
+        {
+            "forced_response.frequency_hz": "[2060.0, 2140.0]",
+            "forced_response.frequencies": "5",
+            "forced_response.peak_points": "0",
+            "harmonics.high": "1",
+            "harmonics.selection": '"always_low"',
+            "harmonics.samples": "32",
+        },
+    )
+    study = tmp_path / "study.toml"
+    study.write_text(text, encoding="utf-8")
+    assert "static equilibrium: 192 of 192 contact points are pressed" in command("check", study)
+    command("run", study)
+    data = xr.load_datatree(tmp_path / "results" / "result.nc", engine="h5netcdf")[
+        "forced_response"
+    ]
+    # both flanks together carry the pull
+    force = np.einsum("pxd,pd->px", data["contact_frame"].values, data["static_force"].values[0])
+    np.testing.assert_allclose(force.sum(axis=0), [0.0, 0.0, -5000.0], atol=1e-6)
+    small, large = (data["peak_amplitude"].values[i] / f for i, f in ((0, 4.0), (1, 20.0)))
+    assert large < 0.7 * small
+    assert data["peak_frequency_hz"].values[1] < data["peak_frequency_hz"].values[0]
+    page = (tmp_path / "results" / "report.html").read_text(encoding="utf-8")
+    assert "left.1" in page
+
+
+# weights of the tie
+
+grids = st.lists(st.floats(0.2, 1.0), min_size=1, max_size=3).map(
+    lambda steps: np.concatenate([[0.0], np.cumsum(steps) / np.sum(steps)])
+)
+kinds = st.sampled_from(["tri", "quad", "tri6", "quad8"])
+
+
+@given(st.tuples(grids, grids), st.tuples(grids, grids), st.tuples(kinds, kinds))
+def test_a_tie_in_the_mean_moves_along_with_linear_fields(grid_a, grid_b, kind):
+    a, b = two_planes(grid_a, grid_b, kind)
+    weights = mortar_tie(a, b)
+    fields = [np.column_stack([np.ones(len(s.points)), s.points[:, :2]]) for s in (a, b)]
+    np.testing.assert_allclose(weights @ fields[1], fields[0], atol=1e-11)
+
+
+def test_a_side_that_reaches_beyond_the_other_is_refused():
+    a, b = two_planes((COARSE[0], COARSE[1]), ([0.0, 0.5, 0.8], COARSE[1]))
+    with pytest.raises(InputError, match="20 % of side A have nothing of side B opposite"):
+        mortar_tie(a, b)
+    assert set(KINDS) == {3, 4, 6, 8}  # those of `kinds`
