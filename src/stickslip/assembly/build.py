@@ -17,6 +17,7 @@ from stickslip.assembly.forces import (
     force_of,
     output_labels,
 )
+from stickslip.assembly.held import refuse_unheld
 from stickslip.assembly.joined import KEY, on_shapes
 from stickslip.assembly.model import Model
 from stickslip.assembly.places import picked, stacked
@@ -86,6 +87,7 @@ def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
             "contact", "there is none: no coordinate would be left to solve for", "Give a contact."
         )
     refuse_rigid(model)
+    refuse_unheld(model)
     stay = np.concatenate([labels.dofs, watched])
     kept = np.concatenate([stay, *(np.flatnonzero(f) for f in forces.values())])
     linear = linear_side(model, order or 0, harmonics, kept, stay, store)

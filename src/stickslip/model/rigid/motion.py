@@ -8,6 +8,7 @@ from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import SingularError
 from stickslip.model.dofs import Dofs
 
+ROUNDING = 1e-12  # of the coordinates, below which points lie at one place
 RIGID = 1e-9  # strain energy of a rigid motion over that of single dofs: below, nothing holds it
 COMPONENTS = {"x": 0, "y": 1, "z": 2, "rx": 3, "ry": 4, "rz": 5}
 SHOWN = 5  # node numbers in a message
@@ -64,29 +65,61 @@ def _name(dofs: Dofs) -> str:
     return f"the body of dof {dofs.labels[0]} ({len(nodes)} nodes{part}: {shown})"
 
 
+def loose_motions(stiffness: Matrix, dofs: Dofs) -> list[tuple[IntArray, FloatArray]]:
+    """Return the bodies that can move without strain: their dofs, and their free motions (m, f), the largest entry of each one.
+
+    Parameters
+    ----------
+    stiffness
+        (n, n), real symmetric, dense or sparse.
+    dofs
+        Its n dofs; of those that are no displacements or rotations of places, small bodies alone are judged.
+    """
+    found = []
+    for part in _bodies(stiffness):
+        shapes = _free_shapes(_own(stiffness, part), dofs.take(part))
+        if shapes.shape[1]:
+            found.append((part, shapes / np.abs(shapes).max(axis=0)))
+    return found
+
+
+def in_words(dofs: Dofs, shapes: FloatArray) -> str:
+    """Return rigid motions (n, f) of dofs in words: ``translation along x, rotation about z``."""
+    motions, centre, size = _six_motions(dofs)
+    basis = np.linalg.qr(shapes)[0]
+    six, *_ = np.linalg.lstsq(motions, basis, rcond=1e-9)
+    if np.linalg.norm(motions @ six - basis) > 1e-6:  # of dofs that have no place
+        most = [dofs.labels[int(np.argmax(np.abs(shape)))] for shape in shapes.T]
+        return f"moving without strain, {', '.join(dict.fromkeys(most))} the most"
+    return _motion_names(six, motions, basis) or _screw(six, centre, size)
+
+
+def _own(stiffness: Matrix, part: IntArray) -> Matrix:
+    if scipy.sparse.issparse(stiffness):
+        return stiffness[part][:, part]
+    return stiffness[np.ix_(part, part)]
+
+
 def _free(stiffness: Matrix, dofs: Dofs, part: IntArray) -> str:
     """Return the motions of a body that cost no energy, in words; empty where it is held."""
-    if scipy.sparse.issparse(stiffness):
-        stiffness = stiffness[part][:, part]
-    else:
-        stiffness = stiffness[np.ix_(part, part)]
-    own = dofs.take(part)
-    motions, centre, size = _six_motions(own)
-    left, values, right = np.linalg.svd(motions, full_matrices=False)
-    kept = values > 1e-9 * max(values[0], 1e-300)
-    base = left[:, kept]
-    scale = float(np.max(np.abs(stiffness.diagonal()), initial=0.0))
-    if scale == 0:
+    own, table = _own(stiffness, part), dofs.take(part)
+    if not np.any(own.diagonal()):
         return "it has no stiffness"
-    if not base.shape[1]:
-        return ""
+    shapes = _free_shapes(own, table, judged=0)
+    return in_words(table, shapes) if shapes.shape[1] else ""
+
+
+def _free_shapes(stiffness: Matrix, dofs: Dofs, judged: int = 1000) -> Matrix:
+    """Return the (n, f) motions of a body that cost no energy; `judged`: size up to which dofs without a place are looked at."""
+    motions, _, _ = _six_motions(dofs)
+    left, values, _ = np.linalg.svd(motions, full_matrices=False)
+    base = left[:, values > 1e-9 * max(values[0], 1e-300)]
+    if not base.shape[1] and len(dofs) <= judged:
+        base = np.eye(len(dofs))
+    scale = float(np.max(np.abs(stiffness.diagonal()), initial=0.0))
     energy = base.conj().T @ (stiffness @ base)
     free, shapes = np.linalg.eigh((energy + energy.conj().T) / 2)
-    null = free <= RIGID * scale / len(part)
-    if not np.any(null):
-        return ""
-    six = right[kept].T / values[kept] @ shapes[:, null]  # coefficients of the six motions
-    return _motion_names(six, motions, base @ shapes[:, null]) or _screw(six, centre, size)
+    return base @ shapes[:, free <= RIGID * scale / len(dofs)]
 
 
 def _motion_names(six: Matrix, motions: FloatArray, null: Matrix) -> str:
@@ -123,13 +156,18 @@ def _six_motions(dofs: Dofs) -> tuple[FloatArray, FloatArray, float]:
     """
     place = np.array([COMPONENTS.get(c, -1) for c in dofs.component])
     known = np.all(np.isfinite(dofs.position), axis=1)
+    position = dofs.position
+    if not known.any():  # a rigid body: all at its centre
+        known, position = np.ones(len(dofs), dtype=bool), np.zeros((len(dofs), 3))
     motions = np.zeros((len(dofs), 6))
     moving, turning = np.flatnonzero((place >= 0) & (place < 3) & known), np.flatnonzero(place >= 3)
     if not moving.size:
         return motions, np.zeros(3), 1.0
-    centre = dofs.position[moving].mean(axis=0)
-    arm = dofs.position[moving] - centre
-    size = float(np.max(np.abs(arm))) or 1.0
+    centre = position[moving].mean(axis=0)
+    arm = position[moving] - centre
+    size = float(np.max(np.abs(arm)))
+    if size <= ROUNDING * float(np.max(np.abs(position[moving]))):  # all at one place
+        arm, size = np.zeros_like(arm), 1.0
     direction = np.eye(3)[place[moving]]
     for i in range(3):
         motions[moving, i] = direction[:, i]

@@ -1,0 +1,131 @@
+"""A part that nothing holds is refused by name with its free motions, before anything long is computed."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_v2 import changed, write_four_masses, write_shrouded_deck, write_two_blades
+from test_assembly_copies import LAW, bar, halves
+from test_cli import done, refused
+
+from stickslip.assembly.contact import Contact, Join
+from stickslip.assembly.held import refuse_unheld, unheld
+from stickslip.assembly.load import Load
+from stickslip.assembly.model import Model
+from stickslip.contact.laws.unilateral_spring import UnilateralSpring
+from stickslip.errors import InputError
+from stickslip.model.fe.solid import Material
+from stickslip.model.part import rigid_part, solid_part, structure_part
+from stickslip.model.readers.matrix_files import numbered_dofs
+from stickslip.model.rigid.body import RigidBody
+from stickslip.model.structure import Structure
+
+
+def free_bar(contacts=None, joins=None, law=LAW, **more):
+    """A bar that nothing holds but what is given, beside a clamped one of the same size."""
+    parts = {
+        "held": solid_part(bar((1, 1, 1), length=0.1), Material()),
+        "loose": solid_part(bar((1, 1, 1), start=0.1, length=0.1, clamp=False), Material()),
+    }
+    touching = {"touch": Contact(between=("loose.right", "ground"), law=law, tangent=(0, 0, 1))}
+    return Model(
+        parts=parts,
+        contacts=touching if contacts is None else contacts,
+        joins=joins or {},
+        loads={"shake": Load(on="loose.right", newton=1.0, direction=(0, 0, 1))},
+        **more,
+    )
+
+
+def test_what_nothing_touches_is_free_in_all_directions() -> None:
+    contact = Contact(between=("held.right", "ground"), law=LAW, tangent=(0, 0, 1))
+    with pytest.raises(InputError) as error:
+        refuse_unheld(free_bar({"touch": contact}))
+    assert "part.loose: is held by nothing" in str(error.value)
+    for word in ("translation along", "rotation about"):
+        for axis in "xyz":
+            assert f"{word} {axis}" in str(error.value)
+
+
+def test_a_contact_holds_what_its_springs_strain() -> None:
+    refuse_unheld(free_bar())
+    normal = free_bar(law=UnilateralSpring(k_n=1e6))
+    with pytest.raises(InputError) as error:
+        refuse_unheld(normal)
+    said = str(error.value)
+    assert "translation along y, translation along z, rotation about x" in said
+    assert "translation along x" not in said
+    with pytest.raises(InputError, match=r"part.loose: is held by nothing"):
+        normal.assembled(1)
+
+
+def test_a_join_holds_and_so_does_a_joined_neighbour() -> None:
+    refuse_unheld(halves("node_to_node"))
+    weld = {"weld": Join(between=("loose.left", "held.right"), pairing="node_to_node")}
+    refuse_unheld(free_bar(law=UnilateralSpring(k_n=1e6), joins=weld))
+
+
+def test_open_contacts_hold_nothing() -> None:
+    found = unheld(free_bar(), np.zeros(4, dtype=bool))
+    assert [error.place for error in found] == ["part.loose"]
+
+
+def test_a_rigid_body_is_held_by_contacts_or_its_retention() -> None:
+    law = UnilateralSpring(k_n=1e6)
+    body = RigidBody(mass=1.0, inertia=(1.0, 1.0, 1.0), centre=(0.2, 0.0, 0.0))
+    model = free_bar(law=law)
+    parts = {"held": model.parts["held"], "block": rigid_part(body)}
+    contact = Contact(between=("held.right", "ground"), law=LAW, tangent=(0, 0, 1))
+    loads = {"shake": Load(on="block", newton=1.0, direction=(0, 0, 1))}
+    alone = Model(parts=parts, contacts={"c": contact}, loads=loads)
+    with pytest.raises(InputError, match=r"part.block: .*rotation about z.*\[retention\]"):
+        refuse_unheld(alone)
+    refuse_unheld(Model(parts=parts, contacts={"c": contact}, loads=loads, retention=1.0))
+
+
+def test_dofs_without_a_place_are_judged_by_their_stiffness() -> None:
+    K = np.diag([2.0, 2.0, 0.0]) - np.eye(3, k=1) - np.eye(3, k=-1)
+    K[2] = K[:, 2] = 0.0
+    zero = np.zeros((3, 3))
+    part = structure_part(Structure(np.eye(3), zero, K, numbered_dofs(3)))
+    contact = Contact(between=("own.dof1", "ground"), law=LAW, acts="tangential")
+    model = Model(parts={"own": part}, contacts={"c": contact})
+    with pytest.raises(InputError, match=r"part.own: the body of dof3 .*own.dof3 the most|dof3"):
+        refuse_unheld(model)
+
+
+@pytest.mark.parametrize("write", [write_two_blades, write_four_masses, write_shrouded_deck])
+def test_what_is_held_is_not_refused(tmp_path: Path, write) -> None:
+    from stickslip.study.models.study import read_study
+
+    refuse_unheld(read_study(write(tmp_path)).model())
+
+
+FREE = """
+schema_version = 2
+[part.chain]
+shape = "lumped"
+masses_kg = [1.0, 1.0, 1.0]
+springs_n_per_m = [["ground", 1, 1e4], [2, 3, 1e4]]
+[contact.brake]
+between = ["chain.m1", "ground"]
+law = "jenkins"
+tangential_stiffness_n_per_m = 1e3
+slip_limit_n = 1.0
+[load.shaker]
+on = "chain.m3"
+force_n = 1.0
+[forced_response]
+frequency_hz = [10.0, 20.0]
+"""
+
+
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_the_command_line_names_part_and_motion(tmp_path: Path, command: str) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(FREE)
+    said = refused(command, str(path))
+    assert "part.chain: the body of m2 is held by nothing" in said
+    assert "translation along x" in said
+    path.write_text(changed(FREE, {"contact.brake.between": '["chain.m1", "chain.m2"]'}))
+    assert "good to run" in done("check", str(path))
