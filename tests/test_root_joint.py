@@ -73,6 +73,7 @@ def deck(path, grid, low, held, quadratic=False):
     faces = {
         "bottom": lambda at: at[:, 2] == heights[0],
         "top": lambda at: at[:, 2] == heights[-1],
+        "side": lambda at: at[:, 0] == 0.0,
     }
     mesh = make_decks.block(lines, sets=faces, quadratic=quadratic)
     write_deck(mesh, STEEL, path, clamped=held)
@@ -189,6 +190,57 @@ def test_a_root_in_its_slot_from_decks_to_the_page(tmp_path):
     assert data["peak_frequency_hz"].values[1] < data["peak_frequency_hz"].values[0]
     page = (tmp_path / "results" / "report.html").read_text(encoding="utf-8")
     assert "left.1" in page
+
+
+# surfaces that cannot meet, and contacts that do nothing
+
+
+def told(folder, contact, low=LENGTH, held=()):
+    """Return what `check` says of two blocks, the upper one at a height, with its exit code."""
+    blocks(folder, COARSE, FINE, "", held)
+    deck(folder / "upper.inp", FINE, low, held)
+    study = folder / "study.toml"
+    study.write_text(PARTS + contact + SHAKEN, encoding="utf-8")
+    found = CliRunner().invoke(app, ["check", str(study)])
+    return found.exit_code, " ".join(found.output.split()).lower()  # decks have names in capitals
+
+
+def between(first, second, name="joint", pairing="segment_to_segment"):
+    return f'[contact.{name}]\nbetween = ["{first}", "{second}"]\npairing = "{pairing}"\n{LAW}'
+
+
+REFUSED = [
+    (between("lower.top", "upper.top"), LENGTH, "contact.joint.between: 'lower.top' and 'upper.top' look the same way: their outward normals, (0.00, 0.00, 1.00) and (0.00, 0.00, 1.00), are 180° from opposite. Name the faces that meet, or check how the parts are placed, turned and mirrored. 'upper.bottom' lies nearer than 'upper.top': are surfaces swapped?"),
+    (between("lower.side", "upper.bottom"), LENGTH, "'lower.side' and 'upper.bottom' do not face each other: their outward normals, (-1.00, 0.00, 0.00) and (0.00, 0.00, -1.00), are 90° from opposite"),
+    (between("lower.root", "ground", pairing="node_to_node"), LENGTH, "contact.joint.between: no point of the contact can move: its nodes are clamped"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("contact", "low", "said"), REFUSED)
+def test_surfaces_that_cannot_meet_are_refused(contact, low, said, tmp_path):
+    code, found = told(tmp_path, contact, low)
+    assert code == 2
+    assert said.lower() in found
+
+
+WARNED = [
+    (between("lower.top", "upper.bottom"), LENGTH - 5e-4, "contact.joint: lower.top and upper.bottom overlap by up to 0.0005 m as they are placed, at ("),
+    (between("lower.side", "ground", pairing="node_to_node"), LENGTH, "contact.joint: lower.side borders on clamped nodes, 1, 4, 7; the facets between them and it, 2 beside 2, take no part in the contact."),
+    (between("lower.top", "upper.bottom") + between("upper.bottom", "lower.top", "again"), LENGTH, "contact.again lies on the same points as contact.joint: their forces add up."),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("contact", "low", "said"), WARNED)
+def test_what_is_doubtful_of_a_contact_is_told(contact, low, said, tmp_path):
+    code, found = told(tmp_path, contact, low, ("top",))
+    assert code == 0, found
+    assert said.lower() in found
+
+
+def test_a_contact_that_is_right_is_not_warned_of(tmp_path):
+    code, found = told(tmp_path, between("lower.top", "upper.bottom"))
+    assert code == 0, found
+    assert "contact.joint" not in found
 
 
 # weights of the tie

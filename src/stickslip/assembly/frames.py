@@ -35,7 +35,7 @@ def with_normals(
     if len(a.facets):  # nodes that span no facet take the normal of the nearest one that does
         near = a.used[cKDTree(a.points[a.used]).query(a.points)[1]]
         return replace(a, facets=NO_FACETS, normals=a.node_normals()[near])
-    theirs = None if second is None or b is None else _normals_of(second, b)
+    theirs = None if second is None or b is None else normals_of(second, b)
     if theirs is None:
         raise input_error(
             f"{key}.between",
@@ -61,7 +61,8 @@ def _named(key: str, normal: tuple[float, float, float], first: Spot, a: Surface
     return np.tile(np.asarray(normal, dtype=float) / length, (len(a.points), 1))
 
 
-def _normals_of(spot: Spot, surface: Surface) -> tuple[FloatArray, FloatArray] | None:
+def normals_of(spot: Spot, surface: Surface) -> tuple[FloatArray, FloatArray] | None:
+    """Return the points of a surface whose normals are known, and these: of its own frames or facets."""
     if spot.frame is not None:
         return surface.points, spot.frame[:, :, 2]
     if not len(surface.facets):

@@ -9,7 +9,15 @@ import scipy.sparse
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.contact import GROUND, NEXT, Contact, Join
-from stickslip.assembly.frames import direction, whole, with_normals
+from stickslip.assembly.facing import (
+    overlap_warning,
+    refuse_averted,
+    refuse_held,
+    rim_warning,
+    twice_warning,
+    with_hint,
+)
+from stickslip.assembly.frames import direction, normals_of, whole, with_normals
 from stickslip.assembly.places import AXES, NO_FACETS, Places, Spot
 from stickslip.assembly.shares import at_rest, shared
 from stickslip.contact.law import ContactLaw
@@ -107,6 +115,12 @@ def pair_contacts(places: Places, contacts: Mapping[str, Contact], turn: Turn | 
     """
     n = places.n
     found = [one_contact(places, name, contact, turn) for name, contact in contacts.items()]
+    twice = twice_warning(
+        {
+            name: (p.own + p.following, bool(np.all(np.isfinite(p.position))))
+            for name, p in zip(contacts, found, strict=True)
+        }
+    )
     names = [name for pairs in found for name in pairs.names]
     if len(set(names)) < len(names):  # the points of two bodies may have the same names
         names = [f"{g}.{x}" for p in found for g, x in zip(p.groups, p.names, strict=True)]
@@ -125,7 +139,7 @@ def pair_contacts(places: Places, contacts: Mapping[str, Contact], turn: Turn | 
         stacked("frame", np.zeros((0, 3, 3))),
         stacked("area", np.zeros(0)),
         np.concatenate([np.zeros((0, 3), dtype=np.int64), *(p.nodes for p in found)]),
-        tuple(text for p in found for text in p.warnings),
+        (*(text for p in found for text in p.warnings), *twice),
     )
 
 
@@ -136,20 +150,21 @@ def one_contact(places: Places, name: str, contact: Contact, turn: Turn | None) 
     law = at_rest(key, contact)
     if first.surface is None or (second is not None and second.surface is None):
         return _single_dofs(places, name, contact, law, first, second, ahead)
-    pairing = _paired(key, contact, law, first, second, ahead)
+    pairing, said = _paired(places, key, contact, law, first, second, ahead)
     n, p = places.n, pairing.n_points
     operator = scipy.sparse.csr_array(pairing.gap_operator)
     on_facets = contact.pairing == "segment_to_segment" and second is not None
     has_area = on_facets or whole(first.surface)
     area = pairing.weights if has_area else np.full(p, np.nan)
-    _refuse_held(key, operator)
+    refuse_held(key, operator)
     labels = first.labels if len(first.labels) == p else tuple(f"{name}.{i + 1}" for i in range(p))
-    warnings: tuple[str, ...] = ()
+    rims = (text for side in (first, second) if side for text in rim_warning(places, key, side))
+    warnings = (*said, *rims)
     if contact.pairing != "node_to_node" and len(first.surface.facets):
         lost = len(first.surface.points) - len(first.surface.used)
         if lost:
             text = f"{key}: {lost} nodes of {first.name} span no facet and take no part."
-            warnings = (text,)
+            warnings = (*warnings, text)
     return Pairs(
         operator[:, :n],
         operator[:, n:] if ahead else scipy.sparse.csr_array((3 * p, n)),
@@ -207,9 +222,15 @@ def sides(
 
 
 def _paired(
-    key: str, contact: Contact, law: ContactLaw, first: Spot, second: Spot | None, turn: Turn | None
-) -> Pairing:
-    """Pair two surfaces; the dofs of the next sector follow those of this one where there is a turn."""
+    places: Places,
+    key: str,
+    contact: Contact,
+    law: ContactLaw,
+    first: Spot,
+    second: Spot | None,
+    turn: Turn | None,
+) -> tuple[Pairing, tuple[str, ...]]:
+    """Pair two surfaces, and say what is doubtful; the dofs of the next sector follow those of this one where there is a turn."""
     assert first.surface is not None
     a, b = widened(first.surface, second, turn)
     facing = with_normals(key, contact, first, a, second, b)
@@ -217,8 +238,19 @@ def _paired(
     if b is None:
         empty = scipy.sparse.csr_array(facing.displacement.shape)
         b = Surface(facing.points, empty, NO_FACETS)
-        return named(key, contact, lambda: node_to_node(facing, b, tolerance=NEAR, direction=along))
-    return named(key, contact, lambda: match(contact, facing, b, along))
+        held = named(key, contact, lambda: node_to_node(facing, b, tolerance=NEAR, direction=along))
+        return held, ()
+    assert second is not None
+    normals = facing.node_normals()[facing.used]
+    opposite = normals_of(second, b)
+    if opposite is not None and turn is not None and second.frame is not None:
+        opposite = opposite[0], opposite[1] @ turn.matrix.T
+    try:
+        refuse_averted(key, contact, (facing.points[facing.used], normals), opposite)
+        found = named(key, contact, lambda: match(contact, facing, b, along))
+    except InputError as error:
+        raise (error if turn is not None else with_hint(error, places, facing, second)) from None
+    return found, overlap_warning(key, contact, found, (facing, b))
 
 
 def match(contact: Contact | Join, a: Surface, b: Surface, along: Any) -> Pairing:
@@ -262,15 +294,6 @@ def named(key: str, contact: Contact | Join, pair: Callable[[], Found]) -> Found
         one, two = contact.between
         raise error.inside(f"{key} (side A: {one}, side B: {two})") from None
     return found
-
-
-def _refuse_held(key: str, operator: Matrix) -> None:
-    if not operator.nnz:
-        raise input_error(
-            f"{key}.between",
-            "no point of the contact can move: its nodes are clamped",
-            "Name a surface that moves, or clamp less.",
-        )
 
 
 def _single_dofs(

@@ -1,0 +1,166 @@
+"""Whether the two surfaces of a contact can meet: normals against each other, no overlap, points that move."""
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import scipy.sparse
+from scipy.spatial import cKDTree
+
+from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.assembly.contact import Contact
+from stickslip.assembly.places import Places, Spot
+from stickslip.contact.facets import centres, normals
+from stickslip.contact.pairing import Pairing
+from stickslip.contact.projection import facet_balls
+from stickslip.contact.surface import SMOOTH, Surface
+from stickslip.errors import InputError, input_error
+from stickslip.model.mesh.mesh_facets import facets_of
+
+STEEPEST = 45.0  # degrees from opposite at which surfaces cannot be meant to touch
+DEEP = 0.05  # of a facet's radius: what facets of curved surfaces overlap by is less
+NONE: IntArray = np.zeros(0, dtype=np.int64)
+NAMED = 5  # points that a message names
+Normals = tuple[FloatArray, FloatArray]  # points (n, 3) and their unit normals
+
+
+def refuse_averted(key: str, contact: Contact, mine: Normals, theirs: Normals | None) -> None:
+    """Refuse surfaces whose normals do not point against each other.
+
+    Parameters
+    ----------
+    key, contact
+        ``contact.NAME``, and what it says.
+    mine, theirs
+        Points and outward normals of both sides; None where the second has none.
+    """
+    if theirs is None or not len(mine[0]):
+        return
+    near = cKDTree(theirs[0]).query(mine[0])[1]
+    cosine = np.clip(-np.einsum("pc,pc->p", mine[1], theirs[1][near]), -1.0, 1.0)
+    angle = float(np.degrees(np.median(np.arccos(cosine))))
+    if angle <= STEEPEST:
+        return
+    one, two = contact.between
+    way = "look the same way" if angle > 180.0 - STEEPEST else "do not face each other"
+    raise input_error(
+        f"{key}.between",
+        f"{one!r} and {two!r} {way}: their outward normals, {_mean(mine[1])} and {_mean(theirs[1])}, are {angle:.0f}° from opposite",
+        "Name the faces that meet, or check how the parts are placed, turned and mirrored.",
+    )
+
+
+def _mean(normals: FloatArray) -> str:
+    mean = normals.mean(axis=0)
+    length = np.linalg.norm(mean)
+    unit = mean / length if length > 0 else mean
+    return f"({', '.join(f'{x + 0.0:.2f}' for x in unit.round(2))})"
+
+
+def overlap_warning(
+    key: str, contact: Contact, pairing: Pairing, sides: Sequence[Surface]
+) -> tuple[str, ...]:
+    """Warn of surfaces that overlap as they are placed by more than their facets can be off and the contact says."""
+    sizes = [float(np.median(facet_balls(side)[1])) for side in sides if len(side.facets)]
+    worst = int(np.argmin(pairing.initial_gap))
+    deep = float(-pairing.initial_gap[worst])
+    if not sizes or deep <= DEEP * min(sizes) + max(-contact.gap, 0.0):
+        return ()
+    one, two = contact.between
+    place = ", ".join(f"{x:.4g}" for x in pairing.positions[worst])
+    text = (
+        f"{key}: {one} and {two} overlap by up to {deep:.3g} m as they are placed, at ({place}) m; the contact takes them as "
+        "touching at rest. Move a part, or give interference_m if they are to press each other."
+    )
+    return (text,)
+
+
+def refuse_held(key: str, operator: Matrix) -> None:
+    """Refuse a contact no point of which can move."""
+    if not operator.nnz:
+        raise input_error(
+            f"{key}.between",
+            "no point of the contact can move: its nodes are clamped",
+            "Name a surface that moves, or clamp less.",
+        )
+
+
+def rim_warning(places: Places, key: str, spot: Spot) -> tuple[str, ...]:
+    """Warn of facets at the rim of a surface that its clamped nodes, which readers take out of sets, leave out."""
+    mesh, word = places.parts[spot.part].mesh, spot.name.partition(".")[2]
+    if mesh is None or spot.surface is None or "root" not in mesh.node_sets:
+        return ()
+    own, root = (mesh.node_sets.get(name, NONE) for name in (word, "root"))
+    if not len(spot.surface.facets) or np.isin(own, root).any():
+        return ()
+    both = facets_of(mesh, np.concatenate([own, root]))
+    mine = np.isin(both, own)
+    rim = both[mine.any(axis=1) & ~mine.all(axis=1)]
+    if not len(rim):
+        return ()
+    inside = facets_of(mesh, own)
+    kept, lost = (_middles(mesh.points, facets) for facets in (inside, rim))
+    near = cKDTree(kept[0]).query(lost[0])[1]
+    flush = np.einsum("pc,pc->p", lost[1], kept[1][near]) > SMOOTH
+    left = np.setdiff1d(rim[flush], own)
+    if not left.size:
+        return ()
+    listed = ", ".join(str(n) for n in mesh.numbers[left[:NAMED]])
+    more = f" and {left.size - NAMED} more" if left.size > NAMED else ""
+    text = (
+        f"{key}: {spot.name} borders on clamped nodes, {listed}{more}; the facets between them and it, {np.count_nonzero(flush)} "
+        f"beside {len(inside)}, take no part in the contact."
+    )
+    return (text,)
+
+
+def _middles(points: FloatArray, facets: IntArray) -> Normals:
+    """Return the middles of facets and their unit normals."""
+    normal = normals(points, facets, centres(facets))
+    middle = points[facets].mean(axis=1)
+    return middle, normal / np.linalg.norm(normal, axis=1, keepdims=True)
+
+
+def twice_warning(found: Mapping[str, tuple[Matrix, bool]]) -> tuple[str, ...]:
+    """Warn of contacts between surfaces that join the same dofs.
+
+    Parameters
+    ----------
+    found
+        Of each contact its rows (3 p, N), and whether it is one of surfaces.
+    """
+    touched: dict[str, frozenset[int]] = {
+        name: frozenset(np.unique(scipy.sparse.csr_array(rows).indices).tolist())
+        for name, (rows, surface) in found.items()
+        if surface
+    }
+    return tuple(
+        f"contact.{two} lies on the same points as contact.{one}: their forces add up. Remove one of them if that is not meant."
+        for one, two in combinations(touched, 2)
+        if touched[one] and touched[one] == touched[two]
+    )
+
+
+def with_hint(error: InputError, places: Places, first: Surface, second: Spot) -> InputError:
+    """Return an error of two surfaces of which one finds no partner, with the set of the second part that lies nearer."""
+    assert second.surface is not None
+    part = places.parts[second.part]
+    own = _distance(first, second.surface.points)
+    near: list[tuple[float, str]] = []
+    for name in part.names:
+        full = f"{second.part}.{name}"
+        spot: Any = places.spot(full, "")
+        if full != second.name and spot.surface is not None and len(spot.surface.points):
+            near.append((_distance(first, spot.surface.points), full))
+    if not near or min(near)[0] > 0.1 * own:
+        return error
+    remedy = (
+        f"{error.remedy} {min(near)[1]!r} lies nearer than {second.name!r}: are surfaces swapped?"
+    )
+    return input_error(error.place, error.problem, remedy)
+
+
+def _distance(surface: Surface, points: FloatArray) -> float:
+    """Return the distance of a surface's middling point to the nearest of `points`, m."""
+    return float(np.median(cKDTree(points).query(surface.points[surface.used])[0]))
