@@ -21,6 +21,7 @@ from stickslip.assembly.held import refuse_unheld
 from stickslip.assembly.joined import KEY, on_shapes
 from stickslip.assembly.model import Model
 from stickslip.assembly.places import picked, stacked
+from stickslip.assembly.points import in_points
 from stickslip.assembly.reduced import Store, in_memory, reduced_parts
 from stickslip.assembly.rigid import held_gaps, in_gaps, refuse_mixed_gaps, refuse_rigid
 from stickslip.assembly.statics import pressed_by, static_contact_force
@@ -185,7 +186,7 @@ def linear_side(
     needed = np.unique(np.concatenate([kept, *used[:2], bodies]))
     kept = np.unique(np.concatenate([needed, ties.followers, used[2]]))
     if model.neighbours is None:
-        return _of_one(model, kept, needed, store)
+        return _of_one(model, (kept, needed, np.concatenate([stay, bodies])), store)
     if model.interface_modes is not None:
         raise input_error(
             KEY, "is for single structures: waves hold no joined nodes", "Leave it out on a wheel."
@@ -214,12 +215,14 @@ def linear_side(
     return Linear(found.wheel, found.gaps, found.steady, of_dofs, load, of_wave)
 
 
-def _of_one(model: Model, kept: IntArray, needed: IntArray, store: Store) -> Linear:
-    own = {
+def _of_one(model: Model, dofs: tuple[IntArray, IntArray, IntArray], store: Store) -> Linear:
+    """Reduce a single structure; `dofs` are those kept, those that no shapes replace, and those that stay coordinates."""
+    kept, needed, stay = dofs
+    mine = {
         name: kept[np.isin(kept, model.places.own(name))] - model.places.offset(name)
         for name in model.parts
     }
-    parts = reduced_parts(model.parts, own, model.spin(model.speed), model.steady, store)
+    parts = reduced_parts(model.parts, mine, model.spin(model.speed), model.steady, store)
     ids = []
     for name, part in parts.items():
         modal = np.full(part.structure.n - part.kept.size, -1)
@@ -228,7 +231,11 @@ def _of_one(model: Model, kept: IntArray, needed: IntArray, store: Store) -> Lin
     structure = at.tied(join(**{name: part.structure for name, part in parts.items()}))
     steady = at.load(np.concatenate([part.steady for part in parts.values()]))
     few = on_shapes(model, structure, at, needed)
-    found = in_gaps(model, few.structure, few.columns(at.columns(model.pairs.own)))
+    gaps = few.columns(at.columns(model.pairs.own))
+    found = in_gaps(model, few.structure, gaps)
+    if found.place is None:
+        fixed = np.unique(at.columns(picked(stay, model.places.n)).nonzero()[1])
+        found = in_points(few.structure, gaps, few.place[fixed], model.pairs.names)
     structure, gaps = found.structure, found.gaps
 
     def of_dofs(dofs: IntArray, place: str) -> IntArray:
