@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -40,8 +41,9 @@ class HarmonicLoad:
         object.__setattr__(self, "static", np.real(static).astype(float))
         harmonics = {h: np.asarray(f, dtype=complex) for h, f in self.harmonics.items()}
         object.__setattr__(self, "harmonics", harmonics)
+        order: Any
         for order, amplitude in harmonics.items():
-            if order != int(order) or order < 1:
+            if not isinstance(order, int | np.integer) or order < 1:
                 raise input_error(
                     "HarmonicLoad.harmonics",
                     f"the order of a harmonic must be an integer from 1 on, got {order!r}",

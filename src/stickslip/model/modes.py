@@ -30,6 +30,10 @@ RIGID = (
     1e-14  # strain energy of a mode over the sum of its terms' magnitudes: below, it is rounding
 )
 FAR = 1e4  # so many times the mean K_ii / M_ii below zero there are no squares
+ABSURD = 1e100  # entries of matrices above, or below its inverse, are no numbers of a model
+INDEFINITE = (
+    1e-9  # of the largest eigenvalue of a mass matrix: negative ones beyond are no rounding
+)
 SHIFT = 1e-8  # below zero, as a fraction of the mean K_ii / M_ii: regular where a body is free
 
 
@@ -93,6 +97,7 @@ def normal_modes(
     nearer to the shift than the n-th; give one below them.
     """
     _check_count("normal_modes", structure, n)
+    refuse_bad_mass(structure, "normal_modes")
     mean = _mean_square(structure)
     squares, shapes = [], []
     for part in connected_parts(structure.stiffness, structure.mass):
@@ -228,6 +233,44 @@ def lowest_modes(
     values, vectors = lanczos(mass, n, solve, shift, kind)
     order = np.argsort(values)
     return values[order], vectors[:, order]
+
+
+def refuse_bad_mass(structure: Structure, place: str) -> None:
+    """Refuse a mass matrix that is not positive, as far as that is seen without long work, and numbers that no model has.
+
+    Raises
+    ------
+    InputError
+        Naming the matrix, and the dof where one is at fault.
+    """
+    for name in ("mass", "stiffness"):
+        matrix = getattr(structure, name)
+        largest = float(abs(matrix).max()) if structure.n else 1.0
+        if not 1 / ABSURD < largest < ABSURD:
+            raise input_error(
+                f"{place}: {name}",
+                f"has entries up to {largest:.3g}, which no model has",
+                "Check the program that wrote it, and its units.",
+            )
+    diagonal = structure.mass.diagonal().real
+    if np.any(diagonal < 0):
+        dof = int(np.argmin(diagonal))
+        raise input_error(
+            f"{place}: mass",
+            f"is negative, {diagonal[dof]:.6g}, at {structure.dofs.labels[dof]}",
+            "A mass matrix is positive definite: check its source.",
+        )
+    if structure.n > DENSE:
+        return
+    dense = structure.mass.toarray() if scipy.sparse.issparse(structure.mass) else structure.mass
+    squares, shapes = np.linalg.eigh(dense)
+    if squares[0] < -INDEFINITE * squares[-1]:
+        most = structure.dofs.labels[int(np.argmax(np.abs(shapes[:, 0])))]
+        raise input_error(
+            f"{place}: mass",
+            f"is not positive definite: a motion, {most} the most, has {squares[0]:.6g} kg",
+            "Check its source: a triangle of a matrix given as the whole, or the stiffness in its place.",
+        )
 
 
 def _check_count(place: str, structure: Structure, n: int) -> None:

@@ -48,6 +48,10 @@ class System:
                 f"the gap operator has {self.interface.gap_operator.shape[1]} columns for {self.structure.n} dofs",
                 "Build the interface on the joined structure.",
             )
+        for name in ("outputs", "alert_dofs", "free"):
+            given = getattr(self, name)
+            if given is not None:
+                object.__setattr__(self, name, _dofs(name, given, self.structure.n))
 
     @property
     def retained(self) -> IntArray:
@@ -106,3 +110,22 @@ class System:
         b = self.interface.gap_operator
         structure = one_structure(self.structure, "System.stuck_structure")
         return with_springs(structure, b, self.springs.stuck_stiffness())
+
+
+def _dofs(name: str, given: IntArray, n: int) -> IntArray:
+    """Return indices of dofs as an array, after checking that they are some."""
+    index = np.asarray(given)
+    if index.size and index.dtype.kind not in "iu":
+        raise input_error(
+            f"System.{name}",
+            f"holds {index.reshape(-1)[0]!r}, which is no index",
+            "Give whole numbers.",
+        )
+    outside = index[(index < 0) | (index >= n)]
+    if outside.size:
+        raise input_error(
+            f"System.{name}",
+            f"names dof {outside[0]}, and the structure has the dofs 0 to {n - 1}",
+            "Take indices from the structure's sets.",
+        )
+    return index.astype(np.int64).reshape(-1)

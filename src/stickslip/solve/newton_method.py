@@ -2,12 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.errors import check_choice
+from stickslip.errors import check_choice, input_error
 from stickslip.solve.dogleg import Dogleg
 from stickslip.solve.iterate import Evaluation, Globalisation, Iterate, Work
 from stickslip.solve.krylov import Automatic
@@ -48,6 +48,19 @@ class Newton:
 
     def __post_init__(self) -> None:
         check_choice("Newton.globalisation", self.globalisation, GLOBALISATIONS)
+        if not 0.0 < self.tolerance < 1.0:
+            raise input_error(
+                "Newton.tolerance",
+                f"must lie between 0 and 1, got {self.tolerance!r}: no residual is smaller than rounding",
+                "1e-10 is usual; the residual is scaled by the load.",
+            )
+        most: Any = self.max_iterations
+        if not isinstance(most, int | np.integer) or most < 1:
+            raise input_error(
+                "Newton.max_iterations",
+                f"must be an integer from 1 on, got {most!r}",
+                "25 is usual.",
+            )
 
 
 @dataclass(frozen=True, eq=False)

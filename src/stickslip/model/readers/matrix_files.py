@@ -10,6 +10,7 @@ import scipy.sparse
 from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import input_error, missing_package
 from stickslip.model.dofs import Dofs
+from stickslip.model.modes import ABSURD
 from stickslip.model.npz import BROKEN, DEFLATE_RATIO, Arrays, read_npz
 from stickslip.model.readers.entries import check_symmetric, check_unique
 from stickslip.model.readers.matrix_market import MOST_EMPTY, read_matrix_market
@@ -175,6 +176,12 @@ def read_matrix(path: Path, name: str, n: int | None) -> Matrix:
     if not np.isfinite(values).all():
         raise input_error(
             str(path), f"the {name} has entries that are not finite", "They come from a failed run."
+        )
+    if values.size and abs(values).max() > ABSURD:
+        raise input_error(
+            str(path),
+            f"the {name} has entries up to {abs(values).max():.3g}, which no model has",
+            "Check the program that wrote it, and its units.",
         )
     return matrix
 

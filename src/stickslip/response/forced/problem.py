@@ -210,6 +210,7 @@ class ForcedProblem:
 
 def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedProblem:
     """Set up the forced response of `system` under `load`."""
+    _refuse_ill_posed(system)
     first, reference = sweep.first_harmonics, sweep.high_harmonics
     for h, force in load.harmonics.items():
         if h not in first and np.any(force):
@@ -231,6 +232,25 @@ def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedPr
             "Solve the stuck structure, which is linear, or raise the excitation.",
         )
     return ForcedProblem(system, sweep, low, low.with_harmonics(reference))
+
+
+def _refuse_ill_posed(system: System) -> None:
+    """Refuse a system without unknowns, and masses that are negative."""
+    if not system.retained.size:
+        raise input_error(
+            "System.interface",
+            "touches no dof that can move: nothing is left to solve for",
+            "Let a contact touch a free dof; without contacts the response is linear.",
+        )
+    structure = system.structure.of_harmonic(0)
+    mass = structure.mass.diagonal().real
+    if np.any(mass < 0):
+        dof = int(np.argmin(mass))
+        raise input_error(
+            "System.structure",
+            f"has the mass {mass[dof]:.6g} at {structure.dofs.labels[dof]}",
+            "A mass matrix is positive definite: check its source.",
+        )
 
 
 def with_stiffness(balance: Balance) -> HarmonicBalance:

@@ -82,7 +82,9 @@ class Sweep:
             raise input_error(
                 "Sweep.omega_range",
                 f"must be positive and growing, got {first:g} to {last:g} rad/s",
-                "Swap the two ends.",
+                "Widen the range; `at` solves at single frequencies in it."
+                if first == last
+                else "Swap the two ends.",
             )
         check_evaluator(self.evaluator)
         if isinstance(self.selection, str):

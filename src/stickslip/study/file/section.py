@@ -59,6 +59,12 @@ def shown(value: object) -> str:
 
 def rising_pair(values: Sequence[float], key: str, what: str = "frequency") -> None:
     """Refuse a pair that does not rise."""
+    if len(values) == 2 and values[0] == values[1]:
+        raise custom_error(
+            f"begins and ends at {values[0]:g}",
+            f"Give the lower {what} first, then a higher one.",
+            key,
+        )
     if len(values) == 2 and not values[0] < values[1]:
         raise custom_error(
             f"must be the lower before the higher, got {list(values)}",

@@ -1,0 +1,119 @@
+"""Wrong arguments of the solvers, and what has no answer, are refused by name and not by a traceback."""
+
+import math
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse
+from small_v2 import write_four_masses
+from test_cli import done, refused
+
+import stickslip as ss
+from stickslip.contact.interface import Interface
+from stickslip.errors import InputError
+from stickslip.harmonic.selection.guarded_alert import GuardedAlert
+from stickslip.model.dofs import Dofs
+from stickslip.model.matrices import chain
+from stickslip.model.structure import Structure
+from stickslip.response.forced.response import Sweep, forced_problem, forced_response
+from stickslip.response.system import System
+from stickslip.solve.krylov import Krylov
+from stickslip.solve.newton_method import Newton
+
+LOAD = ss.HarmonicLoad(np.zeros(2), {1: np.array([0.0, 1.0])})
+LAW = ss.Jenkins(k_t=1e3, limit=1.0)
+
+
+def system(structure=None, touched=(1,), **more):
+    gaps = np.zeros((3, 2))
+    gaps[0, list(touched)] = -1.0
+    interface = Interface(("c",), (LAW,), scipy.sparse.csr_array(gaps))
+    own = {"outputs": np.array([1])} | more
+    return System(structure or chain(2, 1.0, 1e4, 1e-4), interface, **own)
+
+
+def sweep(**more):
+    return Sweep(**({"omega_range": (50.0, 60.0), "points": 3, "high": 3} | more))
+
+
+def negative():
+    mass = np.diag([1.0, -1.0])
+    return Structure(mass, np.eye(2), 1e4 * np.eye(2), chain(2, 1.0, 1.0).dofs)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: ss.HarmonicLoad(np.zeros(2), {1.0: np.ones(2)}), r"integer from 1 on, got 1\.0"),
+        (lambda: system(outputs=np.array([2])), r"System.outputs: names dof 2"),
+        (lambda: system(outputs=np.array([-1])), r"System.outputs: names dof -1"),
+        (lambda: system(outputs=np.array([1.0])), r"System.outputs: holds .*no index"),
+        (lambda: system(alert_dofs=np.array([9])), r"System.alert_dofs: names dof 9"),
+        (lambda: Newton(tolerance=0), r"Newton.tolerance: must lie between"),
+        (lambda: Newton(tolerance=math.nan), r"Newton.tolerance"),
+        (lambda: Newton(max_iterations=0), r"Newton.max_iterations"),
+        (lambda: sweep(omega_range=(50.0, 50.0)), r"got 50 to 50 rad/s. Widen the range"),
+        (
+            lambda: forced_problem(system(touched=()), LOAD, sweep()),
+            r"touches no dof that can move",
+        ),
+        (lambda: forced_problem(system(negative()), LOAD, sweep()), r"has the mass -1 at node1.x"),
+        (
+            lambda: forced_problem(system(), ss.HarmonicLoad(np.zeros(2)), sweep()),
+            r"HarmonicLoad: is zero",
+        ),
+    ],
+)
+def test_wrong_arguments_are_named(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+@pytest.mark.parametrize("linear", [None, Krylov()])
+def test_what_a_worker_needs_survives_a_pickle(linear):
+    newton = Newton(tolerance=1e-9, globalisation="dogleg")
+    own = sweep(newton=newton, selection=GuardedAlert(0.02), at=(51.0, 55.0))
+    assert repr(pickle.loads(pickle.dumps(own))) == repr(own)
+    if linear is not None:
+        assert pickle.loads(pickle.dumps(Newton(linear=linear))).linear.method == linear.method
+    problem = forced_problem(system(), LOAD, own)
+    before = list(forced_response(system(), LOAD, own))
+    again = pickle.loads(pickle.dumps(problem))
+    for point in before:
+        assert again.amplitude(point) == problem.amplitude(point)
+    other = forced_problem(again.system, LOAD, again.sweep)
+    assert other.amplitude(before[0]) == problem.amplitude(before[0])
+
+
+def free_dofs(n: int) -> Dofs:
+    return Dofs(np.arange(n), ("x",) * n, np.zeros((n, 3)))
+
+
+@pytest.mark.parametrize(
+    ("mass", "stiffness", "message"),
+    [
+        (np.diag([1.0, -1.0]), np.eye(2), r"mass: is negative, -1, at node1.x"),
+        (np.array([[1.0, 2.0], [2.0, 1.0]]), np.eye(2), r"mass: is not positive definite"),
+        (1e-308 * np.eye(2), np.eye(2), r"mass: has entries up to 1e-308"),
+        (np.eye(2), np.diag([1e308, -1e308]), r"stiffness: has entries up to 1e\+308"),
+    ],
+)
+def test_matrices_of_no_model_have_no_modes(mass, stiffness, message):
+    structure = Structure(mass, np.zeros((2, 2)), stiffness, free_dofs(2))
+    with pytest.raises(InputError, match=message):
+        ss.model.normal_modes(structure, 1)
+
+
+def test_inspect_says_of_such_matrices_what_it_can(tmp_path: Path) -> None:
+    K, name = np.eye(3), str(tmp_path / "own.npz")
+    np.savez(name, mass=np.diag([1.0, 1.0, -1.0]), stiffness=K)
+    assert "No frequencies: normal_modes: mass: is negative, -1, at dof3" in done("inspect", name)
+    np.savez(name, mass=K, stiffness=1e308 * K)
+    assert "the stiffness has entries up to 1e+308" in refused("inspect", name)
+
+
+def test_a_range_without_width_is_told_as_such(tmp_path: Path) -> None:
+    path = write_four_masses(tmp_path, {"forced_response.frequency_hz": "[20.0, 20.0]"})
+    assert "forced_response.frequency_hz: begins and ends at 20" in refused("check", str(path))
