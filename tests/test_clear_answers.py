@@ -2,6 +2,7 @@
 
 import math
 import pickle
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,11 @@ import pytest
 import scipy.sparse
 from small_v2 import write_four_masses
 from test_cli import done, refused
+from test_cli_files import file_study, write_deck
 
 import stickslip as ss
 from stickslip.contact.interface import Interface
-from stickslip.errors import InputError
+from stickslip.errors import InputError, missing_package
 from stickslip.harmonic.selection.guarded_alert import GuardedAlert
 from stickslip.model.dofs import Dofs
 from stickslip.model.matrices import chain
@@ -117,3 +119,28 @@ def test_inspect_says_of_such_matrices_what_it_can(tmp_path: Path) -> None:
 def test_a_range_without_width_is_told_as_such(tmp_path: Path) -> None:
     path = write_four_masses(tmp_path, {"forced_response.frequency_hz": "[20.0, 20.0]"})
     assert "forced_response.frequency_hz: begins and ends at 20" in refused("check", str(path))
+
+
+@pytest.mark.parametrize(
+    ("package", "lacking", "said"),
+    [
+        ("pyyeti", "pyyeti", r"pyyeti: not installed. Use: pip install 'stickslip\[readers\]'"),
+        ("pyyeti", "matplotlib.pyplot", r"pyyeti: is installed, but it imports matplotlib, which"),
+        ("scikit-fem", "skfem", r"scikit-fem: not installed"),
+    ],
+)
+def test_a_package_that_lacks_another_is_not_called_missing(package, lacking, said):
+    error = ModuleNotFoundError(f"No module named {lacking!r}", name=lacking)
+    assert re.match(said, str(missing_package(package, error, "readers")))
+
+
+def test_a_deck_says_what_of_it_is_not_taken(tmp_path: Path) -> None:
+    deck = write_deck(tmp_path / "deck.inp")
+    more = "*BOUNDARY\nFOOT, 1, 3\n*STEP, NLGEOM\n*STATIC\n*DLOAD\nE, CENTRIF, 10000., 0., 0., 0., 0., 0., 1.\n*END STEP\n"
+    deck.write_text(deck.read_text() + more)
+    path = file_study(tmp_path)
+    for command in ("check", "run"):
+        said = done(command, str(path))
+        assert "NLGEOM of *STEP (deck.inp: line 29): statics is linear here" in said
+        assert "its CENTRIF load of 954.93 rpm is not taken" in said
+    assert "NLGEOM" in done("inspect", str(deck))

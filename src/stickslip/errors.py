@@ -141,6 +141,9 @@ def did_you_mean(word: str, known: list[str]) -> str:
     return f"Known: {', '.join(sorted(known))}." if known else "There is none."
 
 
+IMPORTED_AS = {"scikit-fem": "skfem", "feral-solver": "feral"}  # packages with another name
+
+
 def missing_package(package: str, error: Exception, extra: str) -> StickslipError:
     """Build the error for an optional package that cannot be imported.
 
@@ -157,5 +160,10 @@ def missing_package(package: str, error: Exception, extra: str) -> StickslipErro
         return StickslipError(
             f"{package}: a system library is missing ({error}). On Debian or Ubuntu: apt-get install "
             "libglu1-mesa libxft2 libxcursor1 libxinerama1 libxrender1"
+        )
+    lacking = (getattr(error, "name", None) or "").partition(".")[0]
+    if lacking and lacking != IMPORTED_AS.get(package, package):
+        return StickslipError(
+            f"{package}: is installed, but it imports {lacking}, which is not. Use: pip install {lacking}"
         )
     return StickslipError(f"{package}: not installed. Use: pip install 'stickslip[{extra}]'")

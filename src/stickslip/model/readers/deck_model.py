@@ -28,7 +28,7 @@ HEX_FACES = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3
 
 # Keywords that say nothing about mass, stiffness or supports: steps, output, loads of single nodes
 SILENT = {
-    "HEADING", "NODE", "ELEMENT", "NSET", "ELSET", "MATERIAL", "STEP", "END STEP", "STATIC", "FREQUENCY",
+    "HEADING", "NODE", "ELEMENT", "NSET", "ELSET", "MATERIAL", "END STEP", "STATIC", "FREQUENCY",
     "COMPLEX FREQUENCY", "BUCKLE", "STEADY STATE DYNAMICS", "MODAL DYNAMIC", "DYNAMIC", "SELECT CYCLIC SYMMETRY MODES",
     "NODE PRINT", "NODE FILE", "NODE OUTPUT", "EL PRINT", "EL FILE", "ELEMENT OUTPUT", "ENERGY OUTPUT", "CONTACT FILE",
     "CONTACT PRINT", "OUTPUT", "PREPRINT", "RESTART", "SURFACE", "PART", "END PART", "ASSEMBLY", "END ASSEMBLY",
@@ -286,6 +286,14 @@ def _distributed_load(model: DeckModel, block: Block) -> None:
         model.axes.append((place, numbers[1:4], numbers[4:7]))
 
 
+def _step(model: DeckModel, block: Block) -> None:
+    """List a nonlinear step as ignored: its stiffness is that of another state."""
+    if block.parameters.get("NLGEOM", "NO").strip().upper() != "NO":
+        model.ignored.append(
+            f"NLGEOM of *STEP ({block.path.name}: line {block.line}): statics is linear here"
+        )
+
+
 def _cyclic_model(model: DeckModel, block: Block) -> None:
     model.sectors = whole_number(block.parameter("N"), block.place, "number of sectors N")
     if model.sectors < 1:
@@ -303,6 +311,7 @@ _ACTIONS = {
     "SOLID SECTION": _section,
     "BOUNDARY": _boundary,
     "DLOAD": _distributed_load,
+    "STEP": _step,
     "CYCLIC SYMMETRY MODEL": _cyclic_model,
 }
 

@@ -21,6 +21,7 @@ from stickslip.model.readers.open_model import read_model
 from stickslip.model.readers.units import Units
 from stickslip.model.structure import Structure
 from stickslip.study.file.parts import FileModel
+from stickslip.units import RPM
 
 ROOT = "root"
 DECKS, ARCHIVES = (".inp", ".inp.gz"), (".cdb",)
@@ -117,9 +118,22 @@ def _from_deck(
         deck.axis,
         held=deck.held if partly.any() else None,
         quadrature=deck.quadrature if table.quadrature == "calculix" else EXACT,
-        warnings=tuple(f"{table.file}: passed over {text}" for text in deck.ignored),
+        warnings=(
+            *(f"{table.file}: passed over {text}" for text in deck.ignored),
+            *_own_speed(table, deck),
+        ),
         **others,
     )
+
+
+def _own_speed(table: FileModel, deck: Deck) -> list[str]:
+    """Say that a deck's own speed is not taken."""
+    if not deck.speed:
+        return []
+    rpm = deck.speed / RPM
+    return [
+        f"{table.file}: its CENTRIF load of {rpm:.6g} rpm is not taken; the speed is that of [rotation]."
+    ]
 
 
 def _materials(deck: Deck) -> Materials:
