@@ -3,12 +3,14 @@
 import math
 import pickle
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.sparse
-from small_v2 import write_four_masses
+from small_v2 import write_four_masses, write_shrouded_sector
+from test_assembly_copies import bar
 from test_cli import done, refused
 from test_cli_files import file_study, write_deck
 
@@ -17,12 +19,16 @@ from stickslip.contact.interface import Interface
 from stickslip.errors import InputError, missing_package
 from stickslip.harmonic.selection.guarded_alert import GuardedAlert
 from stickslip.model.dofs import Dofs
+from stickslip.model.facts import unlike_units
+from stickslip.model.fe.solid import Material
 from stickslip.model.matrices import chain
+from stickslip.model.part import solid_part
 from stickslip.model.structure import Structure
 from stickslip.response.forced.response import Sweep, forced_problem, forced_response
 from stickslip.response.system import System
 from stickslip.solve.krylov import Krylov
 from stickslip.solve.newton_method import Newton
+from stickslip.study.models.study import read_study
 
 LOAD = ss.HarmonicLoad(np.zeros(2), {1: np.array([0.0, 1.0])})
 LAW = ss.Jenkins(k_t=1e3, limit=1.0)
@@ -144,3 +150,45 @@ def test_a_deck_says_what_of_it_is_not_taken(tmp_path: Path) -> None:
         assert "NLGEOM of *STEP (deck.inp: line 29): statics is linear here" in said
         assert "its CENTRIF load of 954.93 rpm is not taken" in said
     assert "NLGEOM" in done("inspect", str(deck))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"harmonic": 0, "phase": 0.5}, r"Load.phase: is 0.5 rad of a static load"),
+        ({"harmonic": 1.0}, r"Load.harmonic: must be an integer from 0 on, got 1.0"),
+        ({"harmonic": -1}, r"Load.harmonic"),
+        ({"engine_order": -2}, r"Load.engine_order"),
+        ({"newton": math.nan}, r"Load: has nan N"),
+    ],
+)
+def test_loads_that_mean_nothing_are_named(given, message):
+    with pytest.raises(InputError, match=message):
+        ss.Load(**({"on": "a.b", "newton": 1.0} | given))
+
+
+def test_engine_orders_that_sectors_cannot_tell_apart_are_told(tmp_path: Path) -> None:
+    path = write_shrouded_sector(tmp_path, {"load.gas.engine_order": "10"})
+    (said,) = [w for w in read_study(path).model().warnings if "engine_order" in w]
+    assert said.startswith("load.gas.engine_order is 10, and 8 sectors see it as 2")
+    text = path.read_text().replace("engine_order = 10", "engine_order = 0")
+    path.write_text(
+        text.replace("frequency_hz = [200.0, 260.0]", 'over = "speed"\nspeed_rpm = [100.0, 200.0]')
+    )
+    assert "load.gas.engine_order: is 0, and with over" in refused("check", str(path))
+
+
+def test_parts_of_unlike_units_are_told() -> None:
+    mesh = bar((1, 1, 1), length=0.1)
+    steel, soft = Material(), Material(young_modulus=2.1e8)
+    small = replace(mesh, points=1e-3 * mesh.points)
+    parts = {
+        "a": solid_part(mesh, steel),
+        "b": solid_part(small, steel),
+        "c": solid_part(mesh, soft),
+    }
+    found = unlike_units(parts)
+    assert len(found) == 4
+    assert found[0].startswith("part.a has a size of 0.106 m, part.b 0.000106 m")
+    assert "part.a has a Young's modulus of 2.1e+11 Pa, part.c 2.1e+08 Pa" in found[1]
+    assert not unlike_units({"a": parts["a"], "b": parts["a"]})

@@ -263,6 +263,13 @@ def test_wrong_number_of_sectors_is_recognised():
         cyclic_sector(structure, 23)
 
 
+def test_swapped_faces_are_recognised_though_one_lacks_nodes():
+    structure = random_sector(24)
+    node = structure.dofs.node[structure.sets["cyclic_low"][0]]
+    with pytest.raises(InputError, match=r"are swapped: 'cyclic_low' lies 15° behind"):
+        cyclic_sector(without(structure, [node]), 24, low="cyclic_high", high="cyclic_low")
+
+
 def test_swapped_faces_are_recognised():
     structure = random_sector(24)
     with pytest.raises(

@@ -1,6 +1,11 @@
 """Loads on a model, and where its motion is reported."""
 
+import math
 from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.errors import input_error
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,7 +25,12 @@ class Load:
     phase
         In rad.
     engine_order
-        m of a wheel's excitation: harmonic h travels as the wave ``h m``; None for a single structure.
+        m of a wheel's excitation: harmonic h travels as the wave ``h m``, 0: all sectors alike; None for a single structure.
+
+    Raises
+    ------
+    InputError
+        If a number is no count or not finite, or a static load has a phase.
     """
 
     on: str
@@ -29,6 +39,28 @@ class Load:
     harmonic: int = 1
     phase: float = 0.0
     engine_order: int | None = None
+
+    def __post_init__(self) -> None:
+        for name, least in (("harmonic", 0), ("engine_order", 0)):
+            value = getattr(self, name)
+            if value is not None and (not isinstance(value, int | np.integer) or value < least):
+                raise input_error(
+                    f"Load.{name}",
+                    f"must be an integer from {least} on, got {value!r}",
+                    "Give a count.",
+                )
+        if not (math.isfinite(self.newton) and math.isfinite(self.phase)):
+            raise input_error(
+                "Load",
+                f"has {self.newton} N and a phase of {self.phase} rad",
+                "Give finite numbers.",
+            )
+        if self.harmonic == 0 and self.phase:
+            raise input_error(
+                "Load.phase",
+                f"is {self.phase:g} rad of a static load",
+                "Leave it out, or give a harmonic from 1 on.",
+            )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,7 +24,7 @@ from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.errors import input_error
 from stickslip.harmonic.rigid_contacts import STIFF
 from stickslip.model.axis import Axis
-from stickslip.model.facts import Facts, facts_of_parts
+from stickslip.model.facts import Facts, facts_of_parts, unlike_units
 from stickslip.model.fe.factorisation import factorise
 from stickslip.model.modes import with_springs
 from stickslip.model.part import Part
@@ -161,7 +161,11 @@ class Model:
         """What the user should know."""
         of_parts = [text for part in self.parts.values() for text in part.warnings]
         of_wheel = () if self.neighbours is None else self.neighbours.warnings
-        return tuple(dict.fromkeys([*of_parts, *of_wheel, *self.pairs.warnings]))
+        of_units = unlike_units(self.parts)
+        orders = _beyond_sectors(self.loads, self.sectors)
+        return tuple(
+            dict.fromkeys([*of_parts, *of_units, *of_wheel, *orders, *self.pairs.warnings])
+        )
 
     def spin(self, speed: float) -> Spin:
         """Return how it turns at a speed in rad/s."""
@@ -325,3 +329,13 @@ class Model:
         from stickslip.assembly.build import assemble
 
         return assemble(self, harmonics, in_memory if store is None else store)
+
+
+def _beyond_sectors(loads: Mapping[str, Load], sectors: int) -> list[str]:
+    """Say of engine orders not below the number of sectors that the sectors cannot tell them from lower ones."""
+    return [
+        f"load.{name}.engine_order is {load.engine_order}, and {sectors} sectors see it as {load.engine_order % sectors}: a force "
+        "that changes so much within a sector is taken as the same all over its place."
+        for name, load in loads.items()
+        if sectors > 1 and load.engine_order is not None and load.engine_order >= sectors
+    ]

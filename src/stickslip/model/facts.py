@@ -1,6 +1,6 @@
 """Mass, centre of mass, size and counts of a model."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +12,7 @@ from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
 
+UNLIKE = 300.0  # times as large: millimetres and metres are 1000 apart
 DEGREE = 4  # integrates volume and first moment of straight-edged cells of second order exactly
 
 
@@ -76,6 +77,47 @@ def facts_of_parts(parts: Iterable[Part]) -> Facts:
         nodes=sum(f.nodes for f in found),
         elements=sum(f.elements for f in found),
     )
+
+
+def unlike_units(parts: Mapping[str, Part]) -> list[str]:
+    """Return a sentence on each pair of parts whose sizes or materials are so unlike that one has probably other units."""
+    names = list(parts)
+    found = []
+    for i, one in enumerate(names):
+        for other in names[i + 1 :]:
+            for what, unit, measure in _MEASURES:
+                a, b = measure(parts[one]), measure(parts[other])
+                if a > 0 and b > 0 and not 1 / UNLIKE < a / b < UNLIKE:
+                    found.append(
+                        f"part.{one} has {what} {a:.3g} {unit}, part.{other} {b:.3g} {unit}: is a unit of one of them wrong?"
+                    )
+    return found
+
+
+def _size(part: Part) -> float:
+    """Return the diagonal of the box around a part's nodes, m; 0 where it is not known."""
+    facts = facts_of_part(part)
+    box = np.array(facts.high) - np.array(facts.low)
+    return float(np.linalg.norm(box)) if np.all(np.isfinite(box)) else 0.0
+
+
+def _of_material(name: str) -> Callable[[Part], float]:
+    """Return what tells a number of a part's first material; 0 where it has none."""
+
+    def number(part: Part) -> float:
+        if part.solid is None:
+            return 0.0
+        material = part.solid.material
+        return float(getattr(material if isinstance(material, Material) else material[0], name))
+
+    return number
+
+
+_MEASURES: tuple[tuple[str, str, Callable[[Part], float]], ...] = (
+    ("a size of", "m", _size),
+    ("a Young's modulus of", "Pa", _of_material("young_modulus")),
+    ("a density of", "kg/m³", _of_material("density")),
+)
 
 
 def facts_of_solid(mesh: SolidMesh, material: Materials, dofs: int) -> Facts:

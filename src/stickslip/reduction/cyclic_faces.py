@@ -13,6 +13,7 @@ from stickslip.model.dofs import Dofs
 from stickslip.reduction.turning import COMPONENTS, node_table
 
 TOLERANCE = 1e-5  # of the faces' size: coordinates in text files have six digits or more
+MOST = 0.8  # share of nodes with partners above which faces are the same, but for some nodes
 LISTED = 6  # unmatched nodes that a message names
 
 
@@ -170,17 +171,17 @@ def _unmatched(low: Face, high: Face, sectors: int, axis: Axis, reach: float) ->
     """Say which nodes have no partner, or why none has."""
     pitch = 360 / sectors
     names = f"{low.name!r} and {high.name!r}"
+    shares = [_share(low, high, sign * 2 * math.pi / sectors, axis, reach) for sign in (1.0, -1.0)]
+    if sectors > 2 and shares[1] > MOST and shares[1] > 2 * shares[0]:
+        return input_error(
+            f"cyclic_sector: {names}",
+            f"are swapped: {high.name!r} lies {pitch:.6g}° behind {low.name!r} about the axis {axis.direction}",
+            "Swap them, or turn the axis round.",
+        )
     found = _angle_between(low, high, axis)
     partner, ok = _match(low, high, found, axis, reach)
     if ok.all() and len(set(partner.tolist())) == len(low.node) == len(high.node):
         degrees = math.degrees(found)
-        if math.isclose(degrees, -pitch, abs_tol=1e-3 * pitch):
-            return input_error(
-                f"cyclic_sector: {names}",
-                f"are swapped: {high.name!r} lies {pitch:.6g}° behind {low.name!r} about the axis "
-                f"{axis.direction}",
-                "Swap them, or turn the axis round.",
-            )
         fits = round(360 / abs(degrees)) if degrees else 0
         near = fits > 0 and math.isclose(360 / fits, abs(degrees), rel_tol=1e-3)
         return input_error(
@@ -197,6 +198,12 @@ def _unmatched(low: Face, high: Face, sectors: int, axis: Axis, reach: float) ->
         + f"sectors={sectors}, axis {axis.direction} through {axis.origin}, tolerance {reach:.3g} m",
         "Mesh both faces alike, clamp the nodes of both or of neither, check the axis.",
     )
+
+
+def _share(low: Face, high: Face, angle: float, axis: Axis, reach: float) -> float:
+    """Return the share of the face with fewer nodes that has partners on the other after a turn; sets may hold other free nodes."""
+    _, ok = _match(low, high, angle, axis, reach)
+    return float(np.count_nonzero(ok)) / max(min(len(low.node), len(high.node)), 1)
 
 
 def _missing(here: Face, there: Face, angle: float, axis: Axis, reach: float) -> str:

@@ -282,6 +282,16 @@ def _questions(tables: Tables) -> Iterator[InputError]:
     sectors = sectors_of(tables)
     if forced is not None and sectors is not None and sectors > 1:
         for name, table in tables.load.items():
+            if (
+                table.engine_order == 0
+                and table.harmonic > 0
+                and getattr(forced, "over", "") == "speed"
+            ):
+                yield input_error(
+                    f"load.{name}.engine_order",
+                    'is 0, and with over = "speed" the frequency is the engine order times the speed',
+                    "Give an engine order from 1 on, or frequency_hz.",
+                )
             if table.harmonic > 0 and table.engine_order is None:
                 yield input_error(
                     f"load.{name}.engine_order",
