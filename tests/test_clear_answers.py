@@ -189,6 +189,6 @@ def test_parts_of_unlike_units_are_told() -> None:
     }
     found = unlike_units(parts)
     assert len(found) == 4
-    assert found[0].startswith("part.a has a size of 0.106 m, part.b 0.000106 m")
+    assert found[0].startswith("part.a has a size of 0.111 m, part.b 0.000111 m")
     assert "part.a has a Young's modulus of 2.1e+11 Pa, part.c 2.1e+08 Pa" in found[1]
     assert not unlike_units({"a": parts["a"], "b": parts["a"]})
