@@ -128,7 +128,8 @@ def _panels(response: Response, cases: tuple[ShownCase, ...], direction: int) ->
     acting = np.flatnonzero(np.any(np.nan_to_num(spans) > 0, axis=0)).tolist()
     if len(acting) > _MOST_LOOPS:
         area = np.max([_area(response, c, direction) for c in cases], axis=0)
-        acting = sorted(acting, key=lambda k: -area[k])[:_MOST_LOOPS]
+        most = _MOST_LOOPS if area.any() else _MOST_ROW  # straight lines are all alike
+        acting = sorted(acting, key=lambda k: -area[k])[:most]
         return _wrapped([sorted(acting)])
     rows = [[k for k in row if k in acting] for row in contact_lines(response)]
     return _wrapped([row for row in rows if row])

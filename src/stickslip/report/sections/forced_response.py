@@ -8,6 +8,7 @@ from stickslip.report.forced.curves import frequency_response, low_order, optimi
 from stickslip.report.forced.errors import error_scatter, errors
 from stickslip.report.forced.harmonics import kept_harmonics
 from stickslip.report.forced.head import cards, warnings
+from stickslip.report.forced.surface import surface_map
 from stickslip.report.response import NEEDED, Response
 from stickslip.report.section import Block, Section
 
@@ -25,7 +26,7 @@ SECTION: Section = Section(
         Block(
             "contact",
             "Contacts at the peak",
-            (chooser, hysteresis_t, hysteresis_w, state_map, bodies, energy),
+            (chooser, surface_map, hysteresis_t, hysteresis_w, state_map, bodies, energy),
         ),
         Block("cases", "Cases", (tables.peaks, tables.attempts)),
         Block(

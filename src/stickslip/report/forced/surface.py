@@ -1,0 +1,103 @@
+"""Contact surfaces seen along their normal: where they slip, and where they lift off."""
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.report.cases import ShownCase
+from stickslip.report.forced.contact import states
+from stickslip.report.plot import MUTED, STATE_COLOURS, Plot, styled
+from stickslip.report.quantities import joined, percent
+from stickslip.report.response import Response
+
+FEWEST = 9  # points that make a surface worth a map
+THICK = 0.05  # second extent over the first, below which points stand in a line
+MOST_BESIDE = 3  # maps beside each other
+_SCALE = [[0.0, STATE_COLOURS[0]], [0.5, "#f4efe6"], [1.0, STATE_COLOURS[1]]]  # from stick to slip
+
+
+def surface_map(response: Response) -> Plot | None:
+    """Share of the cycle for which each point of a contact surface slips."""
+    needed = ("peak_state", "contact_position", "contact_frame")
+    cases = response.peaked if response.has(*needed) else ()
+    surfaces = _surfaces(response) if cases else {}
+    if not surfaces:
+        return None
+    width = min(len(surfaces), MOST_BESIDE)
+    height = -(-len(surfaces) // width)
+    figure = make_subplots(height, width, subplot_titles=list(surfaces), horizontal_spacing=0.1)
+    names = np.array(response.labels("contact"))
+    for case in cases:
+        slips, opens = _shares(response, case)
+        for k, (points, at) in enumerate(surfaces.values()):
+            figure.add_trace(
+                _map(at, names[points], slips[points], opens[points]).update(meta=case.index),
+                row=k // width + 1,
+                col=k % width + 1,
+            )
+    styled(figure, 90 + 330 * height)
+    figure.update_xaxes(title_text="along t (mm)")
+    figure.update_yaxes(title_text="along w (mm)", col=1)
+    bar = {"title": {"text": "slips (%)"}, "len": 0.9, "thickness": 12, "outlinewidth": 0}
+    figure.update_layout(
+        showlegend=False, coloraxis={"colorscale": _SCALE, "cmin": 0, "cmax": 100, "colorbar": bar}
+    )
+    caption = (
+        "Contact points at their places, seen along the normal; colours tell for which share of the cycle at the peak a point "
+        "slips in either direction. A dark rim marks points that lift off in the cycle."
+    )
+    captions = {c.index: _caption(response, c, surfaces) for c in cases}
+    return Plot("surface", "Where the contacts slip", caption, figure, captions, response.chosen)
+
+
+def _surfaces(response: Response) -> dict[str, tuple[IntArray, FloatArray]]:
+    """Return the contacts whose points span a surface: their points, and places (p, 2) along t and w from the middle, mm."""
+    position, frame = (response.values(f"contact_{name}") for name in ("position", "frame"))
+    found = {}
+    for group, members in response.groups.items():
+        points = np.array(members, dtype=np.int64)
+        if points.size < FEWEST or not np.isfinite(position[points]).all():
+            continue
+        arm = position[points] - position[points].mean(axis=0)
+        extent = np.linalg.svd(arm, compute_uv=False)
+        if extent[1] > THICK * extent[0]:
+            # the frame of the first point: those of a curved surface turn with it
+            found[group] = points, 1e3 * arm @ frame[points[0]][:, :2]
+    return found
+
+
+def _shares(response: Response, case: ShownCase) -> tuple[FloatArray, FloatArray]:
+    """Return for which share of the cycle each contact point slips and is open, percent."""
+    state = states(response, case)
+    slips, opens = (100.0 * (state == k).any(axis=1).mean(axis=1) for k in (1, 2))
+    return slips, opens
+
+
+def _map(at: FloatArray, names: FloatArray, slips: FloatArray, opens: FloatArray) -> go.Scatter:
+    lifted = opens > 0
+    return go.Scatter(
+        x=at[:, 0].astype(np.float32), y=at[:, 1].astype(np.float32), mode="markers", showlegend=False,
+        marker={
+            "size": 7, "color": slips.astype(np.float32), "coloraxis": "coloraxis",
+            "line": {"color": MUTED, "width": np.where(lifted, 1.8, 0.4)},
+        },
+        customdata=np.column_stack([names, slips.round(), opens.round()]),
+        hovertemplate="%{customdata[0]}<br>slips %{customdata[1]} %, open %{customdata[2]} %<extra></extra>",
+    )  # fmt: skip
+
+
+def _caption(
+    response: Response, case: ShownCase, surfaces: dict[str, tuple[IntArray, FloatArray]]
+) -> str:
+    slips, opens = _shares(response, case)
+    said = [
+        f"{group} {percent(100.0 * float(np.mean(slips[points] > 0)))}"
+        + (
+            f", {percent(100.0 * float(np.mean(opens[points] > 0)))} of them lift off"
+            if opens[points].any()
+            else ""
+        )
+        for group, (points, _) in surfaces.items()
+    ]
+    return f"Points that slip in the cycle: {joined(said)}."
