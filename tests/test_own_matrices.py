@@ -14,7 +14,11 @@ from test_cli import done, refused
 from stickslip.front.result import Result
 
 EXAMPLE = EXAMPLES / "own_matrices"
-FEW = {"forced_response.points": "8", "forced_response.peak_points": "0"}
+FEW = {
+    "forced_response.frequencies_hz": "[7.0, 8.0, 9.0, 9.5, 10.0, 10.5, 11.0, 12.0]",
+    "forced_response.peak_points": "0",
+}
+FEW["harmonics.selection"] = '"always_high"'  # steps of a branch follow rounding
 FEW["part.chain.reduction.method"] = (
     '"none"'  # else its modes are coordinates, and round off otherwise
 )
@@ -30,6 +34,7 @@ def write(folder: Path, part: str, dof: str) -> Path:
     text = (EXAMPLE / "study.toml").read_text()
     lines = [line for line in text.splitlines() if not line.startswith(OF_THE_FILE)]
     text = "\n".join(lines).replace("[part.chain]", f"[part.chain]\n{part}")
+    text = text.replace("frequency_hz = [7.0, 12.0]\npoints = 30\n", "")
     for i in range(20, 0, -1):
         text = text.replace(f"chain.dof{i}", f"chain.{dof.format(i)}")
     path = folder / "study.toml"
@@ -116,3 +121,16 @@ def test_what_does_not_fit_is_refused_by_name(tmp_path: Path, changes, message) 
     path = tmp_path / "study.toml"
     path.write_text(changed(path.read_text(), changes))
     assert message in refused("check", str(path))
+
+
+def test_speeds_of_matrices_are_refused_together(tmp_path: Path) -> None:
+    for name in ("chain.npz", "study.toml"):
+        shutil.copy(EXAMPLE / name, tmp_path)
+    path = tmp_path / "study.toml"
+    more = (
+        "[rotation]\nspeed_rpm = 100.0\n[campbell]\nspeeds_rpm = [0.0, 9.0]\nengine_orders = [2]\n"
+    )
+    path.write_text(path.read_text() + more)
+    said = refused("check", str(path))
+    assert "campbell: needs a part that a speed changes" in said
+    assert "rotation.speed_rpm: is 100, but no part is a mesh" in said

@@ -298,16 +298,28 @@ def _questions(tables: Tables) -> Iterator[InputError]:
                     f"is missing on a wheel of {sectors} sectors",
                     "Say how many periods the force has around the circumference.",
                 )
-    if getattr(asked, "campbell", None) is not None and not any(
-        _turns(original(tables, name)) for name in tables.part
-    ):
+    yield from _without_a_mesh(tables)
+    for name in ("modes", "campbell"):
+        yield from _diameters(name, getattr(asked, name, None), sectors)
+
+
+def _without_a_mesh(tables: Tables) -> Iterator[InputError]:
+    """Yield the complaints about speeds where nothing turns that they change."""
+    if any(_turns(original(tables, name)) for name in tables.part):
+        return
+    asked: Any = tables
+    if getattr(asked, "campbell", None) is not None:
         yield input_error(
             "campbell",
             "needs a part that a speed changes, and none is a mesh",
             "Give a part a shape, a deck (.inp) or an archive (.cdb).",
         )
-    for name in ("modes", "campbell"):
-        yield from _diameters(name, getattr(asked, name, None), sectors)
+    if tables.rotation.speed_rpm > 0:
+        yield input_error(
+            "rotation.speed_rpm",
+            f"is {tables.rotation.speed_rpm:g}, but no part is a mesh, and a speed changes nothing else",
+            "Give 0, or bring a mesh. Matrices that were exported at speed hold its effects already.",
+        )
 
 
 def _turns(table: Any) -> bool:

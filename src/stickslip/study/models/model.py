@@ -7,7 +7,6 @@ from typing import Any
 from stickslip.assembly.contact import GROUND, NEXT, Contact, Join
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.model import Model
-from stickslip.errors import input_error
 from stickslip.model.part import Part
 from stickslip.study.file.loads import LoadTable
 from stickslip.study.file.tables import Tables
@@ -37,7 +36,7 @@ def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
     """
     parts = Workshop(tables, home, memo).parts()
     rotation = tables.rotation
-    model = Model(
+    return Model(
         parts=parts,
         contacts={name: _contact(parts, table) for name, table in tables.contact.items()},
         joins={
@@ -59,13 +58,6 @@ def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
         interface_modes=None if tables.reduction is None else tables.reduction.interface_modes,
         retention=tables.retention.stiffness_n_per_m,
     )
-    if rotation.speed_rpm > 0 and not model.rotates:
-        raise input_error(
-            "rotation.speed_rpm",
-            f"is {rotation.speed_rpm:g}, but no part is a mesh, and a speed changes nothing else",
-            "Give 0, or bring a mesh. Matrices that were exported at speed hold its effects already.",
-        )
-    return model
 
 
 def newton(tables: Tables, table: LoadTable) -> float:
