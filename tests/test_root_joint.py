@@ -198,6 +198,61 @@ def test_a_root_in_its_slot_from_decks_to_the_page(tmp_path):
     assert slip[1] == pytest.approx(exact, rel=1e-5)
 
 
+ROCKED = """
+[contact.joint]
+between = ["upper.bottom", "lower.top"]
+pairing = "node_to_node"
+friction_coefficient = 0.3
+{}
+[load.push]
+on = "upper.top"
+force_n = 2000.0
+direction = [0.0, 0.0, -1.0]
+harmonic = 0
+[load.shaker]
+on = "upper.top"
+force_n = 250.0
+direction = "x"
+[damping]
+ratio = 0.01
+between_hz = [3000.0, 9000.0]
+[reduction]
+fixed_interface_modes = 8
+[forced_response]
+frequencies_hz = [4000.0, 4100.0]
+peak_points = 0
+[harmonics]
+low = 3
+high = 3
+samples = 96
+selection = "always_high"
+[output]
+points = {{ top = "upper.top" }}
+"""
+
+
+def test_rigid_contacts_of_meshes_are_the_limit_of_stiff_ones(tmp_path):
+    """A block that rocks, slips and lifts off on another one: gaps of two flexible bodies become coordinates."""
+    grid = ([0.0, 0.5, 1.0], [0.0, 1.0])
+    found = []
+    for name, law in (
+        ("rigid", 'law = "rigid_coulomb"'),
+        ("stiff", LAW.replace(str(STIFFNESS), "1e15")),
+    ):
+        (tmp_path / name).mkdir()
+        own = law.replace("friction_coefficient = 0.3\n", "")
+        data = answered(blocks(tmp_path / name, grid, grid, ROCKED.format(own), ()))
+        assert (data["status"] == 0).all()
+        found.append(data)
+    rigid, stiff = found
+    for name, off in (("static_force", 0.01), ("amplitude", 0.02)):
+        a, b = (data[name].values for data in (rigid, stiff))
+        assert np.abs(a - b).max() < off * np.abs(b).max()
+    assert set(np.unique(rigid["peak_state"])) == {0, 1, 2}
+    weight = rigid["static_force"].values[0, :, 2].sum()
+    assert weight == pytest.approx(-2000.0, rel=1e-9)
+
+
 # surfaces that cannot meet, and contacts that do nothing
 
 
