@@ -283,20 +283,26 @@ def wheel_of(
     phases = {k: wave(k, sector.sectors).phase for k in waves}
     written = {k: nodal.of_wave(structure, phases[k]) for k, (structure, _) in waves.items()}
     ways = {k: scipy.sparse.csr_array(structure.basis) for k, structure in written.items()}
-    gaps = nodal.operator[: pairs.own.shape[0]]
-    touched = np.unique(gaps.nonzero()[1])
-    hidden = np.isin(kept[touched[touched < kept.size]], partners(sector)[np.concatenate(stay)])
-    if touched.size and not hidden.any() and not nodal.multipliers.size:
-        # the gaps are the same combinations in all waves, and so is what is beside them
+    gaps = scipy.sparse.csr_array(nodal.operator[: pairs.own.shape[0]])
+    stays = np.isin(kept, partners(sector)[np.concatenate(stay)])
+    fixed = np.zeros(gaps.shape[1])
+    fixed[np.flatnonzero(stays)] = 1.0
+    moved = gaps @ scipy.sparse.diags_array(1.0 - fixed)
+    moved.eliminate_zeros()
+    touched = np.unique(moved.indices)
+    hidden = bool(np.isin(gaps.indices, np.flatnonzero(stays)).any())
+    fewer = np.count_nonzero(np.diff(moved.indptr)) < touched.size
+    if touched.size and (fewer or not hidden) and not nodal.multipliers.size:
+        # the gaps, less what has to stay adds to them, are the same combinations in all waves, and so is what is beside them
         plain = {k: replace(structure, basis=None) for k, structure in written.items()}
         try:
-            small = {k: in_relative_coordinates(s, gaps, pairs.names) for k, s in plain.items()}
+            small = {k: in_relative_coordinates(s, moved, pairs.names) for k, s in plain.items()}
         except InputError:  # gaps depend on each other: nodes stay
             small = {}
         if small:
-            gaps = small[0][1]
-            written = {k: structure for k, (structure, _) in small.items()}
             into = scipy.sparse.csr_array(small[0][0].basis)
+            gaps = small[0][1] + gaps @ scipy.sparse.diags_array(fixed) @ into
+            written = {k: structure for k, (structure, _) in small.items()}
             ways = {k: scipy.sparse.csr_array(way @ into) for k, way in ways.items()}
     structures = {k: replace(structure, basis=None) for k, structure in written.items()}
     wheel = TunedWheel(structures, sector.sectors, *order, nodal.multipliers)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse
 
 from stickslip.assembly.model import Model
 from stickslip.harmonic.balance import CROSSOVER
@@ -100,10 +101,14 @@ def nodes_of(model: Model) -> int:
 
 
 def retained_of(model: Model) -> int:
-    """Return how many coordinates stay unknown: dofs under contacts and of free rigid bodies; of a wheel in gaps it is half as many."""
-    pairs = (model.pairs.own, model.pairs.following)
-    bodies = [model.places.own(name) for name, part in model.parts.items() if part.body is not None]
-    return np.unique(np.concatenate([*bodies, *(p.nonzero()[1] for p in pairs)])).size
+    """Return how many coordinates stay unknown: of free rigid bodies, and dofs under contacts or the motion of contact points if that is less."""
+    bodies = np.zeros(model.places.n, dtype=bool)
+    bodies[model.places.bodies()] = True
+    both = scipy.sparse.hstack([model.pairs.own, model.pairs.following], format="csr")
+    both = both @ scipy.sparse.diags_array(np.tile(~bodies, 2).astype(float))
+    both.eliminate_zeros()
+    dofs = np.unique(both.indices % model.places.n).size
+    return int(bodies.sum()) + min(dofs, int(np.count_nonzero(np.diff(both.indptr))))
 
 
 def _nodes(part: Part) -> int:
