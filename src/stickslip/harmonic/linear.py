@@ -2,7 +2,7 @@
 
 from typing import Protocol, Self
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.harmonic.dynamic_stiffness import Condensed
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -37,8 +37,8 @@ class LinearSide(Protocol):
         """Return the structure that temporal harmonic `harmonic` (0: the mean) vibrates as; the same object where it is the same."""
         ...
 
-    def grounded(self, stiffness: FloatArray) -> Self:
-        """Return the same with springs (n,) in N/m from its coordinates to the ground."""
+    def grounded(self, springs: Matrix) -> Self:
+        """Return the same with springs, a sparse matrix (n, n) in N/m, from its coordinates to the ground."""
         ...
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 
-from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import did_you_mean, input_error
 from stickslip.model.dofs import Dofs, join_dofs
 
@@ -108,11 +108,10 @@ class Structure:
         """Return the load(s) on the reduced coordinates of full-model load(s) (n_full,) or (n_full, k)."""
         return load if self.basis is None else self.basis.conj().T @ load
 
-    def grounded(self, stiffness: FloatArray) -> "Structure":
-        """Return the structure with springs (n,) in N/m from its coordinates to the ground."""
+    def grounded(self, springs: Matrix) -> "Structure":
+        """Return the structure with springs, a sparse matrix (n, n) in N/m, from its coordinates to the ground."""
         sparse = scipy.sparse.issparse(self.stiffness)
-        added = scipy.sparse.diags_array(stiffness) if sparse else np.diag(stiffness)
-        return replace(self, stiffness=self.stiffness + added)
+        return replace(self, stiffness=self.stiffness + (springs if sparse else springs.toarray()))
 
     def with_damping(self, damping: Matrix) -> "Structure":
         """Return the same structure with another damping matrix."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import InputError, input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
@@ -94,9 +94,9 @@ class TunedWheel:
         """Number of coordinates."""
         return self.of_harmonic(0).n
 
-    def grounded(self, stiffness: FloatArray) -> "TunedWheel":
-        """Return the wheel with springs (n,) in N/m from its coordinates to the ground."""
-        waves = {k: wave.grounded(stiffness) for k, wave in self.waves.items()}
+    def grounded(self, springs: Matrix) -> "TunedWheel":
+        """Return the wheel with springs, a sparse matrix (n, n) in N/m, from its coordinates to the ground."""
+        waves = {k: wave.grounded(springs) for k, wave in self.waves.items()}
         return replace(self, waves=waves)
 
     def project(self, load: Matrix, harmonic: int) -> Matrix:

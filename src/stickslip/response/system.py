@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse
 
 from stickslip.arrays import IntArray
 from stickslip.contact.interface import Interface
@@ -90,20 +91,24 @@ class System:
     def with_retention(self, stiffness: float) -> "System":
         """Return the system with a spring of `stiffness` (N/m, rotations N m/rad per m²) from each free dof to ground.
 
-        Rotational dofs get the stiffness times the squared radius of gyration of the body, so that one number serves all six.
+        Rotational dofs get the stiffness times the inertia tensor over the mass of the body, so that one number serves all six and the
+        spring turns with the body.
         """
         if self.free is None or stiffness == 0.0:
             return self
         structure = self.structure.of_harmonic(0)
-        added = np.zeros(structure.n)
+        springs = scipy.sparse.lil_array((structure.n, structure.n))
         dofs = structure.dofs
-        turns = np.array([dofs.component[d].startswith("r") for d in self.free])
-        inertia = np.array([np.real(structure.mass[d, d]) for d in self.free])
-        for dof, turn, own in zip(self.free, turns, inertia, strict=True):
-            same_body = np.array([dofs.part[d] == dofs.part[dof] for d in self.free]) & ~turns
-            mass = np.max(inertia[same_body], initial=0.0)
-            added[dof] = stiffness * (own / mass if turn and mass > 0.0 else 1.0)
-        return replace(self, structure=self.structure.grounded(added))
+        for body in dict.fromkeys(dofs.part[d] for d in self.free):
+            own = np.array([d for d in self.free if dofs.part[d] == body])
+            turns = np.array([dofs.component[d].startswith("r") for d in own])
+            inertia = np.array([[np.real(structure.mass[a, b]) for b in own] for a in own])
+            mass = np.max(inertia.diagonal()[~turns], initial=0.0)
+            added = np.eye(own.size)
+            if mass > 0.0:
+                added[np.ix_(turns, turns)] = inertia[np.ix_(turns, turns)] / mass
+            springs[np.ix_(own, own)] = stiffness * added
+        return replace(self, structure=self.structure.grounded(springs.tocsr()))
 
     def stuck_structure(self) -> Structure:
         """Return the linear structure with every contact bonded through its springs."""
