@@ -5,9 +5,7 @@ import os
 from collections.abc import Hashable, Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
-import h5netcdf
 import numpy as np
 import xarray as xr
 
@@ -15,7 +13,7 @@ from stickslip.arrays import BoolArray, IntArray
 from stickslip.errors import input_error
 from stickslip.study.keep.whole import whole_file
 
-CHECKSUM = "checksum"  # attribute of the root
+MARK = b"\nstickslip: sha256 of all before: "
 _AGAIN = (
     "Give the result.nc that 'stickslip run' wrote, or its folder. Of a damaged one, run the study again: no finished point is "
     "computed anew. With --fresh everything is, after what runs wrote into the folder is removed, and no other file."
@@ -25,7 +23,9 @@ _MISSING: dict[str, object] = {"f": np.nan, "c": np.nan, "i": -1, "U": "", "O": 
 
 
 def write_tree(tree: xr.DataTree, path: Path) -> None:
-    """Write netCDF-4 under another name, with the sum of what can be read from it, and put it in place: `path` is always whole.
+    """Write netCDF-4 under another name, its sum behind it, and put it in place, so that `path` is always a whole file.
+
+    Readers of HDF5 pass over what stands behind the end that the file names itself.
 
     Raises
     ------
@@ -35,12 +35,12 @@ def write_tree(tree: xr.DataTree, path: Path) -> None:
     with whole_file(path) as temporary:
         try:
             tree.to_netcdf(temporary, format="NETCDF4", engine="h5netcdf")
-            found = checksum(_read(temporary))
-            with h5netcdf.File(temporary, "a") as stream:
-                stream.attrs[CHECKSUM] = found
         # the HDF5 libraries tell of a full disk by RuntimeError, and name no reason
         except RuntimeError as error:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)) from error
+        with temporary.open("rb+") as stream:
+            own = _sum(stream.read())
+            stream.write(own)
 
 
 def read_tree(path: Path) -> xr.DataTree:
@@ -51,48 +51,26 @@ def read_tree(path: Path) -> xr.DataTree:
     InputError
         If it cannot be read, or is not what was written.
     """
+    # HDF5 may read damaged files for ever, or end the process
+    content = path.read_bytes()
+    length = content.rfind(MARK)
+    if length >= 0 and content[length:] != _sum(content[:length]):
+        problem = "holds other bytes than were written: it is damaged, or was changed"
+        raise input_error(str(path), problem, _AGAIN)
     try:
-        tree = _read(path)
-        damaged = tree.attrs.pop(CHECKSUM, None) not in (None, checksum(tree))
+        with xr.open_datatree(path, engine="h5netcdf", decode_times=False) as tree:
+            return tree.load()
     except MemoryError:
         raise
-    except Exception as error:  # h5netcdf, h5py and xarray say it of wrong bytes in a dozen ways
+    except Exception as error:  # noqa: BLE001  the libraries say it of wrong bytes in a dozen ways
         said = " ".join(str(error).split())
         raise input_error(
             str(path), f"is no netCDF-4 file, or a damaged one ({said})", _AGAIN
-        ) from error
-    if damaged:
-        raise input_error(
-            str(path),
-            "holds other values than were written: it is damaged, or was changed",
-            f"{_AGAIN} Whoever changed it on purpose takes out the attribute {CHECKSUM}.",
-        )
-    return tree
+        ) from None
 
 
-def checksum(tree: xr.DataTree) -> str:
-    """Return a hash of all values, labels and attributes of a tree but its own."""
-    found = sha256()
-    for node in tree.subtree:
-        own = node.to_dataset(inherit=False)
-        told: list[object] = [node.path, _plain(own.attrs)]
-        for name, v in own.variables.items():
-            told += [name, v.dims, v.shape, _plain(v.attrs)]
-            values = np.ascontiguousarray(v.values)
-            found.update(
-                repr(values.tolist()).encode() if values.dtype == object else values.tobytes()
-            )
-        found.update(repr(told).encode())
-    return found.hexdigest()
-
-
-def _plain(attributes: Mapping[Any, Any]) -> list[tuple[str, object]]:
-    return sorted((str(k), np.asarray(v).tolist()) for k, v in attributes.items() if k != CHECKSUM)
-
-
-def _read(path: Path) -> xr.DataTree:
-    with xr.open_datatree(path, engine="h5netcdf", decode_times=False) as tree:
-        return tree.load()
+def _sum(content: bytes) -> bytes:
+    return MARK + sha256(content).hexdigest().encode()
 
 
 def variable(dims: str, values: object, units: str, long_name: str) -> xr.Variable:
