@@ -47,17 +47,19 @@ class PolynomialSpring:
     """
 
     along_t: tuple[float, ...] = quantity(
-        "coefficients [c_1, c_2, ...] along the tangent t in N/m, N/m², ...",
+        "coefficients [c_1, c_2, ...] along the tangent t in N/m, N/m², ..., of a square metre with per = area",
         default=(),
         shared=True,
     )
     along_w: tuple[float, ...] = quantity(
-        "coefficients [c_1, c_2, ...] along the tangent w in N/m, N/m², ...",
+        "coefficients [c_1, c_2, ...] along the tangent w in N/m, N/m², ..., of a square metre with per = area",
         default=(),
         shared=True,
     )
     along_n: tuple[float, ...] = quantity(
-        "coefficients [c_1, c_2, ...] along the normal in N/m, N/m², ...", default=(), shared=True
+        "coefficients [c_1, c_2, ...] along the normal in N/m, N/m², ..., of a square metre with per = area",
+        default=(),
+        shared=True,
     )
 
     kernel: ClassVar[Any] = polynomial_step

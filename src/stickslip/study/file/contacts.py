@@ -100,7 +100,7 @@ class ContactBase(Pair):
     )
     tangent: Triple | None = Field(
         None,
-        description="direction [x, y, z] whose part in the contact plane is the tangent t; left out: that of the surface",
+        description="direction [x, y, z] whose part in the contact plane is the tangent t; left out: that of the surface, which will not do where the law is not the same along t and w",
     )
     normal: Triple | None = Field(
         None,
