@@ -14,9 +14,6 @@ from stickslip.report.quantities import (
 from stickslip.report.response import Response
 from stickslip.report.section import Card
 
-_LARGE_SHIFT = 0.01  # relative change of the peak worth a warning
-_LARGE_DIFFERENCE = 1.0  # percent between time integration and balance (Gastaldi and Berruti 2017: below it at H = 5)
-
 
 def _peak_card(response: Response) -> Card:
     cases = [c for c in response.peaked if np.isfinite(response.peak_response(c))]
@@ -92,26 +89,3 @@ def cards(response: Response) -> list[Card]:
     first = (_peak_card(response), _shift_card(response), _loss_card(response))
     rest = _alert_cards if response.is_error and response.decides else _work_cards
     return [card for card in first if card is not None] + rest(response)
-
-
-def warnings(response: Response) -> list[str]:
-    """Return what follows from the numbers: a peak that hangs on the retention, a check that failed."""
-    found = []
-    for case in response.cases:
-        shift = np.nan_to_num(response.number_of("retention_peak_shift", case))
-        if abs(shift) > _LARGE_SHIFT:
-            found.append(
-                f"{'For ' + case.label if case.label else 'Here'} the peak changes by {percent(100 * float(shift))} when the retention stiffness "
-                "of rigid bodies is ten times smaller: it depends on a stiffness that is not physical."
-            )
-    if response.has("verify_difference_percent"):
-        off = np.abs(np.nan_to_num(response.floats("verify_difference_percent")))
-        large = int((off > _LARGE_DIFFERENCE).sum())
-        if large:
-            found.append(
-                f"Time integration and harmonic balance differ by more than {percent(_LARGE_DIFFERENCE)} in "
-                f"{counted(large, 'check')}; see the table."
-            )
-    if response.has("verify_settled") and (response.floats("verify_settled") == 0).any():
-        found.append("A time integration did not settle to a periodic motion; see the table.")
-    return found

@@ -7,7 +7,7 @@ from stickslip.report.forced.contact import chooser, hysteresis_t, hysteresis_w,
 from stickslip.report.forced.curves import frequency_response, low_order, optimisation
 from stickslip.report.forced.errors import error_scatter, errors
 from stickslip.report.forced.harmonics import kept_harmonics
-from stickslip.report.forced.head import cards, warnings
+from stickslip.report.forced.head import cards
 from stickslip.report.forced.surface import surface_map
 from stickslip.report.response import NEEDED, Response
 from stickslip.report.section import Block, Section
@@ -34,5 +34,4 @@ SECTION: Section = Section(
         ),
     ),
     cards=cards,
-    warnings=warnings,
 )

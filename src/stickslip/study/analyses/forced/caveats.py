@@ -1,7 +1,8 @@
 """What the user should know of a response: sentences, told while it is computed and with its result."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,8 @@ COULOMB = (
     "coupled_coulomb",
     "regularised_coulomb",
 )  # friction under the normal force
+LARGE_SHIFT = 0.01  # relative change of the peak worth a warning
+LARGE_DIFFERENCE = 1.0  # percent between time integration and balance (Gastaldi and Berruti 2017: below it at H = 5)
 LISTED = 5  # natural frequencies that a line names
 
 
@@ -38,6 +41,27 @@ def caveats(question: Question, response: Response, shift: tuple[float, float]) 
         *_of_drift(question, response),
         *_of_peak(question, response, shift),
     ]
+
+
+def of_numbers(values: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what follows from the values of a case: a peak that hangs on the retention, a check that failed."""
+    shift = float(np.nan_to_num(values.get("retention_peak_shift", 0.0)))
+    if abs(shift) > LARGE_SHIFT:
+        yield (
+            f"the peak changes by {100 * shift:.3g} % when the retention stiffness of rigid bodies is ten times smaller: it depends "
+            "on a stiffness that is not physical."
+        )
+    off = np.abs(
+        np.nan_to_num(np.asarray(values.get("verify_difference_percent", ()), dtype=float))
+    )
+    large = int(np.count_nonzero(off > LARGE_DIFFERENCE))
+    if large:
+        yield (
+            f"time integration and harmonic balance differ by more than {LARGE_DIFFERENCE:g} % at {large} of {off.size} frequencies; "
+            "see the table of checks."
+        )
+    if np.any(np.asarray(values.get("verify_settled", ())) == 0):
+        yield "a time integration did not settle to a periodic motion; see the table of checks."
 
 
 def mixed_places(labels: Sequence[str]) -> list[str]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from stickslip.study.analyses.forced.caveats import of_numbers
 from stickslip.study.analyses.forced.quantities import QUANTITIES, flags
 from stickslip.study.analyses.forced.question import said
 from stickslip.study.analyses.forced.values import Values
@@ -66,7 +67,11 @@ def _attributes(cases: Sequence[Values], labels: Sequence[str]) -> dict[str, Any
     """Return the attributes of the dataset: texts and numbers; what chose the harmonics is that of the first case."""
     both = list(zip(labels, cases, strict=True))
     told = [said(label, str(c["choice_sentence"])) for label, c in both if c["choice_sentence"]]
-    doubts = [(label, text) for label, c in both for text in (*c["caveats"], *c.get("doubts", ()))]
+    doubts = [
+        (label, text)
+        for label, c in both
+        for text in (*c["caveats"], *c.get("doubts", ()), *of_numbers(c))
+    ]
     own: dict[str, Any] = json.loads(cases[0]["attributes"])
     return own | {
         "alert_explanation": " ".join(told),
