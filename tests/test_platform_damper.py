@@ -14,6 +14,7 @@ from stickslip.assembly.contact import Contact
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.model import Model
 from stickslip.assembly.placing import place_of, placed_body
+from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.errors import InputError
 from stickslip.front.result import Result
 from stickslip.model.axis import Axis
@@ -129,6 +130,23 @@ def test_the_motion_of_points_stands_for_that_of_the_nodes_around_them(
     mine, theirs = (answered(a.system, a.load, (2000.0, 2050.0)) for a in (few, nodal))
     for a, b in zip(mine, theirs, strict=True):
         assert np.abs(a.outputs - b.outputs).max() < 1e-8 * np.abs(b.outputs).max()
+
+
+def test_single_dofs_of_the_next_sector_count_along_the_axes_of_this_one() -> None:
+    one = one_sector()
+    law = Jenkins(k_t=1e5, limit=10.0)
+    link = Contact(between=("damper.x", "next.damper.x"), law=law, acts="tangential")
+    pairs = Model(parts=one.parts, contacts={"link": link}).pairs
+    own = one.places.own("damper")
+    moved = np.zeros(one.places.n)
+    moved[own[:3]] = AXIS.rotation(-PITCH) @ [
+        1.0,
+        0.0,
+        0.0,
+    ]  # in the axes of the next sector, along x of this one
+    np.testing.assert_allclose((pairs.following @ moved)[0], 1.0)
+    moved[own[:3]] = AXIS.rotation(-PITCH) @ [0.0, 1.0, 0.0]
+    np.testing.assert_allclose(pairs.following @ moved, 0.0, atol=1e-15)
 
 
 def write(folder: Path, changes: dict[str, str]) -> Path:

@@ -30,6 +30,7 @@ from stickslip.contact.pairing import (
 from stickslip.contact.surface import Surface
 from stickslip.errors import InputError, input_error
 from stickslip.model.axis import Axis
+from stickslip.reduction.turning import dof_rotation
 
 NEAR = 1e-6  # m: partners node to node
 Found = TypeVar("Found")
@@ -329,6 +330,8 @@ def _single_dofs(
         )
 
     own, theirs = rows(one, -1.0), rows(two, 1.0)
+    if turn is not None and second is not None:
+        theirs = theirs @ _turned_dofs(places, key, second.part, turn)
     names = (name,) if p == 1 else tuple(f"{name}.{i + 1}" for i in range(p))
     area = np.full(p, np.nan)
     return Pairs(
@@ -342,3 +345,15 @@ def _single_dofs(
         area,
         np.column_stack([one, np.full((p, 2), -1)]),
     )
+
+
+def _turned_dofs(places: Places, key: str, name: str, turn: Turn) -> Matrix:
+    """Return the (N, N) matrix from the next sector's dofs in its own axes to those along the axes of this one; masses on a line have none."""
+    part, n = places.parts[name], places.n
+    if turn.axis is None or (part.body is None and part.mesh is None):
+        return scipy.sparse.eye_array(n, format="csr")
+    own = dof_rotation(part.structure.dofs, turn.matrix, f"{key}.between")
+    first = places.offset(name)
+    before, after = first, n - first - part.structure.n
+    sides = [scipy.sparse.eye_array(before), own, scipy.sparse.eye_array(after)]
+    return scipy.sparse.block_diag(sides, format="csr")
