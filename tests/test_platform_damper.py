@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_v2 import EXAMPLES, changed
+from small_v2 import EXAMPLES, changed, write_two_blades
 from test_assembly_wheel import LAW, SECTORS, SPEED, STEEL, answered, shrouded_sector, whole_wheel
 from test_cli import done, refused
 
@@ -251,3 +251,21 @@ placed = { turn_deg = 90.0 }
         "part.first.of: first is a copy of third is a copy of second is a copy of first"
         in refused("check", str(path))
     )
+
+
+def test_the_undersides_of_prismatic_blades_take_a_body_without_nodes_of_their_own(
+    tmp_path: Path,
+) -> None:
+    apart = {
+        "part.blades.nodes_at": "[]",
+        "part.damper.apex_m": "[0.028, 0.1065]",
+        "part.damper.flat_angle_deg": "45.0",
+        "part.damper.curved_angle_deg": "45.0",
+        "contact.flat.pairing": '"node_to_segment"',
+        "contact.curved.pairing": '"node_to_segment"',
+    }
+    found = []
+    for name, changes in (("nodes", {}), ("facets", apart)):
+        model = read_study(write_two_blades(tmp_path / name, changes)).model()
+        found.append(natural_frequencies(model.at(0.0, 0, "stuck"), 3))
+    np.testing.assert_allclose(found[1], found[0], rtol=0.02)  # two coarse meshes
