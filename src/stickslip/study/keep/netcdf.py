@@ -1,7 +1,5 @@
 """Labelled variables, and files of them that are always whole."""
 
-import errno
-import os
 from collections.abc import Hashable, Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
@@ -11,7 +9,7 @@ import xarray as xr
 
 from stickslip.arrays import BoolArray, IntArray
 from stickslip.errors import input_error
-from stickslip.study.keep.whole import whole_file
+from stickslip.study.keep.whole import write_whole
 
 MARK = b"\nstickslip: sha256 of all before: "
 _AGAIN = (
@@ -32,15 +30,9 @@ def write_tree(tree: xr.DataTree, path: Path) -> None:
     InputError
         If the file cannot be written.
     """
-    with whole_file(path) as temporary:
-        try:
-            tree.to_netcdf(temporary, format="NETCDF4", engine="h5netcdf")
-        # the HDF5 libraries tell of a full disk by RuntimeError, and name no reason
-        except RuntimeError as error:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)) from error
-        with temporary.open("rb+") as stream:
-            own = _sum(stream.read())
-            stream.write(own)
+    # made in memory: on a full disk HDF5 leaves open files behind, which print tracebacks when they are closed
+    content = bytes(tree.to_netcdf(format="NETCDF4", engine="h5netcdf"))
+    write_whole(path, content + _sum(content))
 
 
 def read_tree(path: Path) -> xr.DataTree:
