@@ -14,9 +14,9 @@ from stickslip.assembly.load import Load
 from stickslip.assembly.model import Model
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError
+from stickslip.model.dofs import numbered_dofs
 from stickslip.model.fe.solid import Material
 from stickslip.model.part import rigid_part, solid_part, structure_part
-from stickslip.model.readers.matrix_files import numbered_dofs
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.structure import Structure
 

@@ -12,6 +12,7 @@ from small_v2 import EXAMPLES, changed
 from test_cli import done, refused
 
 from stickslip.front.result import Result
+from stickslip.study.models.study import read_study
 
 EXAMPLE = EXAMPLES / "own_matrices"
 FEW = {
@@ -90,8 +91,6 @@ def test_own_matrices_give_the_response_of_the_same_masses_and_springs(tmp_path,
 
 
 def test_damping_in_the_file_is_kept_and_a_table_of_the_part_replaces_it(tmp_path: Path) -> None:
-    from stickslip.study.models.study import read_study
-
     mass, stiffness = matrices()
     np.savez(tmp_path / "chain.npz", mass=mass, stiffness=stiffness, damping=1e-4 * stiffness)
     shutil.copy(EXAMPLE / "study.toml", tmp_path)
@@ -112,6 +111,16 @@ def test_damping_in_the_file_is_kept_and_a_table_of_the_part_replaces_it(tmp_pat
         ({"load.shaker.on": '"chain.dof21"'}, "there is no surface or set 'chain.dof21'"),
         ({"part.chain.file": '"none.npz"'}, "there is no file"),
         ({"part.chain.mass": '"M.mtx"'}, "is of 3 x 3, the model has 20 dofs"),
+        (
+            {"contact.stop.between": '["chain.dof0", "ground"]'},
+            "has 20 dofs, chain.dof1 to chain.dof20.",
+        ),
+        (
+            {"contact.joint.between": '["chain.dof12", "chain.DOF12"]'},
+            "pairs 'chain.dof12' with itself",
+        ),
+        ({"output.peak": '"tip.dof20"'}, "no output 'tip.dof20'. Did you mean 'end.dof20'?"),
+        ({"output.peak": '"end.x"'}, "no output 'end.x'. Known: end.dof20, middle.dof10."),
     ],
 )
 def test_what_does_not_fit_is_refused_by_name(tmp_path: Path, changes, message) -> None:
@@ -121,6 +130,52 @@ def test_what_does_not_fit_is_refused_by_name(tmp_path: Path, changes, message) 
     path = tmp_path / "study.toml"
     path.write_text(changed(path.read_text(), changes))
     assert message in refused("check", str(path))
+
+
+def copied(folder: Path, changes: dict[str, str], **arrays: np.ndarray) -> Path:
+    """Write the example's study with changes, and its matrices with others in their place."""
+    given = dict(zip(("mass", "stiffness"), matrices(), strict=True)) | arrays
+    np.savez(folder / "chain.npz", **given)
+    path = folder / "study.toml"
+    path.write_text(changed((EXAMPLE / "study.toml").read_text(), changes))
+    return path
+
+
+def test_matrices_without_a_table_are_of_translations_in_any_units(tmp_path: Path) -> None:
+    """In millimetres, tonnes and seconds a spring of 2e5 N/m has 200 N/mm, and a mass of 0.5 kg 5e-4 t."""
+    mass, stiffness = matrices()
+    small = {"mass": mass / 1e3, "stiffness": stiffness / 1e3, "damping": 1e-7 * stiffness}
+    path = copied(tmp_path, {"part.chain.units": '"mm-t-s"'}, **small)
+    found = read_study(path).model().parts["chain"].structure
+    assert np.allclose(found.mass, mass, rtol=1e-12)
+    assert np.allclose(found.stiffness, stiffness, rtol=1e-12)
+    assert np.allclose(found.damping, 1e-4 * stiffness, rtol=1e-12)
+
+
+def test_names_of_dofs_need_no_capitals(tmp_path: Path) -> None:
+    path = copied(tmp_path, {"contact.brake.between": '["chain.DOF8", "ground"]'})
+    assert read_study(path).model().pairs.nodes[0, 0] == 7
+
+
+def test_dofs_of_a_table_are_named_where_a_number_is_given(tmp_path: Path) -> None:
+    (tmp_path / "dofs.csv").write_text(TABLE)
+    path = copied(tmp_path, {"part.chain.nodes": '"dofs.csv"'})
+    assert "called by node and direction: 'chain.node1.x'" in refused("check", str(path))
+
+
+def test_arrays_of_other_names_are_told(tmp_path: Path) -> None:
+    path = copied(tmp_path, {})
+    mass, stiffness = matrices()
+    np.savez(tmp_path / "chain.npz", K=stiffness, M=mass)
+    said = "holds the arrays K, M, and no stiffness. Its arrays must be called mass, stiffness"
+    assert said in refused("check", str(path))
+    assert said in refused("inspect", str(tmp_path / "chain.npz"))
+
+
+def test_a_lossy_stiffness_is_told_from_one_that_lacks_symmetry(tmp_path: Path) -> None:
+    said = refused("check", str(copied(tmp_path, {}, stiffness=(1 + 0.01j) * matrices()[1])))
+    assert "is complex and symmetric" in said
+    assert "loss_factor" in said
 
 
 def test_speeds_of_matrices_are_refused_together(tmp_path: Path) -> None:

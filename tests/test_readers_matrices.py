@@ -441,7 +441,7 @@ def test_unsymmetric_matrices_are_told(tmp_path):
         ("job.inp", "no such file"),
         ("K.mtx", r"is one matrix, not a whole model. Give mass="),
         ("A_STIF1.mtx", r"is one matrix, not a whole model. Give mass="),
-        ("K.npz", "not of a structure"),
+        ("K.npz", "holds the arrays arr_0, and no stiffness"),
     ],
 )
 def test_what_cannot_be_opened_is_asked_for(tmp_path, name, message):

@@ -212,6 +212,7 @@ def sides(
         return first, None, None
     second = places.spot(two.removeprefix(NEXT), place)
     if not two.startswith(NEXT):
+        refuse_itself(place, first, second)
         return first, second, None
     if turn is None or (places.parts[second.part].sectors == 1 and places.parts[second.part].mesh):
         raise input_error(
@@ -220,6 +221,19 @@ def sides(
             f"Leave {NEXT!r} out, or give the part its number of sectors.",
         )
     return first, second, turn
+
+
+def refuse_itself(place: str, first: Spot, second: Spot) -> None:
+    """Refuse two sides that are the same, or single dofs of which one meets itself."""
+    same = first.name == second.name
+    met = first.dofs.shape == second.dofs.shape and bool(np.any(first.dofs == second.dofs))
+    if same or met:
+        whom = repr(first.name) if same else f"{first.name!r} and {second.name!r}, one dof of which"
+        raise input_error(
+            place,
+            f"pairs {whom} with itself, where nothing moves relative to anything",
+            'Name the other side, or "ground".',
+        )
 
 
 def _paired(

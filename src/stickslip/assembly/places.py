@@ -10,14 +10,15 @@ import scipy.sparse
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.contact.surface import Surface, nodal_surface, rigid_surface
-from stickslip.errors import did_you_mean, input_error
-from stickslip.model.dofs import Dofs, join_dofs
+from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.model.dofs import Dofs, is_numbered, join_dofs
 from stickslip.model.mesh.mesh_facets import facets_of
 from stickslip.model.part import BodyPoints, Part
 
 AXES = ("x", "y", "z")
 COMPONENTS = (*AXES, "rx", "ry", "rz")
 _DOF = re.compile(r"(?:node(\d+)\.)?(\w+)")
+_DOF_NUMBER = re.compile(r".*\.dof\d+", re.IGNORECASE)
 _NODE = re.compile(r"node(\d+)")
 NO_FACETS = np.zeros((0, 3), dtype=np.int64)
 
@@ -126,9 +127,7 @@ class Places:
         else:
             found = self._node(name, head, rest) or self._dof(name, head, rest)
         if found is None:
-            known = [f"{head}.{word}" for word in part.names]
-            remedy = did_you_mean(name, known) if known else "The part has no sets."
-            raise input_error(place, f"there is no surface or set {name!r}", remedy)
+            raise _unknown(name, head, part, place)
         return found
 
     def _centre(self, head: str, part: Part, place: str) -> Spot:
@@ -198,6 +197,22 @@ class Places:
         """Return the (k, 6) dofs x, y, z, rx, ry, rz of nodes of a part by number; -1 where there is none."""
         rows = node_rows(self.parts[head].structure.dofs, numbers)
         return np.where(rows >= 0, rows + self.offset(head), -1)
+
+
+def _unknown(name: str, head: str, part: Part, place: str) -> InputError:
+    """Return the complaint about a name that a part does not have."""
+    table, n = part.structure.dofs, part.structure.n
+    numbered = [is_numbered(component) for component in table.component]
+    known = [f"{head}.{word}" for word in part.names]
+    if n and all(numbered):
+        has = f"The part has {n} dofs, {head}.dof1 to {head}.dof{n}"
+        remedy = f"{has}{', and the sets ' if known else ''}{', '.join(known)}."
+    elif _DOF_NUMBER.fullmatch(name) and n:
+        first = f"{head}.{table.labels[0]}"
+        remedy = f"Dofs of this part are called by node and direction: {first!r}."
+    else:
+        remedy = did_you_mean(name, known) if known else "The part has no sets."
+    return input_error(place, f"there is no surface or set {name!r}", remedy)
 
 
 def node_rows(table: Dofs, numbers: IntArray) -> IntArray:

@@ -1,10 +1,13 @@
 """Names of the coordinates of a structure."""
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
+
+_NUMBERED = re.compile(r"dof[1-9]\d*")
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +61,17 @@ class Dofs:
             place = "" if node < 0 else f"node{node}."
             names.append(f"{prefix}{place}{component}")
         return tuple(names)
+
+
+def numbered_dofs(n: int) -> Dofs:
+    """Return the table of `n` dofs of which nothing is known: ``dof1``, ``dof2`` and so on."""
+    names = tuple(f"dof{i + 1}" for i in range(n))
+    return Dofs(np.full(n, -1), names, np.full((n, 3), np.nan))
+
+
+def is_numbered(component: str) -> bool:
+    """Tell whether a component is one of `numbered_dofs`."""
+    return _NUMBERED.fullmatch(component) is not None
 
 
 def modal_dofs(n: int) -> Dofs:

@@ -319,6 +319,8 @@ def _reciprocal(K: Matrix, M: Matrix, n: int, shift: float) -> tuple[FloatArray,
     size = len(K)
     largest = (size - n, size - 1)
     inverse, vectors = scipy.linalg.eigh(M, K - shift * M, subset_by_index=largest)
+    if inverse[0] <= 0:
+        raise np.linalg.LinAlgError("dofs have no mass, or a negative one")
     values = shift + 1.0 / inverse[::-1]
     return np.asarray(values), np.asarray((vectors / np.sqrt(inverse))[:, ::-1])
 

@@ -76,6 +76,12 @@ def check_symmetric(matrix: Matrix, place: str) -> None:
     """Refuse a matrix that is not Hermitian; the message names the worst pair."""
     if asymmetry(matrix) <= SYMMETRY:
         return
+    if np.iscomplexobj(matrix) and abs(matrix - matrix.T).max() == 0:
+        raise input_error(
+            place,
+            "is complex and symmetric, as K (1 + i η) is; a matrix without loss is Hermitian",
+            "Write its real part, and give the loss as loss_factor in the damping of the part.",
+        )
     difference = scipy.sparse.csr_array(abs(matrix - matrix.conj().T))
     row, column = divmod(int(difference.argmax()), matrix.shape[0])
     raise input_error(

@@ -9,7 +9,7 @@ import scipy.sparse
 
 from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import input_error, missing_package
-from stickslip.model.dofs import Dofs
+from stickslip.model.dofs import Dofs, numbered_dofs
 from stickslip.model.modes import ABSURD
 from stickslip.model.npz import BROKEN, DEFLATE_RATIO, Arrays, read_npz
 from stickslip.model.readers.entries import check_symmetric, check_unique
@@ -47,7 +47,7 @@ def read_matrix_files(
     nodes
         CSV file, one line a dof in the order of the equations, with the columns ``node, component, x, y, z``; components
         are x, y, z, rx, ry, rz and mode. A further column ``set`` names sets, separated by blanks. None: the dofs are called
-        ``dof1``, ``dof2`` and so on, and have no place.
+        ``dof1``, ``dof2`` and so on, have no place, and count as translations.
     units
         Unit system of matrices and positions.
     plausible
@@ -100,6 +100,17 @@ def names_in(path: Path) -> tuple[str, ...]:
     return tuple(name for name in ("stiffness", "mass", "damping") if name in found)
 
 
+def refuse_other_names(path: Path) -> None:
+    """Refuse an ``.npz`` file of arrays that have other names than matrices have here."""
+    found = sorted(_names_in_npz(path))
+    if found and "format" not in found:
+        raise input_error(
+            str(path),
+            f"holds the arrays {', '.join(found)}, and no stiffness",
+            "Its arrays must be called mass, stiffness and, if there is one, damping.",
+        )
+
+
 def _names_in_npz(path: Path) -> Collection[str]:
     try:
         with zipfile.ZipFile(path) as archive:
@@ -116,12 +127,6 @@ def _names_in_hdf5(path: Path) -> Collection[str]:
             return set(file)
     except (ModuleNotFoundError, OSError, RuntimeError):  # told when its matrices are read
         return ("mass",)
-
-
-def numbered_dofs(n: int) -> Dofs:
-    """Return the table of `n` dofs of which nothing is known: ``dof1``, ``dof2`` and so on."""
-    names = tuple(f"dof{i + 1}" for i in range(n))
-    return Dofs(np.full(n, -1), names, np.full((n, 3), np.nan))
 
 
 def read_dof_table(path: Path) -> tuple[Dofs, dict[str, IntArray]]:

@@ -16,7 +16,7 @@ from stickslip.model.readers.ansys_results import AnsysResults, read_ansys_resul
 from stickslip.model.readers.calculix import read_calculix_matrices
 from stickslip.model.readers.calculix_deck import Deck, assemble_deck, read_deck
 from stickslip.model.readers.frd import FrdResults, read_frd
-from stickslip.model.readers.matrix_files import names_in, read_matrix_files
+from stickslip.model.readers.matrix_files import names_in, read_matrix_files, refuse_other_names
 from stickslip.model.readers.nastran import NastranResults, read_nastran_op2
 from stickslip.model.readers.summary import (
     ModelSummary,
@@ -176,6 +176,7 @@ def _calculix(files: _Files) -> Structure:
 
 def _npz(files: _Files) -> Structure:
     if files.mass is None and "stiffness" not in names_in(files.path):
+        refuse_other_names(files.path)
         return load_structure(files.path)
     return _neutral(files)
 

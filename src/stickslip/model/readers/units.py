@@ -7,7 +7,7 @@ import scipy.sparse
 
 from stickslip.arrays import FloatArray, Matrix
 from stickslip.errors import InputError, did_you_mean, input_error
-from stickslip.model.dofs import Dofs
+from stickslip.model.dofs import Dofs, is_numbered
 from stickslip.model.structure import Structure
 from stickslip.units import check_quantities, quantity
 
@@ -110,8 +110,12 @@ class Units:
         return self.mass / self.length**3
 
     def lengths(self, dofs: Dofs) -> FloatArray:
-        """Return, for each dof, what one unit of it is: a length in m, or 1 where it is none (rotations, modes)."""
-        return np.where(np.isin(dofs.component, ("x", "y", "z")), self.length, 1.0)
+        """Return, for each dof, what one unit of it is: a length in m, or 1 where it is none (rotations, modes).
+
+        Dofs of matrices without a table count as translations: as pure numbers their stiffness would be an energy.
+        """
+        along = [c in ("x", "y", "z") or is_numbered(c) for c in dofs.component]
+        return np.where(along, self.length, 1.0)
 
 
 SI = Units.si()

@@ -1,12 +1,12 @@
 """What can be refused without a mesh: names that are not there, files that are not there, questions without what they need."""
 
-import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from stickslip.assembly.contact import GROUND, NEXT
 from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.model.dofs import is_numbered
 from stickslip.study.file.bodies import Cylinder, FlatCurved, RigidBodyTable, Wedge
 from stickslip.study.file.parts import (
     BeamTable,
@@ -25,7 +25,6 @@ BLADES = ("root", "force", "tip1", "edge1", "tip2")
 SECTOR = ("root", "cyclic_low", "cyclic_high", "tip")
 SIDES = ("flat", "curved")
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
-NUMBERED = re.compile(r"dof[1-9]\d*")  # dofs of matrices without a table
 
 
 def refusals(tables: Tables, home: Path) -> Iterator[InputError]:
@@ -259,13 +258,22 @@ def _outputs(tables: Tables) -> Iterator[InputError]:
     peak = tables.output.peak
     if peak:
         head, _, direction = peak.partition(".")
-        known_direction = direction in COMPONENTS or NUMBERED.fullmatch(direction)
-        if head not in tables.output.points or not known_direction:
-            usual = tables.output.directions or COMPONENTS[:3]
-            known = [f"{name}.{d}" for name in tables.output.points for d in usual]
+        of = {name: _directions(tables, point) for name, point in tables.output.points.items()}
+        words = of.get(head, ())
+        may_have = len(words) > 1 and (direction in COMPONENTS or is_numbered(direction))
+        if direction not in words and not may_have:
+            known = [f"{name}.{d}" for name, own in of.items() for d in own]
             yield input_error(
                 "output.peak", f"there is no output {peak!r}", did_you_mean(peak, known)
             )
+
+
+def _directions(tables: Tables, point: Any) -> tuple[str, ...]:
+    """Return the directions in which a point is reported, as far as they are known without a mesh: of a single dof its own."""
+    _, dot, last = point.on.rpartition(".")
+    if dot and (last.lower() in COMPONENTS or is_numbered(last.lower())):
+        return (last.lower(),)
+    return tuple(point.directions or tables.output.directions or COMPONENTS[:3])
 
 
 def _questions(tables: Tables) -> Iterator[InputError]:

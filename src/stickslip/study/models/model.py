@@ -1,5 +1,6 @@
 """From the tables of a study to a model."""
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from stickslip.study.models.files import alike
 from stickslip.study.models.parts import Memo, Workshop
 from stickslip.units import DEG, RPM
 
+DOF = re.compile(r"node\d+(\.r?[xyz])?|r?[xyz]|dof\d+")
 NORMAL_ALONE = ("unilateral_spring",)  # laws without tangential forces
 
 
@@ -100,7 +102,8 @@ def _own_name(parts: Mapping[str, Part], name: str) -> str:
     head, dot, rest = name.removeprefix(NEXT).partition(".")
     if name == GROUND or head not in parts or not rest:
         return name
-    return f"{ahead}{head}{dot}{alike(rest, parts[head].names) or rest}"
+    as_dof = rest.lower() if DOF.fullmatch(rest.lower()) else rest
+    return f"{ahead}{head}{dot}{alike(rest, parts[head].names) or as_dof}"
 
 
 def _load(tables: Tables, parts: Mapping[str, Part], table: LoadTable) -> Load:
