@@ -2,16 +2,19 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from stickslip import Study
 from stickslip.errors import InputError
 from stickslip.model.axis import Axis
 from stickslip.model.part import damper_part
 from stickslip.model.rigid.body import RigidBody, body_of_tensor
 from stickslip.model.rigid.prisms import CylinderDamper, WedgeDamper
+from stickslip.units import RPM
 
 DEG = math.pi / 180
 OBLIQUE = Axis(direction=(0.3, -0.5, 1.0), origin=(0.1, 0.2, -0.3))
@@ -203,3 +206,51 @@ def test_axes_of_a_body_are_square_to_each_other():
             centre=(0, 0, 0),
             axes=((1, 0, 0), (0, 1, 0), (0, 1, 1)),
         )
+
+
+RIM = """
+schema_version = 2
+title = "A body pressed on a rim by its own rotation"
+
+[part.body]
+shape = "rigid_body"
+mass_kg = 0.05
+inertia_kg_m2 = [1e-6, 1e-6, 1e-6]
+centre_m = [0.3, 0.0, 0.0]
+
+[part.body.surfaces.top]
+points_m = [[0.31, 0.01, 0.0], [0.31, -0.005, 0.008], [0.31, -0.005, -0.008]]
+normal = [1.0, 0.0, 0.0]
+
+[part.held]
+shape = "lumped"
+masses_kg = [1.0]
+springs_n_per_m = [["ground", 1, 1e6]]
+
+[contact.rim]
+between = ["body.top", "ground"]
+law = "elastic_coulomb"
+normal_stiffness_n_per_m = 1e6
+tangential_stiffness_n_per_m = 1e6
+axial_stiffness_n_per_m = 1e6
+friction_coefficient = 0.3
+
+[rotation]
+speed_rpm = 1000.0
+
+[load.shaker]
+on = "body"
+direction = "x"
+force_n = 1.0
+
+[forced_response]
+frequencies_hz = [100.0]
+"""
+
+
+def test_rotation_alone_presses_a_body_where_no_part_is_a_mesh(tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(RIM)
+    force = Study.from_file(path).model().assembled(1).static_force
+    growth = 0.05 * (1000.0 * RPM) ** 2  # N/m: the further out, the stronger it is pulled
+    assert force[:, 2].sum() == pytest.approx(-growth * 0.3 / (1.0 - growth / 1e6), rel=1e-9)

@@ -108,7 +108,11 @@ class Model:
 
     @property
     def rotates(self) -> bool:
-        """Whether a speed changes it."""
+        """Whether a speed changes it: meshes and rigid bodies, not matrices."""
+        return any(part.body is not None for part in self.parts.values()) or self._has_mesh
+
+    @property
+    def _has_mesh(self) -> bool:
         return any(part.solid is not None for part in self.parts.values())
 
     @property
@@ -181,7 +185,7 @@ class Model:
     @cached_property
     def steady(self) -> dict[str, Steady]:
         """What the displacements of steady rotation obey: cyclic faces, and joins, by which parts share in it."""
-        if self.joins and self.rotates:
+        if self.joins and self._has_mesh:
             return self._joined_displacements()
         ties = {} if self.neighbours is None else self.neighbours.ties
         return {name: Steady(ties.get(name)) for name in self.parts}

@@ -7,7 +7,13 @@ from typing import Any
 from stickslip.assembly.contact import GROUND, NEXT
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.dofs import is_numbered
-from stickslip.study.file.bodies import Cylinder, FlatCurved, RigidBodyTable, Wedge
+from stickslip.study.file.bodies import (
+    BODIES,
+    Cylinder,
+    FlatCurved,
+    RigidBodyTable,
+    Wedge,
+)
 from stickslip.study.file.parts import (
     BeamTable,
     Copy,
@@ -313,7 +319,8 @@ def _questions(tables: Tables) -> Iterator[InputError]:
 
 def _without_a_mesh(tables: Tables) -> Iterator[InputError]:
     """Yield the complaints about speeds where nothing turns that they change."""
-    if any(_turns(original(tables, name)) for name in tables.part):
+    originals = [original(tables, name) for name in tables.part]
+    if any(map(_turns, originals)):
         return
     asked: Any = tables
     if getattr(asked, "campbell", None) is not None:
@@ -322,10 +329,10 @@ def _without_a_mesh(tables: Tables) -> Iterator[InputError]:
             "needs a part that a speed changes, and none is a mesh",
             "Give a part a shape, a deck (.inp) or an archive (.cdb).",
         )
-    if tables.rotation.speed_rpm > 0:
+    if tables.rotation.speed_rpm > 0 and not any(isinstance(part, BODIES) for part in originals):
         yield input_error(
             "rotation.speed_rpm",
-            f"is {tables.rotation.speed_rpm:g}, but no part is a mesh, and a speed changes nothing else",
+            f"is {tables.rotation.speed_rpm:g}, but no part is a mesh or a rigid body, and a speed changes nothing else",
             "Give 0, or bring a mesh. Matrices that were exported at speed hold its effects already.",
         )
 
