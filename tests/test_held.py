@@ -9,9 +9,12 @@ from test_assembly_copies import LAW, bar, halves
 from test_cli import done, refused
 
 from stickslip.assembly.contact import Contact, Join
+from stickslip.assembly.forces import force_of
 from stickslip.assembly.held import refuse_unheld, unheld
 from stickslip.assembly.load import Load
 from stickslip.assembly.model import Model
+from stickslip.assembly.pulled import refuse_pulled
+from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError
 from stickslip.model.dofs import numbered_dofs
@@ -19,6 +22,8 @@ from stickslip.model.fe.solid import Material
 from stickslip.model.part import rigid_part, solid_part, structure_part
 from stickslip.model.rigid.body import RigidBody
 from stickslip.model.structure import Structure
+
+STICKY = ElasticCoulomb(k_t=3e6, k_w=3e6, k_n=5e6, mu=0.3)
 
 
 def free_bar(contacts=None, joins=None, law=LAW, **more):
@@ -68,6 +73,40 @@ def test_a_join_holds_and_so_does_a_joined_neighbour() -> None:
 def test_open_contacts_hold_nothing() -> None:
     found = unheld(free_bar(), np.zeros(4, dtype=bool))
     assert [error.place for error in found] == ["part.loose"]
+
+
+def test_a_static_load_that_opens_all_contacts_is_refused_before_the_equilibrium() -> None:
+    # along -x the loose bar leaves the ground at its right end; 45° to it friction of 0.3 does not hold, nor does a tilting moment
+    for toward in ((-1.0, 0.0, 0.0), (-1.0, 1.0, 0.0)):
+        pull = Load(on="loose.left", newton=10.0, direction=toward, harmonic=0)
+        with pytest.raises(InputError, match=r"load.pull: pulls part.loose off") as error:
+            refuse_pulled(*with_static(free_bar(law=STICKY), pull))
+        assert "part.held" not in str(error.value)
+    for toward in ((1.0, 0.0, 0.0), (1.0, 0.2, 0.0)):  # pressed; within the cone of friction
+        push = Load(on="loose.right", newton=10.0, direction=toward, harmonic=0)
+        refuse_pulled(*with_static(free_bar(law=STICKY), push))
+    side = Load(on="loose.right", newton=10.0, direction=(1.0, 0.5, 0.0), harmonic=0)
+    with pytest.raises(InputError, match=r"load.pull: pulls part.loose off"):
+        refuse_pulled(*with_static(free_bar(law=STICKY), side))
+    weld = {"weld": Join(between=("loose.left", "held.right"), pairing="node_to_node")}
+    pull = Load(on="loose.left", newton=10.0, direction=(-1.0, 0.0, 0.0), harmonic=0)
+    refuse_pulled(*with_static(free_bar(joins=weld), pull))
+
+
+def with_static(model: Model, load: Load) -> tuple[Model, dict[str, np.ndarray]]:
+    return model, {"load.pull": force_of(model.places, "pull", load)}
+
+
+def test_a_body_of_open_contacts_is_warned_of(tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    gap = "[contact.stop]\nbetween = ['chain.m3', 'chain.m1']\nlaw = 'unilateral_spring'\n"
+    gap += "normal_stiffness_n_per_m = 1e4\ngap_m = 1e-3\n[load.shaker]"
+    path.write_text(FREE.replace("[load.shaker]", gap))
+    said = " ".join(done("check", str(path)).split())
+    assert "part.chain: the body of m2 is held by nothing at rest" in said
+    held = FREE.replace("[2, 3, 1e4]]", "[2, 3, 1e4], [1, 2, 1e2]]")
+    path.write_text(held.replace("[load.shaker]", gap))
+    assert "held by nothing" not in done("check", str(path))
 
 
 def test_a_rigid_body_is_held_by_contacts_or_its_retention() -> None:

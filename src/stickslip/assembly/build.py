@@ -17,11 +17,12 @@ from stickslip.assembly.forces import (
     force_of,
     output_labels,
 )
-from stickslip.assembly.held import refuse_unheld
+from stickslip.assembly.held import open_warnings, refuse_unheld
 from stickslip.assembly.joined import KEY, on_shapes
 from stickslip.assembly.model import Model
 from stickslip.assembly.places import picked, stacked
 from stickslip.assembly.points import in_points
+from stickslip.assembly.pulled import refuse_pulled
 from stickslip.assembly.reduced import Store, in_memory, reduced_parts
 from stickslip.assembly.rigid import held_gaps, in_gaps, refuse_mixed_gaps, refuse_rigid
 from stickslip.assembly.statics import pressed_by, static_contact_force
@@ -87,8 +88,7 @@ def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
         raise input_error(
             "contact", "there is none: no coordinate would be left to solve for", "Give a contact."
         )
-    refuse_rigid(model)
-    refuse_unheld(model)
+    _refuse_free(model, forces)
     stay = np.concatenate([labels.dofs, watched])
     kept = np.concatenate([stay, *(np.flatnonzero(f) for f in forces.values())])
     linear = linear_side(model, order or 0, harmonics, kept, stay, store)
@@ -103,6 +103,7 @@ def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
     load = _loads(model, linear, forces)
     held = system.with_retention(model.retention)
     gap, force = static_state(held, load.static)
+    pressed = pressed_by(system.springs.laws, force)
     checked = frequencies(model, linear, system.springs.stuck_stiffness(), order, store)
     if model.peak_output:
         labels.of((model.peak_output,), "output.peak")
@@ -129,8 +130,14 @@ def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
             "reduced": linear.side.n,
             "retained": int(held.retained.size),
         },
-        warnings=(*model.warnings, *checked.warnings()),
+        warnings=(*model.warnings, *open_warnings(model, pressed), *checked.warnings()),
     )
+
+
+def _refuse_free(model: Model, forces: dict[str, Matrix]) -> None:
+    refuse_rigid(model)
+    refuse_unheld(model)
+    refuse_pulled(model, _static_forces(model, forces))
 
 
 def _refuse_beyond(model: Model, harmonics: int) -> None:
@@ -283,6 +290,22 @@ def _loads(model: Model, linear: Linear, forces: dict[str, Matrix]) -> HarmonicL
     return HarmonicLoad(static, harmonics)
 
 
+def _static_forces(model: Model, forces: dict[str, Matrix]) -> dict[str, FloatArray]:
+    """Return the static forces (N,) on the dofs of all parts, by the keys that give them."""
+    static = {
+        f"load.{name}": np.real(force)
+        for name, force in forces.items()
+        if model.loads[name].harmonic == 0
+    }
+    if model.centrifugal and model.speed > 0:
+        static["rotation.speed_rpm"] = centrifugal_of_bodies(model)
+        for name, part in model.parts.items():
+            if part.solid is not None:
+                own = model.speed**2 * part.solid.centrifugal
+                static["rotation.speed_rpm"][model.places.own(name)] = own
+    return static
+
+
 def centrifugal_of_bodies(model: Model) -> FloatArray:
     """Return the (N,) centrifugal forces (N) and moments (N m) on rigid bodies at their centres of mass."""
     force = np.zeros(model.places.n)
@@ -313,6 +336,7 @@ def pressed_points(model: Model) -> BoolArray:
     """Return the contact points that the static loads at the model's own speed press, and those that cannot open."""
     static = {name: load for name, load in model.loads.items() if load.harmonic == 0}
     forces = {name: force_of(model.places, name, load) for name, load in static.items()}
+    refuse_pulled(model, _static_forces(model, forces))
     kept = stacked(np.flatnonzero(f) for f in forces.values())
     empty = kept[:0]
     linear = linear_side(model, 0, 0, kept, empty, in_memory)

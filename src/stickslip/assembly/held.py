@@ -52,24 +52,57 @@ def refuse_unheld(model: Model) -> None:
 def unheld(model: Model, holds: BoolArray) -> list[InputError]:
     """Return a complaint about each part that is free to move where some contact points (p,) hold and the others are open."""
     bodies = _loose(model)
-    if not bodies:
-        return []
-    columns = np.cumsum([0, *(body.motions.shape[1] for body in bodies)])
-    moves = np.zeros((model.places.n, columns[-1]))
-    for body, first in zip(bodies, columns, strict=False):
-        moves[body.dofs, first : first + body.motions.shape[1]] = body.motions
-    strained = np.vstack([rows @ moves for rows in _holding(model, holds)])
-    _, values, right = np.linalg.svd(strained, full_matrices=True)
-    rank = int(np.count_nonzero(values > RANK * values.max(initial=0.0)))
-    free = right[rank:].T
+    columns = _columns(bodies)
+    free = _free(model, bodies, holds)
     found: dict[str, InputError] = {}
     for body, first, last in zip(bodies, columns, columns[1:], strict=False):
         own = free[first:last]
         left, sizes, _ = np.linalg.svd(own, full_matrices=False)
         shapes = body.motions @ left[:, sizes > SHARE]
         if shapes.shape[1]:
-            found.setdefault(body.part, _complaint(model, body, shapes))
+            complaint = _complaint(model, body, shapes, at_rest=not np.all(holds))
+            found.setdefault(body.part, complaint)
     return list(found.values())
+
+
+def open_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
+    """Warn of parts that are free to move at rest, where the static loads press some contact points (p,) and the others are open."""
+    if np.all(pressed):
+        return ()
+    return tuple(
+        f"{error} The mean of its vibration is known only where contacts close."
+        for error in unheld(model, pressed)
+    )
+
+
+def free_motions(model: Model, holds: BoolArray) -> FloatArray:
+    """Return the (N, f) motions of the dofs of all parts that strain nothing where some contact points (p,) hold."""
+    bodies = _loose(model)
+    return _moves(model, bodies) @ _free(model, bodies, holds)
+
+
+def _columns(bodies: list[Loose]) -> IntArray:
+    return np.cumsum([0, *(body.motions.shape[1] for body in bodies)])
+
+
+def _moves(model: Model, bodies: list[Loose]) -> FloatArray:
+    """Return the motions of bodies side by side, on the dofs of all parts."""
+    columns = _columns(bodies)
+    moves = np.zeros((model.places.n, columns[-1]))
+    for body, first in zip(bodies, columns, strict=False):
+        moves[body.dofs, first : first + body.motions.shape[1]] = body.motions
+    return moves
+
+
+def _free(model: Model, bodies: list[Loose], holds: BoolArray) -> FloatArray:
+    """Return the shares (m, f) of the motions of bodies that make one that strains nothing."""
+    moves = _moves(model, bodies)
+    strained = np.vstack([rows @ moves for rows in _holding(model, holds)])
+    if len(strained) > moves.shape[1]:
+        strained = np.asarray(np.linalg.qr(strained, mode="r"))
+    _, values, right = np.linalg.svd(strained, full_matrices=True)
+    rank = int(np.count_nonzero(values > RANK * values.max(initial=0.0)))
+    return np.asarray(right[rank:].T)
 
 
 def _loose(model: Model) -> list[Loose]:
@@ -133,7 +166,7 @@ def _holding(model: Model, holds: BoolArray) -> list[Matrix]:
     return found
 
 
-def _complaint(model: Model, body: Loose, shapes: FloatArray) -> InputError:
+def _complaint(model: Model, body: Loose, shapes: FloatArray, *, at_rest: bool) -> InputError:
     part = model.parts[body.part]
     words = in_words(model.places.dofs.take(body.dofs), shapes)
     whole = body.dofs.size == part.structure.n
@@ -142,6 +175,8 @@ def _complaint(model: Model, body: Loose, shapes: FloatArray) -> InputError:
         if whole
         else f"the body of {_label(part, body.dofs[0] - model.places.own(body.part)[0])} "
     )
+    what = "no closed contact, support" if at_rest else "no support, contact"
+    add = "press its contacts by a static load" if at_rest else "add a contact with stiffness"
     spring = (
         "give [retention] a stiffness"
         if part.body is not None
@@ -149,8 +184,8 @@ def _complaint(model: Model, body: Loose, shapes: FloatArray) -> InputError:
     )
     return input_error(
         f"part.{body.part}",
-        f"{which}is held by nothing: no support, contact or join keeps it from {words}",
-        f"Clamp it, join it, add a contact with stiffness in that direction, or {spring}.",
+        f"{which}is held by nothing{' at rest' if at_rest else ''}: {what} or join keeps it from {words}",
+        f"Clamp it, join it, {add} in that direction, or {spring}.",
     )
 
 

@@ -34,11 +34,15 @@ def pressed_by(laws: Sequence[ContactLaw], force: FloatArray) -> BoolArray:
     force
         (p, 3) static contact forces t, w, n, N.
     """
-    opens: dict[int, bool] = {}
+    return np.asarray((force[:, 2] < 0.0) | ~opening(laws))
+
+
+def opening(laws: Sequence[ContactLaw]) -> BoolArray:
+    """Return the contact points (p,) whose law lets go of them where they are far away."""
+    found: dict[int, bool] = {}
     for law in laws:
-        opens.setdefault(id(law), _opens(law))
-    can = np.array([opens[id(law)] for law in laws], dtype=bool)
-    return np.asarray((force[:, 2] < 0.0) | ~can)
+        found.setdefault(id(law), _opens(law))
+    return np.array([found[id(law)] for law in laws], dtype=bool)
 
 
 def _opens(law: ContactLaw) -> bool:

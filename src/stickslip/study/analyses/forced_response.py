@@ -99,7 +99,13 @@ class ForcedResponseAnalysis:
         question = self.inputs(case, model)
         chooser, passages = question.chooser, case.settings.harmonics.passages
         labels = question.model.error_labels
-        doubts = [*no_resonance(question), *nothing_pressed(question), *mixed_places(labels)]
+        of_model = [text for text in question.model.warnings if text not in model.warnings]
+        doubts = [
+            *of_model,
+            *no_resonance(question),
+            *nothing_pressed(question),
+            *mixed_places(labels),
+        ]
         return (
             str(estimate(model, question.sweep)),
             *(f"harmonics: {line}" for line in chooser.lines(passages)),
