@@ -211,3 +211,43 @@ def test_what_the_numbers_of_a_case_cast_doubt_on_is_a_warning_of_the_run() -> N
         "verify_settled": [1],
     }
     assert not list(of_numbers(good))
+
+
+@pytest.mark.parametrize("share", [5e-7, 1e-9])
+def test_a_faint_excitation_is_measured_as_a_whole(share):
+    # 16 dofs share the force: each has a quarter of its norm; the damper sticks, so that the response is linear
+    n = 16
+    structure = chain(n, 1.0, 1e4, 1e-4)
+    gaps = np.zeros((3, n))
+    gaps[0, -1] = -1.0
+    law = ss.Jenkins(k_t=1e3, limit=1e6)
+    held = System(
+        structure, Interface(("c",), (law,), scipy.sparse.csr_array(gaps)), outputs=np.array([0])
+    )
+    static = np.zeros(n)
+    static[0] = 1.0
+
+    def amplitude(size):
+        load = ss.HarmonicLoad(static, {1: np.full(n, size / math.sqrt(n))})
+        points = list(forced_response(held, load, sweep(peak_points=0)))
+        assert all(point.converged for point in points)
+        problem = forced_problem(held, load, sweep())
+        return np.array([problem.amplitude(point) for point in points])
+
+    if share < 1e-7:
+        with pytest.raises(InputError, match=r"is 1e-09 of the static load"):
+            amplitude(share)
+        return
+    assert amplitude(share) / share == pytest.approx(amplitude(1.0), rel=1e-3)
+
+
+def test_a_faint_excitation_is_refused_by_its_key(tmp_path):
+    changes = {
+        "load.pull.on": '"chain.m4"',
+        "load.pull.force_n": "1.0",
+        "load.pull.harmonic": "0",
+        "load.shaker.force_n": "1e-9",
+        "vary.load.shaker.force_n": "[1e-9]",
+    }
+    said = refused("check", str(write_four_masses(tmp_path, changes)))
+    assert "load.shaker.force_n (" in said and "is 1e-09 of the static load" in said

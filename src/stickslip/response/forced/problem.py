@@ -30,7 +30,7 @@ from stickslip.solve.status import Rung, Status
 
 Balance = HarmonicBalance | DynamicLagrangian
 Stage = Literal["low", "high", "branch", "peak"]
-FAINTEST = 1e-6  # excitation over static load: below, the residual tolerance swallows the vibration
+FAINTEST = 1e-7  # excitation over static load: a thousand times the residual tolerance, which swallows the vibration
 ALERT_TOLERANCE = 1e-6  # relative residual of the alert's step where it is found by iteration
 BRANCH_ITERATIONS = 10  # of a corrector along a branch
 
@@ -221,14 +221,13 @@ def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedPr
             )
     linear = system.condensed(load, reference[-1])
     low = _periodic(system, linear, sweep)
-    dynamic = max(
-        (float(np.max(np.abs(f), initial=0.0)) for f in load.harmonics.values()), default=0.0
-    )
+    # norms, as the tolerance bounds one: the share of a node says nothing of the whole force
+    dynamic = float(np.linalg.norm(list(load.harmonics.values())))
     if 0.0 < dynamic < FAINTEST * low.force_scale:
         raise input_error(
             "HarmonicLoad",
-            f"the excitation of {dynamic:.3g} N is less than a millionth of the static load or preload of {low.force_scale:.3g} N, "
-            "too faint for the tolerance of the solver",
+            f"the excitation is {dynamic / low.force_scale:.2g} of the static load or preload on the coordinates of the model, "
+            f"{dynamic:.3g} of {low.force_scale:.3g} N: below {FAINTEST:g} it is too faint for the tolerance of the solver",
             "Solve the stuck structure, which is linear, or raise the excitation.",
         )
     return ForcedProblem(system, sweep, low, low.with_harmonics(reference))

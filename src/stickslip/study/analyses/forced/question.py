@@ -123,7 +123,8 @@ def question_of(case: Case, model: Model) -> Question:
     try:
         forced_problem(assembled.system, assembled.load, sweep)
     except InputError as error:
-        raise error.at(f"load ({case.label})" if case.label else "load") from None
+        place = _driving(settings.load)
+        raise error.at(f"{place} ({case.label})" if case.label else place) from None
     counts = {name: assembled.counts[name] for name in ("reduced", "retained")}
     return Question(
         label=case.label,
@@ -135,6 +136,15 @@ def question_of(case: Case, model: Model) -> Question:
         checks=case.checks,
         first=case.index == 0,
     )
+
+
+def _driving(loads: Mapping[str, Any]) -> str:
+    """Return the key of the only load that vibrates; the table where there are several."""
+    driven = {name: table for name, table in loads.items() if table.harmonic > 0}
+    if len(driven) != 1:
+        return "load"
+    (name, table), *_ = driven.items()
+    return f"load.{name}.{'ratio' if table.ratio_of else 'force_n'}"
 
 
 def _engine_order(model: Model) -> int | None:
