@@ -7,6 +7,7 @@ import pytest
 from small_v2 import write_example_deck
 from test_cli import done, refused
 
+from stickslip.errors import InputError
 from stickslip.model.readers.calculix_deck import read_deck
 from stickslip.model.readers.units import Units
 from stickslip.model.structure_file import save_structure
@@ -183,3 +184,10 @@ def test_a_cyclic_tie_without_a_number_of_sectors_is_refused(tmp_path: Path) -> 
     at = next(i for i, line in enumerate(lines) if line.startswith("*CYCLIC SYMMETRY MODEL"))
     deck.write_text("\n".join(lines[:at] + lines[at + 2 :]) + "\n")
     assert "nothing says how many sectors there are" in refused("check", str(path))
+
+
+def test_a_material_that_no_solid_is_names_deck_and_line(tmp_path: Path) -> None:
+    deck = write_deck(tmp_path / "bar.inp")
+    deck.write_text(deck.read_text().replace("7850.", "-7850."))
+    with pytest.raises(InputError, match=r"bar\.inp: line \d+, .*'STEEL': Material\.density: must"):
+        read_deck(deck, plausible=False)

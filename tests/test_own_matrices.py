@@ -2,6 +2,7 @@
 
 import runpy
 import shutil
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from small_v2 import EXAMPLES, changed
 from test_cli import done, refused
 
 from stickslip.front.result import Result
+from stickslip.model.modes import lowest_modes
 from stickslip.study.models.study import read_study
 
 EXAMPLE = EXAMPLES / "own_matrices"
@@ -120,6 +122,14 @@ def test_damping_in_the_file_is_kept_and_a_table_of_the_part_replaces_it(tmp_pat
             "pairs 'chain.dof12' with itself",
         ),
         ({"output.peak": '"tip.dof20"'}, "no output 'tip.dof20'. Did you mean 'end.dof20'?"),
+        (
+            {"load.shaker.direction": '"y"'},
+            "load.shaker.direction: is given, but 'chain.dof20' is a single dof",
+        ),
+        (
+            {"modes.number": "21"},
+            "modes.number: is 21, and the model has 20 dofs with mass. Give at most 20.",
+        ),
         ({"output.peak": '"end.x"'}, "no output 'end.x'. Known: end.dof20, middle.dof10."),
     ],
 )
@@ -170,6 +180,35 @@ def test_arrays_of_other_names_are_told(tmp_path: Path) -> None:
     said = "holds the arrays K, M, and no stiffness. Its arrays must be called mass, stiffness"
     assert said in refused("check", str(path))
     assert said in refused("inspect", str(tmp_path / "chain.npz"))
+
+
+M, K = matrices()
+
+
+@pytest.mark.parametrize(
+    ("arrays", "message"),
+    [
+        ({"stiffness": K - 3e5 * np.diag(np.eye(20)[3])}, "stiffness: is not positive: a motion, dof4 the most"),
+        ({"mass": M - np.diag(np.eye(20)[3])}, "mass: is negative, -0.5, at dof4"),
+    ],
+)  # fmt: skip
+def test_matrices_of_the_wrong_sign_are_refused_by_file_and_dof(tmp_path, arrays, message) -> None:
+    said = refused("check", str(copied(tmp_path, {}, **arrays)))
+    assert f"chain.npz: {message}" in said
+
+
+def test_modes_of_a_negative_mass_are_looked_for_without_a_root_of_it() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(np.linalg.LinAlgError):
+            lowest_modes(K, M - np.diag(np.eye(20)[3]), 20, None)
+
+
+def test_negative_damping_is_warned_of(tmp_path: Path) -> None:
+    model = read_study(copied(tmp_path, {}, damping=np.diag(np.arange(20) - 3.0))).model()
+    assert "damping is negative, -3 N s/m in a motion of dof1" in model.warnings[0]
+    model = read_study(copied(tmp_path, {}, damping=np.diag(np.arange(20.0)))).model()
+    assert model.warnings == ()
 
 
 def test_a_lossy_stiffness_is_told_from_one_that_lacks_symmetry(tmp_path: Path) -> None:

@@ -9,6 +9,8 @@ import pytest
 from small_v2 import EXAMPLES, changed
 from test_cli import done, refused
 
+from stickslip.assembly.forces import force_of
+from stickslip.errors import InputError
 from stickslip.front.result import Result
 from stickslip.model.damping import rayleigh_damping
 from stickslip.model.fe.beam import Beam, beam, rotating_beam
@@ -131,3 +133,25 @@ def test_a_node_without_a_normal_is_told_how_to_get_one(tmp_path: Path) -> None:
     lines = [line for line in path.read_text().splitlines() if not line.startswith("normal =")]
     path.write_text("\n".join(lines))
     assert "give the normal of the contact" in refused("check", str(path))
+
+
+def test_a_force_across_a_beam_that_bends_one_way_is_refused(tmp_path: Path) -> None:
+    path = write(
+        tmp_path, SMALL | {"part.beam.bending": '"z"', "contact.plate.normal": "[1.0, 0.0, 0.0]"}
+    )
+    said = refused("check", str(path))
+    assert "load.side.direction: is given, but 'beam.tip' is a single dof" in said
+    assert "of direction z" in said
+
+
+def test_a_contact_without_motion_along_its_normal_is_warned_of(tmp_path: Path) -> None:
+    model = read_study(write(tmp_path / "a", SMALL | {"part.beam.axial": "false"})).model()
+    assert "no point of it can move along the normal" in model.warnings[0]
+    assert read_study(write(tmp_path / "b", SMALL)).model().warnings == ()
+
+
+def test_a_force_along_an_axis_in_which_no_point_moves_is_refused(tmp_path: Path) -> None:
+    changes = {"part.beam.axial": "false", "load.side.direction": "[1.0, 1.0, 0.0]"}
+    model = read_study(write(tmp_path, SMALL | changes)).model()
+    with pytest.raises(InputError, match=r"load.side.on: 'beam.tip' cannot move along x"):
+        force_of(model.places, "side", model.loads["side"])

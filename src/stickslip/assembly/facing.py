@@ -12,6 +12,8 @@ from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.contact import Contact
 from stickslip.assembly.places import Places, Spot
 from stickslip.contact.facets import centres, normals
+from stickslip.contact.law import ContactLaw
+from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.contact.pairing import Pairing
 from stickslip.contact.projection import facet_balls
 from stickslip.contact.surface import SMOOTH, Surface
@@ -20,6 +22,7 @@ from stickslip.model.mesh.mesh_facets import facets_of
 
 STEEPEST = 45.0  # degrees from opposite at which surfaces cannot be meant to touch
 DEEP = 0.05  # of a facet's radius: what facets of curved surfaces overlap by is less
+FLAT = 1e-9  # part of a motion along a normal that is rounding
 NONE: IntArray = np.zeros(0, dtype=np.int64)
 NAMED = 5  # points that a message names
 Normals = tuple[FloatArray, FloatArray]  # points (n, 3) and their unit normals
@@ -84,6 +87,18 @@ def refuse_held(key: str, operator: Matrix) -> None:
             "no point of the contact can move: its nodes are clamped",
             "Name a surface that moves, or clamp less.",
         )
+
+
+def flat_warning(key: str, operator: Matrix, law: ContactLaw) -> tuple[str, ...]:
+    """Warn of a contact with normal stiffness of which no point can move along its normal."""
+    rigid = isinstance(law, RigidCoulomb)
+    if abs(operator[2::3]).max() > FLAT or not (rigid or law.stuck_stiffness()[2] > 0):
+        return ()
+    text = (
+        f"{key}: no point of it can move along the normal; its normal force stays that at rest, and its normal stiffness "
+        "does nothing. Let the part move so (a beam: axial = true), or give another normal."
+    )
+    return (text,)
 
 
 def rim_warning(places: Places, key: str, spot: Spot) -> tuple[str, ...]:

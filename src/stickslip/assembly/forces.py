@@ -27,18 +27,41 @@ def force_of(places: Places, name: str, load: Load) -> Matrix:
     amplitude = load.newton * (cmath.exp(1j * load.phase) if load.phase else 1.0)
     force = np.zeros(places.n, dtype=type(amplitude))
     if spot.surface is None:
+        _refuse_direction(places, key, load, spot)
         force[spot.dofs] = amplitude / spot.dofs.size
         return force
     unit = _unit(key, load)
     points = len(spot.surface.points)
     shape = spot.surface.displacement.T @ np.tile(unit / points, points)
-    if not np.any(shape):
+    stuck = [axis for i, axis in enumerate(AXES) if abs(unit[i]) > ALONG and not _moves(spot, i)]
+    if not np.any(shape) or stuck:
+        along = stuck[0] if len(stuck) == 1 and np.any(shape) else unit.tolist()
         raise input_error(
             f"{key}.on",
-            f"{load.on!r} cannot move along {unit.tolist()}",
-            "Choose a place that is not clamped.",
+            f"{load.on!r} cannot move along {along}",
+            "Choose a place that is not clamped, or another direction.",
         )
     return amplitude * shape
+
+
+def _moves(spot: Spot, axis: int) -> bool:
+    """Tell whether a point of a spot can move along an axis."""
+    assert spot.surface is not None
+    return bool(abs(spot.surface.displacement[axis::3]).max() > 0)
+
+
+def _refuse_direction(places: Places, key: str, load: Load, spot: Spot) -> None:
+    """Refuse a direction that is not the one in which single dofs move, along which the whole force acts."""
+    if load.direction is None:
+        return
+    own = {places.dofs.component[dof] for dof in spot.dofs}
+    unit = _unit(key, load)
+    if any(axis not in AXES or abs(unit[AXES.index(axis)] - 1) > ALONG for axis in own):
+        raise input_error(
+            f"{key}.direction",
+            f"is given, but {load.on!r} is a single dof, or several, of direction {', '.join(sorted(own))}",
+            "Leave it out: the force acts along the dof, and its sign is that of force_n. Or name a node that can move so.",
+        )
 
 
 def _unit(key: str, load: Load) -> FloatArray:

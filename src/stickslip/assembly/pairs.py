@@ -10,6 +10,7 @@ import scipy.sparse
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.contact import GROUND, NEXT, Contact, Join
 from stickslip.assembly.facing import (
+    flat_warning,
     overlap_warning,
     refuse_averted,
     refuse_held,
@@ -160,7 +161,7 @@ def one_contact(places: Places, name: str, contact: Contact, turn: Turn | None) 
     refuse_held(key, operator)
     labels = first.labels if len(first.labels) == p else tuple(f"{name}.{i + 1}" for i in range(p))
     rims = (text for side in (first, second) if side for text in rim_warning(places, key, side))
-    warnings = (*said, *rims)
+    warnings = (*said, *rims, *flat_warning(key, operator, law))
     if contact.pairing != "node_to_node" and len(first.surface.facets):
         lost = len(first.surface.points) - len(first.surface.used)
         if lost:

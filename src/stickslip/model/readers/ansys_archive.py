@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from stickslip.arrays import IntArray
-from stickslip.errors import input_error
+from stickslip.errors import InputError, input_error
 from stickslip.model.fe.solid import Material
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.readers.ansys_blocks import (
@@ -109,11 +109,14 @@ def read_ansys_materials(
         poisson = values.get("NUXY", values.get("PRXY"))
         if poisson is None or not {"EX", "DENS"} <= values.keys():
             continue
-        material = Material(
-            young_modulus=units.stress * values["EX"],
-            poisson_ratio=poisson,
-            density=units.density * values["DENS"],
-        )
+        try:
+            material = Material(
+                young_modulus=units.stress * values["EX"],
+                poisson_ratio=poisson,
+                density=units.density * values["DENS"],
+            )
+        except InputError as error:
+            raise error.inside(place) from None
         if plausible:
             check_material(material.density, material.young_modulus, units, place)
         materials[number] = material

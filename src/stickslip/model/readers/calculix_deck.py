@@ -15,7 +15,7 @@ import scipy.sparse
 from scipy.spatial import cKDTree
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
-from stickslip.errors import did_you_mean, input_error
+from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.axis import Axis
 from stickslip.model.dofs import nodal_dofs
 from stickslip.model.fe.elements import Quadrature
@@ -218,7 +218,10 @@ def _materials(model: DeckModel, units: Units, plausible: bool) -> dict[str, Mat
         modulus, density = units.stress * modulus, units.density * model.density[name]
         if plausible:
             check_material(density, modulus, units, place)
-        materials[name] = Material(young_modulus=modulus, poisson_ratio=ratio, density=density)
+        try:
+            materials[name] = Material(young_modulus=modulus, poisson_ratio=ratio, density=density)
+        except InputError as error:
+            raise error.inside(f"{place}: material {name!r}") from None
     return materials
 
 

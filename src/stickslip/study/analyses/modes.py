@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
+from stickslip.errors import input_error
 from stickslip.study.analyses.analysis import Case, Solved
 from stickslip.study.analyses.waves.analysis import WaveAnalysis
 from stickslip.study.analyses.waves.dataset import Variables, frequencies, growth
@@ -114,6 +115,7 @@ class Modes(WaveAnalysis):
         asked: ModesTable = self.asked(case)
         wheel = Wheel(model.sectors, model.coriolis and model.rotates and model.speed > 0)
         wheel.require(asked.nodal_diameters, "modes.nodal_diameters")
+        _refuse_too_many(model, asked.number)
         numbers = wheel.numbers(asked.nodal_diameters)
         known = asked.compared_with(case.home)
         if known is not None:
@@ -127,6 +129,18 @@ class Modes(WaveAnalysis):
             (model.speed,),
             rpm=float(f"{model.speed / RPM:.12g}"),
             shapes=asked.shapes and model.skin is not None,
+        )
+
+
+def _refuse_too_many(model: Model, number: int) -> None:
+    """Refuse more modes than there are dofs with mass."""
+    parts = model.parts.values()
+    most = sum(int(np.count_nonzero(part.structure.mass.diagonal())) for part in parts)
+    if number > most:
+        raise input_error(
+            "modes.number",
+            f"is {number}, and the model has {most} dofs with mass",
+            f"Give at most {most}.",
         )
 
 

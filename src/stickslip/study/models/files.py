@@ -17,6 +17,7 @@ from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.part import FACES, Part, solid_part, structure_part
 from stickslip.model.readers.ansys_archive import read_ansys_archive, read_ansys_materials
 from stickslip.model.readers.calculix_deck import Deck, read_deck
+from stickslip.model.readers.definite import negative_damping, refuse_indefinite
 from stickslip.model.readers.open_model import read_model
 from stickslip.model.readers.units import Units
 from stickslip.model.structure import Structure
@@ -185,6 +186,8 @@ def _from_matrices(key: str, table: FileModel, home: Path, others: dict[str, Any
     sectors = _sectors(key, table)
     files = {name: home / file for name, file in table.files().items()}
     structure = _matrices(key, table, files)
+    if table.plausible:
+        refuse_indefinite(structure, str(files["file"]))
     mesh = None
     if "mesh" in files and files["mesh"].name.lower().endswith(DECKS):
         mesh = read_deck(files["mesh"], units=_units(table), plausible=table.plausible).mesh
@@ -193,6 +196,7 @@ def _from_matrices(key: str, table: FileModel, home: Path, others: dict[str, Any
     ):  # its own is meant, not that of the whole study
         others = {name: value for name, value in others.items() if name != "damping"}
     faces = _faces(key, table, structure.sets, sectors)
+    others["warnings"] = negative_damping(structure, table.file)
     return structure_part(
         structure, mesh=mesh, sectors=sectors, faces=faces, axis=table.axis() or Axis(), **others
     )
