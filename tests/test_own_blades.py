@@ -197,3 +197,16 @@ def test_the_study_is_the_model_put_together_by_hand(tmp_path: Path) -> None:
     # near a resonance, both to the tolerance of Newton's method
     same(answers[0].outputs[:, at], answers[1].outputs, 1e-7)
     same(answers[0].forces, answers[1].forces, 1e-7)
+
+
+@pytest.mark.parametrize(("angle", "tilted"), [(43.0, None), (41.0, "4")])
+def test_a_wedge_of_another_angle_than_its_undersides_is_warned_of(
+    tmp_path: Path, angle: float, tilted: str | None
+) -> None:
+    own = {"part.damper.left_angle_deg": str(angle), "part.damper.right_angle_deg": "45.0"}
+    warnings = read_study(write(tmp_path, own)).model().warnings
+    found = [text for text in warnings if "is tilted by" in text]
+    assert len(found) == (0 if tilted is None else 1)
+    for text in found:
+        assert text.startswith(f"contact.left: damper.left is tilted by {tilted}° against left.")
+        assert "left_angle_deg" in text

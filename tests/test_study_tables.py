@@ -386,7 +386,9 @@ def test_what_a_deck_contradicts_is_told_with_keys_of_the_study(changes, said, t
 
 def test_a_speed_of_what_no_speed_changes_is_refused(tmp_path):
     path = write_four_masses(tmp_path, {"rotation.speed_rpm": "100.0"})
-    with pytest.raises(InputError, match=r"rotation.speed_rpm: is 100, but no part is a mesh or a rigid body"):
+    with pytest.raises(
+        InputError, match=r"rotation.speed_rpm: is 100, but no part is a mesh or a rigid body"
+    ):
         read_study(path)
 
 

@@ -20,6 +20,7 @@ from stickslip.contact.surface import SMOOTH, Surface
 from stickslip.errors import InputError, input_error
 from stickslip.model.mesh.mesh_facets import facets_of
 
+TILTED = 3.0  # degrees from opposite at which a rigid body is perhaps turned wrongly: meshes are off by less
 STEEPEST = 45.0  # degrees from opposite at which surfaces cannot be meant to touch
 DEEP = 0.05  # of a facet's radius: what facets of curved surfaces overlap by is less
 FLAT = 1e-9  # part of a motion along a normal that is rounding
@@ -40,9 +41,7 @@ def refuse_averted(key: str, contact: Contact, mine: Normals, theirs: Normals | 
     """
     if theirs is None or not len(mine[0]):
         return
-    near = cKDTree(theirs[0]).query(mine[0])[1]
-    cosine = np.clip(-np.einsum("pc,pc->p", mine[1], theirs[1][near]), -1.0, 1.0)
-    angle = float(np.degrees(np.median(np.arccos(cosine))))
+    angle = float(np.median(_from_opposite(mine, theirs)))
     if angle <= STEEPEST:
         return
     one, two = contact.between
@@ -52,6 +51,30 @@ def refuse_averted(key: str, contact: Contact, mine: Normals, theirs: Normals | 
         f"{one!r} and {two!r} {way}: their outward normals, {_mean(mine[1])} and {_mean(theirs[1])}, are {angle:.0f}° from opposite",
         "Name the faces that meet, or check how the parts are placed, turned and mirrored.",
     )
+
+
+def tilt_warning(
+    key: str, contact: Contact, part: str, mine: Normals, theirs: Normals | None
+) -> tuple[str, ...]:
+    """Warn of a rigid part no point of which lies flat on the other surface; arguments as of `refuse_averted`."""
+    if theirs is None or not len(mine[0]):
+        return ()
+    angle = float(np.min(_from_opposite(mine, theirs)))  # a curved surface is flat on it somewhere
+    if angle < TILTED:
+        return ()
+    one, two = contact.between
+    text = (
+        f"{key}: {one} is tilted by {angle:.3g}° against {two}. Check the angles of part.{part} (of a wedge left_angle_deg and "
+        "right_angle_deg) and how it is placed."
+    )
+    return (text,)
+
+
+def _from_opposite(mine: Normals, theirs: Normals) -> FloatArray:
+    """Return by how many degrees the normals of points differ from the opposite of those nearest on the other side."""
+    near = cKDTree(theirs[0]).query(mine[0])[1]
+    cosine = np.clip(-np.einsum("pc,pc->p", mine[1], theirs[1][near]), -1.0, 1.0)
+    return np.degrees(np.arccos(cosine))
 
 
 def _mean(normals: FloatArray) -> str:

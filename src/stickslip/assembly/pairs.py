@@ -15,6 +15,7 @@ from stickslip.assembly.facing import (
     refuse_averted,
     refuse_held,
     rim_warning,
+    tilt_warning,
     twice_warning,
     with_hint,
 )
@@ -262,11 +263,14 @@ def _paired(
     if opposite is not None and turn is not None and second.frame is not None:
         opposite = opposite[0], opposite[1] @ turn.matrix.T
     try:
-        refuse_averted(key, contact, (facing.points[facing.used], normals), opposite)
+        mine = facing.points[facing.used], normals
+        refuse_averted(key, contact, mine, opposite)
         found = named(key, contact, lambda: match(contact, facing, b, along))
     except InputError as error:
         raise (error if turn is not None else with_hint(error, places, facing, second)) from None
-    return found, overlap_warning(key, contact, found, (facing, b))
+    rigid = places.parts[first.part].body is not None and len(b.facets)
+    tilted = tilt_warning(key, contact, first.part, mine, opposite) if rigid else ()
+    return found, (*tilted, *overlap_warning(key, contact, found, (facing, b)))
 
 
 def match(contact: Contact | Join, a: Surface, b: Surface, along: Any) -> Pairing:
