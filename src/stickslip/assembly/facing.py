@@ -74,7 +74,7 @@ def _from_opposite(mine: Normals, theirs: Normals) -> FloatArray:
     """Return by how many degrees the normals of points differ from the opposite of those nearest on the other side."""
     near = cKDTree(theirs[0]).query(mine[0])[1]
     cosine = np.clip(-np.einsum("pc,pc->p", mine[1], theirs[1][near]), -1.0, 1.0)
-    return np.degrees(np.arccos(cosine))
+    return np.asarray(np.degrees(np.arccos(cosine)))
 
 
 def _mean(normals: FloatArray) -> str:
