@@ -112,7 +112,7 @@ def test_damping_in_the_file_is_kept_and_a_table_of_the_part_replaces_it(tmp_pat
     [
         ({"load.shaker.on": '"chain.dof21"'}, "there is no surface or set 'chain.dof21'"),
         ({"part.chain.file": '"none.npz"'}, "there is no file"),
-        ({"part.chain.mass": '"M.mtx"'}, "is of 3 x 3, the model has 20 dofs"),
+        ({"part.chain.mass": '"M.mtx"'}, "M.mtx: is of 3 x 3, the model has 20 dofs"),
         (
             {"contact.stop.between": '["chain.dof0", "ground"]'},
             "has 20 dofs, chain.dof1 to chain.dof20.",
@@ -130,6 +130,17 @@ def test_damping_in_the_file_is_kept_and_a_table_of_the_part_replaces_it(tmp_pat
             {"modes.number": "21"},
             "modes.number: is 21, and the model has 20 dofs with mass. Give at most 20.",
         ),
+        (
+            {"modes.nodal_diameters": "[1]"},
+            "modes.nodal_diameters: are of a wheel, and no part is a sector of one",
+        ),
+        (
+            {"contact.brake.between": '["ground", "ground"]'},
+            "are both the ground. Name a place of a part first.",
+        ),
+        ({"limits.memory_gb": "0.01"}, "the parts, some 2 nodes"),
+        ({"damping.ratio": "1.0"}, "from 0 to below 1 (0.01 is 1 %)"),
+        ({"reduction.fixed_interface_modes": "0"}, "Give number of modes that craig_bampton keeps"),
         ({"output.peak": '"end.x"'}, "no output 'end.x'. Known: end.dof20, middle.dof10."),
     ],
 )
@@ -202,6 +213,19 @@ def test_modes_of_a_negative_mass_are_looked_for_without_a_root_of_it() -> None:
         warnings.simplefilter("error")
         with pytest.raises(np.linalg.LinAlgError):
             lowest_modes(K, M - np.diag(np.eye(20)[3]), 20, None)
+
+
+def test_a_matrix_of_another_size_is_named(tmp_path: Path) -> None:
+    said = refused("check", str(copied(tmp_path, {}, mass=M[:5, :5])))
+    assert "chain.npz: mass: is of 5 x 5, the model has 20 dofs" in said
+
+
+def test_rigid_motions_are_counted_and_elements_that_are_not_there_are_not(tmp_path: Path) -> None:
+    free = K.copy()
+    free[0, 0] = -K[0, 1]
+    said = done("check", str(copied(tmp_path, {}, stiffness=free)))
+    assert "natural frequencies, contacts open: 1 of rigid motions, " in said
+    assert "elements" not in said
 
 
 def test_negative_damping_is_warned_of(tmp_path: Path) -> None:

@@ -155,3 +155,33 @@ def test_a_force_along_an_axis_in_which_no_point_moves_is_refused(tmp_path: Path
     model = read_study(write(tmp_path, SMALL | changes)).model()
     with pytest.raises(InputError, match=r"load.side.on: 'beam.tip' cannot move along x"):
         force_of(model.places, "side", model.loads["side"])
+
+
+def test_a_place_far_from_every_node_is_warned_of(tmp_path: Path) -> None:
+    """A beam of 0.4 m: 50 m away is a place in millimetres."""
+
+    def warned(name: str, x: float) -> tuple[str, ...]:
+        points = f'{{ tip = {{ on = "beam", near_m = [{x}, 0.0, 0.0] }} }}'
+        return (
+            read_study(write(tmp_path / name, SMALL | {"output.points": points})).model().warnings
+        )
+
+    assert (
+        "output.points.tip.near_m: the nearest node of beam is 49.6 m away" in warned("a", 50.0)[0]
+    )
+    assert warned("b", 0.41) == ()
+
+
+def test_an_output_that_sticks_throughout_is_said_not_to_move(tmp_path: Path) -> None:
+    changes = {
+        "contact.plate.law": '"rigid_coulomb"',
+        "contact.plate.friction_coefficient": "0.3",
+        "contact.plate.interference_m": "1e-5",
+    }
+    path = write(tmp_path, SMALL | changes)
+    drop = ("normal_stiffness", "tangential_stiffness", "preload", "axial_stiffness")
+    lines = [line for line in path.read_text().splitlines() if not line.startswith(drop)]
+    path.write_text("\n".join(lines))
+    said = done("run", str(path), "--no-report")
+    assert "does not move: a rigid contact holds it at all frequencies" in said
+    assert "Widen" not in said

@@ -11,6 +11,7 @@ from stickslip.assembly.load import Load, Output
 from stickslip.assembly.places import AXES, COMPONENTS, Places, Spot
 from stickslip.errors import did_you_mean, input_error
 
+FAR = 0.1  # of a part's size: no mesh is so coarse
 ALONG = 1e-6  # share of a direction below which it has no such component
 
 
@@ -188,6 +189,23 @@ def _first(places: Places, spot: Spot) -> IntArray:
     assert spot.surface is not None
     assert spot.surface.numbers is not None
     return np.asarray(places.rows(spot.part, spot.surface.numbers[:1])[0])
+
+
+def far_outputs(places: Places, outputs: tuple[Output, ...]) -> list[str]:
+    """Return a warning about each output whose nearest node is far from the place asked for."""
+    found = []
+    for output in outputs:
+        if output.near is None or output.on not in places.parts:
+            continue
+        points = places.parts[output.on].structure.dofs.position
+        points = points[np.isfinite(points).all(axis=1)]
+        away = np.linalg.norm(points - np.asarray(output.near, dtype=float), axis=1)
+        if points.size and away.min() > FAR * np.linalg.norm(np.ptp(points, axis=0)):
+            found.append(
+                f"output.points.{output.name}.near_m: the nearest node of {output.on} is {away.min():.3g} m away, at "
+                f"{points[np.argmin(away)].tolist()} m. Is the place in metres?"
+            )
+    return found
 
 
 def _nearest(places: Places, output: Output, key: str) -> IntArray:

@@ -12,6 +12,7 @@ from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.assembled import Assembled, Skin
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.coordinates import Coordinates, coordinates
+from stickslip.assembly.forces import far_outputs
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.pairs import Pairs, pair_contacts
 from stickslip.assembly.places import Places, picked
@@ -166,9 +167,12 @@ class Model:
         of_parts = [text for part in self.parts.values() for text in part.warnings]
         of_wheel = () if self.neighbours is None else self.neighbours.warnings
         of_units = unlike_units(self.parts)
+        of_outputs = far_outputs(self.places, self.outputs)
         orders = _beyond_sectors(self.loads, self.sectors)
         return tuple(
-            dict.fromkeys([*of_parts, *of_units, *of_wheel, *orders, *self.pairs.warnings])
+            dict.fromkeys(
+                [*of_parts, *of_units, *of_outputs, *of_wheel, *orders, *self.pairs.warnings]
+            )
         )
 
     def spin(self, speed: float) -> Spin:

@@ -50,7 +50,8 @@ def _size(model: Model) -> str:
     facts = model.facts
     wheel = f"one of {model.sectors} sectors, " if model.sectors > 1 else ""
     mass = f"mass {facts.mass:.6g} kg, " if math.isfinite(facts.mass) else ""
+    elements = f"{facts.elements} elements, " if facts.elements else ""
     return (
-        f"{wheel}{facts.nodes} nodes, {facts.elements} elements, {facts.dofs} free dofs, {mass}"
+        f"{wheel}{facts.nodes} nodes, {elements}{facts.dofs} free dofs, {mass}"
         f"{len(model.pairs.names)} contact points"
     )

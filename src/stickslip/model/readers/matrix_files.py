@@ -259,7 +259,7 @@ def _from_arrays(arrays: Arrays, name: str, n: int | None, place: str) -> Matrix
             raise input_error(
                 place, f"{name} is an array of {dense.shape}, no matrix of numbers", "Check it."
             )
-        _check_size((dense.shape[0], dense.shape[1]), n, dense.size, place)
+        _check_size((dense.shape[0], dense.shape[1]), n, dense.size, f"{place}: {name}")
         return dense
     layout = arrays.get("format", np.array("csr"))
     kind = layout.item() if layout.shape == () else ""

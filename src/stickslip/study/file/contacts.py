@@ -69,6 +69,8 @@ class Pair(Section):
     @classmethod
     def _are_surfaces(cls, given: list[str]) -> list[str]:
         first, second = given
+        if set(given) == {GROUND}:
+            raise custom_error("are both the ground", "Name a place of a part first.")
         if first == GROUND or first.startswith(NEXT):
             raise custom_error(
                 f"begins with {first!r}, but the first surface gives the points and their normal",

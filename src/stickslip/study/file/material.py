@@ -60,7 +60,7 @@ class ReductionTable(Section):
     )
     fixed_interface_modes: Annotated[int, Field(ge=1, le=500)] | None = Field(
         None,
-        description=f"of craig_bampton: number of modes kept, 1 to 500; left out: {FEW}. A part with fewer keeps all",
+        description=f"number of modes that craig_bampton keeps, 1 to 500; left out: {FEW}. A part with fewer keeps all",
     )
     free_interface_modes: Annotated[int, Field(ge=1, le=500)] | None = Field(
         None, description="of rubin: number of modes kept, rigid motions among them, 1 to 500"
@@ -149,7 +149,8 @@ class DampingTable(Section):
     """Damping of a part: ratio and between_hz, or alpha_per_s and beta_s, or modal_ratio, or modal_ratios; and a loss factor."""
 
     ratio: Annotated[float, Field(ge=0, lt=1)] | None = Field(
-        None, description="damping ratio at the two frequencies of between_hz, 0 to 1"
+        None,
+        description="damping ratio at the two frequencies of between_hz, from 0 to below 1 (0.01 is 1 %)",
     )
     between_hz: list[Positive] | None = Field(
         None, min_length=2, max_length=2, description="two frequencies in Hz, the lower first"

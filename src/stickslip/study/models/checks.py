@@ -235,7 +235,9 @@ def _loads(tables: Tables) -> Iterator[InputError]:
                 yield input_error(
                     f"{place}.ratio_of",
                     f"{table.ratio_of!r} {problem}",
-                    did_you_mean(table.ratio_of, known),
+                    did_you_mean(table.ratio_of, known)
+                    if known
+                    else "Give a load force_n of its own.",
                 )
         if table.engine_order is not None:
             orders.add(table.engine_order)
@@ -346,6 +348,13 @@ def _turns(table: Any) -> bool:
 def _diameters(name: str, table: Any, sectors: int | None) -> Iterator[InputError]:
     given = getattr(table, "nodal_diameters", None)
     if sectors is None or not given:
+        return
+    if sectors == 1 and max(given) > 0:
+        yield input_error(
+            f"{name}.nodal_diameters",
+            "are of a wheel, and no part is a sector of one",
+            "Leave them out, or give the part its number of sectors.",
+        )
         return
     if max(given) > sectors // 2:
         yield input_error(

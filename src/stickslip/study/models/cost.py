@@ -30,7 +30,7 @@ def memory_gb(nodes: float) -> float:
 def too_large(tables: Tables, home: Path) -> InputError | None:
     """Return the complaint about parts that take more than the study's limits allow; None if they do not."""
     nodes = sum(_nodes(table, home) for table in tables.part.values())
-    what = f"the parts, some {nodes:.2g} nodes, are estimated"
+    what = f"the parts, some {max(round(nodes), 1):.2g} nodes, are estimated"
     return above(tables.limits, what, memory_gb(nodes), nodes * SECONDS_A_NODE)
 
 

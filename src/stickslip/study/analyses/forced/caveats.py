@@ -19,6 +19,8 @@ COULOMB = (
 )  # friction under the normal force
 LARGE_SHIFT = 0.01  # relative change of the peak worth a warning
 LARGE_DIFFERENCE = 1.0  # percent between time integration and balance (Gastaldi and Berruti 2017: below it at H = 5)
+RIGID = 5e-3  # Hz that are printed as zero
+STUCK = 1e-18  # m/N: no structure is so stiff; what moves less sticks to rigid contacts or is held
 LISTED = 5  # natural frequencies that a line names
 
 
@@ -83,7 +85,9 @@ def inside(question: Question) -> list[str]:
     known, normal = question.model.frequencies, -question.model.static_force[:, 2]
     told = [f"sweep: {lowest:.2f} to {highest:.2f} Hz"]
     for state, hertz in (("open", known.free_reduced), ("stuck", known.stuck_reduced)):
-        near = [f"{f:.2f}" for f in hertz if f <= highest][-LISTED:]
+        rigid = int(np.count_nonzero(hertz < RIGID))
+        near = [f"{f:.2f}" for f in hertz[rigid:] if f <= highest][-LISTED:]
+        near = [f"{rigid} of rigid motions"] * bool(rigid) + near
         beyond = [f"{f:.2f}" for f in hertz if f > highest][:1]
         told += [f"natural frequencies, contacts {state}: {', '.join([*near, *beyond])} Hz"] * bool(near or beyond)  # fmt: skip
     if np.any(normal):
@@ -164,7 +168,13 @@ def _of_drift(question: Question, response: Response) -> Iterator[str]:
 
 
 def _of_peak(question: Question, response: Response, shift: tuple[float, float]) -> Iterator[str]:
-    if response.peak_at_end:
+    model = question.model
+    if response.top is not None and response.peak_amplitude < STUCK * model.excitation:
+        yield (
+            f"the output {model.output_labels[model.peak_output]} does not move: a rigid contact holds it at all frequencies. "
+            "Name an output that moves, or raise the load until it slips."
+        )
+    elif response.peak_at_end:
         yield (
             f"the largest amplitude stands at the end of the sweep ({response.peak_hz:.2f} Hz); it is no resonance. "
             f"Widen forced_response.{question.key}."

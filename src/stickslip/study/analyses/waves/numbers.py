@@ -39,6 +39,10 @@ class Wheel:
     def require(self, diameters: Sequence[int] | None, key: str) -> None:
         """Refuse nodal diameters that the wheel has not."""
         highest = self.sectors // 2
+        if diameters and self.sectors == 1 and max(diameters) > 0:
+            raise input_error(
+                key, "are of a wheel, and no part is a sector of one", "Leave them out."
+            )
         if diameters and max(diameters) > highest:
             raise input_error(
                 key,
