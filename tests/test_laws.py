@@ -610,6 +610,9 @@ def test_sliders_add_up_to_the_element(population):
 def test_first_loading_follows_the_curve_it_was_made_of():
     x, f = (1.0, 2.0, 4.0), (2.0, 3.0, 3.5)
     law = ss.Iwan(k_t=2.0, limit=3.0, population=ss.contact.FirstLoading(displacement=x, force=f))
-    # the last piece goes on: 0.25 of elastic spring, under which the sliders hold 3.5 - 4 / 4 = 2.5
-    got = case_b1_iwan.first_loading(law, np.array(x) * 3.0 / 2.5)
-    assert got == pytest.approx(np.array(f) * 3.0 / 2.5, rel=1e-13)
+    got = case_b1_iwan.first_loading(law, np.array(x) * 3.0 / 3.5)
+    assert got == pytest.approx(np.array(f) * 3.0 / 3.5, rel=1e-13)
+    # at the last corner all have slipped: a curve that goes on level is the same one
+    level = ss.contact.FirstLoading(displacement=(*x, 9.0), force=(*f, 3.5))
+    assert level.sliders() == pytest.approx(law.population.sliders(), rel=1e-13)
+    assert case_b1_iwan.first_loading(law, np.array([100.0])) == pytest.approx([3.0], rel=1e-13)

@@ -121,6 +121,14 @@ def test_damping_in_the_file_is_kept_and_a_table_of_the_part_replaces_it(tmp_pat
             {"contact.joint.between": '["chain.dof12", "chain.DOF12"]'},
             "pairs 'chain.dof12' with itself",
         ),
+        (
+            {"contact.joint.pairing": '"segment_to_segment"'},
+            "contact.joint.pairing: is given, and 'chain.dof",
+        ),
+        (
+            {"contact.joint.normal": "[0.0, 0.0, 1.0]"},
+            "contact.joint.normal: is given, and 'chain.dof",
+        ),
         ({"output.peak": '"tip.dof20"'}, "no output 'tip.dof20'. Did you mean 'end.dof20'?"),
         (
             {"load.shaker.direction": '"y"'},

@@ -273,6 +273,8 @@ def between(first, second, name="joint", pairing="segment_to_segment"):
 REFUSED = [
     (between("lower.top", "upper.top"), LENGTH, "contact.joint.between: 'lower.top' and 'upper.top' look the same way: their outward normals, (0.00, 0.00, 1.00) and (0.00, 0.00, 1.00), are 180° from opposite. Name the faces that meet, or check how the parts are placed, turned and mirrored. 'upper.bottom' lies nearer than 'upper.top': are surfaces swapped?"),
     (between("lower.side", "upper.bottom"), LENGTH, "'lower.side' and 'upper.bottom' do not face each other: their outward normals, (-1.00, 0.00, 0.00) and (0.00, 0.00, -1.00), are 90° from opposite"),
+    (between("lower.top", "upper.root"), LENGTH, "there is no surface or set 'upper.root'"),
+    (between("lower.top", "upper.bottom") + '[join.weld]\nbetween = ["lower.top", "upper.bottom"]\n', LENGTH, "contact.joint.between: names the surfaces that join.weld ties for good"),
     (between("lower.root", "ground", pairing="node_to_node"), LENGTH, "contact.joint.between: no point of the contact can move: its nodes are clamped"),
 ]  # fmt: skip
 
@@ -286,6 +288,7 @@ def test_surfaces_that_cannot_meet_are_refused(contact, low, said, tmp_path):
 
 WARNED = [
     (between("lower.top", "upper.bottom"), LENGTH - 5e-4, "contact.joint: lower.top and upper.bottom overlap by up to 0.0005 m as they are placed, at ("),
+    (between("lower.top", "upper.bottom"), LENGTH + 1e-4, "contact.joint: lower.top and upper.bottom lie apart by 0.0001 m"),
     (between("lower.side", "ground", pairing="node_to_node"), LENGTH, "contact.joint: lower.side borders on clamped nodes, 1, 4, 7; the facets between them and it, 2 beside 2, take no part in the contact."),
     (between("lower.top", "upper.bottom") + between("upper.bottom", "lower.top", "again"), LENGTH, "contact.again lies on the same points as contact.joint: their forces add up."),
 ]  # fmt: skip

@@ -9,7 +9,7 @@ import scipy.sparse
 from scipy.spatial import cKDTree
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
-from stickslip.assembly.contact import Contact
+from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.places import Places, Spot
 from stickslip.contact.facets import centres, normals
 from stickslip.contact.law import ContactLaw
@@ -22,6 +22,7 @@ from stickslip.model.mesh.mesh_facets import facets_of
 
 TILTED = 3.0  # degrees from opposite at which a rigid body is perhaps turned wrongly: meshes are off by less
 STEEPEST = 45.0  # degrees from opposite at which surfaces cannot be meant to touch
+OFF = 1e-3  # of a facet's radius: what surfaces that touch may be off everywhere, by rounding in their files
 DEEP = 0.05  # of a facet's radius: what facets of curved surfaces overlap by is less
 FLAT = 1e-9  # part of a motion along a normal that is rounding
 NONE: IntArray = np.zeros(0, dtype=np.int64)
@@ -87,12 +88,15 @@ def _mean(normals: FloatArray) -> str:
 def overlap_warning(
     key: str, contact: Contact, pairing: Pairing, sides: Sequence[Surface]
 ) -> tuple[str, ...]:
-    """Warn of surfaces that overlap as they are placed by more than their facets can be off and the contact says."""
+    """Warn of surfaces that as they are placed overlap by more than their facets can be off and the contact says, or nowhere touch."""
     sizes = [float(np.median(facet_balls(side)[1])) for side in sides if len(side.facets)]
     worst = int(np.argmin(pairing.initial_gap))
     deep = float(-pairing.initial_gap[worst])
     if not sizes or deep <= DEEP * min(sizes) + max(-contact.gap, 0.0):
-        return ()
+        gap = pairing.initial_gap
+        everywhere = float(np.abs(gap).min()) if np.ptp(np.sign(gap)) == 0 else 0.0
+        far = sizes and contact.gap == 0.0 and everywhere > OFF * min(sizes)
+        return (_apart(key, contact, float(np.median(gap))),) if far else ()
     one, two = contact.between
     place = ", ".join(f"{x:.4g}" for x in pairing.positions[worst])
     text = (
@@ -100,6 +104,29 @@ def overlap_warning(
         "touching at rest. Move a part, or give interference_m if they are to press each other."
     )
     return (text,)
+
+
+def _apart(key: str, contact: Contact, gap: float) -> str:
+    """Say that surfaces nowhere touch as they are placed."""
+    one, two = contact.between
+    how = "lie apart" if gap > 0 else "overlap"
+    word = "gap_m" if gap > 0 else "interference_m"
+    return (
+        f"{key}: {one} and {two} {how} by {abs(gap):.3g} m as they are placed; the contact takes them as touching at rest. Move a "
+        f"part, or give {word} if that is meant."
+    )
+
+
+def refuse_joined(contacts: Mapping[str, Contact], joins: Mapping[str, Join]) -> None:
+    """Refuse a contact between surfaces that a join ties for good."""
+    for name, contact in contacts.items():
+        for other, tied in joins.items():
+            if set(contact.between) == set(tied.between):
+                raise input_error(
+                    f"contact.{name}.between",
+                    f"names the surfaces that join.{other} ties for good, so that the contact cannot move",
+                    "Remove one of them.",
+                )
 
 
 def refuse_held(key: str, operator: Matrix) -> None:

@@ -12,6 +12,7 @@ from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.assembled import Assembled, Skin
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.coordinates import Coordinates, coordinates
+from stickslip.assembly.facing import refuse_joined
 from stickslip.assembly.forces import far_outputs
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.pairs import Pairs, pair_contacts
@@ -146,6 +147,7 @@ class Model:
     @cached_property
     def pairs(self) -> Pairs:
         """Points of its contacts."""
+        refuse_joined(self.contacts, self.joins)
         here = self.neighbours
         return pair_contacts(self.places, self.contacts, None if here is None else here.turn)
 

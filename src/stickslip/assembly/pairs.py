@@ -340,6 +340,7 @@ def _single_dofs(
             f"is missing: {first.name!r} is a single dof, which has no normal",
             'Say what its relative motion is to the contact: acts = "normal" or "tangential".',
         )
+    _refuse_unused(key, contact)
     p, n = len(one), places.n
     row = 3 * np.arange(p) + ROWS[contact.acts]
 
@@ -364,6 +365,19 @@ def _single_dofs(
         area,
         np.column_stack([one, np.full((p, 2), -1)]),
     )
+
+
+def _refuse_unused(key: str, contact: Contact) -> None:
+    """Refuse what is said of surfaces in a contact of single dofs."""
+    pairing = None if contact.pairing == "node_to_node" else contact.pairing
+    said = {"pairing": pairing, "normal": contact.normal, "tangent": contact.tangent}
+    for word, given in said.items():
+        if given is not None:
+            raise input_error(
+                f"{key}.{word}",
+                f"is given, and {contact.between[0]!r} is a single dof: the contact acts along its motion alone",
+                "Leave it out; acts says whether that motion is tangential or normal. Or name a node or a surface.",
+            )
 
 
 def _turned_dofs(places: Places, key: str, name: str, turn: Turn) -> Matrix:

@@ -105,8 +105,8 @@ class FourParameter:
 class FirstLoading:
     """Sliders of any first-loading curve, which slip one after the other at its corners (Segalman & Starr 2008).
 
-    The curve begins at the origin; where it ends it goes on with the slope of its last piece. Only its shape counts: the
-    element scales it to its own stiffness and limit.
+    The curve begins at the origin; where it ends all have slipped, and the force stays. Only its shape counts: the element scales
+    it to its own stiffness and limit.
 
     Parameters
     ----------
@@ -149,10 +149,7 @@ class FirstLoading:
 
     def sliders(self) -> FloatArray:
         """Return (2, n) shares of stiffness and limit."""
-        slopes = self._slopes()
-        stiffness = -np.diff(slopes)
-        limit = stiffness * np.asarray(self.displacement[:-1])
-        if slopes[-1] > 0.0:
-            stiffness, limit = np.append(stiffness, slopes[-1]), np.append(limit, np.inf)
-        finite = np.isfinite(limit)
-        return np.array([stiffness / np.sum(stiffness), limit / np.sum(limit[finite])])
+        stiffness = -np.diff([*self._slopes(), 0.0])
+        limit = stiffness * np.asarray(self.displacement)
+        slips = stiffness > 0.0
+        return np.array([stiffness / np.sum(stiffness), limit / np.sum(limit)])[:, slips]

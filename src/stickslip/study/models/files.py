@@ -224,7 +224,7 @@ def _clamped(key: str, table: FileModel, mesh: SolidMesh) -> SolidMesh:
         held.update(sets[_known(f"{key}.clamped[{i}]", name, sets)].tolist())
     root = np.array(sorted(held), dtype=np.int64)
     kept = {name: _without(members, root) for name, members in sets.items()}
-    return replace(mesh, node_sets={ROOT: root} | {k: m for k, m in kept.items() if m.size})
+    return replace(mesh, node_sets={k: m for k, m in ({ROOT: root} | kept).items() if m.size})
 
 
 def _faces(
