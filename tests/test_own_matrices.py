@@ -223,6 +223,10 @@ def test_modes_of_a_negative_mass_are_looked_for_without_a_root_of_it() -> None:
             lowest_modes(K, M - np.diag(np.eye(20)[3]), 20, None)
 
 
+def test_a_chain_on_the_ground_is_held_by_more_than_sliders(tmp_path: Path) -> None:
+    assert "sliders alone" not in done("check", str(copied(tmp_path, {})))
+
+
 def test_a_matrix_of_another_size_is_named(tmp_path: Path) -> None:
     said = refused("check", str(copied(tmp_path, {}, mass=M[:5, :5])))
     assert "chain.npz: mass: is of 5 x 5, the model has 20 dofs" in said
@@ -234,6 +238,7 @@ def test_rigid_motions_are_counted_and_elements_that_are_not_there_are_not(tmp_p
     said = done("check", str(copied(tmp_path, {}, stiffness=free)))
     assert "natural frequencies, contacts open: 1 of rigid motions, " in said
     assert "elements" not in said
+    assert "part.chain: sliders alone hold it" in said.replace("\n", " ")
 
 
 def test_negative_damping_is_warned_of(tmp_path: Path) -> None:

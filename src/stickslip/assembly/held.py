@@ -7,6 +7,7 @@ import numpy as np
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.model import Model
 from stickslip.assembly.places import picked
+from stickslip.contact.laws import law_name
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.errors import InputError, input_error
 from stickslip.model.part import Part
@@ -14,6 +15,7 @@ from stickslip.model.rigid.motion import in_words, loose_motions
 
 RANK = 1e-8  # singular value over the largest below which a motion strains nothing
 SHARE = 1e-6  # of the largest share of a free motion below which a body takes no part in it
+SLIDERS = ("jenkins", "iwan", "dahl")  # laws of a bounded force that nothing presses
 NAMED = 3  # parts that a message names
 
 
@@ -72,6 +74,20 @@ def open_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
     return tuple(
         f"{error} The mean of its vibration is known only where contacts close."
         for error in unheld(model, pressed)
+    )
+
+
+def sliding_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
+    """Warn of parts that sliders alone hold where contact points (p,) are pressed at rest: once all slip, nothing does."""
+    slides = np.array([law_name(law) in SLIDERS for law in model.pairs.laws], dtype=bool)
+    if not slides.any():
+        return ()
+    at_rest = {error.place for error in unheld(model, pressed)}
+    return tuple(
+        f"{error.place}: sliders alone hold it; while all of them slip it is free, its mean position is undetermined, and the "
+        "solution may fail there. Give it a spring to the ground, or a load that does not move them all."
+        for error in unheld(model, pressed & ~slides)
+        if error.place not in at_rest
     )
 
 
