@@ -17,7 +17,7 @@ from stickslip.assembly.forces import (
     force_of,
     output_labels,
 )
-from stickslip.assembly.held import open_warnings, refuse_unheld, sliding_warnings
+from stickslip.assembly.held import held_warnings, refuse_unheld
 from stickslip.assembly.joined import KEY, on_shapes
 from stickslip.assembly.model import Model
 from stickslip.assembly.places import picked, stacked
@@ -130,12 +130,7 @@ def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
             "reduced": linear.side.n,
             "retained": int(held.retained.size),
         },
-        warnings=(
-            *model.warnings,
-            *open_warnings(model, pressed),
-            *sliding_warnings(model, pressed),
-            *checked.warnings(),
-        ),
+        warnings=(*model.warnings, *held_warnings(model, pressed), *checked.warnings()),
     )
 
 

@@ -67,6 +67,11 @@ def unheld(model: Model, holds: BoolArray) -> list[InputError]:
     return list(found.values())
 
 
+def held_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
+    """Warn of parts that are free at rest, or once all sliders slip, where contact points (p,) are pressed at rest."""
+    return (*open_warnings(model, pressed), *sliding_warnings(model, pressed))
+
+
 def open_warnings(model: Model, pressed: BoolArray) -> tuple[str, ...]:
     """Warn of parts that are free to move at rest, where the static loads press some contact points (p,) and the others are open."""
     if np.all(pressed):
