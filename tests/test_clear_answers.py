@@ -16,7 +16,7 @@ from test_cli_files import file_study, write_deck
 
 import stickslip as ss
 from stickslip.contact.interface import Interface
-from stickslip.errors import InputError, missing_package
+from stickslip.errors import InputError, did_you_mean, missing_package
 from stickslip.harmonic.selection.guarded_alert import GuardedAlert
 from stickslip.model.dofs import Dofs
 from stickslip.model.facts import unlike_units
@@ -252,3 +252,15 @@ def test_a_faint_excitation_is_refused_by_its_key(tmp_path):
     said = refused("check", str(write_four_masses(tmp_path, changes)))
     assert "load.shaker.force_n (" in said
     assert "is 1e-09 of the static load" in said
+
+
+@pytest.mark.parametrize(
+    ("word", "known", "told"),
+    [
+        ("right.tipp", ["right.ROOT", "right.TIP"], "Did you mean 'right.TIP'?"),
+        ("left.under_rigth", ["left.ROOT", "left.UNDER_RIGHT"], "Did you mean 'left.UNDER_RIGHT'?"),
+        ("xy", ["x", "y", "z"], "Known: x, y, z."),
+    ],
+)
+def test_the_nearest_name_is_found_whatever_its_capitals(word, known, told):
+    assert did_you_mean(word, known) == told

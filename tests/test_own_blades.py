@@ -1,6 +1,7 @@
 """J2: two blades from one deck and a wedge damper, through the command line and against the same model put together by hand."""
 
 import math
+import re
 import shutil
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from test_cli import done
 
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.errors import InputError
 from stickslip.front.result import Result
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.axis import Axis
@@ -210,3 +212,23 @@ def test_a_wedge_of_another_angle_than_its_undersides_is_warned_of(
     for text in found:
         assert text.startswith(f"contact.left: damper.left is tilted by {tilted}° against left.")
         assert "left_angle_deg" in text
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"between": '["left.under_right", "damper.left"]'},
+            'between = ["damper.left", "left.under_right"], with pairing = "node_to_segment"',
+        ),
+        ({"pairing": '"segment_to_segment"'}, 'facets, as segment_to_segment needs them there. Give pairing = "node_to_segment"'),
+        ({"pairing": '"node_to_node"'}, 'm. Give pairing = "node_to_segment": each point'),
+    ],
+)  # fmt: skip
+def test_points_that_meet_facets_are_told_the_pairing_and_the_order(
+    tmp_path: Path, changes: dict[str, str], message: str
+) -> None:
+    own = {f"contact.left.{key}": value for key, value in changes.items()}
+    with pytest.raises(InputError, match=re.escape(message)) as refused:
+        read_study(write(tmp_path, own)).model()
+    assert "contact.left" in str(refused.value)

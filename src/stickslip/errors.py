@@ -131,13 +131,20 @@ def together(errors: Iterable[InputError]) -> InputError:
     return InputError(first.place, first.problem, first.advice, first.words, others)
 
 
+SHORT = 2  # letters of a word of which no other is a slip
+
+
 def did_you_mean(word: str, known: list[str]) -> str:
-    """Return ``did you mean 'x'?`` for the nearest known word, or the list of the known ones."""
+    """Return ``did you mean 'word'?`` for the nearest known word, whatever its capitals, or the list of the known ones.
+
+    Of words as short as x, y, z none is nearer than another.
+    """
     from difflib import get_close_matches
 
-    near = get_close_matches(word, known, n=1, cutoff=0.6)
+    plain = {one.casefold(): one for one in reversed(known) if len(one) > SHORT}
+    near = get_close_matches(word.casefold(), plain, n=1, cutoff=0.6)
     if near:
-        return f"Did you mean {near[0]!r}?"
+        return f"Did you mean {plain[near[0]]!r}?"
     return f"Known: {', '.join(sorted(known))}." if known else "There is none."
 
 

@@ -9,7 +9,7 @@ import scipy.sparse
 from scipy.spatial import cKDTree
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
-from stickslip.assembly.contact import Contact, Join
+from stickslip.assembly.contact import NEXT, Contact, Join
 from stickslip.assembly.places import Places, Spot
 from stickslip.contact.facets import centres, normals
 from stickslip.contact.law import ContactLaw
@@ -26,6 +26,7 @@ OFF = 1e-3  # of a facet's radius: what surfaces that touch may be off everywher
 DEEP = 0.05  # of a facet's radius: what facets of curved surfaces overlap by is less
 FLAT = 1e-9  # part of a motion along a normal that is rounding
 NONE: IntArray = np.zeros(0, dtype=np.int64)
+MEET_FACETS = 'Give pairing = "node_to_segment": each point of a rigid body meets a facet'
 NAMED = 5  # points that a message names
 Normals = tuple[FloatArray, FloatArray]  # points (n, 3) and their unit normals
 
@@ -52,6 +53,31 @@ def refuse_averted(key: str, contact: Contact, mine: Normals, theirs: Normals | 
         f"{one!r} and {two!r} {way}: their outward normals, {_mean(mine[1])} and {_mean(theirs[1])}, are {angle:.0f}° from opposite",
         "Name the faces that meet, or check how the parts are placed, turned and mirrored.",
     )
+
+
+def refuse_without_facets(key: str, contact: Contact, a: Surface, b: Surface) -> None:
+    """Refuse points without facets where the pairing asks for facets, and say what does."""
+    one, two = contact.between
+    need = {"node_to_segment": (b,), "segment_to_segment": (a, b)}.get(contact.pairing, ())
+    if all(len(side.facets) for side in need):
+        return
+    points, remedy = two, 'Give pairing = "node_to_node", or name a surface with facets.'
+    if len(a.facets) and not two.startswith(NEXT):
+        remedy = f'Name the points first: between = ["{two}", "{one}"], with pairing = "node_to_segment".'
+    elif len(b.facets):
+        points, remedy = one, f"{MEET_FACETS}."
+    raise input_error(
+        f"{key}.between",
+        f"{points!r} has points and no facets, as {contact.pairing} needs them there",
+        remedy,
+    )
+
+
+def with_pairing(error: InputError, contact: Contact, a: Surface, b: Surface) -> InputError:
+    """Return an error of points without partners; of points without facets that meet facets, with the pairing for them."""
+    if contact.pairing != "node_to_node" or len(a.facets) or not len(b.facets):
+        return error
+    return input_error(error.place, error.problem, f"{MEET_FACETS}.")
 
 
 def tilt_warning(

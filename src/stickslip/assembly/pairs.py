@@ -14,10 +14,12 @@ from stickslip.assembly.facing import (
     overlap_warning,
     refuse_averted,
     refuse_held,
+    refuse_without_facets,
     rim_warning,
     tilt_warning,
     twice_warning,
     with_hint,
+    with_pairing,
 )
 from stickslip.assembly.frames import direction, normals_of, whole, with_normals
 from stickslip.assembly.places import AXES, NO_FACETS, Places, Spot
@@ -262,12 +264,14 @@ def _paired(
     opposite = normals_of(second, b)
     if opposite is not None and turn is not None and second.frame is not None:
         opposite = opposite[0], opposite[1] @ turn.matrix.T
+    mine = facing.points[facing.used], normals
+    refuse_without_facets(key, contact, facing, b)
     try:
-        mine = facing.points[facing.used], normals
         refuse_averted(key, contact, mine, opposite)
         found = named(key, contact, lambda: match(contact, facing, b, along))
     except InputError as error:
-        raise (error if turn is not None else with_hint(error, places, facing, second)) from None
+        told = with_pairing(error, contact, facing, b)
+        raise (told if turn is not None else with_hint(told, places, facing, second)) from None
     rigid = places.parts[first.part].body is not None and len(b.facets)
     tilted = tilt_warning(key, contact, first.part, mine, opposite) if rigid else ()
     return found, (*tilted, *overlap_warning(key, contact, found, (facing, b)))
