@@ -230,5 +230,5 @@ def test_points_that_meet_facets_are_told_the_pairing_and_the_order(
 ) -> None:
     own = {f"contact.left.{key}": value for key, value in changes.items()}
     with pytest.raises(InputError, match=re.escape(message)) as refused:
-        read_study(write(tmp_path, own)).model()
+        _ = read_study(write(tmp_path, own)).model().pairs
     assert "contact.left" in str(refused.value)
