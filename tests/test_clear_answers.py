@@ -264,3 +264,16 @@ def test_a_faint_excitation_is_refused_by_its_key(tmp_path):
 )
 def test_the_nearest_name_is_found_whatever_its_capitals(word, known, told):
     assert did_you_mean(word, known) == told
+
+
+def test_a_file_or_a_link_in_place_of_the_results_is_called_so(tmp_path):
+    path = write_four_masses(tmp_path / "study")
+    (path.parent / "results").touch()
+    said = refused("run", str(path))
+    assert f"{path.parent / 'results'}: is a file, and a run makes a folder of that name" in said
+    assert "permissions" not in said
+    (path.parent / "results").unlink()
+    (path.parent / "results").symlink_to(tmp_path)
+    said = refused("run", str(path))
+    assert "which is a link to" in said
+    assert "Remove the link" in said

@@ -219,7 +219,7 @@ def test_a_wedge_of_another_angle_than_its_undersides_is_warned_of(
     [
         (
             {"between": '["left.under_right", "damper.left"]'},
-            'between = ["damper.left", "left.under_right"], with pairing = "node_to_segment"',
+            'between = ["damper.left", "left.UNDER_RIGHT"], with pairing = "node_to_segment"',
         ),
         ({"pairing": '"segment_to_segment"'}, 'facets, as segment_to_segment needs them there. Give pairing = "node_to_segment"'),
         ({"pairing": '"node_to_node"'}, 'm. Give pairing = "node_to_segment": each point'),

@@ -169,7 +169,8 @@ class Output(Section):
         target = (home / relative).resolve()
         if target == home or not target.is_relative_to(home):
             raise custom_error(
-                f"leads out of the study's folder, got {name!r}, which is {target}", remedy
+                f"leads out of the study's folder, got {name!r}, which is a link to {target}",
+                "Remove the link, or name another folder.",
             )
         return name
 

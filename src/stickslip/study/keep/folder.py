@@ -143,6 +143,12 @@ def _found(folder: Path, pattern: str) -> Iterator[Path]:
 
 
 def _unwritable(folder: Path, error: OSError) -> InputError:
+    inner = (folder / JOBS, folder / PARTS)
+    file = next(
+        (p for p in (*inner, folder, *folder.parents) if p.exists() and not p.is_dir()), None
+    )
+    if file is not None:
+        return _stranger(file, "is a file, and a run makes a folder of that name")
     return input_error(
         f"output folder {folder}",
         f"cannot be written ({error.strerror})",
