@@ -222,7 +222,7 @@ def test_a_wedge_of_another_angle_than_its_undersides_is_warned_of(
             'between = ["damper.left", "left.UNDER_RIGHT"], with pairing = "node_to_segment"',
         ),
         ({"pairing": '"segment_to_segment"'}, 'facets, as segment_to_segment needs them there. Give pairing = "node_to_segment"'),
-        ({"pairing": '"node_to_node"'}, 'm. Give pairing = "node_to_segment": each point'),
+        ({"pairing": '"node_to_node"'}, 'and 4 more. Give pairing = "node_to_segment": each point'),
     ],
 )  # fmt: skip
 def test_points_that_meet_facets_are_told_the_pairing_and_the_order(
