@@ -14,6 +14,7 @@ from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.matrices import chain, lumped
 from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.structure import Structure, join
+from stickslip.reduction.choice import Reduction
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.reduction.free_interface import rubin
@@ -314,3 +315,13 @@ def test_wrong_choices_are_refused():
         rubin(full, np.array([8]), 1)
     with pytest.raises(InputError, match="rubin: n_modes: got FrequencyError"):
         rubin(full, np.array([2]), FrequencyError(1e-3, 10.0))
+
+
+def test_a_part_whose_modes_describe_its_kept_dofs_keeps_all():
+    k = np.diag([1.0, 2.0, 3.0, 4.0])
+    one = Structure(np.eye(4), np.zeros((4, 4)), k, chain(4, 1.0, 1.0).dofs)
+    small = Reduction(n_modes=100, method="rubin").of(one, np.array([0]))
+    assert small.n == 4
+    assert squares(small) == pytest.approx([1.0, 2.0, 3.0, 4.0])
+    with pytest.raises(SingularError):
+        Reduction(n_modes=1, method="rubin").of(one, np.array([0]))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol, get_args
 
 from stickslip.arrays import IntArray
-from stickslip.errors import input_error
+from stickslip.errors import SingularError, input_error
 from stickslip.model.structure import Structure
 from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.reduction.free_interface import rubin
@@ -54,10 +54,16 @@ class Reduction:
 
     def of(self, structure: Structure, keep: IntArray) -> Structure:
         """Return a structure reduced to the dofs `keep` and its modes; see `craig_bampton` and `rubin`."""
-        n_modes = self.n_modes
+        n_modes, most = self.n_modes, structure.n - len(keep)
         if isinstance(n_modes, int):
-            n_modes = min(n_modes, structure.n - len(keep))
-        return METHODS[self.method](structure, keep, n_modes)
+            n_modes = min(n_modes, most)
+        try:
+            return METHODS[self.method](structure, keep, n_modes)
+        except SingularError:
+            if n_modes != most or self.method != "rubin":
+                raise
+            # all are asked for: as many modes with the kept dofs fixed span the same, whatever has no residual flexibility
+            return craig_bampton(structure, keep, n_modes)
 
     @property
     def in_words(self) -> str:
