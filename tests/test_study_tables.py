@@ -427,8 +427,8 @@ def test_a_link_out_of_the_folder_is_refused(tmp_path):
     home = tmp_path / "home"
     path = write_four_masses(home)
     (home / "results").symlink_to(tmp_path)
-    told = "output.folder: leads out of the study's folder, got 'results', which is"
-    assert f"{path}: {told} {tmp_path.resolve()}. Give a plain relative name" in refused(path)
+    told = "output.folder: leads out of the study's folder, got 'results', which is a link to"
+    assert f"{path}: {told} {tmp_path.resolve()}. Remove the link" in refused(path)
 
 
 # what a study varies
