@@ -320,7 +320,7 @@ def test_what_is_not_asked_for_is_told(tmp_path: Path) -> None:
 
 def test_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
     (tmp_path / "results").write_text("a file")
-    with pytest.raises(InputError, match=r"output folder .*results: cannot be written"):
+    with pytest.raises(InputError, match=r"results: is a file, and a run makes a folder"):
         run_study(study(tmp_path))
 
 
