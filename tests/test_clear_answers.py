@@ -60,7 +60,7 @@ def negative():
         (lambda: system(outputs=np.array([-1])), r"System.outputs: names dof -1"),
         (lambda: system(outputs=np.array([1.0])), r"System.outputs: holds .*no index"),
         (lambda: system(alert_dofs=np.array([9])), r"System.alert_dofs: names dof 9"),
-        (lambda: Newton(tolerance=0), r"Newton.tolerance: must lie between"),
+        (lambda: Newton(tolerance=0), r"Newton.tolerance: must be above zero"),
         (lambda: Newton(tolerance=math.nan), r"Newton.tolerance"),
         (lambda: Newton(max_iterations=0), r"Newton.max_iterations"),
         (lambda: sweep(omega_range=(50.0, 50.0)), r"got 50 to 50 rad/s. Widen the range"),

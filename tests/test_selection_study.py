@@ -87,6 +87,7 @@ def forget_after(study: Study, kept: int) -> int:
     with sqlite3.connect(sealed) as db:
         rows = [i for (i,) in db.execute("select id from record order by id")]
         db.execute("delete from record where id > ?", (rows[kept - 1],))
+        db.execute("update sqlite_sequence set seq = ?", (rows[kept - 1],))  # the last number
         db.execute("delete from note")
     db.close()
     sealed.rename(sealed.with_suffix(".part"))

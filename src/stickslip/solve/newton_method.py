@@ -1,5 +1,6 @@
 """Newton's method for equations that are smooth between kinks, with a choice of what keeps it from going astray."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -48,11 +49,11 @@ class Newton:
 
     def __post_init__(self) -> None:
         check_choice("Newton.globalisation", self.globalisation, GLOBALISATIONS)
-        if not 0.0 < self.tolerance < 1.0:
+        if not 0.0 < self.tolerance < math.inf:
             raise input_error(
                 "Newton.tolerance",
-                f"must lie between 0 and 1, got {self.tolerance!r}: no residual is smaller than rounding",
-                "1e-10 is usual; the residual is scaled by the load.",
+                f"must be above zero, got {self.tolerance!r}: no residual is smaller than rounding",
+                "1e-10 is usual where the residual is scaled by the load.",
             )
         most: Any = self.max_iterations
         if not isinstance(most, int | np.integer) or most < 1:
