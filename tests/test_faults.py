@@ -20,7 +20,7 @@ from small_v2 import write_four_masses
 from stickslip.errors import InputError
 from stickslip.front.result import Result
 from stickslip.study.keep.folder import locked_folder
-from stickslip.study.keep.netcdf import write_tree
+from stickslip.study.keep.netcdf import read_tree, write_tree
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
 
@@ -237,3 +237,24 @@ def test_a_run_at_work_keeps_its_files_from_a_fresh_one(tmp_path: Path) -> None:
     assert "another run is at work in it. Wait for it, or stop it." in second.stderr
     assert at_work == 0
     assert Result.open(tmp_path / "results").data.attrs["complete"] == 1
+
+
+def test_an_interrupt_waits_until_a_result_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # HDF5 calls back while it writes, and what is raised there is lost
+    tree = xr.DataTree(xr.Dataset({"x": ("i", np.arange(3.0))}))
+    made = xr.DataTree.to_netcdf
+    after = []
+
+    def interrupted(*words: object, **named: object) -> object:
+        os.kill(os.getpid(), signal.SIGINT)
+        after.append("goes on")
+        return made(*words, **named)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(xr.DataTree, "to_netcdf", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_tree(tree, tmp_path / "result.nc")
+    assert after == ["goes on"]
+    np.testing.assert_array_equal(read_tree(tmp_path / "result.nc").x, np.arange(3.0))
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

@@ -9,7 +9,7 @@ import xarray as xr
 
 from stickslip.arrays import BoolArray, IntArray
 from stickslip.errors import input_error
-from stickslip.study.keep.whole import write_whole
+from stickslip.study.keep.whole import interrupted_later, write_whole
 
 MARK = b"\nstickslip: sha256 of all before: "
 _AGAIN = (
@@ -31,8 +31,9 @@ def write_tree(tree: xr.DataTree, path: Path) -> None:
         If the file cannot be written.
     """
     # made in memory: on a full disk HDF5 leaves open files behind, which print tracebacks when they are closed
-    content = bytes(tree.to_netcdf(format="NETCDF4", engine="h5netcdf"))
-    write_whole(path, content + _sum(content))
+    with interrupted_later():
+        content = bytes(tree.to_netcdf(format="NETCDF4", engine="h5netcdf"))
+        write_whole(path, content + _sum(content))
 
 
 def read_tree(path: Path) -> xr.DataTree:
