@@ -174,7 +174,7 @@ def test_a_study_of_schema_one_is_refused_with_the_remedy(tmp_path: Path) -> Non
 def test_output_folder_that_cannot_be_made(tmp_path: Path) -> None:
     path = write_four_masses(tmp_path)
     (tmp_path / "results").write_text("a file where the folder should be")
-    assert "cannot be written" in refused("run", str(path))
+    assert "results: is a file, and a run makes a folder" in refused("run", str(path))
 
 
 def test_full_disk_is_told_before_anything_is_computed(
