@@ -27,6 +27,7 @@ from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.response.forced.response import Sweep, forced_problem, forced_response
 from stickslip.response.recovery import fields
 from stickslip.response.system import System
+from stickslip.study.check import check_study
 from stickslip.study.models.study import read_study
 
 EXAMPLE = EXAMPLES / "own_blades"
@@ -232,3 +233,14 @@ def test_points_that_meet_facets_are_told_the_pairing_and_the_order(
     with pytest.raises(InputError, match=re.escape(message)) as refused:
         _ = read_study(write(tmp_path, own)).model().pairs
     assert "contact.left" in str(refused.value)
+
+
+def test_a_damper_far_from_its_blades_is_told_how_far(tmp_path: Path) -> None:
+    away = '[{ move_m = [0.3, 0.0, 0.3186346] }, { turn_deg = 5.0, axis = "y" }]'
+    study = read_study(write(tmp_path, {"part.damper.placed": away}))
+    with pytest.raises(InputError) as error:
+        check_study(study)
+    told = str(error.value)
+    assert "contact.left (side A: damper.left" in told
+    assert re.search(r"; the nearest nodes or points of both lie 0\.2\d+ m apart\.", told)
+    assert "raise tolerance_m" in told

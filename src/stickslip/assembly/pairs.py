@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 import scipy.sparse
+from scipy.spatial import cKDTree
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.contact import GROUND, NEXT, Contact, Join
@@ -268,7 +269,7 @@ def _paired(
     refuse_without_facets(key, contact, facing, b)
     try:
         refuse_averted(key, contact, mine, opposite)
-        found = named(key, contact, lambda: match(contact, facing, b, along))
+        found = named(key, contact, lambda: match(contact, facing, b, along), (facing, b))
     except InputError as error:
         told = with_pairing(error, contact, facing, b)
         raise (told if turn is not None else with_hint(told, places, facing, second)) from None
@@ -310,13 +311,26 @@ def widened(
     )
 
 
-def named(key: str, contact: Contact | Join, pair: Callable[[], Found]) -> Found:
-    """Say of which contact a complaint is."""
+def named(
+    key: str,
+    contact: Contact | Join,
+    pair: Callable[[], Found],
+    surfaces: tuple[Surface, Surface] | None = None,
+) -> Found:
+    """Say of which contact a complaint is, and how far its surfaces lie apart."""
     try:
         found = pair()
     except InputError as error:
         one, two = contact.between
-        raise error.inside(f"{key} (side A: {one}, side B: {two})") from None
+        told = error.called({"reach": "tolerance"})
+        if surfaces is not None:
+            a, b = (side.points[side.used] for side in surfaces)
+            nearest = float(cKDTree(b).query(a)[0].min())
+            problem = (
+                f"{told.problem}; the nearest nodes or points of both lie {nearest:.3g} m apart"
+            )
+            told = InputError(told.place, problem, told.advice, told.words, told.others)
+        raise told.inside(f"{key} (side A: {one}, side B: {two})") from None
     return found
 
 

@@ -193,9 +193,9 @@ def node_to_segment(
         beyond = np.where(np.isfinite(feet.overhang), feet.overhang, np.inf)
         raise _without_partner(
             "node_to_segment", a, nodes[lost], beyond[lost],
-            f"facet of side B that faces them within {reach:g} m and less than {tolerance:g} m beyond its rim",
-            "Check that both sides' normals point outward, raise reach or tolerance, or make side B the larger "
-            "one$outside.",
+            f"facet of side B that faces them within {reach:.3g} m",
+            "Check that both sides' normals point outward, raise $reach, or make side B the larger one$outside.",
+            reach="reach or tolerance",
         )  # fmt: skip
     kept, facet, reference = nodes[~lost], feet.facet[~lost], feet.reference[~lost]
     facets = b.facets[facet]
@@ -308,12 +308,18 @@ def _numbers(surface: Surface, nodes: IntArray) -> list[int]:
 
 
 def _without_partner(
-    place: str, a: Surface, nodes: IntArray, distance: FloatArray, partner: str, remedy: str
+    place: str,
+    a: Surface,
+    nodes: IntArray,
+    distance: FloatArray,
+    partner: str,
+    remedy: str,
+    **words: str,
 ) -> InputError:
     """Name the nodes of side A without a partner: number, place, and how far the next one is."""
     worst = np.argsort(-distance)[:LISTED]
     listed = [
-        f"node {_numbers(a, nodes[[i]])[0]} at ({', '.join(f'{x:.6g}' for x in a.points[nodes[i]])}) m"
+        f"node {_numbers(a, nodes[[i]])[0]} at ({', '.join(f'{round(x, 12):.6g}' for x in a.points[nodes[i]])}) m"
         + (f", {distance[i]:.3g} m off" if np.isfinite(distance[i]) else ", none near")
         for i in worst
     ]
@@ -323,4 +329,5 @@ def _without_partner(
         f"{len(nodes)} nodes of side A have no {partner}: {'; '.join(listed)}{more}",
         remedy,
         outside=SKIP,
+        **words,
     )

@@ -121,10 +121,11 @@ def _without_facet(a: Surface, left: IntArray, reach: float) -> InputError:
     middle = a.points[row[row >= 0]].mean(axis=0)
     return input_error(
         "segment_to_segment",
-        f"{len(left)} of {len(a.facets)} facets of side A have no facet of side B opposite to them within {reach:g} m, e.g. facet "
+        f"{len(left)} of {len(a.facets)} facets of side A have no facet of side B opposite to them within {reach:.3g} m, e.g. facet "
         f"{left[0]} at ({', '.join(f'{x:.6g}' for x in middle)}) m",
-        "Check that both sides' normals point outward, or raise reach$outside.",
+        "Check that both sides' normals point outward, or raise $reach$outside.",
         outside=SKIP,
+        reach="reach",
     )
 
 

@@ -185,7 +185,7 @@ def of_task(study: Study, case: Case) -> Iterator[None]:
         yield
     except InputError as error:
         place = f"{study.path} ({case.label})" if case.label else str(study.path)
-        raise error.called({"outside": ""}).inside(place) from None
+        raise error.called({"outside": "", "reach": "tolerance_m"}).inside(place) from None
 
 
 def _inputs(study: Study, task: Task) -> Any:
