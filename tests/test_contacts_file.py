@@ -1,5 +1,7 @@
 """Contacts of a study file: every law runs from one, and what presses or opens a contact at rest."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -11,6 +13,7 @@ from stickslip.contact.laws.iwan_populations import FourParameter
 from stickslip.errors import InputError
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.study.check import check_study
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
 
@@ -154,3 +157,20 @@ def test_an_interference_that_presses_nothing_is_refused(said, told, tmp_path):
     study = read_study(write(tmp_path, f'law = "{said}"\n{own}\ninterference_m = 1e-4\n'))
     with pytest.raises(InputError, match=f"contact.joint.{told}"):
         run_study(study)
+
+
+def test_a_contact_where_everything_is_clamped_says_so(tmp_path: Path) -> None:
+    bars = Path(__file__).parent / "data" / "calculix" / "tied_bars.inp"
+    (tmp_path / "bars.inp").write_text(bars.read_text() + "*NSET, NSET=FOOT\nROOT\n")
+    path = tmp_path / "study.toml"
+    path.write_text(
+        'schema_version = 2\ntitle = "t"\n[part.bars]\nfile = "bars.inp"\nunits = "mm-t-s"\n'
+        '[contact.foot]\nbetween = ["bars.foot", "ground"]\nlaw = "bonded"\n'
+        "normal_stiffness_n_per_m = 1e6\ntangential_stiffness_n_per_m = 1e6\naxial_stiffness_n_per_m = 1e6\n"
+        '[load.shaker]\non = "bars.tip"\ndirection = "z"\nforce_n = 1.0\n'
+        "[forced_response]\nfrequencies_hz = [100.0]\n"
+    )
+    with pytest.raises(
+        InputError, match=r"contact.foot.between: every node of 'bars.foot' is clamped"
+    ):
+        check_study(read_study(path))

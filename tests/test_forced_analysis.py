@@ -34,6 +34,7 @@ from stickslip.response.forced.response import (
 from stickslip.response.recovery import fields
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton
+from stickslip.study.analyses import forced_response as analysis_module
 from stickslip.study.analyses.analysis import Case, Solved
 from stickslip.study.analyses.forced.caveats import mixed_places, no_resonance, nothing_pressed
 from stickslip.study.analyses.forced.estimate import estimate, retained_of
@@ -44,6 +45,7 @@ from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.keep.journal import JobJournal
 from stickslip.study.models.study import read_study
 from stickslip.study.outcome import case_variables
+from stickslip.study.run import run_study
 from stickslip.units import HZ, RPM
 
 NO_TIME = ("seconds", "attempt_seconds", "seconds_contact", "seconds_linear", "seconds_rest")
@@ -443,3 +445,15 @@ def test_friction_that_nothing_presses_is_told(tmp_path: Path):
     case = read_study(path).cases()[0]
     said = nothing_pressed(FORCED_RESPONSE.inputs(case, case.build()))
     assert said[0].startswith("all 1 contact points with friction are open in the static state")
+
+
+def test_a_first_run_says_that_it_compiles(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(analysis_module, "COMPILED", 0.0)
+    path = write_four_masses(tmp_path, {"forced_response.points": "3", "harmonics.high": "1"})
+    with caplog.at_level("INFO", "stickslip"):
+        run_study(read_study(path))
+    said = [r.getMessage() for r in caplog.records if "the contact laws" in r.getMessage()]
+    assert said[0].startswith("compiling the contact laws, once an installation")
+    assert said[-1].startswith("compiled the contact laws in ")

@@ -1,8 +1,8 @@
 """Whether the two surfaces of a contact can meet: normals against each other, no overlap, points that move."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.sparse
@@ -19,6 +19,8 @@ from stickslip.contact.projection import facet_balls
 from stickslip.contact.surface import SMOOTH, Surface
 from stickslip.errors import InputError, input_error
 from stickslip.model.mesh.mesh_facets import facets_of
+
+Found = TypeVar("Found")
 
 TILTED = 3.0  # degrees from opposite at which a rigid body is perhaps turned wrongly: meshes are off by less
 STEEPEST = 45.0  # degrees from opposite at which surfaces cannot be meant to touch
@@ -255,3 +257,26 @@ def with_hint(error: InputError, places: Places, first: Surface, second: Spot) -
 def _distance(surface: Surface, points: FloatArray) -> float:
     """Return the distance of a surface's middling point to the nearest of `points`, m."""
     return float(np.median(cKDTree(points).query(surface.points[surface.used])[0]))
+
+
+def named(
+    key: str,
+    contact: Contact | Join,
+    pair: Callable[[], Found],
+    surfaces: tuple[Surface, Surface] | None = None,
+) -> Found:
+    """Say of which contact a complaint is, and how far its surfaces lie apart."""
+    try:
+        found = pair()
+    except InputError as error:
+        one, two = contact.between
+        told = error.called({"reach": "tolerance"})
+        if surfaces is not None and contact.pairing != "node_to_node":
+            a, b = (side.points[side.used] for side in surfaces)
+            nearest = float(cKDTree(b).query(a)[0].min())
+            problem = (
+                f"{told.problem}; the nearest nodes or points of both lie {nearest:.3g} m apart"
+            )
+            told = InputError(told.place, problem, told.advice, told.words, told.others)
+        raise told.inside(f"{key} (side A: {one}, side B: {two})") from None
+    return found

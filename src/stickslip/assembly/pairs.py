@@ -1,17 +1,17 @@
 """Contacts of a model as pairs of points, on the dofs of all parts: gaps, frames, areas, and each point's share of the law."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import scipy.sparse
-from scipy.spatial import cKDTree
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.contact import GROUND, NEXT, Contact, Join
 from stickslip.assembly.facing import (
     flat_warning,
+    named,
     overlap_warning,
     refuse_averted,
     refuse_held,
@@ -38,7 +38,6 @@ from stickslip.model.axis import Axis
 from stickslip.reduction.turning import dof_rotation
 
 NEAR = 1e-6  # m: partners node to node
-Found = TypeVar("Found")
 ROWS = {"tangential": 0, "normal": 2}
 
 
@@ -309,29 +308,6 @@ def widened(
         replace(first, displacement=own),
         Surface(turn.points(b.points), theirs, b.facets, normals, b.numbers),
     )
-
-
-def named(
-    key: str,
-    contact: Contact | Join,
-    pair: Callable[[], Found],
-    surfaces: tuple[Surface, Surface] | None = None,
-) -> Found:
-    """Say of which contact a complaint is, and how far its surfaces lie apart."""
-    try:
-        found = pair()
-    except InputError as error:
-        one, two = contact.between
-        told = error.called({"reach": "tolerance"})
-        if surfaces is not None:
-            a, b = (side.points[side.used] for side in surfaces)
-            nearest = float(cKDTree(b).query(a)[0].min())
-            problem = (
-                f"{told.problem}; the nearest nodes or points of both lie {nearest:.3g} m apart"
-            )
-            told = InputError(told.place, problem, told.advice, told.words, told.others)
-        raise told.inside(f"{key} (side A: {one}, side B: {two})") from None
-    return found
 
 
 def _single_dofs(

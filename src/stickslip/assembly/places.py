@@ -201,6 +201,12 @@ class Places:
 
 def _unknown(name: str, head: str, part: Part, place: str) -> InputError:
     """Return the complaint about a name that a part does not have."""
+    if name.partition(".")[2].upper() in map(str.upper, part.clamped_sets):
+        return input_error(
+            place,
+            f"every node of {name!r} is clamped",
+            "Name a set whose nodes can move, or clamp less.",
+        )
     table, n = part.structure.dofs, part.structure.n
     numbered = [is_numbered(component) for component in table.component]
     known = [f"{head}.{word}" for word in part.names]

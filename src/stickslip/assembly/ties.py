@@ -9,7 +9,8 @@ from scipy.spatial import cKDTree
 
 from stickslip.arrays import IntArray, Matrix
 from stickslip.assembly.contact import Join
-from stickslip.assembly.pairs import Turn, match, named, sides
+from stickslip.assembly.facing import named
+from stickslip.assembly.pairs import Turn, match, sides
 from stickslip.assembly.places import NO_FACETS, Places, Spot, picked, stacked
 from stickslip.contact.mortar import mortar_tie
 from stickslip.contact.surface import Surface

@@ -153,6 +153,8 @@ class Part:
         Of a copy: the part it copies, whose reduction it shares, and where it stands; `copy_of` makes one.
     warnings
         What the user should know.
+    clamped_sets
+        Names of sets of which every node is held, so that nothing can act there.
     """
 
     structure: Structure
@@ -168,6 +170,7 @@ class Part:
     template: "Part | None" = None
     place: Place | None = None
     warnings: tuple[str, ...] = ()
+    clamped_sets: tuple[str, ...] = ()
     memo: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)  # its reductions
 
     def __repr__(self) -> str:

@@ -57,6 +57,8 @@ class Deck:
         Number of sectors; None without cyclic symmetry.
     ignored
         Keywords and loads that were passed over, with their lines.
+    clamped_sets
+        Names of the deck's sets of which every node is clamped, so that they are not among those of the mesh.
     """
 
     mesh: SolidMesh
@@ -68,6 +70,7 @@ class Deck:
     axis: Axis
     sectors: int | None
     ignored: tuple[str, ...]
+    clamped_sets: tuple[str, ...] = ()
 
     @property
     def material(self) -> Material:
@@ -158,6 +161,7 @@ def read_deck(
         axis,
         model.sectors,
         tuple(model.ignored),
+        tuple(name for name, nodes in free_sets.items() if not nodes.size),
     )
 
 

@@ -119,6 +119,7 @@ def _from_deck(
         deck.axis,
         held=deck.held if partly.any() else None,
         quadrature=deck.quadrature if table.quadrature == "calculix" else EXACT,
+        clamped_sets=deck.clamped_sets,
         warnings=(
             *(f"{table.file}: passed over {text}" for text in deck.ignored),
             *_own_speed(table, deck),
@@ -168,12 +169,16 @@ def _solid(
     material: Materials,
     sectors: int,
     axis: Axis | None,
+    clamped_sets: tuple[str, ...] = (),
     **others: Any,
 ) -> Part:
     faces = _faces(key, table, mesh.node_sets, sectors)
-    mesh = _clamped(key, table, mesh)
+    free = _clamped(key, table, mesh)
+    gone = *clamped_sets, *(name for name in mesh.node_sets if name not in free.node_sets)
     axis = table.axis() or axis or Axis()
-    return solid_part(mesh, material, axis, sectors=sectors, faces=faces, **others)
+    return solid_part(
+        free, material, axis, sectors=sectors, faces=faces, clamped_sets=gone, **others
+    )
 
 
 def _from_matrices(key: str, table: FileModel, home: Path, others: dict[str, Any]) -> Part:
