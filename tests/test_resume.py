@@ -25,12 +25,13 @@ SLIPPING = {
 # a user's interrupt in the first passage, a lost machine in the repeats
 STOPS = {signal.SIGINT: "  low 6:", signal.SIGKILL: "  high 15:"}
 SCRIPT = """
-import logging, sys
+import logging, signal, sys
 from pathlib import Path
 from stickslip.study.keep.progress import Interrupted
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # jobs in the background ignore it
     logging.basicConfig(level=logging.INFO, format="  %(message)s", stream=sys.stdout)
     try:
         run_study(read_study(Path(sys.argv[1])), workers=int(sys.argv[2]))
