@@ -16,7 +16,7 @@ LOCK_FLAGS := --quiet --generate-hashes --strip-extras \
 # Two test workers on two cores: a threaded BLAS under each would only make them wait for each other.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help install run test readers test-readers sparse test-sparse lint docs figures bench bench-rival calculix validate baseline strategies alarms lock clean
+.PHONY: help install run test coverage readers test-readers sparse test-sparse lint docs figures bench bench-rival calculix validate baseline strategies alarms lock clean
 .DELETE_ON_ERROR:
 
 help:  ## list the targets
@@ -38,8 +38,11 @@ run: $(INSTALLED)  ## solve the example of two blades and a damper, and write it
 	@status=0; $(BIN)/stickslip run $(STUDY) || status=$$?; page=$(dir $(STUDY))results/report.html; \
 	if [ -e "$$page" ]; then echo "Open $$page in a browser."; fi; exit $$status
 
-test: $(INSTALLED)  ## run the tests and report their coverage
-	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --durations=20 --cov --cov-report=term:skip-covered
+test: $(INSTALLED)  ## run the tests
+	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup --durations=20
+
+coverage: $(INSTALLED)  ## run the tests and report their coverage, a quarter slower
+	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup --durations=20 --cov --cov-report=term:skip-covered
 
 readers: $(READERS_INSTALLED)  ## install what reads Nastran's binary files, and files of ANSYS to test with
 

@@ -13,7 +13,7 @@ import stickslip as ss
 
 # %%
 # A blade of 0.1 kg, tuned to 50 Hz, and a damper of constant pressure: no normal stiffness, a preload of 20 N,
-# friction 0.3. The time integration, and with it `shoot`, knows `ElasticCoulomb` contacts only.
+# friction 0.3.
 
 blade = ss.model.lumped(
     np.array([0.1]), np.array([[1e4]]), damping=np.array([[0.2]]), names=("blade",)
@@ -43,10 +43,7 @@ balance = ss.response.fields(problem, peak).outputs[1, 0]
 # springs. (Without a start it begins at rest, which needs more periods and, where several motions exist, may find another.)
 
 motion = problem.low.linear.recover(peak.omega, peak.coefficients)  # (harmonics, all dofs)
-traction = ss.response.signals(problem, peak).force[
-    :, :2, 0
-]  # t and w of each contact, first sample
-start = ss.response.start_from_harmonics(motion, peak.omega, traction)
+start = ss.response.start_from_harmonics(motion, peak.omega, damper.gap_operator, damper.laws)
 
 
 def shot(load, omega, start=None):
@@ -79,7 +76,10 @@ for force in forces:
 figure, (above, below) = plt.subplots(2, 1, sharex=True, layout="constrained", figsize=(6.4, 6.4))
 above.semilogx(forces, np.array(amplitudes) / forces * 1e3, "o-", ms=3)
 above.set(ylabel="amplitude over force, mm/N", title=f"{peak.omega:.1f} rad/s")
-for column, name in zip(np.array(sizes).T, ("largest", "second", "third"), strict=True):
+largest = np.array(sizes).T[
+    :3
+]  # the fourth is that of the direction across, which has no stiffness: 0
+for column, name in zip(largest, ("largest", "second", "third"), strict=True):
     below.semilogx(forces, column, "o-", ms=3, label=name)
 below.axhline(1.0, color="0.6", lw=0.8)
 below.set(xlabel="force, N", ylabel="size of the Floquet multipliers")

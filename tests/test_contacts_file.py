@@ -57,8 +57,8 @@ WRITTEN = {
         ss.ElasticCoulomb(k_t=2e4, k_w=0.0, k_n=2e4, mu=0.5, preload=4.0),
     ),
     "coupled_coulomb": (
-        f"{TANGENTIAL}{NORMAL}friction_coefficient = 0.5\ninterference_m = 2e-4",
-        ss.CoupledCoulomb(k_t=2e4, k_n=2e4, mu=0.5, preload=4.0),
+        f"{TANGENTIAL}axial_stiffness_n_per_m = 1e4\n{NORMAL}friction_coefficient = 0.5\ninterference_m = 2e-4",
+        ss.CoupledCoulomb(k_t=2e4, k_w=1e4, k_n=2e4, mu=0.5, preload=4.0),
     ),
     "regularised_coulomb": (
         "transition_velocity_m_per_s = 0.05\nfriction_coefficient = 0.5\npreload_n = 4.0",

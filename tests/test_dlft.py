@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from models import table
 
+from evidence.models.rigid_beams import rubbing_beams
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.jenkins import Jenkins
@@ -112,6 +113,62 @@ def test_with_more_samples_the_penalty_matters_less_than_the_missing_harmonics()
     soft, hard = (solution(rubbing(15, 960, p), 1.5)[0][1, 0] for p in (2.0, 8.0))
     finer = solution(rubbing(60, 3840), 1.5)[0][1, 0]
     assert abs(soft - hard) < abs(hard - finer)
+
+
+def beams(coordinates, preload, order=7, samples=224, penalty=None):
+    system, load = rubbing_beams(coordinates, preload)
+    linear = system.condensed(load, order, system.outputs)
+    return dynamic_lagrangian(linear, system.interface, order, samples, penalty)
+
+
+@pytest.mark.parametrize("coordinates", ["craig_bampton", "rubin", "relative"])
+@pytest.mark.parametrize("preload", [0.2, 2.0])
+def test_default_penalty_converges_whatever_the_coordinates(coordinates, preload):
+    # a share of the stiffness of a Rubin coordinate is a thousand times as much: with 2 N none of these was found from rest
+    problem = beams(coordinates, preload)
+    for omega in np.linspace(80.0, 180.0, 8):
+        _, found = solution(problem, omega, iterations=60)
+        assert found.iterations <= 40
+
+
+@pytest.mark.parametrize("omega", [80.0, 130.0])
+def test_default_penalty_does_not_depend_on_coordinates(omega):
+    of_one, of_other = (
+        p.penalties(omega).value * p.force_scale / p.displacement_scale
+        for p in (beams("craig_bampton", 2.0), beams("rubin", 2.0))
+    )
+    np.testing.assert_allclose(of_one, of_other, rtol=0.01)  # but for modes left out
+
+
+def test_default_penalty_changes_smoothly_with_frequency():
+    problem = beams("rubin", 2.0)
+    for omega in (70.0, 100.0, 127.3):  # 100: the first resonance
+        step = 1e-4
+        low, high = (problem.penalties(omega + d).value for d in (-step, step))
+        at = problem.penalties(omega)
+        np.testing.assert_allclose(at.slope, (high - low) / (2.0 * step), rtol=1e-5)
+        x = np.random.default_rng(1).standard_normal(problem.size)
+        by_omega = (
+            problem.linearise(x, omega + step).residual
+            - problem.linearise(x, omega - step).residual
+        ) / (2.0 * step)
+        jac_p = problem.linearise(x, omega).jac_p
+        np.testing.assert_allclose(jac_p, by_omega, atol=1e-6 * np.max(np.abs(jac_p)))
+    values = np.array([problem.penalties(w).value for w in np.linspace(60.0, 200.0, 4000)])
+    assert np.max(np.abs(np.diff(np.log(values), axis=0))) < 0.02
+
+
+@pytest.mark.parametrize("coordinates", ["craig_bampton", "rubin", "relative"])
+def test_penalties_ten_times_apart_give_the_same_answer(coordinates):
+    # exactly where there are as many samples as coefficients, else by less than missing harmonics
+    omega = 120.0
+    problem = beams(coordinates, 0.5, samples=15)
+    own = float(np.mean(problem.penalties(omega).value))
+    own *= problem.force_scale / problem.displacement_scale
+    start, _ = solution(problem, omega)
+    for factor in (10.0**-0.5, 10.0**0.5):
+        other, _ = solution(beams(coordinates, 0.5, 7, 15, factor * own), omega, start)
+        assert np.max(np.abs(other - start)) < 1e-7 * np.max(np.abs(start))
 
 
 def test_laws_hold_at_the_samples():

@@ -9,6 +9,7 @@ import scipy.sparse
 from test_reduced_wheel import TILTED, shrouded
 
 import stickslip as ss
+from evidence.integrator.transient import TimeStepping, integrate
 from evidence.models.lumped_disks import TIP, blisk_with_ring, friction_ring
 from stickslip.harmonic.travelling import condense_waves
 
@@ -148,9 +149,9 @@ def test_one_sector_answers_as_all_of_them_integrated_in_time(sectors, engine_or
         for side, rows in (("left", static[low]), ("right", force[high])):
             mine = whole.dof_set(f"sector{n}.{side}")
             f[0 if side == "left" else 1, mine] += turn @ rows * (1 if side == "left" else phase)
-    moved = ss.response.integrate(
+    moved = integrate(
         whole, pairs.gap_operator, pairs.laws, ss.HarmonicLoad(f[0].real, {1: f[1]}), omega,
-        whole.dof_set("right"), stepping=ss.response.TimeStepping(max_periods=600, tolerance=1e-6),
+        whole.dof_set("right"), stepping=TimeStepping(max_periods=600, tolerance=1e-6),
     )  # fmt: skip
     assert moved.settled
     scale = np.abs(moved.harmonics[1]).max()

@@ -3,13 +3,17 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
-from small_v2 import write_two_blades
+from small_v2 import changed, write_four_masses, write_shrouded_sector, write_two_blades
 
+from stickslip.errors import InputError
 from stickslip.response.forced.response import forced_response
+from stickslip.response.time.transient import TransientResult
 from stickslip.study.analyses import forced_response as analysis
-from stickslip.study.analyses.forced.in_time import Check, chosen, refined
+from stickslip.study.analyses.forced import in_time
+from stickslip.study.analyses.forced.in_time import Check, check_in_time, chosen, refined
 from stickslip.study.analyses.forced.points import Response, collect
 from stickslip.study.analyses.forced.question import Question
 from stickslip.study.analyses.forced_response import FORCED_RESPONSE
@@ -78,6 +82,33 @@ def test_stuck_contacts_agree_and_nothing_is_integrated_twice(
     assert caplog.text.count("periodic after") == 6
 
 
+@pytest.mark.parametrize("law", ["jenkins", "dahl", "iwan"])
+def test_other_laws_are_integrated_and_agree(law: str, tmp_path: Path) -> None:
+    """Two friction elements of a law and a stop with clearance: the balance with five harmonics is within 1 % at its peak."""
+    path = write_four_masses(tmp_path)
+    text = path.read_text(encoding="utf-8").replace('law = "jenkins"', f'law = "{law}"')
+    path.write_text(text, encoding="utf-8")
+    case = next(iter(read_study(path).cases()))
+    asked = FORCED_RESPONSE.inputs(replace(case, checks=frozenset({"verify"})), case.build())
+    points = list(forced_response(asked.model.system, asked.model.load, asked.sweep))
+    response = collect(asked.problem, points, 0)
+    assert response.top is not None
+    found = check_in_time(asked, response, response.top)
+    assert found.settled
+    assert abs(found.difference_percent) < 1.0
+
+
+def test_a_wheel_of_too_many_coordinates_is_refused(tmp_path: Path) -> None:
+    path = write_shrouded_sector(tmp_path)
+    text = path.read_text(encoding="utf-8")
+    path.write_text(changed(text, {"load.gas.engine_order": "1"}), encoding="utf-8")
+    (case,) = read_study(path).cases()
+    asked = replace(case, checks=frozenset({"verify"}))
+    said = r"part\.blade\.sectors: --verify integrates all sectors that do different things, \d+ coordinates, more than 600"
+    with pytest.raises(InputError, match=said):
+        FORCED_RESPONSE.inputs(asked, asked.build())
+
+
 def test_more_harmonics_leave_a_linear_response_as_it_is(stuck: tuple[Question, Response]) -> None:
     asked, response = stuck
     assert response.top is not None
@@ -104,3 +135,34 @@ def test_sentence_tells_which_side_is_wrong() -> None:
     better = replace(CHECK, refined_order=15, refined=1.001e-3)
     assert better.sentence.endswith("the balance with 15 harmonics gives 1.00100e-03 m (+0.10 %)")
     assert replace(CHECK, refined_order=15).sentence.endswith("15 harmonics does not converge")
+
+
+def test_sentence_tells_of_the_step() -> None:
+    finer = replace(CHECK, steps=4096, step_percent=0.2)
+    assert finer.sentence.endswith("with 4096 steps a period (half of them: -0.2 %)")
+    never = replace(CHECK, steps=8192, step_percent=7.0)
+    assert "8192 steps a period are still too few for it" in never.sentence
+
+
+def test_a_difference_is_not_believed_before_twice_the_steps_confirm_it(
+    stuck: tuple[Question, Response], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # steps that make the amplitude by 3, then by 0.75 and 0.19 % too large, as an error of second order of a coarse step does
+    asked, response = stuck
+    assert response.top is not None
+    asked_for = []
+    real = in_time.integrated
+
+    def coarse(*arguments: Any, steps: int = in_time.STEPS, **more: Any) -> TransientResult:
+        asked_for.append(steps)
+        found = real(*arguments, **more)
+        wrong = 1.0 + 0.03 * (in_time.STEPS / steps) ** 2
+        return replace(found, harmonics=wrong * found.harmonics)
+
+    monkeypatch.setattr(in_time, "integrated", coarse)
+    check = check_in_time(asked, response, response.top)
+    assert asked_for == [1024, 2048, 4096]
+    assert check.steps == 4096
+    assert check.step_percent == pytest.approx(-0.56, abs=0.02)
+    assert check.refined_order == 0
+    assert abs(check.difference_percent) < 0.3

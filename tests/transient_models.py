@@ -1,5 +1,7 @@
 """Models of the time integration and of shooting, with exact values."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from evidence.models.lumped import blades_and_damper
@@ -8,7 +10,7 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.response.time.transient import TransientStart, start_from_harmonics
+from stickslip.response.time.start import TransientStart, start_from_harmonics
 
 # Exact event-driven |X1| of the oscillator with a friction damper (after Griffin 1980): m = 1, k = 1, c = 0.02,
 # k_d = 0.5, f_c = 0.1, force 0.1 cos Wt; piecewise-linear propagation with root finding of every switch.
@@ -57,5 +59,7 @@ def stuck_motion(
         structure.stiffness + normal.T @ (springs[:, 2:] * normal), load.static
     )
     motion = np.array([static, np.linalg.solve(dynamic, load.harmonics[1])])
-    traction = springs[:, :2] * (gap @ motion[1].real).reshape(-1, 3)[:, :2]
-    return motion, start_from_harmonics(motion, omega, traction)
+    start = start_from_harmonics(motion, omega, gap, laws)
+    # their mean stretches no spring: sliders go where the mean has brought them
+    mean = (gap @ static).reshape(-1, 3)[:, :2]
+    return motion, replace(start, states=tuple(mean))

@@ -3,6 +3,7 @@
     python -m evidence.benchmarks.robustness                          # 500 systems, seed 1, on two processes
     python -m evidence.benchmarks.robustness --systems 60 --seed 7 --workers 1
     python -m evidence.benchmarks.robustness --seed 1 --only 137      # one system again, point by point
+    python -m evidence.benchmarks.robustness --planar --systems 100   # planar friction; with --planes the same systems with two springs, with both each system both ways
 
 `evidence.benchmarks.robustness_systems` says what is drawn. Each system is swept through its resonance with the public `forced_response`. Every
 frequency that the response consists of counts, and so does each repeat of a frequency that failed; a system that exceeds its
@@ -18,17 +19,18 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy: the processes sha
 
 import signal
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache, partial
+from itertools import count, islice
 from multiprocessing import Pool
 from time import process_time
 
 import numpy as np
 
 from evidence.benchmarks.robustness_judge import Judgement, judge
-from evidence.models.random_machines import MANY, Drawn, draw, draw_many
+from evidence.models.random_machines import MANY, Drawn, draw, draw_many, has_planes
 from stickslip.errors import StickslipError
 from stickslip.response.forced.response import (
     ForcedPoint,
@@ -61,6 +63,7 @@ class Outcome:
     rescues: dict[str, int]
     seconds: float
     judgements: list[Judgement] = field(default_factory=list)
+    planar: bool = False
 
 
 @contextmanager
@@ -92,16 +95,16 @@ def solve(drawn: Drawn) -> tuple[list[ForcedPoint], str]:
 
 
 @cache
-def warmed() -> None:
+def warmed(*, planar: bool) -> None:
     """Compile or load the kernels, once a process and outside the clock."""
-    drawn = draw(0, 0)
+    drawn = draw(0, 0, planar=planar)
     next(iter(forced_response(drawn.system, drawn.load, drawn.sweep)))
 
 
-def outcome(seed: int, number: int) -> Outcome:
+def outcome(seed: int, number: int, *, planar: bool = False) -> Outcome:
     """Solve and count one system; negative numbers are the larger wedges."""
-    warmed()
-    drawn = drawn_system(seed, number)
+    warmed(planar=planar)
+    drawn = drawn_system(seed, number, planar=planar)
     began = process_time()
     points, early = solve(drawn)
     seconds = process_time() - began
@@ -113,7 +116,11 @@ def outcome(seed: int, number: int) -> Outcome:
         reasons[early] += unsolved
     low = [p for p in points if p.stage == "low"]
     high = list({p.index: p for p in points if p.stage == "high"}.values())
-    judged = number >= 0 and np.random.default_rng([seed, number, TENTH]).integers(TENTH) == 0
+    judged = (
+        not planar
+        and number >= 0
+        and np.random.default_rng([seed, number, TENTH]).integers(TENTH) == 0
+    )
     judgements = []
     if judged and any(p.converged for p in accepted):
         problem = forced_problem(drawn.system, drawn.load, drawn.sweep)
@@ -131,14 +138,20 @@ def outcome(seed: int, number: int) -> Outcome:
         dict(Counter(str(getattr(p, "rescue", 0)) for p in accepted if p.converged)),
         seconds,
         judgements,
+        planar,
     )
 
 
-def drawn_system(seed: int, number: int) -> Drawn:
-    """Draw a system; negative numbers are the larger wedges."""
+def drawn_system(seed: int, number: int, *, planar: bool = False) -> Drawn:
+    """Draw a system; negative numbers are the larger wedges, which have two springs always."""
     if number < 0:
         return draw_many(seed, -number, MANY[-number - 1])
-    return draw(seed, number)
+    return draw(seed, number, planar=planar)
+
+
+def with_planes(seed: int, systems: int) -> list[int]:
+    """Return the first numbers whose systems can have planar friction."""
+    return list(islice((n for n in count() if has_planes(seed, n)), systems))
 
 
 def missing(drawn: Drawn, points: list[ForcedPoint]) -> int:
@@ -187,8 +200,8 @@ def show_judgements(outcomes: list[Outcome]) -> None:
     print(
         f"\n{len(judged)} points of {sum(bool(o.judgements) for o in outcomes)} systems against time integration:"
     )
-    for verdict, count in Counter(j.verdict for _, j in judged).most_common():
-        print(f"{count:5} {verdict}")
+    for verdict, times in Counter(j.verdict for _, j in judged).most_common():
+        print(f"{times:5} {verdict}")
     off = [j.default_off for _, j in judged if j.verdict == "agrees"]
     if off:
         print(f"of those that agree, the default orders differ from the integration by {np.median(off):.1e} in the median, "
@@ -203,28 +216,62 @@ def share(failed: int, of: int) -> str:
     return f"{100 * (1 - failed / of):.2f} %" if of else "-"
 
 
-def run(systems: int, seed: int, workers: int) -> list[Outcome]:
-    """Solve all systems, and the larger wedges if all 500 are asked for."""
-    numbers = [*range(systems), *(range(-1, -len(MANY) - 1, -1) if systems >= 500 else ())]
-    one = partial(outcome, seed)
+def run(
+    numbers: list[int], seed: int, workers: int, laws: Sequence[bool] = (False,)
+) -> list[Outcome]:
+    """Solve the systems of the given numbers, planar (True) or with two springs; each is told as it is done."""
+    asked = [(n, planar) for n in numbers for planar in laws]
+    one = partial(_one, seed)
     if workers == 1:
-        return [one(n) for n in numbers]
+        return [told(one(each)) for each in asked]
     with Pool(workers) as pool:
-        return list(pool.imap(one, numbers, chunksize=1))
+        return [told(done) for done in pool.imap(one, asked, chunksize=1)]
+
+
+def _one(seed: int, asked: tuple[int, bool]) -> Outcome:
+    return outcome(seed, asked[0], planar=asked[1])
+
+
+def told(done: Outcome) -> Outcome:
+    """Print one line, so that a run that is ended leaves what it found."""
+    law = "planar" if done.planar else "springs"
+    print(f"{done.number:5} {done.family:8} {law:8} {done.failed:4} of {done.points:4} failed "
+          f"{done.seconds:5.1f} s  {done.reasons}", flush=True)  # fmt: skip
+    return done
+
+
+def asked_numbers(asked: argparse.Namespace) -> list[int]:
+    """Return the numbers of the systems asked for; 500 of all families have the larger wedges beside them."""
+    if asked.planar or asked.planes:
+        return with_planes(asked.seed, asked.systems)
+    larger = range(-1, -len(MANY) - 1, -1) if asked.systems >= 500 else ()
+    return [*range(asked.systems), *larger]
 
 
 def main() -> int:
     """Parse, run and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        description=f"{__doc__.splitlines()[0]} A sweep has {CPU_SECONDS:g} s of CPU time, not of the clock on the wall."
+    )
     parser.add_argument("--systems", type=int, default=500)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--only", type=int)
+    parser.add_argument("--planar", action="store_true", help="friction coupled in the plane")
+    parser.add_argument(
+        "--planes",
+        action="store_true",
+        help="the systems of --planar with two springs; with --planar: both ways",
+    )
     asked = parser.parse_args()
     if asked.only is None:
-        show(run(asked.systems, asked.seed, asked.workers), asked.seed)
+        laws = [True, False] if asked.planar and asked.planes else [asked.planar]
+        outcomes = run(asked_numbers(asked), asked.seed, asked.workers, laws)
+        for law in laws:
+            print("\nplanar friction" if law else "\ntwo springs")
+            show([o for o in outcomes if o.planar is law], asked.seed)
         return 0
-    drawn = drawn_system(asked.seed, asked.only)
+    drawn = drawn_system(asked.seed, asked.only, planar=asked.planar)
     points, early = solve(drawn)
     print(drawn.note, early)
     problem = forced_problem(drawn.system, drawn.load, drawn.sweep)
@@ -232,7 +279,7 @@ def main() -> int:
         rescue = getattr(p, "rescue", 0)
         print(f"{p.stage:6} {p.index:4} {p.omega / 2 / np.pi:12.6f} Hz  {problem.amplitude(p):.4e} m  H = {p.order}  "
               f"{p.status.name.lower():20} {p.iterations:4}  {rescue}")  # fmt: skip
-    show([outcome(asked.seed, asked.only)], asked.seed)
+    show([outcome(asked.seed, asked.only, planar=asked.planar)], asked.seed)
     return 0
 
 

@@ -10,17 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from evidence.models.solving import integrate_refined
-from stickslip.harmonic.aft import contact_forces
+from evidence.integrator.transient import TimeStepping, TransientStart
+from evidence.integrator.verlet import start_along
+from evidence.models.solving import integrate, integrate_refined
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.fourier import to_real
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem
-from stickslip.response.time.transient import (
-    TimeStepping,
-    TransientStart,
-    integrate,
-    start_from_harmonics,
-)
 from stickslip.solve.newton_method import Newton, newton
 
 ORDERS = (9, 15, 25)
@@ -79,9 +73,9 @@ def judged(problem: ForcedProblem, load: HarmonicLoad, point: ForcedPoint) -> Ju
     before, many = ladder
     outputs = problem.system.outputs[:1]
     motion = problem.low.linear.recover(point.omega, many)
-    start = start_from_harmonics(motion, point.omega, tractions(problem, many))
     system = problem.system
     laws, gaps = system.interface.laws, system.interface.gap_operator
+    start = start_along(motion, point.omega, gaps, laws)
     common = (system.structure, gaps, laws, load, point.omega, outputs)
     once = one_period(common, start)
     found = integrate_refined(
@@ -136,10 +130,3 @@ def one_period(common: tuple, start: TransientStart) -> complex:  # type: ignore
     stepping = TimeStepping(steps_per_period=8 * STEPS, max_periods=2)
     found = integrate(*common, start=start, stepping=stepping)
     return complex(found.harmonics[1, 0])
-
-
-def tractions(problem: ForcedProblem, coefficients: np.ndarray) -> np.ndarray:
-    """Return the (n_contacts, 2) tangential forces at t = 0, N."""
-    balance = problem.high
-    gaps = coefficients @ balance.interface.gap_operator.T
-    return contact_forces(to_real(gaps), balance.compiled, SAMPLES).force[:, :2, 0]

@@ -25,7 +25,7 @@ from stickslip.response import (
     shoot,
     signals,
 )
-from stickslip.response.time.transient import start_from_harmonics
+from stickslip.response.time.start import start_from_harmonics
 
 HZ = 2 * np.pi
 STEPS = 512  # of a period; the error of the step is printed
@@ -252,11 +252,11 @@ def orbit(model: Model, problem: ForcedProblem, point: ForcedPoint, steps: int =
     begun = process_time()
     system = model.system
     motion = problem.low.linear.recover(point.omega, point.coefficients)
-    traction = signals(problem, point).force[:, :2, 0]
-    start = start_from_harmonics(motion, point.omega, traction)
+    gaps, laws = system.interface.gap_operator, system.interface.laws
+    start = start_from_harmonics(motion, point.omega, gaps, laws)
     outputs = np.array([*system.outputs, model.rotation])
     where = (
-        system.plain_structure, system.interface.gap_operator, system.interface.laws,
+        system.plain_structure, gaps, laws,
         problem.low.linear.load, point.omega, outputs, start,
     )  # fmt: skip
     shot = shoot(

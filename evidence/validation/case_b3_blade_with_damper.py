@@ -4,19 +4,19 @@ The source's peaks come from a closed form without sampling error: once the cont
 fitted, once the peak is tracked directly with exact events. The best preload is found by direct tracking. The source's table of H = 1
 and H = 11 is that of 2048 samples a period: its digits are met with that number and with no other power of two (at 65536 samples the
 same solver agrees with the closed form of H = 1 to nine digits, and the table does not, by up to 1e-6). Its exact column was
-integrated with located events; ours is the library's time integration, extrapolated from two step lengths.
+integrated with located events; ours is the integration of `evidence.integrator`, extrapolated from two step lengths.
 """
 
 import numpy as np
 from numpy.polynomial import Chebyshev
 
+from evidence.integrator.transient import TimeStepping
 from evidence.models.lumped import griffin
 from evidence.models.solving import RefinedResult, balance_of, bonded, integrated, motion, solve
 from evidence.validation.compare import Record, digits
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.response.parameter import Discretisation
-from stickslip.response.time.transient import TimeStepping
 from stickslip.response.tracking import smallest_peak, track_peak
 
 SOURCE = "literature benchmark B3"

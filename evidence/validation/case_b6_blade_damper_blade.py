@@ -1,7 +1,7 @@
 """B6: blade, damper, blade with variable normal load and lift-off: amplitudes, peaks, mean values, natural frequencies.
 
 The source's H = 1, 3 and 5 columns belong to 256 samples a period, its H = 11 column to 1024; the same are used here. Its exact column
-was integrated with located events; ours is the library's time integration, extrapolated from two step lengths.
+was integrated with located events; ours is the integration of `evidence.integrator`, extrapolated from two step lengths.
 
 The benchmark's note says what its digits are good to, found by comparing three programs: the exact column to 2e-5 at 150 and 160 Hz,
 and the peaks to 1.2e-4 in amplitude and 4e-4 in frequency, because with 256 samples the curve has several tops. All other numbers
@@ -11,6 +11,7 @@ hold to their digits.
 import numpy as np
 import scipy.linalg
 
+from evidence.integrator.transient import TimeStepping
 from evidence.models.lumped import Y2, blades_and_damper
 from evidence.models.solving import (
     at_frequency,
@@ -25,7 +26,6 @@ from stickslip.arrays import FloatArray
 from stickslip.response.equilibrium import preload
 from stickslip.response.forced.response import Sweep, forced_problem
 from stickslip.response.system import System
-from stickslip.response.time.transient import TimeStepping
 
 SOURCE = "literature benchmark B6"
 TABLE = (  # Hz, exact, H=1, H=3, H=5 (256 samples), H=11 (1024 samples)

@@ -106,8 +106,10 @@ class Quantity:
         return (not many or few <= len(entries) <= many) and all(map(self._allows_one, entries))
 
     def _allows_one(self, value: Any) -> bool:
-        if self.choices or not isinstance(value, Real):
-            return not self.choices or value in self.choices
+        if self.choices:
+            return value in self.choices
+        if not isinstance(value, Real):
+            return not (self.unit and isinstance(value, str))
         size, unit = float(value), self.factor
         return (
             math.isfinite(size)
@@ -160,6 +162,6 @@ def check_quantities(given: Any) -> None:
             unit = {"": "", "deg": " in rad"}.get(known.unit, " in SI units")
             raise input_error(
                 f"{type(given).__name__}.{entry.name}",
-                f"must {known.limits}, got {value}",
+                f"must {known.limits}, got {repr(value) if isinstance(value, str) else value}",
                 f"Meant is{unit}: {known.about or 'a number in SI units'}.",
             )

@@ -105,8 +105,8 @@ def told_apart(law: Any, *, per_area: bool) -> str:
     said = []
     for name, entry in known.items():
         other = known.get(f"{name[:-1]}w") if name.endswith("_t") else None
-        if other is None or getattr(law, name) == getattr(law, other.name):
-            continue
+        if other is None or getattr(law, other.name) in (None, getattr(law, name)):
+            continue  # None along w: as along t
         for one in (entry, other):
             told = quantity_of(one)
             word = one.name if told is None else told.key_of(one.name, per_area=per_area)

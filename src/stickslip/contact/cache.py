@@ -1,22 +1,36 @@
 """Where compiled functions are kept for the next start; without any place they are compiled at every start."""
 
+import hashlib
 import logging
 import os
+import re
 from functools import cache
+from pathlib import Path
 from typing import Any
 
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, _SourceFileBackedLocatorMixin
 from numba.core.dispatcher import Dispatcher
 
 LOG = logging.getLogger("stickslip")
+_PACKAGE = Path(__file__).parents[1]
+_IMPORT = re.compile(r"^\s*from stickslip\.([\w.]+) import", re.MULTILINE)
 _TOLD = "STICKSLIP_UNCACHED"  # in the environment: worker processes need not say it again
 
 
 @cache
 def allow_no_cache() -> None:
-    """Let numba compile functions that ask for a cache also where it may write to no folder: it refuses to load them otherwise."""
+    """Let numba compile functions that ask for a cache also where it may write to no folder: it refuses to load them otherwise.
+
+    What another version of this package has left in the cache, with types that are gone, is compiled again. So is a function whose file
+    imports one that has changed: numba looks at the function's own file only, and would go on with the constants and functions of before.
+    """
     keep: Any = Dispatcher.enable_caching
+    read: Any = FunctionCache.load_overload
     save: Any = FunctionCache.save_overload
+    stamp: Any = _SourceFileBackedLocatorMixin.get_source_stamp
+
+    def stamp_with_imports(self: Any) -> Any:
+        return stamp(self), _contents(Path(self._py_file))
 
     def enable(self: Any) -> None:
         try:
@@ -30,8 +44,34 @@ def allow_no_cache() -> None:
         except OSError:  # a disk that is full since
             _tell()
 
+    def load_if_known(self: Any, signature: Any, target_context: Any) -> Any:
+        try:
+            return read(self, signature, target_context)
+        except (
+            AttributeError,
+            ImportError,
+        ):  # while the list of what is kept is read, before its age is looked at
+            self.flush()
+            return None
+
+    _SourceFileBackedLocatorMixin.get_source_stamp = stamp_with_imports  # type: ignore[method-assign]
     Dispatcher.enable_caching = enable  # type: ignore[method-assign]
+    FunctionCache.load_overload = load_if_known  # type: ignore[method-assign]
     FunctionCache.save_overload = save_if_possible  # type: ignore[method-assign]
+
+
+@cache
+def _contents(file: Path) -> str:
+    """Return the digest of all files of this package that a file imports, directly or through others."""
+    found: set[Path] = set()
+    to_do = [file]
+    while to_do:
+        for name in _IMPORT.findall(to_do.pop().read_text(encoding="utf-8")):
+            path = _PACKAGE.joinpath(*name.split(".")).with_suffix(".py")
+            if path not in found and path.is_file():
+                found.add(path)
+                to_do.append(path)
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(found))).hexdigest()
 
 
 def _tell() -> None:

@@ -7,7 +7,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.contact.law import UNCOUPLED_TANGENTS, ContactLaw, PiecewiseLinear
+from stickslip.contact.element import element
+from stickslip.contact.law import UNCOUPLED_TANGENTS, ContactLaw, PiecewiseLinear, PlanarFriction
 from stickslip.errors import check_choice, input_error
 
 Evaluator = Literal["intervals", "march", "events"]
@@ -30,7 +31,8 @@ class CompiledContacts:
     Attributes
     ----------
     evaluator
-        How piecewise-linear laws are evaluated: ``intervals`` (on samples), ``events`` (exact), or ``march`` as all others are.
+        How piecewise-linear laws are evaluated: ``intervals`` (on samples), ``events`` (exact), or ``march`` as all others but planar
+        ones are.
     n_contacts
         Number of contacts.
     pairs
@@ -41,6 +43,8 @@ class CompiledContacts:
         Contacts that are sums of elementary ones.
     elements, first
         (n_elements, 7) and (len(piecewise) + 1,): their elements, see `contact_period`.
+    planar, planar_elements
+        Contacts with isotropic planar friction, and their (len(planar), 7) rows.
     marched
         All other contacts.
     """
@@ -52,12 +56,19 @@ class CompiledContacts:
     piecewise: IntArray
     elements: FloatArray
     first: IntArray
+    planar: IntArray
+    planar_elements: FloatArray
     marched: tuple[MarchedLaws, ...]
+
+    @property
+    def needs_samples(self) -> bool:
+        """Whether forces depend on the number of samples."""
+        return bool(self.marched) or (self.evaluator != "events" and self.piecewise.size > 0)
 
     @property
     def keeps_events(self) -> bool:
         """Whether an evaluation without samples tells when every contact changes its state."""
-        return self.evaluator == "events" and not self.marched
+        return self.evaluator == "events" and not self.marched and not self.planar.size
 
 
 def check_evaluator(evaluator: str) -> None:
@@ -91,7 +102,8 @@ def compile_contacts(
     weights
         (n_contacts,) factors of the forces; None: ones.
     evaluator
-        ``intervals`` or ``events`` for piecewise-linear laws (others are marched), or ``march`` for all.
+        ``intervals`` or ``events`` for piecewise-linear laws, ``march`` for all; planar friction is evaluated at events by both of the
+        first, and all other laws are marched.
 
     Raises
     ------
@@ -104,11 +116,14 @@ def compile_contacts(
     march_all = evaluator == "march"
     rows: list[FloatArray] = []
     piecewise: list[int] = []
+    planar: dict[int, FloatArray] = {}
     others: dict[tuple[Any, int, int], list[int]] = {}
     for index, law in enumerate(laws):
         if isinstance(law, PiecewiseLinear) and not march_all:
             piecewise.append(index)
             rows.append(law.elements())
+        elif not march_all and (row := _planar_row(law)) is not None:
+            planar[index] = row
         else:
             kind = (law.kernel, law.parameters().size, law.initial_state().size)
             others.setdefault(kind, []).append(index)
@@ -120,8 +135,19 @@ def compile_contacts(
         np.array(piecewise, dtype=np.int64),
         np.concatenate(rows) if rows else np.zeros((0, 7)),
         np.cumsum([0, *(len(r) for r in rows)], dtype=np.int64),
+        np.array(list(planar), dtype=np.int64),
+        np.array(list(planar.values())).reshape(-1, 7),
         tuple(_marched(laws, np.array(indices), kind[0]) for kind, indices in others.items()),
     )
+
+
+def _planar_row(law: ContactLaw) -> FloatArray | None:
+    """Return the row of an elementary contact for a law whose friction is isotropic in the plane."""
+    values = law.planar() if isinstance(law, PlanarFriction) else None
+    if values is None:
+        return None
+    k, k_n, mu, preload = values
+    return element(k_t=k, k_w=k, k_n=k_n, mu=mu, preload=preload)
 
 
 def _marched(laws: Sequence[ContactLaw], contacts: IntArray, kernel: Any) -> MarchedLaws:

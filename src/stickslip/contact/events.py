@@ -43,7 +43,7 @@ LARGEST = 1e152  # of a gap's Fourier coefficients; its square is still finite
 
 
 @numba.njit(cache=True)
-def _sample_normal(gap, row, limit, force, state):  # type: ignore[no-untyped-def]
+def sample_normal(gap, row, limit, force, state):  # type: ignore[no-untyped-def]
     """Add the normal force on samples; fill the limit there and the state that a direction without stiffness has."""
     for i in range(gap.size):
         normal, _, limit[i], _, is_open = normal_contact(gap[i], row)
@@ -84,7 +84,7 @@ def _element(  # type: ignore[no-untyped-def]
         n_crossings[e] = keep_rows(work.roots[0], n_roots, crossings[e])
         begins_open[e] = starts_open
     add_normal_force(polynomials[2], row, n_roots, starts_open, work, coefficients[2], blocks[NN])
-    _sample_normal(gap[2], row, work.pressure, force[2], state)
+    sample_normal(gap[2], row, work.pressure, force[2], state)
     for d in range(2):
         k, x = row[d], polynomials[d]
         if k == 0.0:

@@ -105,6 +105,15 @@ class PiecewiseLinear(Protocol):
         ...
 
 
+@runtime_checkable
+class PlanarFriction(Protocol):
+    """A law with isotropic planar friction, whose periods are evaluated at located events."""
+
+    def planar(self) -> FloatArray | None:
+        """Return the (4,) tangential stiffness, normal stiffness, friction coefficient and preload; None: it is marched."""
+        ...
+
+
 def law_kernel(step: Callable[..., None]) -> Any:
     """Compile the step of a law.
 

@@ -8,11 +8,15 @@ that one, which the change over a period alone does not where the start is forgo
 start for ever, as a spring that only sticks, is left where marching brought it.
 """
 
+from functools import cache
+from typing import Any
+
 import numba
 import numpy as np
 from numba import types
 
-from stickslip.contact.law import PAIRS, STEP_SIGNATURE
+from stickslip.contact.addresses import law_at
+from stickslip.contact.law import PAIRS
 
 MAX_PERIODS = 400
 ROUNDING = 1e-14  # change over a period that counts as none, as a share of the state's range
@@ -24,7 +28,7 @@ KEPT = 1e-11  # singular value below which a direction is said to keep its memor
 _PAIRS = np.array(PAIRS)
 _cube = types.float64[:, :, ::1]
 _SIGNATURE = types.void(
-    types.FunctionType(STEP_SIGNATURE),
+    types.int64,  # where the step of the law begins
     types.float64[:, ::1],  # parameters
     types.float64[:, ::1],  # start
     _cube,  # gap
@@ -247,16 +251,21 @@ def _settle(  # type: ignore[no-untyped-def]
     return -1
 
 
-@numba.njit(_SIGNATURE, cache=True)
+@cache
+def period_march() -> Any:
+    """Return `march_period`, compiled when it is first asked for: half a minute that exact events never need."""
+    return numba.njit(_SIGNATURE, cache=True)(march_period)
+
+
 def march_period(  # type: ignore[no-untyped-def]
-    step, parameters, start, gap, velocity, basis, basis_rate, omega, force, state, blocks, by_omega, periods,
+    address, parameters, start, gap, velocity, basis, basis_rate, omega, force, state, blocks, by_omega, periods,
 ):  # fmt: skip
     """March contacts of one law until they are periodic; forces and derivatives are those of the last period.
 
     Parameters
     ----------
-    step
-        The law, compiled by `law_kernel`.
+    address
+        Where the step of the law begins, from `law_address`.
     parameters, start
         (n, n_parameters) and (n, n_state) of each contact.
     gap, velocity
@@ -276,6 +285,7 @@ def march_period(  # type: ignore[no-untyped-def]
     periods
         Out: (n,) periods marched; -1 if the state did not repeat within the largest number.
     """
+    step = law_at(address)
     n_samples, m = basis.shape
     n_state = start.shape[1]
     work = _workspace(n_state, blocks.shape[1], n_samples, m)

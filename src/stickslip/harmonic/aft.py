@@ -6,11 +6,13 @@ from functools import lru_cache
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.contact.addresses import law_address
 from stickslip.contact.compiled import CompiledContacts, MarchedLaws
 from stickslip.contact.event_integrals import Events, integrated, room_for_events
 from stickslip.contact.events import exact_period
 from stickslip.contact.intervals import contact_period, contact_period_threads, prefix_sums
-from stickslip.contact.march import march_period
+from stickslip.contact.march import period_march
+from stickslip.contact.planar.period import planar_period
 from stickslip.contact.threads import thread_shares
 from stickslip.errors import input_error
 
@@ -101,7 +103,7 @@ def contact_forces(
             f"gap coefficients of shape {gap_coefficients.shape} for {contacts.n_contacts} contacts",
             "Give 2 H + 1 rows, and columns t, w, n of each contact.",
         )
-    if not history and contacts.keeps_events:
+    if not history and not contacts.needs_samples:
         samples = 0
     tables = _tables((m - 1) // 2, samples)
     # one row a gap, so that an evaluator runs along it
@@ -112,6 +114,8 @@ def contact_forces(
         evaluate = _exact if contacts.evaluator == "events" else _on_samples
         period = evaluate(gap_coefficients, gap, contacts, tables)
         parts.append((own, period))
+    if contacts.planar.size:
+        parts.append((contacts.planar, _planar(gap_coefficients, gap, contacts)))
     for laws in contacts.marched:
         period = _marched(gap_coefficients, gap, laws, contacts.pairs, tables, omega)
         parts.append((laws.contacts, period))
@@ -166,6 +170,18 @@ def _exact(
     return ContactPeriod(coefficients, blocks, None, gap, force, state, 0, kept)
 
 
+def _planar(
+    gap_coefficients: FloatArray, gap: FloatArray, contacts: CompiledContacts
+) -> ContactPeriod:
+    """Evaluate contacts with isotropic planar friction at located events."""
+    own = contacts.planar
+    gap = gap if own.size == len(gap) else np.ascontiguousarray(gap[own])
+    coefficients, blocks, force, state, unsettled = planar_period(
+        _of(gap_coefficients, own), contacts.planar_elements, gap, contacts.pairs
+    )
+    return ContactPeriod(coefficients, blocks, None, gap, force, state, unsettled)
+
+
 def forces_between(events: Events, contacts: CompiledContacts, order: int) -> ContactPeriod:
     """Return forces and derivatives up to `order` at a motion with fewer harmonics whose events are known, without samples.
 
@@ -205,8 +221,8 @@ def _marched(
     state = np.empty((n, 2, samples), dtype=np.int64)
     blocks = np.empty((n, pairs, m, m))
     periods = np.empty(n, dtype=np.int64)
-    march_period(
-        laws.kernel, laws.parameters, laws.start, gap, velocity.reshape(gap.shape), tables.basis,
+    period_march()(
+        law_address(laws.kernel), laws.parameters, laws.start, gap, velocity.reshape(gap.shape), tables.basis,
         rate, omega, force, state, blocks, by_omega, periods,
     )  # fmt: skip
     return ContactPeriod(

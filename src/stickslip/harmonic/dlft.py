@@ -28,6 +28,7 @@ from stickslip.harmonic.balance import (
     harmonic_balance,
 )
 from stickslip.harmonic.linear import DynamicStiffness
+from stickslip.harmonic.penalty import Penalty, dynamic_penalty
 from stickslip.harmonic.rigid_contacts import NORMAL, STIFF, RigidContacts, rigid_contacts
 from stickslip.harmonic.support import Harmonics, harmonics_of
 
@@ -119,7 +120,7 @@ class DynamicLagrangian:
         inner = replace(
             self.balance, harmonics=harmonics_of(order), samples=_samples_of_others(samples, order)
         )
-        own = rigid_contacts(self.interface, self.rigid.index, inner, self.penalty)
+        own = rigid_contacts(self.interface, self.rigid.index, inner)
         return replace(self, balance=inner, rigid=own, samples=samples)
 
     def linearise(self, x: FloatArray, omega: float) -> Linearisation:
@@ -128,12 +129,12 @@ class DynamicLagrangian:
         start = perf_counter()
         rigid = self.rigid
         rows = rigid.column[:, None] + self.linear.n * np.arange(2 * self.order + 1)
-        found = self._corrected(x, at.residual)
+        found = self._corrected(x, omega, at.residual)
         # derivatives of the predictions by x and, in the last column, by ω
         jac = at.dense_jac()
         slope = -np.concatenate([jac[rows], at.jac_p[rows][:, :, None]], axis=2)
         slope /= rigid.factor[:, None, None]
-        _add_penalty(slope, rows, rigid, found.stuck)
+        _add_penalty(slope, rows, rigid, found)
         change = rigid.factor[:, None, None] * _chain(found.period.blocks, slope, rigid)
         residual, jac_p = at.residual.copy(), at.jac_p.copy()
         own = found.coefficients[:, rigid.contact, rigid.direction].T
@@ -148,7 +149,7 @@ class DynamicLagrangian:
         Gaps are those of the motion, without initial gaps. For rigid contacts the blocks are derivatives by predicted forces.
         """
         balance, rigid = self.balance, self.rigid
-        found = self._corrected(x, balance.linearise(x, omega).residual)
+        found = self._corrected(x, omega, balance.linearise(x, omega).residual)
         q = x.reshape(2 * self.order + 1, -1) * balance.displacement_scale
         n = self.interface.n_contacts
         others = np.setdiff1d(np.arange(n), rigid.index)
@@ -168,13 +169,25 @@ class DynamicLagrangian:
         flat = coefficients.reshape(q.shape[0], -1)
         return ContactPeriod(flat, blocks, None, gap, force, state, soft.unsettled)
 
-    def _corrected(self, x: FloatArray, residual: FloatArray) -> "_Corrected":
+    def penalties(self, omega: float) -> Penalty:
+        """Return ε of each gap at `omega` (rad/s), scaled, and its derivative by ω."""
+        gaps = self.rigid.column.size
+        stiffness = self.force_scale / self.displacement_scale
+        if self.penalty is not None:
+            return Penalty(np.full(gaps, self.penalty / stiffness), np.zeros(gaps))
+        found = dynamic_penalty(self.linear, omega, self.order)
+        share = 1.0 / (stiffness * self.rigid.factor**2)
+        column = self.rigid.column
+        return Penalty(share * found.value[column], share * found.slope[column])
+
+    def _corrected(self, x: FloatArray, omega: float, residual: FloatArray) -> "_Corrected":
         """Predict the forces of the rigid contacts from the `residual` without them, and correct them."""
         rigid, m = self.rigid, 2 * self.order + 1
+        penalty = self.penalties(omega)
         n = rigid.index.size
         equilibrium = -residual.reshape(m, -1)[:, rigid.column] / rigid.factor
-        elastic = rigid.penalty * rigid.factor * x.reshape(m, -1)[:, rigid.column]
-        elastic[0] += rigid.penalty * rigid.offset
+        elastic = penalty.value * rigid.factor * x.reshape(m, -1)[:, rigid.column]
+        elastic[0] += penalty.value * rigid.offset
         sliding = np.where(rigid.direction == NORMAL, elastic, derivative(self.order) @ elastic)
         predicted = np.zeros((m, n, 3))
         predicted[:, rigid.contact, rigid.direction] = equilibrium + sliding
@@ -188,7 +201,8 @@ class DynamicLagrangian:
             ]
             _hold(period, held, stuck, rigid)
         coefficients = _in_harmonics(period.force.reshape(3 * n, -1), self.order)
-        return _Corrected(period, coefficients.reshape(m, n, 3), stuck)
+        forbidden = np.where(stuck, elastic, sliding)
+        return _Corrected(period, coefficients.reshape(m, n, 3), stuck, penalty, forbidden)
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,6 +210,8 @@ class _Corrected:
     period: RigidPeriod
     coefficients: FloatArray  # (m, n_rigid, 3)
     stuck: BoolArray  # (n_gaps,) tangents that stick throughout
+    penalty: Penalty
+    forbidden: FloatArray  # (m, n_gaps) penalty times what the laws forbid
 
 
 def derivative(order: int) -> FloatArray:
@@ -252,14 +268,18 @@ def _slider(mu: float, constant: float) -> ElasticCoulomb:
     return ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=0.0, mu=mu, preload=constant)
 
 
-def _add_penalty(slope: FloatArray, rows: IntArray, rigid: RigidContacts, stuck: BoolArray) -> None:
+def _add_penalty(
+    slope: FloatArray, rows: IntArray, rigid: RigidContacts, found: _Corrected
+) -> None:
     """Add the derivatives of what the laws forbid: of displacements along the normal and where a tangent is held, else of velocities."""
     m = rows.shape[1]
     sliding = derivative((m - 1) // 2)
-    for g, by_place in enumerate((rigid.direction == NORMAL) | stuck):
+    penalty = found.penalty
+    for g, by_place in enumerate((rigid.direction == NORMAL) | found.stuck):
         slope[g][:, rows[g]] += (
-            rigid.penalty[g] * rigid.factor[g] * (np.eye(m) if by_place else sliding)
+            penalty.value[g] * rigid.factor[g] * (np.eye(m) if by_place else sliding)
         )
+    slope[:, :, -1] += (penalty.slope / penalty.value * found.forbidden).T
 
 
 def _chain(blocks: FloatArray, slope: FloatArray, rigid: RigidContacts) -> FloatArray:
@@ -295,8 +315,7 @@ def dynamic_lagrangian(
         depends on the penalty; with more, eight a harmonic and up, the answer is more accurate and depends on it by less than the
         error that the missing harmonics make.
     penalty
-        Penalty ε of the method (N/m); None: for each gap a quarter of the structure's stiffness at that coordinate times the order, so
-        that the error falls in proportion to 1/H, and extrapolates.
+        Penalty ε of the method (N/m); None: for each gap what the structure holds against it at the frequency, see `dynamic_penalty`.
     evaluator
         Of the contacts that have a stiffness; see `harmonic_balance`.
 
@@ -322,7 +341,7 @@ def dynamic_lagrangian(
         linear, _without(interface, rigid), order, _samples_of_others(samples, order), evaluator
     )
     local = interface.restricted(linear.retained)
-    own = rigid_contacts(local, rigid, balance, penalty)
+    own = rigid_contacts(local, rigid, balance)
     return DynamicLagrangian(balance, local, own, samples, penalty)
 
 

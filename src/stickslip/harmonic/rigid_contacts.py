@@ -12,7 +12,6 @@ from stickslip.harmonic.balance import HarmonicBalance
 
 NORMAL = 2
 STIFF = 1e5  # of springs in place of rigid contacts, over the structure's largest stiffness at a contact: off by 1e-5
-PENALTY_SHARE = 0.25  # of the structure's stiffness, per harmonic
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,9 +24,9 @@ class RigidContacts:
         (n_rigid,) their positions in the interface.
     mu, constant
         (n_rigid,) friction coefficients; constant normal loads, scaled, NaN where the normal force is a reaction.
-    contact, direction, column, factor, penalty, offset
-        (n_gaps,) the rigid contact of a gap, 0 1 2 for t w n, its retained coordinate, the gap over that coordinate, ε scaled, and
-        the gap at zero displacement, scaled.
+    contact, direction, column, factor, offset
+        (n_gaps,) the rigid contact of a gap, 0 1 2 for t w n, its retained coordinate, the gap over that coordinate, and the gap at zero
+        displacement, scaled.
     """
 
     index: IntArray
@@ -37,12 +36,11 @@ class RigidContacts:
     direction: IntArray
     column: IntArray
     factor: FloatArray
-    penalty: FloatArray
     offset: FloatArray
 
 
 def rigid_contacts(
-    interface: Interface, rigid: IntArray, balance: HarmonicBalance, penalty: float | None
+    interface: Interface, rigid: IntArray, balance: HarmonicBalance
 ) -> RigidContacts:
     """Find the coordinates of the gaps, and write all parameters in the scaled units of a problem.
 
@@ -54,8 +52,6 @@ def rigid_contacts(
         (n_rigid,) which of them are rigid.
     balance
         The periodic problem without them.
-    penalty
-        ε in N/m, or None for the default.
 
     Raises
     ------
@@ -63,8 +59,6 @@ def rigid_contacts(
         If a gap is no coordinate, or two gaps are the same one.
     """
     length, force = balance.displacement_scale, balance.force_scale
-    stiffness = np.abs(np.diagonal(balance.linear.nn[0]))
-    typical = force / length
     entries: list[tuple[int, int, int, float]] = []
     for c, i in enumerate(rigid):
         entries += [(c, *entry) for entry in _gap_coordinates(interface, i)]
@@ -76,15 +70,12 @@ def rigid_contacts(
         twice = column[np.argmax(np.bincount(column)[column] > 1)]
         names = [interface.names[rigid[c]] for c in contact[column == twice]]
         raise _no_coordinate(" and ".join(names), "share one coordinate")
-    own = np.where(stiffness[column] > 0.0, stiffness[column], typical) / factor**2
-    own *= PENALTY_SHARE * max(balance.order, 1)
     laws = [law for law in interface.laws if isinstance(law, RigidCoulomb)]
     gaps = np.array([law.initial_gap for law in laws]) / length
     constant = np.array([np.nan if law.preload is None else law.preload for law in laws])
     return RigidContacts(
         rigid, np.array([law.mu for law in laws]), constant * interface.factors[rigid] / force,
         contact, direction, column, factor,
-        (own if penalty is None else np.full(column.size, penalty)) * length / force,
         np.where(direction == NORMAL, gaps[contact], 0.0),
     )  # fmt: skip
 

@@ -11,6 +11,15 @@ from stickslip.arrays import FloatArray
 from stickslip.solve.linear import Bordered, Jacobian, LinearSolver, solve_with
 from stickslip.solve.status import Status
 
+EPS = float(np.finfo(float).eps)
+LAST = 4.0  # digits that are changed, in units of the last
+PROBES = 6  # changes of the last digits that are tried
+ROUNDING = 2.0  # times the largest change they make, which is still rounding
+FAR = (
+    1e3  # times that change, which is not asked for again until the residual has fallen to a tenth
+)
+COARSEST = 1e-4  # residual that is not called rounding, whatever the last digits do
+
 
 class Evaluation(Protocol):
     """What a corrector needs of one evaluation."""
@@ -51,12 +60,36 @@ class Work:
     seconds_contact: float = 0.0
     seconds_linear: float = 0.0
     rejected: int = 0  # trials that were evaluated and not accepted
+    noise: float = 0.0  # largest change of the residual that last digits were seen to make
+    probed: float = np.inf  # residual at which they were last changed
 
     def at(self, x: FloatArray) -> Iterate:
         """Evaluate at `x`."""
         at = self.evaluate(x)
         self.seconds_contact += at.seconds_contact
         return Iterate(x, at, float(np.max(np.abs(at.residual))))
+
+    def rounded(self, now: Iterate) -> bool:
+        """Whether a residual is as small as the last digits of the unknowns allow.
+
+        They are changed at random, and the residual with them: by the stiffness of a contact times the rounding of a gap, if that is
+        more than what the equations are to be solved to. No step can make it smaller than that.
+        """
+        if not now.norm <= COARSEST:
+            return False
+        if now.norm > max(
+            0.1 * self.probed, FAR * self.noise
+        ):  # asked not long ago, and far from it
+            return False
+        self.probed = now.norm
+        digits = np.random.default_rng(0)
+        for _ in range(PROBES):
+            if now.norm <= ROUNDING * self.noise:
+                break
+            beside = now.x * (1.0 + EPS * digits.uniform(-LAST, LAST, now.x.size))
+            change = float(np.max(np.abs(self.at(beside).at.residual - now.at.residual)))
+            self.noise = max(self.noise, change)
+        return now.norm <= ROUNDING * self.noise
 
     def newton_step(self, now: Iterate) -> FloatArray | None:
         """Return the full Newton step; None if there is none. The Jacobian of `now` may be overwritten."""

@@ -24,6 +24,8 @@ GLOBALISATIONS: dict[GlobalisationName, Callable[[], Globalisation]] = {
     "levenberg_marquardt": LevenbergMarquardt,
 }
 
+SLOW = 0.1  # share of the residual left by a step after which it may be rounding
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Newton:
@@ -32,7 +34,8 @@ class Newton:
     Parameters
     ----------
     tolerance
-        Largest absolute entry of the scaled residual at a solution.
+        Largest absolute entry of the scaled residual at a solution; where the last digits of the unknowns change it by more, as with
+        contacts a million times stiffer than the structure, it is as small as they allow.
     max_iterations
         Newton steps before giving up.
     globalisation
@@ -114,11 +117,11 @@ def newton(
     """
     work = Work(evaluate, options.linear)
     globalisation = globalisation or GLOBALISATIONS[options.globalisation]()
-    now = work.at(x)
-    best = (now.x, now.norm)
+    now = best = work.at(x)
     iterations = 0
     status = _ended(now, iterations, options)
     while status is None:
+        before = now.norm
         after = globalisation.advance(work, now)
         if isinstance(after, Status):
             iterations += after is Status.STALLED
@@ -126,12 +129,15 @@ def newton(
             break
         now = after
         iterations += 1
-        if now.norm < best[1]:
-            best = (now.x, now.norm)
+        best = now if now.norm < best.norm else best
         status = _ended(now, iterations, options)
+        if status is None and now.norm > SLOW * before and work.rounded(best):
+            status = Status.CONVERGED
+    if not status.converged and work.rounded(best):
+        status = Status.CONVERGED
     rung = Rung.DAMPED_STEP if work.rejected else Rung.FULL_STEPS
-    x, norm = best
-    return Solution(x, status, iterations, norm, work.seconds_contact, work.seconds_linear, rung)
+    cost = (work.seconds_contact, work.seconds_linear)
+    return Solution(best.x, status, iterations, best.norm, *cost, rung)
 
 
 def _ended(now: Iterate, iterations: int, options: Newton) -> Status | None:

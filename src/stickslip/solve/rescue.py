@@ -21,6 +21,9 @@ STEPS = StepControl(scale=1.0, first=0.1, largest=0.5, smallest=1e-5)
 ITERATIONS = (
     10  # of a corrector along a homotopy: there a shorter step is cheaper than a long correction
 )
+MOST_STEPS = (
+    1500  # Newton steps along the legs of one homotopy: those that came through took 770 to 1200
+)
 ROOTLESS = 200  # points of the homotopy that needs no physics and may lead nowhere
 DIFFERENCE = 1e-6  # change of s for the derivative of a family by s
 BEYOND = 1e-9  # how far outside 0..1 rounding may carry s
@@ -213,13 +216,13 @@ def _begun(
 def _to_the_end(
     leg: Problem, start: Point, least: float, following: Following, spent: list[Solution]
 ) -> Point:
-    """Follow a leg from `start` until p = 1, p < `least`, or no step converges."""
+    """Follow a leg from `start` until p = 1, p < `least`, no step converges, or `MOST_STEPS` are spent."""
     point = start
     if not start.solution.status.converged:
         return start
     for point in trace(leg, start, 1.0, following):
         spent.append(point.solution)
-        if point.p < least:
+        if point.p < least or sum(s.iterations for s in spent) > MOST_STEPS:
             break
     return point
 

@@ -1,78 +1,210 @@
 """Unilateral normal spring with a planar friction spring: the vector of the friction forces is limited."""
 
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numba
 import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import COUPLED_TANGENTS, OPEN, SLIP, STICK, law_kernel
 from stickslip.contact.laws.parameter_checks import check_any_stiffness
 from stickslip.contact.laws.quantities import friction_coefficient, normal_stiffness
+from stickslip.contact.planar_slip import grown, slipped
 from stickslip.units import check_quantities, quantity
+
+NOTHING = 1e-60  # of the force that it would have without a limit: a limit that is none
+OUTSIDE = 1e-3  # share of a step by which a start outside the limit may lie behind it
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _meeting(f_t, f_w, pull_t, pull_w, before, rise):  # type: ignore[no-untyped-def]
+    """Return the share of the step at which a spring that sticks meets the limit, and whether that moves with its start.
+
+    It is beyond the limit at the end. From a start on the limit the share is zero but for rounding; a little outside it is
+    negative, so that the step is smooth there.
+    """
+    excess = f_t * f_t + f_w * f_w - before * before
+    b = f_t * pull_t + f_w * pull_w - before * rise
+    a = pull_t * pull_t + pull_w * pull_w - rise * rise
+    root = math.sqrt(max(0.0, b * b - a * excess))
+    if b > 0.0:
+        share = -excess / (b + root)
+        near = share > -OUTSIDE and -min(share, 0.0) * rise < 0.5 * before
+        return (min(share, 1.0), True) if near else (0.0, False)
+    return (min((root - b) / a, 1.0), True) if a > 0.0 else (1.0, False)  # beyond by rounding alone
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _slip_on(k_t, k_w, way_t, way_w, f_t, f_w, before, after):  # type: ignore[no-untyped-def]
+    """Follow the force from `f` inside the limit to the limit and along it; both limits are positive.
+
+    Returns
+    -------
+    e_t, e_w
+        Direction of the force behind the step.
+    p_t, p_w, p_ft, p_fw, p_before, p_after
+        Derivatives of its angle by the way, the force before and both limits.
+    """
+    pull_t, pull_w, rise = k_t * way_t, k_w * way_w, after - before
+    share, moves = _meeting(f_t, f_w, pull_t, pull_w, before, rise)
+    m_t, m_w, limit = f_t + share * pull_t, f_w + share * pull_w, before + share * rise
+    size = math.hypot(m_t, m_w)
+    start = math.hypot(f_t, f_w)
+    outside = moves and start > 0.0 and not abs(size - limit) <= OUTSIDE * limit
+    o_t, o_w = f_t / start, f_w / start
+    if outside:  # a limit of rounding, far within the force before, which is brought back to it
+        share, moves = _meeting(before * o_t, before * o_w, pull_t, pull_w, before, rise)
+        m_t, m_w = before * o_t + share * pull_t, before * o_w + share * pull_w
+        limit = before + share * rise
+        size = math.hypot(m_t, m_w)
+    a_t, a_w, rest = m_t / size, m_w / size, 1.0 - share
+    e_t, e_w, kept, q_t, q_w, q_limit, q_after = slipped(
+        k_t, k_w, a_t, a_w, rest * way_t, rest * way_w, limit, after
+    )
+    turn_t, turn_w = -kept * a_w / size, kept * a_t / size  # by the force where it meets the limit
+    by_share = turn_t * pull_t + turn_w * pull_w - q_t * way_t - q_w * way_w + q_limit * rise
+    steep = m_t * pull_t + m_w * pull_w - limit * rise
+    moved = -by_share / steep if moves and steep > 0.0 else 0.0
+    by_t, by_w = turn_t + moved * m_t, turn_w + moved * m_w
+    by_way = share * k_t * by_t + rest * q_t, share * k_w * by_w + rest * q_w
+    by_before = rest * (q_limit - moved * limit)
+    if outside:
+        along, across = by_t * o_t + by_w * o_w, (by_w * o_t - by_t * o_w) * before / start
+        by_t, by_w, by_before = -across * o_w, across * o_t, by_before + along
+    return (
+        e_t,
+        e_w,
+        by_way[0],
+        by_way[1],
+        by_t,
+        by_w,
+        by_before,
+        q_after + share * (q_limit - moved * limit),
+    )
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _keep(displacement, pressure, k, k_n, force, new_state, jac):  # type: ignore[no-untyped-def]
+    """Write the state behind the step: slider, displacement and pressure, with the derivatives that follow from those of the force."""
+    for d in range(2):
+        new_state[d] = displacement[d]
+        new_state[2 + d] = displacement[d]
+        jac[3 + d, d] = 1.0
+        jac[5 + d, d] = 1.0
+        if k[d] > 0.0:
+            new_state[d] -= force[d] / k[d]
+            for a in range(11):
+                jac[3 + d, a] -= jac[d, a] / k[d]
+    new_state[4] = pressure
+    jac[7, 2] = -k_n
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _closed_share(pressure, before, k_n):  # type: ignore[no-untyped-def]
+    """Return the share of the step behind the closing of the contact, its derivatives by the normal gap and by the pressure before."""
+    if before > 0.0 or pressure <= before:
+        return 1.0, 0.0, 0.0
+    change = pressure - before
+    return pressure / change, k_n * before / change**2, pressure / change**2
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _stick_rows(k, way, closing, share, jac):  # type: ignore[no-untyped-def]
+    """Fill the derivatives of a force that sticks; `share` is what `_closed_share` returns."""
+    for d in range(2):
+        jac[d, d] = k[d] * share[0]
+        if closing:
+            jac[d, 2] = k[d] * way[d] * share[1]
+            jac[d, 8 + d] = -k[d] * share[0]
+            jac[d, 10] = k[d] * way[d] * share[2]
+        else:
+            jac[d, 6 + d] = -k[d]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _slip(way, state, parameters, limit, closing, share, force, jac):  # type: ignore[no-untyped-def]
+    """Fill a force that slips, and its derivatives."""
+    k_t, k_w, k_n, mu, _ = parameters
+    # derivatives of its angle: by the gap t, w, n, by slider, displacement and pressure before
+    if closing:
+        part, by_gap, by_before = share
+        e_t, e_w, q_t, q_w, q_limit = grown(k_t, k_w, part * way[0], part * way[1], limit)
+        by_share = q_t * way[0] + q_w * way[1]
+        row = (
+            part * q_t, part * q_w, by_share * by_gap - q_limit * mu * k_n,
+            0.0, 0.0, -part * q_t, -part * q_w, by_share * by_before,
+        )  # fmt: skip
+    else:
+        f_t, f_w = k_t * (state[2] - state[0]), k_w * (state[3] - state[1])
+        e_t, e_w, p_t, p_w, p_ft, p_fw, p_before, p_after = _slip_on(
+            k_t, k_w, way[0], way[1], f_t, f_w, mu * state[4], limit
+        )
+        row = (
+            p_t, p_w, -p_after * mu * k_n,
+            -k_t * p_ft, -k_w * p_fw, k_t * p_ft - p_t, k_w * p_fw - p_w, mu * p_before,
+        )  # fmt: skip
+    for d, along, across in ((0, e_t, -e_w), (1, e_w, e_t)):
+        force[d] = limit * along
+        for a in range(3):
+            jac[d, a] = limit * across * row[a]
+        for a in range(5):
+            jac[d, 6 + a] = limit * across * row[3 + a]
+        jac[d, 2] -= mu * k_n * along
 
 
 def _step(displacement, velocity, state, parameters, force, new_state, jac, status):  # type: ignore[no-untyped-def]
-    """Return the trial force to the Coulomb disc along its radius; the state is the position of the slider in the plane."""
-    k, k_n, mu, preload = parameters
+    """Stick, slip and open along the straight way from the step before; the state is slider (2), displacement (2) and pressure there."""
+    k_t, k_w, k_n, mu, preload = parameters
+    k = (k_t, k_w)
     pressure = preload - k_n * displacement[2]
     if pressure < 0.0:
         status[:] = OPEN
         force[:] = 0.0
-        for d in range(2):
-            new_state[d] = displacement[d]
-            jac[3 + d, d] = 1.0
+        _keep(displacement, pressure, k, k_n, force, new_state, jac)
         return
     force[2] = -pressure
     jac[2, 2] = k_n
-    limit = mu * pressure
-    trial_t = k * (displacement[0] - state[0])
-    trial_w = k * (displacement[1] - state[1])
-    size = np.hypot(trial_t, trial_w)
-    if size <= limit:
-        status[:] = STICK
-        force[0], force[1] = trial_t, trial_w
-        for d in range(2):
-            new_state[d] = state[d]
-            jac[d, d] = k
-            jac[d, 6 + d] = -k
-            jac[3 + d, 6 + d] = 1.0
-        return
-    status[:] = SLIP
-    direction = (trial_t / size, trial_w / size)
-    share = limit / size  # of the stiffness left across the direction of slip
-    for a in range(2):
-        force[a] = limit * direction[a]
-        new_state[a] = displacement[a] - force[a] / k
-        jac[a, 2] = -mu * k_n * direction[a]
-        jac[3 + a, 2] = mu * k_n / k * direction[a]
-        for b in range(2):
-            across = share * ((1.0 if a == b else 0.0) - direction[a] * direction[b])
-            jac[a, b] = k * across
-            jac[a, 6 + b] = -k * across
-            jac[3 + a, b] = (1.0 if a == b else 0.0) - across
-            jac[3 + a, 6 + b] = across
+    way = (displacement[0] - state[2], displacement[1] - state[3])
+    closing = state[4] <= 0.0
+    share = _closed_share(pressure, state[4], k_n)
+    for d in range(2):
+        force[d] = k[d] * (share[0] * way[d] if closing else displacement[d] - state[d])
+    limit, trial = mu * pressure, math.hypot(force[0], force[1])
+    status[:] = STICK if trial <= limit else SLIP
+    if trial <= limit:
+        _stick_rows(k, way, closing, share, jac)
+    elif limit <= NOTHING * trial:
+        force[0] = force[1] = 0.0
+    else:
+        _slip(way, state, parameters, limit, closing, share, force, jac)
+    _keep(displacement, pressure, k, k_n, force, new_state, jac)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CoupledCoulomb:
     """Contact that sticks, slips in any direction of its plane and lifts off.
 
-    ``N = max(0, preload - k_n g_n)`` as of `ElasticCoulomb`, but one spring of the same stiffness in every direction of the
-    plane, whose force is limited as a vector: ``T_t² + T_w² <= (mu N)²``. Over a step the slider moves along the radius of the disc
-    (radial return, the implicit form of Coulomb's rule that slip is opposed by the force). Does not depend on the
-    orientation of t and w in the plane.
+    ``N = max(0, preload - k_n g_n)`` as of `ElasticCoulomb`, but one spring in the plane, whose force is limited as a vector:
+    ``T_t² + T_w² <= (mu N)²``. A slider that slips moves along the force. With one stiffness the law does not depend on the orientation of
+    t and w in the plane.
+
+    A step takes path and normal force as straight from the step before; what happens within it is followed: stick up to the
+    limit, slip along it, opening and closing.
 
     Parameters
     ----------
     k_t
-        Contact stiffness along every direction of the contact plane, N/m.
+        Contact stiffness along every direction of the contact plane or, with `k_w`, along t, N/m.
     k_n
         Normal contact stiffness, N/m.
     mu
         Friction coefficient.
     preload
         Normal force at zero normal gap, N; negative for a contact with a clearance. With ``k_n = 0`` the normal force is constant.
+    k_w
+        Contact stiffness along w, N/m; None: as along t.
 
     Raises
     ------
@@ -81,7 +213,7 @@ class CoupledCoulomb:
     """
 
     k_t: float = quantity(
-        "stiffness in every direction of the contact plane",
+        "stiffness in every direction of the contact plane or, with axial_stiffness, along the tangent t",
         "n_per_m",
         key="tangential_stiffness",
         least=0,
@@ -90,22 +222,40 @@ class CoupledCoulomb:
     k_n: float = normal_stiffness()
     mu: float = friction_coefficient()
     preload: float = 0.0
+    k_w: float | None = quantity(
+        "stiffness along the tangent w; left out: as along t",
+        "n_per_m",
+        key="axial_stiffness",
+        default=None,
+        least=0,
+        shared=True,
+    )
 
     kernel: ClassVar[Any] = law_kernel(_step)
     pairs: ClassVar[int] = COUPLED_TANGENTS
 
     def __post_init__(self) -> None:
         check_quantities(self)
-        check_any_stiffness(self, "k_t", "k_n")
+        check_any_stiffness(self, "k_t", "k_w", "k_n")
+
+    @property
+    def _along_w(self) -> float:
+        return self.k_t if self.k_w is None else self.k_w
 
     def parameters(self) -> FloatArray:
-        """Return the (4,) k_t, k_n, mu and preload."""
+        """Return the (5,) k_t, k_w, k_n, mu and preload."""
+        return np.array([self.k_t, self._along_w, self.k_n, self.mu, self.preload])
+
+    def planar(self) -> FloatArray | None:
+        """Return the (4,) k_t, k_n, mu and preload of an isotropic contact, see `contact.law.PlanarFriction`; None with two stiffnesses."""
+        if self._along_w != self.k_t:
+            return None
         return np.array([self.k_t, self.k_n, self.mu, self.preload])
 
     def initial_state(self) -> FloatArray:
-        """Return the (2,) position of the slider before t = 0, m: the spring is unstretched at zero displacement."""
-        return np.zeros(2)
+        """Return the (5,) position of the slider, displacement (m) and normal force (N) before t = 0: the spring is unstretched at zero displacement, and t = 0 is reached while N grows from nothing."""
+        return np.zeros(5)
 
     def stuck_stiffness(self) -> FloatArray:
         """Return the (3,) stiffnesses t, w, n of the contact that neither slips nor opens, N/m."""
-        return np.array([self.k_t, self.k_t, self.k_n])
+        return np.array([self.k_t, self._along_w, self.k_n])

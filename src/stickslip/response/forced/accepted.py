@@ -22,10 +22,11 @@ def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, For
     passed = -1
     for first, last in runs_of_repeats(high):
         branch = branch_points(points, first, last)
-        if reached(branch, low, last):
+        end = replaced(branch, low, last)
+        if end > passed:
             kept += [(high.get(p.index, p), p) for p in low[passed + 1 : branch[0].index]]
             kept += [(p, None) for p in branch]
-            passed = last
+            passed = end
     kept += [(high.get(p.index, p), p) for p in low[passed + 1 :]]
     peak = [p for p in points if p.stage == "peak"]
     again = {p.omega: p for p in peak if p.converged}
@@ -67,15 +68,21 @@ def branch_end(low: Sequence[ForcedPoint], last: int) -> float:
     return low[min(last + 1, len(low) - 1)].omega
 
 
-def reached(branch: Sequence[ForcedPoint], low: Sequence[ForcedPoint], last: int) -> bool:
-    """Whether a branch came to its end: to the frequency of the next quiet point, and to its motion.
+def replaced(branch: Sequence[ForcedPoint], low: Sequence[ForcedPoint], last: int) -> int:
+    """Return the index of the last point of the first passage whose place a branch takes; -1 if it takes none.
 
-    Where the branch folds it may pass that frequency several times, on its way to the other sheets.
+    It goes through its run where it came to the frequency of the next quiet point, and to its motion: where it folds it may pass that
+    frequency on other sheets. On another sheet it goes on to the end of the range and takes the place of all that follows.
     """
-    if not branch or not branch[-1].converged or branch[-1].omega != branch_end(low, last):
-        return False
-    if last + 1 >= len(low) or not low[last + 1].converged:
-        return True
+    if not branch or not branch[-1].converged:
+        return -1
+    if branch[-1].omega == low[-1].omega:
+        return len(low) - 1
+    if branch[-1].omega != branch_end(low, last):
+        return -1
+    if not low[last + 1].converged:
+        return last
     quiet = low[last + 1].coefficients[1:]
     here = branch[-1].coefficients[1 : len(quiet) + 1]
-    return bool(np.linalg.norm(here - quiet) <= ALIKE * np.linalg.norm(quiet))
+    alike = np.linalg.norm(here - quiet) <= ALIKE * np.linalg.norm(quiet)
+    return last if alike else -1

@@ -12,7 +12,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection.strategy import always_kept, judged
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.equilibrium import bonded_start, preload
-from stickslip.response.forced.accepted import branch_end, reached
+from stickslip.response.forced.accepted import branch_end, replaced
 from stickslip.response.forced.homotopies import homotopies
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.forced.sweep import Sweep
@@ -23,8 +23,9 @@ from stickslip.solve.rescue import Homotopy, solve_robustly
 
 LOOP = 3  # multiples of `Sweep.points` after which a branch that gains no frequency is left
 BRANCH_SEEDS = 4  # points from which a branch with many harmonics is begun
-BRANCH_LENGTH = 5  # multiples of `Sweep.points` after which such a branch is given up
-STALLS = 1.5  # multiples of `Sweep.points` after which it is given up if it gains no frequency
+BRANCH_LENGTH = 8  # multiples of `Sweep.points` after which such a branch is given up
+STALLS = 1.5  # multiples of `Sweep.points` after which it is left where it does not gain a step of frequency
+LEAPS = (1.0, 0.25)  # steps of frequency by which it is then taken up further on
 BACKWARD = 0.1  # share of the range by which it may fall back behind the start of the range
 DETOUR = 30  # most points on the way from a neighbour to a repeat that fails
 
@@ -53,7 +54,7 @@ def first_passage(
             point = advance(latest, problem.branch_point(points[-1]), last, following)
         if point is None or not point.solution.status.converged or _before(sweep, point.p, first):
             # the branch starts here, or is lost: take it up (again) a little further on
-            gap = sweep.forward * sweep.control.largest * sweep.control.scale if points else 0.0
+            gap = sweep.forward * _gap(sweep) if points else 0.0
             ahead = reach + gap if _before(sweep, reach + gap, last) else last
             # a single frequency is left to the repeats, which know both sides; a second one in a row to the homotopies
             left = bool(points) and points[-1].converged and problem.repeats
@@ -199,32 +200,30 @@ def follow_run(
     """Follow the branch with many harmonics through a run of repeats that did not all converge, and append to `branch`.
 
     Where the two orders differ much the branch may fold: then some frequencies have no solution near the low-order one, and only the
-    branch itself leads through.
+    branch itself leads through. It ends at the next quiet point if it comes to its motion, else at the end of the range. Stiff contacts
+    that lift off under little damping fold it hundreds of times within a step of frequency: there it is left, as a machine would leave
+    it, for a solution further on.
     """
+    sweep, balance = problem.sweep, problem.high
     end = branch_end(low, last)
-    begin, stop = problem.sweep.omega_range
+    begin, stop = sweep.omega_range
     margin = BACKWARD * (stop - begin)
-    balance = problem.high
     following = problem.following(balance)
-    while len(branch) <= BRANCH_LENGTH * problem.sweep.points:
+    while len(branch) <= BRANCH_LENGTH * sweep.points and replaced(branch, low, last) < 0:
         began = perf_counter()
-        if not branch:
+        here = branch[-1] if branch else None
+        lost = here and not (here.converged and begin - margin < here.omega < stop + margin)
+        if here is None:
             point = _branch_start(problem, low, high, first)
-            if point is None:
-                return
-        elif (
-            reached(branch, low, last)
-            or not branch[-1].converged
-            or len(branch) - _farthest(problem.sweep, branch) > problem.sweep.points * STALLS
-            or not begin - margin < branch[-1].omega < stop + margin
-        ):
-            return
         else:
-            # another sheet at the frequency of the end: on, until the branch comes back to it
-            upward = branch[-1].tangent[-1] > 0.0
-            beyond = stop + 2 * margin if upward else begin - 2 * margin
-            goal = beyond if branch[-1].omega == end else end
-            point = advance(balance, problem.branch_point(branch[-1]), goal, following)
+            leap = lost or _stalled(sweep, branch)
+            point = _further_on(problem, low, branch, end) if leap else None
+            if point is None and not lost and not _idle(sweep, branch):
+                # another sheet at the frequency of the end: on to that of the range
+                goal = low[-1].omega if any(p.omega == end for p in branch) else end
+                point = advance(balance, problem.branch_point(here), goal, following)
+        if point is None:
+            return
         made = forced_point(
             balance, point.solution, "branch", first, point.p, perf_counter() - began
         )
@@ -232,6 +231,49 @@ def follow_run(
             replace(made, tangent=point.tangent, step=point.step, orientation=point.orientation)
         )
         yield branch[-1]
+
+
+def _stalled(sweep: Sweep, branch: Sequence[ForcedPoint]) -> bool:
+    """Whether the last points of a branch together gained less than a step of frequency; asked once for so many of them."""
+    count = int(STALLS * sweep.points)
+    if len(branch) % count:
+        return False
+    reach = [sweep.forward * p.omega for p in branch]
+    return max(reach) - max(reach[:-count], default=reach[0]) < _gap(sweep)
+
+
+def _idle(sweep: Sweep, branch: Sequence[ForcedPoint]) -> bool:
+    """Whether the last points of a branch gained no frequency at all."""
+    return len(branch) - _farthest(sweep, branch) > STALLS * sweep.points
+
+
+def _gap(sweep: Sweep) -> float:
+    return sweep.control.largest * sweep.control.scale
+
+
+def _further_on(
+    problem: ForcedProblem,
+    low: Sequence[ForcedPoint],
+    branch: Sequence[ForcedPoint],
+    end: float,
+) -> Point | None:
+    """Solve beyond the farthest frequency of a branch, from its farthest point and from the first passage there."""
+    sweep, balance = problem.sweep, problem.high
+    following = problem.following(balance)
+    found = [p for p in branch if p.converged]
+    farthest = found[_farthest(sweep, found)]
+    end = end if _before(sweep, farthest.omega, end) else low[-1].omega
+    for leap in LEAPS:
+        omega = farthest.omega + sweep.forward * leap * _gap(sweep)
+        omega = omega if _before(sweep, omega, end) else end
+        beside = min((p for p in low if p.converged), key=lambda p: abs(p.omega - omega))
+        for seed in (farthest, beside):
+            point = start_point(balance, balance.unknowns(seed.coefficients), omega, following)
+            if point.solution.status.converged:
+                return point if sweep.direction == "up" else reversed_point(point)
+        if omega == end:
+            break
+    return None
 
 
 def _branch_start(

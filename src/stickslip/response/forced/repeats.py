@@ -20,7 +20,7 @@ from stickslip.solve.rescue import solve_robustly
 from stickslip.solve.status import Rung, Status
 
 PATIENT = 16  # iterations of a repeat from one start
-ISOLATED = 5  # iterations of a repeat beside none that is accepted: it converges soon or not at all
+ISOLATED = 25  # iterations of a repeat beside none that is accepted: damped steps of planar friction need them, and one that comes through leads to the others
 NEIGHBOURS = 1  # points on each side from which a repeat that fails is tried
 PATIENCE = (
     4  # repeats that fail one after the other before most of the following are left to the branch
@@ -34,6 +34,7 @@ def repeat(
     others: Mapping[int, ForcedPoint],
     static: Callable[[], FloatArray] | None = None,
     branch: Sequence[ForcedPoint] = (),
+    quickly: bool = False,
 ) -> ForcedPoint:
     """Solve a frequency with more harmonics: from the best of q + Δq, q and its neighbours, or along the branch from a neighbour.
 
@@ -51,31 +52,43 @@ def repeat(
         Gives the (n_retained,) static equilibrium, m, for what `solve_robustly` tries if all else fails; None: that is not tried.
     branch
         Points of a branch with many harmonics: where it passed the frequency, it leads to a solution.
+    quickly
+        From these starts alone: a detour costs as much as ten of them.
     """
     began = perf_counter()
     omega = point.omega
     balance = problem.balance(tuple(int(h) for h in point.asked) or problem.high.harmonics)
     near = _neighbours(point.index, others)
-    beside = passing(branch, point) + [p for p in near if abs(p.index - point.index) <= 1]
-    alone = not beside and static is None
     q = balance.unknowns(point.coefficients)
-    starts = [*_predicted(problem, point), *(balance.unknowns(p.coefficients) for p in near)]
-    most = ISOLATED if alone else PATIENT
-    options = replace(problem.sweep.newton, max_iterations=most)
     spent: list[Solution] = []
-    nearest, *further = _nearest_first(balance, omega, q, starts, options)
-    # from q itself contacts change one by one, which leads to a solution from farther away than the measure tells
-    second = [start for start in further if start[1] is q] or further[:1]
-    for start in [nearest] if alone else [nearest, *second]:
-        spent.append(_from_start(balance, omega, start, options))
-        if spent[-1].status.converged:
-            break
-    for neighbour in beside:
-        if spent[-1].status.converged:
-            break
-        detour = along_branch(problem, neighbour, omega, balance).solution
-        spent.append(replace(detour, rung=max(detour.rung, Rung.SHORTER_STEP)))
-    if not spent[-1].status.converged and static is not None:
+
+    def found() -> bool:
+        return bool(spent) and spent[-1].status.converged
+
+    def detours(ends: Sequence[ForcedPoint]) -> None:
+        for end in ends:
+            if found():
+                return
+            detour = along_branch(problem, end, omega, balance).solution
+            spent.append(replace(detour, rung=max(detour.rung, Rung.SHORTER_STEP)))
+
+    # between two points of the branch a solution is near: a dozen evaluations where other starts take a hundred
+    detours(passing(branch, point))
+    beside = [] if found() else [p for p in near if abs(p.index - point.index) <= 1]
+    alone = not beside and not branch and static is None
+    options = replace(problem.sweep.newton, max_iterations=ISOLATED if alone else PATIENT)
+    if not found():
+        starts = [*_predicted(problem, point), *(balance.unknowns(p.coefficients) for p in near)]
+        nearest, *further = _nearest_first(balance, omega, q, starts, options)
+        # from q itself contacts change one by one, which leads to a solution from farther away than the measure tells
+        second = [start for start in further if start[1] is q] or further[:1]
+        for start in [nearest] if alone else [nearest, *second]:
+            spent.append(_from_start(balance, omega, start, options))
+            if found():
+                break
+    if not quickly:
+        detours(beside)
+    if not found() and static is not None:
         solution = solve_robustly(
             lambda v: balance.linearise(v, omega),
             [nearest[1]],
@@ -145,7 +158,7 @@ def _predicted(problem: ForcedProblem, point: ForcedPoint) -> list[FloatArray]:
     return [problem.balance(verdict.again or problem.high.harmonics).unknowns(verdict.start)]
 
 
-def worth_a_try(index: int, forward: bool, failed: Callable[[int], bool], known: bool) -> bool:
+def worth_a_try(index: int, forward: bool, high: Mapping[int, ForcedPoint], known: bool) -> bool:
     """Whether a repeat is tried now, or left to the branch with many harmonics and to the homotopy.
 
     A few repeats that fail in a row show that the solution with few harmonics says little about that with many. Then only some are
@@ -157,14 +170,14 @@ def worth_a_try(index: int, forward: bool, failed: Callable[[int], bool], known:
         Of the point of the first passage.
     forward
         Whether this is the first attempt.
-    failed
-        Whether the repeat of an index failed.
+    high
+        Repeats by index.
     known
         Whether a neighbour is accepted.
     """
     if known:
         return True
-    row = all(failed(i) for i in range(index - PATIENCE, index))
+    row = all(i in high and not high[i].converged for i in range(index - PATIENCE, index))
     return forward and (not row or index % GLANCE == 0)
 
 

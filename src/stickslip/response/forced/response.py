@@ -6,7 +6,7 @@ that resolve the resonance peak.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 
 from stickslip.arrays import FloatArray
@@ -16,7 +16,7 @@ from stickslip.response.forced.accepted import (
     accepted_pairs,
     accepted_points,
     branch_points,
-    reached,
+    replaced,
     runs_of_repeats,
 )
 from stickslip.response.forced.passages import first_passage, follow_run
@@ -38,6 +38,7 @@ __all__ = [
 ]
 
 
+Way = Callable[[], FloatArray]  # gives the static equilibrium where homotopies begin
 LAST_TRY = 2  # repeats of a frequency before the last one, by homotopy
 
 
@@ -88,7 +89,7 @@ def _double_passage(
     problem: ForcedProblem,
     load: HarmonicLoad,
     done: Sequence[ForcedPoint],
-    static: Callable[[], FloatArray],
+    static: Way,
 ) -> Iterator[ForcedPoint]:
     """Finish the response with few harmonics, then solve again what needs more."""
     low = [p for p in done if p.stage == "low"]
@@ -96,9 +97,26 @@ def _double_passage(
     high = {p.index: p for p in done if p.stage == "high"}
     quiet = {p.index: p for p in low if p.converged and not problem.alerted(p)}
     tried = Counter(p.index for p in done if p.stage == "high")
-    yield from _repeats(problem, low, quiet, high, tried)
     branches: list[ForcedPoint] = []
-    for first, last in runs_of_repeats(high):
+    passed = -1
+
+    def again(indices: Iterable[int], most: int, last_way: Way | None) -> Iterator[ForcedPoint]:
+        for index in [i for i in indices if not high[i].converged and tried[i] <= most]:
+            known = quiet | {i: p for i, p in high.items() if p.converged}
+            led = index - 1 in known or index + 1 in known or bool(passing(branches, low[index]))
+            # homotopies cost seconds each: in a long row that found nothing only some are tried
+            if led or (last_way is not None and worth_a_try(index, True, high, led)):
+                high[index] = repeat(problem, low[index], known, last_way, branches)
+            else:
+                high[index] = postponed(problem, low[index])
+            tried[index] += 1
+            yield high[index]
+
+    asked = {p.index: p for p in low if problem.asks_again(p)}
+    for first, last in runs_of_repeats(asked):
+        if last <= passed:  # in the place of a branch that went on to the end of the range
+            continue
+        yield from _repeats(problem, low[first : last + 1], quiet, high, tried)
         branch = branch_points(done, first, last)
         if _nothing_known(low, high, first) and tried[first] == LAST_TRY:
             high[first] = repeat(problem, low[first], {}, static)
@@ -109,22 +127,11 @@ def _double_passage(
         if begin is not None and all(tried[i] <= LAST_TRY for i in range(first + 1, last + 1)):
             yield from follow_run(problem, begin, last, low, branch, high)
         branches += branch
-
-    def failed(index: int) -> bool:
-        return index in high and not high[index].converged
-
-    # last, from where the branch passed a frequency or from new neighbours; for what is left then, a homotopy
-    for most, last_way in ((LAST_TRY, None), (LAST_TRY + 1, static)):
-        for index in [i for i in _unsolved(low, high, branches) if tried[i] <= most]:
-            known = quiet | {i: p for i, p in high.items() if p.converged}
-            led = index - 1 in known or index + 1 in known or bool(passing(branches, low[index]))
-            # homotopies cost seconds each: in a long row that found nothing only some are tried
-            if led or (last_way is not None and worth_a_try(index, True, failed, led)):
-                high[index] = repeat(problem, low[index], known, last_way, branches)
-            else:
-                high[index] = postponed(problem, low[index])
-            tried[index] += 1
-            yield high[index]
+        passed = replaced(branch, low, last)
+        # from where the branch passed a frequency, or from new neighbours
+        yield from again(range(max(first, passed + 1), last + 1), LAST_TRY, None)
+    # for what is left then, a homotopy
+    yield from again(_unsolved(low, high, branches), LAST_TRY + 1, static)
 
 
 def _repeats(
@@ -135,10 +142,6 @@ def _repeats(
     tried: Counter[int],
 ) -> Iterator[ForcedPoint]:
     """Repeat what the alert asks for, once forward, and what failed once more backward, when its neighbours are known."""
-
-    def failed(index: int) -> bool:
-        return index in high and not high[index].converged
-
     for attempt, order in enumerate((low, low[::-1])):
         for point in order:
             index = point.index
@@ -147,8 +150,8 @@ def _repeats(
                 continue
             known = quiet | {i: p for i, p in high.items() if p.converged}
             beside = index - 1 in known or index + 1 in known
-            if worth_a_try(index, attempt == 0, failed, beside):
-                high[index] = repeat(problem, point, known)
+            if worth_a_try(index, attempt == 0, high, beside):
+                high[index] = repeat(problem, point, known, quickly=attempt == 0)
             else:
                 high[index] = postponed(problem, point)
             tried[index] += 1
@@ -179,10 +182,9 @@ def _unsolved(
     low: Sequence[ForcedPoint], high: Mapping[int, ForcedPoint], branches: Sequence[ForcedPoint]
 ) -> list[int]:
     """Return the indices of repeats that failed and that no branch replaces."""
-    return [
-        i
-        for first, last in runs_of_repeats(high)
-        if not reached(branch_points(branches, first, last), low, last)
-        for i in range(first, last + 1)
-        if not high[i].converged
-    ]
+    passed = -1
+    unsolved: list[int] = []
+    for first, last in runs_of_repeats(high):
+        passed = max(passed, replaced(branch_points(branches, first, last), low, last))
+        unsolved += [i for i in range(max(first, passed + 1), last + 1) if not high[i].converged]
+    return unsolved

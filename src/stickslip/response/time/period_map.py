@@ -4,32 +4,28 @@ It is the compiled time step of `integrate`, period for period, so that a fixed 
 `integrate` would find settled, with the same error of the step.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stickslip.arrays import FloatArray, IntArray, Matrix
-from stickslip.contact.law import ContactLaw
-from stickslip.model.structure import Structure
-from stickslip.response.time.propagator import ModalCoordinates, PeriodicLoad, step_operators
+from stickslip.arrays import BoolArray, FloatArray, IntArray
+from stickslip.response.time.contact_step import StepState
+from stickslip.response.time.floquet import Floquet, floquet
+from stickslip.response.time.marcher import Marcher, Record
+from stickslip.response.time.sectors import WaveMotion
 from stickslip.response.time.settling import overflowed
+from stickslip.response.time.start import TransientStart
 from stickslip.response.time.step_tangent import (
     TangentOperators,
-    equal_steps,
-    fresh_tangent,
-    run_tangent_period,
+    advanced,
+    first_tangent,
+    kept,
+    law_derivatives,
     tangent_operators,
 )
-from stickslip.response.time.time_step import (
-    StepOperators,
-    StepRecord,
-    StepState,
-    StepWork,
-    run_period,
-    step_workspace,
-)
-from stickslip.response.time.transient import TransientStart, initial_state, law_table
+from stickslip.response.time.time_step import StepLog
+
+SINGULAR = 1e-9  # of the largest singular value of (1 - monodromy): below it a direction is neutral
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +44,7 @@ class Image:
 
     state: FloatArray
     failures: int
-    record: StepRecord
+    record: Record
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,124 +57,214 @@ class Derivative:
         The period.
     monodromy
         (size, size) derivative of its end; NaN if the motion overflowed.
-    grazing
-        Number of tangential springs that reached their limit without slipping, and were taken as sticking.
+    kept
+        States of laws that the period left as they were and would leave so wherever they were: sliders that stuck.
+    unfelt
+        States of laws that no force follows from: what they were is forgotten.
+    idle
+        States of laws that are none of the motion: nothing moves them, and no spring is theirs.
     """
 
     image: Image
     monodromy: FloatArray
-    grazing: int
+    kept: IntArray
+    unfelt: IntArray
+    idle: IntArray
+
+    def inverse(self) -> FloatArray:
+        """Return (size, size) what turns a defect into a correction; directions that nothing decides are left as they are.
+
+        A slider that sticks for the whole period stays where it is: of the family of motions this is the one that it belongs to.
+        """
+        moves = np.setdiff1d(np.arange(len(self.monodromy)), self.kept)
+        inverse = np.zeros_like(self.monodromy)
+        part = np.ix_(moves, moves)
+        inverse[part] = np.linalg.pinv(np.eye(moves.size) - self.monodromy[part], rcond=SINGULAR)
+        return inverse
 
 
 @dataclass(frozen=True, eq=False)
 class PeriodMap:
-    """The period map in coordinates whose square is an energy: modal displacement, velocity, spring force.
+    """The period map in coordinates whose square is an energy: modal displacement, velocity, states of the laws.
 
-    A state is ``(ωs q, ωs w, T/√k)`` with q, w and the speeds s of `ModalCoordinates` and T the forces in those
-    tangential springs that have a stiffness. Half its squared length is the energy of the modes and of the springs, in
-    J; with it, distances of states mean the same for stiff and for soft coordinates.
+    A state is ``(ωs q, ωs w, c z)`` with q, w and the speeds s of `ModalCoordinates`, the states z of the laws, and factors c that
+    make the force of a state into that of its contact's spring: half its squared length is the energy of the modes and of the
+    springs, in J, so that distances of states mean the same for stiff and for soft coordinates.
+
+    Parameters
+    ----------
+    marcher
+        What marches.
+    linear
+        Matrices of its tangents.
+    scale
+        (size,) factors of (q, w, z).
+    shares
+        1, or number of sectors n of a motion that every sector makes a share of the period after another: the map is then that
+        over T/n, with the sectors put where those stand whose state is theirs.
+    shift
+        (size, size) which puts them there; None: there are none.
     """
 
-    operators: StepOperators
+    marcher: Marcher
     linear: TangentOperators
-    modes: ModalCoordinates
-    springs: IntArray  # (size - m,) rows of the gaps whose tangential spring has a stiffness
-    scale: FloatArray  # (size,) factors of (q, w, T)
-    held: FloatArray  # (k,) forces in springs of no stiffness, which no motion changes
-    steps: int
-    work: StepWork = field(repr=False)
+    scale: FloatArray
+    shares: int = 1
+    shift: FloatArray | None = None
 
     @property
     def size(self) -> int:
         """Number of coordinates of a state."""
         return self.scale.size
 
+    @property
+    def n_motion(self) -> int:
+        """Number of those that are displacements and velocities."""
+        return 2 * self.marcher.n
+
     def start_of(self, state: FloatArray) -> StepState:
-        """Return the state in the form that the step takes, its springs as they are."""
-        m, law = 2 * self.modes.speed.size, self.operators.law
-        plain = state / self.scale
-        gap = self.linear.gaps @ plain[: m // 2]
-        force = self.held.copy()
-        force[self.springs] = plain[m:]
-        force[2::3] = -np.maximum(0.0, law[:, 4] - law[:, 2] * gap[2::3])
-        return StepState(np.concatenate([plain[:m], force - law[:, :3].ravel() * gap]), gap, force)
+        """Return the state in the form that the step takes."""
+        return self._begun(state)[0]
 
     def state_of(self, step: StepState) -> FloatArray:
         """Return the coordinates of a state of the step."""
-        motion = step.x[: 2 * self.modes.speed.size]
-        return np.asarray(self.scale * np.concatenate([motion, step.force[self.springs]]))
+        return np.asarray(self.scale * np.concatenate([step.x[: self.n_motion], step.law]))
 
     def image(self, state: FloatArray) -> Image:
-        """March one period."""
-        step, record = self.start_of(state), self._record()
-        return self._ended(step, run_period(self.operators, step, self.work, record), record)
+        """March one period, or its share."""
+        image = self._marched(state, self.marcher.steps // self.shares)
+        return image if self.shift is None else replace(image, state=self.shift @ image.state)
+
+    def period(self, state: FloatArray) -> Image:
+        """March one whole period."""
+        return self._marched(state, self.marcher.steps)
+
+    def _marched(self, state: FloatArray, steps: int) -> Image:
+        step, record = self.start_of(state), self.marcher.record(steps)
+        return self._ended(step, self.marcher.march(step, record), record)
+
+    def vibration(self, image: Image) -> float:
+        """Return the size of the vibration over a period in the measure of the states; that of the state where there is none."""
+        n = self.marcher.n
+        scale, motion = self.scale[:n], image.record.motion
+        if self.shares == 1:
+            swing = np.std(motion, axis=0)
+        else:  # all sectors together make a whole period
+            basis = self.marcher.modes.basis
+            own = (motion @ basis.T).reshape(-1, n // self.shares)
+            mean = np.tile(own.mean(axis=0), self.shares)
+            away = motion - self.marcher.modes.inverse @ mean
+            swing = np.sqrt(np.mean(away**2, axis=0))
+        size = float(np.sqrt(2.0) * np.linalg.norm(scale * swing))
+        return max(size, 1e-9 * float(np.linalg.norm(image.state)), np.finfo(float).tiny)
 
     def derivative(self, state: FloatArray) -> Derivative:
         """March one period with its tangents."""
-        step, record = self.start_of(state), self._record()
-        tangent = fresh_tangent(self._first_tangents(step), step.gap.size)
-        m, law = 2 * self.modes.speed.size, self.operators.law[:, :3].ravel()
-        equal = equal_steps(m, step.gap.size)
-        failures = run_tangent_period(
-            self.operators, self.linear, step, self.work, record, tangent, equal
+        (step, first), record = (
+            self._begun(state),
+            self.marcher.record(self.marcher.steps // self.shares),
         )
-        image = self._ended(step, failures, record)
-        lost = np.nan if image.failures < 0 else 1.0
-        motion, beyond = tangent.state[:m], tangent.state[m:]
-        forces = beyond + law[:, None] * (self.linear.gaps @ motion[: m // 2])
-        matrix = np.vstack([motion, forces[self.springs]])
-        return Derivative(
-            image,
-            lost * self.scale[:, None] * matrix / self.scale,
-            int(np.count_nonzero(tangent.grazed)),
-        )
+        tangent = first_tangent(first, self.linear, step.law.size)
+        seen = np.zeros(first.size, dtype=bool)
 
-    def _ended(self, step: StepState, failures: int, record: StepRecord) -> Image:
+        def carry(log: StepLog, rows: int) -> None:
+            nonlocal tangent
+            tangent = advanced(log, rows, tangent, self.linear)
+            np.logical_or(seen, np.any(log.jac[:rows] != 0.0, axis=0), out=seen)
+
+        failures = self.marcher.march_logged(step, record, carry)
+        image = self._ended(step, failures, record)
+        if image.failures < 0:
+            nothing, none = np.full((self.size, self.size), np.nan), np.zeros(0, dtype=np.int64)
+            return Derivative(image, nothing, none, none, none)
+        m, k = self.n_motion, self.marcher.k
+        matrix = np.vstack([tangent[:m], tangent[m + k :]])
+        stays = kept(matrix, np.arange(m, self.size))
+        rest = self._no_motion(seen, np.isin(np.arange(m, self.size), stays))
+        matrix = self.scale[:, None] * matrix / self.scale
+        if self.shift is None:
+            return Derivative(image, matrix, stays, *rest)
+        image = replace(image, state=self.shift @ image.state)
+        return Derivative(image, self.shift @ matrix, stays[:0], *rest)
+
+    def floquet(self, derivative: Derivative) -> Floquet:
+        """Return the multipliers of a whole period, without those of states that are none of the motion."""
+        none = np.concatenate([derivative.unfelt, derivative.idle])
+        states = np.delete(np.arange(self.size), none)
+        monodromy = derivative.monodromy[np.ix_(states, states)]
+        found = floquet(np.linalg.matrix_power(monodromy, self.shares)).multipliers
+        return Floquet(np.append(found, np.zeros(derivative.unfelt.size, dtype=complex)))
+
+    def _no_motion(self, seen: BoolArray, still: BoolArray) -> tuple[IntArray, IntArray]:
+        """Return which states are unfelt and which idle.
+
+        `seen` says which of the laws' derivatives were not zero, `still` which of their states stayed.
+        """
+        pattern = law_derivatives(seen.astype(float), self.linear, still.size)
+        sprung = np.any(pattern.force_by_law[self.marcher.contacts.table.stuck != 0.0], axis=0)
+        felt, more = np.zeros_like(still), np.any(pattern.force_by_law, axis=0)
+        while not np.array_equal(felt, more):
+            felt, more = more, more | np.any(pattern.law_by_law[more], axis=0)
+        sectors = (self.shares, -1)  # which take turns
+        felt, sprung = (np.any(a.reshape(sectors), axis=0) for a in (felt, sprung))
+        idle = np.all(still.reshape(sectors), axis=0) & ~sprung
+        unfelt = ~felt & ~idle
+        first = self.n_motion
+        return tuple(first + np.flatnonzero(np.tile(a, self.shares)) for a in (unfelt, idle))  # type: ignore[return-value]
+
+    def _begun(self, state: FloatArray) -> tuple[StepState, FloatArray]:
+        plain, m = state / self.scale, self.n_motion
+        return self.marcher.begin(plain[:m], plain[m:])
+
+    def _ended(self, step: StepState, failures: int, record: Record) -> Image:
         """Return the period that ends at `step`; all NaN if its squares would overflow."""
         state = self.state_of(step)
         if failures < 0 or overflowed(state, record.motion):
-            for array in (state, *record):
+            for array in (state, record.rows):
                 array.fill(np.nan)
             failures = -1
         return Image(state, failures, record)
 
-    def _record(self) -> StepRecord:
-        n, k = self.modes.speed.size, self.held.size
-        return StepRecord(*(np.empty((self.steps, width)) for width in (n, k, k)))
-
-    def _first_tangents(self, step: StepState) -> FloatArray:
-        """Return (m + k, size) derivatives of the step's state by (q, w, T)."""
-        n, law = self.modes.speed.size, self.operators.law[:, :3].ravel()
-        first = np.zeros((2 * n + step.gap.size, self.size))
-        first[: 2 * n, : 2 * n] = np.eye(2 * n)
-        first[2 * n :, :n] = -law[:, None] * self.linear.gaps
-        # a closed contact holds its normal spring: no force beyond it
-        first[2 * n + 2 :: 3][step.force[2::3] < 0.0] = 0.0
-        first[2 * n + self.springs, 2 * n + np.arange(self.springs.size)] = 1.0
-        return first
-
 
 def period_map(
-    structure: Structure,
-    gap_operator: Matrix,
-    laws: Sequence[ContactLaw],
-    load: PeriodicLoad,
-    omega: float,
-    start: TransientStart,
-    steps: int,
+    marcher: Marcher, start: TransientStart, symmetry: WaveMotion | None = None
 ) -> tuple[PeriodMap, FloatArray]:
-    """Return the period map with `steps` steps a period, and the coordinates of `start`."""
-    law = law_table(laws, "shoot")
-    operators, modes = step_operators(structure, gap_operator, law, load, omega, steps, "shoot")
-    begin = initial_state(modes, gap_operator, law, start)
-    tangential = np.flatnonzero(np.arange(begin.gap.size) % 3 < 2)
-    springs = tangential[law[:, :3].ravel()[tangential] > 0.0]
-    held = begin.force.copy()
-    held[springs] = 0.0
-    speed = modes.omega * modes.speed
-    scale = np.concatenate([speed, speed, 1.0 / np.sqrt(law[:, :3].ravel()[springs])])
-    gaps = np.asarray(gap_operator @ modes.basis)
-    linear = tangent_operators(operators, gaps)
-    work = step_workspace(begin.gap.size)
-    made = PeriodMap(operators, linear, modes, springs, scale, held, steps, work)
+    """Return the period map of a marcher, with a symmetry that over a share of the period, and the coordinates of `start`."""
+    linear = tangent_operators(marcher)
+    begin = marcher.begun(start)
+    speed = marcher.modes.omega * marcher.modes.speed
+    scale = np.concatenate([speed, speed, _law_scale(marcher, linear)])
+    made = PeriodMap(marcher, linear, scale)
+    if symmetry is not None:
+        shift = scale[:, None] * _shift(marcher, symmetry) / scale
+        made = replace(made, shares=symmetry.sectors, shift=shift)
     return made, made.state_of(begin)
+
+
+def _shift(marcher: Marcher, symmetry: WaveMotion) -> FloatArray:
+    """Return the matrix by which a state (q, w, z) becomes that of the sectors that they stand for."""
+    modes, n, n_states = marcher.modes, marcher.n, marcher.contacts.start.size
+    moved = modes.inverse @ symmetry.shifted(modes.basis)
+    turned = moved * modes.speed / modes.speed[:, None]
+    states = symmetry.shifted(np.eye(n_states)) if n_states else np.zeros((0, 0))
+    shift = np.zeros((2 * n + n_states,) * 2)
+    for at, part in ((0, moved), (n, turned), (2 * n, states)):
+        shift[at : at + len(part), at : at + len(part)] = part
+    return shift
+
+
+def _law_scale(marcher: Marcher, linear: TangentOperators) -> FloatArray:
+    """Return (n_states,) factors of the laws' states: their force at rest over the root of the contact's stiffness.
+
+    A state that has no force there, as of a contact that is open, counts as a displacement.
+    """
+    contacts = marcher.contacts
+    n_states = contacts.start.size
+    at_rest = marcher.begin(np.zeros(2 * marcher.n), contacts.start)[1]
+    force = law_derivatives(at_rest, linear, n_states).force_by_law.reshape(contacts.n, 3, n_states)
+    stiffness = np.max(contacts.table.stuck.reshape(-1, 3), axis=1, initial=0.0)
+    fallback = np.max(stiffness, initial=0.0) or 1.0
+    root = np.sqrt(np.where(stiffness > 0.0, stiffness, fallback))
+    own = np.repeat(np.arange(contacts.n), np.diff(contacts.state_places))
+    size = np.linalg.norm(force[own, :, np.arange(n_states)], axis=1)
+    return np.where(size > 0.0, size, root[own] ** 2) / root[own]

@@ -13,6 +13,8 @@ from stickslip.errors import input_error
 from stickslip.model.structure import Structure
 from stickslip.response.time.time_step import StepOperators
 
+FAST = 10.0  # times the load's frequency; above it a contact's spring on the mass at it is no part of the linear structure
+
 
 class PeriodicLoad(Protocol):
     """Any load ``f(t) = static + Re Σ_h harmonics[h] e^{ihωt}``, N."""
@@ -33,6 +35,7 @@ class ModalCoordinates:
     basis: FloatArray  # (n, n), mass-normalised
     inverse: FloatArray  # (n, n) = basisᵀ M
     speed: FloatArray  # (n,) scale of w, which keeps the propagator of a stiff mode near a rotation
+    seen: FloatArray  # (2k, 2n): gaps and their rates of a motion
     omega: float
 
     def motion(self, displacement: FloatArray, velocity: FloatArray) -> FloatArray:
@@ -59,10 +62,17 @@ def _dense(matrix: Matrix) -> FloatArray:
     return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix, dtype=float)
 
 
-def _coordinates(structure: Structure, stiffness: FloatArray, omega: float) -> ModalCoordinates:
+def _linear_springs(
+    structure: Structure, gap_operator: FloatArray, stuck: FloatArray, omega: float
+) -> FloatArray:
+    """Return the springs of contacts that belong to the linear structure, 0 for those that are too fast.
+
+    As a part of it a spring that does not slip is exact; one that slips acts like a mass ``k h²/12`` too little. That must
+    be little of the mass that it acts on, of which ``1 / B M⁻¹ Bᵀ`` moves with the gap alone.
+    """
     mass = _dense(structure.mass)
     try:
-        values, basis = scipy.linalg.eigh((stiffness + stiffness.T) / 2, mass)
+        root = scipy.linalg.cholesky(mass, lower=True)
     except np.linalg.LinAlgError as error:
         diagonal = np.diag(mass)
         name = structure.dofs.labels[int(np.argmin(diagonal))]
@@ -71,25 +81,38 @@ def _coordinates(structure: Structure, stiffness: FloatArray, omega: float) -> M
             f"is not positive definite (smallest diagonal entry {np.min(diagonal):.3g} at {name})",
             "Time integration needs a mass on every coordinate: condense the massless ones.",
         ) from error
+    moved = scipy.linalg.solve_triangular(root, gap_operator.T, lower=True)
+    own = np.sqrt(np.maximum(stuck, 0.0) * np.sum(moved**2, axis=0))
+    return np.where(own > FAST * omega, 0.0, stuck)
+
+
+def _coordinates(
+    structure: Structure, stiffness: FloatArray, gap_operator: FloatArray, omega: float
+) -> ModalCoordinates:
+    mass = _dense(structure.mass)
+    values, basis = scipy.linalg.eigh((stiffness + stiffness.T) / 2, mass)
     speed = np.maximum(1.0, np.sqrt(np.abs(values)) / omega)
-    return ModalCoordinates(basis, basis.T @ mass, speed, omega)
+    gaps = gap_operator @ basis
+    none = np.zeros_like(gaps)
+    seen = np.block([[gaps, none], [none, omega * gaps * speed]])
+    return ModalCoordinates(basis, basis.T @ mass, speed, seen, omega)
 
 
 def step_operators(
     structure: Structure,
     gap_operator: Matrix,
-    law: FloatArray,
+    stuck: FloatArray,
     load: PeriodicLoad,
     omega: float,
     steps: int,
     caller: str = "integrate",
-) -> tuple[StepOperators, ModalCoordinates]:
-    """Return the matrices of one of `steps` time steps in a period, and the coordinates they act on.
+) -> tuple[StepOperators, ModalCoordinates, FloatArray]:
+    """Return the matrices of one of `steps` time steps in a period, the coordinates they act on, and the springs (3 n_contacts,) in them.
 
     Parameters
     ----------
-    law
-        (n_contacts, 5): k_t, k_w, k_n (N/m), mu, preload (N) of each contact; the rest as in `integrate`.
+    stuck
+        (3 n_contacts,) stiffnesses of the contacts where all stick, N/m; the rest as in `integrate`.
     caller
         Public function that errors name.
     """
@@ -100,26 +123,28 @@ def step_operators(
             "Use viscous damping: modal_damping with half the loss factor has the same effect at resonance.",
         )
     gap_operator = _dense(gap_operator)
-    _check(structure.n, gap_operator, law, load, omega, caller)
-    springs = law[:, :3].reshape(-1, 1)
-    stuck = _dense(structure.stiffness) + gap_operator.T @ (springs * gap_operator)
-    modes = _coordinates(structure, stuck, omega)
-    n, k, m = structure.n, gap_operator.shape[0], 2 * structure.n
-    gaps = np.hstack([gap_operator @ modes.basis, np.zeros((k, n))])
+    _check(structure.n, gap_operator, stuck.size, load, omega, caller)
+    springs = _linear_springs(structure, gap_operator, stuck, omega)
+    stiffness = _dense(structure.stiffness) + gap_operator.T @ (springs[:, None] * gap_operator)
+    modes = _coordinates(structure, stiffness, gap_operator, omega)
+    n, k, m, seen = structure.n, gap_operator.shape[0], 2 * structure.n, modes.seen
     damping = modes.basis.T @ _dense(structure.damping) @ modes.basis
-    motion = _motion_matrix(modes.basis.T @ stuck @ modes.basis, damping, modes)
-    exponential = _step_exponential(motion, gaps[:, :n], modes, load, 2 * np.pi / steps)
-    hold = exponential[:, m + k : m + 2 * k]
-    transfer = np.hstack([exponential[:, :m], exponential[:, m : m + k] - hold])
+    motion = _motion_matrix(modes.basis.T @ stiffness @ modes.basis, damping, modes)
+    exponential = _step_exponential(motion, seen[:k, :n], modes, load, 2 * np.pi / steps)
+    constant, line = exponential[:, m : m + k], exponential[:, m + k : m + 2 * k]
+    # a line would make fast springs unstable; with the mean of both ends they do the work that their energy changes by
+    hold = np.where(springs == stuck, line, constant / 2)
+    transfer = np.hstack([exponential[:, :m], constant - hold])
     drive = _clock(sorted(load.harmonics), steps) @ exponential[:, m + 2 * k :].T
     operators = StepOperators(
-        np.ascontiguousarray(np.vstack([transfer, gaps @ transfer]).T),
-        np.hstack([drive, drive @ gaps.T]),
+        np.ascontiguousarray(transfer.T),
+        np.ascontiguousarray(drive),
         np.ascontiguousarray(hold.T),
-        np.ascontiguousarray((gaps @ hold).T),
-        law,
+        np.ascontiguousarray((seen @ hold).T),
+        np.ascontiguousarray(seen[:k, :n]),
+        np.ascontiguousarray(seen[k:, n:]),
     )
-    return operators, modes
+    return operators, modes, springs
 
 
 def _motion_matrix(
@@ -169,12 +194,12 @@ def _clock(orders: list[int], steps: int) -> FloatArray:
 def _check(
     n: int,
     gap_operator: FloatArray,
-    law: FloatArray,
+    rows: int,
     load: PeriodicLoad,
     omega: float,
     caller: str,
 ) -> None:
-    require_array(f"{caller}: gap_operator", gap_operator, (3 * len(law), n))
+    require_array(f"{caller}: gap_operator", gap_operator, (rows, n))
     require_array(f"{caller}: load.static", load.static, (n,))
     for order, amplitude in load.harmonics.items():
         require_array(f"{caller}: load.harmonics[{order}]", amplitude, (n,))

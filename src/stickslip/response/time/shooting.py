@@ -5,7 +5,7 @@ matrix, comes from tangents carried along the steps. The method finds unstable m
 wait for undamped vibrations of a damper to die, and gives the Floquet multipliers.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -13,14 +13,19 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.contact.law import ContactLaw
-from stickslip.harmonic.linear import LinearSide, one_structure
-from stickslip.response.time.floquet import Floquet, floquet
-from stickslip.response.time.period_map import Derivative, Image, PeriodMap, period_map
+from stickslip.errors import input_error
+from stickslip.harmonic.linear import LinearSide
+from stickslip.response.time.floquet import UNIT_TOLERANCE, Floquet
+from stickslip.response.time.marcher import Marcher, prepared
+from stickslip.response.time.period_map import Derivative, PeriodMap, period_map
 from stickslip.response.time.propagator import PeriodicLoad
-from stickslip.response.time.settling import period_harmonics, remaining_change
-from stickslip.response.time.transient import TimeStepping, TransientStart, check_arguments, rest
+from stickslip.response.time.sectors import WaveMotion
+from stickslip.response.time.settling import remaining_change
+from stickslip.response.time.start import TransientStart, check_start, rest
+from stickslip.response.time.step_check import COARSE, StepErrors, harmonics, step_errors
+from stickslip.response.time.transient import TimeStepping, check_outputs
 
-ShootingStatus = Literal["converged", "not converged", "diverged"]
+ShootingStatus = Literal["converged", "coarse", "not converged", "diverged"]
 TOLERANCE = (
     1e-9  # of the distance to the orbit, relative to its vibration, where no stepping is given
 )
@@ -33,7 +38,6 @@ CONTRACTION = 0.5  # a derivative is kept while a period, which costs far less, 
 FALLBACK = 8  # plain periods where no part of a correction comes nearer to an orbit
 ANEW = 8  # corrections of a search begun anew: from where the plain periods near an orbit four are enough
 RESERVE = 2 * ANEW  # periods left for them
-SINGULAR = 1e-9  # of the largest singular value of (1 - monodromy): below it a direction is neutral
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,16 +47,14 @@ class ShootingResult:
     Parameters
     ----------
     status
-        ``converged``; ``not converged``: the periods ran out, or the plain periods settled and the corrections from there
+        ``converged``; ``coarse``: periodic, but with twice as many steps the harmonics would change by more than 1 %, so that
+        these are not those of the motion; ``not converged``: the periods ran out, or the plain periods settled and the corrections from there
         did not, or there is no periodic motion nearby (a drift); ``diverged``: the motion overflowed, and all arrays are
         NaN.
     harmonics
         (n_h + 1, n_outputs) complex amplitudes, m.
     floquet
         Multipliers of the motion, and how many of them are neutral.
-    grazing
-        Number of tangential springs that reach their limit without slipping: they have just shaken down, and the
-        multipliers are those of the side on which they stick.
     periods
         Periods marched, those with tangents among them; a correction that is under way may go beyond the most by a few.
     corrections
@@ -61,6 +63,12 @@ class ShootingResult:
         Distance of the state after a period from that before, relative to the vibration of the orbit.
     distance
         Length of the last correction, relative to the same.
+    step_error
+        Estimated error of the harmonics by the step, relative to the largest: twice as many steps tell, and four times as many
+        where a contact opens or closes. NaN where no motion was found.
+    growth_error
+        That of the largest modulus of the multipliers where it is within 0.05 of 1 or a contact opens or closes; infinite where a
+        slider turns within a step, which the multipliers do not see, or where openings make the motion coarse; 0 elsewhere.
     contact_failures
         Time steps of the last period in which the contact equations were not solved to rounding.
     final
@@ -74,11 +82,12 @@ class ShootingResult:
     status: ShootingStatus
     harmonics: ComplexArray
     floquet: Floquet
-    grazing: int
     periods: int
     corrections: int
     residual: float
     distance: float
+    step_error: float
+    growth_error: float
     contact_failures: int
     final: TransientStart
     outputs: FloatArray
@@ -93,7 +102,13 @@ class ShootingResult:
     @property
     def stable(self) -> bool:
         """Whether it is periodic and no small disturbance of it grows; neutral multipliers are not judged."""
-        return self.converged and self.floquet.stable
+        return self.converged and self.floquet.stable and not self.undecided
+
+    @property
+    def undecided(self) -> bool:
+        """Whether the error of the step reaches from the growth to 1, so that nothing is known of the stability: give more steps."""
+        distance = abs(self.floquet.growth - 1.0)
+        return self.converged and UNIT_TOLERANCE < distance <= self.growth_error
 
 
 @dataclass(slots=True)
@@ -108,7 +123,7 @@ class _Search:
     derivative: Derivative | None = None
 
 
-def shoot(
+def shoot(  # noqa: PLR0913
     structure: LinearSide,
     gap_operator: Matrix,
     laws: Sequence[ContactLaw],
@@ -117,12 +132,16 @@ def shoot(
     outputs: IntArray,
     start: TransientStart | None = None,
     stepping: TimeStepping | None = None,
+    *,
+    weights: FloatArray | None = None,
+    symmetry: WaveMotion | None = None,
 ) -> ShootingResult:
     """Find a periodic motion of ``M ü + C u̇ + K u + gap_operatorᵀ λ = f(t)`` with the period of the load.
 
     Newton's method on ``P(z) = z`` for the state z at t = 0, P being one period of the steps that `integrate` takes.
-    Where contacts stick for the whole period a family of motions exists, one for each residual traction, and the
-    derivative of ``P(z) - z`` is singular: the shortest correction is taken, which leads to a member nearby. The search
+    Where contacts stick for the whole period a family of motions exists, one for each place of their sliders: they stay
+    where the first periods have left them. Where the derivative of ``P(z) - z`` is singular otherwise, as of a body that
+    nothing holds, the shortest correction is taken. The search
     begins with plain periods; a correction that leads away from the orbit is shortened, and if that does not help
     replaced by plain periods. Where forty corrections do not converge, the motion is marched on from the start in ever
     longer blocks, as `integrate` would, with a short search after each of them, until it settles or the periods run out.
@@ -130,31 +149,47 @@ def shoot(
     Parameters
     ----------
     structure, gap_operator, laws, load, omega, outputs
-        As in `integrate`: all laws are `ElasticCoulomb`, and a `HarmonicLoad` is a load.
+        As in `integrate`; a `HarmonicLoad` is a load.
     start
         State at t = 0, best that of a harmonic balance (`start_from_harmonics`); rest if None.
     stepping
         Steps of a period, most periods in all, number of harmonics; `tolerance` bounds the length of the last correction
         relative to the vibration. If None, 1024 steps and 1e-9.
+    weights
+        (n_contacts,) factors of the contact forces; None: ones.
+    symmetry
+        That of all sectors of a tuned wheel (`SectorsInTime.motion`): the map is then that over the share of the period after which
+        each sector is in the state of another, and the motions that are found are those that travel with the load.
 
     Raises
     ------
     InputError
-        If an argument has a wrong shape or value, a law is not elastic Coulomb, or the mass matrix is singular.
+        If an argument has a wrong shape or value, the mass matrix is singular, or a contact is rigid.
     """
-    structure = one_structure(structure, "shoot")
     stepping = stepping or TimeStepping(tolerance=TOLERANCE)
-    start = start or rest(structure.n, laws, "shoot")
-    check_arguments(structure.n, len(laws), outputs, start, "shoot")
     steps = stepping.steps_per_period
-    mapping, state = period_map(structure, gap_operator, laws, load, omega, start, steps)
+    if symmetry is not None and steps % symmetry.sectors:
+        raise input_error(
+            "shoot: stepping.steps_per_period",
+            f"is {steps}, which {symmetry.sectors} sectors cannot share",
+            f"Give a multiple, such as {-(-steps // symmetry.sectors) * symmetry.sectors}.",
+        )
+    marcher = prepared(structure, gap_operator, laws, load, omega, steps, weights, "shoot")
+    check_outputs(outputs, marcher.n, "shoot")
+    start = start or rest(marcher.n, laws)
+    check_start(start, marcher.n, marcher.contacts, "shoot")
+    mapping, state = period_map(marcher, start, symmetry)
     search = _Search(state)
     _march(mapping, search, WARM_UP)
     warm = search.state
     _search(mapping, search, stepping, MOST_CORRECTIONS)
     if search.status == "not converged":
         _march_and_search(mapping, search, stepping, warm)
-    return _result(mapping, search, outputs, stepping)
+
+    def finer(times: int) -> Marcher:
+        return prepared(structure, gap_operator, laws, load, omega, times * steps, weights, "shoot")
+
+    return _result(mapping, search, outputs, stepping, finer)
 
 
 def _search(mapping: PeriodMap, search: _Search, stepping: TimeStepping, corrections: int) -> None:
@@ -216,7 +251,7 @@ def _settle(
             search.status = "diverged"
             return False
         change = float(np.linalg.norm(image.state - search.state))
-        changes.append(change / _vibration(mapping, image))
+        changes.append(change / mapping.vibration(image))
         search.state = image.state
         if remaining_change(changes) < tolerance:
             return True
@@ -243,10 +278,10 @@ def _correct(mapping: PeriodMap, search: _Search, tolerance: float) -> bool:
     if image.failures < 0:
         search.status = "diverged"
         return True
-    inverse = np.linalg.pinv(np.eye(mapping.size) - here.monodromy, rcond=SINGULAR)
+    inverse = here.inverse()
     defect = image.state - search.state
     correction = inverse @ defect
-    vibration = _vibration(mapping, image)
+    vibration = mapping.vibration(image)
     length = float(np.linalg.norm(correction))
     search.distance = length / vibration
     if search.distance <= tolerance and np.linalg.norm(defect) <= tolerance * vibration:
@@ -287,43 +322,46 @@ def _approach(
     return nearer
 
 
-def _vibration(mapping: PeriodMap, image: Image) -> float:
-    """Return the size of the vibration over a period in the measure of the states; that of the state where there is none."""
-    n = mapping.modes.speed.size
-    swing = mapping.scale[:n] * np.std(image.record.motion, axis=0)
-    size = float(np.sqrt(2.0) * np.linalg.norm(swing))
-    return max(size, 1e-9 * float(np.linalg.norm(image.state)), np.finfo(float).tiny)
-
-
 def _result(
-    mapping: PeriodMap, search: _Search, outputs: IntArray, stepping: TimeStepping
+    mapping: PeriodMap,
+    search: _Search,
+    outputs: IntArray,
+    stepping: TimeStepping,
+    finer: Callable[[int], Marcher],
 ) -> ShootingResult:
-    """March the period that is reported."""
-    image = mapping.image(search.state)
+    """March the period that is reported, and hold it against one with finer steps."""
+    image = mapping.period(search.state)
     status: ShootingStatus = "diverged" if image.failures < 0 else search.status
     known = np.nan if status == "diverged" else 1.0
-    begin = mapping.start_of(search.state)
-    n = mapping.modes.speed.size
-    modal = period_harmonics(begin.x[:n], image.record.motion, stepping.harmonics)
-    displacement, velocity = mapping.modes.physical(begin.x[: 2 * n])
-    contacts = (stepping.steps_per_period, -1, 3)
+    marcher, record = mapping.marcher, image.record
+    basis, final = marcher.modes.basis[outputs].T, marcher.end(mapping.start_of(search.state))
     found = search.derivative
-    monodromy = np.full((mapping.size, mapping.size), np.nan) if found is None else found.monodromy
+    if found is None or status == "diverged":
+        multipliers = Floquet(np.full(mapping.size, np.nan, dtype=complex))
+    else:
+        multipliers = mapping.floquet(found)
+    errors = StepErrors(np.nan, np.nan)
+    if found is not None and status == "converged":
+        errors = step_errors(mapping, finer, search.state, found, outputs, stepping.harmonics)
+        status = "converged" if errors.motion <= COARSE else "coarse"
     return ShootingResult(
         status=status,
-        harmonics=np.asarray(known * (modal @ mapping.modes.basis[outputs].T)),
-        floquet=floquet(known * monodromy),
-        grazing=0 if found is None else found.grazing,
+        harmonics=known * harmonics(mapping, search.state, image, outputs, stepping.harmonics),
+        floquet=multipliers,
         periods=search.periods + 1,
         corrections=search.corrections,
         residual=known
-        * float(np.linalg.norm(image.state - search.state) / _vibration(mapping, image)),
+        * float(np.linalg.norm(image.state - search.state) / mapping.vibration(image)),
         distance=known * search.distance,
+        step_error=errors.motion,
+        growth_error=errors.growth,
         contact_failures=image.failures,
         final=TransientStart(
-            known * displacement, known * velocity, known * begin.force.reshape(-1, 3)[:, :2]
+            known * final.displacement,
+            known * final.velocity,
+            tuple(known * s for s in final.states),
         ),
-        outputs=known * (image.record.motion @ mapping.modes.basis[outputs].T),
-        gap=known * image.record.gap.reshape(contacts),
-        contact_force=known * image.record.force.reshape(contacts),
+        outputs=known * (record.motion @ basis),
+        gap=known * record.gap,
+        contact_force=known * record.force,
     )

@@ -1,280 +1,220 @@
-"""The derivative of the compiled time step, for `stickslip.response.time.shooting`.
+"""The derivative of a run of time steps, for `stickslip.response.time.shooting`.
 
-The state of a motion has a tangent, one column for each direction in which its start may change. A step that ends with
-every contact sticking is linear and the same for all states; what the other contacts add is a small system of equations
-with the active set in which the step was solved.
+The state of a motion has a tangent, one column for each direction in which its start may change. The laws' own derivatives,
+logged by the march, make a step of it; steps in a row with the same derivatives are taken by squares of their common matrix.
 """
 
-# mypy: disallow-untyped-decorators=False
-
-from typing import NamedTuple
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.response.time.time_step import (
-    StepOperators,
-    StepRecord,
-    StepState,
-    StepWork,
-    advance,
-    step_workspace,
-    write_record,
-)
+from stickslip.response.time.contact_step import ENTRY, JAC
+from stickslip.response.time.marcher import Marcher
+from stickslip.response.time.time_step import StepLog
 
-OPEN = 0
-STUCK = 1  # the code of a contact that is closed, held both ways, and was closed before
-LANDING = 10  # and above: the gap closes within the step
-SINGLY = 3  # steps in one set of contact states up to which their matrix is not worth its making
-GRAZING = 1e-8  # of the limit: a spring that is nearer to it has reached it and does not slip
+SINGLY = 6  # steps in a row up to which their matrix is not worth its making
 
 
-class TangentOperators(NamedTuple):
-    """Matrices of a step that act on tangents."""
+@dataclass(frozen=True, eq=False)
+class LawDerivatives:
+    """Derivatives of force and new state of all contacts, as matrices by all gaps and rates, and by all states."""
 
-    stuck: FloatArray  # (m, m + k): (motion, r) -> motion, with r unchanged over the step
-    gaps: FloatArray  # (k, n): modal displacements -> gaps
-    hold: FloatArray  # (m, k): r at the end of the step -> motion
-
-
-class Tangent(NamedTuple):
-    """Derivatives of the state, one column a direction."""
-
-    state: FloatArray  # (m + k, columns): of (motion, r)
-    moved: FloatArray  # (m, columns): scratch
-    grazed: IntArray  # (k,): how often a spring was at its limit without slipping
+    force: FloatArray  # (k, 2k)
+    force_by_law: FloatArray  # (k, s)
+    law: FloatArray  # (s, 2k)
+    law_by_law: FloatArray  # (s, s)
+    entry: FloatArray  # (k + s, 2k) by gaps and rates before the step; empty where no contact lands
 
 
-class EqualSteps(NamedTuple):
-    """Room for steps that wait for others in the same contact states."""
+@dataclass(frozen=True, eq=False)
+class TangentOperators:
+    """Matrices of a step that act on tangents of (motion, r, states)."""
 
-    work: StepWork  # their contact states and slopes
-    power: Tangent  # (m + k) columns
-
-
-def tangent_operators(ops: StepOperators, gaps: FloatArray) -> TangentOperators:
-    """Return the matrices that the tangents need; `gaps` (k, n) turns modal displacements into gaps."""
-    k, m = ops.hold.shape
-    stuck = np.array(ops.transfer[:, :m].T)
-    stuck[:, m : m + k] += ops.hold.T
-    arrays = (stuck, gaps, ops.hold.T)
-    return TangentOperators(*(np.ascontiguousarray(array) for array in arrays))
+    free: FloatArray  # (m, m + k): motion at the end with r held zero there
+    hold: FloatArray  # (m, k)
+    seen: FloatArray  # (2k, m): gaps and rates
+    response: FloatArray  # (2k, k)
+    springs: FloatArray  # (k,)
+    blocks: tuple["Block", ...]
 
 
-def fresh_tangent(state: FloatArray, k: int) -> Tangent:
-    """Return `state` (m + k, columns) with its scratch arrays."""
-    first = np.array(state, dtype=float, order="C")
-    return Tangent(first, np.zeros_like(first[: len(first) - k]), np.zeros(k, dtype=np.int64))
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Where the logged derivatives of contacts with as many states go."""
+
+    jac: IntArray  # (contacts, (3 + s) (6 + s)) places in a row of the log
+    entry: IntArray  # (contacts, (3 + s) 6)
+    gaps: IntArray  # (contacts, 6) columns of their gaps and rates
+    states: IntArray  # (contacts, s)
 
 
-def equal_steps(m: int, k: int) -> EqualSteps:
-    """Return fresh room for `m` coordinates of motion and `k` gaps."""
-    return EqualSteps(step_workspace(k), fresh_tangent(np.eye(m + k), k))
+def tangent_operators(marcher: Marcher) -> TangentOperators:
+    """Return the matrices that the tangents of a marcher need."""
+    ops, k = marcher.operators, marcher.k
+    places, begins = marcher.contacts.table.places, marcher.contacts.state_places
+    sizes = np.diff(begins)
+    blocks = []
+    for size in np.unique(sizes):
+        contacts = np.flatnonzero(sizes == size)
+        gaps = 3 * contacts[:, None] + np.arange(3)
+        blocks.append(
+            Block(
+                places[JAC, contacts, None] + np.arange((3 + size) * (6 + size)),
+                places[ENTRY, contacts, None] + np.arange((3 + size) * 6),
+                np.hstack([gaps, k + gaps]),
+                begins[contacts, None] + np.arange(size),
+            )
+        )
+    return TangentOperators(
+        np.ascontiguousarray(ops.transfer.T),
+        np.ascontiguousarray(ops.hold.T),
+        marcher.modes.seen,
+        np.ascontiguousarray(ops.response.T),
+        marcher.contacts.table.springs,
+        tuple(blocks),
+    )
 
 
-@njit(cache=True)
-def _hold_grazing(c: int, before: StepState, law: FloatArray, work: StepWork, tan: Tangent) -> None:
-    """Take a spring that just reaches its limit as sticking.
-
-    A contact that stays closed and slips one way only cannot be in a periodic motion unless it slips by nothing: Newton
-    ends there exactly, and the next state is one in which it sticks.
-    """
-    if work.code[c] < STUCK or work.code[c] >= LANDING:
-        return
-    for d in range(2):
-        row, unit = 3 * c + d, 1 if d == 0 else 3
-        trial = before.force[row] + law[d] * (work.gap[row] - before.gap[row])
-        limit = abs(law[3] * work.force[3 * c + 2])
-        if law[d] == 0.0 or limit == 0.0 or abs(abs(trial) - limit) > GRAZING * limit:
-            continue
-        work.code[c] -= (work.code[c] - STUCK) // unit % 3 * unit
-        work.slope[c, d, :] = 0.0
-        tan.grazed[row] += 1
-
-
-@njit(cache=True)
-def _let_slide(c: int, law: FloatArray, work: StepWork) -> None:
-    """Take a spring without friction as slipping where its gap did not move, so that it seemed to stick.
-
-    Its force is zero wherever the gap goes: it keeps no traction, and neither does it just reach its limit.
-    """
-    if work.code[c] == OPEN or law[3] > 0.0:
-        return
-    slips = work.code[c] - (LANDING if work.code[c] >= LANDING else STUCK)
-    for d in range(2):
-        unit = 1 if d == 0 else 3
-        if slips // unit % 3 == 0:
-            work.code[c] += unit
-            work.slope[c, d, :] = 0.0
-            work.slope[c, d, d] = -law[d]
+def law_derivatives(row: FloatArray, linear: TangentOperators, n_states: int) -> LawDerivatives:
+    """Return a row of the log as matrices."""
+    k = linear.springs.size
+    whole, entry = np.zeros((k + n_states, 2 * k + n_states)), np.zeros((k + n_states, 2 * k))
+    landed = False
+    for block in linear.blocks:
+        size = block.states.shape[1]
+        rows = np.hstack([block.gaps[:, :3], k + block.states])[:, :, None]
+        columns = np.hstack([block.gaps, 2 * k + block.states])[:, None, :]
+        whole[rows, columns] = row[block.jac].reshape(-1, 3 + size, 6 + size)
+        before = row[block.entry].reshape(-1, 3 + size, 6)
+        if np.any(before):
+            landed = True
+            entry[rows, block.gaps[:, None, :]] = before
+    split = 2 * k
+    return LawDerivatives(
+        whole[:k, :split], whole[:k, split:], whole[k:, :split], whole[k:, split:],
+        entry if landed else entry[:, :0],
+    )  # fmt: skip
 
 
-@njit(cache=True)
-def _given(
-    c: int,
-    gap_before: FloatArray,
-    law: FloatArray,
-    work: StepWork,
-    tan: Tangent,
-    ops: TangentOperators,
-    out: FloatArray,
-) -> None:
-    """Write to `out` (3, columns) the part of a contact's r that what was before the step decides."""
-    m = tan.moved.shape[0]
-    normal, closed_by = law[4] - law[2] * work.gap[3 * c + 2], law[4] - law[2] * gap_before[2]
-    slips = work.code[c] - (
-        LANDING if work.code[c] >= LANDING else STUCK
-    )  # t in units, w in threes
-    for d in range(2):
-        if work.code[c] == OPEN or (d == 0 and slips % 3 > 0) or (d == 1 and slips > 2):
-            continue
-        out[d] = tan.state[m + 3 * c + d]
-        if work.code[c] < LANDING:
-            continue
-        # takes hold within the step: force = force before + share k (gap - gap before), see time_step
-        share = normal / (normal - closed_by)
-        by_normal = -law[2] * normal / (normal - closed_by) ** 2
-        travel = law[d] * (work.gap[3 * c + d] - gap_before[d])
-        for j in range(ops.gaps.shape[1]):
-            factor = law[d] * (1.0 - share) * ops.gaps[3 * c + d, j]
-            factor += travel * by_normal * ops.gaps[3 * c + 2, j]
-            out[d] += factor * tan.state[j]
+def first_tangent(row: FloatArray, linear: TangentOperators, n_states: int) -> FloatArray:
+    """Return (m + k + s, m + s) derivatives of (motion, r, states) by motion and states, from the log of how a march begins."""
+    laws = law_derivatives(row, linear, n_states)
+    k, m = linear.springs.size, linear.seen.shape[1]
+    by_motion = laws.force @ linear.seen - linear.springs[:, None] * linear.seen[:k]
+    return np.block(
+        [
+            [np.eye(m), np.zeros((m, n_states))],
+            [by_motion, laws.force_by_law],
+            [laws.law @ linear.seen, laws.law_by_law],
+        ]
+    )
 
 
-@njit(cache=True)
-def _active(before: StepState, ops: StepOperators, work: StepWork) -> IntArray:
-    """Return the contacts whose force beyond the stuck springs may change over the step."""
-    found = np.empty(work.code.size, dtype=np.int64)
-    count = 0
-    for c in range(work.code.size):
-        closed_by = ops.law[c, 4] - ops.law[c, 2] * before.gap[3 * c + 2]
-        if work.code[c] != STUCK or closed_by <= 0.0:
-            found[count] = c
-            count += 1
-    return found[:count]
+def advanced(log: StepLog, rows: int, tangent: FloatArray, linear: TangentOperators) -> FloatArray:
+    """Return the tangent (m + k + s, columns) after the steps of a log."""
+    n_states = len(tangent) - linear.free.shape[1]
+    for i in range(rows):
+        laws = law_derivatives(log.jac[i], linear, n_states)
+        tangent = _steps(int(log.steps[i]), laws, tangent, linear)
+    return tangent
 
 
-@njit(cache=True)
-def _contact_changes(
-    rows: IntArray, given: FloatArray, gaps: FloatArray, ops: StepOperators, work: StepWork
+def _steps(
+    count: int, laws: LawDerivatives, tangent: FloatArray, linear: TangentOperators
 ) -> FloatArray:
-    """Return the change of r over the step at active `rows`.
-
-    ``dr = slope dg + given`` in each contact, with ``dg = gaps + response dr`` over all active ones.
-    """
-    size = rows.size
-    response, slope = np.empty((size, size)), np.zeros((size, size))
-    for i in range(size):
-        for j in range(size):
-            response[i, j] = ops.response[rows[j], rows[i]]
-            if i // 3 == j // 3:
-                slope[i, j] = work.slope[rows[i] // 3, i % 3, j % 3]
-    moved = np.linalg.solve(np.eye(size) - np.dot(response, slope), gaps + np.dot(response, given))
-    return np.asarray(given + np.dot(slope, moved))
-
-
-@njit(cache=True)
-def advance_tangent(
-    ops: StepOperators,
-    linear: TangentOperators,
-    before: StepState,
-    work: StepWork,
-    tan: Tangent,
-) -> None:
-    """Carry the tangents over the step that `work` has just solved."""
-    m, n = tan.moved.shape[0], linear.gaps.shape[1]
-    active = _active(before, ops, work)
-    np.dot(linear.stuck, tan.state, tan.moved)
-    if active.size > 0:
-        rows = np.empty(3 * active.size, dtype=np.int64)
-        given = np.zeros((rows.size, tan.state.shape[1]))
-        for a in range(active.size):
-            c = active[a]
-            gap_before = before.gap[3 * c : 3 * c + 3]
-            for d in range(3):
-                rows[3 * a + d] = 3 * c + d
-            _given(c, gap_before, ops.law[c], work, tan, linear, given[3 * a : 3 * a + 3])
-        gaps = np.dot(linear.gaps[rows], tan.moved[:n])
-        beyond = m + rows
-        change = _contact_changes(rows, given - tan.state[beyond], gaps, ops, work)
-        for i in range(rows.size):
-            tan.state[beyond[i]] += change[i]
-        tan.moved[:] += np.dot(linear.hold[:, rows], change)
-    tan.state[:m] = tan.moved
-
-
-@njit(cache=True)
-def _by_itself(before: StepState, ops: StepOperators, work: StepWork, tan: Tangent) -> bool:
-    """Settle what grazes or has no friction; return whether the step's derivative depends on more than the contact states."""
-    alone = False
-    for c in range(work.code.size):
-        _let_slide(c, ops.law[c], work)
-        _hold_grazing(c, before, ops.law[c], work, tan)
-        closed_by = ops.law[c, 4] - ops.law[c, 2] * before.gap[3 * c + 2]
-        alone = alone or work.code[c] >= LANDING or (work.code[c] == STUCK and closed_by <= 0.0)
-    return alone
-
-
-@njit(cache=True)
-def _advance_equal_steps(
-    count: int,
-    ops: StepOperators,
-    linear: TangentOperators,
-    before: StepState,
-    work: StepWork,
-    tan: Tangent,
-    power: Tangent,
-) -> None:
-    """Carry the tangents over `count` steps in the same contact states: by squares of their common matrix."""
-    if count <= SINGLY:
+    """Carry the tangent over steps with the same derivatives."""
+    k = linear.springs.size
+    beyond = laws.force.copy()
+    beyond[:, :k] -= np.diag(linear.springs)
+    newton = np.linalg.inv(np.eye(k) - beyond @ linear.response)
+    if count <= SINGLY or not _holds_still(laws):
         for _ in range(count):
-            advance_tangent(ops, linear, before, work, tan)
-        return
-    power.state[:] = np.eye(power.state.shape[0])
-    advance_tangent(ops, linear, before, work, power)
-    matrix = power.state.copy()
-    while True:
-        if count % 2 == 1:
-            tan.state[:] = np.dot(matrix, tan.state)
-        count //= 2
-        if count == 0:
-            return
-        matrix = np.dot(matrix, matrix)
+            tangent = _step(laws, beyond, newton, tangent, linear)
+        return tangent
+    tangent = _step(laws, beyond, newton, tangent, linear)
+    return _many(count - 1, laws, beyond, newton, tangent, linear)
 
 
-@njit(cache=True)
-def run_tangent_period(
-    ops: StepOperators,
+def _holds_still(laws: LawDerivatives) -> bool:
+    """Whether states are forgotten in each step or kept for all: sliders that slip and stick."""
+    force, new = laws.force_by_law, laws.law_by_law
+    return not (
+        np.any(force @ laws.law)
+        or np.any(new @ laws.law)
+        or np.any(force @ new != force)
+        or np.any(new @ new != new)
+    )
+
+
+def _many(
+    count: int,
+    laws: LawDerivatives,
+    beyond: FloatArray,
+    newton: FloatArray,
+    tangent: FloatArray,
     linear: TangentOperators,
-    state: StepState,
-    work: StepWork,
-    record: StepRecord,
-    tan: Tangent,
-    equal: EqualSteps,
-) -> int:
-    """Advance `state` and its tangents by one period; return what `run_period` returns."""
-    moved = np.empty(ops.hold.shape[1] + ops.hold.shape[0])
-    before = StepState(state.x.copy(), state.gap.copy(), state.force.copy())
-    failures, waiting = 0, 0
-    for step in range(record.motion.shape[0]):
-        before.gap[:] = state.gap
-        before.force[:] = state.force
-        if not advance(ops, state, work, step, moved):
-            failures += 1
-        write_record(record, state, step)
-        if not np.isfinite(np.sum(state.x)):
-            return -1
-        alone = _by_itself(before, ops, work, tan)
-        if alone or np.any(work.code != equal.work.code):
-            _advance_equal_steps(waiting, ops, linear, before, equal.work, tan, equal.power)
-            waiting = 0
-        if alone:
-            advance_tangent(ops, linear, before, work, tan)
-            continue
-        if waiting == 0:
-            equal.work.code[:] = work.code
-            equal.work.slope[:] = work.slope
-        waiting += 1
-    _advance_equal_steps(waiting, ops, linear, before, equal.work, tan, equal.power)
-    return failures
+) -> FloatArray:
+    """Carry motion and r over steps in which all states hold still, by squares of ``x -> P x + Q c`` with their constant force c."""
+    m, k = linear.hold.shape
+    held = np.flatnonzero(np.any(laws.force_by_law, axis=1))
+    constant = laws.force_by_law[held] @ tangent[m + k :]
+    by_motion, add = beyond @ linear.seen, np.eye(k)[:, held]
+    start = linear.free[:, m:]
+    power = linear.free[:, :m] + start @ by_motion
+    share = start[:, held]
+    answer = linear.hold @ newton
+    share = share + answer @ (by_motion @ share + add)
+    power = power + answer @ (by_motion @ power)
+    motion = tangent[:m]
+    while count > 0:
+        if count % 2 == 1:
+            motion = power @ motion + share @ constant
+        count //= 2
+        if count > 0:
+            share = power @ share + share
+            power = power @ power
+    r = by_motion @ motion
+    r[held] += constant
+    states = laws.law_by_law @ tangent[m + k :] + (laws.law @ linear.seen) @ motion
+    return np.vstack([motion, r, states])
+
+
+def _seen(linear: TangentOperators, motion: FloatArray, *, rates: bool) -> FloatArray:
+    """Return gaps and rates of tangents of motion; rates are zero where nothing asks for them."""
+    m, k = linear.hold.shape
+    seen = np.zeros((2 * k, motion.shape[1]))
+    seen[:k] = linear.seen[:k, : m // 2] @ motion[: m // 2]
+    if rates:
+        seen[k:] = linear.seen[k:, m // 2 :] @ motion[m // 2 :]
+    return seen
+
+
+def _step(
+    laws: LawDerivatives,
+    beyond: FloatArray,
+    newton: FloatArray,
+    tangent: FloatArray,
+    linear: TangentOperators,
+) -> FloatArray:
+    """Carry the tangent over a step: the laws answer to gaps and rates that the change of r at its end moves, too."""
+    m, k = linear.hold.shape
+    states = tangent[m + k :]
+    motion = linear.free @ tangent[: m + k]
+    rates = bool(np.any(beyond[:, k:]) or np.any(laws.law[:, k:]))
+    seen = _seen(linear, motion, rates=rates)
+    given, new = beyond @ seen + laws.force_by_law @ states, laws.law_by_law @ states
+    if laws.entry.size:
+        before = laws.entry @ _seen(linear, tangent[:m], rates=True)
+        given += before[:k]
+        new += before[k:]
+    r = newton @ given
+    return np.vstack([motion + linear.hold @ r, r, new + laws.law @ (seen + linear.response @ r)])
+
+
+def kept(monodromy: FloatArray, places: Sequence[int] | IntArray) -> IntArray:
+    """Return which of the states at `places` the period leaves as they are, whatever the others are."""
+    rows = monodromy[places].copy()
+    rows[np.arange(len(places)), places] -= 1.0
+    return np.asarray(np.asarray(places)[~np.any(rows, axis=1)])

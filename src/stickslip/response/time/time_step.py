@@ -1,213 +1,173 @@
-"""The compiled time step of `stickslip.response.time.transient`, with its own elastic Coulomb law.
+"""The compiled time step of `stickslip.response.time.transient`, for contacts of any law.
 
-Nothing here is shared with the laws that the harmonic balance uses: the two are compared with each other.
+The linear structure with every contact stuck is carried over the step exactly, the contact force beyond the stuck springs,
+r, as a line. Its end is the unknown: the laws answer the gaps and rates that it leads to. A contact that sticks answers the
+same r whatever its gap.
 """
 
 # mypy: disallow-untyped-decorators=False
 
-from typing import NamedTuple
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, typeof, types
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.contact.law import OPEN
+from stickslip.response.time.contact_step import (
+    FORCE,
+    GAP,
+    RATE,
+    ContactTable,
+    StepState,
+    evaluate,
+    inner,
+    large,
+    law_work,
+)
+from stickslip.response.time.step_newton import (
+    back_substitute,
+    factor,
+    newton_matrix,
+    newton_work,
+    slopes,
+)
 
-FULL_STEPS = 12  # Newton steps taken at full length before they are halved to break a cycle between two states
+FULL_STEPS = 12  # Newton steps taken at full length before a cycle between two states is broken: by sticking, then by half steps
 NEWTON_STEPS = 60
 GAP_TOLERANCE = 1e-12  # of the largest gap: some hundred roundings
 
 
 class StepOperators(NamedTuple):
-    """Matrices of one step; state ``x = (motion, r)``, r being the contact force beyond the stuck springs."""
+    """Matrices of one step; state ``x = (motion, r)``."""
 
-    transfer: FloatArray  # (m + k, m + k), transposed: x -> motion and gaps at the end of the step, with r held zero there
-    drive: FloatArray  # (steps, m + k): what the loads add to that
+    transfer: FloatArray  # (m + k, m), transposed: x -> motion at the end, with r held zero there
+    drive: FloatArray  # (steps, m): what the loads add to that
     hold: FloatArray  # (k, m), transposed: r at the end of the step -> motion
-    response: FloatArray  # (k, k): r at the end of the step -> gaps
-    law: FloatArray  # (n_contacts, 5): k_t, k_w, k_n, mu, preload
+    response: FloatArray  # (k, 2k), transposed: r at the end of the step -> gaps and rates
+    gaps: FloatArray  # (k, m/2): displacements -> gaps
+    rates: FloatArray  # (k, m/2): velocities -> rates of the gaps
 
 
-class StepState(NamedTuple):
-    """State between steps; x as in `StepOperators`."""
+class StepLog(NamedTuple):
+    """Derivatives of the laws in every step, each kept once for steps in a row that have the same."""
 
-    x: FloatArray  # (m + k,)
-    gap: FloatArray  # (k,)
-    force: FloatArray  # (k,)
-
-
-class StepRecord(NamedTuple):
-    """One period, sampled at the end of every step."""
-
-    motion: FloatArray  # (steps, n) modal displacements
-    gap: FloatArray  # (steps, k)
-    force: FloatArray  # (steps, k)
+    jac: FloatArray  # (rows, ...) as `LawWork.jac`
+    steps: IntArray  # (rows,) steps in a row
 
 
-class StepWork(NamedTuple):
-    """Arrays that the contact solve writes to, so that no step allocates."""
-
-    gap: FloatArray  # (k,) iterate
-    force: FloatArray  # (k,) there
-    defect: FloatArray  # (k,)
-    slope: FloatArray  # (n_contacts, 3, 3): derivative of the force beyond the stuck springs
-    code: IntArray  # (n_contacts,) contact state there
-    factor: FloatArray  # (k, k) LU of the Newton matrix
-    pivot: IntArray  # (k,)
-    factored: IntArray  # (n_contacts,) contact states that the LU belongs to
+# what a run is to do, and what it did: whether to begin by asking the laws, first step, steps, whether to fill the log;
+# steps taken, steps in which the contacts were not solved (-1: overflow), rows of the log
+BEGIN, FIRST, STEPS, LOGS, TAKEN, FAILED, ROWS = range(7)
 
 
-@njit(cache=True)
-def _contact(
-    gap: FloatArray,
-    before: FloatArray,
-    force_before: FloatArray,
-    law: FloatArray,
-    force: FloatArray,
-    slope: FloatArray,
-) -> int:
-    """Step one contact: write its force and derivative; return 0 open, 1-9 closed, 10-18 landing in this step."""
-    slope[:, :] = 0.0
-    force[:] = 0.0
-    normal = law[4] - law[2] * gap[2]
-    if normal <= 0.0:
-        return 0
-    normal_before = law[4] - law[2] * before[2]
-    share, share_slope, code = 1.0, 0.0, 1
-    if normal_before < 0.0:
-        # The slider takes hold where the gap closes within the step, not at its beginning: without this the force would
-        # be off by an amount of first order for the rest of the sticking phase.
-        share = normal / (normal - normal_before)
-        share_slope = law[2] * normal_before / (normal - normal_before) ** 2
-        code = 10
-    force[2] = -normal
-    slope[2, 2] = law[2]
-    limit = law[3] * normal
-    for d in range(2):
-        travel = law[d] * (gap[d] - before[d])
-        trial = force_before[d] + share * travel
-        if abs(trial) <= limit:
-            force[d] = trial
-            slope[d, d] = share * law[d]
-            slope[d, 2] = travel * share_slope
-        else:
-            sign = 1.0 if trial > 0.0 else -1.0
-            force[d] = sign * limit
-            slope[d, 2] = -sign * law[3] * law[2]
-            code += (1 if sign > 0.0 else 2) * (1 if d == 0 else 3)
-    return code
-
-
-@njit(cache=True)
-def _evaluate(free: FloatArray, ops: StepOperators, before: StepState, work: StepWork) -> float:
-    """Contact forces and the defect of ``gap = free + response r(gap)`` at the iterate; return its largest entry."""
-    n_contacts, k = work.code.size, work.gap.size
-    for c in range(n_contacts):
-        part = slice(3 * c, 3 * c + 3)
-        work.code[c] = _contact(
-            work.gap[part],
-            before.gap[part],
-            before.force[part],
-            ops.law[c],
-            work.force[part],
-            work.slope[c],
-        )
-        for d in range(3):
-            work.slope[c, d, d] -= ops.law[c, d]
-    largest = 0.0
+@inner
+def _defect(ops, table, laws, work):  # type: ignore[no-untyped-def]
+    """Write how far r at the iterate is from what the laws answer; return the largest change of a gap that this makes."""
+    k, largest = work.r.size, 0.0
     for i in range(k):
-        work.defect[i] = free[i] - work.gap[i]
-    for j in range(k):
-        beyond = work.force[j] - ops.law[j // 3, j % 3] * work.gap[j]
-        for i in range(k):
-            work.defect[i] += ops.response[j, i] * beyond
-    for i in range(k):
-        largest = max(largest, abs(work.defect[i]))
+        work.defect[i] = laws.seen[FORCE, i] - table.springs[i] * laws.seen[GAP, i] - work.r[i]
         if not np.isfinite(work.defect[i]):
             return np.inf
+    for i in range(k):
+        work.moves[i] = 0.0
+    for j in range(k):
+        defect = work.defect[j]
+        for i in range(k):
+            work.moves[i] += ops.response[j, i] * defect
+    for i in range(k):
+        largest = max(largest, abs(work.moves[i]))
     return largest
 
 
-@njit(cache=True)
-def _newton_matrix(ops: StepOperators, work: StepWork) -> None:
-    """Write ``I - response slope`` where its LU will be."""
-    k = work.gap.size
+@inner
+def _at_guess(ops, laws, work):  # type: ignore[no-untyped-def]
+    """Write gaps and rates of the iterate; return the size of the gaps."""
+    k, scale = work.r.size, 0.0
     for i in range(k):
-        for j in range(k):
-            total = 1.0 if i == j else 0.0
-            for d in range(3):
-                total -= ops.response[3 * (j // 3) + d, i] * work.slope[j // 3, d, j % 3]
-            work.factor[i, j] = total
-
-
-@njit(cache=True)
-def _factor(ops: StepOperators, work: StepWork) -> None:
-    """LU of the Newton matrix with row pivoting, kept for as long as no contact changes its state."""
-    k = work.gap.size
-    _newton_matrix(ops, work)
-    lu = work.factor
+        laws.seen[GAP, i], laws.seen[RATE, i] = work.free[i], work.free[k + i]
+        scale = max(scale, abs(work.free[i]))
     for j in range(k):
-        best = j
-        for i in range(j + 1, k):
-            if abs(lu[i, j]) > abs(lu[best, j]):
-                best = i
-        work.pivot[j] = best
-        for i in range(k):
-            lu[j, i], lu[best, i] = lu[best, i], lu[j, i]
-        for i in range(j + 1, k):
-            if lu[i, j] != 0.0:
-                lu[i, j] /= lu[j, j]
-                for col in range(j + 1, k):
-                    lu[i, col] -= lu[i, j] * lu[j, col]
-    work.factored[:] = work.code
-
-
-@njit(cache=True)
-def _back_substitute(work: StepWork) -> None:
-    """Overwrite the defect with the Newton step that removes it."""
-    k = work.gap.size
-    lu, x = work.factor, work.defect
-    for j in range(k):
-        x[j], x[work.pivot[j]] = x[work.pivot[j]], x[j]
+        r = work.r[j]
+        if r != 0.0:
+            for i in range(k):
+                laws.seen[GAP, i] += ops.response[j, i] * r
+                laws.seen[RATE, i] += ops.response[j, k + i] * r
     for i in range(k):
-        for j in range(i):
-            x[i] -= lu[i, j] * x[j]
-    for i in range(k - 1, -1, -1):
-        for j in range(i + 1, k):
-            x[i] -= lu[i, j] * x[j]
-        x[i] /= lu[i, i]
+        scale = max(scale, abs(laws.seen[GAP, i]))
+    return scale
 
 
-@njit(cache=True)
-def _solve_contacts(
-    free: FloatArray, ops: StepOperators, before: StepState, work: StepWork
-) -> bool:
-    """Semi-smooth Newton for the gaps at the end of a step; return whether it reached rounding.
+@inner
+def _foresee(state, laws, work):  # type: ignore[no-untyped-def]
+    """Put r where it ends if the laws go on as the LU has them: exact while piecewise linear laws stay in their states."""
+    k = work.r.size
+    if k == 0 or np.isnan(work.factored[0, 0]):
+        return
+    for i in range(k):
+        first = 3 * (i // 3)
+        work.defect[i] = 0.0
+        for b in range(6):
+            slope = work.factored[i, b]
+            if slope != 0.0:
+                row, j = (GAP, first + b) if b < 3 else (RATE, first + b - 3)
+                work.defect[i] += slope * (laws.seen[row, j] - state.seen[row, j])
+    back_substitute(work)
+    for i in range(k):
+        if not np.isfinite(work.defect[i]):
+            return
+    for i in range(k):
+        work.r[i] += work.defect[i]
 
-    Within a contact state the force is affine in the gap, so that a step which ends in the state it was taken in is exact.
+
+@large
+def _assume_stick(table, ops, state, work):  # type: ignore[no-untyped-def]
+    """Begin anew as if all contacts stuck or stayed open: between slip one way and the other steep laws have their solution."""
+    k = work.r.size
+    m = state.x.size - k
+    for i in range(k):
+        for b in range(6):
+            work.slope[i, b] = 0.0
+        closed = state.status[i // 3, 0] != OPEN
+        work.slope[i, i % 3] = (table.stuck[i] if closed else 0.0) - table.springs[i]
+        work.r[i] = state.x[m + i]
+    newton_matrix(ops, work)
+    factor(work)
+
+
+@inner
+def _solve_contacts(table, ops, state, laws, work, solves):  # type: ignore[no-untyped-def]
+    """Semi-smooth Newton for r at the end of a step; return whether it reached rounding.
+
+    Where all laws are piecewise linear a step that ends in the states it was taken in is exact. Unless it `solves`, the laws
+    are asked about gaps and rates as they are.
     """
-    scale = 0.0
-    for i in range(free.size):
-        scale = max(scale, abs(free[i]), abs(work.gap[i]))
-    for iteration in range(NEWTON_STEPS):
-        largest = _evaluate(free, ops, before, work)
-        if largest <= GAP_TOLERANCE * scale:
+    for iteration in range(-1, NEWTON_STEPS):
+        if iteration == FULL_STEPS:
+            _assume_stick(table, ops, state, work)
+        scale = _at_guess(ops, laws, work) if solves else np.inf
+        if solves and (iteration < 0 or iteration == FULL_STEPS):
+            _foresee(state, laws, work)
+            continue
+        evaluate(table, state, laws)
+        largest = _defect(ops, table, laws, work)
+        if not solves or largest <= GAP_TOLERANCE * scale * work.stiff[0]:
             return True
         if largest == np.inf:
             return False
-        stale = False
-        for c in range(work.code.size):
-            stale = stale or work.code[c] != work.factored[c] or work.code[c] >= 10
-        if stale:
-            _factor(ops, work)
-        _back_substitute(work)
-        length = 1.0 if iteration < FULL_STEPS else 0.5
-        for i in range(work.gap.size):
-            work.gap[i] += length * work.defect[i]
+        if not slopes(table, laws, work):
+            newton_matrix(ops, work)
+            factor(work)
+        back_substitute(work)
+        length = 1.0 if iteration < 2 * FULL_STEPS else 0.5
+        for i in range(work.r.size):
+            work.r[i] += length * work.defect[i]
     return False
 
 
-@njit(cache=True)
-def _accumulate(matrix: FloatArray, x: FloatArray, out: FloatArray) -> None:
+@inner
+def _accumulate(matrix, x, out):  # type: ignore[no-untyped-def]
     """``out += matrixᵀ x``: plain loops, because calling a threaded BLAS costs more than it saves at this size."""
     whole = x.size - x.size % 4
     for j in range(0, whole, 4):
@@ -224,59 +184,120 @@ def _accumulate(matrix: FloatArray, x: FloatArray, out: FloatArray) -> None:
             out[i] += matrix[j, i] * x[j]
 
 
-@njit(cache=True)
-def advance(
-    ops: StepOperators, state: StepState, work: StepWork, step: int, moved: FloatArray
-) -> bool:
-    """Take one step of `state`, with `moved` (m + k,) to write to; return whether the contacts were solved."""
-    m, k = ops.hold.shape[1], ops.hold.shape[0]
-    moved[:] = ops.drive[step]
-    _accumulate(ops.transfer, state.x, moved)
-    free = moved[m:]
-    # First guess: the contact force does not change over the step.
-    work.gap[:] = free
-    _accumulate(ops.response, state.x[m:], work.gap)
-    solved = _solve_contacts(free, ops, state, work)
+@inner
+def _take_over(table, state, laws):  # type: ignore[no-untyped-def]
+    """Make what the laws answered the state, r with it."""
+    k = table.springs.size
+    m = state.x.size - k
     for i in range(k):
-        state.x[m + i] = work.force[i] - ops.law[i // 3, i % 3] * work.gap[i]
-    _accumulate(ops.hold, state.x[m:], moved[:m])
-    state.x[:m] = moved[:m]
-    state.gap[:] = work.gap
-    state.force[:] = work.force
-    return bool(solved)
+        for d in range(3):
+            state.seen[d, i] = laws.seen[d, i]
+        state.x[m + i] = laws.seen[FORCE, i] - table.springs[i] * laws.seen[GAP, i]
+    for i in range(state.law.size):
+        state.law[i] = laws.law[0, i]
+    for c in range(table.weight.size):
+        state.status[c, 0], state.status[c, 1] = laws.status[c, 0], laws.status[c, 1]
 
 
-@njit(cache=True)
-def write_record(record: StepRecord, state: StepState, step: int) -> None:
-    """Keep the state at the end of a step."""
-    record.motion[step] = state.x[: record.motion.shape[1]]
-    record.gap[step] = state.gap
-    record.force[step] = state.force
+@inner
+def _same(first, second):  # type: ignore[no-untyped-def]
+    same = True
+    for i in range(first.size):
+        same = same and first[i] == second[i]
+    return same
 
 
-@njit(cache=True)
-def run_period(ops: StepOperators, state: StepState, work: StepWork, record: StepRecord) -> int:
-    """Advance `state` by one period; return the number of failed steps, or -1 if the motion overflowed."""
-    moved = np.empty(ops.hold.shape[1] + ops.hold.shape[0])
-    failures = 0
-    for step in range(record.motion.shape[0]):
-        if not advance(ops, state, work, step, moved):
-            failures += 1
-        write_record(record, state, step)
-        if not np.isfinite(np.sum(state.x)):
-            return -1
-    return failures
+@large
+def _keep(log, laws, rows):  # type: ignore[no-untyped-def]
+    """Log the derivatives of a step; return the number of rows then."""
+    if rows > 0 and _same(log.jac[rows - 1], laws.jac):
+        log.steps[rows - 1] += 1
+        return rows
+    for i in range(laws.jac.size):
+        log.jac[rows, i] = laws.jac[i]
+    log.steps[rows] = 1
+    return rows + 1
 
 
-def step_workspace(k: int) -> StepWork:
-    """Return fresh work arrays for `k` gaps."""
-    return StepWork(
-        np.zeros(k),
-        np.zeros(k),
-        np.zeros(k),
-        np.zeros((k // 3, 3, 3)),
-        np.zeros(k // 3, dtype=np.int64),
-        np.zeros((k, k)),
-        np.zeros(k, dtype=np.int64),
-        np.full(k // 3, -1, dtype=np.int64),
+@inner
+def _write(row, state, n):  # type: ignore[no-untyped-def]
+    """Keep displacements, gaps and forces at the end of a step; return whether the state is finite."""
+    total, k = 0.0, state.seen.shape[1]
+    for i in range(n):
+        row[i] = state.x[i]
+    for i in range(k):
+        row[n + i], row[n + k + i] = state.seen[GAP, i], state.seen[FORCE, i]
+    for i in range(state.x.size):
+        total += state.x[i]
+    return np.isfinite(total)
+
+
+@inner
+def _predict(ops, state, work, step):  # type: ignore[no-untyped-def]
+    """Write motion, gaps and rates at the end of a step with r held zero there; the first guess of r is that it does not change."""
+    n, k, moved, free = ops.gaps.shape[1], work.r.size, work.moved, work.free
+    for j in range(moved.size):
+        moved[j] = ops.drive[step, j]
+    _accumulate(ops.transfer, state.x, moved)
+    for i in range(k):
+        gap, rate = 0.0, 0.0
+        for j in range(n):
+            gap += ops.gaps[i, j] * moved[j]
+            rate += ops.rates[i, j] * moved[n + j]
+        free[i], free[k + i] = gap, rate
+        work.r[i] = state.x[2 * n + i]
+
+
+@inner
+def _move(ops, state, work):  # type: ignore[no-untyped-def]
+    """Add what r at the end of the step does to the motion."""
+    moved, m = work.moved, work.moved.size
+    _accumulate(ops.hold, state.x[m:], moved)
+    for j in range(m):
+        state.x[j] = moved[j]
+
+
+def _run_steps(table, ops, state, laws, work, record, log, plan):  # type: ignore[no-untyped-def]
+    """Take the steps of `plan`, as many as the log has room for."""
+    k, n = table.springs.size, ops.gaps.shape[1]
+    for j in range(k):
+        laws.seen[GAP, j], laws.seen[RATE, j] = state.seen[GAP, j], state.seen[RATE, j]
+    plan[TAKEN], plan[FAILED], plan[ROWS] = 0, 0, 0
+    for i in range(-plan[BEGIN], plan[STEPS]):
+        logs, step = plan[LOGS] != 0, plan[FIRST] + i
+        if logs and plan[ROWS] == log.steps.size:
+            return
+        if i >= 0:
+            _predict(ops, state, work, step)
+        if not _solve_contacts(table, ops, state, laws, work, i >= 0):
+            plan[FAILED] += 1
+        _take_over(table, state, laws)
+        if logs:
+            plan[ROWS] = _keep(log, laws, plan[ROWS])
+        if i >= 0:
+            _move(ops, state, work)
+            plan[TAKEN] += 1
+            if not _write(record[step], state, n):
+                plan[FAILED] = -1
+                return
+
+
+@cache
+def run_steps() -> Any:
+    """Return the compiled run of steps, ``run(table, ops, state, laws, work, record, log, plan)``."""
+    vector, matrix = types.float64[::1], types.float64[:, ::1]
+    counts, table = types.int64[::1], types.int64[:, ::1]
+    named: Any = types.NamedTuple
+    alike: Any = types.NamedUniTuple
+    type_of: Any = typeof
+    tuples = (
+        named((table, vector, vector, vector, vector), ContactTable),
+        alike(matrix, 6, StepOperators),
+        named((vector, matrix, vector, table), StepState),
+        type_of(law_work(0, 0, 0)),
+        type_of(newton_work(0, 0)),
+        matrix,
+        named((matrix, counts), StepLog),
+        counts,
     )
+    return njit(types.void(*tuples), cache=True, error_model="numpy")(_run_steps)

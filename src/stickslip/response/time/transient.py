@@ -5,6 +5,8 @@ matrix and however stiff the modes; so are the periodic loads. What is left of t
 stuck springs, is interpolated linearly over the step (first-order hold) and solved for implicitly. A contact that sticks
 is then integrated without error. One that slips or is open is not: its departure is curved, and the line in its place acts
 like a mass ``k h²/12`` too little on the spring; the switches between states add another error of second order in the step.
+Springs that with the mass they act on vibrate much faster than the load are therefore no part of the linear structure:
+their force is held at the mean of both ends of the step, which does the work that their energy changes by.
 """
 
 from collections.abc import Sequence
@@ -14,26 +16,16 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.contact.law import ContactLaw
-from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import input_error
-from stickslip.harmonic.linear import LinearSide, one_structure
-from stickslip.model.structure import Structure
-from stickslip.response.time.propagator import (
-    ModalCoordinates,
-    PeriodicLoad,
-    require_array,
-    step_operators,
-)
+from stickslip.harmonic.linear import LinearSide
+from stickslip.response.time.contact_step import StepState
+from stickslip.response.time.marcher import Marcher, Record, prepared
+from stickslip.response.time.propagator import PeriodicLoad
 from stickslip.response.time.settling import Progress, SettlingStatus, overflowed, period_harmonics
-from stickslip.response.time.time_step import (
-    StepOperators,
-    StepRecord,
-    StepState,
-    run_period,
-    step_workspace,
-)
+from stickslip.response.time.start import TransientStart, check_start, rest
 from stickslip.units import check_quantities, quantity
 
+MOST_STEPS = 10_000_000  # a period of which fills the memory of a large machine
 DRIFT_THRESHOLD = 1e-4  # of a coordinate's own swing, per period
 
 
@@ -44,8 +36,8 @@ class TimeStepping:
     Parameters
     ----------
     steps_per_period
-        Steps in a period of the excitation. The fastest mode that the contact springs hold should have six or more of
-        them in a cycle.
+        Steps in a period of the excitation. Impacts on stiff springs need several of them while they last; where a sliding contact
+        turns within a step, the error is of first order.
     max_periods
         Give up settling after this many periods.
     tolerance
@@ -54,7 +46,7 @@ class TimeStepping:
         Highest harmonic reported.
     """
 
-    steps_per_period: int = quantity("steps in a period", default=1024, least=16)
+    steps_per_period: int = quantity("steps in a period", default=1024, least=16, most=MOST_STEPS)
     max_periods: int = quantity("periods at most", default=3000, least=2)
     tolerance: float = quantity("relative change, 1e-5 is usual", default=1e-5, above=0, below=1)
     harmonics: int = quantity("highest harmonic reported", default=7, least=1)
@@ -66,23 +58,6 @@ class TimeStepping:
             raise input_error(
                 "TimeStepping.harmonics", problem, "Ask for less than half the number of steps."
             )
-
-
-@dataclass(frozen=True, eq=False)
-class TransientStart:
-    """State at t = 0, which is also the state at any whole number of periods.
-
-    Parameters
-    ----------
-    displacement, velocity
-        (n,) in m and m/s.
-    traction
-        (n_contacts, 2) forces in the tangential contact springs, N; limited to μN on the first use.
-    """
-
-    displacement: FloatArray
-    velocity: FloatArray
-    traction: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,36 +130,7 @@ class TransientResult:
         )
 
 
-def rest(n: int, laws: Sequence[ContactLaw], caller: str = "integrate") -> TransientStart:
-    """Return zero displacement and velocity of `n` coordinates, with the residual traction of each law."""
-    known = _known(laws, caller)
-    held = [(law.residual_traction or 0.0) * law.mu * max(law.preload, 0.0) for law in known]
-    return TransientStart(np.zeros(n), np.zeros(n), np.tile(held, (2, 1)).T)
-
-
-def start_from_harmonics(
-    coefficients: ComplexArray, omega: float, traction: FloatArray
-) -> TransientStart:
-    """Return the state at t = 0 of a motion ``Re Σ X_h e^{ihωt}``, such as that of a harmonic balance.
-
-    With the balance's `problem` and `point`: ``problem.low.linear.recover(point.omega, point.coefficients)`` are the
-    amplitudes of all dofs, and ``signals(problem, point).force[:, :2, 0]`` the tractions.
-
-    Parameters
-    ----------
-    coefficients
-        (H + 1, n) complex displacement amplitudes, m; harmonic 0 first.
-    omega
-        Angular frequency, rad/s.
-    traction
-        (n_contacts, 2) forces in the tangential contact springs at t = 0, N.
-    """
-    orders = np.arange(len(coefficients))[:, None]
-    velocity = np.sum((1j * orders * omega * coefficients).real, axis=0)
-    return TransientStart(np.sum(coefficients.real, axis=0), velocity, traction)
-
-
-def integrate(
+def integrate(  # noqa: PLR0913
     structure: LinearSide,
     gap_operator: Matrix,
     laws: Sequence[ContactLaw],
@@ -193,6 +139,8 @@ def integrate(
     outputs: IntArray,
     start: TransientStart | None = None,
     stepping: TimeStepping | None = None,
+    *,
+    weights: FloatArray | None = None,
 ) -> TransientResult:
     """Integrate ``M ü + C u̇ + K u + gap_operatorᵀ λ = f(t)`` until the first harmonic of the outputs is periodic.
 
@@ -203,7 +151,7 @@ def integrate(
     gap_operator
         (3 n_contacts, n), dense or sparse: rows t, w, n of each contact; normal gap positive when open.
     laws
-        One law a contact.
+        One law a contact, of any kind but `RigidCoulomb`, which has no stiffness.
     load
         Static and harmonic loads.
     omega
@@ -214,104 +162,54 @@ def integrate(
         State at t = 0; rest if None.
     stepping
         Step, patience and tolerance.
+    weights
+        (n_contacts,) factors of the contact forces, such as the areas of an `Interface`; None: ones.
 
     Raises
     ------
     InputError
-        If an argument has a wrong shape or value, or the mass matrix is singular.
+        If an argument has a wrong shape or value, the mass matrix is singular, or a contact is rigid.
     """
-    structure = one_structure(structure, "integrate")
     stepping = stepping or TimeStepping()
-    start = start or rest(structure.n, laws)
-    check_arguments(structure.n, len(laws), outputs, start)
-    law = law_table(laws)
-    operators, modes = step_operators(
-        structure, gap_operator, law, load, omega, stepping.steps_per_period
+    marcher = prepared(
+        structure, gap_operator, laws, load, omega, stepping.steps_per_period, weights
     )
-    state = initial_state(modes, gap_operator, law, start)
-    return _settle(structure, operators, modes, state, outputs, stepping)
-
-
-def _known(laws: Sequence[ContactLaw], caller: str) -> list[ElasticCoulomb]:
-    """Return the laws if the integration has a step of its own for each of them."""
-    for law in laws:
-        if not isinstance(law, ElasticCoulomb):
-            raise input_error(
-                f"{caller}: laws",
-                f"got {type(law).__name__}",
-                "The time integration judges ElasticCoulomb contacts only.",
-            )
-    return [law for law in laws if isinstance(law, ElasticCoulomb)]
-
-
-def law_table(laws: Sequence[ContactLaw], caller: str = "integrate") -> FloatArray:
-    """Return (n_contacts, 5): k_t, k_w, k_n (N/m), mu, preload (N) of each contact.
-
-    Raises
-    ------
-    InputError
-        If a law is not elastic Coulomb.
-    """
-    rows = [[c.k_t, c.k_w, c.k_n, c.mu, c.preload] for c in _known(laws, caller)]
-    return np.array(rows, dtype=float).reshape(-1, 5)
-
-
-def initial_state(
-    modes: ModalCoordinates, gap_operator: Matrix, law: FloatArray, start: TransientStart
-) -> StepState:
-    """Return the step's own form of a start, with its springs limited to what friction holds."""
-    gap = gap_operator @ start.displacement
-    normal = np.maximum(0.0, law[:, 4] - law[:, 2] * gap[2::3])
-    limit = (law[:, 3] * normal)[:, None]
-    force = np.hstack([np.clip(start.traction, -limit, limit), -normal[:, None]]).ravel()
-    beyond = force - law[:, :3].ravel() * gap
-    return StepState(
-        np.concatenate([modes.motion(start.displacement, start.velocity), beyond]), gap, force
-    )
+    check_outputs(outputs, marcher.n, "integrate")
+    start = start or rest(marcher.n, laws)
+    check_start(start, marcher.n, marcher.contacts, "integrate")
+    return _settle(marcher, marcher.begun(start), outputs, stepping)
 
 
 def _settle(
-    structure: Structure,
-    operators: StepOperators,
-    modes: ModalCoordinates,
-    state: StepState,
-    outputs: IntArray,
-    stepping: TimeStepping,
+    marcher: Marcher, state: StepState, outputs: IntArray, stepping: TimeStepping
 ) -> TransientResult:
     """March period by period until what is left of the change of the first harmonic is below the tolerance."""
-    n, k, steps = structure.n, len(state.gap), stepping.steps_per_period
-    record = StepRecord(np.empty((steps, n)), np.empty((steps, k)), np.empty((steps, k)))
-    work = step_workspace(k)
+    n, basis, record = marcher.n, marcher.modes.basis, marcher.record()
     unknown = np.full((stepping.harmonics + 1, len(outputs)), np.nan, dtype=complex)
     now = Progress(unknown, np.full(n, np.nan))
     while now.periods < stepping.max_periods and now.status == "unsettled":
         began = state.x[:n].copy()
-        failed = run_period(operators, state, work, record)
+        failed = marcher.march(state, record)
         if failed < 0 or overflowed(state.x, record.motion):
             now.periods, now.status = now.periods + 1, "diverged"
-            for array in (*state, *record):  # infinities are no numbers to go on with
+            for array in (
+                state.x,
+                state.law,
+                record.rows,
+            ):  # infinities are no numbers to go on with
                 array.fill(np.nan)
             break
         modal = period_harmonics(began, record.motion, stepping.harmonics)
-        now.take_in(
-            modal @ modes.basis[outputs].T, modes.basis @ modal[0].real, failed, stepping.tolerance
-        )
-    return _result(structure, modes, state, record, outputs, now)
+        now.take_in(modal @ basis[outputs].T, basis @ modal[0].real, failed, stepping.tolerance)
+    return _result(marcher, state, record, outputs, now)
 
 
 def _result(
-    structure: Structure,
-    modes: ModalCoordinates,
-    state: StepState,
-    record: StepRecord,
-    outputs: IntArray,
-    now: Progress,
+    marcher: Marcher, state: StepState, record: Record, outputs: IntArray, now: Progress
 ) -> TransientResult:
     # a number that overflowed later was none before
     known = np.nan if now.status == "diverged" else 1.0
-    motion = record.motion @ modes.basis.T
-    displacement, velocity = modes.physical(state.x[: 2 * structure.n])
-    contacts = (len(motion), -1, 3)
+    motion = record.motion @ marcher.modes.basis.T
     return TransientResult(
         status=now.status,
         harmonics=np.asarray(known * now.harmonics),
@@ -323,21 +221,16 @@ def _result(
         contact_failures=now.failures,
         drift=known * now.drift,
         swing=np.ptp(motion, axis=0) / 2,
-        labels=structure.dofs.labels,
-        final=TransientStart(displacement, velocity, state.force.reshape(-1, 3)[:, :2]),
+        labels=marcher.labels,
+        final=marcher.end(state),
         outputs=motion[:, outputs],
-        gap=record.gap.reshape(contacts),
-        contact_force=record.force.reshape(contacts),
+        gap=record.gap,
+        contact_force=record.force,
     )
 
 
-def check_arguments(
-    n: int, n_contacts: int, outputs: IntArray, start: TransientStart, caller: str = "integrate"
-) -> None:
-    """Refuse a start of another shape, and outputs that the structure does not have."""
-    require_array(f"{caller}: start.displacement", start.displacement, (n,))
-    require_array(f"{caller}: start.velocity", start.velocity, (n,))
-    require_array(f"{caller}: start.traction", start.traction, (n_contacts, 2))
+def check_outputs(outputs: IntArray, n: int, caller: str) -> None:
+    """Refuse outputs that the structure does not have."""
     if len(outputs) == 0 or np.min(outputs) < 0 or np.max(outputs) >= n:
         raise input_error(
             f"{caller}: outputs", f"got {outputs} for {n} dofs", f"Give indices from 0 to {n - 1}."

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
-from threading import Timer
 from time import perf_counter
 
 import numpy as np
@@ -174,14 +173,6 @@ def _compile(question: Question) -> None:
     """Evaluate contacts and strategy once, or the first case would count their compilation as work."""
     problem, system, omega = question.problem, question.model.system, question.sweep.ends[0]
     start = perf_counter()
-    # said while it lasts: a first run is silent for minutes on a slow machine
-    soon = Timer(
-        COMPILED,
-        LOG.info,
-        ("compiling the contact laws, once an installation; this may take minutes",),
-    )
-    soon.daemon = True
-    soon.start()
     try:
         x = bonded_start(problem.low, omega, system)
         problem.low.linearise(x, omega)
@@ -189,8 +180,6 @@ def _compile(question: Question) -> None:
             problem.strategy.judge(problem.step(problem.low, x, omega))
     except NO_SOLUTION:
         return  # the response says what is wrong
-    finally:
-        soon.cancel()
     seconds = perf_counter() - start
     if seconds > COMPILED:
         LOG.info(f"compiled the contact laws in {seconds:.0f} s, once an installation")

@@ -28,7 +28,7 @@ class Solver(Section):
     evaluator: Evaluator = Field(
         "events",
         description="how piecewise-linear laws are evaluated over a period: events (exact transition times, no sampling error), "
-        "intervals (transitions on the time samples) or march (sample by sample, as coupled_coulomb always is)",
+        "intervals (transitions on the time samples) or march (sample by sample)",
     )
 
 

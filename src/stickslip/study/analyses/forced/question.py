@@ -13,7 +13,9 @@ from stickslip.contact.laws import law_name
 from stickslip.errors import InputError, input_error, together
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.support import is_full, named
+from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
+from stickslip.response.time.sectors import different_sectors
 from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.forced.chooser import Chooser, chooser_of
@@ -23,7 +25,7 @@ from stickslip.units import RPM
 
 IN_TIME, HARMONICS = "verify", "verify_harmonics"  # checks that a run may ask for
 RIGID = "rigid_coulomb"  # the law that the balance solves without springs
-INTEGRABLE = "elastic_coulomb"  # the law that the time integration knows
+MOST_IN_TIME = 600  # coordinates of all sectors: half a second a period, hundreds of periods
 FACTOR = 2  # times the highest harmonic that is kept: what solutions are held against
 
 
@@ -119,7 +121,12 @@ def question_of(case: Case, model: Model) -> Question:
     _refuse_for_rigid(model, sweep, case.checks)
     check_limits(settings.limits, estimate(model, sweep))
     # the guard and the check of the harmonics look at twice as many as are kept
-    assembled = model.assembled(FACTOR * sweep.high_harmonics[-1], case.store)
+    harmonics = FACTOR * sweep.high_harmonics[-1]
+    if IN_TIME in case.checks:
+        harmonics = max(harmonics, model.sectors // 2)  # those that all waves of a wheel need
+    assembled = model.assembled(harmonics, case.store)
+    if IN_TIME in case.checks:
+        _require_sectors(model, assembled)
     try:
         forced_problem(assembled.system, assembled.load, sweep)
     except InputError as error:
@@ -166,13 +173,6 @@ def _require_driven(model: Model, sweep: Sweep) -> None:
 def _require_integrable(model: Model) -> None:
     """Refuse a check by time integration of what it does not know."""
     for name, part in model.parts.items():
-        if part.sectors > 1:
-            raise input_error(
-                f"part.{name}.sectors",
-                "--verify integrates one structure in time, and the harmonics of a wheel are different travelling waves",
-                "Run without --verify; --verify-harmonics works.",
-            )
-    for name, part in model.parts.items():
         if part.structure.loss is not None or (part.damping and part.damping.loss_factor):
             raise input_error(
                 f"part.{name}.damping.loss_factor",
@@ -182,14 +182,29 @@ def _require_integrable(model: Model) -> None:
     found = [
         input_error(
             f"contact.{name}.law",
-            f"--verify integrates in time, which knows {INTEGRABLE} alone, got {law_name(contact.law)!r}",
-            f"Run without --verify, or give the law {INTEGRABLE}.",
+            f"--verify integrates in time, and {RIGID} has no stiffness: its force is no function of the gap",
+            "Run without --verify, or give a law with stiffnesses, such as elastic_coulomb.",
         )
         for name, contact in model.contacts.items()
-        if law_name(contact.law) != INTEGRABLE
+        if law_name(contact.law) == RIGID
     ]
     if found:
         raise together(found)
+
+
+def _require_sectors(model: Model, assembled: Assembled) -> None:
+    """Refuse a wheel whose sectors are too many coordinates to be integrated."""
+    side = assembled.system.structure
+    if not isinstance(side, TunedWheel):
+        return
+    place = f"part.{next(name for name, part in model.parts.items() if part.sectors > 1)}.sectors"
+    size = different_sectors(side)[0] * side.n
+    if size > MOST_IN_TIME:
+        raise input_error(
+            place,
+            f"--verify integrates all sectors that do different things, {size} coordinates, more than {MOST_IN_TIME}",
+            "Run without --verify; --verify-harmonics works.",
+        )
 
 
 def _refuse_for_rigid(model: Model, sweep: Sweep, checks: frozenset[str]) -> None:

@@ -1,0 +1,114 @@
+"""What a period of a marched motion tells: its harmonics, and whether it has become periodic."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray
+
+SettlingStatus = Literal["settled", "unsettled", "diverged"]
+LONGEST_MEMORY = (
+    1e4  # periods; a decay slower than this (damping ratio 1.6e-5) is not credited to any structure
+)
+OVERFLOW = 1e100  # far above every motion, and its square is still a number
+
+
+def overflowed(*arrays: FloatArray) -> bool:
+    """Return whether a number is NaN or so large that what is computed from it may overflow."""
+    return any(not np.max(np.abs(array), initial=0.0) < OVERFLOW for array in arrays)
+
+
+def last_third(n: int) -> int:
+    """Return the length of the stretch over which `n` periods are judged: at least four."""
+    return max(4, n // 3)
+
+
+def remaining_change(changes: Sequence[float]) -> float:
+    """Estimate what is left of a decaying sequence of changes per period: the sum of those still to come.
+
+    The largest changes of two successive stretches, each a third of the record and at least four periods, give the
+    ratio ρ of the decay per period; the rest is ``d ρ / (1 - ρ)``. The stretches grow with the record so that slow
+    beating is seen as such, and no sum is cut short by a small last change alone: a lightly damped transient that
+    changes by 1e-6 a period may still have 1e-3 to go. Where no decay can be seen, as at the level of rounding, the
+    slowest decay that is credited to a structure is assumed.
+    """
+    stretch = last_third(len(changes))
+    if len(changes) < 2 * stretch:
+        return np.inf
+    late, early = max(changes[-stretch:]), max(changes[-2 * stretch : -stretch])
+    if late == 0.0:
+        return 0.0
+    ratio = (late / early) ** (1.0 / stretch) if early > 0.0 else 1.0
+    return late * (min(ratio / (1.0 - ratio), LONGEST_MEMORY) if ratio < 1.0 else LONGEST_MEMORY)
+
+
+def period_harmonics(began: FloatArray, samples: FloatArray, order: int) -> ComplexArray:
+    """Fourier coefficients 0..order of a period by the trapezoidal rule, its ends counted half each."""
+    period = np.vstack([(began + samples[-1]) / 2, samples[:-1]])
+    coefficients = np.fft.rfft(period, axis=0)[: order + 1] * (2.0 / len(period))
+    coefficients[0] /= 2.0
+    return np.asarray(coefficients)
+
+
+@dataclass(slots=True)
+class Progress:
+    """What is known after some periods; the only state of the march besides that of the motion."""
+
+    harmonics: ComplexArray  # (n_h + 1, n_outputs) of the last period; NaN before the first
+    unknown: FloatArray  # (n,) NaN: a drift that cannot be told
+    status: SettlingStatus = "unsettled"
+    periods: int = 0
+    failures: int = 0
+    remaining: float = np.inf
+    changes: list[float] = field(default_factory=list)  # of the first harmonic, relative
+    firsts: list[ComplexArray] = field(default_factory=list)  # first harmonic of every period
+    means: list[FloatArray] = field(default_factory=list)  # (n,) mean displacement of every period
+
+    def take_in(
+        self, harmonics: ComplexArray, mean: FloatArray, failures: int, tolerance: float
+    ) -> None:
+        """Add a period and judge whether the first harmonic has settled."""
+        self.harmonics, self.periods, self.failures = (
+            harmonics,
+            self.periods + 1,
+            self.failures + failures,
+        )
+        self.firsts.append(harmonics[1])
+        self.means.append(mean)
+        if self.periods > 1:
+            self.changes.append(_relative(self.firsts[-1] - self.firsts[-2], self.firsts[-1]))
+            self.remaining = remaining_change(self.changes)
+            self.status = "settled" if self.remaining < tolerance else "unsettled"
+
+    @property
+    def change(self) -> float:
+        """Largest relative change of the first harmonic over the last four periods."""
+        return max(self.changes[-4:], default=np.nan)
+
+    @property
+    def average(self) -> ComplexArray:
+        """First harmonic averaged over the last third."""
+        last = self.firsts[-last_third(self.periods) :] or [self.harmonics[1]]
+        return np.asarray(np.mean(last, axis=0))
+
+    @property
+    def scatter(self) -> float:
+        """Largest relative distance from that average."""
+        average = self.average
+        last = self.firsts[-last_third(self.periods) :]
+        return max((_relative(first - average, average) for first in last), default=np.nan)
+
+    @property
+    def drift(self) -> FloatArray:
+        """Change of the mean displacement per period over the last third."""
+        stretch = min(last_third(self.periods), len(self.means) - 1)
+        if stretch < 1:
+            return self.unknown
+        return (self.means[-1] - self.means[-1 - stretch]) / stretch
+
+
+def _relative(difference: ComplexArray, size: ComplexArray) -> float:
+    largest = float(np.max(np.abs(size)))
+    return float(np.max(np.abs(difference))) / largest if largest > 0.0 else 0.0

@@ -1,0 +1,1 @@
+"""Independent judges: programs that share no code with src and say what the right answer is."""

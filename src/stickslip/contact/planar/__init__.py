@@ -1,0 +1,1 @@
+"""Isotropic planar Coulomb friction over one period, by located events and collocation of the angle of slip."""

@@ -1,0 +1,195 @@
+"""What piecewise-linear contacts are to a small disturbance between their located transitions, and what they keep at these.
+
+A tangential spring that sticks is a spring ``k`` from the structure to its slider, one that slips a force ``±μ`` times the pressure, an
+open one nothing. Forces are continuous at every transition, so that the motion of the structure has no jumps in its derivative; only
+what the slider knows changes: slip and lift-off erase it, and the beginning of stick sets it anew.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import BoolArray, FloatArray, IntArray
+from stickslip.contact.compiled import CompiledContacts
+from stickslip.contact.element import K_N, MU, RESIDUAL, UNILATERAL
+from stickslip.contact.event_integrals import Events
+from stickslip.contact.law import SLIP, STICK
+from stickslip.contact.slider import ANCHOR, BY_NORMAL, NO_ANCHOR, PERIOD, SIGN, START, STATE
+
+
+@dataclass(frozen=True, eq=False)
+class ContactStates:
+    """The contacts over a period, by the intervals in which none of them changes its state.
+
+    Attributes
+    ----------
+    times
+        (n_intervals + 1,) their ends, from the first transition to the same one a period later; τ = ωt.
+    stiffness
+        (n_intervals, n_contacts, 3, 3) derivative of the forces by the gaps where sliders rest, N/m.
+    rows
+        (n_sliders,) row t or w of the gap operator that each slider belongs to; those that neither stick nor slip for ever.
+    normals
+        (n_sliders,) row n of the same contact.
+    springs
+        (n_sliders,) their stiffness, N/m.
+    sticks
+        (n_intervals, n_sliders) whether a slider rests.
+    takes_hold
+        (n_intervals, n_sliders) whether it begins to at the beginning of the interval.
+    by_normal
+        (n_intervals, n_sliders) derivative of the slider's place by the normal gap where it does; that by its own gap is one.
+    resting
+        Number of sliders that rest for the whole period: parameters of the motion.
+    grazing
+        Number of these that have reached their limit, and rest since.
+    always_slipping
+        Number of sliders that never rest.
+    transitions
+        Number of changes of state over the period.
+    """
+
+    times: FloatArray
+    stiffness: FloatArray
+    rows: IntArray
+    normals: IntArray
+    springs: FloatArray
+    sticks: BoolArray
+    takes_hold: BoolArray
+    by_normal: FloatArray
+    resting: int
+    grazing: int
+    always_slipping: int
+    transitions: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Spring:
+    """One tangential spring of an element."""
+
+    element: int
+    contact: int
+    tangent: int
+    segments: FloatArray  # (n_segments, 6)
+
+    @property
+    def changes(self) -> BoolArray:
+        """Return which segments begin with a change of state; the first may go on from the last of the period before."""
+        states = self.segments[:, [STATE, SIGN]]
+        return np.asarray(np.any(states != np.roll(states, 1, axis=0), axis=1))
+
+
+def contact_states(
+    events: Events, compiled: CompiledContacts, own: IntArray, n_contacts: int
+) -> ContactStates:
+    """Lay the states of all contacts out over the intervals between their transitions.
+
+    Parameters
+    ----------
+    events
+        All events of the motion.
+    compiled
+        The laws with which they were found, all of them piecewise linear.
+    own, n_contacts
+        Which contacts of an interface they are, and how many that has; the others have no stiffness here.
+    """
+    springs = _springs(events, compiled)
+    openings = [events.crossings[e, : events.n_crossings[e]] for e in range(len(compiled.elements))]
+    starts = [s.segments[s.changes, START] for s in springs]
+    times = np.unique(np.concatenate([np.zeros(0), *openings, *starts]))
+    if not times.size:
+        times = np.zeros(1)
+    times = np.append(times, times[0] + PERIOD)
+    middle = 0.5 * (times[1:] + times[:-1]) % PERIOD
+    moving = [s for s in springs if np.any(s.changes)]
+    factor = np.ones(compiled.n_contacts) if compiled.weights is None else compiled.weights
+    own_stiffness = np.zeros((middle.size, compiled.n_contacts, 3, 3))
+    _add_normal(own_stiffness, events, compiled, middle)
+    for spring in springs:
+        _add_tangential(own_stiffness, spring, compiled.elements[spring.element], middle)
+    stiffness = np.zeros((middle.size, n_contacts, 3, 3))
+    stiffness[:, own] = own_stiffness * factor[:, None, None]
+    sticks, takes_hold, by_normal = _sliders(moving, compiled.elements, times, middle)
+    still = [s for s in springs if not np.any(s.changes)]
+    resting = [s for s in still if s.segments[0, STATE] == STICK]
+    k = [factor[s.contact] * compiled.elements[s.element, s.tangent] for s in moving]
+    return ContactStates(
+        times,
+        stiffness,
+        np.array([3 * own[s.contact] + s.tangent for s in moving], dtype=np.int64),
+        np.array([3 * own[s.contact] + 2 for s in moving], dtype=np.int64),
+        np.array(k),
+        sticks,
+        takes_hold,
+        by_normal,
+        len(resting),
+        sum(_has_slipped(s, compiled.elements[s.element]) for s in resting),
+        len(still) - len(resting),
+        sum(map(len, openings)) + sum(map(len, starts)),
+    )
+
+
+def _springs(events: Events, compiled: CompiledContacts) -> list[_Spring]:
+    """Return all tangential springs."""
+    contact = np.repeat(np.arange(compiled.n_contacts), np.diff(compiled.first))
+    return [
+        _Spring(e, int(contact[e]), d, events.segments[e, d, : events.n_segments[e, d]])
+        for e in range(len(compiled.elements))
+        for d in range(2)
+        if compiled.elements[e, d] != 0.0
+    ]
+
+
+def _has_slipped(spring: _Spring, row: FloatArray) -> bool:
+    """Whether a slider that rests for the whole period does not rest where it began."""
+    began = NO_ANCHOR if np.isnan(row[RESIDUAL]) else 0.0
+    return bool(spring.segments[0, ANCHOR] != began)
+
+
+def _add_normal(
+    stiffness: FloatArray, events: Events, compiled: CompiledContacts, middle: FloatArray
+) -> None:
+    """Add the normal springs of all elements where they are closed."""
+    for c in range(compiled.n_contacts):
+        for e in range(compiled.first[c], compiled.first[c + 1]):
+            row = compiled.elements[e]
+            if row[UNILATERAL] == 0.0:
+                stiffness[:, c, 2, 2] += row[K_N]
+                continue
+            passed = np.searchsorted(events.crossings[e, : events.n_crossings[e]], middle)
+            closed = (passed + int(events.starts_open[e])) % 2 == 0
+            stiffness[closed, c, 2, 2] += row[K_N]
+
+
+def _segment_at(spring: _Spring, middle: FloatArray) -> IntArray:
+    """Return the segment of a spring at each time."""
+    return np.searchsorted(spring.segments[:, START], middle, side="right") - 1
+
+
+def _add_tangential(
+    stiffness: FloatArray, spring: _Spring, row: FloatArray, middle: FloatArray
+) -> None:
+    """Add one tangential spring: its stiffness where it sticks, its share of the pressure where it slips."""
+    at = spring.segments[_segment_at(spring, middle)]
+    c, d = spring.contact, spring.tangent
+    stiffness[at[:, STATE] == STICK, c, d, d] += row[d]
+    if row[UNILATERAL] != 0.0:
+        slips = at[:, STATE] == SLIP
+        stiffness[slips, c, d, 2] -= at[slips, SIGN] * row[MU] * row[K_N]
+
+
+def _sliders(
+    springs: list[_Spring], elements: FloatArray, times: FloatArray, middle: FloatArray
+) -> tuple[BoolArray, BoolArray, FloatArray]:
+    """Return where sliders rest, where they take hold, and how their place then depends on the normal gap."""
+    shape = (middle.size, len(springs))
+    sticks, takes_hold = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+    by_normal = np.zeros(shape)
+    for j, spring in enumerate(springs):
+        sticks[:, j] = spring.segments[_segment_at(spring, middle), STATE] == STICK
+        begin = spring.changes & (spring.segments[:, STATE] == STICK)
+        at = np.searchsorted(times[:-1], spring.segments[begin, START])
+        takes_hold[at, j] = True
+        k = elements[spring.element, spring.tangent]
+        by_normal[at, j] = spring.segments[begin, BY_NORMAL] / k
+    return sticks, takes_hold, by_normal

@@ -1,0 +1,234 @@
+"""All sectors of a tuned wheel in time: harmonics have no waves there, the motion of every sector is marched.
+
+The coordinates of a tuned wheel mean the same in every wave, and so do its gaps. The motion of sector s is the sum of its waves,
+``y_s = Σ_k exp(2πi k s / n_s) y_k``, and the matrices between sectors are the transforms of those of the waves. An engine order
+m that has a divisor g in common with the number of sectors makes the same motion in n_s/g sectors; they stand for all.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import gcd
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import ComplexArray, FloatArray, Matrix
+from stickslip.contact.interface import Interface
+from stickslip.errors import input_error
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.model.dofs import Dofs
+from stickslip.model.structure import Structure
+from stickslip.reduction.basis import is_hermitian
+from stickslip.reduction.tuned import TunedWheel
+from stickslip.reduction.waves import excited_wave
+from stickslip.response.system import System
+
+REAL = 1e-8  # of the largest entry: imaginary parts below it are rounding
+
+
+@dataclass(frozen=True, eq=False)
+class WaveMotion:
+    """A motion that every sector makes, each a share of the period after another one.
+
+    Parameters
+    ----------
+    sectors
+        n: number of sectors, and of shares of the period.
+    ahead
+        After a share T/n of the period a sector does what the sector so many places further on does now.
+    """
+
+    sectors: int
+    ahead: int
+
+    def shifted(self, rows: Matrix) -> Matrix:
+        """Return (sectors · p, ...) rows, sector by sector, as the sectors that they stand for have them."""
+        parts = np.asarray(rows).reshape(self.sectors, -1, *np.shape(rows)[1:])
+        return np.roll(parts, self.ahead, axis=0).reshape(np.shape(rows))
+
+
+@dataclass(frozen=True, eq=False)
+class SectorsInTime:
+    """A tuned wheel as `integrate` and `shoot` take it; `all_sectors` makes one.
+
+    Parameters
+    ----------
+    structure, contacts, load
+        Of all sectors, one after the other. Dofs of sector 0 have the numbers that they have in the wheel.
+    motion
+        What the wave does.
+    wheel
+        The wheel of one sector.
+    """
+
+    structure: Structure
+    contacts: Interface
+    load: HarmonicLoad
+    motion: WaveMotion
+    wheel: TunedWheel
+
+    def spread(self, coefficients: ComplexArray) -> ComplexArray:
+        """Return the (H + 1, sectors · n) amplitudes of all sectors from those (H + 1, n) of the wheel's harmonics.
+
+        Harmonics of waves that turn against the one that the matrices were taken from are left out: their modal coordinates
+        may be others.
+        """
+        rows = []
+        for h, row in enumerate(coefficients[:, : _kept(self.wheel)]):
+            kept = h <= self.wheel.harmonics and _agrees(self.wheel, h)
+            rows.append(_travelling(self.wheel, h, row if kept else np.zeros_like(row)))
+        return np.array(rows)
+
+
+def all_sectors(system: System, load: HarmonicLoad) -> SectorsInTime:
+    """Return the wheel of all sectors of a system with a tuned wheel.
+
+    Parameters
+    ----------
+    system
+        Its structure is a `TunedWheel` with waves up to half as many harmonics as there are different sectors.
+    load
+        Loads on the coordinates of its harmonics.
+
+    Raises
+    ------
+    InputError
+        If waves are missing, have matrices that no motion in time has, or a load acts on a wave that turns against another one.
+    """
+    wheel, interface = system.structure, system.interface
+    if not isinstance(wheel, TunedWheel):
+        raise input_error("all_sectors", "got no tuned wheel", "Integrate its one structure.")
+    sectors, common = different_sectors(wheel)
+    own = _kept(wheel)
+    loads: dict[int, ComplexArray] = {}
+    for h, amplitude in load.harmonics.items():
+        if not _agrees(wheel, h):
+            raise input_error(
+                "all_sectors",
+                f"harmonic {h} of the load drives a wave that turns against another one of its wave number",
+                "Leave gyroscopic terms out, or the load.",
+            )
+        loads[h] = _travelling(wheel, h, amplitude[:own])
+    waves = [_wave(wheel, common * k) for k in range(sectors)]
+    weights = None if interface.weights is None else np.tile(interface.weights, sectors)
+    gaps = _circulant([_gaps(wheel, w, interface.gap_operator) for w in waves])
+    step = pow(wheel.engine_order // common % sectors, -1, sectors) if sectors > 1 else 0
+    static = np.tile(load.static[:own], sectors)
+    structure = Structure(
+        _circulant([_dense(w.mass)[:own, :own] for w in waves]),
+        _circulant([_dense(w.damping)[:own, :own] for w in waves]),
+        _circulant([_dense(w.stiffness)[:own, :own] for w in waves]),
+        _dofs(wheel.dofs.take(np.arange(own)), sectors),
+        loss=None
+        if waves[0].loss is None
+        else _circulant([_dense(w.loss)[:own, :own] for w in waves]),
+    )
+    names = tuple(f"sector{s}.{name}" for s in range(sectors) for name in interface.names)
+    contacts = Interface(names, interface.laws * sectors, gaps, weights)
+    return SectorsInTime(
+        structure, contacts, HarmonicLoad(static, loads), WaveMotion(sectors, step), wheel
+    )
+
+
+def different_sectors(wheel: TunedWheel) -> tuple[int, int]:
+    """Return the number of sectors that do different things, and the divisor that engine order and sectors have in common."""
+    common = gcd(wheel.engine_order, wheel.sectors)
+    return wheel.sectors // common, common
+
+
+def _kept(wheel: TunedWheel) -> int:
+    """Return the number of a sector's coordinates that move by themselves; behind them are copies of neighbours' and what ties these."""
+    ties = wheel.multipliers.size
+    if not np.array_equal(wheel.multipliers, np.arange(wheel.n - ties, wheel.n)):
+        raise input_error(
+            "all_sectors", "has forces of constraints among its motions", "Put them behind these."
+        )
+    return wheel.n - 2 * ties
+
+
+def _gaps(wheel: TunedWheel, wave: Structure, operator: Matrix) -> Matrix:
+    """Return the gaps in a wave by what moves by itself: copies follow from the constraints of the wave."""
+    own, ties = _kept(wheel), wheel.multipliers.size
+    gaps, held = _dense(operator), _dense(wave.stiffness)[wheel.n - ties :]
+    copies = -np.linalg.solve(held[:, own : own + ties], held[:, :own])
+    return gaps[:, :own] + gaps[:, own : own + ties] @ copies
+
+
+def _travelling(wheel: TunedWheel, harmonic: int, row: Matrix) -> ComplexArray:
+    """Return a row (n,) of a harmonic of sector 0 for all sectors."""
+    sectors, _ = different_sectors(wheel)
+    k = excited_wave(wheel.engine_order, wheel.sectors, harmonic)
+    phases = np.exp(2j * np.pi * k * np.arange(sectors) / wheel.sectors)
+    return np.asarray((phases[:, None] * row).ravel())
+
+
+def _wave(wheel: TunedWheel, k: int) -> Structure:
+    """Return the structure of a wave number, of which a harmonic comes first, or the conjugate of that of the other direction."""
+    chosen = _chosen(wheel.waves, k % wheel.sectors, wheel)
+    structure = wheel.waves[chosen]
+    for name in ("mass", "stiffness"):
+        if not is_hermitian(getattr(structure, name)):
+            raise input_error(
+                "all_sectors",
+                f"the {name} of wave {k} is not Hermitian",
+                "Leave aerodynamic forces out.",
+            )
+    return structure if chosen == k % wheel.sectors else _conjugate(structure)
+
+
+def _chosen(waves: Mapping[int, Structure], k: int, wheel: TunedWheel) -> int:
+    """Return k or the wave number of the other direction, whichever belongs to the lower harmonic."""
+    for h in range(wheel.harmonics + 1):
+        found = excited_wave(wheel.engine_order, wheel.sectors, h)
+        if found in waves and found in (k, (wheel.sectors - k) % wheel.sectors):
+            return found
+    raise input_error(
+        "all_sectors",
+        f"the wheel has no wave {k}: it was made for harmonics up to {wheel.harmonics}",
+        f"Give tuned_wheel {different_sectors(wheel)[0] // 2} harmonics.",
+    )
+
+
+def _agrees(wheel: TunedWheel, harmonic: int) -> bool:
+    """Whether a harmonic's wave is the one that the matrices are taken from, or its conjugate."""
+    k = excited_wave(wheel.engine_order, wheel.sectors, harmonic)
+    chosen = _chosen(wheel.waves, k, wheel)
+    if chosen == k:
+        return True
+    own, other = (_dense(wheel.waves[number].stiffness) for number in (k, chosen))
+    return bool(np.allclose(own, np.conj(other), rtol=0, atol=REAL * np.abs(own).max()))
+
+
+def _conjugate(own: Structure) -> Structure:
+    mass, damping, stiffness = (np.conj(_dense(m)) for m in (own.mass, own.damping, own.stiffness))
+    loss = None if own.loss is None else np.conj(_dense(own.loss))
+    return Structure(mass, damping, stiffness, own.dofs, loss=loss)
+
+
+def _circulant(waves: list[Matrix]) -> FloatArray:
+    """Return the (n p, n q) matrix of n sectors from the (p, q) matrices of their waves."""
+    parts = np.fft.ifft(np.array([_dense(w) for w in waves]), axis=0)
+    if np.abs(parts.imag).max(initial=0.0) > REAL * np.abs(parts).max(initial=0.0):
+        raise input_error(
+            "all_sectors", "the waves are those of no real matrices", "Give waves of a real sector."
+        )
+    n = len(parts)
+    return np.block([[parts[(row - column) % n].real for column in range(n)] for row in range(n)])
+
+
+def _dense(matrix: Matrix) -> Matrix:
+    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
+
+
+def _dofs(own: Dofs, sectors: int) -> Dofs:
+    """Return the table of the coordinates of all sectors."""
+    named = own.part or ("",) * len(own.component)
+    parts = [
+        f"sector{s}.{part}" if part else f"sector{s}" for s in range(sectors) for part in named
+    ]
+    return Dofs(
+        np.tile(own.node, sectors),
+        own.component * sectors,
+        np.tile(own.position, (sectors, 1)),
+        tuple(parts),
+    )

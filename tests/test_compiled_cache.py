@@ -1,0 +1,77 @@
+"""The cache of compiled functions: what another version of the code left there does no harm."""
+
+import importlib
+import sys
+import time
+
+import numba
+import pytest
+
+import stickslip.contact
+from stickslip.contact import cache, compiling
+
+SOURCE = """
+from typing import NamedTuple
+import numba
+
+class {name}(NamedTuple):
+    a: float
+
+@numba.njit(cache=True)
+def double(pair):
+    return 2.0 * pair.a
+"""
+
+
+def test_types_that_are_gone_are_compiled_again(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    for name in ("Before", "After"):
+        (tmp_path / "versioned.py").write_text(SOURCE.format(name=name))
+        sys.modules.pop("versioned", None)
+        importlib.invalidate_caches()
+        module = importlib.import_module("versioned")
+        assert module.double(getattr(module, name)(1.5)) == 3.0
+    monkeypatch.delitem(sys.modules, "versioned")
+
+
+USED = "FACTOR = {factor}\n"
+USER = """
+import numba
+from stickslip.used import FACTOR
+
+@numba.njit(cache=True)
+def times(x):
+    return FACTOR * x
+"""
+
+
+def test_a_function_is_compiled_again_when_a_file_that_it_imports_has_changed(
+    tmp_path, monkeypatch
+):
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(cache, "_PACKAGE", tmp_path)
+    (tmp_path / "user.py").write_text(USER)
+    for factor in (2.0, 3.0, 3.0):
+        cache._contents.cache_clear()
+        (tmp_path / "used.py").write_text(USED.format(factor=factor))
+        for name in ("user", "stickslip.used"):
+            sys.modules.pop(name, None)
+        importlib.invalidate_caches()
+        monkeypatch.setattr(stickslip, "__path__", [*stickslip.__path__, str(tmp_path)])
+        times = importlib.import_module("user").times
+        assert times(1.0) == factor
+    assert sum(times.stats.cache_hits.values()) == 1, "nothing had changed, and yet it was compiled"
+    for name in ("user", "stickslip.used"):
+        monkeypatch.delitem(sys.modules, name)
+
+
+@pytest.mark.parametrize("patience", [0.0, 1e3])
+def test_what_takes_long_to_compile_is_said_once(patience, monkeypatch, caplog):
+    monkeypatch.setattr(compiling, "PATIENCE", patience)
+    monkeypatch.setattr(compiling._LISTENER, "told", False)
+    with caplog.at_level("INFO", "stickslip"):
+        for number in range(2):
+            assert numba.njit(lambda x, n=number: (x + n) ** 2)(1.0) == (1 + number) ** 2
+        time.sleep(0.05)
+    said = [r for r in caplog.records if r.getMessage() == compiling.LINE]
+    assert len(said) == (patience == 0.0)
