@@ -25,6 +25,7 @@ COMPILED_TOGETHER = {
 GROUP_OF = {f"test_{name}": group for group, names in COMPILED_TOGETHER.items() for name in names}
 
 
+@pytest.hookimpl(tryfirst=True)  # before pytest-xdist reads the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Name the group of each test that has one."""
     for item in items:
