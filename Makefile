@@ -39,10 +39,10 @@ run: $(INSTALLED)  ## solve the example of two blades and a damper, and write it
 	if [ -e "$$page" ]; then echo "Open $$page in a browser."; fi; exit $$status
 
 test: $(INSTALLED)  ## run the tests
-	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup --durations=20
+	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --durations=20
 
 coverage: $(INSTALLED)  ## run the tests and report their coverage, a quarter slower
-	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup --durations=20 --cov --cov-report=term:skip-covered
+	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --durations=20 --cov --cov-report=term:skip-covered
 
 readers: $(READERS_INSTALLED)  ## install what reads Nastran's binary files, and files of ANSYS to test with
 

@@ -453,7 +453,8 @@ def test_cases_of_different_sizes_stand_behind_each_other(tmp_path: Path) -> Non
     assert np.isnan(data.frequency_hz[0, 0, 3:]).all()
     few, many = one_case(data, 0), one_case(data, 1)
     assert few["shape"].shape[1] == few.sizes["mode"] == 3
-    np.testing.assert_array_equal(few.frequency_hz, many.frequency_hz[:, :3])
+    # asked for two more, the eigenvalue solver rounds differently
+    np.testing.assert_allclose(few.frequency_hz, many.frequency_hz[:, :3], rtol=1e-12)
     titles = [table.title for table in outcome.summaries["modes"]]
     assert titles == [f"modes.number = {n}: Natural frequencies in Hz at rest" for n in (3, 5)]
     assert [len(table.rows[0]) for table in outcome.summaries["modes"]] == [5, 7]
