@@ -19,6 +19,7 @@ ROWS = {
     "attempt": ("attempt_case", "attempt_frequency_hz"),
     "alert_point": ("alert_case", "alert_frequency_hz"),
     "check": ("verify_case", "verify_frequency_hz"),
+    "examined": ("stability_case", "stability_frequency_hz"),
 }
 COUNTED = (
     "harmonic",

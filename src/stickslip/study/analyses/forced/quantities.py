@@ -123,8 +123,17 @@ _OF = {
         "verify_settled": ("1", "1 if it became periodic"),
         "verify_periods": ("1", "periods integrated"),
         "verify_scatter": ("1", "scatter about the average of a motion that did not become periodic"),
+        "verify_motion": ("1", "attained, left, not periodic or not settled: what the motion in time did that began with the balance's state"),
         "verify_refined": ("m", "amplitude by harmonic balance with three times the harmonics"),
         "verify_sentence": ("1", "what happened, in words"),
+    },
+    "examined": {
+        "stability_case": ("1", "case of a point whose stability was examined"),
+        "stability_frequency_hz": ("Hz", "its frequency"),
+        "stability_verdict": ("1", "stable, unstable, undecided or not examined"),
+        "stability_multiplier": ("1", "modulus of the multiplier that decides, the largest as a rule; NaN where none is known"),
+        "stability_multiplier_error": ("1", "how far it may be from that of the motion with all harmonics"),
+        "stability_sentence": ("1", "what was found and why, in words"),
     },
     "case mode": {
         "frequency_full_hz": ("Hz", "natural frequency, full model, contacts open"),
