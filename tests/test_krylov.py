@@ -25,13 +25,14 @@ from stickslip.harmonic.structured import StructuredJacobian, real_matrix
 from stickslip.harmonic.support import harmonics_of
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
+from stickslip.operators import Bordered, array_of
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.response import forced_problem, forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
 from stickslip.solve.krylov import YOUNG, Automatic, Krylov, to_tolerance
-from stickslip.solve.linear import Bordered, Dense
+from stickslip.solve.linear import Dense
 from stickslip.solve.newton_method import Newton, newton
 from stickslip.solve.status import Status
 
@@ -237,6 +238,21 @@ def test_factors_solve_as_lapack_does(n, dtype):
     np.testing.assert_allclose(found, expected, rtol=1e-7 * n)
 
 
+@pytest.mark.parametrize("n", [1, 63, 64, 65, 150])
+@pytest.mark.parametrize("dtype", [float, complex])
+def test_factors_solve_the_transposed_system(n, dtype):
+    rng = np.random.default_rng(n)
+    matrix, right = rng.standard_normal((n, n)).astype(dtype), rng.standard_normal(n).astype(dtype)
+    if dtype is complex:
+        matrix, right = matrix + 1j * rng.standard_normal((n, n)), right * np.exp(0.3j)
+    matrix[:, -1] *= 1e-6
+    found = factorise(np.array(matrix, order="F")).solve_transposed(right)
+    assert found.dtype == matrix.dtype
+    # as above: exact for a matrix that differs by rounding, times a growth of at most n
+    left = np.linalg.norm(matrix.T @ found - right)
+    assert left <= n * 1e-14 * np.linalg.norm(matrix) * np.linalg.norm(found)
+
+
 def test_singular_matrix_has_no_factors():
     assert factorise(np.ones((3, 3), order="F")) is None
     assert factorise(np.zeros((2, 2), dtype=complex, order="F")) is None
@@ -324,6 +340,51 @@ def test_bordered_solution_is_that_of_lu(name):
         assert known in {-1.0, 1.0}
 
 
+@pytest.mark.parametrize("relative", [True, False])
+@pytest.mark.parametrize("name", STATES)
+def test_transposed_system_shares_the_factors(name, relative):
+    balance, x = state(name, relative=relative)
+    jac = balance.linearise(x, OMEGA).jac
+    kept = jac.preconditioner()
+    rng = np.random.default_rng(7)
+    a, b = rng.standard_normal((2, x.size))
+    solve, _ = jac.preconditioned_by(kept)
+    back, product = jac.transposed.preconditioned_by(kept)
+    # <P⁻¹ a, b> = <a, P⁻ᵀ b>
+    assert solve(a) @ b == pytest.approx(a @ back(b), rel=1e-10)
+    assert_same(product(a, b), jac.dense().T @ a)
+    assert jac.transposed.transposed is jac
+    krylov = Krylov(tolerance=1e-11)
+    krylov.solve(jac, a)
+    found = krylov.solve(jac.transposed, a)
+    exact = np.linalg.solve(jac.dense().T, a)
+    assert np.linalg.norm(found - exact) <= 1e-8 * np.linalg.norm(exact)
+    assert krylov.counts.preconditioners == 1
+
+
+@pytest.mark.parametrize("name", STATES)
+@pytest.mark.parametrize("m", [2, 3])
+def test_several_borders_are_solved_as_by_lu(name, m):
+    balance, x = state(name)
+    at = balance.linearise(x, OMEGA)
+    rng = np.random.default_rng(m)
+    column, row = rng.standard_normal((x.size, m)), rng.standard_normal((m, x.size))
+    column[:, 0] = at.jac_p
+    corner = rng.standard_normal((m, m))
+    krylov = Krylov(tolerance=1e-11, tangent_tolerance=1e-11)
+    whole = array_of(Bordered(at.jac.dense(), column, row, corner))
+    for right in (rng.standard_normal(x.size + m), np.eye(x.size + m)[-1]):
+        found, _ = krylov.solve_bordered(at.jac, column, row, corner, right)
+        exact = np.linalg.solve(whole, right)
+        assert np.linalg.norm(found - exact) <= 1e-7 * np.linalg.norm(exact)
+        # the same borders one around the other
+        inner = Bordered(at.jac, column[:, :-1], row[:-1], corner[:-1, :-1])
+        outer = np.append(column[:, -1], corner[:-1, -1]), np.append(row[-1], corner[-1, :-1])
+        nested, _ = krylov.solve_bordered(inner, *outer, corner[-1, -1], right)
+        assert np.linalg.norm(nested - exact) <= 1e-7 * np.linalg.norm(exact)
+        assert_same(krylov.solve(Bordered(inner, *outer, corner[-1, -1]), right), nested, 1e-9)
+
+
 class Nearly:
     """A Jacobian with a preconditioner of which it is a small change."""
 
@@ -342,6 +403,10 @@ class Nearly:
     def rmatvec(self, v):
         return self.matrix.T @ v
 
+    @property
+    def transposed(self):
+        return Nearly(self.matrix.T, self.nearby.T)
+
     def preconditioner(self):
         self.made += 1
         return np.linalg.inv(self.nearby)
@@ -350,24 +415,34 @@ class Nearly:
         return lambda right: kept @ right, lambda v, _: self.matrix @ v
 
 
-def fold(n: int = 30) -> tuple[Nearly, np.ndarray, np.ndarray]:
-    """A singular Jacobian whose border makes it regular, and a preconditioner that is almost singular."""
+def fold(lacks: int = 1, nearby: float = 1e-6, n: int = 30) -> tuple[Nearly, Bordered]:
+    """A Jacobian that lacks some rank, borders that make it regular, and a preconditioner that is almost as singular."""
     rng = np.random.default_rng(8)
     left, _, right = np.linalg.svd(rng.standard_normal((n, n)))
     sizes = np.linspace(1.0, 2.0, n)
-    singular, nearby = sizes.copy(), sizes.copy()
-    singular[-1], nearby[-1] = 0.0, 1e-6
-    made = Nearly(left @ np.diag(singular) @ right, left @ np.diag(nearby) @ right)
-    return made, left[:, -1] + 0.1, right[-1] + 0.1
+    singular, close = sizes.copy(), sizes.copy()
+    singular[n - lacks :], close[n - lacks :] = 0.0, nearby
+    made = Nearly(left @ np.diag(singular) @ right, left @ np.diag(close) @ right)
+    corner = np.zeros((lacks, lacks))
+    return made, Bordered(made, left[:, n - lacks :] + 0.1, right[n - lacks :] + 0.1, corner)
 
 
-def test_bordered_system_at_a_fold():
-    jac, column, row = fold()
-    right = np.append(np.zeros(30), 1.0)
-    found, _ = Krylov().solve_bordered(jac, column, row, 0.0, right)
-    left = Bordered(jac, column, row, 0.0).matvec(found) - right
-    assert np.linalg.norm(left) <= 1e-6
-    assert Dense().solve(jac.matrix.copy(), right[:-1] + 1.0) is None
+@pytest.mark.parametrize("method", ["gmres", "bicgstab"])
+@pytest.mark.parametrize("lacks", [1, 2])
+@pytest.mark.parametrize("nearby", [1e-3, 1e-6, 1e-9, 1e-12])
+def test_bordered_system_at_a_fold(lacks, nearby, method):
+    jac, bordered = fold(lacks, nearby)
+    whole = array_of(replace(bordered, jac=jac.matrix))
+    assert np.linalg.cond(jac.matrix) > 1e13
+    assert np.linalg.cond(whole) < 100.0
+    tight = Krylov(method=method, tolerance=1e-11, tangent_tolerance=1e-6)
+    for right, tolerance in ((np.eye(30 + lacks)[-1], 1e-6), (np.ones(30 + lacks), 1e-11)):
+        for system, matrix in ((bordered, whole), (bordered.transposed, whole.T)):
+            found, _ = tight.solve_bordered(system.jac, system.column, system.row, system.corner, right)  # fmt: skip
+            left = matrix @ found - right
+            # the rounding of the product that judges comes on top
+            assert np.linalg.norm(left) <= 2.0 * tolerance * np.linalg.norm(right)
+    assert Dense().solve(jac.matrix.copy(), np.ones(30)) is None
 
 
 def test_preconditioner_is_kept_while_it_serves():

@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stickslip.errors import InputError
+from stickslip.operators import Bordered, array_of, times, transpose_of, transposed_times
 from stickslip.solve.kink import Kinks
 from stickslip.solve.levenberg_marquardt import damped_step
-from stickslip.solve.linear import Bordered, Dense, bordered_array, times, transposed_times
+from stickslip.solve.linear import Dense, factorised
 from stickslip.solve.newton_method import GLOBALISATIONS, Newton, newton
 from stickslip.solve.rescue import ByDifference, Homotopy, solve_robustly
 from stickslip.solve.status import Rung, Status
@@ -339,20 +340,56 @@ class Products:
     def rmatvec(self, v):
         return self.array.T @ v
 
+    @property
+    def transposed(self):
+        return Products(self.array.T)
 
-@pytest.mark.parametrize("inside", [np.asfortranarray, Products])
-def test_a_bordered_matrix_multiplies_as_its_array(inside):
-    rng = np.random.default_rng(1)
-    a, column, row, v = (
-        rng.standard_normal((4, 4)),
-        *rng.standard_normal((2, 4)),
-        rng.standard_normal(5),
-    )
-    whole = bordered_array(a, column, row, 0.3)
-    bordered = Bordered(inside(a), column, row, 0.3)
-    assert bordered.shape == (5, 5)
+
+def borders(m: int, inside) -> tuple[np.ndarray, Bordered]:
+    """A random matrix with `m` borders as an array, and as an operator around its inside."""
+    rng = np.random.default_rng(m)
+    whole = np.asfortranarray(rng.standard_normal((4 + m, 4 + m)))
+    return whole, Bordered(inside(whole[:4, :4]), whole[:4, 4:], whole[4:, :4], whole[4:, 4:])
+
+
+@pytest.mark.parametrize("inside", [np.array, Products])
+@pytest.mark.parametrize("m", [1, 2, 3])
+def test_a_bordered_matrix_multiplies_as_its_array(m, inside):
+    whole, bordered = borders(m, inside)
+    v = np.random.default_rng(9).standard_normal(4 + m)
+    assert bordered.shape == whole.shape
     assert np.allclose(times(bordered, v), whole @ v, rtol=0, atol=1e-14)
     assert np.allclose(transposed_times(bordered, v), whole.T @ v, rtol=0, atol=1e-14)
+    assert np.allclose(times(transpose_of(bordered), v), whole.T @ v, rtol=0, atol=1e-14)
+
+
+def test_one_border_may_be_given_as_vectors_and_a_number():
+    whole, bordered = borders(1, np.array)
+    given = Bordered(bordered.jac, whole[:4, 4], whole[4, :4], float(whole[4, 4]))
+    assert np.array_equal(array_of(given), whole)
+
+
+def test_borders_around_borders_are_borders_of_what_is_inside():
+    whole, _ = borders(3, np.array)
+    inner = Bordered(whole[:4, :4], whole[:4, 4], whole[4, :4], whole[4, 4])
+    outer = Bordered(inner, whole[:5, 5:], whole[5:, :5], whole[5:, 5:])
+    assert outer.shape == whole.shape
+    assert outer.flat.jac is inner.jac
+    assert np.array_equal(array_of(outer), whole)
+    assert array_of(Bordered(Products(whole), whole[:, :1], whole[:1], np.eye(1))) is None
+
+
+@pytest.mark.parametrize("m", [1, 2, 3])
+def test_factors_solve_with_a_bordered_matrix_and_its_transpose(m):
+    whole, bordered = borders(m, np.array)
+    right = np.random.default_rng(3).standard_normal(4 + m)
+    for inverse in (factorised(Dense(), bordered), factorised(Dense(), whole.copy(order="F"))):
+        assert np.allclose(inverse(right), np.linalg.solve(whole, right), rtol=1e-12)
+        expected = np.linalg.solve(whole.T, right)
+        assert np.allclose(inverse(right, transposed=True), expected, rtol=1e-12)
+    found, sign = Dense().solve_bordered(*vars(bordered).values(), right)
+    assert np.allclose(found, np.linalg.solve(whole, right), rtol=1e-12)
+    assert sign == np.sign(np.linalg.det(whole))
 
 
 def test_a_singular_matrix_in_a_regular_border():
@@ -361,7 +398,7 @@ def test_a_singular_matrix_in_a_regular_border():
     column, row = np.array([0.0, 1.0]), np.array([0.0, 2.0])
     x, sign = Dense().solve_bordered(a, column, row, 0.0, np.array([1.0, 2.0, 3.0]))
     assert np.allclose(x, [1.0, 1.5, 2.0])
-    assert sign == np.sign(np.linalg.det(bordered_array(a, column, row, 0.0))) == -1.0
+    assert sign == np.sign(np.linalg.det(array_of(Bordered(a, column, row, 0.0)))) == -1.0
     assert Dense().solve(np.asfortranarray(a), np.ones(2)) is None
     assert Dense().solve_bordered(a, column, np.zeros(2), 0.0, np.ones(3)) == (None, 0.0)
 

@@ -49,6 +49,23 @@ class Factors:
             x[:first] -= self.lu[:first, first:last] @ x[first:last]
         return x
 
+    def solve_transposed(self, right: FloatArray | ComplexArray) -> FloatArray | ComplexArray:
+        """Solve with the transposed matrix and one right side (n,)."""
+        x = right.copy()
+        n = x.size
+        starts = range(0, n, BLOCK)
+        for inverse, first in zip(self.upper, starts, strict=True):
+            last = min(first + BLOCK, n)
+            x[first:last] = x[first:last] @ inverse
+            x[last:] -= x[first:last] @ self.lu[first:last, last:]
+        for inverse, first in zip(self.lower[::-1], starts[::-1], strict=True):
+            last = min(first + BLOCK, n)
+            x[first:last] = x[first:last] @ inverse
+            x[:first] -= x[first:last] @ self.lu[first:last, :first]
+        out = np.empty_like(x)
+        out[self.order] = x
+        return out
+
 
 def factorise(matrix: FloatArray | ComplexArray) -> Factors | None:
     """Factorise a (n, n) matrix of doubles in Fortran order, which is overwritten; None if it is singular to working precision."""

@@ -17,7 +17,7 @@ from stickslip.contact.law import ContactLaw
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.structured import StructuredJacobian
+from stickslip.operators import Jacobian
 
 BalanceAt = Callable[[float], HarmonicBalance]
 LoadPart = Literal["excitation", "static_load"]
@@ -31,7 +31,7 @@ class ParameterLinearisation:
     """Residual and derivatives at one state and one value of the parameter; `jac_p` is computed when it is asked for."""
 
     residual: FloatArray
-    jac: FloatArray | StructuredJacobian
+    jac: Jacobian
     seconds_contact: float
     by_parameter: Callable[[], FloatArray]
 

@@ -1,65 +1,167 @@
 """The resonance peak as an equation: the periodic problem bordered by a condition that holds where an amplitude is largest.
 
-The unknowns are those of the balance and the frequency. With ``a`` the first harmonic of one retained coordinate, the condition is
+The unknowns are those of the balance and the frequency. With ``|a|`` the norm of one retained coordinate over the harmonics that the load
+drives, the condition is
 
 - by horizontal tangent, ``d|a|/dω = 0`` along the response, with the exact sensitivity ``dx/dω = -J⁻¹ ∂r/∂ω``: true for every maximum,
   minimum and saddle of the amplitude (Krack et al. 2017, section 3.4 and note 22);
-- by phase quadrature, ``a`` lags the force by 90°: no second derivative is needed, and it is not exactly the maximum.
+- by phase quadrature, the coordinate lags the force by 90°: no second derivative is needed, and it is not exactly the maximum.
 
 The gradient of the first condition follows from the adjoint ``Jᵀ μ = ∂ ln|a|``. With ``v = dx/dω``, the matrix ``∂(J v + ∂r/∂ω)/∂x``
 is, by the symmetry of second derivatives, the derivative of J along the response, and two evaluations of the Jacobian give it.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
-import scipy.linalg
 
-from stickslip.arrays import FloatArray
-from stickslip.harmonic.balance import HarmonicBalance, Linearisation
-from stickslip.harmonic.parameters import (
-    BalanceAt,
-    ParameterLinearisation,
-    by_parameter,
-    difference,
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.bordered import (
+    Condition,
+    Invert,
+    PeriodicProblem,
+    State,
+    unknown_frequency,
 )
+from stickslip.harmonic.parameters import BalanceAt, ParameterLinearisation, by_parameter
+from stickslip.operators import transposed_times
 
-Condition = Literal["horizontal_tangent", "phase_quadrature"]
-EVALUATIONS: dict[Condition, int] = {"horizontal_tangent": 3, "phase_quadrature": 1}
-WANDERED = 3.0  # |ln(ω / omega_scale)| at which a corrector has lost the peak
+Peak = Literal["horizontal_tangent", "phase_quadrature"]
+EVALUATIONS: dict[Peak, int] = {"horizontal_tangent": 3, "phase_quadrature": 1}
 ALONG = 1e-6  # relative change of the state over which the Jacobian is differenced
 # the same where forces are sampled, in samples: J changes only when an event passes one
 ALONG_SAMPLES = 8.0
 
 
-@dataclass(frozen=True, eq=False)
-class Sensitivity:
-    """How the response goes on from one solution when the frequency changes.
+@dataclass(frozen=True)
+class Driven:
+    """One coordinate in the harmonics that the load drives.
 
-    Attributes
+    Parameters
     ----------
-    at
-        Residual, Jacobian and ω-derivative.
-    rate
-        ``d ln|a| / d ln ω`` along the response.
-    state
-        (size,) ``dx / d ln ω``.
-    adjoint
-        (size,) ``J⁻ᵀ ∂ ln|a| / ∂x``.
+    position
+        Position of the coordinate among the retained ones.
+    harmonics
+        The harmonics, that of the largest force first.
     """
 
-    at: Linearisation
-    rate: float
-    state: FloatArray
-    adjoint: FloatArray
+    position: int
+    harmonics: tuple[int, ...]
+
+    def places(self, balance: HarmonicBalance) -> IntArray:
+        """Return the (2 k,) places of the cosine and sine parts among the unknowns, a pair for each harmonic."""
+        rows = np.array([balance.harmonics.index(h) for h in self.harmonics])
+        pairs = np.stack([2 * rows - 1, 2 * rows], axis=1)
+        return np.asarray(pairs.reshape(-1) * balance.linear.n + self.position)
+
+    def motion(self, balance: HarmonicBalance, x: FloatArray) -> ComplexArray:
+        """Return the (k,) complex displacements at the unknowns `x`, m."""
+        own = x[self.places(balance)]
+        return np.asarray(balance.displacement_scale * (own[::2] - 1j * own[1::2]))
+
+    def gradient(self, balance: HarmonicBalance, x: FloatArray) -> FloatArray:
+        """Return (size,) the derivative of ``ln|a|``, |a| the norm over the harmonics."""
+        places = self.places(balance)
+        out = np.zeros(x.size)
+        out[places] = x[places] / (x[places] @ x[places])
+        return out
 
 
-@dataclass(frozen=True, eq=False)
-class BorderedLinearisation(ParameterLinearisation):
-    """The same with a Jacobian that is always an array."""
+@dataclass(frozen=True)
+class HorizontalTangent:
+    """The amplitude changes neither way with the first extra unknown, ``ln ω``.
 
-    jac: FloatArray
+    Parameters
+    ----------
+    driven
+        What peaks.
+    sharpness
+        Typical ``|da / d ln ω| / |a|``, by which the slope is divided, so that the tolerance does not depend on the damping.
+    """
+
+    driven: Driven
+    sharpness: float = 1.0
+
+    def value(self, state: State) -> float:
+        """Return the slope ``d ln|a| / d ln ω``; infinite at a fold."""
+        if state.along is None:
+            return np.inf
+        slope = self.driven.gradient(state.setting.balance, state.x) @ state.along
+        return float(slope) / self.sharpness
+
+    def gradient(self, state: State) -> FloatArray:
+        """Return its (size + m,) derivative; zeros at a fold."""
+        size, v, row = state.x.size, state.along, np.zeros(state.y.size)
+        own = self.driven.gradient(state.setting.balance, state.x)
+        adjoint = None if state.inverse is None else state.inverse(own, transposed=True)
+        if v is None or adjoint is None:
+            return row
+        places = self.driven.places(state.setting.balance)
+        row[places] = v[places] / (state.x[places] @ state.x[places])
+        second, by_frequency = _along(state, v, adjoint)
+        row[:size] -= 2.0 * float(own @ v) * own + second
+        row[size] = -by_frequency
+        for place in range(1, state.extra.size):
+            row[size + place] = -state.by_extra(place, lambda s: _weighted(s, v, adjoint)[0])
+        return row / self.sharpness
+
+
+def _along(state: State, v: FloatArray, adjoint: FloatArray) -> tuple[FloatArray, float]:
+    """Return (size,) ``μᵀ ∂(J v + dr/d ln ω)/∂x`` and the same by ``ln ω``, from two evaluations along the response."""
+    balance, size = state.setting.balance, float(np.linalg.norm(state.x))
+    relative = ALONG_SAMPLES / balance.samples if _is_sampled(balance) else ALONG
+    step = relative * size / max(float(np.linalg.norm(v)), size)
+    way = np.zeros(state.y.size)
+    way[: v.size], way[v.size] = v, 1.0
+    up, down = (_weighted(state.moved(s * way), v, adjoint) for s in (step, -step))
+    second, change = ((a - b) / (2.0 * step) for a, b in zip(up[::-1], down[::-1], strict=True))
+    return second, float(change - second @ v)
+
+
+def _weighted(state: State, v: FloatArray, adjoint: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return ``μᵀ(J v + dr/d ln ω)`` and (size,) ``μᵀ J`` at a state, with direction v and adjoint μ of another one."""
+    rows = transposed_times(state.at.jac, adjoint)
+    return np.asarray(rows @ v + adjoint @ state.columns[:, 0]), rows
+
+
+@dataclass(frozen=True)
+class PhaseQuadrature:
+    """The coordinate lags the force by 90°, in the harmonic of the largest force.
+
+    Parameters
+    ----------
+    driven
+        What lags.
+    phase
+        Phase of the force, rad.
+    """
+
+    driven: Driven
+    phase: float
+
+    def value(self, state: State) -> float:
+        """Return the cosine of the phase lag."""
+        own = state.x[self._places(state)]
+        return float(self._direction @ own / np.linalg.norm(own))
+
+    def gradient(self, state: State) -> FloatArray:
+        """Return its (size + m,) derivative."""
+        places = self._places(state)
+        own = state.x[places]
+        size = float(np.linalg.norm(own))
+        row = np.zeros(state.y.size)
+        row[places] = self._direction / size - self.value(state) * own / size**2
+        return row
+
+    def _places(self, state: State) -> IntArray:
+        return self.driven.places(state.setting.balance)[:2]
+
+    @property
+    def _direction(self) -> FloatArray:
+        return np.array([np.cos(self.phase), -np.sin(self.phase)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,151 +174,79 @@ class PeakProblem:
     ----------
     family
         Harmonic balance of each value of the design parameter.
-    condition
+    by
         What makes a peak.
-    position
-        Position of the coordinate among the retained ones.
+    driven
+        What peaks.
     phase
-        Phase of the force, rad; the phase condition asks the coordinate to lag it by 90°.
+        Phase of the force in the first harmonic of `driven`, rad; the phase condition asks the coordinate to lag it by 90°.
     omega_scale
         Frequency at which the last unknown is zero, rad/s.
+    invert
+        How systems with the Jacobian of the balance are solved, as exactly as the peak is to be found.
     sharpness
-        Typical ``|da / d ln ω| / |a|``, by which the slope is divided, so that the tolerance does not depend on the damping.
+        That of the horizontal tangent.
     """
 
     family: BalanceAt
-    condition: Condition
-    position: int
+    by: Peak
+    driven: Driven
     phase: float
     omega_scale: float
+    invert: Invert
     sharpness: float = 1.0
+
+    @cached_property
+    def bordered(self) -> PeriodicProblem:
+        """The equation."""
+        condition: Condition = HorizontalTangent(self.driven, self.sharpness)
+        if self.by == "phase_quadrature":
+            condition = PhaseQuadrature(self.driven, self.phase)
+        settings = unknown_frequency(self.family, self.omega_scale)
+        return PeriodicProblem(settings, (condition,), self.invert)
 
     def omega(self, y: FloatArray) -> float:
         """Return the frequency of the unknowns `y`, rad/s."""
         return self.omega_scale * float(np.exp(y[-1]))
 
-    def linearise(self, y: FloatArray, p: float) -> "BorderedLinearisation":
+    def linearise(self, y: FloatArray, p: float) -> ParameterLinearisation:
         """Evaluate the bordered problem at the unknowns `y` (size + 1,) and the design parameter `p`."""
-        if not abs(y[-1]) < WANDERED:
-            n = y.size
-            return BorderedLinearisation(np.full(n, np.inf), np.eye(n), 0.0, lambda: np.zeros(n))
-        at, value, row = self._bordered(self.family(p), y)
-        n = at.residual.size
-        jac: FloatArray = np.empty((n + 1, n + 1), order="F")
-        jac[:n, :n] = at.dense_jac()
-        jac[:n, n] = at.jac_p * self.omega(y)
-        jac[n] = row
+        return self.bordered.linearise(y, p)
 
-        def residual(value_of_p: float) -> FloatArray:
-            other, condition, _ = self._bordered(self.family(value_of_p), y)
-            return np.append(other.residual, condition)
+    def state(self, y: FloatArray, p: float) -> State:
+        """Return the problem at the unknowns `y` and the design parameter `p`, for what follows."""
+        return self.bordered.state(y, p)
 
-        return BorderedLinearisation(
-            np.append(at.residual, value), jac, at.seconds_contact, lambda: difference(residual, p)
-        )
+    def rate(self, state: State) -> float:
+        """Return ``d ln|a| / d ln ω`` along the response; infinite at a fold."""
+        return HorizontalTangent(self.driven).value(state)
 
-    def sensitivity(self, balance: HarmonicBalance, y: FloatArray) -> Sensitivity | None:
-        """Return how the response goes on with the frequency; None where its Jacobian is singular, at a fold."""
-        omega = self.omega(y)
-        at = balance.linearise(y[:-1], omega)
-        lu, pivots, info = scipy.linalg.lapack.dgetrf(at.dense_jac())
-        if info != 0 or not np.all(np.isfinite(lu)):
-            return None
-        gradient = self._gradient(balance, y)
-        state, _ = scipy.linalg.lapack.dgetrs(lu, pivots, -omega * at.jac_p)
-        adjoint, _ = scipy.linalg.lapack.dgetrs(lu, pivots, gradient, trans=1)
-        return Sensitivity(at, float(gradient @ state), state, adjoint)
-
-    def curvature(self, y: FloatArray, p: float) -> float:
+    def curvature(self, state: State) -> float:
         """Return ``d² ln|a| / d(ln ω)²`` along the response: negative at a maximum; NaN at a fold."""
-        balance = self.family(p)
-        here = self.sensitivity(balance, y)
-        if here is None:
+        if state.along is None:
             return np.nan
-        row = self._tangent_row(balance, y, here)
-        return float(row[:-1] @ here.state + row[-1])
+        row = HorizontalTangent(self.driven).gradient(state)
+        return float(row[:-1] @ state.along + row[-1])
 
-    def amplitude_slope(self, y: FloatArray, p: float) -> float:
+    def amplitude_slope(self, state: State) -> float:
         """Return ``d ln|a| / dp`` along the curve of peaks; NaN where the problem is singular.
 
-        By horizontal tangent a shift of the frequency does not change the amplitude (envelope theorem), so that the adjoint answers.
+        By horizontal tangent a shift of the frequency does not change the amplitude (envelope theorem): the slope is that at fixed frequency.
         """
-        balance = self.family(p)
-        by_p = by_parameter(self.family, y[:-1], self.omega(y), p)
-        if self.condition == "horizontal_tangent":
-            here = self.sensitivity(balance, y)
-            return np.nan if here is None else -float(here.adjoint @ by_p)
-        change = _solved(self.linearise(y, p).jac, -np.append(by_p, 0.0))
-        return np.nan if change is None else float(self._gradient(balance, y) @ change[:-1])
+        by_p = by_parameter(self.family, state.x, state.setting.omega, state.p)
+        inverse, right = state.inverse, -by_p
+        if self.by == "phase_quadrature":
+            inverse = self.invert(self.linearise(state.y, state.p).jac)
+            right = np.append(right, 0.0)
+        change = None if inverse is None else inverse(right)
+        if change is None:
+            return np.nan
+        own = self.driven.gradient(state.setting.balance, state.x)
+        return float(own @ change[: own.size])
 
-    def amplitude(self, y: FloatArray, p: float) -> complex:
-        """Return the first harmonic ``a`` of the coordinate at the unknowns `y`, m."""
-        balance = self.family(p)
-        cos, sin = self._places(balance)
-        return balance.displacement_scale * complex(y[cos], -y[sin])
-
-    def _places(self, balance: HarmonicBalance) -> tuple[int, int]:
-        """Positions of cosine and sine part of the first harmonic in the unknowns."""
-        n = balance.linear.n
-        return n + self.position, 2 * n + self.position
-
-    def _gradient(self, balance: HarmonicBalance, y: FloatArray) -> FloatArray:
-        """Return (size,) the derivative of ``ln|a|``."""
-        cos, sin = self._places(balance)
-        out = np.zeros(y.size - 1)
-        square = y[cos] ** 2 + y[sin] ** 2
-        out[cos], out[sin] = y[cos] / square, y[sin] / square
-        return out
-
-    def _bordered(
-        self, balance: HarmonicBalance, y: FloatArray
-    ) -> tuple[Linearisation, float, FloatArray]:
-        """Return the periodic problem, the value of the condition and its (size + 1,) derivative."""
-        if self.condition == "phase_quadrature":
-            at = balance.linearise(y[:-1], self.omega(y))
-            return at, *self._quadrature(balance, y)
-        here = self.sensitivity(balance, y)
-        if here is None:
-            at = balance.linearise(y[:-1], self.omega(y))
-            return at, np.inf, np.zeros(y.size)
-        row = self._tangent_row(balance, y, here)
-        return here.at, here.rate / self.sharpness, row / self.sharpness
-
-    def _quadrature(self, balance: HarmonicBalance, y: FloatArray) -> tuple[float, FloatArray]:
-        """Return the cosine of the phase lag and its derivative."""
-        cos, sin = self._places(balance)
-        size = np.hypot(y[cos], y[sin])
-        direction = np.zeros(y.size)
-        direction[cos], direction[sin] = np.cos(self.phase), -np.sin(self.phase)
-        value = float(direction @ y) / size
-        row = direction / size
-        row[:-1] -= value * self._gradient(balance, y)
-        return value, row
-
-    def _tangent_row(
-        self, balance: HarmonicBalance, y: FloatArray, here: Sensitivity
-    ) -> FloatArray:
-        """Return the (size + 1,) derivative of the rate ``d ln|a| / d ln ω`` by state and frequency."""
-        v = here.state
-        along = np.append(v, 1.0)
-        relative = ALONG_SAMPLES / balance.samples if _is_sampled(balance) else ALONG
-        size = float(np.linalg.norm(y[:-1]))
-        step = relative * size / max(float(np.linalg.norm(v)), size)
-        sides = []
-        for s in (step, -step):
-            moved = y + s * along
-            omega = self.omega(moved)
-            at = balance.linearise(moved[:-1], omega)
-            sides.append((at.dense_jac(), at.dense_jac() @ v + omega * at.jac_p))
-        second = (sides[0][0] - sides[1][0]) / (2.0 * step)
-        by_omega = (sides[0][1] - sides[1][1]) / (2.0 * step) - second @ v
-        cos, sin = self._places(balance)
-        square = y[cos] ** 2 + y[sin] ** 2
-        row = np.zeros(y.size)
-        row[[cos, sin]] = v[[cos, sin]] / square
-        row[:-1] -= 2.0 * here.rate * self._gradient(balance, y) + here.adjoint @ second
-        row[-1] = -here.adjoint @ by_omega
-        return row
+    def motion(self, y: FloatArray, p: float) -> ComplexArray:
+        """Return the (k,) complex displacements in the driven harmonics at the unknowns `y`, m."""
+        return self.driven.motion(self.family(p), y[:-1])
 
 
 def _is_sampled(balance: HarmonicBalance) -> bool:
@@ -224,10 +254,3 @@ def _is_sampled(balance: HarmonicBalance) -> bool:
     contacts = balance.compiled
     on_grid = contacts.piecewise.size > 0 and contacts.evaluator != "events"
     return on_grid or any(laws.start.shape[1] > 0 for laws in contacts.marched)
-
-
-def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
-    try:
-        return np.linalg.solve(matrix, right)
-    except np.linalg.LinAlgError:
-        return None

@@ -13,6 +13,7 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.contact.interface import SparseRows, add_contact_jacobian
+from stickslip.contact.law import PAIRS
 from stickslip.contact.product import (
     add_stiffness,
     contact_product,
@@ -89,6 +90,11 @@ class StructuredJacobian:
         out = self.linear.transposed_product(q)
         return self.scale * self._add_contacts(self.blocks, q, True, out)
 
+    @property
+    def transposed(self) -> "TransposedJacobian":
+        """Its transpose."""
+        return TransposedJacobian(self)
+
     def dense(self) -> FloatArray:
         """Return the Jacobian as an array."""
         n = self.linear.n
@@ -131,6 +137,26 @@ class StructuredJacobian:
 
         return solve, product
 
+    def solve_transposed(self, kept: HarmonicFactors, right: FloatArray) -> FloatArray:
+        """Solve ``Pᵀ x = y`` harmonic by harmonic, from the highest one down."""
+        rows = self._by_row(right).copy()
+        for h in range(len(kept.factors) - 1, -1, -1):
+            first, last = max(2 * h - 1, 0), 2 * h + 1
+            if h == 0:
+                rows[0] = kept.factors[0].solve_transposed(rows[0])
+                break
+            # the transpose of a real form is that of the conjugate transpose
+            solved = kept.factors[h].solve_transposed(rows[first] + 1j * rows[first + 1])
+            rows[first], rows[first + 1] = solved.real, solved.imag
+            gap = self.rows.gaps(rows[first:last]).reshape(2, -1, 3)
+            force = np.zeros((first, *gap.shape[1:]))
+            for block, (row, col) in enumerate(PAIRS[: self.blocks.shape[1]]):
+                force[:, :, col] += np.einsum(
+                    "cpq,pc->qc", self.blocks[:, block, first:last, :first], gap[:, :, row]
+                )
+            self.rows.add_forces(-self.scale * force.reshape(first, -1), rows[:first])
+        return rows.reshape(-1)
+
     def _sweep(self, kept: HarmonicFactors, right: FloatArray) -> FloatArray:
         """Solve harmonic by harmonic, from the static one up."""
         rows = self._by_row(right).copy()
@@ -160,6 +186,41 @@ class StructuredJacobian:
             blocks, self.rows.columns, self.rows.values, q, transposed, np.empty((3, m)), np.empty((3, m)), out
         )  # fmt: skip
         return out.reshape(-1)
+
+
+@dataclass(frozen=True, eq=False)
+class TransposedJacobian:
+    """The transpose of a Jacobian, known by its products; both share the factors of a preconditioner."""
+
+    transposed: StructuredJacobian
+
+    @property
+    def problem(self) -> object:
+        """That of the Jacobian."""
+        return self.transposed.problem
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.transposed.shape
+
+    def matvec(self, v: FloatArray) -> FloatArray:
+        """Return ``Jᵀ v``."""
+        return self.transposed.rmatvec(v)
+
+    def rmatvec(self, v: FloatArray) -> FloatArray:
+        """Return ``J v``."""
+        return self.transposed.matvec(v)
+
+    def preconditioner(self) -> HarmonicFactors | None:
+        """Return the factors that the Jacobian makes."""
+        return self.transposed.preconditioner()
+
+    def preconditioned_by(self, kept: HarmonicFactors) -> tuple[Solve, Product]:
+        """Return how to solve ``Pᵀ x = y``, and ``Jᵀ v``."""
+        return lambda right: self.transposed.solve_transposed(
+            kept, right
+        ), lambda v, _: self.matvec(v)
 
 
 def real_matrix(blocks: list[ComplexArray] | ComplexArray) -> FloatArray:

@@ -64,9 +64,7 @@ class Discretisation:
     def balance(self, system: System, load: HarmonicLoad, more: IntArray) -> HarmonicBalance:
         """Set up the periodic problem, the dofs `more` retained beside those of the contacts."""
         linear = system.condensed(load, self.order, more)
-        return harmonic_balance(
-            linear, system.interface, self.order, self.samples, self.evaluator, "dense"
-        )
+        return harmonic_balance(linear, system.interface, self.order, self.samples, self.evaluator)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,8 @@ Newton steps a point, and its lowest point is the root of the exact slope of the
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import get_args
 
 import numpy as np
@@ -15,7 +16,8 @@ from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import check_choice, input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.peak import EVALUATIONS, Condition, PeakProblem
+from stickslip.harmonic.parameters import ParameterLinearisation
+from stickslip.harmonic.peak import EVALUATIONS, Driven, Peak, PeakProblem
 from stickslip.response.follow import following_vibration, steps_through
 from stickslip.response.parameter import (
     Discretisation,
@@ -25,7 +27,9 @@ from stickslip.response.parameter import (
 )
 from stickslip.response.system import System
 from stickslip.solve.continuation import Point, start_point, trace
-from stickslip.solve.newton_method import Newton, Solution, newton
+from stickslip.solve.krylov import to_tolerance
+from stickslip.solve.linear import factorised
+from stickslip.solve.newton_method import Newton, Solution, charged, newton
 from stickslip.solve.status import Status
 
 SWEEP_POINTS = 40  # at least, of the one sweep that finds the first peak
@@ -35,6 +39,8 @@ FARTHEST = 0.1  # change of ln ω in one step beyond which another peak was foun
 EVALUATIONS_BESIDE = 2  # of a point of a sweep, beside one a Newton step: the start and the tangent
 BRACKET = 1e-12  # width in ln ω at which a peak on a kink counts as found
 SEARCH = 60  # solutions that may be spent on a bracket
+EXACT = 1e-12  # relative residual of sensitivities that are found by iteration ...
+STEP = 1e-6  # ... and of Newton steps, each of which costs three evaluations and two sensitivities
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +54,9 @@ class PeakPoint:
     omega
         Frequency of the peak, rad/s.
     amplitude
-        First-harmonic amplitude of the output, m.
+        Amplitude of the output in the harmonic that the load drives, m; with several, the norm over them.
     phase
-        Phase of the output against the force, rad; -π/2 in quadrature.
+        Phase of the output against the force, rad, in the harmonic of the largest force; -π/2 in quadrature.
     slope
         Derivative of the amplitude by the parameter along the curve of peaks, m over the parameter's unit.
     curvature
@@ -94,7 +100,7 @@ def track_peak(
     parameter: Parameter,
     values: Sequence[float] | FloatArray,
     omega_range: tuple[float, float],
-    by: Condition = "horizontal_tangent",
+    by: Peak = "horizontal_tangent",
     output: int = 0,
     discretisation: Discretisation | None = None,
 ) -> Iterator[PeakPoint]:
@@ -128,7 +134,8 @@ def track_peak(
     Raises
     ------
     InputError
-        If there are no values, the parameter, the condition or the output is unknown, or the range holds no peak at the first value.
+        If there are no values, the parameter, the condition or the output is unknown, the load drives no harmonic, or the range holds no
+        peak at the first value.
     """
     tracker = _tracker(system, load, parameter, float(values[0]) if len(values) else np.nan, omega_range, by, output, discretisation)  # fmt: skip
     for value in values:
@@ -184,7 +191,7 @@ class _Tracker:
 
     problem: PeakProblem
     newton: Newton
-    known: list[tuple[float, FloatArray]] = field(default_factory=list)
+    known: list[tuple[float, FloatArray]]
     evaluations: int = 0
 
     def point(self, value: float) -> PeakPoint:
@@ -194,44 +201,41 @@ class _Tracker:
         balance = problem.family(value)
         slope, curvature = np.nan, np.nan
         if solution.status.converged:
-            slope, curvature = problem.amplitude_slope(y, value), problem.curvature(y, value)
-            self.evaluations += 2 + 2 * EVALUATIONS["horizontal_tangent"]
-        a, omega = problem.amplitude(y, value), problem.omega(y)
-        lag = np.angle(a * np.exp(-1j * problem.phase))
+            state = problem.state(y, value)
+            slope, curvature = problem.amplitude_slope(state), problem.curvature(state)
+            self.evaluations += 2 + EVALUATIONS["horizontal_tangent"]
+        driven, omega = problem.motion(y, value), problem.omega(y)
+        amplitude = float(np.linalg.norm(driven))
+        lag = float(np.angle(driven[0] * np.exp(-1j * problem.phase)))
         motion = balance.linear.recover(omega, balance.coefficients(y[:-1]))
         spent, self.evaluations = self.evaluations, 0
         return PeakPoint(
-            value, omega, abs(a), float(lag), abs(a) * slope, curvature, motion, solution.status, solution.iterations, spent
+            value, omega, amplitude, lag, amplitude * slope, curvature, motion, solution.status, solution.iterations, spent
         )  # fmt: skip
 
     def _reach(self, value: float, halvings: int) -> Solution:
         """Solve from the predicted peak; through the values between, or in a bracket, if that fails."""
         guess = self._predicted(value)
         solution = self._solved(guess, value)
-        if not self._is_found(solution, guess, value) and halvings > 0 and self._last != value:
-            between = self._reach(0.5 * (self._last + value), halvings - 1)
+        last = self.known[-1][0]
+        if not self._is_found(solution, guess, value) and halvings > 0 and last != value:
+            between = self._reach(0.5 * (last + value), halvings - 1)
             if between.status.converged:
                 guess = self._predicted(value)
                 solution = self._solved(guess, value)
-        if (
-            not self._is_found(solution, guess, value)
-            and self.problem.condition == "horizontal_tangent"
-        ):
+        tangent = self.problem.by == "horizontal_tangent"
+        if tangent and not self._is_found(solution, guess, value):
             solution = self._bracketed(guess, value)
         if solution.status.converged:
             self.known = [*self.known[-1:], (value, solution.x)]
         return solution
 
-    @property
-    def _last(self) -> float:
-        return self.known[-1][0]
-
     def _predicted(self, value: float) -> FloatArray:
         """Extrapolate the last two peaks; the last one, where that would go far."""
         p, y = self.known[-1]
-        if len(self.known) < 2 or self.known[0][0] == p:
-            return y
         before, earlier = self.known[0]
+        if before == p:
+            return y
         share = (value - p) / (p - before)
         return y + share * (y - earlier) if abs(share) <= 2.0 else y
 
@@ -239,72 +243,55 @@ class _Tracker:
         """Whether a solution is the peak that was followed: near, and no minimum between two peaks."""
         if not solution.status.converged or abs(solution.x[-1] - guess[-1]) > FARTHEST:
             return False
-        if self.problem.condition == "phase_quadrature":
+        if self.problem.by == "phase_quadrature":
             return True
         self.evaluations += EVALUATIONS["horizontal_tangent"]
-        return not self.problem.curvature(solution.x, value) > 0.0
+        return not self.problem.curvature(self.problem.state(solution.x, value)) > 0.0
 
     def _solved(self, y: FloatArray, value: float) -> Solution:
-        def evaluate(v: FloatArray):  # type: ignore[no-untyped-def]
-            self.evaluations += EVALUATIONS[self.problem.condition]
+        def evaluate(v: FloatArray) -> ParameterLinearisation:
+            self.evaluations += EVALUATIONS[self.problem.by]
             return self.problem.linearise(v, value)
 
         return newton(evaluate, y, self.newton)
 
     def _bracketed(self, y: FloatArray, value: float) -> Solution:
         """Find the top of a response whose slope jumps there: a kink, or the steps that samples make."""
-        climb = _Climb(self, value, y)
+        spent: list[Solution] = []
         try:
-            top = climb.top()
+            top = self._top(y, value, spent)
         except (ArithmeticError, ValueError):
-            return replace(climb.last, x=y, status=Status.STALLED)
-        return replace(climb.last, x=climb.state(top))
+            return replace(charged(spent[-1], spent), x=y, status=Status.STALLED)
+        return replace(charged(spent[-1], spent), x=np.append(self._at(top, value, spent), top))
 
-
-@dataclass(slots=True)
-class _Climb:
-    """Solutions at fixed frequencies, each from the one before, and the slope of the amplitude there."""
-
-    tracker: _Tracker
-    value: float
-    y: FloatArray
-    last: Solution = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.last = Solution(self.y, Status.STALLED, 0, np.nan, 0.0, 0.0)
-
-    def state(self, at: float) -> FloatArray:
-        """Return the unknowns at ``ln(ω / omega_scale) = at``."""
-        problem, tracker = self.tracker.problem, self.tracker
-        balance = problem.family(self.value)
-        omega = problem.omega(np.array([at]))
-        solution = newton(lambda v: balance.linearise(v, omega), self.y[:-1], tracker.newton)
-        tracker.evaluations += solution.iterations + 1
+    def _at(self, place: float, value: float, spent: list[Solution]) -> FloatArray:
+        """Solve at ``ln(ω / omega_scale) = place`` from the last of the solutions spent."""
+        balance, omega = self.problem.family(value), self.problem.omega(np.array([place]))
+        solution = newton(lambda v: balance.linearise(v, omega), spent[-1].x, self.newton)
+        spent.append(solution)
+        self.evaluations += solution.iterations + 1
         if not solution.status.converged:
             raise ArithmeticError(solution.status.advice)
-        self.y = np.append(solution.x, at)
-        self.last = replace(solution, iterations=self.last.iterations + solution.iterations)
-        return self.y
+        return solution.x
 
-    def rate(self, at: float) -> float:
-        """Return the slope of the amplitude there."""
-        problem = self.tracker.problem
-        here = problem.sensitivity(problem.family(self.value), self.state(at))
-        self.tracker.evaluations += 1
-        if here is None:
-            raise ArithmeticError("fold")
-        return here.rate
+    def _top(self, y: FloatArray, value: float, spent: list[Solution]) -> float:
+        """Climb until the slope changes its sign, then close the bracket; `spent` takes the solutions."""
+        spent.append(Solution(y[:-1], Status.STALLED, 0, np.nan, 0.0, 0.0))
 
-    def top(self) -> float:
-        """Climb until the slope changes its sign, then close the bracket."""
-        at = float(self.y[-1])
-        slope = self.rate(at)
-        step = 0.1 / self.tracker.problem.sharpness * (1.0 if slope > 0.0 else -1.0)
+        def rate(place: float) -> float:
+            x = self._at(place, value, spent)
+            self.evaluations += 1
+            found = self.problem.rate(self.problem.state(np.append(x, place), value))
+            if not np.isfinite(found):
+                raise ArithmeticError("fold")
+            return found
+
+        at = float(y[-1])
+        slope = rate(at)
+        step = 0.1 / self.problem.sharpness * (1.0 if slope > 0.0 else -1.0)
         for _ in range(SEARCH):
-            ahead = self.rate(at + step)
-            if ahead * slope <= 0.0:
-                found: float = scipy.optimize.brentq(self.rate, at, at + step, xtol=BRACKET)
-                return found
+            if rate(at + step) * slope <= 0.0:
+                return float(scipy.optimize.brentq(rate, at, at + step, xtol=BRACKET))
             at, step = at + step, 1.3 * step
         raise ArithmeticError("no maximum")
 
@@ -315,14 +302,14 @@ def _tracker(
     parameter: Parameter,
     first: float,
     omega_range: tuple[float, float],
-    by: Condition,
+    by: Peak,
     output: int,
     discretisation: Discretisation | None,
 ) -> _Tracker:
     """Find the first peak by a sweep."""
     if not np.isfinite(first):
         raise input_error("values", "are empty or not finite", "Give numbers.")
-    check_choice("by", by, get_args(Condition))
+    check_choice("by", by, get_args(Peak))
     if not 0 <= output < system.outputs.size:
         have = system.outputs.size
         raise input_error("output", f"is {output}, of {have} outputs", f"Give 0 to {have - 1}.")
@@ -332,25 +319,37 @@ def _tracker(
         system, load, parameter, first, lambda s, f: how.balance(s, f, np.array([dof]))
     )
     balance = family(first)
-    position = int(np.searchsorted(balance.linear.retained, dof))
     changed = parameter(first)[0] if callable(parameter) else system
     changed = replace(changed, interface=replace(changed.interface, laws=balance.interface.laws))
-    force = balance.linear.load.coefficients(1)[1]
-    phase = float(np.angle(force[np.argmax(np.abs(force))]))
-    problem = PeakProblem(family, by, position, phase, omega_range[1])
+    harmonics, phase = _driven(balance.linear.load)
+    driven = Driven(int(np.searchsorted(balance.linear.retained, dof)), harmonics)
+    invert = partial(factorised, to_tolerance(how.newton.linear, EXACT))
+    problem = PeakProblem(family, by, driven, phase, omega_range[1], invert)
     points = _sweep(changed, balance, omega_range, how.newton)
     x, omega = _first_peak(problem, first, points)
     problem = replace(problem, omega_scale=omega)
     y = np.append(x, 0.0)
-    here = problem.sensitivity(balance, y)
-    if here is not None:
-        n = balance.linear.n
-        places = [n + position, 2 * n + position]
-        sharp = np.linalg.norm(here.state[places]) / np.linalg.norm(x[places])
+    along = problem.state(y, first).along
+    if along is not None:
+        places = driven.places(balance)
+        sharp = np.linalg.norm(along[places]) / np.linalg.norm(x[places])
         problem = replace(problem, sharpness=max(float(sharp), 1.0))
-    few = replace(how.newton, max_iterations=min(STEPS, how.newton.max_iterations))
+    few = replace(
+        how.newton,
+        max_iterations=min(STEPS, how.newton.max_iterations),
+        linear=to_tolerance(how.newton.linear, STEP),
+    )
     spent = sum(p.solution.iterations + EVALUATIONS_BESIDE for p in points)
     return _Tracker(problem, few, [(first, y)], spent)
+
+
+def _driven(load: HarmonicLoad) -> tuple[tuple[int, ...], float]:
+    """Return the harmonics that a load drives, that of the largest force first, and the phase of this force, rad."""
+    largest = {h: f[np.argmax(np.abs(f))] for h, f in load.harmonics.items() if np.any(f)}
+    if not largest:
+        raise input_error("load", "drives no harmonic", "A peak needs an excitation.")
+    order = sorted(largest, key=lambda h: (-abs(largest[h]), h))
+    return tuple(order), float(np.angle(largest[order[0]]))
 
 
 def _sweep(
@@ -373,17 +372,17 @@ def _first_peak(
     problem: PeakProblem, value: float, points: list[Point]
 ) -> tuple[FloatArray, float]:
     """Return state and frequency near the highest peak of a sweep, or near the quadrature next to it."""
-    first = [problem.amplitude(p.x, value) for p in points]
-    top = int(np.argmax(np.abs(first))) if first else 0
+    motions = np.array([problem.driven.motion(problem.family(value), p.x) for p in points])
+    top = int(np.argmax(np.linalg.norm(motions, axis=1))) if points else 0
     if top in (0, len(points) - 1):
         raise input_error(
             "omega_range",
             f"holds no peak at the first value: of {len(points)} solutions the first or the last is the highest",
             "Widen it, or choose another output.",
         )
-    if problem.condition == "horizontal_tangent":
+    if problem.by == "horizontal_tangent":
         return points[top].x, points[top].p
-    in_phase = np.real(np.array(first) * np.exp(-1j * problem.phase))
+    in_phase = np.real(motions[:, 0] * np.exp(-1j * problem.phase))
     crossings = np.flatnonzero(in_phase[:-1] * in_phase[1:] <= 0.0)
     if crossings.size == 0:
         raise input_error(

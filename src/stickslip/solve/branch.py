@@ -7,7 +7,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import check_choice
-from stickslip.solve.linear import Jacobian
+from stickslip.operators import Jacobian
 from stickslip.solve.newton_method import Newton, Solution
 
 Parametrisation = Literal["arc_length", "natural", "local"]

@@ -8,7 +8,8 @@ from typing import Protocol
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.solve.linear import Bordered, Jacobian, LinearSolver, solve_with
+from stickslip.operators import Jacobian, array_of
+from stickslip.solve.linear import LinearSolver, solve_with
 from stickslip.solve.status import Status
 
 EPS = float(np.finfo(float).eps)
@@ -124,12 +125,8 @@ def column_scale(jac: Jacobian, before: FloatArray | None) -> FloatArray:
 
 
 def _column_squares(jac: Jacobian) -> FloatArray:
-    if isinstance(jac, np.ndarray):
-        return np.asarray(np.einsum("ij,ij->j", jac, jac))
-    if isinstance(jac, Bordered) and isinstance(jac.jac, np.ndarray):
-        squares = _column_squares(jac.jac) + jac.row**2
-        return np.append(squares, jac.column @ jac.column + jac.corner**2)
-    return np.ones(jac.shape[1])
+    array = array_of(jac)
+    return np.ones(jac.shape[1]) if array is None else np.einsum("ij,ij->j", array, array)
 
 
 def squared_ratio(residual: FloatArray, size: float) -> float:

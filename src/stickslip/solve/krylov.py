@@ -15,12 +15,18 @@ import scipy.sparse.linalg
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import check_choice, input_error
-from stickslip.solve.linear import Dense, Jacobian, JacobianOperator, LinearSolver
+from stickslip.operators import Bordered, Corner, Jacobian, JacobianOperator, array_of, times
+from stickslip.solve.linear import Dense, LinearSolver
 
 Solve = Callable[[FloatArray], FloatArray]
 Product = Callable[[FloatArray, FloatArray], FloatArray]
 WORN = 2.0  # growth of the iterations at which a preconditioner is made anew ...
 YOUNG = 12  # ... though not below that many iterations, which cost less than new factors
+GAIN = (
+    0.1  # share of the residual of a bordered system above which another correction does not help
+)
+COARSE = 1e-4  # tolerance above which rounding is no part of what is left
+ROUNDING = 2.0  # times the tolerance, which a residual may be by the rounding of the product that judges it
 
 
 @runtime_checkable
@@ -53,15 +59,17 @@ class KrylovCounts:
 
 @dataclass(eq=False)
 class _Kept:
-    """A preconditioner and the products that its first system took."""
+    """A preconditioner, the products that its first system took for each digit, and whether it takes many more by now."""
 
     preconditioner: object
-    first: int = 0
-    last: int = 0
+    rate: float = 0.0
+    worn: bool = False
 
-    @property
-    def worn(self) -> bool:
-        return self.last > max(WORN * self.first, YOUNG)
+    def took(self, products: int, tolerance: float) -> None:
+        """Take down what a system took: the first one says what is usual."""
+        digits = -np.log10(tolerance)
+        self.rate = self.rate or products / digits
+        self.worn = products > max(WORN * self.rate * digits, YOUNG)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -107,53 +115,73 @@ class Krylov:
 
     def solve(self, jac: Jacobian, right: FloatArray) -> FloatArray | None:
         """Solve ``jac x = right`` to `tolerance`; see `LinearSolver`."""
-        return self._solve(_preconditioned(jac), None, right, self.tolerance)
+        return self._solve(jac, right, self.tolerance)
 
     def solve_bordered(
-        self, jac: Jacobian, column: FloatArray, row: FloatArray, corner: float, right: FloatArray
+        self, jac: Jacobian, column: FloatArray, row: FloatArray, corner: Corner, right: FloatArray
     ) -> tuple[FloatArray | None, float]:
         """Solve the bordered system, whose preconditioner has the same border; the sign is not known. See `LinearSolver`."""
-        tolerance = self.tolerance if np.any(right[:-1]) else self.tangent_tolerance
-        border = _Border(column, row, corner)
-        return self._solve(_preconditioned(jac), border, right, tolerance), np.nan
+        whole = Bordered(jac, column, row, corner).flat
+        tolerance = (
+            self.tolerance if np.any(right[: whole.jac.shape[0]]) else self.tangent_tolerance
+        )
+        return self._solve(whole, right, tolerance), np.nan
 
-    def _solve(
-        self, jac: Preconditioned, border: "_Border | None", right: FloatArray, tolerance: float
-    ) -> FloatArray | None:
+    def _solve(self, jac: Jacobian, right: FloatArray, tolerance: float) -> FloatArray | None:
         """Solve with the preconditioner that is kept, and with a new one if that fails or is worn."""
+        jac = jac.flat if isinstance(jac, Bordered) else jac
+        inside = _preconditioned(jac.jac if isinstance(jac, Bordered) else jac)
         self.counts.systems += 1
         if not np.any(right):
             return np.zeros_like(right)
-        kept = self.memory.get(jac.problem)
+        kept = self.memory.get(inside.problem)
         if kept is not None and not kept.worn:
-            solution, left = self._iterate(jac, kept, border, right, tolerance)
+            solution, left = self._refined(jac, kept, right, tolerance)
             if left <= tolerance:
                 return solution
         # the old factors go before the new ones come: they are most of what a large problem holds
-        self.memory.pop(jac.problem, None)
+        self.memory.pop(inside.problem, None)
         kept = None
-        made = jac.preconditioner()
+        made = inside.preconditioner()
         if made is not None:
             self.counts.preconditioners += 1
-            kept = self.memory[jac.problem] = _Kept(made)
-            solution, left = self._iterate(jac, kept, border, right, tolerance)
-            kept.first = kept.last
+            kept = self.memory[inside.problem] = _Kept(made)
+            solution, left = self._refined(jac, kept, right, tolerance)
             if left <= max(tolerance, np.sqrt(tolerance)):
                 return solution
         self.counts.failures += 1
         return None
 
-    def _iterate(
-        self,
-        jac: Preconditioned,
-        kept: _Kept,
-        border: "_Border | None",
-        right: FloatArray,
-        tolerance: float,
+    def _refined(
+        self, jac: Jacobian, kept: _Kept, right: FloatArray, tolerance: float
     ) -> tuple[FloatArray, float]:
-        """Return the solution and its relative residual, which is `tolerance` where that was reached."""
+        """Return a solution and its relative residual, which is `tolerance` where that was reached.
+
+        Inside a border a matrix may be singular, and its preconditioner with it. Large numbers then cancel in every product, and the
+        iteration ends at their rounding: what the residual of its solution asks for is added as long as that helps.
+        """
         before = self.counts.products
-        system = _system(*jac.preconditioned_by(kept.preconditioner), border)
+        solution, left = self._iterate(jac, kept, right, tolerance)
+        kept.took(self.counts.products - before, tolerance)
+        if not isinstance(jac, Bordered) or tolerance > COARSE:
+            return solution, left
+        size, best = float(np.linalg.norm(right)), np.inf
+        while True:
+            self.counts.products += 1
+            rest = right - times(jac, solution)
+            left = float(np.linalg.norm(rest)) / size
+            if left <= ROUNDING * tolerance:
+                return solution, tolerance
+            if left > GAIN * best or not np.isfinite(left):
+                return solution, left
+            best = left
+            solution = solution + self._iterate(jac, kept, rest, tolerance / left)[0]
+
+    def _iterate(
+        self, jac: Jacobian, kept: _Kept, right: FloatArray, tolerance: float
+    ) -> tuple[FloatArray, float]:
+        """Return a solution and the relative residual that the iteration left, `tolerance` where that was reached."""
+        system = _system(jac, kept.preconditioner)
 
         def product(y: FloatArray) -> FloatArray:
             self.counts.products += 1
@@ -170,18 +198,10 @@ class Krylov:
             y, failed = scipy.sparse.linalg.bicgstab(
                 operator, right, rtol=tolerance, maxiter=self.max_products // 2
             )
-        kept.last = self.counts.products - before
         left = tolerance
         if failed:
             left = float(np.linalg.norm(right - system.product(y)) / np.linalg.norm(right))
         return system.precondition(y), left
-
-
-@dataclass(frozen=True, eq=False)
-class _Border:
-    column: FloatArray
-    row: FloatArray
-    corner: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,27 +212,35 @@ class _System:
     product: Callable[[FloatArray], FloatArray]
 
 
-def _system(solve: Solve, after: Product, border: _Border | None) -> _System:
-    """Put the same border around matrix and preconditioner; that of the latter is eliminated."""
-    if border is None:
+def _system(jac: Jacobian, kept: object) -> _System:
+    """Put the borders of the matrix around the preconditioner too, where they are eliminated."""
+    if not isinstance(jac, Bordered):
+        solve, after = _preconditioned(jac).preconditioned_by(kept)
         return _System(solve, lambda y: after(solve(y), y))
-    solved = solve(border.column)
-    pivot = border.corner - float(border.row @ solved)
-    # where P is singular in the direction of the border, any number will do: P is an approximation
-    pivot = pivot if pivot != 0.0 else 1.0
+    solve, after = _preconditioned(jac.jac).preconditioned_by(kept)
+    columns, rows, corner = jac.borders
+    n = columns.shape[0]
+    solved = np.stack([solve(column) for column in columns.T], axis=1)
+    pivot = _inverse(corner - rows @ solved)
 
     def precondition(y: FloatArray) -> FloatArray:
-        x = solve(y[:-1])
-        z = float(y[-1] - border.row @ x) / pivot
-        return np.append(x - z * solved, z)
+        x = solve(y[:n])
+        z = pivot @ (y[n:] - rows @ x)
+        return np.append(x - solved @ z, z)
 
     def product(y: FloatArray) -> FloatArray:
         v = precondition(y)
-        x, z = v[:-1], v[-1]
-        top = after(x, y[:-1] - z * border.column) + z * border.column
-        return np.append(top, border.row @ x + border.corner * z)
+        x, z = v[:n], v[n:]
+        given = columns @ z
+        return np.append(after(x, y[:n] - given) + given, rows @ x + corner @ z)
 
     return _System(precondition, product)
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    """Return the inverse; where a singular value is zero any number will do, for what is inverted belongs to an approximation."""
+    left, sizes, right = np.linalg.svd(matrix)
+    return np.asarray((right.T / np.where(sizes > 0.0, sizes, 1.0)) @ left.T)
 
 
 def _preconditioned(jac: Jacobian) -> Preconditioned:
@@ -237,13 +265,13 @@ class Automatic:
         return self._solver(jac).solve(jac, right)
 
     def solve_bordered(
-        self, jac: Jacobian, column: FloatArray, row: FloatArray, corner: float, right: FloatArray
+        self, jac: Jacobian, column: FloatArray, row: FloatArray, corner: Corner, right: FloatArray
     ) -> tuple[FloatArray | None, float]:
         """Solve the bordered system; see `LinearSolver`."""
         return self._solver(jac).solve_bordered(jac, column, row, corner, right)
 
     def _solver(self, jac: Jacobian) -> LinearSolver:
-        return self.dense if isinstance(jac, np.ndarray) else self.krylov
+        return self.krylov if array_of(jac) is None else self.dense
 
 
 def to_tolerance(linear: LinearSolver, tolerance: float) -> LinearSolver:

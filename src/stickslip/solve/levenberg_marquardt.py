@@ -5,9 +5,9 @@ import scipy.linalg
 from scipy.sparse.linalg import LinearOperator, lsmr
 
 from stickslip.arrays import FloatArray
+from stickslip.operators import Jacobian, array_of, times, transposed_times
 from stickslip.solve.iterate import Iterate, Work, column_scale, squared_ratio
 from stickslip.solve.kink import Kinks, slow
-from stickslip.solve.linear import Bordered, Jacobian, bordered_array, times, transposed_times
 from stickslip.solve.status import Status
 
 FIRST = 1e-3  # damping of the first step, as a share of the squared columns
@@ -99,7 +99,7 @@ def damped_step(
     """
     root = float(np.sqrt(damping))
     n = right.size
-    array = _array(jac)
+    array = array_of(jac)
     if array is None:
         scaled = LinearOperator(
             (n, n),
@@ -117,12 +117,3 @@ def damped_step(
         stacked, np.append(right, np.zeros(n)), lwork=64 * n, overwrite_a=True
     )
     return np.asarray(solution[:n]) / scale if info == 0 else None
-
-
-def _array(jac: Jacobian) -> FloatArray | None:
-    """Return the Jacobian as an array, if it is one inside."""
-    if isinstance(jac, np.ndarray):
-        return jac
-    if isinstance(jac, Bordered) and isinstance(jac.jac, np.ndarray):
-        return bordered_array(jac.jac, jac.column, jac.row, jac.corner)
-    return None

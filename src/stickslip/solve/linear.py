@@ -1,6 +1,5 @@
 """The linear systems of Newton and continuation: what a solver of them is, and the dense one."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -9,22 +8,9 @@ import scipy.linalg
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
+from stickslip.operators import Bordered, Corner, Inverse, Jacobian, array_of, transpose_of
 
 SINGULAR = 1e-15  # smallest pivot over largest; below, the matrix has no usable inverse
-
-
-class JacobianOperator(Protocol):
-    """A Jacobian that is known by its products."""
-
-    @property
-    def shape(self) -> tuple[int, int]: ...  # noqa: D102
-
-    def matvec(self, v: FloatArray) -> FloatArray: ...  # noqa: D102
-
-    def rmatvec(self, v: FloatArray) -> FloatArray: ...  # noqa: D102
-
-
-Jacobian = FloatArray | JacobianOperator
 
 
 class LinearSolver(Protocol):
@@ -48,7 +34,7 @@ class LinearSolver(Protocol):
         ...
 
     def solve_bordered(
-        self, jac: Jacobian, column: FloatArray, row: FloatArray, corner: float, right: FloatArray
+        self, jac: Jacobian, column: FloatArray, row: FloatArray, corner: Corner, right: FloatArray
     ) -> tuple[FloatArray | None, float]:
         """Solve ``[[jac, column], [row, corner]] x = right``; `jac` itself may be singular, as at a fold.
 
@@ -57,14 +43,14 @@ class LinearSolver(Protocol):
         jac
             (n, n) Jacobian; it is left as it is.
         column, row, corner
-            (n,), (n,), number: the border.
+            (n,), (n,) and a number, or (n, m), (m, n) and (m, m): the border.
         right
-            (n + 1,) right side.
+            (n + m,) right side.
 
         Returns
         -------
         solution
-            (n + 1,) solution; None if the bordered matrix is singular or no solution was found.
+            (n + m,) solution; None if the bordered matrix is singular or no solution was found.
         sign
             Sign of the determinant of the bordered matrix, 0 if it is singular, NaN where the solver cannot tell.
         """
@@ -80,66 +66,18 @@ class Dense:
         return solve_signed(_array(jac), right)[0]
 
     def solve_bordered(
-        self, jac: Jacobian, column: FloatArray, row: FloatArray, corner: float, right: FloatArray
+        self, jac: Jacobian, column: FloatArray, row: FloatArray, corner: Corner, right: FloatArray
     ) -> tuple[FloatArray | None, float]:
         """Solve the bordered system and return the sign of its determinant; see `LinearSolver`."""
-        return solve_signed(bordered_array(_array(jac), column, row, corner), right)
-
-
-@dataclass(frozen=True, eq=False)
-class Bordered:
-    """The matrix ``[[jac, column], [row, corner]]`` as an operator."""
-
-    jac: Jacobian
-    column: FloatArray
-    row: FloatArray
-    corner: float
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Rows and columns."""
-        n = self.column.size + 1
-        return n, n
-
-    def matvec(self, v: FloatArray) -> FloatArray:
-        """Return its product with `v` (n + 1,)."""
-        top = times(self.jac, v[:-1]) + self.column * v[-1]
-        return np.append(top, self.row @ v[:-1] + self.corner * v[-1])
-
-    def rmatvec(self, v: FloatArray) -> FloatArray:
-        """Return the product of its transpose with `v` (n + 1,)."""
-        top = transposed_times(self.jac, v[:-1]) + self.row * v[-1]
-        return np.append(top, self.column @ v[:-1] + self.corner * v[-1])
+        return solve_signed(_array(Bordered(jac, column, row, corner)), right)
 
 
 def solve_with(linear: LinearSolver, jac: Jacobian, right: FloatArray) -> FloatArray | None:
     """Solve ``jac x = right`` by `linear`, which is given a border apart from its matrix."""
     if isinstance(jac, Bordered):
-        return linear.solve_bordered(jac.jac, jac.column, jac.row, jac.corner, right)[0]
+        flat = jac.flat
+        return linear.solve_bordered(flat.jac, flat.column, flat.row, flat.corner, right)[0]
     return linear.solve(jac, right)
-
-
-def times(jac: Jacobian, v: FloatArray) -> FloatArray:
-    """Return ``jac @ v``."""
-    return jac @ v if isinstance(jac, np.ndarray) else jac.matvec(v)
-
-
-def transposed_times(jac: Jacobian, v: FloatArray) -> FloatArray:
-    """Return ``jac.T @ v``."""
-    return v @ jac if isinstance(jac, np.ndarray) else jac.rmatvec(v)
-
-
-def bordered_array(
-    jac: FloatArray, column: FloatArray, row: FloatArray, corner: float
-) -> FloatArray:
-    """Return ``[[jac, column], [row, corner]]`` as a new array, in the order LAPACK likes."""
-    n = column.size
-    matrix = np.empty((n + 1, n + 1), order="F")
-    matrix[:n, :n] = jac
-    matrix[:n, n] = column
-    matrix[n, :n] = row
-    matrix[n, n] = corner
-    return matrix
 
 
 def solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
@@ -147,21 +85,36 @@ def solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
     return solve_signed(matrix, right)[0]
 
 
-def factorised(
-    linear: LinearSolver, jac: Jacobian
-) -> Callable[[FloatArray], FloatArray | None] | None:
-    """Return the solution of ``jac x = right`` by right side; None if `jac` is singular.
+def factorised(linear: LinearSolver, jac: Jacobian) -> Inverse | None:
+    """Return how systems with `jac` and with its transpose are solved; None if `jac` is singular.
 
     An array is factorised once, and overwritten; a Jacobian known by its products is solved by `linear` for each right side.
     """
-    if isinstance(jac, Bordered) and isinstance(jac.jac, np.ndarray):
-        jac = bordered_array(jac.jac, jac.column, jac.row, jac.corner)
-    if not isinstance(jac, np.ndarray):
-        return lambda right: solve_with(linear, jac, right)
-    lu, pivots = _factors(jac)
-    if lu is None:
-        return None
-    return lambda right: np.asarray(scipy.linalg.lapack.dgetrs(lu, pivots, right)[0])
+    matrix = array_of(jac)
+    if matrix is None:
+        return _Iterated(linear, jac)
+    lu, pivots = _factors(matrix)
+    return None if lu is None else _Factored(lu, pivots)
+
+
+@dataclass(frozen=True, eq=False)
+class _Iterated:
+    linear: LinearSolver
+    jac: Jacobian
+
+    def __call__(self, right: FloatArray, *, transposed: bool = False) -> FloatArray | None:
+        jac = transpose_of(self.jac) if transposed else self.jac
+        return solve_with(self.linear, jac, right)
+
+
+@dataclass(frozen=True, eq=False)
+class _Factored:
+    lu: FloatArray
+    pivots: FloatArray
+
+    def __call__(self, right: FloatArray, *, transposed: bool = False) -> FloatArray:
+        solution, _ = scipy.linalg.lapack.dgetrs(self.lu, self.pivots, right, trans=int(transposed))
+        return np.asarray(solution)
 
 
 def _factors(matrix: FloatArray) -> tuple[FloatArray | None, FloatArray]:
@@ -185,8 +138,9 @@ def solve_signed(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray | No
 
 
 def _array(jac: Jacobian) -> FloatArray:
-    if isinstance(jac, np.ndarray):
-        return jac
+    array = array_of(jac)
+    if array is not None:
+        return array
     raise input_error(
         "Newton.linear",
         "Dense needs the Jacobian as an array, and this one is known by its products only",

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.operators import Jacobian
 from stickslip.solve.branch import ParameterEvaluation, Problem
 from stickslip.solve.continuation import Following, Point, StepControl, start_point, trace
 from stickslip.solve.iterate import Evaluation
-from stickslip.solve.linear import Jacobian
 from stickslip.solve.newton_method import GLOBALISATIONS, Newton, Solution, charged, newton
 from stickslip.solve.status import Rung, Status
 

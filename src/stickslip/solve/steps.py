@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.operators import Bordered
 from stickslip.solve.branch import (
     Following,
     Latest,
@@ -15,7 +16,6 @@ from stickslip.solve.branch import (
     measure_at,
     tangent_at,
 )
-from stickslip.solve.linear import Bordered
 from stickslip.solve.newton_method import newton
 from stickslip.solve.status import Status
 

@@ -1,0 +1,186 @@
+"""The periodic problem with extra unknowns and as many conditions: one equation ``F(y, p) = 0`` for the solvers of `stickslip.solve`.
+
+A resonance peak is a periodic motion whose frequency is unknown too and whose amplitude has a horizontal tangent; a motion of given amplitude
+has the level of the excitation as a further unknown. Each is a harmonic balance whose Jacobian gets a border: a column for each extra unknown
+and a row for each condition. Inside the border the Jacobian stays what it was, an array or known by its products.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.harmonic.balance import HarmonicBalance, Linearisation
+from stickslip.harmonic.parameters import BalanceAt, ParameterLinearisation, difference
+from stickslip.operators import Bordered, Inverse, Jacobian
+
+WANDERED = 3.0  # |ln(ω / scale)| at which a corrector has lost what it was looking for
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What extra unknowns and the parameter decide: the periodic problem and its frequency.
+
+    Attributes
+    ----------
+    balance
+        The periodic problem.
+    omega
+        Frequency, rad/s; NaN where the extra unknowns are out of bounds.
+    slopes
+        (m,) derivative of `omega` by the extra unknowns; those for which it is zero change the balance.
+    """
+
+    balance: HarmonicBalance
+    omega: float
+    slopes: FloatArray
+
+
+Invert = Callable[[Jacobian], Inverse | None]  # may overwrite an array
+Settings = Callable[[FloatArray, float], Setting]  # of the extra unknowns (m,) and the parameter
+
+
+def unknown_frequency(family: BalanceAt, scale: float) -> Settings:
+    """Return what decides a problem whose one extra unknown is ``ln(ω / scale)``, `scale` in rad/s, and whose parameter is that of `family`."""
+
+    def setting(extra: FloatArray, p: float) -> Setting:
+        near = abs(extra[0]) < WANDERED
+        omega = scale * float(np.exp(extra[0])) if near else np.nan
+        return Setting(family(p), omega, np.array([omega]))
+
+    return setting
+
+
+class Condition(Protocol):
+    """One equation beside the balance, of the motion and the extra unknowns."""
+
+    def value(self, state: "State") -> float:
+        """Return what is zero where the condition holds; infinite where it cannot be said."""
+        ...
+
+    def gradient(self, state: "State") -> FloatArray:
+        """Return the (size + m,) derivative of the value by the unknowns of the balance and the extra ones."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A bordered problem at one state, as its conditions see it.
+
+    Attributes
+    ----------
+    problem
+        The bordered problem.
+    y
+        (size + m,) unknowns of the balance and the extra ones.
+    p
+        Parameter.
+    setting
+        The balance and its frequency there.
+    """
+
+    problem: "PeriodicProblem"
+    y: FloatArray
+    p: float
+    setting: Setting
+
+    @property
+    def x(self) -> FloatArray:
+        """(size,) unknowns of the balance."""
+        return self.y[: self.setting.balance.size]
+
+    @property
+    def extra(self) -> FloatArray:
+        """(m,) extra unknowns."""
+        return self.y[self.setting.balance.size :]
+
+    @cached_property
+    def at(self) -> Linearisation:
+        """Residual and derivatives of the balance."""
+        return self.setting.balance.linearise(self.x, self.setting.omega)
+
+    @cached_property
+    def inverse(self) -> Inverse | None:
+        """How systems with the balance's own Jacobian and its transpose are solved; None where it is singular, at a fold."""
+        jac = self.at.jac
+        return self.problem.invert(jac.copy(order="K") if isinstance(jac, np.ndarray) else jac)
+
+    @cached_property
+    def columns(self) -> FloatArray:
+        """(size, m) derivatives of the balance by the extra unknowns: exact by the frequency, else central differences."""
+        own = [
+            slope * self.at.jac_p
+            if slope != 0.0
+            else self.by_extra(place, lambda state: state.at.residual)
+            for place, slope in enumerate(self.setting.slopes)
+        ]
+        return np.stack(own, axis=1)
+
+    @cached_property
+    def along(self) -> FloatArray | None:
+        """(size,) change of the motion with the first extra unknown, along solutions of the balance; None at a fold."""
+        return None if self.inverse is None else self.inverse(-self.columns[:, 0])
+
+    def moved(self, step: FloatArray) -> "State":
+        """Return the state a `step` (size + m,) away, for the same parameter."""
+        return self.problem.state(self.y + step, self.p)
+
+    def by_extra(self, place: int, function: Callable[["State"], FloatArray]) -> FloatArray:
+        """Return the derivative of a function of states by one of the extra unknowns, a central difference."""
+        here = np.zeros(self.y.size)
+        place += self.setting.balance.size
+        here[place] = 1.0
+        value = float(self.y[place])
+        return difference(lambda v: function(self.moved((v - value) * here)), value)
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicProblem:
+    """A periodic problem with extra unknowns and as many conditions; an equation in a parameter.
+
+    The unknowns y are those of the balance and the extra ones; the residual is that of the balance and the values of the conditions.
+
+    Parameters
+    ----------
+    settings
+        Balance and frequency from the extra unknowns and the parameter.
+    conditions
+        One for each extra unknown.
+    invert
+        How systems with a Jacobian are solved that conditions ask for, None for a singular one; its accuracy is theirs.
+    """
+
+    settings: Settings
+    conditions: tuple[Condition, ...]
+    invert: Invert
+
+    def state(self, y: FloatArray, p: float) -> State:
+        """Return the problem at the unknowns `y` and the parameter `p`; nothing is evaluated yet."""
+        return State(self, y, p, self.settings(y[y.size - len(self.conditions) :], p))
+
+    def residual(self, y: FloatArray, p: float) -> FloatArray:
+        """Return the (size + m,) residual."""
+        state = self.state(y, p)
+        return np.append(state.at.residual, [c.value(state) for c in self.conditions])
+
+    def linearise(self, y: FloatArray, p: float) -> ParameterLinearisation:
+        """Evaluate everything at the unknowns `y` (size + m,) and the parameter `p`; infinite out of bounds."""
+        state, n = self.state(y, p), y.size
+        if not 0.0 <= state.setting.omega < np.inf:
+            return ParameterLinearisation(np.full(n, np.inf), np.eye(n), 0.0, lambda: np.zeros(n))
+        values = np.array([c.value(state) for c in self.conditions])
+        rows = np.zeros((values.size, n))
+        for row, condition, value in zip(rows, self.conditions, values, strict=True):
+            if np.isfinite(value):
+                row[:] = condition.gradient(state)
+        size = n - values.size
+        jac = Bordered(state.at.jac, state.columns, rows[:, :size], rows[:, size:])
+        return ParameterLinearisation(
+            np.append(state.at.residual, values),
+            jac,
+            state.at.seconds_contact,
+            lambda: difference(lambda v: self.residual(y, v), p),
+        )

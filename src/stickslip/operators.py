@@ -1,0 +1,133 @@
+"""Square matrices that need not be arrays: known by their products, or in a border. What solvers take and problems hand out."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+
+
+class JacobianOperator(Protocol):
+    """A Jacobian that is known by its products."""
+
+    @property
+    def shape(self) -> tuple[int, int]: ...  # noqa: D102
+
+    def matvec(self, v: FloatArray) -> FloatArray: ...  # noqa: D102
+
+    def rmatvec(self, v: FloatArray) -> FloatArray: ...  # noqa: D102
+
+    @property
+    def transposed(self) -> "JacobianOperator": ...  # noqa: D102
+
+
+Jacobian = FloatArray | JacobianOperator
+Corner = float | FloatArray
+
+
+class Inverse(Protocol):
+    """The solution of systems with one matrix."""
+
+    def __call__(self, right: FloatArray, *, transposed: bool = False) -> FloatArray | None:
+        """Return the solution for the right side (n,), of the transposed system where that is asked for; None if there is none."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Bordered:
+    """The matrix ``[[jac, column], [row, corner]]`` as an operator, with one border or several.
+
+    Parameters
+    ----------
+    jac
+        (n, n) what is inside, which may be bordered itself.
+    column, row, corner
+        (n,), (n,) and a number, or (n, m), (m, n) and (m, m).
+    """
+
+    jac: Jacobian
+    column: FloatArray
+    row: FloatArray
+    corner: Corner
+
+    @property
+    def borders(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(n, m) columns, (m, n) rows and (m, m) corner."""
+        n = self.jac.shape[0]
+        columns = self.column.reshape(n, -1)
+        m = columns.shape[1]
+        return columns, self.row.reshape(m, n), np.reshape(self.corner, (m, m))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        n = self.jac.shape[0] + self.borders[2].shape[0]
+        return n, n
+
+    @property
+    def transposed(self) -> "Bordered":
+        """Its transpose."""
+        columns, rows, corner = self.borders
+        return Bordered(transpose_of(self.jac), rows.T, columns.T, corner.T)
+
+    @property
+    def flat(self) -> "Bordered":
+        """The same with all borders around the innermost Jacobian."""
+        if not isinstance(self.jac, Bordered):
+            return self
+        inner = self.jac.flat
+        n = inner.jac.shape[0]
+        (near, below, own), (columns, rows, corner) = inner.borders, self.borders
+        return Bordered(
+            inner.jac,
+            np.hstack([near, columns[:n]]),
+            np.vstack([below, rows[:, :n]]),
+            np.block([[own, columns[n:]], [rows[:, n:], corner]]),
+        )
+
+    def matvec(self, v: FloatArray) -> FloatArray:
+        """Return its product with `v` (n + m,)."""
+        columns, rows, corner = self.borders
+        x, z = np.split(v, [columns.shape[0]])
+        return np.append(times(self.jac, x) + columns @ z, rows @ x + corner @ z)
+
+    def rmatvec(self, v: FloatArray) -> FloatArray:
+        """Return the product of its transpose with `v` (n + m,)."""
+        columns, rows, corner = self.borders
+        x, z = np.split(v, [columns.shape[0]])
+        return np.append(transposed_times(self.jac, x) + z @ rows, x @ columns + z @ corner)
+
+    def array(self) -> FloatArray | None:
+        """Return it as a new array, in the order LAPACK likes; None if what is inside is known by its products only."""
+        flat = self.flat
+        if not isinstance(flat.jac, np.ndarray):
+            return None
+        columns, rows, corner = flat.borders
+        n, size = columns.shape[0], flat.shape[0]
+        matrix = np.empty((size, size), order="F")
+        matrix[:n, :n], matrix[:n, n:] = flat.jac, columns
+        matrix[n:, :n], matrix[n:, n:] = rows, corner
+        return matrix
+
+
+def times(jac: Jacobian, v: FloatArray) -> FloatArray:
+    """Return ``jac @ v``."""
+    return jac @ v if isinstance(jac, np.ndarray) else jac.matvec(v)
+
+
+def transposed_times(jac: Jacobian, v: FloatArray) -> FloatArray:
+    """Return ``jac.T @ v``."""
+    return v @ jac if isinstance(jac, np.ndarray) else jac.rmatvec(v)
+
+
+def transpose_of(jac: Jacobian) -> Jacobian:
+    """Return ``jac.T``."""
+    return jac.T if isinstance(jac, np.ndarray) else jac.transposed
+
+
+def array_of(jac: Jacobian) -> FloatArray | None:
+    """Return a Jacobian that is an array, borders included; None for one that is known by its products only."""
+    if isinstance(jac, Bordered):
+        return jac.array()
+    return jac if isinstance(jac, np.ndarray) else None
