@@ -12,6 +12,7 @@ from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.errors import InputError
+from stickslip.harmonic import balance as balance_module
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import AtFrequency, law_field, load_level
 from stickslip.harmonic.peak import Driven, PeakProblem
@@ -25,6 +26,7 @@ from stickslip.response.parameter import (
 )
 from stickslip.response.system import System
 from stickslip.response.tracking import smallest_peak, track_peak
+from stickslip.solve.krylov import Automatic, Krylov
 from stickslip.solve.linear import Dense, factorised
 from stickslip.solve.newton_method import Newton, newton
 
@@ -204,6 +206,27 @@ def test_samples_leave_a_peak_with_kinks_that_is_found_all_the_same():
     # second order in 1/samples: (2π/128)² / 12 is 2.0e-4
     assert other == pytest.approx(one, rel=8e-4)
     assert other != one
+
+
+@pytest.mark.parametrize("by", ["horizontal_tangent", "phase_quadrature"])
+def test_many_unknowns_are_tracked_by_products_as_by_arrays(by, monkeypatch):
+    system, load = block()
+    how, values = Discretisation(order=4), (0.5, 0.3, 0.15)
+    arrays = list(track_peak(system, load, "mu", values, (0.8, 1.6), by, discretisation=how))
+    monkeypatch.setattr(balance_module, "CROSSOVER", 1)
+    assert how.balance(system, load, NONE).structured
+    krylov = Krylov()
+    how = replace(how, newton=Newton(linear=Automatic(krylov=krylov)))
+    products = list(track_peak(system, load, "mu", values, (0.8, 1.6), by, discretisation=how))
+    assert krylov.counts.products > 0
+    for one, other in zip(products, arrays, strict=True):
+        assert one.converged
+        assert other.converged
+        for name in ("amplitude", "omega", "phase"):
+            assert getattr(one, name) == pytest.approx(getattr(other, name), rel=1e-9)
+        # differences of Jacobians over 1e-6
+        assert one.curvature == pytest.approx(other.curvature, rel=1e-5)
+        assert one.slope == pytest.approx(other.slope, rel=1e-5)
 
 
 def test_phase_quadrature_is_in_quadrature_and_near_the_top():
@@ -410,13 +433,14 @@ def test_initial_gap_of_an_elastic_contact_is_a_negative_preload():
         ({"parameter": "colour"}, "'colour' is no field of the contact laws"),
         ({"omega_range": (1.2, 1.5)}, "holds no peak"),
         ({"omega_range": (1.5, 1.2)}, "must be positive and growing"),
+        ({"load": HarmonicLoad(np.array([0.1]))}, "load: drives no harmonic"),
     ],
 )
 def test_input_of_tracking_is_checked(change, message):
     system, load = damped()
     given = {"parameter": "limit", "values": [0.2], "omega_range": (0.8, 1.4), **change}
     with pytest.raises(InputError, match=message.replace("(", r"\(")):
-        list(track_peak(system, load, **given))
+        list(track_peak(system, **{"load": load, **given}))
 
 
 @pytest.mark.parametrize(

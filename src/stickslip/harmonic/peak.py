@@ -11,13 +11,14 @@ The gradient of the first condition follows from the adjoint ``Jᵀ μ = ∂ ln|
 is, by the symmetry of second derivatives, the derivative of J along the response, and two evaluations of the Jacobian give it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.bordered import (
     Condition,
@@ -26,6 +27,7 @@ from stickslip.harmonic.bordered import (
     State,
     unknown_frequency,
 )
+from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import BalanceAt, ParameterLinearisation, by_parameter
 from stickslip.operators import transposed_times
 
@@ -68,6 +70,21 @@ class Driven:
         out = np.zeros(x.size)
         out[places] = x[places] / (x[places] @ x[places])
         return out
+
+
+def driven_by(load: HarmonicLoad) -> tuple[tuple[int, ...], float]:
+    """Return the harmonics that a load drives, that of the largest force first, and the phase of this force, rad.
+
+    Raises
+    ------
+    InputError
+        If it drives none.
+    """
+    largest = {h: f[np.argmax(np.abs(f))] for h, f in load.harmonics.items() if np.any(f)}
+    if not largest:
+        raise input_error("load", "drives no harmonic", "A peak needs an excitation.")
+    order = sorted(largest, key=lambda h: (-abs(largest[h]), h))
+    return tuple(order), float(np.angle(largest[order[0]]))
 
 
 @dataclass(frozen=True)
@@ -204,6 +221,14 @@ class PeakProblem:
             condition = PhaseQuadrature(self.driven, self.phase)
         settings = unknown_frequency(self.family, self.omega_scale)
         return PeriodicProblem(settings, (condition,), self.invert)
+
+    def sharpened(self, state: State) -> "PeakProblem":
+        """Return the problem with the sharpness that a `state` near the peak has."""
+        if state.along is None:
+            return self
+        places = self.driven.places(state.setting.balance)
+        sharp = np.linalg.norm(state.along[places]) / np.linalg.norm(state.x[places])
+        return replace(self, sharpness=max(float(sharp), 1.0))
 
     def omega(self, y: FloatArray) -> float:
         """Return the frequency of the unknowns `y`, rad/s."""

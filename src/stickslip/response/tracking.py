@@ -4,7 +4,7 @@ Each peak is the solution of one equation (see `harmonic.peak`), started from th
 Newton steps a point, and its lowest point is the root of the exact slope of the peak amplitude.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import get_args
@@ -17,7 +17,7 @@ from stickslip.errors import check_choice, input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import ParameterLinearisation
-from stickslip.harmonic.peak import EVALUATIONS, Driven, Peak, PeakProblem
+from stickslip.harmonic.peak import EVALUATIONS, Driven, Peak, PeakProblem, driven_by
 from stickslip.response.follow import following_vibration, steps_through
 from stickslip.response.parameter import (
     Discretisation,
@@ -215,85 +215,80 @@ class _Tracker:
 
     def _reach(self, value: float, halvings: int) -> Solution:
         """Solve from the predicted peak; through the values between, or in a bracket, if that fails."""
-        guess = self._predicted(value)
-        solution = self._solved(guess, value)
-        last = self.known[-1][0]
-        if not self._is_found(solution, guess, value) and halvings > 0 and last != value:
-            between = self._reach(0.5 * (last + value), halvings - 1)
-            if between.status.converged:
-                guess = self._predicted(value)
-                solution = self._solved(guess, value)
-        tangent = self.problem.by == "horizontal_tangent"
-        if tangent and not self._is_found(solution, guess, value):
-            solution = self._bracketed(guess, value)
+        solution, last = self._solved(value), self.known[-1][0]
+        if (
+            not solution.status.converged
+            and halvings > 0
+            and last != value
+            and self._reach(0.5 * (last + value), halvings - 1).status.converged
+        ):
+            solution = self._solved(value)
+        if not solution.status.converged and self.problem.by == "horizontal_tangent":
+            solution = self._bracketed(value)
         if solution.status.converged:
             self.known = [*self.known[-1:], (value, solution.x)]
         return solution
 
     def _predicted(self, value: float) -> FloatArray:
         """Extrapolate the last two peaks; the last one, where that would go far."""
-        p, y = self.known[-1]
-        before, earlier = self.known[0]
-        if before == p:
-            return y
-        share = (value - p) / (p - before)
+        (before, earlier), (p, y) = self.known[0], self.known[-1]
+        share = (value - p) / (p - before) if p != before else np.inf
         return y + share * (y - earlier) if abs(share) <= 2.0 else y
 
-    def _is_found(self, solution: Solution, guess: FloatArray, value: float) -> bool:
-        """Whether a solution is the peak that was followed: near, and no minimum between two peaks."""
-        if not solution.status.converged or abs(solution.x[-1] - guess[-1]) > FARTHEST:
-            return False
-        if self.problem.by == "phase_quadrature":
-            return True
-        self.evaluations += EVALUATIONS["horizontal_tangent"]
-        return not self.problem.curvature(self.problem.state(solution.x, value)) > 0.0
+    def _solved(self, value: float) -> Solution:
+        """Solve from the predicted peak; another peak than the one that was followed is none."""
+        guess = self._predicted(value)
 
-    def _solved(self, y: FloatArray, value: float) -> Solution:
         def evaluate(v: FloatArray) -> ParameterLinearisation:
             self.evaluations += EVALUATIONS[self.problem.by]
             return self.problem.linearise(v, value)
 
-        return newton(evaluate, y, self.newton)
+        solution = newton(evaluate, guess, self.newton)
+        if not solution.status.converged or self._is_same(solution.x, guess, value):
+            return solution
+        return replace(solution, status=Status.STALLED)
 
-    def _bracketed(self, y: FloatArray, value: float) -> Solution:
+    def _is_same(self, y: FloatArray, guess: FloatArray, value: float) -> bool:
+        """Whether a solution is the peak that was followed: near, and no minimum between two peaks."""
+        if abs(y[-1] - guess[-1]) > FARTHEST:
+            return False
+        if self.problem.by == "phase_quadrature":
+            return True
+        self.evaluations += EVALUATIONS["horizontal_tangent"]
+        return not self.problem.curvature(self.problem.state(y, value)) > 0.0
+
+    def _bracketed(self, value: float) -> Solution:
         """Find the top of a response whose slope jumps there: a kink, or the steps that samples make."""
-        spent: list[Solution] = []
-        try:
-            top = self._top(y, value, spent)
-        except (ArithmeticError, ValueError):
-            return replace(charged(spent[-1], spent), x=y, status=Status.STALLED)
-        return replace(charged(spent[-1], spent), x=np.append(self._at(top, value, spent), top))
-
-    def _at(self, place: float, value: float, spent: list[Solution]) -> FloatArray:
-        """Solve at ``ln(ω / omega_scale) = place`` from the last of the solutions spent."""
-        balance, omega = self.problem.family(value), self.problem.omega(np.array([place]))
-        solution = newton(lambda v: balance.linearise(v, omega), spent[-1].x, self.newton)
-        spent.append(solution)
-        self.evaluations += solution.iterations + 1
-        if not solution.status.converged:
-            raise ArithmeticError(solution.status.advice)
-        return solution.x
-
-    def _top(self, y: FloatArray, value: float, spent: list[Solution]) -> float:
-        """Climb until the slope changes its sign, then close the bracket; `spent` takes the solutions."""
-        spent.append(Solution(y[:-1], Status.STALLED, 0, np.nan, 0.0, 0.0))
+        balance, y = self.problem.family(value), self._predicted(value)
+        spent = [Solution(y[:-1], Status.STALLED, 0, np.nan, 0.0, 0.0)]
 
         def rate(place: float) -> float:
-            x = self._at(place, value, spent)
-            self.evaluations += 1
-            found = self.problem.rate(self.problem.state(np.append(x, place), value))
-            if not np.isfinite(found):
-                raise ArithmeticError("fold")
+            """Solve at ``ln(ω / omega_scale) = place`` from the last solution, and return the slope there."""
+            omega = self.problem.omega(np.array([place]))
+            spent.append(newton(lambda v: balance.linearise(v, omega), spent[-1].x, self.newton))
+            self.evaluations += spent[-1].iterations + 2
+            found = self.problem.rate(self.problem.state(np.append(spent[-1].x, place), value))
+            if not (spent[-1].status.converged and np.isfinite(found)):
+                raise ArithmeticError("lost the response, or met a fold")
             return found
 
-        at = float(y[-1])
-        slope = rate(at)
-        step = 0.1 / self.problem.sharpness * (1.0 if slope > 0.0 else -1.0)
-        for _ in range(SEARCH):
-            if rate(at + step) * slope <= 0.0:
-                return float(scipy.optimize.brentq(rate, at, at + step, xtol=BRACKET))
-            at, step = at + step, 1.3 * step
-        raise ArithmeticError("no maximum")
+        try:
+            top = _sign_change(rate, float(y[-1]), 0.1 / self.problem.sharpness)
+            rate(top)
+        except (ArithmeticError, ValueError):
+            return replace(charged(spent[-1], spent), x=y, status=Status.STALLED)
+        return replace(charged(spent[-1], spent), x=np.append(spent[-1].x, top))
+
+
+def _sign_change(rate: Callable[[float], float], at: float, step: float) -> float:
+    """Climb until the slope changes its sign, then close the bracket."""
+    slope = rate(at)
+    step = step if slope > 0.0 else -step
+    for _ in range(SEARCH):
+        if rate(at + step) * slope <= 0.0:
+            return float(scipy.optimize.brentq(rate, at, at + step, xtol=BRACKET))
+        at, step = at + step, 1.3 * step
+    raise ArithmeticError("no maximum")
 
 
 def _tracker(
@@ -321,19 +316,15 @@ def _tracker(
     balance = family(first)
     changed = parameter(first)[0] if callable(parameter) else system
     changed = replace(changed, interface=replace(changed.interface, laws=balance.interface.laws))
-    harmonics, phase = _driven(balance.linear.load)
+    harmonics, phase = driven_by(balance.linear.load)
     driven = Driven(int(np.searchsorted(balance.linear.retained, dof)), harmonics)
     invert = partial(factorised, to_tolerance(how.newton.linear, EXACT))
     problem = PeakProblem(family, by, driven, phase, omega_range[1], invert)
     points = _sweep(changed, balance, omega_range, how.newton)
     x, omega = _first_peak(problem, first, points)
-    problem = replace(problem, omega_scale=omega)
     y = np.append(x, 0.0)
-    along = problem.state(y, first).along
-    if along is not None:
-        places = driven.places(balance)
-        sharp = np.linalg.norm(along[places]) / np.linalg.norm(x[places])
-        problem = replace(problem, sharpness=max(float(sharp), 1.0))
+    problem = replace(problem, omega_scale=omega)
+    problem = problem.sharpened(problem.state(y, first))
     few = replace(
         how.newton,
         max_iterations=min(STEPS, how.newton.max_iterations),
@@ -341,15 +332,6 @@ def _tracker(
     )
     spent = sum(p.solution.iterations + EVALUATIONS_BESIDE for p in points)
     return _Tracker(problem, few, [(first, y)], spent)
-
-
-def _driven(load: HarmonicLoad) -> tuple[tuple[int, ...], float]:
-    """Return the harmonics that a load drives, that of the largest force first, and the phase of this force, rad."""
-    largest = {h: f[np.argmax(np.abs(f))] for h, f in load.harmonics.items() if np.any(f)}
-    if not largest:
-        raise input_error("load", "drives no harmonic", "A peak needs an excitation.")
-    order = sorted(largest, key=lambda h: (-abs(largest[h]), h))
-    return tuple(order), float(np.angle(largest[order[0]]))
 
 
 def _sweep(
