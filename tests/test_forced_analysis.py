@@ -179,6 +179,7 @@ def test_checks_of_a_finished_job_agree_and_solve_nothing_again(
         "Forced response",
         "Where guarded_alert asked for more harmonics",
         "Against twice as many harmonics",
+        "Is it stable?",
         "Against time integration",
     ]
 

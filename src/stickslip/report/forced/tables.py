@@ -77,7 +77,7 @@ def attempts(response: Response) -> str | None:
     return text + response.table(head, rows)
 
 
-def _sentences(response: Response, name: str) -> str:
+def sentences(response: Response, name: str) -> str:
     """List what each check said, in words."""
     if not response.has(name):
         return ""
@@ -99,7 +99,7 @@ def more_harmonics(response: Response) -> str | None:
         f"<h3>More harmonics</h3><p>What twice as many harmonics as {response.high_name} are predicted to change at the accepted "
         "points: the change of the complex amplitude, phase included, over its size.</p>"
     )
-    return text + response.table(head, rows) + _sentences(response, "reference_sentence")
+    return text + response.table(head, rows) + sentences(response, "reference_sentence")
 
 
 def time_integration(response: Response) -> str | None:
@@ -127,7 +127,7 @@ def time_integration(response: Response) -> str | None:
         f"<h3>Time integration</h3><p>First-harmonic amplitude of {response.output_name}: the two independent ways differ by at most "
         f"{worst}.</p>"
     )
-    return text + response.table(head, rows) + _sentences(response, "verify_sentence")
+    return text + response.table(head, rows) + sentences(response, "verify_sentence")
 
 
 def retention(response: Response) -> str | None:

@@ -8,6 +8,7 @@ from stickslip.report.forced.curves import frequency_response, low_order, optimi
 from stickslip.report.forced.errors import error_scatter, errors
 from stickslip.report.forced.harmonics import kept_harmonics
 from stickslip.report.forced.head import cards
+from stickslip.report.forced.stability import stability
 from stickslip.report.forced.surface import surface_map
 from stickslip.report.response import NEEDED, Response
 from stickslip.report.section import Block, Section
@@ -30,7 +31,9 @@ SECTION: Section = Section(
         ),
         Block("cases", "Cases", (tables.peaks, tables.attempts)),
         Block(
-            "checks", "Checks", (tables.more_harmonics, tables.time_integration, tables.retention)
+            "checks",
+            "Checks",
+            (stability, tables.more_harmonics, tables.time_integration, tables.retention),
         ),
     ),
     cards=cards,

@@ -1,24 +1,26 @@
-"""What the harmonics that a motion lacks change in it: one Newton step with more of them, from the motion as it was solved."""
+"""What the harmonics that a motion lacks change in it: a Newton step with more of them, or as many as it takes."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray
+from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.selection.alert import silent
 from stickslip.harmonic.support import harmonics_of
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_stiffness
+from stickslip.solve.newton_method import newton
 
 FACTOR, MORE = 2, 3  # the step has FACTOR times the harmonics of the motion and MORE,
+MOST = 41  # harmonics with which Newton's method goes on: beyond, it costs more than the motion in time
 LEAST = 11  # and at least these: after H = 1, five are too few to see what closings do
 
 
-def corrected(problem: ForcedProblem, point: ForcedPoint) -> ComplexArray | None:
-    """Return the (order+1, n_retained) coefficients of a point after a Newton step with more harmonics, m.
+def corrected(problem: ForcedProblem, point: ForcedPoint) -> ForcedPoint | None:
+    """Return a point after a Newton step with more harmonics.
 
-    It is the step that the Jacobian Alert predicts errors from. The point's own come back where no force acts on the missing harmonics,
-    and None where the step is none: singular, or with a larger residual behind it.
+    It is the step that the Jacobian Alert predicts errors from; where it leaves a larger residual, Newton's method goes on to a solution,
+    with up to `MOST` harmonics. The point itself comes back where no force acts on the missing ones, and None where nothing is found.
     """
     omega = point.omega
     low = with_stiffness(problem.balance(point.support))
@@ -26,14 +28,21 @@ def corrected(problem: ForcedProblem, point: ForcedPoint) -> ComplexArray | None
     x, padded = low.unknowns(point.coefficients), high.unknowns(point.coefficients)
     period = high.forces(padded, omega, problem.step(low, x, omega).events)
     if silent(low, high, period):
-        return point.coefficients
+        return point
     before = high.linearise(padded, omega, period)
     change = problem.alert_solve(before.jac, -before.residual)
-    if change is None or not np.all(np.isfinite(change)):
+    if change is not None and np.all(np.isfinite(change)):
+        after = high.linearise(padded + change, omega)
+        if np.linalg.norm(after.residual) < np.linalg.norm(before.residual):
+            return _point(point, high, padded + change)
+    if high.order > MOST:
         return None
-    after = high.linearise(padded + change, omega)
-    fallen = np.linalg.norm(after.residual) < np.linalg.norm(before.residual)
-    return high.coefficients(padded + change) if fallen else None
+    found = newton(lambda x: high.linearise(x, omega), padded, problem.sweep.newton)
+    return _point(point, high, found.x) if found.status.converged else None
+
+
+def _point(point: ForcedPoint, high: HarmonicBalance, x: FloatArray) -> ForcedPoint:
+    return replace(point, coefficients=high.coefficients(x), harmonics=np.array(high.harmonics))
 
 
 def _more(problem: ForcedProblem, order: int) -> HarmonicBalance:

@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.contact.compiled import compile_contacts
 from stickslip.contact.event_integrals import room_for_events
 from stickslip.contact.events import exact_period
@@ -75,12 +75,71 @@ class Stability:
         A multiplier above 1 whose error is more than half of itself does not show that a disturbance grows: so much is no estimate.
         Neutral multipliers are not judged while their errors are of rounding.
         """
-        size, errors = np.abs(self.floquet.multipliers), self.errors
-        judged = (np.abs(self.floquet.multipliers - 1.0) > UNIT_TOLERANCE) | ~(errors <= UNIT_TOLERANCE)  # fmt: skip
-        size, errors = size[judged], errors[judged]
-        if np.any((size - errors > 1.0 + UNIT_TOLERANCE) & (errors <= ROUGH * size)):
+        size, errors = self._judged
+        if np.any(self._outside):
             return "unstable"
         return "stable" if np.all(size + errors <= 1.0 + UNIT_TOLERANCE) else "undecided"
+
+    @property
+    def multiplier(self) -> float:
+        """Modulus of the multiplier that decides, see `reason`; 0 where all are neutral, NaN where none is known."""
+        return self._decisive[0]
+
+    @property
+    def multiplier_error(self) -> float:
+        """How far that multiplier may be from that of the motion with all harmonics."""
+        return self._decisive[1]
+
+    @property
+    def reason(self) -> str:
+        """What the verdict rests on: which multiplier and its error, or what was not known."""
+        size, error = self._decisive
+        if np.isnan(size):
+            return (
+                "no multiplier is known: rounding makes more transitions than gaps of these harmonics can have, or a law gave "
+                "tangents that are not finite"
+            )
+        if not np.isfinite(error):
+            return (
+                f"as it was solved the motion has a largest multiplier of modulus {size:.4g}; what more harmonics would change in it "
+                "is not known, no motion with more was found nearby"
+            )
+        said = f"{size:.4g} ± {error:.2g}"
+        return {
+            "unstable": f"a multiplier of modulus {said} lies outside the unit circle: a disturbance grows by as much in a period",
+            "stable": f"the largest multiplier that is not neutral has the modulus {said}: disturbances die",
+            "undecided": f"a multiplier of modulus {said} may lie on either side of the unit circle",
+        }[self.verdict]
+
+    @property
+    def _judged(self) -> tuple[FloatArray, FloatArray]:
+        """Moduli and errors of the multipliers that are judged."""
+        off = np.abs(self.floquet.multipliers - 1.0) > UNIT_TOLERANCE
+        judged = off | ~(self.errors <= UNIT_TOLERANCE)
+        return np.abs(self.floquet.multipliers[judged]), self.errors[judged]
+
+    @property
+    def _outside(self) -> BoolArray:
+        """Which of these show that a disturbance grows."""
+        size, errors = self._judged
+        return (size - errors > 1.0 + UNIT_TOLERANCE) & (errors <= ROUGH * size)
+
+    @property
+    def _decisive(self) -> tuple[float, float]:
+        """Modulus and error of the largest multiplier among those that make the verdict what it is."""
+        size, errors = self._judged
+        reaching = size + errors > 1.0 + UNIT_TOLERANCE
+        of_verdict = next((own for own in (self._outside, reaching) if np.any(own)), size >= 0.0)
+        if not np.any(of_verdict):
+            unknown = np.any(np.isnan(size))
+            return (np.nan, np.inf) if unknown else (0.0, 0.0)
+        at = np.flatnonzero(of_verdict)[np.argmax(size[of_verdict])]
+        return float(size[at]), float(errors[at])
+
+    @property
+    def unknown(self) -> bool:
+        """Whether no multiplier is known."""
+        return bool(np.any(np.isnan(self.floquet.multipliers)))
 
     @property
     def stable(self) -> bool:
@@ -91,8 +150,9 @@ class Stability:
 def stability(problem: ForcedProblem, point: ForcedPoint) -> Stability:
     """Return the stability of a solved point of a forced response.
 
-    The multipliers are those of the motion after one Newton step with more harmonics, and what this step changes in them is part of their
-    errors: few harmonics give the times of transitions less well than amplitudes.
+    The multipliers are those of the motion after a Newton step with more harmonics, and what this step changes in them is part of their
+    errors: few harmonics give the times of transitions less well than amplitudes. Where one step does not lead nearer to a motion, Newton's
+    method goes on to one.
 
     Parameters
     ----------
@@ -112,22 +172,19 @@ def stability(problem: ForcedProblem, point: ForcedPoint) -> Stability:
             f"did not converge at {point.omega:g} rad/s ({point.status.advice})",
             "Ask for the stability of solutions only.",
         )
-    solved = _of_coefficients(problem, point.coefficients, point.omega)
+    solved = _of_point(problem, point)
     more = corrected(problem, point)
-    better = None if more is None else _of_coefficients(problem, more, point.omega)
-    known = [
-        one for one in (better, solved) if one and not np.any(np.isnan(one.floquet.multipliers))
-    ]
-    if better is None or len(known) < 2:
-        found = known[0] if known else solved
-        return replace(found, errors=np.full_like(found.errors, np.inf))
-    return _with_change(solved, better)
+    better = None if more is None else _of_point(problem, more)
+    if better is not None and not better.unknown and not solved.unknown:
+        return _with_change(solved, better)
+    found = better if solved.unknown and better is not None else solved
+    return replace(found, errors=np.full_like(found.errors, np.inf))
 
 
-def _of_coefficients(problem: ForcedProblem, coefficients: ComplexArray, omega: float) -> Stability:
-    """Return the stability of the motion with these coefficients of the retained coordinates."""
-    gaps = to_real(coefficients @ problem.low.interface.gap_operator.T)
-    return motion_stability(problem.system.structure, problem.system.interface, gaps, omega)
+def _of_point(problem: ForcedProblem, point: ForcedPoint) -> Stability:
+    """Return the stability of the motion of a point as it was solved."""
+    gaps = to_real(point.coefficients @ problem.low.interface.gap_operator.T)
+    return motion_stability(problem.system.structure, problem.system.interface, gaps, point.omega)
 
 
 def _with_change(solved: Stability, better: Stability) -> Stability:

@@ -34,14 +34,22 @@ def remaining_change(changes: Sequence[float]) -> float:
     changes by 1e-6 a period may still have 1e-3 to go. Where no decay can be seen, as at the level of rounding, the
     slowest decay that is credited to a structure is assumed.
     """
-    stretch = last_third(len(changes))
-    if len(changes) < 2 * stretch:
+    late, early = last_changes(changes)
+    if np.isnan(late):
         return np.inf
-    late, early = max(changes[-stretch:]), max(changes[-2 * stretch : -stretch])
     if late == 0.0:
         return 0.0
+    stretch = last_third(len(changes))
     ratio = (late / early) ** (1.0 / stretch) if early > 0.0 else 1.0
     return late * (min(ratio / (1.0 - ratio), LONGEST_MEMORY) if ratio < 1.0 else LONGEST_MEMORY)
+
+
+def last_changes(changes: Sequence[float]) -> tuple[float, float]:
+    """Return the largest change of the last stretch and of the one before; NaN where the record is too short for two."""
+    stretch = last_third(len(changes))
+    if len(changes) < 2 * stretch:
+        return np.nan, np.nan
+    return max(changes[-stretch:]), max(changes[-2 * stretch : -stretch])
 
 
 def period_harmonics(began: FloatArray, samples: FloatArray, order: int) -> ComplexArray:
@@ -81,6 +89,16 @@ class Progress:
             self.changes.append(_relative(self.firsts[-1] - self.firsts[-2], self.firsts[-1]))
             self.remaining = remaining_change(self.changes)
             self.status = "settled" if self.remaining < tolerance else "unsettled"
+
+    def goes_on(self, least: int) -> bool:
+        """Whether there is more to be seen: nothing of a motion that has overflowed, of a settled one until `least` periods are over."""
+        return self.status == "unsettled" or (self.status == "settled" and self.periods < least)
+
+    @property
+    def decay(self) -> float:
+        """Largest change of the last third over that of the third before; NaN without two such stretches or without any change."""
+        late, early = last_changes(self.changes)
+        return late / early if early > 0.0 else np.nan
 
     @property
     def change(self) -> float:

@@ -44,12 +44,15 @@ class TimeStepping:
         The first harmonic counts as settled when what is left of its change, relative to its amplitude, is below this.
     harmonics
         Highest harmonic reported.
+    min_periods
+        Go on for so many periods, however settled the motion is: a disturbance may need them to show.
     """
 
     steps_per_period: int = quantity("steps in a period", default=1024, least=16, most=MOST_STEPS)
     max_periods: int = quantity("periods at most", default=3000, least=2)
     tolerance: float = quantity("relative change, 1e-5 is usual", default=1e-5, above=0, below=1)
     harmonics: int = quantity("highest harmonic reported", default=7, least=1)
+    min_periods: int = quantity("periods at least", default=1, least=1)
 
     def __post_init__(self) -> None:
         check_quantities(self)
@@ -82,6 +85,9 @@ class TransientResult:
         Largest relative change of the first harmonic from one period to the next over the last few periods.
     remaining
         What is left to come of such changes if they go on decaying as they did (see `stickslip.response.time.settling`).
+    decay
+        Largest such change of the last third of the periods over that of the third before: what goes on ringing has 1, what grows
+        more. NaN where the periods are too few.
     contact_failures
         Time steps in which the contact equations were not solved to rounding.
     drift
@@ -105,6 +111,7 @@ class TransientResult:
     periods: int
     change: float
     remaining: float
+    decay: float
     contact_failures: int
     drift: FloatArray
     swing: FloatArray
@@ -187,7 +194,7 @@ def _settle(
     n, basis, record = marcher.n, marcher.modes.basis, marcher.record()
     unknown = np.full((stepping.harmonics + 1, len(outputs)), np.nan, dtype=complex)
     now = Progress(unknown, np.full(n, np.nan))
-    while now.periods < stepping.max_periods and now.status == "unsettled":
+    while now.periods < stepping.max_periods and now.goes_on(stepping.min_periods):
         began = state.x[:n].copy()
         failed = marcher.march(state, record)
         if failed < 0 or overflowed(state.x, record.motion):
@@ -218,6 +225,7 @@ def _result(
         periods=now.periods,
         change=known * now.change,
         remaining=known * now.remaining,
+        decay=known * now.decay,
         contact_failures=now.failures,
         drift=known * now.drift,
         swing=np.ptp(motion, axis=0) / 2,

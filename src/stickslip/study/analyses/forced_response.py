@@ -26,15 +26,30 @@ from stickslip.study.analyses.forced.dataset import put_together
 from stickslip.study.analyses.forced.estimate import estimate
 from stickslip.study.analyses.forced.in_time import Check, check_in_time, chosen
 from stickslip.study.analyses.forced.more_harmonics import check_harmonics
-from stickslip.study.analyses.forced.points import Response, collect
-from stickslip.study.analyses.forced.question import HARMONICS, IN_TIME, Question, question_of
+from stickslip.study.analyses.forced.points import Accepted, Response, collect
+from stickslip.study.analyses.forced.question import (
+    HARMONICS,
+    IN_TIME,
+    STABLE,
+    Question,
+    question_of,
+)
 from stickslip.study.analyses.forced.retention import peak_shift
 from stickslip.study.analyses.forced.section import ForcedResponse
+from stickslip.study.analyses.forced.stable import (
+    Examined,
+    cost_line,
+    examine,
+    to_examine,
+    to_integrate,
+    with_motion,
+)
 from stickslip.study.analyses.forced.summary import tables
 from stickslip.study.analyses.forced.values import (
     Values,
     of_checks,
     of_doubt,
+    of_examined,
     of_model,
     of_response,
     texts,
@@ -44,7 +59,7 @@ from stickslip.units import HZ
 
 NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
 COMPILED = 5.0  # seconds of the first evaluation: below, it was found compiled
-NOTES = ("model", "response", IN_TIME, HARMONICS)  # what makes up the dataset
+NOTES = ("model", "response", STABLE, IN_TIME, HARMONICS)  # what makes up the dataset
 
 
 class ForcedResponseAnalysis:
@@ -81,8 +96,7 @@ class ForcedResponseAnalysis:
         notes.put("finished", {"points": len(points)})
         response = collect(inputs.problem, points, inputs.model.peak_output)
         _put_down(inputs, response, notes)
-        if IN_TIME in inputs.checks:
-            _check_in_time(inputs, response, notes)
+        _judge(inputs, response, notes)
         if HARMONICS in inputs.checks:
             _check_harmonics(inputs, response, notes)
         if failure is not None:
@@ -109,6 +123,7 @@ class ForcedResponseAnalysis:
         return (
             str(estimate(model, question.sweep)),
             *(f"harmonics: {line}" for line in chooser.lines(passages)),
+            cost_line(question),
             *inside(question),
             *(f"WARNING: {text}" for text in doubts),
         )
@@ -150,17 +165,52 @@ def _put_down(question: Question, response: Response, notes: Notes) -> None:
     )
 
 
-def _check_in_time(question: Question, response: Response, notes: Notes) -> None:
-    """Integrate in time; what an interrupted run has integrated is not done again."""
-    checks = []
-    for accepted in chosen(question, response):
-        name = f"{IN_TIME}.{accepted.point.omega!r}"
+def _judge(question: Question, response: Response, notes: Notes) -> None:
+    """Examine the stability, and integrate in time what was asked for and what the multipliers leave undecided at the peak."""
+    examined = _examined(question, response, notes)
+    chosen_points = chosen(question, response) if IN_TIME in question.checks else []
+    if not chosen_points and response.top and to_integrate(question, response, examined):
+        chosen_points = [response.top]
+    checks = {a.point.omega: _checked(question, response, a, examined, notes) for a in chosen_points}  # fmt: skip
+    if checks:
+        notes.put(IN_TIME, of_checks(list(checks.values())))
+    told = [with_motion(one, checks.get(one.omega)) for one in examined]
+    for one in told:
+        LOG.info(f"stability: {question.said(one.sentence)}")
+    notes.put(STABLE, of_examined(told))
+
+
+def _examined(question: Question, response: Response, notes: Notes) -> list[Examined]:
+    """Examine the stability; what an interrupted run has examined is not done again."""
+    found = []
+    for position in to_examine(question, response):
+        name = f"{STABLE}.{position}"
         known = notes.get(name)
-        check = Check(**known) if known else check_in_time(question, response, accepted)
-        notes.put(name, asdict(check))
-        LOG.info(f"time integration: {question.said(check.sentence)}")
-        checks.append(check)
-    notes.put(IN_TIME, of_checks(checks))
+        one = Examined(**known) if known else examine(question, response.accepted[position])
+        notes.put(name, asdict(one))
+        found.append(one)
+    return found
+
+
+def _checked(
+    question: Question,
+    response: Response,
+    accepted: Accepted,
+    examined: Sequence[Examined],
+    notes: Notes,
+) -> Check:
+    """Integrate in time; what an interrupted run has integrated is not done again."""
+    omega = accepted.point.omega
+    name = f"{IN_TIME}.{omega!r}"
+    known = notes.get(name)
+    if known:
+        check = Check(**known)
+    else:
+        doubted = [e.multiplier for e in examined if e.omega == omega and e.doubted]
+        check = check_in_time(question, response, accepted, *doubted)
+    notes.put(name, asdict(check))
+    LOG.info(f"time integration: {question.said(check.sentence)}")
+    return check
 
 
 def _check_harmonics(question: Question, response: Response, notes: Notes) -> None:

@@ -2,13 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import ceil, isfinite, log
+from typing import Literal
 
 import numpy as np
 
+from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import one_structure
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, forced_problem
+from stickslip.response.system import System
 from stickslip.response.time.sectors import all_sectors
 from stickslip.response.time.start import TransientStart, start_from_harmonics
 from stickslip.response.time.transient import (
@@ -25,10 +29,28 @@ PATIENCE = 600  # periods; a blade damped by 0.3 % forgets its start to 1e-5, un
 LARGE = 1.0  # percent: above it the balance is repeated with more harmonics, to tell which of the two is wrong
 NAMED = 3  # drifting coordinates that a sentence names
 MORE = 3  # times the harmonics, and the samples, of that repeat
+MOST_HARMONICS = 63  # of it
+APART = 10.0  # percent: a motion in time that is farther from every balance is another one
+KICK = 1e-3  # of their own amplitude, by which speeds are disturbed where multipliers do not say that disturbances die
+SHOWN = 1e3  # times: a disturbance that has grown or decayed so much has shown what becomes of it
+RINGS = 1e-3  # scatter of a motion that repeats but for what goes on ringing
+DECAYS, GROWS = 0.5, 1.1  # change of the last third of an integration over that of the third before
+MOST_TOLD = 10**6  # periods
+GOLDEN = 2.399963  # rad, of which no few multiples are alike
 STEPS = 1024  # of a period
+FLOPS = 4e9  # a second, of a march
 MOST_STEPS = (
     8 * STEPS
 )  # of an integration that is repeated with twice the steps for as long as these change it by more than `LARGE`
+
+
+Motion = Literal["attained", "left", "not periodic", "not settled"]
+TOLD: dict[str, str] = {
+    "attained": "attained: the motion in time stays with that of the balance",
+    "left": "left: the motion in time goes away from that of the balance",
+    "not periodic": "the motion in time does not repeat with the period of the load",
+    "not settled": "where the motion in time goes is not known yet",
+}
 
 
 @dataclass(frozen=True)
@@ -57,6 +79,11 @@ class Check:
         By how much the amplitude changed with the last doubling of the steps; 0 where it was not needed.
     refined_order, refined
         Harmonics and amplitude of the balance repeated with more of them; NaN where it was not needed or failed.
+    motion
+        What the motion in time did that began with the balance's state: *attained* it, *left* it for another one or without bound,
+        is *not periodic*, or has *not settled* so far.
+    shows_after
+        Periods in which a disturbance changes a thousandfold by the multiplier that was found; 0 where that was not asked for.
     """
 
     frequency_hz: float
@@ -71,6 +98,8 @@ class Check:
     step_percent: float = 0.0
     refined_order: int = 0
     refined: float = float("nan")
+    motion: Motion | Literal[""] = ""
+    shows_after: int = 0
 
     @property
     def difference_percent(self) -> float:
@@ -83,7 +112,7 @@ class Check:
         return (
             f"{self.frequency_hz:.3f} Hz: balance {self.balance:.5e} m (H = {self.order}), "
             f"time integration {self.transient:.5e} m, difference {self.difference_percent:+.2f} %; "
-            f"{self._motion}{self._step}{self._verdict}"
+            f"{self._motion}{self._step}{self._verdict}{self._became}"
         )
 
     @property
@@ -93,8 +122,9 @@ class Check:
         if self.settled:
             return f"periodic after {self.periods} periods"
         drifting = f", and these coordinates drift: {self.drifting}" if self.drifting else ""
+        word = "not settled" if self.motion == "not settled" else "not periodic"
         return (
-            f"not periodic after {self.periods} periods: average over the last third, "
+            f"{word} after {self.periods} periods: average over the last third, "
             f"scatter {100 * self.scatter:.2g} %{drifting}"
         )
 
@@ -115,6 +145,17 @@ class Check:
         left = 100 * (self.refined - self.transient) / self.transient
         return f"; the balance with {self.refined_order} harmonics gives {self.refined:.5e} m ({left:+.2f} %)"
 
+    @property
+    def _became(self) -> str:
+        if not self.motion:
+            return ""
+        capped = (
+            f" (followed for {self.periods} periods at most, of {self.shows_after} in which a disturbance would show)"
+            if self.shows_after > PATIENCE
+            else ""
+        )
+        return f"; {TOLD[self.motion]}{capped}"
+
 
 def chosen(question: Question, response: Response) -> list[Accepted]:
     """Return the points that are integrated: the peak of each case, and where there is one case alone its flanks, too."""
@@ -124,7 +165,12 @@ def chosen(question: Question, response: Response) -> list[Accepted]:
     return sorted((response.top, *beside), key=lambda a: a.point.omega)
 
 
-def check_in_time(question: Question, response: Response, accepted: Accepted) -> Check:
+def check_in_time(
+    question: Question,
+    response: Response,
+    accepted: Accepted,
+    multiplier: float | None = None,
+) -> Check:
     """Integrate in time at a point of the response, and compare.
 
     Parameters
@@ -133,28 +179,88 @@ def check_in_time(question: Question, response: Response, accepted: Accepted) ->
         The model, and its finished response.
     accepted
         One of its points.
+    multiplier
+        Modulus of the multiplier of a point that is not known to be stable, NaN where none is known: the motion then begins with
+        disturbed speeds and is followed for as long as these need to show. None: neither.
     """
     problem, point = question.problem, accepted.point
-    found = integrated(problem, point, question.model.load)
-    check = _compared(response, accepted, found, STEPS)
+    after = 0 if multiplier is None else shows_after(multiplier)
+    found = integrated(
+        problem,
+        point,
+        question.model.load,
+        kick=0.0 if multiplier is None else KICK,
+        least=max(1, min(after, PATIENCE)),
+    )
+    check = replace(_compared(response, accepted, found, STEPS), shows_after=after)
     if found.settled and not abs(check.difference_percent) <= LARGE:
-        check = _with_steps_enough(question, response, accepted, found)
-    if abs(check.difference_percent) <= LARGE:
-        return check
-    order = MORE * max(question.sweep.high_harmonics[-1], point.order)
-    many = refined(question, point, order)
-    if many is None:
-        return replace(check, refined_order=order)
-    return replace(check, refined_order=order, refined=problem.amplitude(many, response.output))
+        check = _with_steps_enough(question, response, accepted, check, found)
+    apart = [_apart(question, response, point, found)]
+    if not (abs(check.difference_percent) <= LARGE and apart[0] <= APART):
+        many = MORE * max(question.sweep.high_harmonics[-1], point.order)
+        order = max(min(many, MOST_HARMONICS), point.order + 1)
+        better = refined(question, point, order)
+        check = replace(check, refined_order=order)
+        if better is not None:
+            check = replace(check, refined=problem.amplitude(better, response.output))
+            apart.append(_apart(question, response, better, found))
+    return replace(check, motion=_motion(check, found, min(apart)))
+
+
+def shows_after(multiplier: float) -> int:
+    """Return the periods in which a disturbance grows or decays a thousandfold by a multiplier; more than are ever followed where it does neither.
+
+    Parameters
+    ----------
+    multiplier
+        Its modulus; NaN: not known.
+    """
+    rate = abs(log(multiplier)) if isfinite(multiplier) and multiplier > 0.0 else float("nan")
+    if multiplier == 0.0:
+        return 1
+    return ceil(log(SHOWN) / rate) if rate > log(SHOWN) / MOST_TOLD else MOST_TOLD
+
+
+def seconds_in_time(system: System) -> float:
+    """Return about how long an integration takes that does not settle, s, by the size of the model."""
+    rows, gaps = 2 * system.structure.n, 3 * system.interface.n_contacts
+    return PATIENCE * STEPS * (2.0 * rows**2 + float(gaps) ** 3) / FLOPS
+
+
+def _motion(check: Check, found: TransientResult, apart: float) -> Motion:
+    """Return what the motion in time did, `apart` percent from the nearest balance."""
+    if not isfinite(check.transient):
+        return "left"
+    if not found.settled and found.scatter > RINGS:
+        return "not settled" if found.decay < DECAYS else "not periodic"
+    if not found.settled and found.decay > GROWS:
+        return "not settled"
+    return "attained" if apart <= APART else "left"
+
+
+def _apart(
+    question: Question, response: Response, point: ForcedPoint, found: TransientResult
+) -> float:
+    """Return the distance of a balance from the integration over all outputs, phases included, percent of the latter."""
+    system = question.problem.system
+    motion = question.problem.low.linear.recover(point.omega, point.coefficients)
+    known = _known(found)
+    size = float(np.abs(known[response.output]))
+    off = float(np.abs(motion[1, system.outputs] - known)[response.output])
+    return 100 * off / size if size > 0.0 else float("inf")
+
+
+def _known(found: TransientResult) -> ComplexArray:
+    """Return the (n_outputs,) first harmonic of an integration, m; of what did not settle the average."""
+    return found.harmonics[1] if found.settled else found.average
 
 
 def _compared(response: Response, accepted: Accepted, found: TransientResult, steps: int) -> Check:
     """Return the comparison with an integration."""
-    known = found.harmonics[1] if found.settled else found.average
     return Check(
         frequency_hz=accepted.point.omega / HZ,
         balance=response.amplitude(accepted),
-        transient=float(np.abs(known[response.output])),
+        transient=float(np.abs(_known(found)[response.output])),
         settled=bool(found.settled),
         periods=int(found.periods),
         scatter=float(found.scatter),
@@ -165,16 +271,20 @@ def _compared(response: Response, accepted: Accepted, found: TransientResult, st
 
 
 def _with_steps_enough(
-    question: Question, response: Response, accepted: Accepted, found: TransientResult
+    question: Question,
+    response: Response,
+    accepted: Accepted,
+    coarse: Check,
+    found: TransientResult,
 ) -> Check:
     """Go on from a settled motion with twice the steps until these do not change it: too long a step is the first to suspect."""
-    steps, coarse = STEPS, _compared(response, accepted, found, STEPS)
+    steps = STEPS
     while True:
         steps *= 2
         found = integrated(
             question.problem, accepted.point, question.model.load, begin=found.final, steps=steps
         )
-        fine = _compared(response, accepted, found, steps)
+        fine = replace(_compared(response, accepted, found, steps), shows_after=coarse.shows_after)
         moved = 100 * (fine.transient / coarse.transient - 1.0)
         if abs(moved) <= LARGE and coarse.steps == STEPS:
             return coarse
@@ -197,6 +307,8 @@ def integrated(
     *,
     begin: TransientStart | None = None,
     steps: int = STEPS,
+    kick: float = 0.0,
+    least: int = 1,
 ) -> TransientResult:
     """Integrate in time from the balance's state at t = 0: near what is judged, so that little has to settle.
 
@@ -212,6 +324,10 @@ def integrated(
         Where to begin instead, as where an integration with fewer steps has ended.
     steps
         Steps in a period.
+    kick
+        Disturbance of the speeds at the beginning, a fraction of the amplitude that each of them has.
+    least
+        Go on for so many periods in any case.
     """
     system = problem.system
     motion = problem.low.linear.recover(point.omega, point.coefficients)
@@ -228,10 +344,25 @@ def integrated(
         point.omega,
         system.outputs,
         start=begin
-        or start_from_harmonics(motion, point.omega, contacts.gap_operator, contacts.laws),
-        stepping=TimeStepping(steps_per_period=steps, max_periods=periods),
+        or _kicked(
+            start_from_harmonics(motion, point.omega, contacts.gap_operator, contacts.laws),
+            kick * _speeds(motion, point.omega),
+        ),
+        stepping=TimeStepping(steps_per_period=steps, max_periods=periods, min_periods=least),
         weights=contacts.weights,
     )
+
+
+def _speeds(motion: ComplexArray, omega: float) -> FloatArray:
+    """Return the (n,) amplitudes of the speeds of a motion (H + 1, n), rad/s its frequency: the sums over its harmonics."""
+    orders = np.arange(len(motion))[:, None]
+    return np.asarray(np.sum(np.abs(orders * omega * motion), axis=0))
+
+
+def _kicked(start: TransientStart, speeds: FloatArray) -> TransientStart:
+    """Return a start with other speeds: by up to `speeds`, in other shares for each coordinate, that no symmetry hides a disturbance."""
+    shares = np.cos(GOLDEN * np.arange(speeds.size))
+    return replace(start, velocity=start.velocity + shares * speeds)
 
 
 def refined(question: Question, point: ForcedPoint, order: int) -> ForcedPoint | None:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from stickslip.study.analyses.forced.section import sweep_of
 from stickslip.units import RPM
 
 IN_TIME, HARMONICS = "verify", "verify_harmonics"  # checks that a run may ask for
+STABLE = "stability"  # what every run finds out unless the study says no
 RIGID = "rigid_coulomb"  # the law that the balance solves without springs
 MOST_IN_TIME = 600  # coordinates of all sectors: half a second a period, hundreds of periods
 FACTOR = 2  # times the highest harmonic that is kept: what solutions are held against
@@ -51,6 +52,8 @@ class Question:
         Checks asked for beside the response.
     first
         Whether it is the first case, which says what all have in common.
+    examine
+        Of which points the stability is examined: ``peak``, ``all`` or ``off``.
     """
 
     label: str
@@ -61,6 +64,7 @@ class Question:
     key: str = "frequency_hz"
     checks: frozenset[str] = frozenset()
     first: bool = True
+    examine: Literal["peak", "off", "all"] = "peak"
 
     @property
     def over_speed(self) -> bool:
@@ -142,6 +146,7 @@ def question_of(case: Case, model: Model) -> Question:
         key=settings.forced_response.range_key,
         checks=case.checks,
         first=case.index == 0,
+        examine=settings.forced_response.stability,
     )
 
 

@@ -52,6 +52,11 @@ class ForcedResponse(Section):
         description="number of equally spaced frequencies to step through, 2 to 10000; left out: the branch is followed, with "
         "more points where it turns (a single passage then steps through as many as points says)",
     )
+    stability: Literal["peak", "off", "all"] = Field(
+        "peak",
+        description="whether a disturbance dies, by Floquet multipliers. peak: at the peak of each case and at up to four doubtful "
+        "points, the nearest to it; all: at every point; off: nowhere",
+    )
 
     @property
     def range_key(self) -> str:

@@ -29,7 +29,8 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
         TextTable("Forced response", head, rows),
         _lines(f"Where {data.attrs['selection']} asked for more harmonics", choices(data)),
         _lines("Against twice as many harmonics", _sentences(data, "reference_sentence", labels)),
-        _lines("Against time integration", _checks(data, labels)),
+        _lines("Is it stable?", _along(data, "stability", labels)),
+        _lines("Against time integration", _along(data, "verify", labels)),
     ]
     return tuple(table for table in found if table.rows or table.lines)
 
@@ -87,8 +88,9 @@ def _sentences(data: xr.Dataset, name: str, labels: list[str]) -> tuple[str, ...
     return tuple(said(label, text) for label, text in told if text)
 
 
-def _checks(data: xr.Dataset, labels: list[str]) -> tuple[str, ...]:
-    if "verify_sentence" not in data:
+def _along(data: xr.Dataset, name: str, labels: list[str]) -> tuple[str, ...]:
+    """Return the sentences that single points have, with the labels of their cases."""
+    if f"{name}_sentence" not in data:
         return ()
-    told = zip(data["verify_case"].values, data["verify_sentence"].values, strict=True)
+    told = zip(data[f"{name}_case"].values, data[f"{name}_sentence"].values, strict=True)
     return tuple(said(labels[i], str(text)) for i, text in told)

@@ -15,6 +15,7 @@ from stickslip.study.analyses.forced.more_harmonics import ReferenceDoubt
 from stickslip.study.analyses.forced.points import Response, unknowns
 from stickslip.study.analyses.forced.quantities import STAGES
 from stickslip.study.analyses.forced.question import Question
+from stickslip.study.analyses.forced.stable import Examined
 from stickslip.units import HZ, RPM
 
 Values = dict[str, Any]
@@ -85,7 +86,19 @@ def of_checks(checks: Sequence[Check]) -> Values:
     return columns | {
         "verify_settled": _whole(int(c.settled) for c in checks),
         "verify_periods": _whole(c.periods for c in checks),
-        "verify_sentence": np.array([c.sentence for c in checks], dtype=str),
+        "verify_motion": texts(c.motion for c in checks),
+        "verify_sentence": texts(c.sentence for c in checks),
+    }
+
+
+def of_examined(examined: Sequence[Examined]) -> Values:
+    """Return what was found of the stability of points."""
+    return {
+        "stability_frequency_hz": np.array([e.omega / HZ for e in examined]),
+        "stability_verdict": texts(e.verdict for e in examined),
+        "stability_multiplier": np.array([e.multiplier for e in examined]),
+        "stability_multiplier_error": np.array([e.error for e in examined]),
+        "stability_sentence": texts(e.sentence for e in examined),
     }
 
 

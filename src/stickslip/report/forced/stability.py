@@ -1,0 +1,29 @@
+"""The table that says whether motions are stable."""
+
+import numpy as np
+
+from stickslip.report.forced.tables import sentences
+from stickslip.report.quantities import NONE, fixed, number
+from stickslip.report.response import Response
+
+
+def stability(response: Response) -> str | None:
+    """One row a point that was examined: verdict and multiplier."""
+    names = [f"stability_{word}" for word in ("case", "frequency_hz", "verdict", "multiplier", "multiplier_error")]  # fmt: skip
+    if not response.has(*names):
+        return None
+    case = response.integers(names[0])
+    hz, size, error = (response.floats(name) for name in (names[1], *names[3:]))
+    verdict = [str(text) for text in response.data[names[2]].values]
+    rows = [
+        [response.cases[int(case[i])].short, fixed(float(hz[i]), 3), verdict[i],
+         number(float(size[i]), 5) if np.isfinite(size[i]) else NONE,
+         number(float(error[i]), 2) if np.isfinite(error[i]) else "not known"]
+        for i in range(len(verdict))
+    ]  # fmt: skip
+    text = (
+        "<h3>Stability</h3><p>Whether a small disturbance of the motion dies. Each is multiplied by so much in a period; above 1 a "
+        "machine does not stay there.</p>"
+    )
+    head = ["frequency (Hz)", "verdict", "largest multiplier", "its error"]
+    return text + response.table(head, rows) + sentences(response, "stability_sentence")

@@ -1,0 +1,190 @@
+"""Whether the motions of a response are stable: the multipliers at its peak and at points that are doubtful, and what a motion in time adds."""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from stickslip.errors import InputError, StickslipError
+from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.stability import stability
+from stickslip.study.analyses.forced.in_time import Check, seconds_in_time
+from stickslip.study.analyses.forced.points import Accepted, Response
+from stickslip.study.analyses.forced.question import Question
+from stickslip.units import HZ
+
+Word = Literal["stable", "unstable", "undecided", "not examined"]
+DOUBTFUL = 4  # points beside the peak, the nearest to it
+INTERVALS = 12  # between transitions, for each contact: 2 to 18 at the peaks of the two blades
+PRODUCTS = 20  # of matrices for each of these
+FLOPS = 2e10  # a second, of such products on one core
+MOST_WORK = 60 * FLOPS  # of one examination
+MOST_IN_TIME = 20.0  # seconds estimated of an integration that nobody asked for
+FAR = 50.0  # percent off: what a motion in time is that has left a balance of which no better one is known
+ONE_SECTOR = (
+    "what vibrates is one sector of a tuned wheel, which sees one family of disturbances only"
+)
+BY_MOTION: dict[str, Word] = {"attained": "stable", "left": "unstable", "not periodic": "unstable"}
+
+
+@dataclass(frozen=True)
+class Examined:
+    """What was found of the stability of a point.
+
+    Parameters
+    ----------
+    omega
+        Where, rad/s.
+    verdict
+        In one of four words.
+    multiplier, error
+        Modulus of the multiplier that decides and its error; NaN where none is known.
+    reason
+        What the verdict rests on.
+    motion
+        What the motion in time did where the multipliers left the verdict undecided; empty where it was not asked.
+    """
+
+    omega: float
+    verdict: Word
+    multiplier: float
+    error: float
+    reason: str
+    motion: str = ""
+
+    @property
+    def doubted(self) -> bool:
+        """Whether the multipliers were looked at and do not show that disturbances die."""
+        return self.verdict in ("unstable", "undecided")
+
+    @property
+    def sentence(self) -> str:
+        """What was found and why."""
+        told = f"{self.omega / HZ:.3f} Hz: {self.verdict}"
+        if self.verdict == "undecided" and not self.motion:
+            return f"{told}: {self.reason}; an integration in time (--verify) tells more"
+        if not self.motion:
+            return f"{told}: {self.reason}"
+        return f"{told}, the motion in time being {self.motion}; by the multipliers undecided: {self.reason}"
+
+
+def to_examine(question: Question, response: Response) -> list[int]:
+    """Return positions of the points that are examined: the peak, and doubtful ones as near to it as possible; or all.
+
+    A point is doubtful where its own predicted error or its audit is above the threshold, or a jump lies beside it. Where nothing can be
+    examined the peak stands for all.
+    """
+    if question.examine == "off" or response.top is None:
+        return []
+    if unexaminable(question):
+        return [response.peak]
+    known = [i for i, a in enumerate(response.accepted) if a.point.converged]
+    if question.examine == "all":
+        return known
+    peak, jumps = response.top.point.omega, _beside_jumps(response)
+    doubtful = [
+        i
+        for i in known
+        if i != response.peak and (i in jumps or _off(question, response.accepted[i]))
+    ]
+    nearest = sorted(doubtful, key=lambda i: abs(response.accepted[i].point.omega - peak))
+    return sorted([response.peak, *nearest[:DOUBTFUL]])
+
+
+def examine(question: Question, accepted: Accepted) -> Examined:
+    """Return what the multipliers say of a point, or why they say nothing."""
+    omega = accepted.point.omega
+    why = unexaminable(question)
+    if why:
+        return Examined(omega, "not examined", np.nan, np.nan, why)
+    try:
+        found = stability(question.problem, accepted.point)
+    except InputError as error:
+        return Examined(omega, "not examined", np.nan, np.nan, error.problem)
+    except (StickslipError, FloatingPointError, np.linalg.LinAlgError) as error:
+        return Examined(omega, "not examined", np.nan, np.nan, f"no multipliers ({error})")
+    return Examined(omega, found.verdict, found.multiplier, found.multiplier_error, found.reason)
+
+
+def with_motion(examined: Examined, check: Check | None) -> Examined:
+    """Return what was found with what the motion in time did, where the multipliers do not decide."""
+    if check is None or examined.verdict != "undecided" or not check.motion:
+        return examined
+    verdict = BY_MOTION.get(check.motion, examined.verdict)
+    alone = np.isfinite(check.transient) and not np.isfinite(check.refined)
+    if check.motion == "left" and alone and abs(check.difference_percent) < FAR:
+        verdict = "undecided"  # few harmonics may be so far off the motion that they stand for
+    return replace(examined, verdict=verdict, motion=check.motion)
+
+
+def to_integrate(question: Question, response: Response, examined: list[Examined]) -> bool:
+    """Whether the peak is integrated in time without being asked to: where it is undecided, and soon done."""
+    top = response.top
+    return (
+        top is not None
+        and any(e.omega == top.point.omega and e.verdict == "undecided" for e in examined)
+        and seconds_in_time(question.model.system) < MOST_IN_TIME
+    )
+
+
+def unexaminable(question: Question) -> str:
+    """Return why no point of a case has multipliers that could be had; empty where nothing is known against it."""
+    system = question.model.system
+    if isinstance(system.structure, TunedWheel):
+        return ONE_SECTOR
+    if system.interface.rigid:
+        return "a contact is rigid: its force is no function of the gap"
+    if _work(question) > MOST_WORK:
+        return (
+            f"{system.structure.n} coordinates with {system.interface.n_contacts} contacts would take about "
+            f"{_work(question) / FLOPS:.0f} s a point, more than {MOST_WORK / FLOPS:.0f} s: each interval between two transitions costs "
+            "the exponential of a matrix of twice as many rows"
+        )
+    return ""
+
+
+def cost_line(question: Question) -> str:
+    """Return what ``stickslip check`` says of the examination."""
+    if question.examine == "off":
+        return 'stability: not examined, forced_response.stability is "off"'
+    why = unexaminable(question)
+    if why:
+        return f"stability: not examined, {why}"
+    points = (
+        "every point"
+        if question.examine == "all"
+        else f"the peak and at most {DOUBTFUL} doubtful points"
+    )
+    seconds = seconds_in_time(question.model.system)
+    motion = (
+        f"up to {seconds:.1f} s of integration in time"
+        if seconds < MOST_IN_TIME
+        else f"it stays undecided without --verify (about {seconds:.0f} s)"
+    )
+    return f"stability: {points} of a case, about {_work(question) / FLOPS:.1g} s each; where the peak is undecided, {motion}"
+
+
+def _work(question: Question) -> float:
+    """Return the operations of one examination, which looks at two motions."""
+    system = question.model.system
+    rows = 2 * system.structure.n
+    return 2.0 * INTERVALS * system.interface.n_contacts * PRODUCTS * 2.0 * rows**3
+
+
+def _off(question: Question, accepted: Accepted) -> bool:
+    """Whether the own error of a point is above the threshold."""
+    return question.chooser.is_error and bool(accepted.point.predicted_error > question.limit)
+
+
+def _beside_jumps(response: Response) -> set[int]:
+    """Return positions of the points on either side of a jump."""
+    branch = [
+        i for i, a in enumerate(response.accepted) if a.point.stage != "peak" and a.point.converged
+    ]
+    return {
+        i
+        for before, behind in pairwise(branch)
+        if response.accepted[behind].point.omega / HZ in response.jumps_hz
+        for i in (before, behind)
+    }

@@ -1,0 +1,266 @@
+"""Stability inside a run: what is examined and said of it, where the motion in time decides, and that nothing is done twice."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from models import lifting
+from small_v2 import write_four_masses, write_shrouded_sector
+from test_forced_analysis import dataset, lifted, question, rubbing, solved
+from typer.testing import CliRunner
+
+from stickslip.cli import app
+from stickslip.response.forced.response import Sweep, forced_response
+from stickslip.study.analyses import forced_response as analysis
+from stickslip.study.analyses.forced import stable
+from stickslip.study.analyses.forced.in_time import MOST_TOLD, Check, check_in_time, shows_after
+from stickslip.study.analyses.forced.points import Response, collect
+from stickslip.study.analyses.forced.question import Question
+from stickslip.study.analyses.forced.stable import (
+    Examined,
+    cost_line,
+    examine,
+    to_examine,
+    to_integrate,
+    with_motion,
+)
+from stickslip.study.analyses.forced_response import FORCED_RESPONSE
+from stickslip.study.models.study import read_study
+from stickslip.units import HZ
+
+
+def response_of(asked: Question) -> Response:
+    points = list(forced_response(asked.model.system, asked.model.load, asked.sweep))
+    return collect(asked.problem, points, 0)
+
+
+def rubbed(**others: object) -> Question:
+    sweep = Sweep(omega_range=(0.6, 1.0), low=1, high=3, points=10, peak_points=3, samples=64)
+    return question(*rubbing(), sweep, **others)
+
+
+def driven_by_itself() -> Question:
+    """A pressed contact on a mass that its dashpot drives: linear, with the multipliers exp(-c π / (m ω))."""
+    system, load = lifting()
+    structure = replace(system.structure, damping=-system.structure.damping)
+    weak = replace(load, harmonics={1: 0.1 * load.harmonics[1]})
+    sweep = Sweep(omega_range=(1.2, 1.6), low=1, high=3, points=10, peak_points=2, samples=64)
+    return question(replace(system, structure=structure), weak, sweep)
+
+
+def undecided() -> Question:
+    """The flank above a fold with one harmonic, which says little of the closing of the contact."""
+    return lifted(omega_range=(1.29, 1.6), direction="down", low=1, high=1, points=12)
+
+
+def test_the_branch_between_two_folds_is_unstable_and_no_other() -> None:
+    asked = replace(lifted(low=7, high=7), examine="all")
+    response = response_of(asked)
+    omega = np.array([a.point.omega for a in response.accepted if a.point.stage == "low"])
+    back = np.flatnonzero(np.diff(omega) < 0)
+    found = {i: examine(asked, response.accepted[i]).verdict for i in to_examine(asked, response)}
+    assert len(found) == len(response.accepted)
+    # the first and the last step backwards go around a fold
+    assert {found[int(i)] for i in back[1:]} == {"unstable"}
+    others = set(found) - set(back.tolist()) - {int(back[-1]) + 1}
+    assert {found[i] for i in others} == {"stable"}
+
+
+def test_a_known_multiplier_comes_out_and_the_motion_in_time_leaves() -> None:
+    asked = driven_by_itself()
+    response = response_of(asked)
+    assert response.top is not None
+    found = examine(asked, response.top)
+    assert found.verdict == "unstable"
+    known = np.exp(0.02 * np.pi / response.top.point.omega)
+    assert found.multiplier == pytest.approx(known, rel=1e-9)
+    assert found.error < 1e-9
+    assert "lies outside the unit circle" in found.sentence
+    check = check_in_time(asked, response, response.top, found.multiplier)
+    assert check.motion == "not periodic"
+    assert with_motion(found, check) == found
+
+
+def test_a_peak_under_friction_is_stable_and_attained() -> None:
+    asked = rubbed()
+    response = response_of(asked)
+    assert response.top is not None
+    found = examine(asked, response.top)
+    assert found.verdict == "stable"
+    assert 0.5 < found.multiplier < 1.0 - found.error
+    assert "disturbances die" in found.sentence
+    check = check_in_time(asked, response, response.top)
+    assert check.motion == "attained"
+    assert "attained" in check.sentence
+
+
+def test_what_the_multipliers_leave_undecided_the_motion_in_time_decides() -> None:
+    data = dataset(solved(undecided()))
+    assert data.stability_verdict.values.tolist() == ["stable"]
+    (sentence,) = data.stability_sentence.values.tolist()
+    assert ": stable, the motion in time being attained; by the multipliers undecided:" in sentence
+    # few harmonics: the multiplier and its error stay what they are
+    size, error = (float(data[f"stability_multiplier{s}"][0]) for s in ("", "_error"))
+    assert size < 1.0 < size + error
+    assert data.verify_motion.values.tolist() == ["attained"]
+    # followed for as long as a disturbance needs to decay a thousandfold
+    assert int(data.verify_periods[0]) >= shows_after(size)
+    assert data.verify_case.values.tolist() == data.stability_case.values.tolist() == [0]
+    assert float(data.verify_frequency_hz[0]) == float(data.stability_frequency_hz[0])
+
+
+def test_a_large_model_stays_undecided_and_names_the_check(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stable, "MOST_IN_TIME", 0.0)
+    data = dataset(solved(undecided()))
+    assert data.stability_verdict.values.tolist() == ["undecided"]
+    assert "(--verify) tells more" in str(data.stability_sentence.values[0])
+    assert "verify_motion" not in data
+    assert "it stays undecided without --verify" in cost_line(undecided())
+
+
+def test_nothing_is_examined_or_integrated_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = undecided()
+    whole = solved(asked)
+    first = dataset(whole)
+    times: list[str] = []
+    monkeypatch.setattr(analysis, "examine", lambda *_: times.append("examined"))
+    monkeypatch.setattr(analysis, "check_in_time", lambda *_: times.append("integrated"))
+
+    class Kept:
+        def __init__(self) -> None:
+            self.notes = dict(whole.notes)
+
+        def put(self, name: str, values: dict[str, object]) -> None:
+            self.notes[name] = values
+
+        def get(self, name: str) -> dict[str, object] | None:
+            return self.notes.get(name)
+
+    kept = Kept()
+    assert list(FORCED_RESPONSE.solve(asked, whole.records, kept)) == []
+    assert times == []
+    again = dataset(replace(whole, notes=kept.notes))
+    assert again.stability_sentence.values.tolist() == first.stability_sentence.values.tolist()
+
+
+def test_doubtful_points_near_the_peak_are_examined_too() -> None:
+    asked = rubbed()
+    response = response_of(asked)
+
+    def with_errors(error: float) -> Response:
+        points = [replace(a.point, predicted_error=error) for a in response.accepted]
+        both = zip(response.accepted, points, strict=True)
+        return replace(response, accepted=tuple(replace(a, point=p) for a, p in both))
+
+    assert to_examine(asked, with_errors(0.01)) == [response.peak]
+    assert to_examine(asked, with_errors(float("nan"))) == [response.peak]
+    assert to_examine(replace(asked, examine="off"), response) == []
+    found = to_examine(asked, with_errors(0.2))
+    assert len(found) == 1 + stable.DOUBTFUL
+    assert response.peak in found
+    omega = np.array([a.point.omega for a in response.accepted])
+    off = np.abs(omega - omega[response.peak])
+    assert sorted(found) == sorted(np.argsort(off)[: len(found)].tolist())
+    assert to_examine(asked, replace(response, peak=-1)) == []
+
+
+def test_one_sector_of_a_tuned_wheel_is_not_examined(tmp_path: Path) -> None:
+    (case,) = read_study(write_shrouded_sector(tmp_path)).cases()
+    asked = FORCED_RESPONSE.inputs(case, case.build())
+    any_point = response_of(rubbed()).accepted[0]
+    found = examine(asked, any_point)
+    assert found.verdict == "not examined"
+    assert np.isnan(found.multiplier)
+    assert found.sentence.endswith(
+        "not examined: what vibrates is one sector of a tuned wheel, which sees one family of disturbances only"
+    )
+    assert cost_line(asked).startswith("stability: not examined, what vibrates is one sector")
+
+
+def test_what_costs_too_much_is_said_by_its_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = rubbed()
+    response = response_of(asked)
+    assert "about" in cost_line(asked)
+    monkeypatch.setattr(stable, "MOST_WORK", 1.0)
+    assert to_examine(replace(asked, examine="all"), response) == [response.peak]
+    assert response.top is not None
+    found = examine(asked, response.top)
+    assert found.verdict == "not examined"
+    assert "2 coordinates with 2 contacts would take about" in found.reason
+    assert not to_integrate(asked, response, [found])
+
+
+def test_structural_damping_is_told_as_the_reason() -> None:
+    asked = rubbed()
+    system = asked.model.system
+    lossy = replace(system, structure=replace(system.structure, loss=0.01 * np.eye(2)))
+    asked = replace(asked, model=replace(asked.model, system=lossy))
+    response = response_of(asked)
+    assert response.top is not None
+    found = examine(asked, response.top)
+    assert found.verdict == "not examined"
+    assert "structural damping" in found.reason
+
+
+EXAMINED = Examined(HZ * 180.0, "undecided", 1.02, 0.1, "a reason")
+CHECK = Check(180.0, 1.02e-3, 1e-3, settled=True, periods=90, order=5, refined=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("motion", "verdict"),
+    [
+        ("attained", "stable"),
+        ("left", "unstable"),
+        ("not periodic", "unstable"),
+        ("not settled", "undecided"),
+    ],
+)
+def test_motions_in_time_decide(motion: str, verdict: str) -> None:
+    found = with_motion(EXAMINED, replace(CHECK, motion=motion))  # type: ignore[arg-type]
+    assert (found.verdict, found.motion) == (verdict, motion)
+    settled = replace(EXAMINED, verdict="stable")
+    assert with_motion(settled, replace(CHECK, motion=motion)) == settled  # type: ignore[arg-type]
+
+
+def test_a_poor_balance_without_a_better_one_is_not_called_unstable() -> None:
+    near = replace(CHECK, motion="left", refined=float("nan"), balance=1.2e-3)
+    assert with_motion(EXAMINED, near).verdict == "undecided"
+    assert with_motion(EXAMINED, replace(near, balance=1.6e-3)).verdict == "unstable"
+    assert with_motion(EXAMINED, replace(near, transient=float("nan"))).verdict == "unstable"
+
+
+def test_periods_after_which_a_disturbance_has_shown() -> None:
+    assert shows_after(0.5) == shows_after(2.0) == 10
+    assert shows_after(0.0) == 1
+    assert shows_after(1.0) == shows_after(float("nan")) == MOST_TOLD
+    capped = replace(CHECK, periods=600, motion="attained", shows_after=1000)
+    assert capped.sentence.endswith(
+        "(followed for 600 periods at most, of 1000 in which a disturbance would show)"
+    )
+
+
+def invoke(*words: str) -> tuple[int, str]:
+    found = CliRunner().invoke(app, list(words))
+    return found.exit_code, found.output
+
+
+def test_a_run_says_whether_its_peaks_are_stable(tmp_path: Path) -> None:
+    study = write_four_masses(tmp_path)
+    code, said = invoke("check", str(study))
+    assert code == 0
+    assert "stability: the peak and at most 4 doubtful points of a case" in said
+    code, said = invoke("run", str(study))
+    assert code == 0
+    assert "Is it stable?" in said
+    assert " Hz: stable" in said
+    page = (study.parent / "results" / "report.html").read_text(encoding="utf-8")
+    assert "<h3>Stability</h3>" in page
+    off = write_four_masses(tmp_path / "off", {"forced_response.stability": '"off"'})
+    code, said = invoke("run", str(off), "--no-report")
+    assert code == 0
+    assert "Is it stable?" not in said
+    wrong = write_four_masses(tmp_path / "wrong", {"forced_response.stability": '"none"'})
+    code, said = invoke("check", str(wrong))
+    assert code == 2
+    assert "forced_response.stability" in said
