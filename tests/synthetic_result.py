@@ -340,7 +340,7 @@ def _attributes() -> dict[str, object]:
     return {
         "selection": "jacobian_alert", "alert_threshold_percent": 5.0, "low_order": 1, "high_order": HIGH,
         "low_harmonics": [0, 1], "high_harmonics": list(range(HIGH + 1)), "selection_threshold": 0.05, "failed": 0,
-        "samples": SAMPLES, "report_output": "tip1.x", "warnings": json.dumps([]), "error_over": "tip1.x",
+        "samples": SAMPLES, "report_output": "tip1.x", "error_over": "tip1.x",
         "alert_explanation": "One Newton step with harmonics 0 to 5 moves the outputs by more than 5 %.",
     }  # fmt: skip
 
@@ -351,7 +351,7 @@ def provenance(**more: object) -> dict[str, object]:
     return {
         "title": "Two blades, one damper <synthetic>", "stickslip_version": "0.1.0", "study_toml": study,
         "versions": json.dumps({"numpy": "2.4", "scipy": "1.17"}), "created": "2026-01-01T00:00:00+00:00",
-        "wall_seconds": 12.3, "warnings": json.dumps([]), "complete": 1,
+        "wall_seconds": 12.3, "complete": 1,
     } | more  # fmt: skip
 
 

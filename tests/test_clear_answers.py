@@ -28,7 +28,6 @@ from stickslip.response.forced.response import Sweep, forced_problem, forced_res
 from stickslip.response.system import System
 from stickslip.solve.krylov import Krylov
 from stickslip.solve.newton_method import Newton
-from stickslip.study.analyses.forced.caveats import of_numbers
 from stickslip.study.models.study import read_study
 
 LOAD = ss.HarmonicLoad(np.zeros(2), {1: np.array([0.0, 1.0])})
@@ -197,24 +196,6 @@ def test_parts_of_unlike_units_are_told() -> None:
     assert found[0].startswith("part.a has a size of 0.111 m, part.b 0.000111 m")
     assert "part.a has a Young's modulus of 2.1e+11 Pa, part.c 2.1e+08 Pa" in found[1]
     assert not unlike_units({"a": parts["a"], "b": parts["a"]})
-
-
-def test_what_the_numbers_of_a_case_cast_doubt_on_is_a_warning_of_the_run() -> None:
-    values = {
-        "retention_peak_shift": 0.2,
-        "verify_difference_percent": np.array([0.5, -7.0, np.nan]),
-        "verify_settled": np.array([1, 1, 0]),
-    }
-    shift, differ, settled = of_numbers(values)
-    assert shift.startswith("the peak changes by 20 % when the retention stiffness")
-    assert "differ by more than 1 % at 1 of 3 frequencies" in differ
-    assert "did not settle" in settled
-    good = {
-        "retention_peak_shift": np.nan,
-        "verify_difference_percent": [0.2],
-        "verify_settled": [1],
-    }
-    assert not list(of_numbers(good))
 
 
 @pytest.mark.parametrize("share", [5e-7, 1e-9])

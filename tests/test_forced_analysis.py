@@ -1,6 +1,5 @@
 """The analysis of the forced response: its dataset against the library, resumption, what it warns of and what it refuses."""
 
-import json
 import pickle
 from dataclasses import replace
 from pathlib import Path
@@ -37,8 +36,8 @@ from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton
 from stickslip.study.analyses import forced_response as analysis_module
 from stickslip.study.analyses.analysis import Case, Solved
-from stickslip.study.analyses.forced.caveats import mixed_places, no_resonance, nothing_pressed
 from stickslip.study.analyses.forced.estimate import estimate, retained_of
+from stickslip.study.analyses.forced.known import mixed_places, no_resonance, nothing_pressed
 from stickslip.study.analyses.forced.question import Question, question_of
 from stickslip.study.analyses.forced.section import ForcedResponse, sweep_of
 from stickslip.study.analyses.forced_response import FORCED_RESPONSE
@@ -88,7 +87,7 @@ def dataset(*each: Solved) -> xr.Dataset:
 
 
 def warnings_of(data: xr.Dataset) -> list[str]:
-    return list(json.loads(data.attrs["warnings"]))
+    return [v.sentence for v in FORCED_RESPONSE.verdicts(data) if v.told]
 
 
 def rubbing() -> tuple[System, HarmonicLoad]:
@@ -222,11 +221,22 @@ def lifted(**sweep: object) -> Question:
 
 def test_fold_is_told_with_the_label_of_its_case() -> None:
     asked = lifted()
-    said = warnings_of(dataset(solved(asked)))
-    assert len(said) == 1
-    assert said[0].startswith("The response folds between 0.2")
-    said = warnings_of(dataset(solved(replace(asked, label="load.f.force_n = 2"))))
-    assert said[0].startswith("load.f.force_n = 2: the response folds between")
+    (said,) = [t for t in warnings_of(dataset(solved(asked))) if "folds" in t]
+    assert said.startswith("The response folds between 0.2")
+    assert "the peak stands among them. Which motion a machine takes" in said
+    told = warnings_of(dataset(solved(replace(asked, label="load.f.force_n = 2"))))
+    assert any(t.startswith("load.f.force_n = 2: the response folds between") for t in told)
+
+
+def test_what_nothing_has_judged_is_doubtful_until_it_is() -> None:
+    asked = lifted(omega_range=(0.8, 1.0), points=5)
+    data = dataset(solved(asked))
+    assert set(data.verdict.values) == {1}
+    assert data.verdict_reason[0].item().startswith("its harmonics were not examined")
+    assert int(data.case_verdict[0]) == 1
+    again = dataset(solved(replace(asked, checks=frozenset({"verify_harmonics"}))))
+    reference = again.reference_error_percent.values
+    np.testing.assert_array_equal(again.verdict.values, reference > 5.0)
 
 
 def test_peak_at_the_end_is_no_resonance() -> None:
@@ -235,7 +245,7 @@ def test_peak_at_the_end_is_no_resonance() -> None:
         f"The largest amplitude stands at the end of the sweep ({0.9 / HZ:.2f} Hz); it is no resonance. "
         "Widen forced_response.frequency_hz."
     )
-    assert said == [told]
+    assert told in said
 
 
 def test_points_without_a_solution_are_marked_and_not_filled_in() -> None:
@@ -248,7 +258,10 @@ def test_points_without_a_solution_are_marked_and_not_filled_in() -> None:
     for name in ("amplitude", "gap", "contact_force", "output_displacement", "dissipated_energy"):
         assert np.all(np.isnan(data[name].values[lost])), name
         assert np.all(np.isfinite(data[name].values[~lost])), name
-    assert f"{lost.sum()} points did not converge" in warnings_of(data)[0]
+    assert any(f"{lost.sum()} points did not converge" in t for t in warnings_of(data))
+    assert np.all(data.verdict.values[lost] == 2)
+    assert np.all(data.verdict.values[~lost] < 2)
+    assert int(data.case_verdict[0]) == 1
 
 
 def drifting(retention: float) -> Question:
@@ -303,12 +316,13 @@ def test_warnings_of_a_sweep_beside_all_resonances() -> None:
         "no natural frequency lies between 60.00 and 70.00 Hz, neither with open nor with stuck contacts; the nearest one is "
         "50.00 Hz. Widen forced_response.frequency_hz."
     )
-    assert no_resonance(asked) == [told]
-    assert no_resonance(lifted(omega_range=(40 * HZ, 70 * HZ))) == []
-    assert mixed_places(("a.x", "b.rz"))[0].startswith(
+    (verdict,) = no_resonance(asked)
+    assert f"{verdict.why}. {verdict.remedy}" == told
+    assert no_resonance(lifted(omega_range=(40 * HZ, 70 * HZ))) == ()
+    assert mixed_places(("a.x", "b.rz"))[0].why.startswith(
         "harmonics.alert_over mixes rotations (b.rz)"
     )
-    assert mixed_places(("a.x", "b.y")) == []
+    assert mixed_places(("a.x", "b.y")) == ()
 
 
 # ---- the table, and what is refused ------------------------------------------------------------------------------------
@@ -440,7 +454,7 @@ def test_friction_that_nothing_presses_is_told(tmp_path: Path):
     )
     case = read_study(path).cases()[0]
     said = nothing_pressed(FORCED_RESPONSE.inputs(case, case.build()))
-    assert said[0].startswith("all 1 contact points with friction are open in the static state")
+    assert said[0].why.startswith("all 1 contact points with friction are open in the static state")
 
 
 def test_a_first_run_says_how_long_it_compiled(

@@ -20,11 +20,13 @@ from stickslip.report.forced.choice import choice, flagged_ranges
 from stickslip.report.forced.curves import frequency_response, optimisation
 from stickslip.report.forced.errors import errors
 from stickslip.report.forced.head import cards
-from stickslip.report.page import plots, report_file, report_html, warnings_of
+from stickslip.report.forced.tables import peaks
+from stickslip.report.page import plots, report_file, report_html
 from stickslip.report.plot import log_ticks
 from stickslip.report.quantities import number, percent, quantity, scale_for
 from stickslip.report.response import NEEDED, Response
 from stickslip.report.skin import edges
+from stickslip.study.analyses.verdict import Verdict, to_json
 
 CHROMIUM = (
     shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -218,7 +220,9 @@ def test_text_of_the_dataset_is_escaped(tmp_path: Path) -> None:
     data = synthetic_result()
     n = data.sizes["case"]
     data.attrs |= {
-        "warnings": json.dumps([evil]),
+        "verdicts": to_json(
+            [Verdict("wrong", evil, 1.0, evil, evil), Verdict("trusted", evil, None, evil)]
+        ),
         "alert_explanation": evil,
         "report_output": evil,
         "error_over": evil,
@@ -232,7 +236,6 @@ def test_text_of_the_dataset_is_escaped(tmp_path: Path) -> None:
     root = {
         "title": evil,
         "study_toml": evil,
-        "warnings": json.dumps([evil]),
         "created": evil,
         "versions": json.dumps({evil: evil}),
     }
@@ -241,24 +244,55 @@ def test_text_of_the_dataset_is_escaped(tmp_path: Path) -> None:
     assert "&lt;script&gt;document.title" in html
 
 
-def test_warnings_are_named(tmp_path: Path) -> None:
+def test_verdicts_are_listed_the_worst_first_with_their_remedies(tmp_path: Path) -> None:
     data = synthetic_result(failed=3)
-    data.attrs["warnings"] = json.dumps([f"{KEY} = 2: 3 points did not converge"])
-    root = {
-        "complete": 0,
-        "warnings": json.dumps(
-            ["The damper may drift along y.", f"{KEY} = 2: 3 points did not converge"]
-        ),
-    }
-    text = page_text(report(data, tmp_path, **root))
-    assert "3 warnings" in text
-    assert "The run is not complete" in text
-    assert "The damper may drift along y." in text
-    assert f"{KEY} = 2: 3 points did not converge" in text
+    each = (
+        Verdict("doubtful", "", None, "the damper may drift along y", "Hold it."),
+        Verdict("wrong", f"{KEY} = 2", 170.0, "did not converge", "Take more points."),
+        Verdict("trusted", "", None, "the response folds", "Points outside belong to the fold."),
+        Verdict("trusted", f"{KEY} = 5", 171.0, "peak with H = 5, stable"),
+    )
+    data.attrs["verdicts"] = to_json(each)
+    text = page_text(report(data, tmp_path, complete=0))
+    assert "Verdicts: 1 wrong, 2 doubtful" in text
+    assert f"wrong {KEY} = 2: 170.00 Hz: did not converge. Take more points." in text
+    assert text.index("did not converge. Take") < text.index("doubtful the run is not complete")
+    assert "doubtful the damper may drift along y. Hold it." in text
+    assert "the response folds. Points outside belong to the fold." in text
+    assert "Trusted, and what for: 1" in text
+
+
+def test_warnings_of_older_results_are_doubts(tmp_path: Path) -> None:
+    data = synthetic_result()
+    data.attrs["warnings"] = json.dumps(["3 points did not converge. Take more."])
+    assert "doubtful 3 points did not converge. Take more." in page_text(report(data, tmp_path))
+
+
+def test_symbols_say_what_is_doubtful_and_what_is_wrong() -> None:
+    data = synthetic_result(ratios=(5,), n=10)
+    levels = np.zeros(data.sizes["point"], dtype=np.int64)
+    levels[[2, 3]] = 1, 2
+    data["verdict"] = ("point", levels)
+    data["verdict_reason"] = ("point", [("", "too few harmonics <5", "it left")[k] for k in levels])
+    data["case_verdict"] = ("case", [1])
+    view = Response(data)
+    plot = frequency_response(view)
+    assert plot is not None
+    trace, at = plot.figure.data[0], view.points(view.cases[0]).tolist()
+    shape = "diamond" if view.more[2] else "circle"
+    assert trace.marker.symbol[at.index(2)] == f"{shape}-open"
+    assert trace.marker.symbol[at.index(3)] == "x"
+    trusted = [s for k, s in zip(at, trace.marker.symbol, strict=True) if levels[k] == 0]
+    assert set(trusted) == {"circle", "diamond"}
+    assert trace.customdata[at.index(2)][3] == "<br>doubtful: too few harmonics &lt;5"
+    assert "1 doubtful point (open symbols), 1 wrong (crosses)" in plot.caption
+    assert {"doubtful", "wrong"} <= {t.name for t in plot.figure.data}
+    assert "<td>doubtful</td>" in peaks(view)
+    assert ("doubtful", "verdict on the peak") in [(c.value, c.label) for c in cards(view)]
 
 
 def test_a_clean_run_says_so(page: Path) -> None:
-    assert "No warnings. The run is complete." in page_text(page)
+    assert "Nothing is doubtful. The run is complete." in page_text(page)
 
 
 def _without(*prefixes: str) -> Callable[[xr.Dataset], xr.Dataset]:
@@ -348,7 +382,7 @@ def test_what_is_missing_is_left_out_of_the_page_and_nothing_else(
 def test_a_run_without_a_finished_case_makes_a_page(tmp_path: Path) -> None:
     data = _without("verify")(small_result().isel(case=slice(0, 0), point=slice(0, 0)))
     html = report_html(tree_of(provenance(complete=0), forced_response=data))
-    assert "The run is not complete" in html
+    assert "the run is not complete" in html
     assert "<figure" not in html
 
 
@@ -453,14 +487,15 @@ def test_a_toy_analysis_adds_its_section_by_a_line(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(module, "SECTIONS", (*module.SECTIONS, toy))
     tree = tree_of(
         toy=xr.Dataset(
-            {"answer": (("case", "n"), [[1.0, 2.0]])}, attrs={"warnings": json.dumps(["so so"])}
+            {"answer": (("case", "n"), [[1.0, 2.0]])},
+            attrs={"verdicts": to_json([Verdict("doubtful", why="so so")])},
         )
     )
     html = report_html(tree)
     assert "<h2>The toy</h2>" in html
     assert "Figure 1. A toy." in html
     assert list(plots(tree)) == ["toy"]
-    assert warnings_of(tree) == ["so so"]
+    assert '<li><b class="doubtful">doubtful</b> so so.</li>' in html
 
 
 def test_flagged_ranges_are_runs_of_neighbouring_points(tmp_path: Path) -> None:

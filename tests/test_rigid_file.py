@@ -1,7 +1,5 @@
 """Rigid friction from a study file: the limit of stiff springs, and what it cannot be asked."""
 
-import json
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -9,6 +7,7 @@ from test_contacts_file import CHAIN
 from typer.testing import CliRunner
 
 from stickslip.cli import app
+from stickslip.study.analyses.verdict import stored
 from stickslip.study.models.study import read_study
 
 RIGID = 'law = "rigid_coulomb"\nfriction_coefficient = 0.5\npreload_n = 4.0\n'
@@ -57,7 +56,11 @@ def test_rigid_friction_is_the_limit_of_stiff_springs(chain, tmp_path):
     """The error of springs falls like k^(-1/2) (docs/theory/dlft.md), down to what seven harmonics leave out."""
     (tmp_path / "rigid").mkdir()
     rigid, data = motion(tmp_path / "rigid", changes=chain)
-    assert json.loads(data.attrs["warnings"])[1:] == []  # the peak stands at the end of the sweep
+    # no error is predicted where a contact is rigid, and the peak stands at the end of the sweep
+    unexamined, end = stored(data.attrs)
+    assert (unexamined.level, end.level) == ("doubtful", "doubtful")
+    assert "A contact is rigid, of which no error is predicted" in unexamined.remedy
+    assert "at the end of the sweep" in end.why
     assert str(data["contact_law"].values[0]) == "rigid_coulomb"
     force = data["peak_force"].values[0, 0, 0]
     assert np.abs(force).max() == pytest.approx(0.5 * 4.0)

@@ -13,6 +13,7 @@ from toy_analysis import Toy, ToyStudy
 
 from stickslip.errors import InputError
 from stickslip.study.analyses import ANALYSES
+from stickslip.study.analyses.verdict import Verdict, of_tree
 from stickslip.study.keep.folder import locked_folder
 from stickslip.study.keep.progress import LOG, Interrupted
 from stickslip.study.keep.workers import executor
@@ -58,7 +59,8 @@ def test_result_is_a_tree_with_its_origin(whole: ToyStudy) -> None:
     assert tree.attrs["title"] == "toy"
     assert tree.attrs["study_toml"] == "[toy]"
     assert tree.attrs["complete"] == 1
-    assert json.loads(tree.attrs["warnings"]) == ["factor = 2.5: large"]
+    (verdict,) = of_tree(tree)
+    assert str(verdict) == "DOUBTFUL: factor = 2.5: large."
     assert json.loads(tree.attrs["versions"])["numpy"] == np.__version__
     node = tree["toy"]
     assert list(node.case_label.values) == ["factor = 1.5", "factor = 2.5"]
@@ -66,7 +68,7 @@ def test_result_is_a_tree_with_its_origin(whole: ToyStudy) -> None:
     np.testing.assert_array_equal(node.vary_value, [[1.5], [2.5]])
     assert node.value.dims == ("case", "term", "entry")
     log = (whole.folder / "run.log").read_text()
-    assert "WARNING: factor = 2.5: large" in log
+    assert "WARNING: factor = 2.5: large." in log
     assert "term 3" not in log  # progress is no line
 
 
@@ -89,7 +91,7 @@ def test_workers_give_the_same_bits_and_their_lines_come_back(
 def test_model_of_python_gets_the_same_answer(tmp_path: Path, whole: ToyStudy) -> None:
     made = answer(Toy(), study(tmp_path).cases())
     same(made.tree, result(whole))
-    assert made.warnings == ("factor = 2.5: large",)
+    assert made.verdicts == (Verdict("doubtful", "factor = 2.5", None, "large"),)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -232,7 +234,8 @@ def test_job_without_a_solution_does_not_take_the_others_with_it(
 ) -> None:
     outcome = run_study(study(tmp_path, stop_at=2, how="singular", stop_in=0), workers=workers)
     assert outcome.failed == 1
-    assert "toy: factor = 1.5: no solution (no equilibrium)" in outcome.warnings
+    (verdict,) = (v for v in outcome.verdicts if v.level == "wrong")
+    assert verdict.sentence.startswith("factor = 1.5: toy has no solution (no equilibrium). Check")
     value = result(study(tmp_path))["toy"].value.values
     assert np.isfinite(value[1]).all()
     assert np.isfinite(value[0, :2]).all()

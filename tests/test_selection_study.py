@@ -78,7 +78,9 @@ def run(study: Study, *checks: str) -> Ran:
     lines = [text for t in tables for text in (t.title, *t.lines)]
     root = outcome.tree.attrs
     data = outcome.tree["forced_response"].to_dataset()
-    return Ran(data.assign_attrs(root | data.attrs), "\n".join([*lines, *outcome.warnings]))
+    return Ran(
+        data.assign_attrs(root | data.attrs), "\n".join([*lines, *map(str, outcome.verdicts)])
+    )
 
 
 def forget_after(study: Study, kept: int) -> int:

@@ -1,6 +1,5 @@
 """Modes, Campbell and SAFE diagrams of a study: against the assembled wheel, full modes, the library, and each other."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from stickslip.model.structure_file import save_structure
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.full_wheel import wheel
 from stickslip.study.analyses.analysis import named
+from stickslip.study.analyses.verdict import stored
 from stickslip.study.analyses.waves.numbers import Wheel
 from stickslip.study.analyses.waves.solve import Question, solve_wave
 from stickslip.study.keep.netcdf import one_case
@@ -135,7 +135,7 @@ def test_basis_that_is_too_small_is_told(
     monkeypatch.setattr("stickslip.study.analyses.waves.doubts.BASIS_ERROR", 1e-9)
     outcome = done(study(tmp_path, {"campbell.engine_orders": "[2]"}), "campbell")
     said = "wave number 2: frequencies between the speeds of the basis are off"
-    assert any(text.startswith(said) for text in outcome.warnings)
+    assert any(v.why.startswith(said) for v in outcome.verdicts)
     rough = float(outcome.tree["campbell"].basis_error.max())
     assert rough > 10 * float(joined[1]["campbell"].basis_error.max())
 
@@ -163,13 +163,15 @@ def test_engine_orders_above_the_computed_modes_are_not_called_clear(tmp_path: P
     # on 8 sectors engine order 14 excites two nodal diameters, at 1400 Hz: far above two modes
     made = study(tmp_path, {"safe.engine_orders": "[2, 14]"})
     outcome = done(made, "safe")
-    said = outcome.warnings[0]
-    assert "engine orders 14 are not judged: they excite nodal diameters 2 at 1400 Hz" in said
-    assert "raise safe.modes, now 2, to" in said
+    said = outcome.verdicts[0].sentence
+    assert "Engine orders 14 are not judged: they excite nodal diameters 2 at 1400 Hz" in said
+    assert "Raise safe.modes, now 2, to" in said
     data = outcome.tree["safe"]
     order = data.pair_engine_order.values
     np.testing.assert_array_equal(data.pair_judged.values, order != 14)
-    assert "not judged" in json.loads(data.attrs["warnings"])[0]
+    (verdict,) = stored(data.attrs)
+    assert verdict.level == "doubtful"
+    assert "not judged" in verdict.why
     rows = [row for row in outcome.summaries["safe"][0].rows if row[0] == "14"]
     assert len(rows) == 2
     assert {row[-1] for row in rows} <= {"order not judged", "NEAR"}
@@ -213,9 +215,9 @@ def test_engine_orders_above_the_followed_modes_are_named(tmp_path: Path) -> Non
     changes = {"campbell.engine_orders": "[2, 10]", "campbell.points": "9"}
     made = study(tmp_path, changes)
     outcome = done(made, "campbell")
-    said = "\n".join(outcome.warnings)
+    said = "\n".join(map(str, outcome.verdicts))
     assert "engine orders are not judged: " in said
-    assert "raise campbell.modes, now 2" in said
+    assert "Raise campbell.modes, now 2" in said
     data = one_case(outcome.tree["campbell"].to_dataset(), 0)
     orders, speeds = data.unfollowed_engine_order.values, data.unfollowed_from_rpm.values
     at = dict(zip(orders.tolist(), speeds.tolist(), strict=True))
@@ -230,15 +232,15 @@ def test_static_displacement_is_told_and_doubted_where_it_is_large(
     joined: Joined, tmp_path: Path
 ) -> None:
     data = joined[1]["modes"]
-    assert "too large" not in data.attrs["warnings"]
+    assert not stored(data.attrs)
     assert data.attrs["static_rpm"] == pytest.approx(6000.0, rel=1e-14)
     small = data.attrs["static_displacement_m"]
     # of the order of a freely rotating ring: rho Omega^2 r^3 / E at the tip
     scale = 7850 * (6000 * RPM) ** 2 * 0.29**3 / 2.1e11
     assert 0.3 * scale < small < 3 * scale
     outcome = done(study(tmp_path, {"rotation.speed_rpm": "60000.0"}), "modes")
-    assert outcome.warnings[0].startswith(
-        "the static displacement at 60000 rpm is too large for linear statics"
+    assert outcome.verdicts[0].sentence.startswith(
+        "The static displacement at 60000 rpm is too large for linear statics"
     )
     first, second = outcome.summaries["modes"]
     assert first.title == "Natural frequencies in Hz at 60000 rpm"

@@ -15,6 +15,7 @@ import xarray as xr
 
 from stickslip.errors import SingularError, input_error
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
+from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.keep.netcdf import stacked, variable
 from stickslip.study.keep.progress import LOG, advance
 
@@ -61,10 +62,13 @@ class Toy:
             notes.put("twice", {"off": 0.0})
 
     def dataset(self, solved: Sequence[Solved]) -> xr.Dataset:
-        said = [f"{s.case.label}: large" for s in solved if s.notes["model"]["factor"] > 2]
-        return xr.Dataset(
-            stacked([_of_case(s) for s in solved]), attrs={"warnings": json.dumps(said)}
+        return xr.Dataset(stacked([_of_case(s) for s in solved])).assign(
+            case_label=("case", [s.case.label for s in solved])
         )
+
+    def verdicts(self, data: xr.Dataset) -> tuple[Verdict, ...]:
+        large = data.case_label.values[data.factor.values > 2]
+        return tuple(Verdict("doubtful", str(label), None, "large") for label in large)
 
     def check(self, case: Case, model: Any) -> tuple[str, ...]:
         return (f"toy: {case.settings.toy.terms} terms",)

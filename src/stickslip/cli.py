@@ -235,16 +235,18 @@ def _say(text: str) -> None:
 
 
 def _print_result(result: "Result", files: Sequence[Path]) -> None:
-    """Print the tables of all analyses, the warnings, and which files there are."""
+    """Print the tables of all analyses, the verdicts, which files there are, and last what is not to be trusted."""
     for table in (t for tables in result.summaries.values() for t in tables):
         _print_table(table)
-    _print_lines("Warnings", result.warnings)
+    _print_lines("Verdicts", [str(v) for v in result.verdicts if v.told])
     if result.failed:
         told = (
             f"{result.failed} of the points: marked in the result and in the report, not filled in"
         )
         _print_lines("Not converged", [told])
     _print_lines("Files", [str(f) for f in files])
+    if result.not_trusted:
+        _say(f"\n{result.not_trusted}")
 
 
 def _print_table(found: "TextTable") -> None:

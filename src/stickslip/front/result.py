@@ -1,9 +1,8 @@
 """What a Python user holds of a result: its data, its figures, its peaks, its page."""
 
-import re
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from html import escape, unescape
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +11,10 @@ import xarray as xr
 
 from stickslip.errors import did_you_mean, input_error
 from stickslip.front.table import Table
-from stickslip.report.page import plots, warnings_of, write_report
+from stickslip.report.page import plots, write_report
 from stickslip.report.result import RESULT, open_result
 from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.analyses.verdict import LEVELS, Verdict, not_trusted, of_tree
 from stickslip.study.keep.netcdf import write_tree
 from stickslip.study.outcome import Outcome
 
@@ -140,9 +140,14 @@ class Result:
         return _frequencies(self.data[name].to_dataset()) if name else Table({})
 
     @cached_property
-    def warnings(self) -> tuple[str, ...]:
-        """What the page warns of, as text."""
-        return tuple(_plain(text) for text in warnings_of(self.data))
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """What is to be trusted, and what not, why, and what to do: of each case, and of its points where they differ from it."""
+        return of_tree(self.data)
+
+    @property
+    def not_trusted(self) -> str:
+        """A line that says which cases are doubtful or wrong; empty where all are trusted."""
+        return not_trusted(self.data)
 
     def saved(self, folder: Path) -> "Result":
         """Return the result with a file in a folder, which is made."""
@@ -157,16 +162,11 @@ class Result:
             size = f"{cases} cases" if cases != 1 else "1 case"
             lines.append(f"  {name}: {size}" + (f", {points} points" if points else ""))
         lines.append(f"  plots: {', '.join(self.plots)}")
-        lines += [f"  WARNING: {text}" for text in self.warnings]
+        lines += [f"  {v}" for v in self.verdicts if v.told]
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(repr(self))}</pre>{self.peaks._repr_html_()}"
-
-
-def _plain(text: str) -> str:
-    """Return HTML as text of one line."""
-    return unescape(re.sub(r"<sup>(.*?)</sup>", r"^\1", text).replace("\u202f", " "))
 
 
 def _peaks(data: xr.Dataset) -> Table:
@@ -178,6 +178,8 @@ def _peaks(data: xr.Dataset) -> Table:
         "peak_amplitude": "amplitude (m)",
     }
     found |= {name: np.asarray(data[key].values) for key, name in units.items() if key in data}
+    if "case_verdict" in data:
+        found["verdict"] = np.array([LEVELS[int(v)] for v in data["case_verdict"].values])
     return Table(found)
 
 

@@ -1,5 +1,6 @@
 """What every page is made of: numbered figures, chapters, boxes, and the frame around them."""
 
+from collections import Counter
 from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
@@ -9,6 +10,7 @@ from plotly.offline import get_plotlyjs
 
 from stickslip.report.plot import Plot
 from stickslip.report.section import Card
+from stickslip.study.analyses.verdict import LEVELS, Verdict
 from stickslip.study.keep.whole import write_whole
 
 _CONFIG = {
@@ -52,13 +54,29 @@ def cards_html(cards: Sequence[Card]) -> str:
     return f'<div class="cards">{boxes}</div>' if boxes else ""
 
 
-def warnings_html(warnings: Sequence[str]) -> str:
-    """Return the warnings, or the statement that there are none."""
-    if not warnings:
-        return '<div class="box good"><b>No warnings.</b> The run is complete.</div>'
-    items = "".join(f"<li>{w}</li>" for w in warnings)
-    said = "1 warning" if len(warnings) == 1 else f"{len(warnings)} warnings"
-    return f'<div class="box bad"><b>{said}</b><ul>{items}</ul></div>'
+def verdicts_html(verdicts: Sequence[Verdict]) -> str:
+    """Return what is doubtful or wrong, why, and what to do, the worst first; below it what is trusted."""
+    bad = sorted((v for v in verdicts if v.rank), reverse=True)
+    notes = [v for v in verdicts if v.told and not v.rank]
+    good = [v for v in verdicts if not v.told]
+    top = '<div class="box good"><b>Nothing is doubtful.</b> The run is complete.</div>'
+    if bad:
+        counts = Counter(v.level for v in bad)
+        said = ", ".join(f"{counts[level]} {level}" for level in LEVELS[::-1] if counts[level])
+        top = f'<div class="box bad"><b>Verdicts: {said}</b><ul>{"".join(map(_verdict, bad))}</ul></div>'
+    top += f'<div class="box"><ul>{"".join(map(_verdict, notes))}</ul></div>' if notes else ""
+    if not good:
+        return top
+    items = "".join(map(_verdict, good))
+    return f"{top}<details><summary>Trusted, and what for: {len(good)}</summary><ul>{items}</ul></details>"
+
+
+def _verdict(verdict: Verdict) -> str:
+    place = "" if verdict.frequency_hz is None else f"{verdict.frequency_hz:.2f} Hz: "
+    case = f"{escape(verdict.case)}: " if verdict.case else ""
+    level = f'<b class="{verdict.level}">{verdict.level}</b> ' if verdict.rank else ""
+    remedy = f" <i>{escape(verdict.remedy)}</i>" if verdict.remedy else ""
+    return f"<li>{level}{case}{place}{escape(verdict.why)}.{remedy}</li>"
 
 
 def page_html(title: str, made: str, body: str) -> str:

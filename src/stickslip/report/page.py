@@ -18,16 +18,17 @@ from stickslip.report.frame import (
     chapter,
     figure_html,
     page_html,
-    warnings_html,
+    verdicts_html,
     write_page,
 )
 from stickslip.report.node import Node
 from stickslip.report.plot import Plot
 from stickslip.report.quantities import NONE, fixed, quantity
-from stickslip.report.result import analysis, open_result, stored_warnings, versions
+from stickslip.report.result import analysis, open_result, versions
 from stickslip.report.section import Card, Part, Section, Shown
 from stickslip.report.sections import campbell, forced_response, modes, safe
 from stickslip.report.tables import html_table
+from stickslip.study.analyses.verdict import of_tree
 from stickslip.study.keep.netcdf import alike, one_case
 
 SECTIONS: tuple[Section, ...] = (
@@ -117,15 +118,6 @@ def _provenance(tree: xr.DataTree) -> str:
     return text + more if study else text
 
 
-def warnings_of(tree: xr.DataTree) -> list[str]:
-    """Return everything the reader must know before using the numbers, as HTML sentences."""
-    found = stored_warnings(tree)
-    for section, data in _shown(tree):
-        for view in _views(section, data):
-            found += section.warnings(view)
-    return list(dict.fromkeys(found))
-
-
 def plots(tree: xr.DataTree) -> dict[str, go.Figure]:
     """Return every figure of the page by its name, in the order of the page."""
     found: list[Plot | str | None] = []
@@ -159,7 +151,7 @@ def report_html(tree: xr.DataTree) -> str:
     chapters.append(chapter("provenance", "Provenance", _provenance(tree)))
     root = Node(tree.to_dataset())
     made = f"stickslip {root.text('stickslip_version')} · {root.text('created')}"
-    top = cards_html(cards) + warnings_html(warnings_of(tree))
+    top = cards_html(cards) + verdicts_html(of_tree(tree))
     return page_html(root.text("title") or "Result", made, top + "".join(chapters))
 
 

@@ -16,6 +16,7 @@ from stickslip.report.cases import ShownCase, cases_of, varied
 from stickslip.report.node import Node
 from stickslip.report.quantities import Scale, number, predicted, scale_for
 from stickslip.report.tables import html_table
+from stickslip.study.analyses.verdict import LEVELS
 
 NEEDED = ("point_case", "frequency_hz", "order", "status", "amplitude", "harmonic_kept")
 _TURNS = (".rx", ".ry", ".rz")
@@ -109,6 +110,17 @@ class Response(Node):
         values = np.atleast_1d(np.asarray(attributes.get("flag_values", [])))
         good = [v for v, m in zip(values, meanings, strict=False) if m == "converged"]
         return np.isin(self.integers("status"), good or [0])
+
+    @cached_property
+    def levels(self) -> IntArray:
+        """(point,) level of the verdict on each point; a result that tells none trusts what converged."""
+        if self.has("verdict"):
+            return self.integers("verdict")
+        return np.where(self.converged, 0, 2)
+
+    def level(self, case: ShownCase) -> str:
+        """Level of the verdict on a case; empty where the result tells none."""
+        return LEVELS[int(self.number_of("case_verdict", case))] if self.has("case_verdict") else ""
 
     @cached_property
     def alert(self) -> Alert:

@@ -60,8 +60,8 @@ class Section:
         Chapters of the page.
     by_case
         Whether `view` sees one case at a time, so that the blocks are drawn for each.
-    cards, warnings
-        Boxes for the top of the page, and sentences on what is doubtful, HTML.
+    cards
+        Boxes for the top of the page, HTML.
     """
 
     name: str
@@ -70,4 +70,3 @@ class Section:
     blocks: tuple[Block, ...]
     by_case: bool = False
     cards: Callable[[Any], Sequence[Card]] = _nothing
-    warnings: Callable[[Any], Sequence[str]] = _nothing

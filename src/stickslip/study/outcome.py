@@ -1,6 +1,5 @@
 """What a run has found, put together: the only place that makes a result of what jobs have left."""
 
-import json
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,6 +9,7 @@ import xarray as xr
 
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.analysis import Analysis, Case, Solved, TextTable
+from stickslip.study.analyses.verdict import ATTRIBUTE, Verdict, of_tree, to_json
 from stickslip.study.keep.journal import read_note, read_sealed
 from stickslip.study.keep.netcdf import variable
 from stickslip.study.keep.progress import LOG
@@ -28,8 +28,6 @@ class Outcome:
         A node an analysis; attributes of the root say where it comes from.
     summaries
         Of each analysis, what the terminal prints.
-    warnings
-        In words.
     failed
         Number of points without a solution.
     files
@@ -38,9 +36,13 @@ class Outcome:
 
     tree: xr.DataTree
     summaries: dict[str, tuple[TextTable, ...]]
-    warnings: tuple[str, ...]
     failed: int
     files: tuple[Path, ...]
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """What is to be trusted."""
+        return of_tree(self.tree)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +72,7 @@ class Book:
     origin: Provenance
     solved: dict[Path, tuple[list[Any], dict[str, dict[str, Any]]]] = field(default_factory=dict)
     nodes: dict[str, xr.Dataset] = field(default_factory=dict)
-    doubts: dict[str, list[str]] = field(default_factory=dict)
+    told: set[str] = field(default_factory=set)
 
     def read(self, tasks: Sequence[Task], unfinished: Container[Path]) -> None:
         """Put together the nodes of the analyses of which jobs have been sealed since."""
@@ -84,19 +86,16 @@ class Book:
     def enter(self, asked: Analysis, solved: Sequence[Solved]) -> None:
         """Make the node of an analysis from what its cases have found."""
         node = asked.dataset(solved).assign(case_variables([s.case for s in solved]))
-        unsolved = [s.notes[UNSOLVED]["text"] for s in solved if UNSOLVED in s.notes]
-        doubts = [*json.loads(node.attrs.get("warnings", "[]")), *unsolved]
-        for text in doubts:
-            if text not in self.warnings:
+        unsolved = [_unsolved(s) for s in solved if UNSOLVED in s.notes]
+        found = (*unsolved, *asked.verdicts(node))
+        new = dict.fromkeys(v.sentence for v in found if v.told)
+        for text in new:
+            if text not in self.told:
                 LOG.warning(text)
+        self.told.update(new)
         failed = int(node.attrs.get("failed", 0)) + len(unsolved)
-        self.doubts[asked.name] = doubts
-        self.nodes[asked.name] = node.assign_attrs(warnings=json.dumps(doubts), failed=failed)
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Those of all analyses, each once."""
-        return tuple(dict.fromkeys(text for name in self._names for text in self.doubts[name]))
+        own = {ATTRIBUTE: to_json(found), "failed": failed}
+        self.nodes[asked.name] = node.assign_attrs(own)
 
     @property
     def _names(self) -> list[str]:
@@ -105,7 +104,7 @@ class Book:
 
     def tree(self, *, complete: bool) -> xr.DataTree:
         """Return the tree of all nodes, with what it comes from."""
-        attributes = self.origin.attributes(self.warnings, complete=complete)
+        attributes = self.origin.attributes(complete=complete)
         root = xr.Dataset(attrs=attributes)
         return xr.DataTree.from_dict({"/": root, **{n: self.nodes[n] for n in self._names}})
 
@@ -114,10 +113,15 @@ class Book:
         return Outcome(
             tree=self.tree(complete=True),
             summaries={a.name: a.summary(self.nodes[a.name]) for a in asked},
-            warnings=self.warnings,
             failed=sum(int(self.nodes[a.name].attrs["failed"]) for a in asked),
             files=(),
         )
+
+
+def _unsolved(solved: Solved) -> Verdict:
+    why = str(solved.notes[UNSOLVED]["text"])
+    remedy = "Check what holds the parts, and the size of the loads."
+    return Verdict("wrong", solved.case.label, None, why, remedy)
 
 
 def case_variables(cases: Sequence[Case]) -> dict[str, Any]:

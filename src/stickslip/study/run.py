@@ -270,5 +270,6 @@ def _solve(asked: Analysis, job: Job, journal: JobJournal, checks: frozenset[str
                 journal.add(record)
     except NO_SOLUTION as error:
         # a job without a solution must not take the finished ones with it
-        journal.put(UNSOLVED, {"text": f"{job.label}: no solution ({error})"})
+        words = asked.name.replace("_", " ")
+        journal.put(UNSOLVED, {"text": f"{words} has no solution ({error})"})
     journal.put(CHECKED, {"names": sorted(checks | checked(journal.get(CHECKED)))})

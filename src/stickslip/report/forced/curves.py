@@ -1,5 +1,7 @@
 """Figures of the response: curves of all cases, low against accepted order, the optimisation curves."""
 
+from textwrap import wrap
+
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
@@ -10,6 +12,7 @@ from stickslip.report.cases import ShownCase, first_number
 from stickslip.report.plot import ALARM, GRID, MUTED, Plot, key_marker, log_ticks, styled
 from stickslip.report.quantities import counted, joined, number, percent, scale_for
 from stickslip.report.response import Response
+from stickslip.study.analyses.verdict import LEVELS
 
 COMPARED = 3  # curves that stay legible in one panel
 _FEWEST = 3  # cases of an optimisation curve
@@ -44,6 +47,7 @@ def _curve(response: Response, case: ShownCase) -> go.Scatter:
     kept = [named(np.flatnonzero(row)) for row in response.kept[at]]
     error = response.floats("predicted_error_percent" if response.is_error else "indicator")[at]
     said = [response.shown(float(e)) for e in error]
+    reasons = _reasons(response)[at]
     about = "predicted error" if response.is_error else "indicator"
     return go.Scatter(
         x=x[at], y=response.accepted[at] * scale.factor, mode="lines+markers",
@@ -51,15 +55,34 @@ def _curve(response: Response, case: ShownCase) -> go.Scatter:
         legendgroup="cases", legendgrouptitle={"text": response.varied} if len(response.cases) > 1 else None,
         line={"color": case.colour, "width": 1.6},
         marker={
-            "symbol": np.where(high, "diamond", "circle-open").tolist(), "size": np.where(high, 7.0, 5.5).tolist(),
+            "symbol": _symbols(response)[at].tolist(), "size": np.where(high, 7.0, 5.5).tolist(),
             "color": case.colour, "line": {"width": 1.1, "color": case.colour},
         },
-        customdata=list(zip(kept, said, response.hz[at], strict=True)),
+        customdata=list(zip(kept, said, response.hz[at], reasons, strict=True)),
         hovertemplate=(
             f"{case.named}<br>%{{x:.2f}} {unit}: %{{y:.4g}} {scale.unit}<br>"
-            f"H = %{{customdata[0]}}, {about} %{{customdata[1]}}<extra></extra>"
+            f"H = %{{customdata[0]}}, {about} %{{customdata[1]}}%{{customdata[3]}}<extra></extra>"
         ),
     )  # fmt: skip
+
+
+def _symbols(response: Response) -> np.ndarray:
+    """(point,) circles for the harmonics of the first passage, diamonds for others; open where doubtful, crosses where wrong."""
+    shape = np.where(response.more, "diamond", "circle").astype(object)
+    return np.where(response.levels == 2, "x", shape + np.where(response.levels == 1, "-open", ""))
+
+
+def _reasons(response: Response) -> np.ndarray:
+    """(point,) lines that say why a point is not trusted."""
+    if not response.has("verdict_reason"):
+        return np.full(response.hz.size, "", dtype=object)
+    reasons = zip(response.levels, response.labels_of("verdict_reason"), strict=True)
+    said = [f"<br>{LEVELS[k]}: {_wrapped(why)}" if why else "" for k, why in reasons]
+    return np.array(said, dtype=object)
+
+
+def _wrapped(text: str) -> str:
+    return "<br>".join(wrap(text, 80))
 
 
 def _failures(response: Response) -> go.Scatter:
@@ -108,9 +131,12 @@ def _caption(response: Response) -> str:
         ends = [number(float(f), 4) for f in (hz[high].min(), hz[high].max())] if high.any() else []
         where = f", from {' to '.join(ends)} Hz" if ends else ""
         text += (
-            f"{int(high.sum())} of {n} keep {response.more_name} (filled diamonds){where}; the rest keep "
-            f"H = {response.low_name} (open circles)."
+            f"{int(high.sum())} of {n} keep {response.more_name} (diamonds){where}; the rest keep "
+            f"H = {response.low_name} (circles)."
         )
+    doubtful, wrong = (int(np.sum(converged & (response.levels == k))) for k in (1, 2))
+    if doubtful or wrong:
+        text += f" Not trusted: {counted(doubtful, 'doubtful point')} (open symbols), {wrong} wrong (crosses)."
     if not converged.all():
         n = counted(int((~converged).sum()), "point")
         text += f" {n} did not converge (crosses); the curve is left open there."
@@ -125,8 +151,11 @@ def frequency_response(response: Response) -> Plot | None:
     figure = go.Figure([_curve(response, case) for case in response.cases])
     if response.decides:
         low, more = response.low_name, response.more_name
-        figure.add_trace(key_marker(f"accepted with H = {low}", "circle-open", "key", "points"))
-        figure.add_trace(key_marker(f"accepted with {more}", "diamond", "key"))
+        figure.add_trace(key_marker(f"H = {low}", "circle", "key", "points"))
+        figure.add_trace(key_marker(more, "diamond", "key"))
+    for level, word, symbol in ((1, "doubtful", "circle-open"), (2, "wrong", "x")):
+        if np.any(response.converged & (response.levels == level)):
+            figure.add_trace(key_marker(word, symbol, "key"))
     if not response.converged.all():
         figure.add_trace(_failures(response))
     styled(figure, 540)

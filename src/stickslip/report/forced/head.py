@@ -13,6 +13,7 @@ from stickslip.report.quantities import (
 )
 from stickslip.report.response import Response
 from stickslip.report.section import Card
+from stickslip.study.analyses.verdict import LEVELS
 
 
 def _peak_card(response: Response) -> Card:
@@ -84,8 +85,25 @@ def _work_cards(response: Response) -> list[Card]:
     return found
 
 
+def _verdict_card(response: Response) -> Card | None:
+    """Return how many cases are trusted; of one case its verdict."""
+    levels = [response.level(c) for c in response.cases]
+    if not levels[0]:
+        return None
+    if len(levels) == 1:
+        return Card(levels[0], "verdict on the peak", "the list below says why")
+    counts = {level: levels.count(level) for level in LEVELS[1:]}
+    note = ", ".join(f"{n} {level}" for level, n in counts.items() if n) or "none is doubtful"
+    return Card(f"{levels.count('trusted')} of {len(levels)}", "cases to be trusted", note)
+
+
 def cards(response: Response) -> list[Card]:
     """Return the numbers that sum the response up."""
-    first = (_peak_card(response), _shift_card(response), _loss_card(response))
+    first = (
+        _peak_card(response),
+        _verdict_card(response),
+        _shift_card(response),
+        _loss_card(response),
+    )
     rest = _alert_cards if response.is_error and response.decides else _work_cards
     return [card for card in first if card is not None] + rest(response)

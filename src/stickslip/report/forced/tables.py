@@ -13,7 +13,7 @@ def peaks(response: Response) -> str:
     """One row a case: peak, points, work."""
     scale = scale_for(np.array([response.peak_response(c) for c in response.cases]), response.unit)
     head = [
-        "excitation", "peak", f"peak / force ({scale.unit})", "at (Hz)", "points", f"with H = {response.low_name}",
+        "excitation", "peak", f"peak / force ({scale.unit})", "at (Hz)", "verdict", "points", f"with H = {response.low_name}",
         f"with {response.more_name}", "failed", "Newton steps", "unknowns solved", "contact (s)", "linear (s)", "rest (s)",
     ]  # fmt: skip
     counts = [
@@ -29,7 +29,8 @@ def peaks(response: Response) -> str:
         rows.append(
             [case.short, quantity(case.excitation, "N"),
              quantity(value * (case.excitation if response.per_force else 1.0), response.length),
-             number(value * scale.factor, 4) if response.per_force else NONE, fixed(response.peak_hz(case), 2)]
+             number(value * scale.factor, 4) if response.per_force else NONE, fixed(response.peak_hz(case), 2),
+             response.level(case) or NONE]
             + [fixed(response.number_of(name, case), 0) for name in counts]
             + [fixed(response.number_of(name, case), 2) for name in clocks]
         )  # fmt: skip

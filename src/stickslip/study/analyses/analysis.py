@@ -11,6 +11,7 @@ import xarray as xr
 from stickslip.assembly.model import Model
 from stickslip.assembly.reduced import Store, in_memory
 from stickslip.study.analyses import ANALYSES
+from stickslip.study.analyses.verdict import Verdict
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,8 +146,12 @@ class Analysis(Protocol):
         """Return the node of the result from all cases sealed so far.
 
         Variables of a case have the leading dimension ``case``; the runner adds ``case_label`` and ``vary_value``. Attributes:
-        ``warnings``, a JSON list of sentences for terminal and page; ``failed``, how many points have no solution (0 if left out).
+        ``failed``, how many points have no solution (0 if left out); what `verdicts` needs.
         """
+        ...
+
+    def verdicts(self, data: xr.Dataset) -> tuple[Verdict, ...]:
+        """Return what is to be trusted of a finished dataset; terminal, page, file and Python show these and nothing else."""
         ...
 
     def check(self, case: Case, model: Model) -> tuple[str, ...]:

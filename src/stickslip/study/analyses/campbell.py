@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 from stickslip.study.analyses.analysis import Case, Solved
+from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.analyses.waves.analysis import WaveAnalysis
 from stickslip.study.analyses.waves.dataset import Variables, frequencies
 from stickslip.study.analyses.waves.doubts import basis_doubts, campbell_doubts, unfollowed_from
@@ -61,7 +62,7 @@ class CampbellTable(WaveTable):
         return tuple(sorted({wheel.diagram(m) for m in self.engine_orders}))
 
 
-def _of_case(solved: Solved) -> tuple[Variables, list[str]]:
+def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
     asked: CampbellTable = solved.case.settings.campbell
     waves: Sequence[WaveBranches] = solved.records
     told = solved.notes["model"]

@@ -15,16 +15,16 @@ from stickslip.harmonic.support import named
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.response import ForcedPoint, Sweep, forced_response
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
-from stickslip.study.analyses.forced.caveats import (
-    caveats,
+from stickslip.study.analyses.forced.dataset import put_together
+from stickslip.study.analyses.forced.estimate import estimate
+from stickslip.study.analyses.forced.in_time import Check, check_in_time, chosen
+from stickslip.study.analyses.forced.known import (
     inside,
+    known,
     mixed_places,
     no_resonance,
     nothing_pressed,
 )
-from stickslip.study.analyses.forced.dataset import put_together
-from stickslip.study.analyses.forced.estimate import estimate
-from stickslip.study.analyses.forced.in_time import Check, check_in_time, chosen
 from stickslip.study.analyses.forced.more_harmonics import check_harmonics
 from stickslip.study.analyses.forced.points import Accepted, Response, collect
 from stickslip.study.analyses.forced.question import (
@@ -52,8 +52,9 @@ from stickslip.study.analyses.forced.values import (
     of_examined,
     of_model,
     of_response,
-    texts,
 )
+from stickslip.study.analyses.forced.verdicts import verdicts
+from stickslip.study.analyses.verdict import Verdict, to_json
 from stickslip.study.keep.progress import LOG, advance
 from stickslip.units import HZ
 
@@ -114,19 +115,21 @@ class ForcedResponseAnalysis:
         chooser, passages = question.chooser, case.settings.harmonics.passages
         labels = question.model.error_labels
         of_model = [text for text in question.model.warnings if text not in model.warnings]
-        doubts = [
-            *of_model,
-            *no_resonance(question),
-            *nothing_pressed(question),
-            *mixed_places(labels),
-        ]
+        doubts = [*no_resonance(question), *nothing_pressed(question), *mixed_places(labels)]
         return (
             str(estimate(model, question.sweep)),
             *(f"harmonics: {line}" for line in chooser.lines(passages)),
             cost_line(question),
             *inside(question),
-            *(f"WARNING: {text}" for text in doubts),
+            *(
+                f"WARNING: {text}"
+                for text in (*of_model, *(f"{v.why}. {v.remedy}" for v in doubts))
+            ),
         )
+
+    def verdicts(self, data: xr.Dataset) -> tuple[Verdict, ...]:
+        """Return what is to be thought of each case and its points."""
+        return verdicts(data, [str(x) for x in data["case_label"].values])
 
     def summary(self, data: xr.Dataset) -> tuple[TextTable, ...]:
         """Return what the terminal prints."""
@@ -155,8 +158,8 @@ def _put_down(question: Question, response: Response, notes: Notes) -> None:
         return
     shift = peak_shift(question, response)
     notes.put("model", of_model(question))
-    told = texts(caveats(question, response, shift))
-    notes.put("response", of_response(question, response, shift) | {"caveats": told})
+    told = {"known_verdicts": to_json(known(question, response, shift))}
+    notes.put("response", of_response(question, response, shift) | told)
     LOG.info(
         question.said(
             f"peak {response.peak_amplitude:.4e} m at {response.peak_hz:.3f} Hz, {len(response.accepted)} points, "

@@ -11,6 +11,7 @@ from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 from stickslip.study.analyses.analysis import Case, Solved
+from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.analyses.waves.analysis import WaveAnalysis
 from stickslip.study.analyses.waves.dataset import Variables, frequencies, growth
 from stickslip.study.analyses.waves.numbers import Wheel
@@ -66,7 +67,7 @@ class ModesTable(WaveTable):
         return read_reference(home / self.reference, self.reference_case)
 
 
-def _of_case(solved: Solved) -> tuple[Variables, list[str]]:
+def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
     waves: Sequence[WaveModes] = solved.records
     hertz = frequencies(waves)
     found = {

@@ -12,6 +12,7 @@ from stickslip.errors import input_error
 from stickslip.response.rotating.nodal_diameters import NodalDiameterMap
 from stickslip.response.rotating.safe import Safe, safe
 from stickslip.study.analyses.analysis import Case, Solved
+from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.analyses.waves.analysis import WaveAnalysis
 from stickslip.study.analyses.waves.dataset import Variables, frequencies, growth
 from stickslip.study.analyses.waves.doubts import safe_doubts
@@ -50,7 +51,7 @@ class SafeTable(WaveTable):
         return self
 
 
-def _of_case(solved: Solved) -> tuple[Variables, list[str]]:
+def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
     waves: Sequence[WaveModes] = solved.records
     told = solved.notes["model"]
     asked: SafeTable = solved.case.settings.safe

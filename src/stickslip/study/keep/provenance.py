@@ -2,7 +2,6 @@
 
 import json
 import platform
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -38,7 +37,7 @@ class Provenance:
     created: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
     began: float = field(default_factory=perf_counter)
 
-    def attributes(self, warnings: Sequence[str], *, complete: bool) -> dict[str, Any]:
+    def attributes(self, *, complete: bool) -> dict[str, Any]:
         """Return the attributes of the root: texts and numbers only."""
         return {
             "title": self.title,
@@ -47,7 +46,6 @@ class Provenance:
             "versions": json.dumps(self.versions),
             "created": self.created,
             "wall_seconds": perf_counter() - self.began,
-            "warnings": json.dumps(list(warnings)),
             "complete": int(complete),
         }
 

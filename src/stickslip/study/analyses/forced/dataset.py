@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stickslip.study.analyses.forced.caveats import of_numbers
 from stickslip.study.analyses.forced.quantities import QUANTITIES, flags
-from stickslip.study.analyses.forced.question import said
 from stickslip.study.analyses.forced.values import Values
+from stickslip.study.analyses.forced.verdicts import with_levels
+from stickslip.study.analyses.verdict import said
 
 LABELLED = ("output", "retained", "contact")  # dimensions whose entries have names
 # dimensions along which cases follow each other, the variable that says whose they are, and one that tells how many there are
@@ -55,28 +55,24 @@ def put_together(cases: Sequence[Values], labels: Sequence[str]) -> xr.Dataset:
     }
     empty = [name for name, variable in found.items() if not _told(name, variable)]
     ordered = {name: variable for name, variable in found.items() if name not in empty}
-    for name, variable in ordered.items():
-        quantity = QUANTITIES[name]
-        variable.attrs = {"units": quantity.units, "long_name": quantity.about} | flags(name)
     used = {d for v in ordered.values() for d in v.dims}
     coordinates: dict[str, Any] = {name: each[0][name].values for name in LABELLED}
     coordinates |= {name: values for name, values in AXES.items() if name in used}
-    return xr.Dataset(ordered, coords=coordinates, attrs=_attributes(cases, labels))
+    data = xr.Dataset(ordered, coords=coordinates, attrs=_attributes(cases, labels))
+    data = data.assign(with_levels(data, labels))
+    for name, variable in data.data_vars.items():
+        quantity = QUANTITIES[str(name)]
+        variable.attrs = {"units": quantity.units, "long_name": quantity.about} | flags(str(name))
+    return data
 
 
 def _attributes(cases: Sequence[Values], labels: Sequence[str]) -> dict[str, Any]:
     """Return the attributes of the dataset: texts and numbers; what chose the harmonics is that of the first case."""
     both = list(zip(labels, cases, strict=True))
     told = [said(label, str(c["choice_sentence"])) for label, c in both if c["choice_sentence"]]
-    doubts = [
-        (label, text)
-        for label, c in both
-        for text in (*c["caveats"], *c.get("doubts", ()), *of_numbers(c))
-    ]
     own: dict[str, Any] = json.loads(cases[0]["attributes"])
     return own | {
         "alert_explanation": " ".join(told),
-        "warnings": json.dumps([said(label, str(text)) for label, text in doubts]),
         "failed": sum(int(c["points_failed"]) for c in cases),
     }
 

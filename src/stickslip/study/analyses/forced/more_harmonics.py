@@ -64,21 +64,12 @@ class ReferenceDoubt:
         """What was checked and what came out."""
         if not self.known:
             return "no solution that could be checked."
-        return (
+        told = (
             f"against {self.harmonics} harmonics, {self.above} of {self.known} solutions are predicted to change by more than "
             f"{100 * self.limit:g} % of their complex amplitude, phase included; the largest change is {error_text(self.worst)} "
             f"of {self.label} at {self.frequency_hz:.2f} Hz, solved with H = {self.kept}."
         )
-
-    @property
-    def warning(self) -> str:
-        """What to do about it; empty where nothing needs to be done."""
-        if not self.above:
-            return ""
-        return (
-            f"at {self.above} of {self.known} frequencies more harmonics than the study keeps are predicted to change the "
-            f"response, in amplitude or phase, by more than {100 * self.limit:g} %. {self.advice}"
-        )
+        return f"{told} {self.advice}" if self.above else told
 
     @property
     def advice(self) -> str:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -12,7 +11,6 @@ from stickslip.response.forced.response import ForcedPoint, ForcedProblem, accep
 from stickslip.response.recovery import Fields, fields
 from stickslip.units import HZ
 
-JUMP = 2.0  # ratio of neighbouring amplitudes that no step of a branch makes
 FLANK = 0.7  # share of the peak amplitude at which frequencies beside a peak are taken
 
 
@@ -100,39 +98,6 @@ class Response:
     def points_low(self) -> int:
         """Number of accepted points with few harmonics."""
         return sum(a.point.support == self.low_harmonics for a in self.accepted)
-
-    @property
-    def peak_at_end(self) -> bool:
-        """Whether the largest amplitude stands at an end of the frequency range."""
-        omega = [a.point.omega for a in self.accepted]
-        return self.top is not None and self.top.point.omega in (min(omega), max(omega))
-
-    @property
-    def jumps_hz(self) -> list[float]:
-        """Frequencies at which neighbours of the response differ more than `JUMP` times, in Hz.
-
-        Steps of the branch are far smaller: there, accepted points with few and with many harmonics stand on different solutions.
-        """
-        branch = [a for a in self.accepted if a.point.stage != "peak" and a.point.converged]
-        height = [self.amplitude(a) for a in branch]
-        return [
-            float(branch[i].point.omega / HZ)
-            for i in range(1, len(branch))
-            if max(height[i - 1], height[i]) > JUMP * min(height[i - 1], height[i])
-            and branch[i - 1].point.support != branch[i].point.support
-        ]
-
-    def folded_hz(self, direction: int = 1) -> tuple[float, float] | None:
-        """Return the lowest and the highest frequency (Hz) between which the response runs backwards somewhere, None if it does not.
-
-        Parameters
-        ----------
-        direction
-            1 where frequencies were asked for upwards, -1 downwards.
-        """
-        hz = [a.point.omega / HZ for a in self.accepted if a.point.stage != "peak"]
-        back = [sorted(pair) for pair in pairwise(hz) if direction * (pair[1] - pair[0]) < 0]
-        return (min(b for b, _ in back), max(a for _, a in back)) if back else None
 
     @property
     def failed(self) -> int:

@@ -13,6 +13,7 @@ import numpy as np
 from stickslip.arrays import IntArray
 from stickslip.response.forced.problem import Stage
 from stickslip.solve.status import Status
+from stickslip.study.analyses.verdict import LEVELS
 
 STAGES = get_args(Stage)
 
@@ -48,6 +49,8 @@ _OF = {
         "reference_worst_hz": ("Hz", "where it is"),
         "reference_above": ("1", "solutions above the threshold"),
         "reference_sentence": ("1", "what the check says, in words"),
+        "known_verdicts": ("1", "what only the model knew, verdicts as JSON"),
+        "case_verdict": ("1", "whether the peak is to be trusted"),
     },
     "point": {
         "frequency_hz": ("Hz", "excitation frequency"),
@@ -58,10 +61,14 @@ _OF = {
         "status": ("1", "how the solver ended"),
         "indicator": ("1", "what the strategy compared with its threshold; of an error: at the first solution, else at the accepted one"),
         "predicted_error_percent": ("percent", "error of the first solution that an alert predicted, NaN where the indicator is no error"),
+        "own_error_percent": ("percent", "error that is predicted of the accepted solution itself, NaN where it was not judged"),
+        "audit_error_percent": ("percent", "difference of the accepted solution from one with more harmonics, NaN where none was made"),
         "real_error_percent": ("percent", "difference of the first and the accepted solution where the frequency was solved again"),
         "newton_iterations": ("1", "Newton iterations"),
         "seconds": ("s", "time of the point"),
         "refinement": ("1", "1 if the point was added to resolve the peak"),
+        "verdict": ("1", "whether the point is to be trusted"),
+        "verdict_reason": ("1", "why not, empty where it is"),
         "reference_error_percent": ("percent", "change of the complex amplitude that twice as many harmonics would make, NaN where unsolved"),
     },
     "point harmonic": {
@@ -177,6 +184,8 @@ def flags(name: str) -> dict[str, IntArray | str]:
         "attempt_status": {s.name.lower(): int(s) for s in Status},
         "attempt_stage": {stage: i for i, stage in enumerate(STAGES)},
         "peak_state": {"stick": 0, "slip": 1, "open": 2},
+        "verdict": {level: i for i, level in enumerate(LEVELS)},
+        "case_verdict": {level: i for i, level in enumerate(LEVELS)},
     }.get(name)
     if meanings is None:
         return {}

@@ -21,6 +21,7 @@ from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.forced.chooser import Chooser, chooser_of
 from stickslip.study.analyses.forced.estimate import check_limits, estimate
 from stickslip.study.analyses.forced.section import sweep_of
+from stickslip.study.analyses.verdict import said
 from stickslip.units import RPM
 
 IN_TIME, HARMONICS = "verify", "verify_harmonics"  # checks that a run may ask for
@@ -90,11 +91,6 @@ class Question:
     def said(self, text: str) -> str:
         """Return a sentence about the case, see `said`."""
         return said(self.label, text)
-
-
-def said(label: str, text: str) -> str:
-    """Return a sentence about a case, with its label where there are several."""
-    return f"{label}: {text}" if label else text[:1].upper() + text[1:]
 
 
 def peak_first(model: Assembled) -> Assembled:

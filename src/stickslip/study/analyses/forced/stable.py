@@ -1,7 +1,6 @@
 """Whether the motions of a response are stable: the multipliers at its peak and at points that are doubtful, and what a motion in time adds."""
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -10,6 +9,7 @@ from stickslip.errors import InputError, StickslipError
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.stability import stability
 from stickslip.study.analyses.forced.in_time import Check, seconds_in_time
+from stickslip.study.analyses.forced.jumps import jumps, stored_energy
 from stickslip.study.analyses.forced.points import Accepted, Response
 from stickslip.study.analyses.forced.question import Question
 from stickslip.units import HZ
@@ -82,11 +82,11 @@ def to_examine(question: Question, response: Response) -> list[int]:
     known = [i for i, a in enumerate(response.accepted) if a.point.converged]
     if question.examine == "all":
         return known
-    peak, jumps = response.top.point.omega, _beside_jumps(response)
+    peak, beside = response.top.point.omega, _beside_jumps(response)
     doubtful = [
         i
         for i in known
-        if i != response.peak and (i in jumps or _off(question, response.accepted[i]))
+        if i != response.peak and (i in beside or _off(question, response.accepted[i]))
     ]
     nearest = sorted(doubtful, key=lambda i: abs(response.accepted[i].point.omega - peak))
     return sorted([response.peak, *nearest[:DOUBTFUL]])
@@ -179,12 +179,12 @@ def _off(question: Question, accepted: Accepted) -> bool:
 
 def _beside_jumps(response: Response) -> set[int]:
     """Return positions of the points on either side of a jump."""
-    branch = [
-        i for i, a in enumerate(response.accepted) if a.point.stage != "peak" and a.point.converged
-    ]
-    return {
-        i
-        for before, behind in pairwise(branch)
-        if response.accepted[behind].point.omega / HZ in response.jumps_hz
-        for i in (before, behind)
-    }
+    every = response.accepted
+    branch = [i for i, a in enumerate(every) if a.point.stage != "peak" and a.fields is not None]
+    shown = [f for f in (every[i].fields for i in branch) if f is not None]
+    amplitude = np.array([response.amplitude(every[i]) for i in branch])
+    few = np.array([every[i].point.support == response.low_harmonics for i in branch], dtype=bool)
+    loss = np.array([f.energy.sum() for f in shown])
+    elastic = max((stored_energy(f.gaps[None, 1:], f.forces[None, 1:]) for f in shown), default=0.0)
+    found = jumps(amplitude, loss, few, elastic)
+    return {i for jump in found for i in branch[jump.step : jump.step + 2]}

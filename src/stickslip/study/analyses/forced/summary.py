@@ -5,10 +5,10 @@ import xarray as xr
 
 from stickslip.harmonic.support import named
 from stickslip.study.analyses.analysis import TextTable
-from stickslip.study.analyses.forced.question import said
+from stickslip.study.analyses.verdict import LEVELS, said
 
-HEAD = ("peak mm", "at Hz", "points")
-COUNTS = ("points_low", "points_high", "points_failed", "newton_steps", "unknowns_solved")
+HEAD = ("peak mm", "at Hz")
+COUNTS = ("points", "points_low", "points_high", "points_failed", "newton_steps", "unknowns_solved")
 SECONDS = ("seconds_contact", "seconds_linear", "seconds_rest")
 
 
@@ -23,7 +23,18 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     labels = [str(x) for x in data["case_label"].values]
     more, low = more_name(data), named(np.atleast_1d(data.attrs["low_harmonics"]))
     first = named(np.atleast_1d(data.attrs["high_harmonics"])) if _always_high(data) else low
-    head = ("case", *HEAD, f"H = {first}", more, "failed", "Newton", "unknowns", "seconds")
+    head = (
+        "case",
+        *HEAD,
+        "verdict",
+        "points",
+        f"H = {first}",
+        more,
+        "failed",
+        "Newton",
+        "unknowns",
+        "seconds",
+    )
     rows = tuple(_row(data.isel(case=i), label) for i, label in enumerate(labels))
     found = [
         TextTable("Forced response", head, rows),
@@ -71,7 +82,7 @@ def _row(case: xr.Dataset, label: str) -> tuple[str, ...]:
         label,
         f"{1e3 * float(case['peak_amplitude']):.5g}",
         f"{float(case['peak_frequency_hz']):.3f}",
-        str(int(case["points"])),
+        LEVELS[int(case["case_verdict"])],
         *(str(int(case[name])) for name in COUNTS),
         f"{sum(float(case[name]) for name in SECONDS):.2f}",
     )

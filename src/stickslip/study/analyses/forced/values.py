@@ -55,6 +55,9 @@ def _attributes(question: Question) -> Values:
         "evaluator": sweep.evaluator,
         "report_output": model.output_labels[0],
         "sectors": model.sectors,
+        "direction": sweep.direction,
+        "stepped": int(sweep.single or sweep.grid.size > 0),
+        "error_limit_percent": 100 * question.limit,
     }
     facts = {name: np.asarray(value).tolist() for name, value in question.facts.items()}
     return question.chooser.attributes() | facts | own | order
@@ -110,7 +113,6 @@ def of_doubt(doubt: ReferenceDoubt) -> Values:
         "reference_worst_hz": doubt.frequency_hz,
         "reference_above": doubt.above,
         "reference_sentence": doubt.sentence,
-        "doubts": texts([doubt.warning] if doubt.warning else []),
     }
 
 
@@ -151,6 +153,7 @@ def _of_points(question: Question, response: Response) -> Values:
         "status": _whole(int(p.status) for p in points),
         "indicator": asked if chooser.is_error else own,
         "predicted_error_percent": 100 * asked if chooser.is_error else np.full(asked.size, np.nan),
+        "own_error_percent": 100 * own if chooser.is_error else np.full(own.size, np.nan),
         "real_error_percent": 100 * np.array([a.real_error for a in response.accepted]),
         "newton_iterations": _whole(p.iterations for p in points),
         "seconds": np.array([p.seconds_total for p in points]),

@@ -9,6 +9,7 @@ import xarray as xr
 from stickslip.assembly.model import ContactsAs, Model
 from stickslip.assembly.statics import StaticState
 from stickslip.study.analyses.facts import facts_of
+from stickslip.study.analyses.verdict import doubt, to_json
 from stickslip.study.analyses.waves.doubts import static_doubts
 from stickslip.study.keep.netcdf import variable
 from stickslip.units import RPM
@@ -58,7 +59,7 @@ def about(model: Model, contacts: ContactsAs, rpm: float, highest: float) -> dic
     note = facts_of(model, rpm) | {
         "speed_rpm": rpm,
         "contacts": contacts if model.contacts else "none",
-        "warnings": np.array([*model.warnings, *doubts], dtype=str),
+        "verdicts": to_json([*map(doubt, model.warnings), *doubts]),
     }
     return note | _static(state)
 

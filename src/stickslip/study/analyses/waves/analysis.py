@@ -8,6 +8,7 @@ import xarray as xr
 
 from stickslip.assembly.model import Model
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
+from stickslip.study.analyses.verdict import Verdict, stored
 from stickslip.study.analyses.waves.dataset import Variables, dataset
 from stickslip.study.analyses.waves.solve import Question, each_wave
 from stickslip.study.analyses.waves.tables import WaveTable
@@ -36,7 +37,7 @@ class WaveAnalysis(ABC):
     checks: tuple[str, ...] = ()
     compared: frozenset[str] = frozenset()
     of_wave: Callable[[Question, int], Any]
-    of_case: Callable[[Solved], tuple[Variables, list[str]]]
+    of_case: Callable[[Solved], tuple[Variables, list[Verdict]]]
     of_text: Callable[[xr.Dataset], Sequence[TextTable]]
 
     @abstractmethod
@@ -63,6 +64,10 @@ class WaveAnalysis(ABC):
         """Say how many modes of how many waves there will be."""
         asked = self.inputs(case, model)
         return (f"{self.name}: {asked.n_modes} modes of each of {len(asked.numbers)} waves",)
+
+    def verdicts(self, data: xr.Dataset) -> tuple[Verdict, ...]:
+        """Return what its records and its model cast doubt on, put down when the dataset was made."""
+        return stored(data.attrs)
 
     def summary(self, data: xr.Dataset) -> tuple[TextTable, ...]:
         """Return what the terminal prints."""

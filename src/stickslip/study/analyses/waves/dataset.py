@@ -1,7 +1,7 @@
 """Datasets of the analyses by waves."""
 
-import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +9,13 @@ import xarray as xr
 
 from stickslip.arrays import FloatArray
 from stickslip.study.analyses.analysis import Solved
+from stickslip.study.analyses.verdict import (
+    ATTRIBUTE,
+    Verdict,
+    from_json,
+    of_all_cases,
+    to_json,
+)
 from stickslip.study.analyses.waves.about import ABOUT, told
 from stickslip.study.analyses.waves.numbers import wave_name
 from stickslip.study.analyses.waves.results import WaveBranches, WaveModes
@@ -20,7 +27,7 @@ LABELS = {"xyz": ["x", "y", "z"], "part": ["re", "im"]}
 
 
 def dataset(
-    solved: Sequence[Solved], of_case: Callable[[Solved], tuple[Variables, list[str]]]
+    solved: Sequence[Solved], of_case: Callable[[Solved], tuple[Variables, list[Verdict]]]
 ) -> xr.Dataset:
     """Return the dataset of all cases.
 
@@ -32,31 +39,19 @@ def dataset(
         Returns the variables of a case beside those of its model and waves, and what the user should know.
     """
     cases = []
-    doubts: dict[str, list[str]] = {}
+    doubts: list[Verdict] = []
     for one in solved:
         note = one.notes.get(ABOUT, {})
         own, said = of_case(one) if one.records else ({}, [])
         cases.append(told(note) | _of_waves(one.records, int(note.get("sectors", 1))) | own)
-        for text in (*note.get("warnings", ()), *said):
-            doubts.setdefault(str(text), []).append(one.case.label)
+        own_doubts = (*from_json(note.get("verdicts", "[]")), *said)
+        doubts += [replace(v, case=one.case.label) for v in own_doubts]
     data = stacked(cases)
     sizes = {dim: size for v in data.values() for dim, size in v.sizes.items()}
     coordinates: dict[str, Any] = {"mode": np.arange(1, sizes.get("mode", 0) + 1), **LABELS}
     used = {name: values for name, values in coordinates.items() if name in sizes}
-    return xr.Dataset(
-        data, coords=used, attrs={"warnings": json.dumps(_labelled(doubts, len(solved)))}
-    )
-
-
-def _labelled(doubts: Mapping[str, Sequence[str]], n_cases: int) -> list[str]:
-    """Return sentences with the labels of the cases they are about; what is about all of several is said once."""
-    found = []
-    for text, labels in doubts.items():
-        everywhere = len(labels) == n_cases > 1
-        found += (
-            [text] if everywhere else [f"{label}: {text}" if label else text for label in labels]
-        )
-    return found
+    every = of_all_cases(doubts, [s.case.label for s in solved])
+    return xr.Dataset(data, coords=used, attrs={ATTRIBUTE: to_json(every)})
 
 
 def frequencies(waves: Waves) -> FloatArray:

@@ -8,37 +8,40 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.assembly.statics import MOST_DISPLACEMENT, MOST_ROTATION, MOST_STRAIN, StaticState
 from stickslip.response.rotating.safe import Safe
+from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.analyses.waves.results import WaveBranches
 from stickslip.units import HZ, RPM
 
 BASIS_ERROR = 1e-4  # relative, of frequencies in a Campbell diagram, above which there is a warning
 
 
-def basis_doubts(waves: Sequence[WaveBranches]) -> tuple[str, ...]:
+def basis_doubts(waves: Sequence[WaveBranches]) -> tuple[Verdict, ...]:
     """Say where the basis of a Campbell diagram is too small for its digits."""
+    remedy = "Ask for more campbell.modes, or for a narrower range of speeds."
     poor = [w for w in waves if not w.error <= BASIS_ERROR]
-    return tuple(
-        f"wave number {w.wave_number}: frequencies between the speeds of the basis are off by up to {w.error:.1e}, relative; "
-        "ask for more campbell.modes, or for a narrower range of speeds"
+    said = [
+        f"wave number {w.wave_number}: frequencies between the speeds of the basis are off by up to {w.error:.1e}, relative"
         for w in poor
-    )
+    ]
+    return tuple(Verdict("doubtful", why=why, remedy=remedy) for why in said)
 
 
-def static_doubts(state: StaticState | None, *, contacts: bool = False) -> tuple[str, ...]:
+def static_doubts(state: StaticState | None, *, contacts: bool = False) -> tuple[Verdict, ...]:
     """Say where displacements under the centrifugal load are too large for linear statics; those that `contacts` hold back count whole."""
     if state is None or not state.too_large:
         return ()
     alone = ", without what contacts hold back," if contacts else ""
-    text = (
+    why = (
         f"the static displacement at {state.speed / RPM:g} rpm{alone} is too large for linear statics: up to {1e3 * state.displacement:.4g} mm "
         f"at a radius of {1e3 * state.radius:.4g} mm, strains up to {100 * state.strain:.3g} %, rotations up to "
         f"{state.rotation:.3g} rad (the limits are {100 * MOST_DISPLACEMENT:g} % of the radius, {100 * MOST_STRAIN:g} %, "
-        f"{MOST_ROTATION:g} rad); frequencies at this speed are in doubt: check the speed (rpm), the material (Young's modulus in Pa, density in kg/m3) and the supports"
+        f"{MOST_ROTATION:g} rad); frequencies at this speed are in doubt"
     )
-    return (text,)
+    remedy = "Check the speed (rpm), the material (Young's modulus in Pa, density in kg/m3) and the supports."
+    return (Verdict("doubtful", why=why, remedy=remedy),)
 
 
-def safe_doubts(found: Safe) -> tuple[str, ...]:
+def safe_doubts(found: Safe) -> tuple[Verdict, ...]:
     """Say which engine orders excite above the computed modes of their nodal diameters, and how many modes it takes."""
     orders = found.not_judged
     if not orders:
@@ -49,19 +52,20 @@ def safe_doubts(found: Safe) -> tuple[str, ...]:
     ratio = max(m * per_order * (1 + found.allowed) / max(highest[m], 1e-300) for m in orders)
     diameters = {min(m % sectors, -m % sectors) for m in orders}
     excited = [m * per_order for m in orders]
-    text = (
+    why = (
         f"engine orders {in_ranges(orders)} are not judged: they excite nodal diameters {in_ranges(diameters)} at "
         f"{_span(excited)} Hz, and with the margin that lies above the highest computed modes ({_span(list(highest.values()))} "
-        f"Hz), where other modes may be near; raise safe.modes, now {n_modes}, to {_more(n_modes, ratio)} or more"
+        "Hz), where other modes may be near"
     )
-    return (text,)
+    remedy = f"Raise safe.modes, now {n_modes}, to {_more(n_modes, ratio)} or more."
+    return (Verdict("doubtful", why=why, remedy=remedy),)
 
 
 def campbell_doubts(
     unfollowed: Sequence[tuple[int, float]],
     unseen: Sequence[int],
     waves: Sequence[WaveBranches],
-) -> tuple[str, ...]:
+) -> tuple[Verdict, ...]:
     """Say which engine orders leave the followed modes below them, and which excite nodal diameters that are left out.
 
     Parameters
@@ -77,16 +81,18 @@ def campbell_doubts(
     if unfollowed:
         named = ", ".join(f"{m} (from {rpm:.4g} rpm)" for m, rpm in unfollowed)
         n_modes = waves[0].frequencies_hz.shape[1]
-        said.append(
+        why = (
             f"above the followed modes of the nodal diameters that they excite, engine orders are not judged: {named}; other "
-            f"modes may cross them there: raise campbell.modes, now {n_modes}"
+            "modes may cross them there"
         )
+        said.append((why, f"Raise campbell.modes, now {n_modes}."))
     if unseen:
-        said.append(
+        why = (
             f"engine orders {in_ranges(unseen)} have no crossings here, because campbell.nodal_diameters leaves out the nodal "
-            "diameters that they excite; add these, or leave the key out"
+            "diameters that they excite"
         )
-    return tuple(said)
+        said.append((why, "Add these, or leave the key out."))
+    return tuple(Verdict("doubtful", why=why, remedy=remedy) for why, remedy in said)
 
 
 def unfollowed_from(order: int, hertz: FloatArray, speeds: FloatArray) -> float | None:

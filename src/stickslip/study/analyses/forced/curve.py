@@ -1,0 +1,218 @@
+"""One case of a finished dataset, as the rules of its verdicts see it; what the dataset does not hold is NaN, empty or absent."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stickslip.arrays import BoolArray, FloatArray, IntArray
+from stickslip.harmonic.support import named
+from stickslip.study.analyses.forced.jumps import stored_energy
+from stickslip.study.analyses.forced.question import RIGID
+
+DEFAULT_LIMIT = 5.0  # percent, where a dataset does not say
+ATTAINED = 1.0  # percent between a settled time integration and the balance
+SAME = 1e-9  # relative difference of frequencies that are one
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A case.
+
+    Parameters
+    ----------
+    data
+        The dataset of all cases.
+    case
+        Position along ``case``.
+    """
+
+    data: xr.Dataset
+    case: int
+
+    def has(self, name: str) -> bool:
+        """Whether the dataset holds a variable."""
+        return name in self.data
+
+    @cached_property
+    def at(self) -> IntArray:
+        """(n,) the points of the case along ``point``."""
+        if "point_case" not in self.data:
+            return np.zeros(0, dtype=np.int64)
+        return np.flatnonzero(self.data["point_case"].values == self.case)
+
+    def floats(self, name: str) -> FloatArray:
+        """Return the (n,) values of a variable along ``point``; NaN where there is none."""
+        if not self.has(name):
+            return np.full(self.at.size, np.nan)
+        return np.asarray(self.data[name].values[self.at], dtype=float)
+
+    def number(self, name: str) -> float:
+        """Return the value of a variable along ``case``; NaN where there is none."""
+        return float(self.data[name].values[self.case]) if self.has(name) else float("nan")
+
+    def text(self, name: str) -> str:
+        """Return the text of a variable along ``case``; empty where there is none."""
+        return str(self.data[name].values[self.case]) if self.has(name) else ""
+
+    @cached_property
+    def hz(self) -> FloatArray:
+        """(n,) frequencies."""
+        return self.floats("frequency_hz")
+
+    @cached_property
+    def status(self) -> IntArray:
+        """(n,) how the solver ended."""
+        return np.nan_to_num(self.floats("status")).astype(np.int64)
+
+    @property
+    def converged(self) -> BoolArray:
+        """(n,) whether there is a solution."""
+        return np.asarray(self.status == 0)
+
+    @property
+    def branch(self) -> IntArray:
+        """Positions of the points in the order of the branch; those that resolve the peak are left out."""
+        return np.flatnonzero(np.nan_to_num(self.floats("refinement")) == 0)
+
+    @cached_property
+    def output(self) -> str:
+        """Label of the output whose peak counts."""
+        labels = [str(x) for x in self.data["output"].values]
+        own = str(self.data.attrs.get("report_output", ""))
+        return own if own in labels else labels[0]
+
+    @cached_property
+    def amplitude(self) -> FloatArray:
+        """(n,) amplitude of that output, m."""
+        labels = [str(x) for x in self.data["output"].values]
+        return np.asarray(self.data["amplitude"].values[self.at, labels.index(self.output)])
+
+    @cached_property
+    def dissipation(self) -> FloatArray:
+        """(n,) energy that all contacts dissipate in a cycle, J; zero where the dataset does not say."""
+        if not self.has("dissipated_energy"):
+            return np.zeros(self.at.size)
+        return np.asarray(np.nansum(self.data["dissipated_energy"].values[self.at], axis=1))
+
+    @cached_property
+    def elastic(self) -> float:
+        """Largest energy that the contacts store, J: beside it the rounding of `dissipation` is seen."""
+        if not self.has("gap") or not self.has("contact_force"):
+            return 0.0
+        gap, force = (self.data[name].values[self.at, 1:] for name in ("gap", "contact_force"))
+        return stored_energy(gap, force)
+
+    @cached_property
+    def peak(self) -> int:
+        """Position of the peak, -1 if there is none."""
+        top = self.number("peak_point")
+        found = np.flatnonzero(self.at == top)
+        return int(found[0]) if found.size else -1
+
+    @property
+    def peak_hz(self) -> float:
+        """Frequency of the peak; NaN if there is none."""
+        return float(self.hz[self.peak]) if self.peak >= 0 else float("nan")
+
+    @cached_property
+    def supports(self) -> list[tuple[int, ...]]:
+        """Harmonics that each point keeps."""
+        rows = self.data["harmonic_kept"].values[self.at]
+        return [tuple(int(h) for h in np.flatnonzero(row)) for row in rows]
+
+    @cached_property
+    def kept(self) -> list[str]:
+        """The same as texts."""
+        return [named(own) for own in self.supports]
+
+    @cached_property
+    def few(self) -> BoolArray:
+        """(n,) whether a point keeps the harmonics of the first passage."""
+        own = tuple(int(h) for h in np.atleast_1d(self.data.attrs.get("low_harmonics", [0, 1])))
+        return np.array([s == own for s in self.supports], dtype=bool)
+
+    @property
+    def low(self) -> str:
+        """These as text."""
+        return named(np.atleast_1d(self.data.attrs.get("low_harmonics", [0, 1])))
+
+    @property
+    def decides(self) -> bool:
+        """Whether anything chose the harmonics."""
+        return bool(np.isfinite(self.data.attrs.get("selection_threshold", np.nan)))
+
+    @property
+    def limit(self) -> float:
+        """Error above which an answer is doubtful, a fraction."""
+        return float(self.data.attrs.get("error_limit_percent", DEFAULT_LIMIT)) / 100
+
+    @property
+    def own_error(self) -> FloatArray:
+        """(n,) error predicted of each point's own solution, a fraction; NaN where it was not judged."""
+        return self.floats("own_error_percent") / 100
+
+    @property
+    def audit(self) -> FloatArray:
+        """(n,) difference from a solution with more harmonics, a fraction; NaN where none was made."""
+        return self.floats("audit_error_percent") / 100
+
+    @property
+    def reference(self) -> FloatArray:
+        """(n,) change that twice as many harmonics are predicted to make, a fraction; NaN where it was not asked for."""
+        return self.floats("reference_error_percent") / 100
+
+    @property
+    def rigid(self) -> bool:
+        """Whether a contact is rigid."""
+        laws = self.data["contact_law"].values if self.has("contact_law") else ()
+        return RIGID in [str(law) for law in laws]
+
+    @property
+    def forward(self) -> float:
+        """1 where the frequencies were asked for upwards, -1 downwards."""
+        return -1.0 if self.data.attrs.get("direction", "up") == "down" else 1.0
+
+    @property
+    def stepped(self) -> bool:
+        """Whether frequencies were given, instead of a branch followed."""
+        return bool(self.data.attrs.get("stepped", 0))
+
+    @property
+    def range_key(self) -> str:
+        """Key of the study that says where the response is."""
+        return "speed_rpm" if self.has("speed_rpm") else "frequency_hz"
+
+    def examined(self, name: str) -> Iterator[tuple[int, dict[str, Any]]]:
+        """Yield the points that a check looked at, with what its row says.
+
+        Parameters
+        ----------
+        name
+            A variable of the check, such as ``verify_settled``: the first word begins the names of all.
+        """
+        word = name.partition("_")[0]
+        if not self.has(name) or not self.at.size:
+            return
+        rows = self.data[name].dims[0]
+        own = [n for n, v in self.data.data_vars.items() if v.dims == (rows,)]
+        for k in np.flatnonzero(self.data[f"{word}_case"].values == self.case):
+            said = {str(n): self.data[n].values[k] for n in own}
+            off = np.abs(self.hz - said[f"{word}_frequency_hz"]) / self.hz
+            # where a fold passes a frequency twice the peak is meant, else the first
+            near = [int(i) for i in np.flatnonzero(self.converged & (off <= SAME))]
+            for point in sorted(near, key=lambda i: i != self.peak)[:1]:
+                yield point, said
+
+    @cached_property
+    def attained(self) -> BoolArray:
+        """(n,) whether a time integration settled to the same amplitude."""
+        found = np.zeros(self.at.size, dtype=bool)
+        for point, said in self.examined("verify_difference_percent"):
+            stays = said.get("verify_motion", "attained") == "attained"
+            close = abs(float(said["verify_difference_percent"])) <= ATTAINED
+            found[point] = stays and bool(said["verify_settled"]) and close
+        return found

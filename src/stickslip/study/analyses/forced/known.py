@@ -1,0 +1,135 @@
+"""What only the model knows of a response, put down by its job: verdicts, and what ``stickslip check`` says beforehand."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from stickslip.response.free_motion import drift
+from stickslip.study.analyses.forced.points import Response
+from stickslip.study.analyses.forced.question import Question
+from stickslip.study.analyses.verdict import Verdict, doubt
+from stickslip.units import HZ
+
+ROTATIONS = ("rx", "ry", "rz")
+COULOMB = (
+    "elastic_coulomb",
+    "coupled_coulomb",
+    "regularised_coulomb",
+)  # friction under the normal force
+RIGID = 5e-3  # Hz that are printed as zero
+LISTED = 5  # natural frequencies that a line names
+
+
+def known(
+    question: Question, response: Response, shift: tuple[float, float]
+) -> tuple[Verdict, ...]:
+    """Return the verdicts on a whole case that its numbers alone do not tell, without the case's label.
+
+    Parameters
+    ----------
+    question, response
+        The case.
+    shift
+        What `peak_shift` found.
+    """
+    return (
+        *(doubt(text) for text in question.model.warnings),
+        *mixed_places(question.model.error_labels),
+        *nothing_pressed(question),
+        *_of_drift(question, response),
+        *_of_retention(question, response, shift),
+    )
+
+
+def mixed_places(labels: Sequence[str]) -> tuple[Verdict, ...]:
+    """Doubt where an error is taken over rotations and displacements together."""
+    rotations = [label for label in labels if label.rpartition(".")[2] in ROTATIONS]
+    others = [label for label in labels if label not in rotations]
+    if not rotations or not others:
+        return ()
+    why = (
+        f"harmonics.alert_over mixes rotations ({', '.join(rotations)}) with displacements ({', '.join(others)}): dofs that move "
+        "less than a thousandth of the largest are left out, and here radians are held against metres"
+    )
+    return (Verdict("doubtful", why=why, remedy="Name one kind only."),)
+
+
+def inside(question: Question) -> list[str]:
+    """Return the natural frequencies beside the range of the sweep, and the normal forces at rest."""
+    lowest, highest = (omega / HZ for omega in question.sweep.omega_range)
+    known, normal = question.model.frequencies, -question.model.static_force[:, 2]
+    told = [f"sweep: {lowest:.2f} to {highest:.2f} Hz"]
+    for state, hertz in (("open", known.free_reduced), ("stuck", known.stuck_reduced)):
+        rigid = int(np.count_nonzero(hertz < RIGID))
+        near = [f"{f:.2f}" for f in hertz[rigid:] if f <= highest][-LISTED:]
+        near = [f"{rigid} of rigid motions"] * bool(rigid) + near
+        beyond = [f"{f:.2f}" for f in hertz if f > highest][:1]
+        told += [f"natural frequencies, contacts {state}: {', '.join([*near, *beyond])} Hz"] * bool(near or beyond)  # fmt: skip
+    if np.any(normal):
+        pressed = np.count_nonzero(normal > 0)
+        told.append(
+            f"static equilibrium: {pressed} of {normal.size} contact points are pressed, normal forces up to {normal.max():.3g} N"
+        )
+    return told
+
+
+def nothing_pressed(question: Question) -> tuple[Verdict, ...]:
+    """Doubt where friction under a normal force finds none in the static state."""
+    laws, normal = question.model.contacts.laws, -question.model.static_force[:, 2]
+    rubs = np.array([law in COULOMB for law in laws], dtype=bool)
+    if not rubs.any() or np.any(normal[rubs] > 0):
+        return ()
+    why = (
+        f"all {np.count_nonzero(rubs)} contact points with friction are open in the static state: they act only where the vibration "
+        "closes them"
+    )
+    remedy = "Check gaps, preloads, static loads and the direction in which the speed moves the surfaces."
+    return (Verdict("doubtful", why=why, remedy=remedy),)
+
+
+def no_resonance(question: Question) -> tuple[Verdict, ...]:
+    """Doubt where no natural frequency, contacts open or stuck, lies in the range of the sweep."""
+    lowest, highest = (omega / HZ for omega in question.sweep.omega_range)
+    known = question.model.frequencies
+    every = np.concatenate([known.free_reduced, known.stuck_reduced])
+    if not every.size or np.any((every >= lowest) & (every <= highest)):
+        return ()
+    near = float(every[np.argmin(np.maximum(lowest - every, every - highest))])
+    why = (
+        f"no natural frequency lies between {lowest:.2f} and {highest:.2f} Hz, neither with open nor with stuck contacts; the "
+        f"nearest one is {near:.2f} Hz"
+    )
+    return (Verdict("doubtful", why=why, remedy=f"Widen forced_response.{question.key}."),)
+
+
+def _of_drift(question: Question, response: Response) -> Iterator[Verdict]:
+    """Doubt where friction leaves the mean position of a body free."""
+    chosen = [a.point for a in response.accepted if not a.point.converged]
+    if response.top is not None:
+        chosen = [response.top.point, *chosen]
+    for point in chosen:
+        found = drift(question.problem, point)
+        if found.undetermined:
+            why = (
+                f"at {point.omega / HZ:.2f} Hz every contact slips or opens in each cycle, the mean position of {found.coordinate} "
+                "is undetermined and the body may drift"
+            )
+            remedy = (
+                "Give [retention] a small stiffness_n_per_m (1e-6 of the contact stiffness); the result then says how far it "
+                "moves the peak."
+            )
+            yield Verdict("doubtful", why=why, remedy=remedy)
+            return
+
+
+def _of_retention(
+    question: Question, response: Response, shift: tuple[float, float]
+) -> Iterator[Verdict]:
+    if question.model.retention > 0.0 and response.top is not None and math.isnan(shift[0]):
+        why = (
+            "no periodic motion was found at the peak with a tenth of the retention stiffness; the peak rests on the body being "
+            "held"
+        )
+        remedy = "Do not rely on it: find what holds the body, or give it a contact that does."
+        yield Verdict("doubtful", why=why, remedy=remedy)

@@ -1,0 +1,231 @@
+"""What makes a forced response doubtful or wrong: one function a rule, each made from the variables of the finished dataset."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from stickslip.solve.status import Status
+from stickslip.study.analyses.forced.chooser import error_text
+from stickslip.study.analyses.forced.curve import ATTAINED, Curve
+from stickslip.study.analyses.forced.jumps import jumps
+from stickslip.study.analyses.verdict import Level, from_json
+
+LARGE_SHIFT = 0.01  # relative change of the peak with a tenth of the retention stiffness
+STUCK = 1e-18  # m/N: no structure is so stiff; what moves less sticks to rigid contacts or is held
+MORE_HARMONICS = "Raise harmonics.high, and compare"
+IN_TIME = "--verify integrates in time at the peak"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a rule finds.
+
+    Parameters
+    ----------
+    level, why, remedy
+        As of a `Verdict`; ``trusted`` is told without doubt.
+    points
+        Positions of its points within the case; none: the case as a whole.
+    size
+        Of several findings of a rule the largest stands for all.
+    """
+
+    level: Level
+    why: str
+    remedy: str
+    points: tuple[int, ...] = ()
+    size: float = 0.0
+
+
+Rule = Callable[[Curve], Iterator[Finding]]
+
+
+def unsolved(case: Curve) -> Iterator[Finding]:
+    """Take no point that did not converge for one, and doubt a peak that is only the largest of the others."""
+    lost = np.flatnonzero(~case.converged)
+    if lost.size == case.hz.size:
+        remedy = "See run.log for what stopped them, and the size of the loads."
+        yield Finding("wrong", "no point converged: there is no peak", remedy)
+        return
+    for i in lost:
+        why = f"did not converge ({Status(int(case.status[i])).advice})"
+        remedy = "A smaller step (more forced_response.points) finds most such points."
+        yield Finding("wrong", why, remedy, (int(i),))
+    if lost.size:
+        why = f"{lost.size} points did not converge; the peak is the largest of the others, and a larger one may stand among them"
+        remedy = "Take more forced_response.points, or narrow the range to theirs."
+        yield Finding("doubtful", why, remedy)
+
+
+def few_harmonics(case: Curve) -> Iterator[Finding]:
+    """Doubt a solution whose own harmonics are predicted to be too few, and one that nothing has judged."""
+    for i in np.flatnonzero(case.converged):
+        own, solved = case.own_error[i], case.audit[i]
+        if case.attained[i] or solved <= case.limit:
+            continue  # what was solved or integrated tells more than a prediction
+        if own > case.limit:
+            why = f"more harmonics than H = {case.kept[i]} are predicted to change it by {error_text(own)}"
+            yield Finding("doubtful", why, f"{MORE_HARMONICS}; {IN_TIME}.", (int(i),), float(own))
+        elif np.isnan(own) and np.isnan(solved) and np.isnan(case.reference[i]):
+            why = f"its harmonics were not examined: nothing says how wrong H = {case.kept[i]} is"
+            yield Finding("doubtful", why, f"{_examination(case)}.", (int(i),))
+
+
+def _examination(case: Curve) -> str:
+    if case.rigid:
+        return "A contact is rigid, of which no error is predicted: compare with a larger harmonics.high, or see --verify"
+    return "--verify-harmonics predicts at every point what more would change, --verify integrates in time at the peak"
+
+
+def audited(case: Curve) -> Iterator[Finding]:
+    """Doubt a solution that more harmonics changed, and that stands all the same."""
+    for i in np.flatnonzero(case.audit > case.limit):
+        if not case.attained[i]:
+            why = f"solved again with more harmonics than H = {case.kept[i]} it differs by {error_text(case.audit[i])}"
+            remedy = f"{MORE_HARMONICS}; {IN_TIME}."
+            yield Finding("doubtful", why, remedy, (int(i),), float(case.audit[i]))
+
+
+def not_audited(case: Curve) -> Iterator[Finding]:
+    """Doubt few harmonics that were accepted by predictions alone."""
+    few = case.converged & case.few
+    none = case.has("audit_error_percent") and bool(np.isnan(case.audit).all())
+    if none and case.decides and few.any():
+        why = f"H = {case.low} was accepted at {few.sum()} points by predictions alone: none of them was solved with more to compare"
+        yield Finding("doubtful", why, f"{_examination(case)}.")
+
+
+def twice_the_harmonics(case: Curve) -> Iterator[Finding]:
+    """Doubt what --verify-harmonics predicts to change."""
+    for i in np.flatnonzero(case.reference > case.limit):
+        if not case.attained[i]:
+            why = f"twice as many harmonics are predicted to change it, in amplitude or phase, by {error_text(case.reference[i])}"
+            remedy = f"{MORE_HARMONICS}."
+            yield Finding("doubtful", why, remedy, (int(i),), float(case.reference[i]))
+
+
+def on_other_motions(case: Curve) -> Iterator[Finding]:
+    """Doubt neighbours of a branch that stand on different motions."""
+    at = case.branch[case.converged[case.branch]]
+    if case.stepped or at.size < 2:  # between given frequencies any growth is possible
+        return
+    for jump in jumps(case.amplitude[at], case.dissipation[at], case.few[at], case.elastic):
+        i, j = int(at[jump.step]), int(at[jump.step + 1])
+        kept = case.kept[i], case.kept[j]
+        unlike = (
+            "" if kept[0] == kept[1] else f"; or one of H = {kept[0]} and H = {kept[1]} is wrong"
+        )
+        why = (
+            f"the response jumps between {case.hz[i]:.2f} and {case.hz[j]:.2f} Hz ({jump.what}): more than one periodic motion "
+            f"exists near there, and which one a machine takes depends on its history{unlike}"
+        )
+        remedy = 'Take more forced_response.points there, and sweep both ways (direction = "down").'
+        yield Finding("doubtful", why, remedy, (i, j), jump.size)
+
+
+def folds(case: Curve) -> Iterator[Finding]:
+    """Tell of a branch that runs backwards: several motions at a frequency; doubt a peak among them."""
+    hz = case.hz[case.branch]
+    back = [sorted(pair) for pair in pairwise(hz) if case.forward * (pair[1] - pair[0]) < 0]
+    if not back:
+        return
+    low, high = min(b for b, _ in back), max(a for _, a in back)
+    inside = low <= case.peak_hz <= high
+    why = (
+        f"the response folds between {low:.2f} and {high:.2f} Hz: more than one periodic motion was found there, as a rule one "
+        "of them unstable" + (", and the peak stands among them" if inside else "")
+    )
+    remedy = "Points outside the asked range belong to the fold."
+    if inside:
+        remedy = 'Which motion a machine takes depends on its history: sweep both ways (direction = "down"), and see --verify.'
+    yield Finding("doubtful" if inside else "trusted", why, remedy)
+
+
+def stability(case: Curve) -> Iterator[Finding]:
+    """Judge by the multipliers of the motion."""
+    for point, said in case.examined("stability_verdict"):
+        why = without_place(said["stability_sentence"])
+        if said["stability_verdict"] == "unstable":
+            why = f"a machine does not stay there: {why}"
+            remedy = "Look for the motion it leaves for: sweep the other way, or see --verify."
+            yield Finding("wrong", why, remedy, (point,))
+        elif said["stability_verdict"] == "undecided" and not case.attained[point]:
+            why = f"whether it is stable: {why}"
+            remedy = f"{IN_TIME}, and sees whether the motion stays."
+            yield Finding("doubtful", why, remedy, (point,))
+
+
+def without_place(sentence: str) -> str:
+    """Return the sentence of a check without the frequency at its head, which a verdict names itself, and without its full stop."""
+    head, found, rest = sentence.partition(" Hz: ")
+    return (rest if found and head.replace(".", "").isdigit() else sentence).removesuffix(".")
+
+
+def in_time(case: Curve) -> Iterator[Finding]:
+    """Judge by time integration."""
+    for point, said in case.examined("verify_difference_percent"):
+        motion, off = said.get("verify_motion", ""), float(said["verify_difference_percent"])
+        if motion in ("left", "not periodic"):
+            what = "leaves it for another motion" if motion == "left" else "is not periodic"
+            why = f"the motion in time, started from it, {what}: {without_place(said['verify_sentence'])}"
+            remedy = "Believe the time integration; sweep the other way for the motion it goes to."
+            yield Finding("wrong", why, remedy, (point,))
+        elif motion == "not settled" or not int(said["verify_settled"]):
+            why = "a time integration did not settle to a periodic motion"
+            remedy = "See the table of checks: it says what drifts or rings on."
+            yield Finding("doubtful", why, remedy, (point,))
+        elif not abs(off) <= ATTAINED:
+            why = f"time integration and harmonic balance differ by {off:+.3g} %, more than {ATTAINED:g} %"
+            remedy = f"{MORE_HARMONICS}; the table of checks says which of the two is wrong."
+            yield Finding("doubtful", why, remedy, (point,), abs(off))
+
+
+def at_the_end(case: Curve) -> Iterator[Finding]:
+    """Doubt a largest amplitude that is no resonance, or none at all."""
+    if case.peak < 0:
+        return
+    if case.amplitude[case.peak] < STUCK * case.number("excitation_n"):
+        why = f"the output {case.output} does not move: a rigid contact holds it at all frequencies"
+        remedy = "Name an output that moves, or raise the load until it slips."
+        yield Finding("doubtful", why, remedy)
+    elif case.peak_hz in (case.hz.min(), case.hz.max()):
+        why = f"the largest amplitude stands at the end of the sweep ({case.peak_hz:.2f} Hz); it is no resonance"
+        yield Finding("doubtful", why, f"Widen forced_response.{case.range_key}.")
+
+
+def retention(case: Curve) -> Iterator[Finding]:
+    """Doubt a peak that hangs on what is not physical."""
+    shift = case.number("retention_peak_shift")
+    if abs(shift) > LARGE_SHIFT:
+        why = (
+            f"the peak changes by {100 * shift:.3g} % when the retention stiffness of rigid bodies is ten times smaller: it "
+            "depends on a stiffness that is not physical"
+        )
+        remedy = (
+            "Lower retention.stiffness_n_per_m until the peak stays, or find what holds the body."
+        )
+        yield Finding("doubtful", why, remedy)
+
+
+def known_to_the_job(case: Curve) -> Iterator[Finding]:
+    """Return what only the model knew."""
+    for v in from_json(case.text("known_verdicts") or "[]"):
+        yield Finding(v.level, v.why, v.remedy)
+
+
+RULES: tuple[Rule, ...] = (
+    known_to_the_job,
+    unsolved,
+    in_time,
+    stability,
+    audited,
+    few_harmonics,
+    twice_the_harmonics,
+    not_audited,
+    on_other_motions,
+    folds,
+    at_the_end,
+    retention,
+)

@@ -1,0 +1,125 @@
+"""The verdicts of a forced response: what the rules find, point by point and case by case."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from stickslip.arrays import IntArray
+from stickslip.study.analyses.forced.chooser import error_text
+from stickslip.study.analyses.forced.curve import Curve
+from stickslip.study.analyses.forced.rules import RULES, Finding, without_place
+from stickslip.study.analyses.verdict import LEVELS, Level, Verdict, of_all_cases, worst
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A case, and what each rule has found of it."""
+
+    label: str
+    case: Curve
+    findings: tuple[tuple[Finding, ...], ...]
+
+    @property
+    def level(self) -> Level:
+        """The case is as bad as its peak and as what holds for all of it."""
+        every = (f for own in self.findings for f in own)
+        return worst(f.level for f in every if not f.points or self.case.peak in f.points)
+
+    @property
+    def of_points(self) -> tuple[IntArray, list[str]]:
+        """(n,) number of the level of each point, and why, empty where it is trusted."""
+        levels = np.zeros(self.case.at.size, dtype=np.int64)
+        reasons: list[list[str]] = [[] for _ in levels]
+        for found, i in ((f, i) for own in self.findings for f in own for i in f.points):
+            levels[i] = max(levels[i], LEVELS.index(found.level))
+            reasons[i].append(found.why)
+        return levels, ["; ".join(own) for own in reasons]
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """The worst first; a case that is trusted says what it was examined for."""
+        found = sorted((v for own in self.findings for v in self._of_rule(own)), reverse=True)
+        if self.level == "trusted":
+            hz = self.case.peak_hz if self.case.peak >= 0 else None
+            found = [Verdict("trusted", self.label, hz, _examined(self.case)), *found]
+        return tuple(found)
+
+    def _of_rule(self, found: Sequence[Finding]) -> Iterator[Verdict]:
+        """Yield a verdict for what holds as a whole, and of each level one for its points: of the peak, else of the worst."""
+        whole = [f for f in found if not f.points]
+        yield from (Verdict(f.level, self.label, None, f.why, f.remedy) for f in whole)
+        for level in LEVELS:
+            group = [f for f in found if f.points and f.level == level]
+            if group:
+                first = max(group, key=lambda f: (self.case.peak in f.points, f.size))
+                at = self.case.peak if self.case.peak in first.points else first.points[0]
+                why = first.why + (self._others(group) if len(group) > 1 else "")
+                yield Verdict(level, self.label, float(self.case.hz[at]), why, first.remedy)
+
+    def _others(self, group: Sequence[Finding]) -> str:
+        hz = self.case.hz[sorted({i for f in group for i in f.points})]
+        count = f"{hz.size} of {self.case.hz.size} points"
+        return f"; the like holds at {count}, {hz.min():.2f} to {hz.max():.2f} Hz"
+
+
+def _examined(case: Curve) -> str:
+    """Say what was examined at the peak, and what was not."""
+    if case.peak < 0:
+        return "nothing to judge"
+    peak, said = case.peak, [f"peak with H = {case.kept[case.peak]}"]
+    for value, about in (
+        (case.own_error[peak], "predicted error"),
+        (case.audit[peak], "difference from more harmonics"),
+        (case.reference[peak], "predicted change with twice as many harmonics"),
+    ):
+        said += [f"{about} {error_text(float(value))}"] * bool(np.isfinite(value))
+    said += ["attained in time integration"] * bool(case.attained[peak])
+    told = [row for point, row in case.examined("stability_verdict") if point == peak]
+    known = [str(row["stability_verdict"]) for row in told]
+    if "stable" in known:
+        return ", ".join([*said, "stable"])
+    because = [
+        f" ({without_place(str(row['stability_sentence'])).removeprefix('not examined: ')})"
+        for row in told
+        if row["stability_verdict"] == "not examined"
+    ]
+    return f"{', '.join(said)}; whether it is stable was not examined{''.join(because)}"
+
+
+def judged(data: xr.Dataset, labels: Sequence[str]) -> tuple[Judged, ...]:
+    """Return what the rules find of each case of a finished dataset.
+
+    Parameters
+    ----------
+    data
+        Of `put_together`.
+    labels
+        Of the cases.
+    """
+    curves = [Curve(data, i) for i in range(len(labels))]
+    return tuple(
+        Judged(label, curve, tuple(tuple(rule(curve)) for rule in RULES))
+        for label, curve in zip(labels, curves, strict=True)
+    )
+
+
+def verdicts(data: xr.Dataset, labels: Sequence[str]) -> tuple[Verdict, ...]:
+    """Return the verdicts of all cases; what holds for each of several is said once."""
+    return of_all_cases([v for own in judged(data, labels) for v in own.verdicts], labels)
+
+
+def with_levels(data: xr.Dataset, labels: Sequence[str]) -> dict[str, tuple[str, object]]:
+    """Return the level of each case and of each point, and why, as variables: dimension and values."""
+    every = judged(data, labels)
+    found: dict[str, tuple[str, object]] = {
+        "case_verdict": ("case", np.array([LEVELS.index(own.level) for own in every]))
+    }
+    if "point_case" not in data:
+        return found
+    levels = np.zeros(data.sizes["point"], dtype=np.int64)
+    reasons = np.full(levels.size, "", dtype=object)
+    for own in every:
+        levels[own.case.at], reasons[own.case.at] = own.of_points
+    return found | {"verdict": ("point", levels), "verdict_reason": ("point", reasons.astype(str))}

@@ -1,0 +1,144 @@
+"""Whether an answer is to be trusted: trusted, doubtful or wrong, why, and what to do."""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+import xarray as xr
+
+Level = Literal["trusted", "doubtful", "wrong"]
+LEVELS: tuple[Level, ...] = get_args(Level)  # the number of a level in a dataset is its place
+ATTRIBUTE = "verdicts"  # of the dataset of an analysis
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What is to be thought of an answer, or of a point of it.
+
+    Verdicts are ordered by their levels: `max` of several is the worst one.
+
+    Parameters
+    ----------
+    level
+        ``trusted``, ``doubtful`` or ``wrong``.
+    case
+        Label of the case; empty: the only one, or all of them.
+    frequency_hz
+        Of the point; None: the case as a whole.
+    why
+        Half a sentence or more, without a full stop.
+    remedy
+        What to do, in whole sentences; empty where nothing is to be done.
+    """
+
+    level: Level
+    case: str = ""
+    frequency_hz: float | None = None
+    why: str = ""
+    remedy: str = ""
+
+    @property
+    def rank(self) -> int:
+        """Number of the level: 0 trusted, 1 doubtful, 2 wrong."""
+        return LEVELS.index(self.level)
+
+    @property
+    def told(self) -> bool:
+        """Whether the user is told of it unasked: it is not trusted, or there is something to do or to know."""
+        return self.rank > 0 or bool(self.remedy)
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in words, but for its level."""
+        place = "" if self.frequency_hz is None else f"{self.frequency_hz:.2f} Hz: "
+        return said(self.case, f"{place}{self.why}. {self.remedy}".rstrip())
+
+    def __str__(self) -> str:
+        return f"{self.level.upper() if self.rank else 'NOTE'}: {self.sentence}"
+
+    def __lt__(self, other: "Verdict") -> bool:
+        return self.rank < other.rank
+
+
+def said(label: str, text: str) -> str:
+    """Return a sentence about a case, with its label where there are several."""
+    return f"{label}: {text}" if label else text[:1].upper() + text[1:]
+
+
+def doubt(text: str, case: str = "") -> Verdict:
+    """Return the verdict ``doubtful`` with what a whole sentence, or several, says."""
+    return Verdict("doubtful", case, None, text.removesuffix("."))
+
+
+def worst(levels: Iterable[Level]) -> Level:
+    """Return the worst of several levels, ``trusted`` of none."""
+    return max(levels, key=LEVELS.index, default="trusted")
+
+
+def of_all_cases(each: Sequence[Verdict], labels: Sequence[str]) -> tuple[Verdict, ...]:
+    """Return verdicts in their order, and once without a case what holds as a whole for each of several."""
+    cases: dict[tuple[Any, ...], list[str]] = {}
+    for v in each:
+        cases.setdefault((v.level, v.frequency_hz, v.why, v.remedy), []).append(v.case)
+    found: dict[Verdict, None] = {}
+    for v in each:
+        known = set(cases[v.level, v.frequency_hz, v.why, v.remedy])
+        everywhere = v.told and v.frequency_hz is None and len(labels) > 1 and known >= set(labels)
+        found[Verdict(v.level, "", None, v.why, v.remedy) if everywhere else v] = None
+    return tuple(found)
+
+
+def to_json(verdicts: Iterable[Verdict]) -> str:
+    """Return verdicts as the text of a JSON list."""
+    return json.dumps([asdict(v) for v in verdicts])
+
+
+def from_json(text: str) -> tuple[Verdict, ...]:
+    """Return the verdicts of a JSON list."""
+    return tuple(Verdict(**own) for own in json.loads(text))
+
+
+def stored(attributes: Mapping[Any, Any]) -> tuple[Verdict, ...]:
+    """Return the verdicts that stand in the attributes of a dataset.
+
+    Results of versions that knew no verdicts have sentences instead, which were warnings.
+    """
+    if ATTRIBUTE in attributes:
+        return from_json(str(attributes[ATTRIBUTE]))
+    return tuple(doubt(str(text)) for text in json.loads(str(attributes.get("warnings", "[]"))))
+
+
+def of_tree(tree: xr.DataTree) -> tuple[Verdict, ...]:
+    """Return the verdicts of all analyses of a result."""
+    nodes = [tree, *tree.children.values()]
+    found: list[Verdict] = []
+    if any(int(node.attrs.get("complete", 1)) == 0 for node in nodes):
+        remedy = "Run the study again: it resumes where it stopped."
+        found = [Verdict("doubtful", why="the run is not complete", remedy=remedy)]
+    return tuple(dict.fromkeys([*found, *(v for node in nodes for v in stored(node.attrs))]))
+
+
+def not_trusted(tree: xr.DataTree) -> str:
+    """Say in a line which analyses, and which of their cases, are doubtful or wrong; empty where all are trusted."""
+    each = [_not_trusted(str(name), node.to_dataset()) for name, node in tree.children.items()]
+    told = "; ".join(text for text in each if text)
+    return f"Not to be trusted as it stands: {told}. See the verdicts." if told else ""
+
+
+def _not_trusted(name: str, data: xr.Dataset) -> str:
+    words = name.replace("_", " ")
+    if "case_verdict" not in data:
+        level = worst(v.level for v in stored(data.attrs))
+        return "" if level == "trusted" else f"{words}: {level}"
+    levels = data["case_verdict"].values
+    if levels.size == 1:
+        return f"{words}: {LEVELS[int(levels[0])]}" if levels[0] else ""
+    labels = np.array([str(x) for x in data["case_label"].values])
+    said = [
+        f"{np.sum(levels == rank)} of {levels.size} cases {LEVELS[rank]} ({', '.join(labels[levels == rank])})"
+        for rank in (2, 1)
+        if np.any(levels == rank)
+    ]
+    return f"{words}: {', '.join(said)}" if said else ""

@@ -1,0 +1,321 @@
+"""Verdicts: each rule on a response that it must find, and on one that it must leave alone; the same words everywhere."""
+
+import math
+import re
+from html import unescape
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from small_v2 import write_four_masses
+from test_cli import done
+
+import stickslip as ss
+from stickslip.study.analyses.forced.verdicts import verdicts, with_levels
+from stickslip.study.analyses.verdict import (
+    LEVELS,
+    Verdict,
+    doubt,
+    from_json,
+    not_trusted,
+    of_all_cases,
+    of_tree,
+    stored,
+    to_json,
+    worst,
+)
+
+HZ = np.array([10.0, 11.0, 12.0, 13.0, 14.0, 15.0])
+TOP = 3  # the point of the peak
+NO_STABILITY = "; whether it is stable was not examined"
+
+
+def response(attrs: dict[str, object] | None = None, **changes: object) -> xr.Dataset:
+    """A resonance of six points, each judged and good; a name with a case's value changes that."""
+    n = len(changes.get("frequency_hz", HZ))
+    kept = np.zeros((n, 6), dtype=int)
+    kept[:, :2] = 1
+    plain = {
+        "point_case": np.zeros(n, dtype=int), "frequency_hz": HZ, "status": np.zeros(n, dtype=int),
+        "refinement": np.zeros(n, dtype=int), "own_error_percent": np.full(n, 1.0),
+    }  # fmt: skip
+    amplitude = np.array([1.0, 1.3, 1.6, 1.9, 1.5, 1.2])
+    case = {"peak_point": [TOP], "excitation_n": [1.0], "retention_peak_shift": [np.nan]}
+    rows = {"verify": "check", "stability": "examined"}
+    found: dict[str, object] = {
+        "harmonic_kept": (("point", "harmonic"), kept),
+        "amplitude": (("point", "output"), np.reshape(changes.pop("amplitude", amplitude), (n, 1))),
+        "dissipated_energy": (("point", "contact"), np.reshape(changes.pop("loss", amplitude), (n, 1))),
+    }  # fmt: skip
+    for name, value in (plain | case | changes).items():
+        word = name.partition("_")[0]
+        dims = rows.get(word, "case" if name in (*case, "known_verdicts") else "point")
+        found[name] = ((dims, "harmonic") if name == "harmonic_kept" else dims, value)
+    own = {"low_harmonics": [0, 1], "selection_threshold": 0.05, "error_limit_percent": 5.0}
+    return xr.Dataset(found, {"output": ["tip.x"]}, own | (attrs or {}))
+
+
+def judged(data: xr.Dataset) -> tuple[tuple[Verdict, ...], str, list[str]]:
+    """Return the verdicts of its one case, the level of the case, and those of its points."""
+    levels = {name: np.asarray(of[1]) for name, of in with_levels(data, [""]).items()}
+    return (
+        verdicts(data, [""]),
+        LEVELS[int(levels["case_verdict"][0])],
+        [LEVELS[int(k)] for k in levels["verdict"]],
+    )
+
+
+def values(at: int, value: float, rest: float = np.nan, n: int = 6) -> np.ndarray:
+    found = np.full(n, rest)
+    found[at] = value
+    return found
+
+
+def checked(**row: object) -> dict[str, list[object]]:
+    own = {
+        "case": 0,
+        "frequency_hz": 13.0,
+        "settled": 1,
+        "difference_percent": 0.2,
+        "sentence": "13.0 Hz: so.",
+    }
+    return {f"verify_{name}": [value] for name, value in (own | row).items()}
+
+
+def examined(verdict: str, hz: float = 13.0) -> dict[str, list[object]]:
+    own = {
+        "case": 0,
+        "frequency_hz": hz,
+        "verdict": verdict,
+        "sentence": f"13.000 Hz: {verdict}: the multiplier is 1.2",
+    }
+    return {f"stability_{name}": [value] for name, value in own.items()}
+
+
+def many(at: tuple[int, ...]) -> np.ndarray:
+    kept = np.zeros((6, 6), dtype=int)
+    kept[:, :2] = 1
+    kept[list(at)] = 1
+    return kept
+
+
+def test_what_is_judged_and_good_is_trusted_and_says_what_was_not_examined() -> None:
+    found, case, points = judged(response())
+    assert case == "trusted"
+    assert set(points) == {"trusted"}
+    (only,) = found
+    assert only == Verdict(
+        "trusted", "", 13.0, f"peak with H = 1, predicted error 1 %{NO_STABILITY}"
+    )
+    assert not only.told
+
+
+# changes of a good response, the level of the case, those of the points that are not trusted, and words of its verdict
+RULES: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
+    "not converged": (
+        {"status": values(1, 1, 0)}, "doubtful", {1: "wrong"}, "a larger one may stand among them",
+    ),
+    "none converged": (
+        {"status": np.ones(6, dtype=int), "peak_point": [-1]}, "wrong", {}, "there is no peak",
+    ),
+    "own error at the peak": (
+        {"own_error_percent": values(TOP, 7.0, 1.0)}, "doubtful", {TOP: "doubtful"}, "predicted to change it by 7 %",
+    ),
+    "own error beside the peak": (
+        {"own_error_percent": values(0, 250.0, 1.0)}, "trusted", {0: "doubtful"}, "predicted to change it by over 100 %",
+    ),
+    "never judged": (
+        {"own_error_percent": values(TOP, np.nan, 1.0)}, "doubtful", {TOP: "doubtful"}, "were not examined",
+    ),
+    "judged by an audit": (
+        {"own_error_percent": values(TOP, np.nan, 1.0), "audit_error_percent": values(TOP, 0.3)}, "trusted", {},
+        "difference from more harmonics 0.3 %",
+    ),
+    "audit": (
+        {"audit_error_percent": values(TOP, 8.0)}, "doubtful", {TOP: "doubtful"}, "it differs by 8 %",
+    ),
+    "no audit": (
+        {"audit_error_percent": np.full(6, np.nan)}, "doubtful", {}, "by predictions alone",
+    ),
+    "twice the harmonics": (
+        {"reference_error_percent": values(TOP, 9.0, 1.0)}, "doubtful", {TOP: "doubtful"}, "amplitude or phase, by 9 %",
+    ),
+    "amplitude jumps": (
+        {"amplitude": [1.0, 1.3, 1.6, 3.9, 3.5, 3.2], "harmonic_kept": many((3, 4, 5)), "loss": np.ones(6)},
+        "doubtful", {2: "doubtful", 3: "doubtful"}, "between 12.00 and 13.00 Hz (amplitude 2.44 times)",
+    ),
+    "dissipation jumps": (
+        {"loss": [1.0, 250.0, 260.0, 270.0, 260.0, 250.0]}, "trusted", {0: "doubtful", 1: "doubtful"},
+        "between 10.00 and 11.00 Hz (dissipation 250 times)",
+    ),
+    "fold beside the peak": (
+        {"frequency_hz": np.array([10.0, 11.0, 10.5, 13.0, 14.0, 15.0])}, "trusted", {}, "folds between 10.50 and 11.00",
+    ),
+    "fold at the peak": (
+        {"frequency_hz": np.array([10.0, 11.0, 14.0, 13.0, 12.0, 15.0])}, "doubtful", {}, "the peak stands among them",
+    ),
+    "unstable": (examined("unstable"), "wrong", {TOP: "wrong"}, "a machine does not stay there: unstable: the multiplier is 1.2"),
+    "undecided": (examined("undecided"), "doubtful", {TOP: "doubtful"}, "whether it is stable: undecided: the multiplier"),
+    "stable": (examined("stable"), "trusted", {}, "predicted error 1 %, stable"),
+    "stability not examined": (
+        examined("not examined"), "trusted", {}, f"{NO_STABILITY[2:]} (the multiplier is 1.2)",
+    ),
+    "unstable beside the peak": (examined("unstable", 11.0), "trusted", {1: "wrong"}, "a machine does not stay there"),
+    "left": (checked(motion="left"), "wrong", {TOP: "wrong"}, "leaves it for another motion"),
+    "not periodic": (checked(motion="not periodic"), "wrong", {TOP: "wrong"}, "is not periodic"),
+    "not settled": (checked(settled=0), "doubtful", {TOP: "doubtful"}, "did not settle"),
+    "attained": (checked(motion="attained"), "trusted", {}, "attained in time integration"),
+    "attained elsewhere": (
+        checked(motion="attained", difference_percent=-1.4), "doubtful", {TOP: "doubtful"}, "differ by -1.4 %",
+    ),
+    "undecided but attained": (
+        examined("undecided") | checked(motion="attained"), "trusted", {}, "attained in time integration",
+    ),
+    "predicted to be wrong but attained": (
+        checked(motion="attained") | {"own_error_percent": values(TOP, 70.0, 1.0)}, "trusted", {}, "attained",
+    ),
+    "peak at the end": (
+        {"amplitude": [1.0, 1.1, 1.2, 1.3, 1.4, 1.5], "peak_point": [5]}, "doubtful", {}, "it is no resonance",
+    ),
+    "output that does not move": ({"amplitude": np.full(6, 1e-20)}, "doubtful", {}, "tip.x does not move"),
+    "retention": ({"retention_peak_shift": [-0.2]}, "doubtful", {}, "the peak changes by -20 %"),
+    "little retention": ({"retention_peak_shift": [0.005]}, "trusted", {}, "peak with H = 1"),
+    "known to the job": (
+        {"known_verdicts": [to_json([doubt("It may drift.")])]}, "doubtful", {}, "It may drift",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", RULES)
+def test_rule(name: str) -> None:
+    changes, case, of_points, words = RULES[name]
+    found, level, points = judged(response(**changes))
+    assert level == case
+    if case != "wrong" or "status" not in changes:
+        assert {i: p for i, p in enumerate(points) if p != "trusted"} == of_points
+    assert any(words in v.why for v in found), found
+    assert all(v.why and (v.remedy or not v.rank or "drift" in v.why) for v in found)
+
+
+def test_a_jump_is_none_where_slip_begins_or_frequencies_are_given() -> None:
+    grows = [
+        1e-9,
+        1.0,
+        12.0,
+        30.0,
+        18.0,
+        1e-9,
+    ]  # slip begins after the first point and ends before the last
+    assert set(judged(response(loss=grows))[2]) == {"trusted"}
+    faint = [
+        1e-9,
+        1e-6,
+        1e-6,
+        270.0,
+        250.0,
+        240.0,
+    ]  # a jump of what does not count, then one that does
+    assert judged(response(loss=faint))[2][:4] == ["trusted", "trusted", "doubtful", "doubtful"]
+    rounding = response(loss=[1e-22, 3e-20, 3e-20, 3e-20, 2e-20, 1e-20])
+    shape = (6, 6, 1, 3, 2)
+    for name in ("gap", "contact_force"):
+        dims = ("point", "harmonic", "contact", "direction", "part")
+        rounding[name] = dims, np.full(shape, 1e-4)
+    assert set(judged(rounding)[2]) == {"trusted"}
+    jump = {"loss": [1.0, 250.0, 260.0, 270.0, 260.0, 250.0]}
+    assert set(judged(response({"stepped": 1}, **jump))[2]) == {"trusted"}
+
+
+def test_a_sweep_downwards_does_not_fold() -> None:
+    down = {"frequency_hz": HZ[::-1].copy(), "peak_point": [2]}
+    assert not any(
+        "folds" in v.why for v in verdicts(response({"direction": "down"}, **down), [""])
+    )
+    assert any("folds" in v.why for v in verdicts(response(**down), [""]))
+
+
+def test_points_of_a_rule_are_told_in_one_sentence_with_the_peak_first() -> None:
+    errors = np.array([30.0, 1.0, 6.0, 7.0, 8.0, 1.0])
+    (found,) = (v for v in verdicts(response(own_error_percent=errors), [""]) if v.rank)
+    assert found.frequency_hz == 13.0
+    assert "by 7 %; the like holds at 4 of 6 points, 10.00 to 14.00 Hz" in found.why
+    (found,) = (
+        v for v in verdicts(response(own_error_percent=values(0, 30.0, 1.0)), [""]) if v.rank
+    )
+    assert found.frequency_hz == 10.0
+    assert "the like" not in found.why
+
+
+def test_remedies_fit_rigid_contacts() -> None:
+    data = response(own_error_percent=np.full(6, np.nan))
+    assert "--verify-harmonics predicts" in verdicts(data, [""])[0].remedy
+    data["contact_law"] = "contact", ["rigid_coulomb"]
+    assert "A contact is rigid" in verdicts(data, [""])[0].remedy
+
+
+def test_verdicts_are_ordered_and_go_to_json_and_back() -> None:
+    good, bad = Verdict("trusted", "a", 1.0, "x"), Verdict("wrong", "a", None, "y", "Do.")
+    middle = doubt("z. And more.", "b")
+    assert max(good, bad, middle) is bad
+    assert sorted([bad, good, middle]) == [good, middle, bad]
+    assert from_json(to_json([good, bad, middle])) == (good, bad, middle)
+    assert worst([]) == "trusted"
+    assert worst(["doubtful", "wrong", "trusted"]) == "wrong"
+    assert str(bad) == "WRONG: a: y. Do."
+    assert str(middle) == "DOUBTFUL: b: z. And more."
+    assert str(Verdict("trusted", "", 1.5, "folds", "Look.")) == "NOTE: 1.50 Hz: folds. Look."
+    assert stored({"warnings": '["z. And more."]'}) == (doubt("z. And more."),)
+
+
+def test_what_holds_for_every_case_is_said_once() -> None:
+    each = [Verdict("doubtful", label, None, "units") for label in ("a", "b")]
+    own = Verdict("doubtful", "a", 3.0, "here")
+    assert of_all_cases([*each, own], ["a", "b"]) == (Verdict("doubtful", "", None, "units"), own)
+    assert of_all_cases(each, ["a", "b", "c"]) == tuple(each)
+
+
+def test_the_last_line_names_the_cases_that_are_not_trusted() -> None:
+    data = xr.Dataset(
+        {"case_verdict": ("case", [0, 1, 2]), "case_label": ("case", ["a", "b", "c"])}
+    )
+    waves = xr.Dataset(attrs={"verdicts": to_json([doubt("rough")])})
+    tree = xr.DataTree.from_dict({"forced_response": data, "modes": waves})
+    assert not_trusted(tree) == (
+        "Not to be trusted as it stands: forced response: 1 of 3 cases wrong (c), 1 of 3 cases doubtful (b); modes: doubtful. "
+        "See the verdicts."
+    )
+    assert not_trusted(xr.DataTree.from_dict({"forced_response": data.isel(case=[0])})) == ""
+    one = xr.DataTree.from_dict({"forced_response": data.isel(case=[2])})
+    assert "forced response: wrong. See" in not_trusted(one)
+    assert of_tree(tree) == (doubt("rough"),)
+
+
+def test_a_journey_says_the_same_on_the_screen_on_the_page_in_the_file_and_in_python(
+    tmp_path: Path,
+) -> None:
+    changes = {"vary.load.shaker.force_n": "[0.01, 8.0]", "harmonics.selection": '"always_low"'}
+    said = done("run", str(write_four_masses(tmp_path, changes)))
+    result = ss.Result.open(tmp_path / "results")
+    data = result["forced_response"]
+    assert set(data.case_verdict.values) == {1}
+    assert data.case_verdict.attrs["flag_meanings"] == "trusted doubtful wrong"
+    assert stored(data.attrs) == result.verdicts
+    page = unescape(re.sub(r"<[^>]*>", "", (tmp_path / "results/report.html").read_text("utf-8")))
+    for v in (v for v in result.verdicts if v.told):
+        assert str(v) in said
+        assert v.why in page
+        assert v.remedy in page
+        assert str(v) in repr(result)
+    assert said.rstrip().splitlines()[-1] == result.not_trusted
+    assert "2 of 2 cases doubtful (load.shaker.force_n = 0.01, load.shaker.force_n = 8)" in said
+    assert result.peaks["verdict"].tolist() == ["doubtful", "doubtful"]
+    assert math.isclose(result.verdicts[0].frequency_hz or 0.0, float(data.peak_frequency_hz[0]))
+    # what was not examined is examined: the weak force is trusted then
+    said = done("run", str(tmp_path / "study.toml"), "--verify-harmonics")
+    again = ss.Result.open(tmp_path / "results")["forced_response"]
+    assert int(again.case_verdict[0]) == 0
+    good = [v for v in stored(again.attrs) if v.case == "load.shaker.force_n = 0.01"]
+    assert [v.level for v in good] == ["trusted"]
+    assert "predicted change with twice as many harmonics" in good[0].why
+    assert "force_n = 0.01" not in said.rstrip().splitlines()[-1]
