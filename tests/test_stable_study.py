@@ -14,7 +14,8 @@ from stickslip.cli import app
 from stickslip.response.forced.response import Sweep, forced_response
 from stickslip.study.analyses import forced_response as analysis
 from stickslip.study.analyses.forced import stable
-from stickslip.study.analyses.forced.in_time import MOST_TOLD, Check, check_in_time, shows_after
+from stickslip.study.analyses.forced.comparison import Check
+from stickslip.study.analyses.forced.in_time import MOST_TOLD, check_in_time, shows_after
 from stickslip.study.analyses.forced.points import Response, collect
 from stickslip.study.analyses.forced.question import Question
 from stickslip.study.analyses.forced.stable import (
@@ -80,6 +81,21 @@ def test_a_known_multiplier_comes_out_and_the_motion_in_time_leaves() -> None:
     check = check_in_time(asked, response, response.top, found.multiplier)
     assert check.motion == "not periodic"
     assert with_motion(found, check) == found
+
+
+def test_what_is_compared_is_the_harmonic_that_the_load_drives() -> None:
+    system, load = lifting()
+    third = replace(load, harmonics={3: 0.1 * load.harmonics[1]})
+    sweep = Sweep(omega_range=(0.42, 0.46), low=3, high=5, points=5, peak_points=0, samples=64)
+    asked = question(system, third, sweep)
+    response = response_of(asked)
+    accepted = response.accepted[2]
+    check = check_in_time(asked, response, accepted)
+    turns = 3 * accepted.point.omega  # a pressed contact: k = 2, c = 0.02
+    assert check.balance == pytest.approx(0.005 / abs(2 - turns**2 + 0.02j * turns), rel=1e-6)
+    assert abs(check.difference_percent) < 0.01
+    assert check.settled
+    assert check.motion == "attained"
 
 
 def test_a_peak_under_friction_is_stable_and_attained() -> None:

@@ -13,7 +13,8 @@ from stickslip.response.forced.response import forced_response
 from stickslip.response.time.transient import TransientResult
 from stickslip.study.analyses import forced_response as analysis
 from stickslip.study.analyses.forced import in_time
-from stickslip.study.analyses.forced.in_time import Check, check_in_time, chosen, refined
+from stickslip.study.analyses.forced.comparison import STEPS, Check
+from stickslip.study.analyses.forced.in_time import check_in_time, chosen, refined
 from stickslip.study.analyses.forced.points import Response, collect
 from stickslip.study.analyses.forced.question import Question
 from stickslip.study.analyses.forced_response import FORCED_RESPONSE
@@ -153,10 +154,10 @@ def test_a_difference_is_not_believed_before_twice_the_steps_confirm_it(
     asked_for = []
     real = in_time.integrated
 
-    def coarse(*arguments: Any, steps: int = in_time.STEPS, **more: Any) -> TransientResult:
+    def coarse(*arguments: Any, steps: int = STEPS, **more: Any) -> TransientResult:
         asked_for.append(steps)
         found = real(*arguments, **more)
-        wrong = 1.0 + 0.03 * (in_time.STEPS / steps) ** 2
+        wrong = 1.0 + 0.03 * (STEPS / steps) ** 2
         return replace(found, harmonics=wrong * found.harmonics)
 
     monkeypatch.setattr(in_time, "integrated", coarse)

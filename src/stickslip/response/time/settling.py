@@ -70,23 +70,24 @@ class Progress:
     periods: int = 0
     failures: int = 0
     remaining: float = np.inf
-    changes: list[float] = field(default_factory=list)  # of the first harmonic, relative
-    firsts: list[ComplexArray] = field(default_factory=list)  # first harmonic of every period
+    judged: tuple[int, ...] = (1,)  # harmonics that have to settle
+    changes: list[float] = field(default_factory=list)  # of these, relative
+    each: list[ComplexArray] = field(default_factory=list)  # the harmonics of every period
     means: list[FloatArray] = field(default_factory=list)  # (n,) mean displacement of every period
 
     def take_in(
         self, harmonics: ComplexArray, mean: FloatArray, failures: int, tolerance: float
     ) -> None:
-        """Add a period and judge whether the first harmonic has settled."""
+        """Add a period and judge whether the motion has settled."""
         self.harmonics, self.periods, self.failures = (
             harmonics,
             self.periods + 1,
             self.failures + failures,
         )
-        self.firsts.append(harmonics[1])
+        self.each.append(harmonics)
         self.means.append(mean)
         if self.periods > 1:
-            self.changes.append(_relative(self.firsts[-1] - self.firsts[-2], self.firsts[-1]))
+            self.changes.append(self._relative(self.each[-1] - self.each[-2], self.each[-1]))
             self.remaining = remaining_change(self.changes)
             self.status = "settled" if self.remaining < tolerance else "unsettled"
 
@@ -102,21 +103,21 @@ class Progress:
 
     @property
     def change(self) -> float:
-        """Largest relative change of the first harmonic over the last four periods."""
+        """Largest relative change of the judged harmonics over the last four periods."""
         return max(self.changes[-4:], default=np.nan)
 
     @property
     def average(self) -> ComplexArray:
-        """First harmonic averaged over the last third."""
-        last = self.firsts[-last_third(self.periods) :] or [self.harmonics[1]]
+        """(n_h + 1, n_outputs) harmonics averaged over the last third."""
+        last = self.each[-last_third(self.periods) :] or [self.harmonics]
         return np.asarray(np.mean(last, axis=0))
 
     @property
     def scatter(self) -> float:
         """Largest relative distance from that average."""
         average = self.average
-        last = self.firsts[-last_third(self.periods) :]
-        return max((_relative(first - average, average) for first in last), default=np.nan)
+        last = self.each[-last_third(self.periods) :]
+        return max((self._relative(one - average, average) for one in last), default=np.nan)
 
     @property
     def drift(self) -> FloatArray:
@@ -126,7 +127,8 @@ class Progress:
             return self.unknown
         return (self.means[-1] - self.means[-1 - stretch]) / stretch
 
-
-def _relative(difference: ComplexArray, size: ComplexArray) -> float:
-    largest = float(np.max(np.abs(size)))
-    return float(np.max(np.abs(difference))) / largest if largest > 0.0 else 0.0
+    def _relative(self, difference: ComplexArray, size: ComplexArray) -> float:
+        """Return the largest entry of the judged harmonics of a difference over that of what it is relative to."""
+        own = list(self.judged)
+        largest = float(np.max(np.abs(size[own])))
+        return float(np.max(np.abs(difference[own]))) / largest if largest > 0.0 else 0.0

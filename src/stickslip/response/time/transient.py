@@ -41,7 +41,8 @@ class TimeStepping:
     max_periods
         Give up settling after this many periods.
     tolerance
-        The first harmonic counts as settled when what is left of its change, relative to its amplitude, is below this.
+        The harmonics that the load drives (without one: the first) count as settled when what is left of their change, relative to
+        their largest amplitude, is below this.
     harmonics
         Highest harmonic reported.
     min_periods
@@ -70,19 +71,21 @@ class TransientResult:
     Parameters
     ----------
     status
-        ``settled``: the first harmonic has become periodic; ``unsettled``: the periods ran out; ``diverged``: the motion
+        ``settled``: the harmonics that the load drives have become periodic; ``unsettled``: the periods ran out; ``diverged``: the motion
         overflowed, and all arrays are NaN.
     harmonics
         (n_h + 1, n_outputs) complex amplitudes over the last period, m.
     average
         (n_outputs,) first harmonic averaged over the last third of the periods, m: the number to use where undamped
         modes of a damper on its contact springs go on ringing and nothing settles.
+    averages
+        (n_h + 1, n_outputs) the same of all harmonics.
     scatter
-        Largest distance of a period's first harmonic from that average, relative to it.
+        Largest distance of a period's driven harmonics from that average, relative to it.
     periods
         Number of periods integrated.
     change
-        Largest relative change of the first harmonic from one period to the next over the last few periods.
+        Largest relative change of the driven harmonics from one period to the next over the last few periods.
     remaining
         What is left to come of such changes if they go on decaying as they did (see `stickslip.response.time.settling`).
     decay
@@ -107,6 +110,7 @@ class TransientResult:
     status: SettlingStatus
     harmonics: ComplexArray
     average: ComplexArray
+    averages: ComplexArray
     scatter: float
     periods: int
     change: float
@@ -123,7 +127,7 @@ class TransientResult:
 
     @property
     def settled(self) -> bool:
-        """Whether the first harmonic has become periodic."""
+        """Whether the harmonics that the load drives have become periodic."""
         return self.status == "settled"
 
     @property
@@ -149,7 +153,7 @@ def integrate(  # noqa: PLR0913
     *,
     weights: FloatArray | None = None,
 ) -> TransientResult:
-    """Integrate ``M ü + C u̇ + K u + gap_operatorᵀ λ = f(t)`` until the first harmonic of the outputs is periodic.
+    """Integrate ``M ü + C u̇ + K u + gap_operatorᵀ λ = f(t)`` until the outputs are periodic in the harmonics that the load drives.
 
     Parameters
     ----------
@@ -184,16 +188,21 @@ def integrate(  # noqa: PLR0913
     check_outputs(outputs, marcher.n, "integrate")
     start = start or rest(marcher.n, laws)
     check_start(start, marcher.n, marcher.contacts, "integrate")
-    return _settle(marcher, marcher.begun(start), outputs, stepping)
+    driven = tuple(h for h, f in sorted(load.harmonics.items()) if 0 < h <= stepping.harmonics and np.any(f))  # fmt: skip
+    return _settle(marcher, marcher.begun(start), outputs, stepping, driven or (1,))
 
 
 def _settle(
-    marcher: Marcher, state: StepState, outputs: IntArray, stepping: TimeStepping
+    marcher: Marcher,
+    state: StepState,
+    outputs: IntArray,
+    stepping: TimeStepping,
+    judged: tuple[int, ...],
 ) -> TransientResult:
-    """March period by period until what is left of the change of the first harmonic is below the tolerance."""
+    """March period by period until what is left of the change of the judged harmonics is below the tolerance."""
     n, basis, record = marcher.n, marcher.modes.basis, marcher.record()
     unknown = np.full((stepping.harmonics + 1, len(outputs)), np.nan, dtype=complex)
-    now = Progress(unknown, np.full(n, np.nan))
+    now = Progress(unknown, np.full(n, np.nan), judged=judged)
     while now.periods < stepping.max_periods and now.goes_on(stepping.min_periods):
         began = state.x[:n].copy()
         failed = marcher.march(state, record)
@@ -220,7 +229,8 @@ def _result(
     return TransientResult(
         status=now.status,
         harmonics=np.asarray(known * now.harmonics),
-        average=np.asarray(known * now.average),
+        average=np.asarray(known * now.average[1]),
+        averages=np.asarray(known * now.average),
         scatter=known * now.scatter,
         periods=now.periods,
         change=known * now.change,

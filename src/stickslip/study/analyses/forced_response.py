@@ -15,9 +15,10 @@ from stickslip.harmonic.support import named
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.response import ForcedPoint, Sweep, forced_response
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
+from stickslip.study.analyses.forced.comparison import Check
 from stickslip.study.analyses.forced.dataset import put_together
 from stickslip.study.analyses.forced.estimate import estimate
-from stickslip.study.analyses.forced.in_time import Check, check_in_time, chosen
+from stickslip.study.analyses.forced.in_time import check_in_time, chosen
 from stickslip.study.analyses.forced.known import (
     inside,
     known,

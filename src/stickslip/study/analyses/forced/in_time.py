@@ -1,9 +1,8 @@
 """The check inside a run (``--verify``): the same reduced model integrated in time at the peak, and beside it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil, isfinite, log
-from typing import Literal
 
 import numpy as np
 
@@ -21,15 +20,14 @@ from stickslip.response.time.transient import (
     integrate,
 )
 from stickslip.solve.newton_method import newton
+from stickslip.study.analyses.forced.comparison import LARGE, PATIENCE, STEPS, Check, Motion
 from stickslip.study.analyses.forced.points import Accepted, Response
 from stickslip.study.analyses.forced.question import Question
 from stickslip.units import HZ
 
-PATIENCE = 600  # periods; a blade damped by 0.3 % forgets its start to 1e-5, undamped ringing of a damper never ends
-LARGE = 1.0  # percent: above it the balance is repeated with more harmonics, to tell which of the two is wrong
 NAMED = 3  # drifting coordinates that a sentence names
 MORE = 3  # times the harmonics, and the samples, of that repeat
-MOST_HARMONICS = 63  # of it
+LEAST_HARMONICS, MOST_HARMONICS = 15, 63  # of it
 APART = 10.0  # percent: a motion in time that is farther from every balance is another one
 KICK = 1e-3  # of their own amplitude, by which speeds are disturbed where multipliers do not say that disturbances die
 SHOWN = 1e3  # times: a disturbance that has grown or decayed so much has shown what becomes of it
@@ -37,124 +35,11 @@ RINGS = 1e-3  # scatter of a motion that repeats but for what goes on ringing
 DECAYS, GROWS = 0.5, 1.1  # change of the last third of an integration over that of the third before
 MOST_TOLD = 10**6  # periods
 GOLDEN = 2.399963  # rad, of which no few multiples are alike
-STEPS = 1024  # of a period
+REPORTED = 7  # harmonics of an integration, or those that the load drives
 FLOPS = 4e9  # a second, of a march
 MOST_STEPS = (
     8 * STEPS
 )  # of an integration that is repeated with twice the steps for as long as these change it by more than `LARGE`
-
-
-Motion = Literal["attained", "left", "not periodic", "not settled"]
-TOLD: dict[str, str] = {
-    "attained": "attained: the motion in time stays with that of the balance",
-    "left": "left: the motion in time goes away from that of the balance",
-    "not periodic": "the motion in time does not repeat with the period of the load",
-    "not settled": "where the motion in time goes is not known yet",
-}
-
-
-@dataclass(frozen=True)
-class Check:
-    """First-harmonic amplitude of the report output by balance and by time integration.
-
-    Parameters
-    ----------
-    frequency_hz
-        Where.
-    balance, transient
-        Amplitudes in m; of the integration the average over its last third where it did not become periodic.
-    settled
-        Whether the integration became periodic.
-    periods
-        Periods integrated.
-    scatter
-        Largest distance of a period's first harmonic from that average, relative to it; over all outputs.
-    drifting
-        Names of the coordinates whose mean moves on from period to period, with commas between them.
-    order
-        Harmonics of the balance.
-    steps
-        Steps in a period of the integration: more than usual where these were too few.
-    step_percent
-        By how much the amplitude changed with the last doubling of the steps; 0 where it was not needed.
-    refined_order, refined
-        Harmonics and amplitude of the balance repeated with more of them; NaN where it was not needed or failed.
-    motion
-        What the motion in time did that began with the balance's state: *attained* it, *left* it for another one or without bound,
-        is *not periodic*, or has *not settled* so far.
-    shows_after
-        Periods in which a disturbance changes a thousandfold by the multiplier that was found; 0 where that was not asked for.
-    """
-
-    frequency_hz: float
-    balance: float
-    transient: float
-    settled: bool
-    periods: int
-    scatter: float = 0.0
-    drifting: str = ""
-    order: int = 0
-    steps: int = STEPS
-    step_percent: float = 0.0
-    refined_order: int = 0
-    refined: float = float("nan")
-    motion: Motion | Literal[""] = ""
-    shows_after: int = 0
-
-    @property
-    def difference_percent(self) -> float:
-        """Of the balance against the integration."""
-        return 100 * (self.balance - self.transient) / self.transient
-
-    @property
-    def sentence(self) -> str:
-        """What was compared and what happened."""
-        return (
-            f"{self.frequency_hz:.3f} Hz: balance {self.balance:.5e} m (H = {self.order}), "
-            f"time integration {self.transient:.5e} m, difference {self.difference_percent:+.2f} %; "
-            f"{self._motion}{self._step}{self._verdict}{self._became}"
-        )
-
-    @property
-    def _motion(self) -> str:
-        if not np.isfinite(self.transient):
-            return f"the integration overflowed after {self.periods} periods"
-        if self.settled:
-            return f"periodic after {self.periods} periods"
-        drifting = f", and these coordinates drift: {self.drifting}" if self.drifting else ""
-        word = "not settled" if self.motion == "not settled" else "not periodic"
-        return (
-            f"{word} after {self.periods} periods: average over the last third, "
-            f"scatter {100 * self.scatter:.2g} %{drifting}"
-        )
-
-    @property
-    def _step(self) -> str:
-        if self.steps == STEPS:
-            return ""
-        if abs(self.step_percent) <= LARGE:
-            return f", with {self.steps} steps a period (half of them: {-self.step_percent:+.2g} %)"
-        return f"; {self.steps} steps a period are still too few for it: the last doubling moved it by {self.step_percent:+.2g} %"
-
-    @property
-    def _verdict(self) -> str:
-        if self.refined_order == 0:
-            return ""
-        if not np.isfinite(self.refined):
-            return f"; the balance with {self.refined_order} harmonics does not converge"
-        left = 100 * (self.refined - self.transient) / self.transient
-        return f"; the balance with {self.refined_order} harmonics gives {self.refined:.5e} m ({left:+.2f} %)"
-
-    @property
-    def _became(self) -> str:
-        if not self.motion:
-            return ""
-        capped = (
-            f" (followed for {self.periods} periods at most, of {self.shows_after} in which a disturbance would show)"
-            if self.shows_after > PATIENCE
-            else ""
-        )
-        return f"; {TOLD[self.motion]}{capped}"
 
 
 def chosen(question: Question, response: Response) -> list[Accepted]:
@@ -183,28 +68,29 @@ def check_in_time(
         Modulus of the multiplier of a point that is not known to be stable, NaN where none is known: the motion then begins with
         disturbed speeds and is followed for as long as these need to show. None: neither.
     """
-    problem, point = question.problem, accepted.point
+    point = accepted.point
     after = 0 if multiplier is None else shows_after(multiplier)
     found = integrated(
-        problem,
+        question.problem,
         point,
         question.model.load,
         kick=0.0 if multiplier is None else KICK,
         least=max(1, min(after, PATIENCE)),
     )
-    check = replace(_compared(response, accepted, found, STEPS), shows_after=after)
+    check = _compared(question, response, point, found, STEPS)
     if found.settled and not abs(check.difference_percent) <= LARGE:
-        check = _with_steps_enough(question, response, accepted, check, found)
-    apart = [_apart(question, response, point, found)]
-    if not (abs(check.difference_percent) <= LARGE and apart[0] <= APART):
-        many = MORE * max(question.sweep.high_harmonics[-1], point.order)
-        order = max(min(many, MOST_HARMONICS), point.order + 1)
-        better = refined(question, point, order)
-        check = replace(check, refined_order=order)
+        check, found = _with_steps_enough(question, response, point, found, check)
+    known = _driven(question, _known(found)[:, response.output])
+    balances = [_of_balance(question, response, point)]
+    if not (abs(check.difference_percent) <= LARGE and _apart(balances[0], known) <= APART):
+        order = min(max(MORE * point.order, LEAST_HARMONICS), MOST_HARMONICS)
+        check = replace(check, refined_order=max(order, point.order + 1))
+        better = refined(question, point, check.refined_order)
         if better is not None:
-            check = replace(check, refined=problem.amplitude(better, response.output))
-            apart.append(_apart(question, response, better, found))
-    return replace(check, motion=_motion(check, found, min(apart)))
+            balances.append(_of_balance(question, response, better))
+            check = replace(check, refined=float(np.linalg.norm(balances[1])))
+    motion = _motion(check, found, min(_apart(one, known) for one in balances))
+    return replace(check, motion=motion, shows_after=after)
 
 
 def shows_after(multiplier: float) -> int:
@@ -238,34 +124,42 @@ def _motion(check: Check, found: TransientResult, apart: float) -> Motion:
     return "attained" if apart <= APART else "left"
 
 
-def _apart(
-    question: Question, response: Response, point: ForcedPoint, found: TransientResult
-) -> float:
-    """Return the distance of a balance from the integration over all outputs, phases included, percent of the latter."""
-    system = question.problem.system
+def _apart(balance: ComplexArray, known: ComplexArray) -> float:
+    """Return the distance of a balance from the integration, phases included, percent of the latter."""
+    size = float(np.linalg.norm(known))
+    return 100 * float(np.linalg.norm(balance - known)) / size if size > 0.0 else float("inf")
+
+
+def _of_balance(question: Question, response: Response, point: ForcedPoint) -> ComplexArray:
+    """Return the driven harmonics of the report output, m."""
     motion = question.problem.low.linear.recover(point.omega, point.coefficients)
-    known = _known(found)
-    size = float(np.abs(known[response.output]))
-    off = float(np.abs(motion[1, system.outputs] - known)[response.output])
-    return 100 * off / size if size > 0.0 else float("inf")
+    return _driven(question, motion[:, question.problem.system.outputs[response.output]])
+
+
+def _driven(question: Question, harmonics: ComplexArray) -> ComplexArray:
+    """Return of the harmonics of an output those that the load drives: amplitudes are their norm."""
+    return np.array([harmonics[h] if h < len(harmonics) else 0.0 for h in question.driven])
 
 
 def _known(found: TransientResult) -> ComplexArray:
-    """Return the (n_outputs,) first harmonic of an integration, m; of what did not settle the average."""
-    return found.harmonics[1] if found.settled else found.average
+    """Return the (n_h + 1, n_outputs) harmonics of an integration, m; of what did not settle the average."""
+    return found.harmonics if found.settled else found.averages
 
 
-def _compared(response: Response, accepted: Accepted, found: TransientResult, steps: int) -> Check:
+def _compared(
+    question: Question, response: Response, point: ForcedPoint, found: TransientResult, steps: int
+) -> Check:
     """Return the comparison with an integration."""
+    known = _known(found)[:, response.output]
     return Check(
-        frequency_hz=accepted.point.omega / HZ,
-        balance=response.amplitude(accepted),
-        transient=float(np.abs(_known(found)[response.output])),
+        frequency_hz=point.omega / HZ,
+        balance=float(np.linalg.norm(_of_balance(question, response, point))),
+        transient=float(np.linalg.norm(_driven(question, known))),
         settled=bool(found.settled),
         periods=int(found.periods),
         scatter=float(found.scatter),
         drifting=listed(found.drifting),
-        order=accepted.point.order,
+        order=point.order,
         steps=steps,
     )
 
@@ -273,24 +167,24 @@ def _compared(response: Response, accepted: Accepted, found: TransientResult, st
 def _with_steps_enough(
     question: Question,
     response: Response,
-    accepted: Accepted,
-    coarse: Check,
+    point: ForcedPoint,
     found: TransientResult,
-) -> Check:
+    coarse: Check,
+) -> tuple[Check, TransientResult]:
     """Go on from a settled motion with twice the steps until these do not change it: too long a step is the first to suspect."""
     steps = STEPS
     while True:
         steps *= 2
-        found = integrated(
-            question.problem, accepted.point, question.model.load, begin=found.final, steps=steps
+        finer = integrated(
+            question.problem, point, question.model.load, begin=found.final, steps=steps
         )
-        fine = replace(_compared(response, accepted, found, steps), shows_after=coarse.shows_after)
+        fine = _compared(question, response, point, finer, steps)
         moved = 100 * (fine.transient / coarse.transient - 1.0)
         if abs(moved) <= LARGE and coarse.steps == STEPS:
-            return coarse
-        coarse = replace(fine, step_percent=moved)
+            return coarse, found
+        coarse, found = replace(fine, step_percent=moved), finer
         if abs(moved) <= LARGE or not found.settled or steps >= MOST_STEPS:
-            return coarse
+            return coarse, found
 
 
 def listed(names: Sequence[str]) -> str:
@@ -348,7 +242,12 @@ def integrated(
             start_from_harmonics(motion, point.omega, contacts.gap_operator, contacts.laws),
             kick * _speeds(motion, point.omega),
         ),
-        stepping=TimeStepping(steps_per_period=steps, max_periods=periods, min_periods=least),
+        stepping=TimeStepping(
+            steps_per_period=steps,
+            max_periods=periods,
+            min_periods=least,
+            harmonics=max(REPORTED, *load.harmonics),
+        ),
         weights=contacts.weights,
     )
 

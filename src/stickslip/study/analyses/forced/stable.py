@@ -8,7 +8,8 @@ import numpy as np
 from stickslip.errors import InputError, StickslipError
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.stability import stability
-from stickslip.study.analyses.forced.in_time import Check, seconds_in_time
+from stickslip.study.analyses.forced.comparison import Check
+from stickslip.study.analyses.forced.in_time import seconds_in_time
 from stickslip.study.analyses.forced.jumps import jumps, stored_energy
 from stickslip.study.analyses.forced.points import Accepted, Response
 from stickslip.study.analyses.forced.question import Question

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.response.forced.response import ForcedPoint
 from stickslip.response.recovery import signals
-from stickslip.study.analyses.forced.in_time import Check
+from stickslip.study.analyses.forced.comparison import Check
 from stickslip.study.analyses.forced.more_harmonics import ReferenceDoubt
 from stickslip.study.analyses.forced.points import Response, unknowns
 from stickslip.study.analyses.forced.quantities import STAGES
