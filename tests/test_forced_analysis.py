@@ -211,6 +211,37 @@ def test_cases_of_different_harmonics_and_contacts_stand_side_by_side(
     assert [r[0] for r in rows] == ["high = 3", "high = 5"]
 
 
+@pytest.mark.parametrize("driven", [(3,), (1, 3)])
+def test_amplitudes_and_the_peak_are_those_of_the_harmonics_that_the_load_drives(
+    driven: tuple[int, ...],
+) -> None:
+    system, load = rubbing()
+    forces = dict.fromkeys(driven, load.harmonics[1])
+    sweep = Sweep(omega_range=(0.2, 0.33), low=3, high=3, selection="always_high", points=8, peak_points=0, samples=64)  # fmt: skip
+    asked = question(system, HarmonicLoad(load.static, forces), sweep)
+    data = dataset(solved(asked))
+    assert list(data.attrs["driven_harmonics"]) == list(driven)
+    motion = data.output_displacement.values[..., 0] + 1j * data.output_displacement.values[..., 1]
+    size = np.sqrt(np.sum(np.abs(motion[:, list(driven)]) ** 2, axis=1))
+    np.testing.assert_allclose(data.amplitude.values, size, rtol=1e-14)
+    top = int(np.argmax(size[:, 0]))
+    assert int(data.peak_point[0]) == top
+    # the first harmonic alone would give another peak, or next to nothing
+    assert float(data.peak_amplitude[0]) > 1.05 * np.abs(motion[top, 1, 0])
+    title = FORCED_RESPONSE.summary(data)[0].title
+    words = "harmonic 3" if driven == (3,) else "norm of harmonics 1, 3"
+    assert title == f"Forced response, {words}"
+
+
+def test_checks_that_some_cases_had_stay_with_theirs(rubbed: tuple[Question, Solved]) -> None:
+    asked, whole = rubbed
+    checked = replace(asked, label="b", checks=frozenset({"verify"}))
+    first = replace(whole, case=replace(whole.case, label="a"))
+    data = dataset(first, solved(checked, None, whole))
+    assert set(data.verify_case.values) == {1}
+    assert data.sizes["check"] == 1
+
+
 def lifted(**sweep: object) -> Question:
     system, load = lifting()
     given: dict[str, object] = {

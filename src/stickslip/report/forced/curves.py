@@ -12,6 +12,7 @@ from stickslip.report.cases import ShownCase, first_number
 from stickslip.report.plot import ALARM, GRID, MUTED, Plot, key_marker, log_ticks, styled
 from stickslip.report.quantities import counted, joined, number, percent, scale_for
 from stickslip.report.response import Response
+from stickslip.study.analyses.forced.summary import amplitude_name
 from stickslip.study.analyses.verdict import LEVELS
 
 COMPARED = 3  # curves that stay legible in one panel
@@ -123,7 +124,8 @@ def _caption(response: Response) -> str:
     converged, hz = response.converged, response.hz
     high = converged & response.more
     over = " divided by the amplitude of the excitation" if response.per_force else ""
-    text = f"First harmonic of {response.output_name}{over}. {_peaks(response)}"
+    name = amplitude_name(response.data)
+    text = f"{name[0].upper()}{name[1:]} of {response.output_name}{over}. {_peaks(response)}"
     if not response.decides:
         text += f"All points keep the same harmonics (<code>{response.selection}</code>)."
     else:

@@ -125,7 +125,7 @@ def time_integration(response: Response) -> str | None:
     ways = ["by time integration", "by harmonic balance"]
     head = ["frequency (Hz)", *ways, "difference", "settled", "periods"]
     text = (
-        f"<h3>Time integration</h3><p>First-harmonic amplitude of {response.output_name}: the two independent ways differ by at most "
+        f"<h3>Time integration</h3><p>Amplitude of {response.output_name}: the two independent ways differ by at most "
         f"{worst}.</p>"
     )
     return text + response.table(head, rows) + sentences(response, "verify_sentence")

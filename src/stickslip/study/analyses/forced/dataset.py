@@ -21,6 +21,7 @@ ROWS = {
     "check": ("verify_case", "verify_frequency_hz"),
     "examined": ("stability_case", "stability_frequency_hz"),
 }
+SOME = ("check", "examined")  # dimensions of what some cases may lack
 COUNTED = (
     "harmonic",
     "sample",
@@ -51,7 +52,7 @@ def put_together(cases: Sequence[Values], labels: Sequence[str]) -> xr.Dataset:
     found = {
         name: _joined([e[name].variable for e in each if name in e], along=quantity.dims[0])
         for name, quantity in QUANTITIES.items()
-        if all(name in e for e in each)
+        if (any if quantity.dims[0] in SOME else all)(name in e for e in each)
     }
     empty = [name for name, variable in found.items() if not _told(name, variable)]
     ordered = {name: variable for name, variable in found.items() if name not in empty}

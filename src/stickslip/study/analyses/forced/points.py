@@ -1,11 +1,12 @@
 """The points of one case, put in order: what was accepted, its fields, its peak, its counts."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, accepted_pairs
 from stickslip.response.recovery import Fields, fields
@@ -28,6 +29,8 @@ class Accepted:
         What they look like everywhere; None where the point did not converge.
     real_error
         Difference between both, a fraction; NaN unless the point repeats the first one.
+    driven
+        Harmonics that the load drives: those of its amplitudes.
     """
 
     point: ForcedPoint
@@ -35,6 +38,7 @@ class Accepted:
     fields: Fields | None
     low_fields: Fields | None
     real_error: float
+    driven: Harmonics = (1,)
 
     @property
     def indicator(self) -> float:
@@ -42,13 +46,13 @@ class Accepted:
         return (self.low or self.point).predicted_error
 
     def amplitudes(self, n_outputs: int) -> FloatArray:
-        """Return the (n_outputs,) amplitudes of harmonic 1, m; NaN where the point did not converge."""
-        return _amplitudes(self.fields, n_outputs)
+        """Return the (n_outputs,) amplitudes, m: norms over the driven harmonics; NaN where the point did not converge."""
+        return _amplitudes(self.fields, n_outputs, self.driven)
 
     def first_amplitudes(self, n_outputs: int, harmonics: Harmonics) -> FloatArray:
         """Return the same of the first solution, NaN where that had other harmonics than these."""
         known = self.low is not None and self.low.support == harmonics
-        return _amplitudes(self.low_fields if known else None, n_outputs)
+        return _amplitudes(self.low_fields if known else None, n_outputs, self.driven)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +150,9 @@ def collect(problem: ForcedProblem, points: Sequence[ForcedPoint], output: int) 
     output
         Position of the output whose peak counts.
     """
-    accepted = tuple(_accept(problem, point, low) for point, low in accepted_pairs(points))
+    driven = driven_harmonics(problem.low.linear.load)
+    pairs = accepted_pairs(points)
+    accepted = tuple(replace(_accept(problem, *pair), driven=driven) for pair in pairs)
     amplitude = np.array([a.amplitudes(output + 1)[output] for a in accepted])
     peak = int(np.nanargmax(amplitude)) if np.any(np.isfinite(amplitude)) else -1
     return Response(tuple(points), accepted, peak, output, problem.sweep.first_harmonics)
@@ -167,7 +173,13 @@ def _accept(problem: ForcedProblem, point: ForcedPoint, low: ForcedPoint | None)
     return Accepted(point, low, found, fields(problem, low), error)
 
 
-def _amplitudes(found: Fields | None, n_outputs: int) -> FloatArray:
+def driven_harmonics(load: HarmonicLoad) -> Harmonics:
+    """Return the harmonics that a load drives; the first where it drives none."""
+    return tuple(h for h, force in sorted(load.harmonics.items()) if np.any(force)) or (1,)
+
+
+def _amplitudes(found: Fields | None, n_outputs: int, driven: Harmonics) -> FloatArray:
     if found is None:
         return np.full(n_outputs, np.nan)
-    return np.abs(found.outputs[1, :n_outputs])
+    own = found.outputs[list(driven), :n_outputs]
+    return np.asarray(np.linalg.norm(own, axis=0))

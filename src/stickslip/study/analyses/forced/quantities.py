@@ -30,7 +30,7 @@ class Quantity:
 _OF = {
     "case": {
         "excitation_n": ("N", "amplitude of the largest harmonic force, NaN without one"),
-        "peak_amplitude": ("m", "largest first-harmonic amplitude of the report output"),
+        "peak_amplitude": ("m", "largest amplitude of the report output"),
         "peak_frequency_hz": ("Hz", "frequency of the peak"),
         "peak_point": ("1", "index of the peak into point, -1 if none"),
         "points": ("1", "accepted points"),
@@ -75,8 +75,8 @@ _OF = {
         "harmonic_kept": ("1", "1 if the solution keeps the harmonic"),
     },
     "point output": {
-        "amplitude": ("m", "first-harmonic amplitude"),
-        "amplitude_low": ("m", "first-harmonic amplitude with the harmonics of the first passage"),
+        "amplitude": ("m", "amplitude of the harmonic that the load drives (attribute driven_harmonics), the norm over several"),
+        "amplitude_low": ("m", "the same with the harmonics of the first passage"),
     },
     "point harmonic output part": {
         "output_displacement": ("m", "displacement of the outputs"),

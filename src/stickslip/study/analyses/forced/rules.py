@@ -16,6 +16,9 @@ LARGE_SHIFT = 0.01  # relative change of the peak with a tenth of the retention 
 STUCK = 1e-18  # m/N: no structure is so stiff; what moves less sticks to rigid contacts or is held
 MORE_HARMONICS = "Raise harmonics.high, and compare"
 IN_TIME = "--verify integrates in time at the peak"
+IN_TIME_TELLS = (
+    "; an integration in time (--verify) tells more"  # what a verdict says as its remedy
+)
 
 
 @dataclass(frozen=True)
@@ -146,7 +149,7 @@ def folds(case: Curve) -> Iterator[Finding]:
 def stability(case: Curve) -> Iterator[Finding]:
     """Judge by the multipliers of the motion."""
     for point, said in case.examined("stability_verdict"):
-        why = without_place(said["stability_sentence"])
+        why = without_place(said["stability_sentence"]).removesuffix(IN_TIME_TELLS)
         if said["stability_verdict"] == "unstable":
             why = f"a machine does not stay there: {why}"
             remedy = "Look for the motion it leaves for: sweep the other way, or see --verify."

@@ -7,6 +7,7 @@ from stickslip.harmonic.support import named
 from stickslip.study.analyses.analysis import TextTable
 from stickslip.study.analyses.verdict import LEVELS, said
 
+FIRST = "first harmonic"  # what amplitudes are as a rule
 HEAD = ("peak mm", "at Hz")
 COUNTS = ("points", "points_low", "points_high", "points_failed", "newton_steps", "unknowns_solved")
 SECONDS = ("seconds_contact", "seconds_linear", "seconds_rest")
@@ -35,15 +36,28 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
         "unknowns",
         "seconds",
     )
+    name = amplitude_name(data)
     rows = tuple(_row(data.isel(case=i), label) for i, label in enumerate(labels))
     found = [
-        TextTable("Forced response", head, rows),
+        TextTable("Forced response" + f", {name}" * (name != FIRST), head, rows),
         _lines(f"Where {data.attrs['selection']} asked for more harmonics", choices(data)),
         _lines("Against twice as many harmonics", _sentences(data, "reference_sentence", labels)),
         _lines("Is it stable?", _along(data, "stability", labels)),
         _lines("Against time integration", _along(data, "verify", labels)),
     ]
     return tuple(table for table in found if table.rows or table.lines)
+
+
+def amplitude_name(data: xr.Dataset) -> str:
+    """Return of which harmonics amplitudes are: those that the load drives."""
+    driven = [int(h) for h in np.atleast_1d(data.attrs.get("driven_harmonics", [1]))]
+    if driven == [1]:
+        return FIRST
+    return (
+        f"harmonic {driven[0]}"
+        if len(driven) == 1
+        else f"norm of harmonics {', '.join(map(str, driven))}"
+    )
 
 
 def choices(data: xr.Dataset) -> tuple[str, ...]:

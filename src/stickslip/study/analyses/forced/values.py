@@ -55,6 +55,7 @@ def _attributes(question: Question) -> Values:
         "evaluator": sweep.evaluator,
         "report_output": model.output_labels[0],
         "sectors": model.sectors,
+        "driven_harmonics": list(question.driven),
         "direction": sweep.direction,
         "stepped": int(sweep.single or sweep.grid.size > 0),
         "error_limit_percent": 100 * question.limit,

@@ -53,10 +53,15 @@ class Judged:
         for level in LEVELS:
             group = [f for f in found if f.points and f.level == level]
             if group:
-                first = max(group, key=lambda f: (self.case.peak in f.points, f.size))
+                first = max(group, key=self._weight)
                 at = self.case.peak if self.case.peak in first.points else first.points[0]
                 why = first.why + (self._others(group) if len(group) > 1 else "")
                 yield Verdict(level, self.label, float(self.case.hz[at]), why, first.remedy)
+
+    def _weight(self, found: Finding) -> tuple[bool, float, float]:
+        """Return what decides which finding stands for all: at the peak, else the largest, else the nearest to the peak."""
+        apart = np.abs(self.case.hz[list(found.points)] - self.case.peak_hz).min()
+        return self.case.peak in found.points, found.size, -float(np.nan_to_num(apart))
 
     def _others(self, group: Sequence[Finding]) -> str:
         hz = self.case.hz[sorted({i for f in group for i in f.points})]
