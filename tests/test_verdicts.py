@@ -169,6 +169,10 @@ RULES: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
     "attained elsewhere": (
         checked(motion="attained", difference_percent=-1.4), "doubtful", {TOP: "doubtful"}, "differ by -1.4 %",
     ),
+    "never judged, but integrated": (
+        checked(difference_percent=3.0) | {"own_error_percent": values(TOP, np.nan, 1.0)}, "doubtful", {TOP: "doubtful"},
+        "differ by +3 %",
+    ),
     "undecided but attained": (
         examined("undecided") | checked(motion="attained"), "trusted", {}, "attained in time integration",
     ),
@@ -319,3 +323,8 @@ def test_a_journey_says_the_same_on_the_screen_on_the_page_in_the_file_and_in_py
     assert [v.level for v in good] == ["trusted"]
     assert "predicted change with twice as many harmonics" in good[0].why
     assert "force_n = 0.01" not in said.rstrip().splitlines()[-1]
+
+
+def test_an_integration_examines_the_harmonics_of_its_point() -> None:
+    data = response(own_error_percent=values(TOP, np.nan, 1.0), **checked(difference_percent=3.0))
+    assert [v.why for v in verdicts(data, [""]) if "not examined" in v.why] == []

@@ -1,6 +1,6 @@
 """One case of a finished dataset, as the rules of its verdicts see it; what the dataset does not hold is NaN, empty or absent."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -16,6 +16,12 @@ from stickslip.study.analyses.forced.question import RIGID
 DEFAULT_LIMIT = 5.0  # percent, where a dataset does not say
 ATTAINED = 1.0  # percent between a settled time integration and the balance
 SAME = 1e-9  # relative difference of frequencies that are one
+
+
+def motion_of(said: Mapping[str, Any]) -> str:
+    """Return what the motion in time did by the row of a check; files that do not tell it say whether it settled."""
+    settled = "attained" if int(said["verify_settled"]) else "not settled"
+    return str(said.get("verify_motion", "")) or settled
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +74,12 @@ class Curve:
         """(n,) how the solver ended."""
         return np.nan_to_num(self.floats("status")).astype(np.int64)
 
-    @property
+    @cached_property
     def converged(self) -> BoolArray:
         """(n,) whether there is a solution."""
         return np.asarray(self.status == 0)
 
-    @property
+    @cached_property
     def branch(self) -> IntArray:
         """Positions of the points in the order of the branch; those that resolve the peak are left out."""
         return np.flatnonzero(np.nan_to_num(self.floats("refinement")) == 0)
@@ -150,17 +156,17 @@ class Curve:
         """Error above which an answer is doubtful, a fraction."""
         return float(self.data.attrs.get("error_limit_percent", DEFAULT_LIMIT)) / 100
 
-    @property
+    @cached_property
     def own_error(self) -> FloatArray:
         """(n,) error predicted of each point's own solution, a fraction; NaN where it was not judged."""
         return self.floats("own_error_percent") / 100
 
-    @property
+    @cached_property
     def audit(self) -> FloatArray:
         """(n,) difference from a solution with more harmonics, a fraction; NaN where none was made."""
         return self.floats("audit_error_percent") / 100
 
-    @property
+    @cached_property
     def reference(self) -> FloatArray:
         """(n,) change that twice as many harmonics are predicted to make, a fraction; NaN where it was not asked for."""
         return self.floats("reference_error_percent") / 100
@@ -210,9 +216,13 @@ class Curve:
     @cached_property
     def attained(self) -> BoolArray:
         """(n,) whether a time integration settled to the same amplitude."""
-        found = np.zeros(self.at.size, dtype=bool)
+        return np.array([abs(off) <= ATTAINED for off in self.integrated], dtype=bool)
+
+    @cached_property
+    def integrated(self) -> FloatArray:
+        """(n,) difference from a time integration that attains the motion, percent; NaN where none did."""
+        found = np.full(self.at.size, np.nan)
         for point, said in self.examined("verify_difference_percent"):
-            stays = said.get("verify_motion", "attained") == "attained"
-            close = abs(float(said["verify_difference_percent"])) <= ATTAINED
-            found[point] = stays and bool(said["verify_settled"]) and close
+            if motion_of(said) == "attained":
+                found[point] = float(said["verify_difference_percent"])
         return found

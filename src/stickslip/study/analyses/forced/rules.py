@@ -71,7 +71,7 @@ def few_harmonics(case: Curve) -> Iterator[Finding]:
         if own > case.limit:
             why = f"more harmonics than H = {case.kept[i]} are predicted to change it by {error_text(own)}"
             yield Finding("doubtful", why, f"{MORE_HARMONICS}; {IN_TIME}.", (int(i),), float(own))
-        elif np.isnan(own) and np.isnan(solved) and np.isnan(case.reference[i]):
+        elif np.isnan([own, solved, case.reference[i], case.integrated[i]]).all():
             why = f"its harmonics were not examined: nothing says how wrong H = {case.kept[i]} is"
             yield Finding("doubtful", why, f"{_examination(case)}.", (int(i),))
 
