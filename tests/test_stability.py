@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 
 from evidence.judges.flow_map import FlowMap, judged
 from evidence.models.lumped import griffin
+from evidence.models.random_motions import as_solved
 from evidence.models.solving import at_frequency
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.bonded import Bonded
@@ -27,10 +28,11 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_real
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.response.forced.problem import forced_problem
+from stickslip.response.forced.problem import forced_problem, with_stiffness
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.stability import motion_stability, stability
+from stickslip.response.stability.missing_harmonics import FARTHER, LEAST, corrected
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton, newton
 from stickslip.solve.status import Status
@@ -137,17 +139,23 @@ def test_slider_of_griffins_blade_is_projected():
     assert (found.resting, found.transitions) == (0, 4)
 
 
-def verdicts(order, many=31):
-    """Return (with few harmonics as they are, with the error of the missing ones, with many) of a mass that meets a stop with friction."""
+def stopped(order):
+    """Return a mass that meets a stop with friction, as a problem, and the points of its response."""
     structure, _, _ = one_mass(0.02)
     law = ElasticCoulomb(k_t=3.0, k_w=0.0, k_n=8.0, mu=0.3, preload=0.5)
     system = System(structure, Interface(("stop",), (law,), np.array([[0.6], [0.0], [0.8]])), np.array([0]))  # fmt: skip
     load = HarmonicLoad(np.zeros(1), {1: np.ones(1, dtype=complex)})
     sweep = Sweep(omega_range=(0.5, 3.5), low=order, high=order, selection="always_low", frequencies=20, peak_points=0, evaluator="events")  # fmt: skip
-    problem = forced_problem(system, load, sweep)
+    return forced_problem(system, load, sweep), list(forced_response(system, load, sweep))
+
+
+def verdicts(order, many=31):
+    """Return (with few harmonics as they are, with the error of the missing ones, with many) of a mass that meets a stop with friction."""
+    problem, points = stopped(order)
+    structure, system = problem.system.structure, problem.system
     best = problem.balance(tuple(range(many + 1)))
     operator = problem.low.interface.gap_operator
-    for point in forced_response(system, load, sweep):
+    for point in points:
         start, options = best.unknowns(point.coefficients), Newton(tolerance=1e-11, max_iterations=60)  # fmt: skip
         exact = newton(lambda x: best.linearise(x, point.omega), start, options)  # noqa: B023
         if not (point.converged and exact.status.converged):
@@ -167,6 +175,44 @@ def test_few_harmonics_are_undecided_rather_than_wrong(order):
     assert any(plain != truth for plain, _, truth in found)
     assert not [row for row in found if row[1] not in (row[2], "undecided")]
     assert sum(row[1] != "undecided" for row in found) > len(found) / 3
+
+
+def test_newton_goes_on_where_a_step_leads_nowhere_and_its_change_counts_twice():
+    problem, points = stopped(1)
+    found = [(p, corrected(problem, p)) for p in points]
+    assert any(more is None for _, more in found)
+    farther = [(p, *more) for p, more in found if more and more[1] == FARTHER]
+    assert farther
+    for point, more, _ in farther:
+        assert more.order == LEAST
+        balance = with_stiffness(problem.balance(more.support))
+        residual = balance.linearise(balance.unknowns(more.coefficients), more.omega).residual
+        assert np.max(np.abs(residual)) < 1e-9
+        found, plain, better = stability(problem, point), *(as_solved(problem, p) for p in (point, more))  # fmt: skip
+        change = abs(better.floquet.multipliers[0] - plain.floquet.multipliers[0])
+        # of two of a pair either may be the partner
+        assert found.errors[0] <= FARTHER * change * (1.0 + 1e-9)
+        assert found.multiplier == pytest.approx(better.multiplier, rel=1e-9)
+
+
+def test_the_reason_names_the_multiplier_and_its_error():
+    found = stability(*solved(0.1, 1.1, 11))
+    assert found.multiplier == np.max(np.abs(found.floquet.multipliers))
+    assert found.reason.startswith(f"the largest multiplier that is not neutral has the modulus {found.multiplier:.4g} ± ")  # fmt: skip
+    first = np.arange(found.errors.size) == 0
+    wide = replace(found, errors=np.where(first, 0.5, 0.0))
+    assert (wide.multiplier, wide.multiplier_error) == (found.multiplier, 0.5)
+    assert "may lie on either side of the unit circle" in wide.reason
+    # not the largest one decides but that which is known to lie outside
+    outside = replace(found.floquet, multipliers=np.where(first, 4.0, 1.5))
+    grown = replace(found, floquet=outside, errors=np.where(first, 3.9, 0.1))
+    assert (grown.verdict, grown.multiplier, grown.multiplier_error) == ("unstable", 1.5, 0.1)
+    assert "1.5 ± 0.1 lies outside the unit circle" in grown.reason
+    unjudged = replace(found, errors=np.full_like(found.errors, np.inf))
+    assert "what more harmonics would change in it is not known" in unjudged.reason
+    lost = replace(unjudged, floquet=replace(found.floquet, multipliers=np.full(3, np.nan)))
+    assert np.isnan(lost.multiplier)
+    assert "no multiplier is known" in lost.reason
 
 
 def test_an_error_that_reaches_the_unit_circle_leaves_it_undecided():

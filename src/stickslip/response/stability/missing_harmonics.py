@@ -13,14 +13,16 @@ from stickslip.solve.newton_method import newton
 
 FACTOR, MORE = 2, 3  # the step has FACTOR times the harmonics of the motion and MORE,
 MOST = 41  # harmonics with which Newton's method goes on: beyond, it costs more than the motion in time
+FARTHER = 2.0  # a solution that one step does not lead to is no neighbour: harmonics beyond it change as much again
 LEAST = 11  # and at least these: after H = 1, five are too few to see what closings do
 
 
-def corrected(problem: ForcedProblem, point: ForcedPoint) -> ForcedPoint | None:
-    """Return a point after a Newton step with more harmonics.
+def corrected(problem: ForcedProblem, point: ForcedPoint) -> tuple[ForcedPoint, float] | None:
+    """Return a point after a Newton step with more harmonics, and how many times the change by it an error is.
 
     It is the step that the Jacobian Alert predicts errors from; where it leaves a larger residual, Newton's method goes on to a solution,
-    with up to `MOST` harmonics. The point itself comes back where no force acts on the missing ones, and None where nothing is found.
+    with up to `MOST` harmonics, whose change counts `FARTHER` times. The point itself comes back where no force acts on the missing
+    ones, and None where nothing is found.
     """
     omega = point.omega
     low = with_stiffness(problem.balance(point.support))
@@ -28,17 +30,17 @@ def corrected(problem: ForcedProblem, point: ForcedPoint) -> ForcedPoint | None:
     x, padded = low.unknowns(point.coefficients), high.unknowns(point.coefficients)
     period = high.forces(padded, omega, problem.step(low, x, omega).events)
     if silent(low, high, period):
-        return point
+        return point, 1.0
     before = high.linearise(padded, omega, period)
     change = problem.alert_solve(before.jac, -before.residual)
     if change is not None and np.all(np.isfinite(change)):
         after = high.linearise(padded + change, omega)
         if np.linalg.norm(after.residual) < np.linalg.norm(before.residual):
-            return _point(point, high, padded + change)
+            return _point(point, high, padded + change), 1.0
     if high.order > MOST:
         return None
     found = newton(lambda x: high.linearise(x, omega), padded, problem.sweep.newton)
-    return _point(point, high, found.x) if found.status.converged else None
+    return (_point(point, high, found.x), FARTHER) if found.status.converged else None
 
 
 def _point(point: ForcedPoint, high: HarmonicBalance, x: FloatArray) -> ForcedPoint:

@@ -174,9 +174,9 @@ def stability(problem: ForcedProblem, point: ForcedPoint) -> Stability:
         )
     solved = _of_point(problem, point)
     more = corrected(problem, point)
-    better = None if more is None else _of_point(problem, more)
-    if better is not None and not better.unknown and not solved.unknown:
-        return _with_change(solved, better)
+    better = None if more is None else _of_point(problem, more[0])
+    if more is not None and better is not None and not better.unknown and not solved.unknown:
+        return _with_change(solved, better, more[1])
     found = better if solved.unknown and better is not None else solved
     return replace(found, errors=np.full_like(found.errors, np.inf))
 
@@ -187,14 +187,14 @@ def _of_point(problem: ForcedProblem, point: ForcedPoint) -> Stability:
     return motion_stability(problem.system.structure, problem.system.interface, gaps, point.omega)
 
 
-def _with_change(solved: Stability, better: Stability) -> Stability:
-    """Return the better of two, with the change of each multiplier as a part of its error."""
+def _with_change(solved: Stability, better: Stability, times: float) -> Stability:
+    """Return the better of two, with so many `times` the change of each multiplier as a part of its error."""
     found = better.floquet.multipliers
     other: ComplexArray = np.append(
         solved.floquet.multipliers, np.zeros(max(0, found.size - solved.errors.size))
     )
     change = np.abs(found - _partners(other, found))
-    return replace(better, errors=better.errors + change)
+    return replace(better, errors=better.errors + times * change)
 
 
 def motion_stability(
