@@ -138,6 +138,12 @@ RULES: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
     "no audit": (
         {"audit_error_percent": np.full(6, np.nan)}, "doubtful", {}, "by predictions alone",
     ),
+    "no audit, but twice the harmonics": (
+        {"audit_error_percent": np.full(6, np.nan), "reference_error_percent": np.ones(6)}, "trusted", {}, "peak with H = 1",
+    ),
+    "no audit, but integrated": (
+        {"audit_error_percent": np.full(6, np.nan)} | checked(motion="attained"), "trusted", {}, "attained in time",
+    ),
     "twice the harmonics": (
         {"reference_error_percent": values(TOP, 9.0, 1.0)}, "doubtful", {TOP: "doubtful"}, "amplitude or phase, by 9 %",
     ),
@@ -166,6 +172,9 @@ RULES: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
     "not periodic": (checked(motion="not periodic"), "wrong", {TOP: "wrong"}, "is not periodic"),
     "not settled": (checked(settled=0), "doubtful", {TOP: "doubtful"}, "did not settle"),
     "attained": (checked(motion="attained"), "trusted", {}, "attained in time integration"),
+    "attained, though something rings": (
+        checked(motion="attained", settled=0), "trusted", {}, "attained in time integration",
+    ),
     "attained elsewhere": (
         checked(motion="attained", difference_percent=-1.4), "doubtful", {TOP: "doubtful"}, "differ by -1.4 %",
     ),

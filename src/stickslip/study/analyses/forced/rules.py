@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip.solve.status import Status
 from stickslip.study.analyses.forced.chooser import error_text
-from stickslip.study.analyses.forced.curve import ATTAINED, Curve
+from stickslip.study.analyses.forced.curve import ATTAINED, Curve, motion_of
 from stickslip.study.analyses.forced.jumps import jumps
 from stickslip.study.analyses.verdict import Level, from_json
 
@@ -95,7 +95,8 @@ def not_audited(case: Curve) -> Iterator[Finding]:
     """Doubt few harmonics that were accepted by predictions alone."""
     few = case.converged & case.few
     none = case.has("audit_error_percent") and bool(np.isnan(case.audit).all())
-    if none and case.decides and few.any():
+    compared = case.attained[case.peak] or not np.isnan(case.reference[few]).any()
+    if none and case.decides and few.any() and not compared:
         why = f"H = {case.low} was accepted at {few.sum()} points by predictions alone: none of them was solved with more to compare"
         yield Finding("doubtful", why, f"{_examination(case)}.")
 
@@ -169,13 +170,13 @@ def without_place(sentence: str) -> str:
 def in_time(case: Curve) -> Iterator[Finding]:
     """Judge by time integration."""
     for point, said in case.examined("verify_difference_percent"):
-        motion, off = said.get("verify_motion", ""), float(said["verify_difference_percent"])
+        motion, off = motion_of(said), float(said["verify_difference_percent"])
         if motion in ("left", "not periodic"):
             what = "leaves it for another motion" if motion == "left" else "is not periodic"
             why = f"the motion in time, started from it, {what}: {without_place(said['verify_sentence'])}"
             remedy = "Believe the time integration; sweep the other way for the motion it goes to."
             yield Finding("wrong", why, remedy, (point,))
-        elif motion != "attained" and not int(said["verify_settled"]):
+        elif motion == "not settled":
             why = "a time integration did not settle to a periodic motion"
             remedy = "See the table of checks: it says what drifts or rings on."
             yield Finding("doubtful", why, remedy, (point,))
