@@ -1,25 +1,415 @@
-"""How branches of vibrations are followed by arc length."""
+"""The one follower of branches of periodic motions: start, predict, correct, judge, adapt the harmonics, recover.
+
+A branch is followed by arc length, or from one listed value of the parameter to the next. What is solved at each point is one of a few
+*levels*, the same equation with more and more harmonics (one level alone: harmonics stay as they are). Harmonics change along the branch:
+
+- A point whose judgement is not quiet is solved with the harmonics of the next level. Where both agree it stays. Otherwise the point before it,
+  which was quiet, is solved with more, too, and the branch goes on from there: where both levels agree no other sheet can be met.
+- Such second solutions are *audits* of the first ones. Others are made at every tenth point and beside each maximum, wherever a level
+  is not the last one and something acts on the harmonics left out. An audit that fails throws the branch back to the last one that held, and the branch
+  goes on from there with more harmonics.
+- After a few quiet points fewer harmonics are tried. A trial that disagrees doubles the wait for the next one.
+
+A branch that cannot be followed, or that gains no parameter for long, is taken up a little further on. Values that were not found are looked
+for once more, when their neighbours are known.
+"""
+
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from time import perf_counter
 
 import numpy as np
 
-from stickslip.harmonic.balance import HarmonicBalance
-from stickslip.harmonic.dlft import DynamicLagrangian
-from stickslip.solve.branch import Following, StepControl
-from stickslip.solve.newton_method import Newton
+from stickslip.response.branch import Curve, Followed, Judged, Kind, Route
+from stickslip.solve.branch import Latest
+from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to
+from stickslip.solve.newton_method import Solution, charged
 
-LARGEST = 0.25  # arc length of the largest step: a quarter of the size of the vibration, or `1 / points` of the range
+IDLE = 2.0  # multiples of the smallest number of points without a step's gain after which a branch is left
+BACKWARD = 0.1  # share of the range by which a branch may fall back behind its start
+AUDITED = 10  # points at most from one audit to the next
+CALM = 3  # quiet points with many harmonics before fewer are tried
+LONGEST_CALM = 48  # the same after trials that failed
+MOST = 40  # multiples of the smallest number of points at which any branch ends
 
 
-def steps_through(length: float, points: int) -> StepControl:
-    """Return the step control that takes `points` steps or more through a range of the parameter of some `length`."""
-    # a range of a single frequency has no length, and no step is taken in it
-    return StepControl(scale=length / (points * LARGEST) or 1.0, first=0.05, largest=LARGEST)
+def follow(curve: Curve, route: Route, done: Iterable[Followed] = ()) -> Iterator[Followed]:
+    """Follow a branch; see the module.
+
+    Parameters
+    ----------
+    curve
+        What is followed.
+    route
+        From where to where.
+    done
+        What an interrupted run has yielded, in its order: none of it is computed again, and the rest comes out as it would have.
+
+    Yields
+    ------
+    Followed
+        What is not in `done`.
+    """
+    yield from _Walk(curve, route, iter(done)).run()
 
 
-def following_vibration(
-    problem: HarmonicBalance | DynamicLagrangian, control: StepControl, newton: Newton
-) -> Following:
-    """Return how a branch of a periodic problem is followed: the static part would hide the growth of the vibration."""
-    weights = np.ones(problem.size)
-    weights[: problem.linear.n] = 0.0
-    return Following(newton=newton, control=control, weights=weights)
+@dataclass(slots=True, eq=False)
+class _Stop:
+    """A point of the branch, from what it goes on, and whether more harmonics have confirmed it."""
+
+    point: Followed
+    ahead: Followed
+    audited: bool = False
+    more: Followed | None = None  # its audit, if it was made before the branch needed it
+
+
+Taken = Generator[Followed, None, Followed]
+
+
+@dataclass(slots=True, eq=False)
+class _Walk:
+    curve: Curve
+    route: Route
+    stored: Iterator[Followed]
+    branch: list[_Stop] = field(default_factory=list)
+    quiet_for: int = 0  # points since harmonics were raised
+    calm: int = CALM  # of them before fewer are tried
+    hold: int = 0  # index up to which fewer are not tried
+    given_up: set[int] = field(default_factory=set)  # indices whose audit failed for good
+    anew_from: int = 0  # index from which solutions without a branch are looked for again
+    taken: int = 0
+
+    def run(self) -> Iterator[Followed]:
+        """Go from the first value to the last."""
+        listed = self.route.listed
+        yield from self._begun(listed[0] if listed else self.route.first)
+        while not self._over():
+            here = self.branch[-1]
+            if not here.ahead.converged or self._idle():
+                if not self.route.recovers:
+                    return
+                yield from self._begun(self._further())
+                continue
+            made = yield from self._take(lambda at=here: self._onward(at))  # type: ignore[misc]
+            raised = not made.converged or not self.curve.quiet(made.level, made.judged)
+            if raised and (yield from self._raised(made)):
+                continue
+            if made.converged:
+                anew = (yield from self._anew(made)) if raised else None
+                yield from self._kept(anew or made)
+            elif self.route.recovers:
+                yield from self._begun(self._further())
+            else:
+                return
+        if not listed and self.branch[-1].point.p != self.route.last:
+            yield from self._begun(self.route.last)
+        yield from self._looked_for()
+
+    # --- one step -----------------------------------------------------------------------------
+
+    def _take(self, make: Callable[[], Followed]) -> Taken:
+        """Return what an interrupted run has stored, else compute and yield it."""
+        self.taken += 1
+        known = next(self.stored, None)
+        if known is None:
+            began = perf_counter()
+            known = replace(make(), seconds=perf_counter() - began)
+            yield known
+        return known
+
+    def _onward(self, here: _Stop) -> Followed:
+        """Take a step along the branch."""
+        level, index = here.ahead.level, len(self.branch)
+        latest = Latest(self.curve.problem(level))
+        following = self.curve.following(level)
+        target = self._target()
+        if target is None:
+            point = advance(latest, here.ahead.point, self.route.last, following)
+        else:
+            point = step_to(latest, here.ahead.point, target, following)
+        return self._made("point", index, level, point, latest)
+
+    def _made(self, kind: Kind, index: int, level: int, point: Point, latest: Latest) -> Followed:
+        judged = Judged()
+        if point.solution.status.converged and kind != "audit":
+            judged = self.curve.judge(level, point, latest)
+        return Followed(kind, index, level, point, judged, 0.0)
+
+    def _kept(self, made: Followed, audit: Followed | None = None) -> Iterator[Followed]:
+        """Accept a point, and look at it or at the one before more closely where that is due."""
+        silent = made.judged.bound == 0.0
+        self.branch.append(_Stop(made, made, silent or audit is not None, audit))
+        if not made.converged:
+            return
+        if audit is not None or self.curve.quiet(made.level, made.judged):
+            self.quiet_for += 1
+        if self._due():
+            yield from self._audited(len(self.branch) - 1)
+        elif self._passed_maximum():
+            yield from self._audited(len(self.branch) - 2)
+        if self.branch and self.branch[-1].point is made:
+            yield from self._lowered()
+
+    # --- harmonics ----------------------------------------------------------------------------
+
+    def _raised(self, made: Followed) -> Generator[Followed, None, bool]:
+        """Do what a point needs that is not quiet or was not found; return whether the branch goes on."""
+        level, index = made.level + 1, len(self.branch)
+        if level >= self.curve.levels:
+            return False
+        check = None
+        if made.converged:
+            check = yield from self._take(lambda: self._again("audit", made, index, level))
+            if check.converged and self.curve.agree(made, check):
+                yield from self._kept(made, check)
+                return True
+        last = index - 1
+        held = yield from self._compared(last, level)
+        if not held:
+            return (yield from self._thrown_back(last, level))
+        if check is None or not check.converged or not self.curve.near(made, check):
+            return True  # the branch with more harmonics leads on from the last point
+        accepted = check
+        more = yield from self._take(lambda: self._accepted(accepted, index))
+        if not self.curve.quiet(more.level, more.judged) and (yield from self._raised(more)):
+            return True
+        yield from self._kept(more)
+        return True
+
+    def _compared(self, index: int, level: int) -> Generator[Followed, None, bool]:
+        """Audit a point with the harmonics of a level; return whether it held, and go on from the audit then."""
+        stop = self.branch[index]
+        if stop.ahead.level >= level:
+            return True
+        audit = stop.more
+        if audit is None or audit.level != level:
+            audit = yield from self._take(lambda: self._again("audit", stop.ahead, index, level))
+        if audit.converged and (stop.audited or self.curve.agree(stop.point, audit)):
+            stop.audited, stop.ahead = True, audit
+            self.quiet_for = 0
+            return True
+        return False
+
+    def _audited(self, index: int) -> Iterator[Followed]:
+        """Audit a point of the branch; go back where it fails."""
+        stop = self.branch[index]
+        level = stop.point.level + 1
+        if stop.audited or level >= self.curve.levels or index in self.given_up:
+            return
+        audit = yield from self._take(lambda: self._again("audit", stop.ahead, index, level))
+        if audit.converged and self.curve.agree(stop.point, audit):
+            stop.audited, stop.more = True, audit
+            return
+        back = yield from self._thrown_back(index, level)
+        if not back:
+            self.given_up.add(index)
+
+    def _thrown_back(self, index: int, level: int) -> Generator[Followed, None, bool]:
+        """Go back to the last point before `index` that more harmonics have confirmed; return whether there is one."""
+        if index in self.given_up:
+            return False
+        for place in range(index - 1, -1, -1):
+            stop = self.branch[place]
+            if not stop.point.converged:
+                break
+            if not stop.audited:
+                continue
+            held = yield from self._compared(place, level)
+            if held:
+                del self.branch[place + 1 :]
+                self.quiet_for, self.hold = 0, index + CALM
+                return True
+            break
+        # nothing before it is sure: begin where this stretch of the branch began
+        # nothing before it is sure: begin where this stretch of the branch began
+        begin = self._beginning(index)
+        known = self.branch[begin].ahead
+        if known.level < level and begin not in self.given_up:
+            audit = yield from self._take(lambda: self._again("audit", known, begin, level))
+            if audit.converged:
+                made = yield from self._take(lambda: self._accepted(audit, begin))
+                del self.branch[begin:]
+                self.branch.append(_Stop(made, made, audited=made.judged.bound == 0.0))
+                self.quiet_for, self.hold = 0, index + CALM
+                return True
+        self.given_up |= {begin, index}
+        return False
+
+    def _beginning(self, index: int) -> int:
+        """Return the index at which the stretch of the branch that leads to `index` began."""
+        for place in range(index, 0, -1):
+            if not self.branch[place - 1].point.converged:
+                return place
+        return 0
+
+    def _lowered(self) -> Iterator[Followed]:
+        """Try fewer harmonics after some quiet points."""
+        stop, index = self.branch[-1], len(self.branch) - 1
+        level = stop.ahead.level - 1
+        if level < 0 or self.quiet_for < self.calm or index < self.hold:
+            return
+        trial = yield from self._take(lambda: self._again("trial", stop.ahead, index, level))
+        if trial.converged and self.curve.agree(trial, stop.point):
+            stop.ahead, stop.audited = trial, True
+        else:
+            self.calm = min(2 * self.calm, LONGEST_CALM)
+        self.quiet_for = 0
+
+    def _again(self, kind: Kind, known: Followed, index: int, level: int) -> Followed:
+        """Solve at the value of a known solution with the harmonics of another level; the direction of travel stays."""
+        curve = self.curve
+        x = curve.lifted(known.point.x, known.level, level)
+        latest = Latest(curve.problem(level))
+        point = start_point(latest, x, known.p, curve.following(level))
+        if point.solution.status.converged and _against(curve, known, point, level):
+            point = reversed_point(point)
+        point = replace(point, step=known.point.step)
+        return self._made(kind, index, level, point, latest)
+
+    # --- where to look closer -----------------------------------------------------------------
+
+    def _due(self) -> bool:
+        """Whether the last audit is long ago, or this is the first or the last point."""
+        last = len(self.branch) - 1
+        recent = self.branch[max(last - AUDITED + 1, 0) :]
+        ends = last == 0 or self.branch[-1].point.p == self.route.last
+        return ends or not any(stop.audited for stop in recent)
+
+    def _passed_maximum(self) -> bool:
+        """Whether the point before the last is higher than its neighbours."""
+        last = [stop.point for stop in self.branch[-3:]]
+        if len(last) < 3 or not all(p.converged for p in last):
+            return False
+        before, top, after = map(self.curve.height, last)
+        return before < top > after
+
+    # --- the way ------------------------------------------------------------------------------
+
+    def _target(self) -> float | None:
+        """Return the next listed value; None where the branch is followed by arc length."""
+        listed = self.route.listed
+        return listed[len(self.branch)] if listed else None
+
+    def _over(self) -> bool:
+        if self.route.listed:
+            return len(self.branch) >= len(self.route.listed)
+        reached = self.branch[-1].point.p == self.route.last
+        return reached or self.taken > MOST * self.route.points
+
+    def _farthest(self) -> float:
+        forward = self.route.forward
+        return max((stop.point.p for stop in self.branch), key=lambda p: forward * p)
+
+    def _idle(self) -> bool:
+        """Whether the last points gained less than a step, or the branch left the range backwards."""
+        route, last = self.route, self.branch[-1].point.p
+        if route.listed:
+            return False
+        if route.before(last, route.first - BACKWARD * (route.last - route.first)):
+            return True
+        count = int(IDLE * route.points)
+        if len(self.branch) <= count:
+            return False
+        ways = [route.forward * stop.point.p for stop in self.branch]
+        return max(ways) - max(ways[:-count]) < abs(route.gap)
+
+    def _further(self) -> float:
+        """Return the value at which a lost branch is taken up."""
+        listed, route = self.route.listed, self.route
+        if listed:
+            return listed[len(self.branch)]
+        ahead = self._farthest() + route.gap
+        return ahead if route.before(ahead, route.last) else route.last
+
+    def _begun(self, p: float) -> Iterator[Followed]:
+        """Solve where no branch leads, with more harmonics until it is quiet."""
+        index = len(self.branch)
+        level = self.branch[-1].ahead.level if self.branch else 0
+        made = yield from self._take(lambda: self._fresh(index, level, p, self._last()))
+        while made.converged and not self.curve.quiet(made.level, made.judged):
+            level = made.level + 1
+            if level >= self.curve.levels:
+                break
+            more = yield from self._take(
+                lambda at=made, to=level: self._again("audit", at, index, to)  # type: ignore[misc]
+            )
+            if more.converged:
+                made = yield from self._take(lambda at=more: self._accepted(at, index))  # type: ignore[misc]
+                continue
+            anew = yield from self._anew(made)
+            if anew is None:
+                break
+            made = anew
+        self.quiet_for = 0
+        yield from self._kept(made)
+
+    def _anew(self, made: Followed) -> Generator[Followed, None, Followed | None]:
+        """Solve by all that may help what has no solution with more harmonics beside that with few; now and then in a row of these."""
+        index, level = len(self.branch), made.level + 1
+        if level >= self.curve.levels or index < self.anew_from:
+            return None
+        self.anew_from = index + AUDITED
+        found = yield from self._take(lambda: self._fresh(index, level, made.p, [made]))
+        if found.converged:
+            return found
+        return (yield from self._take(lambda: made))
+
+    def _last(self) -> list[Followed]:
+        """Return the last solution, if there is one."""
+        return [stop.ahead for stop in self.branch if stop.ahead.converged][-1:]
+
+    def _accepted(self, audit: Followed, index: int) -> Followed:
+        latest = Latest(self.curve.problem(audit.level))
+        return self._made("point", index, audit.level, audit.point, latest)
+
+    def _fresh(self, index: int, level: int, p: float, near: Sequence[Followed]) -> Followed:
+        solution = self.curve.fresh(level, p, near, True)
+        latest = Latest(self.curve.problem(level))
+        following = self.curve.following(level)
+        upward = np.append(np.zeros(solution.x.size), 1.0)
+        point = Point(solution.x, p, upward, following.control.first, solution, 0.0)
+        if solution.status.converged:
+            point = replace(start_point(latest, solution.x, p, following), solution=solution)
+            if self.route.forward < 0.0 and not self.route.listed:
+                point = reversed_point(point)
+        return self._made("point", index, level, point, latest)
+
+    def _looked_for(self) -> Iterator[Followed]:
+        """Look once more for what was not found, from the neighbours on both sides, the last ones first."""
+        for index in reversed(range(len(self.branch))):
+            if self.branch[index].point.converged:
+                continue
+            sides = [i for i in (index + 1, index - 1) if 0 <= i < len(self.branch)]
+            near = [self.branch[i].point for i in sides if self.branch[i].point.converged]
+            if not near:
+                continue
+            found = yield from self._take(lambda n=near, i=index: self._beside(n, i))  # type: ignore[misc]
+            if found.converged:
+                self.branch[index] = _Stop(found, found)
+
+    def _beside(self, near: Sequence[Followed], index: int) -> Followed:
+        """Solve a value from the branches of its neighbours."""
+        lost = self.branch[index].point
+        spent: list[Solution] = []
+        for end in near:
+            latest = Latest(self.curve.problem(end.level))
+            following = self.curve.following(end.level)
+            start = end.point if end.point.tangent[-1] > 0.0 else reversed_point(end.point)
+            point = step_to(latest, start, lost.p, following)
+            spent.append(point.solution)
+            if point.solution.status.converged:
+                made = self._made("found", index, end.level, point, latest)
+                solution = charged(point.solution, spent)
+                return replace(made, point=replace(point, solution=solution))
+        solution = charged(lost.point.solution, spent)
+        return replace(lost, kind="found", point=replace(lost.point, solution=solution))
+
+
+def _against(curve: Curve, known: Followed, point: Point, level: int) -> bool:
+    """Whether a point of another level looks the other way than a known one."""
+    state = curve.lifted(known.point.tangent[:-1], known.level, level)
+    before = np.append(state, known.point.tangent[-1])
+    weights = curve.following(level).weights
+    size = float(np.linalg.norm(weights * point.x)) or 1.0
+    scaled = np.append(weights**2 / size**2, 1.0 / curve.following(level).control.scale ** 2)
+    return bool((scaled * before) @ point.tangent < 0.0)

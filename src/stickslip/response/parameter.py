@@ -12,8 +12,8 @@ from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import AtFrequency, BalanceAt, law_field, load_level, rebuilt
+from stickslip.response.branch import following_vibration, steps_through
 from stickslip.response.equilibrium import bonded_start, preload
-from stickslip.response.follow import following_vibration, steps_through
 from stickslip.response.system import System
 from stickslip.solve.continuation import (
     Point,

@@ -9,7 +9,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.dlft import DynamicLagrangian, dynamic_lagrangian
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response.follow import following_vibration, steps_through
+from stickslip.response.branch import following_vibration, steps_through
 from stickslip.response.parameter import Discretisation
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, Point, start_point, trace

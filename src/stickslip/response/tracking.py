@@ -18,7 +18,7 @@ from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import ParameterLinearisation
 from stickslip.harmonic.peak import EVALUATIONS, Driven, Peak, PeakProblem, driven_by
-from stickslip.response.follow import following_vibration, steps_through
+from stickslip.response.branch import following_vibration, steps_through
 from stickslip.response.parameter import (
     Discretisation,
     Parameter,

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from stickslip.response.forced.problem import ForcedPoint
+from stickslip.response.forced.problem import ForcedPoint, Stage
 
 # relative difference of two vibrations below which a branch has come back to the other
 ALIKE = 0.25
@@ -16,7 +16,29 @@ def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, For
     In the order of the branch: points of the first passage, their repeats in their place, and in place of a run of repeats that did not
     all converge the branch with many harmonics, where that reached the other side. Peak points come last.
     """
-    low = [p for p in points if p.stage == "low"]
+    pairs: list[tuple[ForcedPoint, ForcedPoint | None]]
+    if any(p.stage == "point" for p in points):
+        pairs = [(p, None) for p in _branch(points, "point")]
+    else:
+        pairs = _of_passages(points)
+    best: dict[float, ForcedPoint] = {}
+    for p in points:
+        if p.stage == "peak" and not (p.omega in best and best[p.omega].converged and _fewer(p, best[p.omega])):  # fmt: skip
+            best[p.omega] = p
+    # a peak that was solved again with more harmonics takes the place of what it was
+    again = {omega: p for omega, p in best.items() if p.converged}
+    pairs = [
+        (again.pop(p.omega) if p.omega in again and _fewer(p, again[p.omega]) else p, low)
+        for p, low in pairs
+    ]
+    return pairs + [
+        (p, None) for omega, p in best.items() if again.get(omega) is p or not p.converged
+    ]
+
+
+def _of_passages(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, ForcedPoint | None]]:
+    """Return the points of the published passages, each with that of the first passage which it repeats or is."""
+    low = _branch(points, "low")
     high = {p.index: p for p in points if p.stage == "high"}
     kept: list[tuple[ForcedPoint, ForcedPoint | None]] = []
     passed = -1
@@ -27,15 +49,18 @@ def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, For
             kept += [(high.get(p.index, p), p) for p in low[passed + 1 : branch[0].index]]
             kept += [(p, None) for p in branch]
             passed = end
-    kept += [(high.get(p.index, p), p) for p in low[passed + 1 :]]
-    peak = [p for p in points if p.stage == "peak"]
-    again = {p.omega: p for p in peak if p.converged}
-    # a peak that was solved again with more harmonics takes the place of what it was
-    kept = [
-        (again.pop(p.omega) if p.omega in again and _fewer(p, again[p.omega]) else p, low)
-        for p, low in kept
-    ]
-    return kept + [(p, None) for p in peak if again.get(p.omega) is p or not p.converged]
+    return kept + [(high.get(p.index, p), p) for p in low[passed + 1 :]]
+
+
+def _branch(points: Sequence[ForcedPoint], stage: Stage) -> list[ForcedPoint]:
+    """Return the points of a branch as `stickslip.response.branch.branch_of` does."""
+    branch: list[ForcedPoint] = []
+    for one in points:
+        if one.stage == stage:
+            branch = [*branch[: one.index], one]
+        elif one.stage == "found":
+            branch[one.index] = one
+    return branch
 
 
 def _fewer(one: ForcedPoint, other: ForcedPoint) -> bool:

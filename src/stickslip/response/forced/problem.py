@@ -20,7 +20,7 @@ from stickslip.harmonic.selection.strategy import (
     always_kept,
 )
 from stickslip.harmonic.support import Harmonics, is_full
-from stickslip.response.follow import following_vibration
+from stickslip.response.branch import following_vibration
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, Point
@@ -29,7 +29,7 @@ from stickslip.solve.newton_method import Solution
 from stickslip.solve.status import Rung, Status
 
 Balance = HarmonicBalance | DynamicLagrangian
-Stage = Literal["low", "high", "branch", "peak"]
+Stage = Literal["low", "high", "branch", "peak", "point", "audit", "trial", "found", "check"]
 FAINTEST = 1e-7  # excitation over static load: a thousand times the residual tolerance, which swallows the vibration
 ALERT_TOLERANCE = 1e-6  # relative residual of the alert's step where it is found by iteration
 BRANCH_ITERATIONS = 10  # of a corrector along a branch
@@ -42,8 +42,10 @@ class ForcedPoint:
     Attributes
     ----------
     stage
-        ``low``: first passage; ``high``: repeated with more harmonics; ``branch``: on the branch with more harmonics, where
-        repeats failed; ``peak``: added to resolve the peak.
+        With ``high = "auto"`` the kinds of `stickslip.response.follow.Followed`: ``point``, ``audit``, ``trial``, ``found``. In the published
+        passages ``low``: first passage; ``high``: repeated with more harmonics; ``branch``: on the branch with more harmonics, where
+        repeats failed. In all ``peak``: added to resolve the peak; of several at a frequency that with most harmonics counts. ``check``: a
+        ``peak`` solved with more harmonics, to compare.
     index
         Position in the stage; a ``high`` point has the index of the ``low`` point it repeats, a ``branch`` point that of the
         first repeat that it replaces.
@@ -124,9 +126,8 @@ class ForcedProblem:
     def measure(self) -> ErrorMeasure:
         """What an error is taken of."""
         system, chosen = self.system, self.sweep.error_harmonics
-        driven = tuple(h for h, f in sorted(self.low.linear.load.harmonics.items()) if np.any(f))
         dofs = system.outputs if system.alert_dofs is None else system.alert_dofs
-        return ErrorMeasure(dofs, (driven or (1,)) if chosen is None else tuple(chosen))
+        return ErrorMeasure(dofs, self.driven if chosen is None else tuple(chosen))
 
     @property
     def alert_solve(self) -> Solve:
@@ -139,7 +140,7 @@ class ForcedProblem:
             if own.harmonics == harmonics:
                 return own
         if harmonics not in self.others:
-            self.others[harmonics] = self.high.with_harmonics(harmonics)
+            self.others[harmonics] = self.low.with_harmonics(harmonics)
         return self.others[harmonics]
 
     def step(
@@ -202,10 +203,20 @@ class ForcedProblem:
         )
         return self.measure.change(motion, exact - motion)[0]
 
+    @property
+    def driven(self) -> Harmonics:
+        """Harmonics that the load drives; 1 where it drives none."""
+        forces = self.low.linear.load.harmonics
+        return tuple(h for h in sorted(forces) if np.any(forces[h])) or (1,)
+
     def amplitude(self, point: ForcedPoint, output: int = 0) -> float:
-        """First-harmonic amplitude of output number `output`, m."""
-        motion = self.low.linear.recover(point.omega, point.coefficients)
-        return float(np.abs(motion[1, self.system.outputs[output]]))
+        """Return the amplitude of output number `output` at a point, m; see `amplitude_of`."""
+        return self.amplitude_of(point.omega, point.coefficients, output)
+
+    def amplitude_of(self, omega: float, coefficients: ComplexArray, output: int = 0) -> float:
+        """Return the amplitude of output number `output` over the harmonics that the load drives, m: of several the root of their squares."""
+        motion = self.low.linear.recover(omega, coefficients)
+        return float(np.linalg.norm(motion[list(self.driven), self.system.outputs[output]]))
 
 
 def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedProblem:

@@ -11,21 +11,17 @@ from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import Linearisation
 from stickslip.harmonic.selection.strategy import judged
 from stickslip.response.forced.homotopies import homotopies
-from stickslip.response.forced.passages import along_branch
+from stickslip.response.forced.ladder import along_branch
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
 from stickslip.solve.linear import factorised
 from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Newton, Solution, charged, newton
 from stickslip.solve.rescue import solve_robustly
-from stickslip.solve.status import Rung, Status
+from stickslip.solve.status import Rung
 
 PATIENT = 16  # iterations of a repeat from one start
 ISOLATED = 25  # iterations of a repeat beside none that is accepted: damped steps of planar friction need them, and one that comes through leads to the others
 NEIGHBOURS = 1  # points on each side from which a repeat that fails is tried
-PATIENCE = (
-    4  # repeats that fail one after the other before most of the following are left to the branch
-)
-GLANCE = 8  # each such repeat in a row of failures is tried all the same
 
 
 def repeat(
@@ -34,7 +30,6 @@ def repeat(
     others: Mapping[int, ForcedPoint],
     static: Callable[[], FloatArray] | None = None,
     branch: Sequence[ForcedPoint] = (),
-    quickly: bool = False,
 ) -> ForcedPoint:
     """Solve a frequency with more harmonics: from the best of q + Δq, q and its neighbours, or along the branch from a neighbour.
 
@@ -52,8 +47,6 @@ def repeat(
         Gives the (n_retained,) static equilibrium, m, for what `solve_robustly` tries if all else fails; None: that is not tried.
     branch
         Points of a branch with many harmonics: where it passed the frequency, it leads to a solution.
-    quickly
-        From these starts alone: a detour costs as much as ten of them.
     """
     began = perf_counter()
     omega = point.omega
@@ -86,8 +79,7 @@ def repeat(
             spent.append(_from_start(balance, omega, start, options))
             if found():
                 break
-    if not quickly:
-        detours(beside)
+    detours(beside)
     if not found() and static is not None:
         solution = solve_robustly(
             lambda v: balance.linearise(v, omega),
@@ -98,8 +90,7 @@ def repeat(
         )
         spent.append(solution)
     solution = charged(spent[-1], spent)
-    made = forced_point(balance, solution, "high", point.index, omega, perf_counter() - began)
-    return replace(made, predicted_error=point.predicted_error)
+    return forced_point(balance, solution, "high", point.index, omega, perf_counter() - began)
 
 
 def _nearest_first(
@@ -156,37 +147,6 @@ def _predicted(problem: ForcedProblem, point: ForcedPoint) -> list[FloatArray]:
     if verdict.start is None:
         return []
     return [problem.balance(verdict.again or problem.high.harmonics).unknowns(verdict.start)]
-
-
-def worth_a_try(index: int, forward: bool, high: Mapping[int, ForcedPoint], known: bool) -> bool:
-    """Whether a repeat is tried now, or left to the branch with many harmonics and to the homotopy.
-
-    A few repeats that fail in a row show that the solution with few harmonics says little about that with many. Then only some are
-    tried on the way forward, and on the way back those beside an accepted one.
-
-    Parameters
-    ----------
-    index
-        Of the point of the first passage.
-    forward
-        Whether this is the first attempt.
-    high
-        Repeats by index.
-    known
-        Whether a neighbour is accepted.
-    """
-    if known:
-        return True
-    row = all(i in high and not high[i].converged for i in range(index - PATIENCE, index))
-    return forward and (not row or index % GLANCE == 0)
-
-
-def postponed(problem: ForcedProblem, point: ForcedPoint) -> ForcedPoint:
-    """Return a repeat that was given no iterations: for `follow_run` or a homotopy to find."""
-    x = problem.high.unknowns(point.coefficients)
-    none = Solution(x, Status.TOO_MANY_ITERATIONS, 0, np.nan, 0.0, 0.0)
-    made = forced_point(problem.high, none, "high", point.index, point.omega, 0.0)
-    return replace(made, predicted_error=point.predicted_error)
 
 
 def passing(branch: Sequence[ForcedPoint], point: ForcedPoint) -> list[ForcedPoint]:

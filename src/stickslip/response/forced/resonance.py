@@ -1,20 +1,20 @@
-"""The resonance peak of a forced response, resolved by a few points."""
+"""The resonance peak of a forced response, resolved by a few points, and audited."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
 
-from stickslip.arrays import FloatArray
-from stickslip.harmonic.selection.strategy import judged
-from stickslip.response.forced.homotopies import homotopies
-from stickslip.response.forced.passages import along_branch
-from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
-from stickslip.response.forced.repeats import repeat
-from stickslip.solve.continuation import start_point, step_to
-from stickslip.solve.newton_method import Solution, charged
-from stickslip.solve.rescue import solve_robustly
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.support import Harmonics
+from stickslip.response.branch import Followed, Judged
+from stickslip.response.forced.along import ForcedCurve, of_forced, to_forced
+from stickslip.response.forced.ladder import along_branch, without_branch
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, Stage, forced_point
+from stickslip.solve.branch import Latest
+from stickslip.solve.continuation import Point, start_point, step_to
+from stickslip.solve.newton_method import Solution, charged, newton
 from stickslip.solve.status import Rung
 
 NEARBY = 0.002  # half the bracket about a known peak, relative to its frequency
@@ -23,73 +23,53 @@ PEAK_RESOLUTION = 5e-4  # width of the bracket of the peak, relative to its freq
 
 def resolve_peak(
     problem: ForcedProblem,
-    accepted: list[ForcedPoint],
-    done: list[ForcedPoint],
-    static: Callable[[], FloatArray] | None = None,
+    load: HarmonicLoad,
+    accepted: Sequence[ForcedPoint],
+    done: Sequence[ForcedPoint] = (),
 ) -> Iterator[ForcedPoint]:
-    """Add points around the highest one until its bracket is narrow.
+    """Add points around the highest one until its bracket is narrow; each gets the harmonics that it needs.
 
     Parameters
     ----------
-    problem
+    problem, load
         The forced response.
     accepted
-        Points of both passages in the order of the branch, its lowest frequency first.
+        Points of the response in the order of the branch.
     done
-        Peak points of an interrupted run.
-    static
-        Gives the (n_retained,) static equilibrium, m, for the homotopies of what does not converge otherwise; None: they are not tried.
+        Peak points of an interrupted run, and what they were checked with.
+
+    Yields
+    ------
+    ForcedPoint
+        Points not in `done`: ``peak``, of which that with most harmonics counts at its frequency, and ``check``: more harmonics, to compare.
     """
-    known = [p for p in accepted if p.converged]
+    known = [p for p in accepted if p.converged][:: int(problem.sweep.forward)]
+    search = _Search(problem, load, iter(done))
     heights = [problem.amplitude(p) for p in known]
-    for index in range(problem.sweep.peak_points):
+    for _ in range(problem.sweep.peak_points):
         top = int(np.argmax(heights)) if heights else 0
         seam = _on_seam(known, top)
         omega = known[top].omega if seam else _vertex(known, heights)
         if omega is None:
-            return
-        if index < len(done):
-            point = done[index]
-        elif seam:
-            point = _repeated_top(problem, known, top, index, static)
-            yield point
-        else:
-            aside = known[top - 1 if omega <= known[top].omega else top + 1]
-            point = _peak_point(problem, (known[top], aside), omega, index, static)
-            yield point
+            break
+        aside = top - 1 if omega <= known[top].omega else min(top + 1, len(known) - 1)
+        sides = known[max(top - 1, 0) : top + 2] if seam else (known[top], known[aside])
+        point = yield from search.point(sides, omega)
         if not point.converged:
             return
         place = top if omega <= known[top].omega else top + 1
         known[place : place + seam] = [point]
         heights[place : place + seam] = [problem.amplitude(point)]
+    if heights and problem.sweep.auto and problem.sweep.peak_points:
+        yield from search.settled(known[int(np.argmax(heights))], audit=True)
 
 
-def _on_seam(known: list[ForcedPoint], top: int) -> bool:
-    """Whether the highest point has few harmonics and a neighbour many: then it may be highest because it has few."""
-    few = known[top].harmonics.size if known else 0
-    return any(p.harmonics.size > few for p in known[max(top - 1, 0) : top + 2] if few)
-
-
-def _repeated_top(
-    problem: ForcedProblem,
-    known: list[ForcedPoint],
-    top: int,
-    index: int,
-    static: Callable[[], FloatArray] | None,
-) -> ForcedPoint:
-    began = perf_counter()
-    here = known[top].index
-    sides = {here - 1: known[max(top - 1, 0)], here + 1: known[min(top + 1, len(known) - 1)]}
-    made = repeat(problem, known[top], sides, static)
-    return replace(made, stage="peak", index=index, seconds_total=perf_counter() - began)
-
-
-def peak_from(problem: ForcedProblem, point: ForcedPoint) -> ForcedPoint | None:
+def peak_from(problem: ForcedProblem, load: HarmonicLoad, point: ForcedPoint) -> ForcedPoint | None:
     """Return the peak of `problem` near a peak of a slightly different one; None if no solution is found there.
 
     Parameters
     ----------
-    problem
+    problem, load
         The changed problem; the order of its first passage, or its high one, is that of `point`.
     point
         The known peak.
@@ -106,11 +86,123 @@ def peak_from(problem: ForcedProblem, point: ForcedPoint) -> ForcedPoint | None:
     points = [
         forced_point(balance, p.solution, "peak", 0, p.p, 0.0) for p in (sides[0], middle, sides[1])
     ]
-    found = [p for p in [*points, *resolve_peak(problem, points, [])] if p.converged]
+    points = points[:: int(problem.sweep.forward)]
+    found = [p for p in [*points, *resolve_peak(problem, load, points)] if p.converged]
     return max(found, key=problem.amplitude)
 
 
-def _vertex(known: list[ForcedPoint], heights: list[float]) -> float | None:
+Taken = Generator[ForcedPoint, None, ForcedPoint]
+
+
+@dataclass(slots=True, eq=False)
+class _Search:
+    """Solves points of a peak, or takes them from an interrupted run."""
+
+    problem: ForcedProblem
+    load: HarmonicLoad
+    stored: Iterator[ForcedPoint]
+    count: int = 0
+
+    def point(self, sides: Sequence[ForcedPoint], omega: float) -> Taken:
+        """Solve at a frequency with the harmonics of that of its neighbours which has most, and with more still where that is asked for."""
+        made = yield from self._take(lambda: self._between(sides, omega))
+        return (yield from self.settled(made))
+
+    def settled(self, made: ForcedPoint, *, audit: bool = False) -> Taken:
+        """Add harmonics until a point needs no more of them; `audit`: compare it with more in any case."""
+        auto = self.problem.sweep.auto
+        while made.converged:
+            curve = self._curve(made.support)
+            now = of_forced(curve, made)
+            level = now.level + 1
+            if level >= curve.levels or now.judged.bound == 0.0:
+                break
+            if curve.quiet(now.level, now.judged) and not audit:
+                break
+            stage: Stage = "check" if auto else "peak"
+            more = yield from self._take(lambda: self._more(curve, now, level, stage))  # noqa: B023
+            if not auto:
+                return more
+            if not more.converged or curve.agree(now, of_forced(curve, more)):
+                break
+            made = yield from self._take(lambda: self._accepted(curve, more))  # noqa: B023
+        return made
+
+    def _take(self, make: Callable[[], ForcedPoint]) -> Taken:
+        self.count += 1
+        known = next(self.stored, None)
+        if known is None:
+            began = perf_counter()
+            made = make()
+            known = replace(made, index=self.count - 1, seconds_total=perf_counter() - began)
+            yield known
+        return known
+
+    def _curve(self, support: Harmonics) -> ForcedCurve:
+        """Return the levels of harmonics that a point may have."""
+        problem, strategy = self.problem, self.problem.strategy
+        if problem.sweep.auto:
+            return ForcedCurve(problem, self.load, problem.sweep.supports)
+        few = strategy.verifies and support == problem.low.harmonics != problem.high.harmonics
+        supports = (support, problem.high.harmonics) if few else (support,)
+        return ForcedCurve(problem, self.load, supports, raises=few)
+
+    def _between(self, sides: Sequence[ForcedPoint], omega: float) -> ForcedPoint:
+        """Solve along the branch from either side, then as without one."""
+        most = max(sides, key=lambda p: p.harmonics.size).support
+        curve = self._curve(most)
+        level = curve.supports.index(most)
+        balance = curve.problem(level)
+        spent: list[Solution] = []
+        for end in sides:
+            found = along_branch(self.problem, end, omega, balance).solution
+            rung = max(found.rung, Rung.SHORTER_STEP) if spent else found.rung
+            spent.append(replace(found, rung=rung))
+            if found.status.converged:
+                break
+        if not spent[-1].status.converged:
+            near = [end.coefficients for end in sides]
+            spent.append(without_branch(self.problem, self.load, balance, omega, near))
+        return self._point(curve, level, omega, charged(spent[-1], spent), "peak")
+
+    def _more(self, curve: ForcedCurve, now: Followed, level: int, stage: Stage) -> ForcedPoint:
+        """Solve with more harmonics, from what the strategy foretells and from the padded solution."""
+        balance = curve.problem(level)
+        starts = [curve.lifted(now.point.x, now.level, level)]
+        if now.judged.start is not None:
+            starts.insert(0, balance.unknowns(now.judged.start))
+        spent: list[Solution] = []
+        for start in starts:
+            spent.append(
+                newton(lambda x: balance.linearise(x, now.p), start, self.problem.sweep.newton)
+            )
+            if spent[-1].status.converged:
+                break
+        return self._point(curve, level, now.p, charged(spent[-1], spent), stage)
+
+    def _accepted(self, curve: ForcedCurve, check: ForcedPoint) -> ForcedPoint:
+        found = of_forced(curve, check)
+        return self._point(curve, found.level, found.p, found.point.solution, "peak")
+
+    def _point(
+        self, curve: ForcedCurve, level: int, omega: float, solution: Solution, stage: Stage
+    ) -> ForcedPoint:
+        latest = Latest(curve.problem(level))
+        point = Point(solution.x, omega, np.zeros(0), 0.0, solution, 0.0)
+        judged = Judged()
+        if solution.status.converged and stage == "peak":
+            judged = curve.judge(level, point, latest)
+        found = Followed("point", self.count, level, point, judged, 0.0)
+        return to_forced(curve, found, stage)
+
+
+def _on_seam(known: Sequence[ForcedPoint], top: int) -> bool:
+    """Whether the highest point has few harmonics and a neighbour many: then it may be highest because it has few."""
+    few = known[top].harmonics.size if known else 0
+    return any(p.harmonics.size > few for p in known[max(top - 1, 0) : top + 2] if few)
+
+
+def _vertex(known: Sequence[ForcedPoint], heights: Sequence[float]) -> float | None:
     """Where to look next for the peak; None when it is resolved, at the ends of the branch, or where it folds."""
     top = int(np.argmax(heights)) if heights else 0
     if top in (0, len(known) - 1):
@@ -124,57 +216,3 @@ def _vertex(known: list[ForcedPoint], heights: list[float]) -> float | None:
     if max(c - b, b - a) > 3.0 * min(c - b, b - a) or below == above:
         return 0.5 * (b + c) if c - b > b - a else 0.5 * (a + b)
     return float(b - 0.5 * ((b - a) * below - (b - c) * above) / (below - above))
-
-
-def _peak_point(
-    problem: ForcedProblem,
-    ends: tuple[ForcedPoint, ForcedPoint],
-    omega: float,
-    index: int,
-    static: Callable[[], FloatArray] | None,
-) -> ForcedPoint:
-    """Solve at a frequency between two points: along the branch from either of them, then by all that `solve_robustly` knows."""
-    began = perf_counter()
-    top = ends[0]
-    balance = problem.balance(top.support)
-    solution = _between(problem, ends, omega, static)
-    made = forced_point(balance, solution, "peak", index, omega, perf_counter() - began)
-    strategy = problem.strategy
-    if not strategy.verifies or not made.converged:
-        return made
-    if balance is not problem.low:
-        return made
-    verdict = judged(strategy, problem.step(balance, solution.x, omega))
-    asked = np.array(verdict.again or (), dtype=np.int64)
-    made = replace(made, predicted_error=verdict.indicator, asked=asked)
-    if asked.size and verdict.start is not None:
-        made = replace(made, start=verdict.start)
-    if problem.alerted(made):
-        made = replace(repeat(problem, made, {}, static), stage="peak")
-    return replace(made, seconds_total=perf_counter() - began)
-
-
-def _between(
-    problem: ForcedProblem,
-    ends: tuple[ForcedPoint, ForcedPoint],
-    omega: float,
-    static: Callable[[], FloatArray] | None,
-) -> Solution:
-    balance = problem.balance(ends[0].support)
-    spent: list[Solution] = []
-    for end in ends:
-        found = along_branch(problem, end, omega, balance).solution
-        rung = max(found.rung, Rung.SHORTER_STEP) if spent else found.rung
-        spent.append(replace(found, rung=rung))
-        if found.status.converged:
-            return charged(spent[-1], spent)
-    if static is None:
-        return charged(spent[0], spent)
-    solution = solve_robustly(
-        lambda v: balance.linearise(v, omega),
-        [balance.unknowns(end.coefficients) for end in ends],
-        problem.sweep.newton,
-        homotopies(balance, omega, static()),
-        problem.following(balance).weights,
-    )
-    return charged(solution, [*spent, solution])

@@ -10,7 +10,7 @@ from stickslip.arrays import ComplexArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection.strategy import Step, Verdict, judged
 from stickslip.harmonic.support import Harmonics
-from stickslip.response.forced.passages import along_branch, fresh_point
+from stickslip.response.forced.ladder import along_branch, without_branch
 from stickslip.response.forced.problem import (
     BRANCH_ITERATIONS,
     Balance,
@@ -123,10 +123,8 @@ def _solution(
         if point.omega != omega:
             spent.append(along_branch(problem, point, omega, balance).solution)
     if not (spent and spent[-1].status.converged):
-        # the first passage's way to a solution without a branch, with these harmonics
-        own = replace(problem, low=balance)
-        found = [p for p in tried if p.converged]
-        spent.append(fresh_point(own, load, found, omega).solution)
+        found = [p.coefficients for p in tried if p.converged][-1:]
+        spent.append(without_branch(problem, load, balance, omega, found))
     return charged(spent[-1], spent)
 
 

@@ -12,11 +12,13 @@ from stickslip.errors import check_choice, input_error
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
 from stickslip.harmonic.selection.strategy import Strategy, always_kept, check_strategy
 from stickslip.harmonic.support import Harmonics, harmonics_of
-from stickslip.response.follow import steps_through
+from stickslip.response.branch import steps_through
 from stickslip.solve.continuation import StepControl
 from stickslip.solve.newton_method import Newton
 
 Passages = Literal["double", "single"]
+RUNGS = (5, 9, 15, 25, 41)  # highest harmonics that "auto" goes through
+PUBLISHED = 5  # highest harmonic of the repeats in the papers
 Direction = Literal["up", "down"]
 
 
@@ -28,9 +30,14 @@ class Sweep:
     ----------
     omega_range
         First and last excitation frequency, rad/s, in growing order.
-    low, high
-        Harmonics of the first passage and of the reference, that of the repeats: the highest of all, or a list such as (1, 3, 5).
-        The static term is always kept.
+    low
+        Harmonics with which a response begins: the highest of all, or a list such as (1, 3, 5). The static term is always kept.
+    high
+        ``auto``: harmonics are raised along the branch (5, 9, 15, 25, 41) until the judgement is quiet, and audited. A number or a list:
+        those of the repeats, which are the reference of the Jacobian Alert as published; nothing goes beyond. Strategies that do not
+        verify take 5 for ``auto``.
+    cap
+        Harmonic beyond which ``auto`` does not go; what is not quiet there is doubtful.
     samples
         Samples per period of the contact forces.
     evaluator
@@ -43,7 +50,7 @@ class Sweep:
     passages
         ``double``: finish the response with few harmonics first, then repeat what needs more; ``single``: settle each of
         the equally spaced frequencies before the next one. Strategies that foretell the harmonics of the next frequency always
-        take the single one.
+        take the single one. Not used with ``high = "auto"``.
     error_harmonics
         Harmonics over which the predicted error is taken; None: those that the load drives.
     points
@@ -62,7 +69,8 @@ class Sweep:
 
     omega_range: tuple[float, float]
     low: int | Sequence[int] = 1
-    high: int | Sequence[int] = 5
+    high: int | Sequence[int] | Literal["auto"] = "auto"
+    cap: int = RUNGS[-1]
     samples: int = 256
     evaluator: Evaluator = "events"
     threshold: float = 0.05
@@ -97,7 +105,9 @@ class Sweep:
         check_choice("Sweep.passages", self.passages, get_args(Passages), hint)
         if np.isnan(self.threshold):
             raise input_error("Sweep.threshold", "is not a number", "0.05 is 5 %.")
-        for name in ("samples", "points", "frequencies", "peak_points"):
+        if isinstance(self.high, str):
+            check_choice("Sweep.high", self.high, ("auto",), "5 repeats with five harmonics.")
+        for name in ("samples", "points", "frequencies", "peak_points", "cap"):
             value, least = getattr(self, name), 0 if name in {"frequencies", "peak_points"} else 1
             if not isinstance(value, (int, np.integer)) or value < least:
                 raise input_error(
@@ -127,8 +137,24 @@ class Sweep:
 
     @property
     def high_harmonics(self) -> Harmonics:
-        """Harmonics of the reference."""
+        """Harmonics of the reference, or the most that ``auto`` takes."""
+        if self.auto:
+            return self.supports[-1]
+        if isinstance(self.high, str):
+            return harmonics_of(max(PUBLISHED, self.low_harmonics[-1]))
         return harmonics_of(self.high, "Sweep.high")
+
+    @property
+    def auto(self) -> bool:
+        """Whether harmonics are raised along the branch until the judgement is quiet."""
+        return self.high == "auto" and self.strategy.verifies
+
+    @property
+    def supports(self) -> tuple[Harmonics, ...]:
+        """Harmonics that ``auto`` goes through, the fewest first."""
+        low = self.low_harmonics
+        more = [harmonics_of(rung) for rung in RUNGS if low[-1] < rung <= self.cap]
+        return (low, *more)
 
     @property
     def strategy(self) -> Strategy:
@@ -144,7 +170,7 @@ class Sweep:
         """Whether each frequency is settled before the next one."""
         strategy = self.strategy
         decides = always_kept(strategy) is None
-        return decides and (self.passages == "single" or not strategy.verifies)
+        return decides and (self.passages == "single" or not strategy.verifies) and not self.auto
 
     @property
     def ends(self) -> tuple[float, float]:

@@ -1,0 +1,183 @@
+"""What the follower is told and what it tells: the curve, its way, the points on it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.dlft import DynamicLagrangian
+from stickslip.solve.branch import Latest
+from stickslip.solve.continuation import Following, Point, StepControl
+from stickslip.solve.newton_method import Newton, Solution
+
+LARGEST = 0.25  # arc length of the largest step: a quarter of the size of the vibration, or `1 / points` of the range
+
+Kind = Literal["point", "audit", "trial", "found"]
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What is known of the error of a solution.
+
+    Attributes
+    ----------
+    bound
+        Of its relative error; 0 where nothing acts on the harmonics left out; NaN where nobody can tell.
+    asked, start
+        What a strategy of harmonic selection said beside it, where it is one.
+    """
+
+    bound: float = np.nan
+    asked: tuple[int, ...] = ()
+    start: ComplexArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """One solution on the way, or why there is none.
+
+    Attributes
+    ----------
+    kind
+        ``point``: a point of the branch; it takes the place of all that had its index or a higher one. ``audit``: the same motion with more harmonics, to
+        compare. ``trial``: the same with fewer, from which the branch goes on. ``found``: takes the place of the
+        point of its index alone, which was no solution.
+    index
+        Position along the branch.
+    level
+        Of its harmonics.
+    point
+        The solution and where the branch goes on.
+    judged
+        Of a ``point``, ``trial`` or ``found``.
+    seconds
+        What it took.
+    """
+
+    kind: Kind
+    index: int
+    level: int
+    point: Point
+    judged: Judged
+    seconds: float
+
+    @property
+    def converged(self) -> bool:
+        """Whether it is a solution."""
+        return self.point.solution.status.converged
+
+    @property
+    def p(self) -> float:
+        """The parameter."""
+        return self.point.p
+
+
+class Curve(Protocol):
+    """What is followed: one equation with several levels of harmonics."""
+
+    @property
+    def levels(self) -> int:
+        """Number of levels, at least one."""
+        ...
+
+    def problem(self, level: int) -> HarmonicBalance | DynamicLagrangian:
+        """Return the equation."""
+        ...
+
+    def following(self, level: int) -> Following:
+        """Return how its branch is followed."""
+        ...
+
+    def lifted(self, x: FloatArray, level: int, to: int) -> FloatArray:
+        """Return unknowns of one level as those of another."""
+        ...
+
+    def fresh(self, level: int, p: float, near: Sequence[Followed], most: bool) -> Solution:
+        """Solve where no branch leads; `most`: by all that may help."""
+        ...
+
+    def judge(self, level: int, point: Point, latest: Latest) -> Judged:
+        """Judge the error of a solution."""
+        ...
+
+    def quiet(self, level: int, judged: Judged) -> bool:
+        """Whether a solution needs no more harmonics."""
+        ...
+
+    def agree(self, fewer: Followed, more: Followed) -> bool:
+        """Whether two levels tell the same motion."""
+        ...
+
+    def near(self, fewer: Followed, more: Followed) -> bool:
+        """Whether they differ by so little that they cannot stand on different sheets."""
+        ...
+
+    def height(self, found: Followed) -> float:
+        """Return what maxima are looked for in."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Route:
+    """Where a branch begins and ends.
+
+    Parameters
+    ----------
+    first, last
+        Values of the parameter; the last may be the smaller one.
+    points
+        Smallest number of points.
+    listed
+        Values to step through, in their order; empty: by arc length.
+    recovers
+        Whether a branch that is lost is taken up further on.
+    """
+
+    first: float
+    last: float
+    points: int = 40
+    listed: tuple[float, ...] = ()
+    recovers: bool = True
+
+    @property
+    def forward(self) -> float:
+        """1 where the parameter grows on the way, -1 where it falls."""
+        return 1.0 if self.last >= self.first else -1.0
+
+    @property
+    def gap(self) -> float:
+        """Change of the parameter in the longest step."""
+        return (self.last - self.first) / self.points
+
+    def before(self, one: float, other: float) -> bool:
+        """Whether one value comes before another on the way."""
+        return self.forward * one < self.forward * other
+
+
+def steps_through(length: float, points: int) -> StepControl:
+    """Return the step control that takes `points` steps or more through a range of the parameter of some `length`."""
+    # a range of a single frequency has no length, and no step is taken in it
+    return StepControl(scale=length / (points * LARGEST) or 1.0, first=0.05, largest=LARGEST)
+
+
+def following_vibration(
+    problem: HarmonicBalance | DynamicLagrangian, control: StepControl, newton: Newton
+) -> Following:
+    """Return how a branch of a periodic problem is followed: the static part would hide the growth of the vibration."""
+    weights = np.ones(problem.size)
+    weights[: problem.linear.n] = 0.0
+    return Following(newton=newton, control=control, weights=weights)
+
+
+def branch_of(every: Sequence[Followed]) -> list[Followed]:
+    """Return the points of the branch among all that were yielded: those that no later one took the place of."""
+    branch: list[Followed] = []
+    for one in every:
+        if one.kind == "point":
+            branch = [*branch[: one.index], one]
+        elif one.kind == "found":
+            branch[one.index] = one
+    return branch

@@ -1,0 +1,198 @@
+"""The forced response as a branch whose harmonics change on the way: raised until the judgement is quiet, audited, lowered again."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.harmonic.balance import Linearisation
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.selection.alert import jacobian_alert
+from stickslip.harmonic.selection.guarded_alert import doubled
+from stickslip.harmonic.selection.strategy import Step, always_kept, judged
+from stickslip.harmonic.support import Harmonics
+from stickslip.response.branch import Followed, Judged, Kind, Route
+from stickslip.response.follow import follow
+from stickslip.response.forced.ladder import without_branch
+from stickslip.response.forced.problem import (
+    Balance,
+    ForcedPoint,
+    ForcedProblem,
+    Stage,
+    forced_point,
+    with_stiffness,
+)
+from stickslip.solve.branch import Latest
+from stickslip.solve.continuation import Following, Point
+from stickslip.solve.krylov import to_tolerance
+from stickslip.solve.newton_method import Solution
+
+KINDS: tuple[Kind, ...] = ("point", "audit", "trial", "found")
+# shares of the threshold that bounds may have, with the fewest harmonics and with more: those at the very threshold were wrong at times
+QUIET = (0.5, 0.8)
+ROUGHLY = 1e-3  # relative residual of that step where it is found by iteration
+AGREE = 0.5  # share of the threshold by which motions of neighbouring levels may differ: the next levels add to it
+NEAR = 0.3  # relative difference of motions that stand on the same sheet
+
+
+@dataclass(frozen=True, eq=False)
+class ForcedCurve:
+    """A forced response with one support of harmonics after the other.
+
+    Parameters
+    ----------
+    forced, load
+        What vibrates, and what drives it.
+    supports
+        Harmonics of each level, each holding the one before.
+    raises
+        Whether what is not quiet gets more of them.
+    """
+
+    forced: ForcedProblem
+    load: HarmonicLoad
+    supports: tuple[Harmonics, ...]
+    raises: bool = True
+
+    @property
+    def levels(self) -> int:
+        """Number of supports."""
+        return len(self.supports)
+
+    def problem(self, level: int) -> Balance:
+        """Return the balance with the harmonics of a level."""
+        return self.forced.balance(self.supports[level])
+
+    def following(self, level: int) -> Following:
+        """Return how its branch is followed."""
+        return self.forced.following(self.problem(level))
+
+    def lifted(self, x: FloatArray, level: int, to: int) -> FloatArray:
+        """Return unknowns of one level as those of another; missing harmonics are zero."""
+        if level == to:
+            return x
+        return self.problem(to).unknowns(self.problem(level).coefficients(x))
+
+    def fresh(self, level: int, p: float, near: Sequence[Followed], most: bool) -> Solution:
+        """Solve at a frequency to which no branch leads."""
+        known = [self.problem(n.level).coefficients(n.point.x) for n in near]
+        return without_branch(self.forced, self.load, self.problem(level), p, known, most)
+
+    def judge(self, level: int, point: Point, latest: Latest) -> Judged:
+        """Bound the error of a solution by what the strategy says of the harmonics of the next level."""
+        strategy, forced = self.forced.strategy, self.forced
+        if always_kept(strategy) is not None:
+            return Judged()
+        known = latest.known(point.x, point.p)
+        left = known.events if isinstance(known, Linearisation) else None
+        balance = self.problem(level)
+        step = forced.step(balance, point.x, point.p, left=left)
+        if self.raises and level > 0:
+            return self._predicted(level, step)
+        if level + 1 < self.levels:
+            step = replace(step, reference=with_stiffness(self.problem(level + 1)))
+        verdict = judged(strategy, step)
+        if verdict.again is None:
+            return Judged(verdict.indicator)
+        return Judged(verdict.indicator, verdict.again, verdict.start)
+
+    def _predicted(self, level: int, step: Step) -> Judged:
+        """Predict the error by one Newton step with the harmonics of the next level, or with twice the most that there are; audits look further."""
+        last = level + 1 == self.levels
+        more = doubled(step.balance) if last else with_stiffness(self.problem(level + 1))
+        solve = to_tolerance(self.forced.sweep.newton.linear, ROUGHLY).solve
+        alert = jacobian_alert(
+            step.balance, more, step.x, step.omega, step.measure, solve, events=step.events
+        )
+        return Judged(alert.error)
+
+    def quiet(self, level: int, judged: Judged) -> bool:
+        """Whether a bound is well below the threshold, or nobody can tell."""
+        if not self.raises:
+            return True
+        return not judged.bound > QUIET[min(level, 1)] * self.forced.strategy.threshold
+
+    def agree(self, fewer: Followed, more: Followed) -> bool:
+        """Whether the motions differ by clearly less than the threshold."""
+        return self.change(fewer, more) <= AGREE * self.forced.strategy.threshold
+
+    def near(self, fewer: Followed, more: Followed) -> bool:
+        """Whether the motions differ by so little that they cannot stand on different sheets."""
+        return self.change(fewer, more) <= NEAR
+
+    def change(self, fewer: Followed, more: Followed) -> float:
+        """Return the largest relative difference between two motions, a fraction."""
+        a, b = (self.problem(f.level).coefficients(f.point.x) for f in (fewer, more))
+        rows, linear = min(len(a), len(b)), self.forced.low.linear
+        one, other = (linear.recover(fewer.p, q[:rows]) for q in (a, b))
+        return self.forced.measure.change(one, other - one)[0]
+
+    def height(self, found: Followed) -> float:
+        """Return the amplitude of the first output, m."""
+        q = self.problem(found.level).coefficients(found.point.x)
+        return self.forced.amplitude_of(found.p, q)
+
+
+def along_the_branch(
+    problem: ForcedProblem, load: HarmonicLoad, done: Sequence[ForcedPoint]
+) -> Iterator[ForcedPoint]:
+    """Follow the response with as many harmonics as each point needs.
+
+    Parameters
+    ----------
+    problem, load
+        The forced response.
+    done
+        Points of an interrupted run, in the order in which they came.
+
+    Yields
+    ------
+    ForcedPoint
+        Points not in `done`, their stage the kind of `stickslip.response.follow.Followed`.
+    """
+    curve = ForcedCurve(problem, load, problem.sweep.supports)
+    yield from followed(curve, route_of(problem), done)
+
+
+def route_of(problem: ForcedProblem) -> Route:
+    """Return from where to where a sweep goes."""
+    sweep = problem.sweep
+    first, last = sweep.ends
+    return Route(first=first, last=last, points=sweep.points, listed=tuple(sweep.grid.tolist()))
+
+
+def followed(
+    curve: ForcedCurve, route: Route, done: Sequence[ForcedPoint]
+) -> Iterator[ForcedPoint]:
+    """Follow a curve; points of the response in, points of the response out."""
+    known = [of_forced(curve, p) for p in done]
+    for found in follow(curve, route, known):
+        yield to_forced(curve, found)
+
+
+def to_forced(curve: ForcedCurve, found: Followed, stage: Stage | None = None) -> ForcedPoint:
+    """Return what was found on the way as a point of the response."""
+    point, judged = found.point, found.judged
+    balance = curve.problem(found.level)
+    made = forced_point(balance, point.solution, stage or found.kind, found.index, point.p, found.seconds)  # fmt: skip
+    start = np.zeros((0, 0), dtype=complex) if judged.start is None else judged.start
+    return replace(
+        made,
+        tangent=point.tangent,
+        step=point.step,
+        orientation=point.orientation,
+        predicted_error=judged.bound,
+        asked=np.array(judged.asked, dtype=np.int64),
+        start=start,
+    )
+
+
+def of_forced(curve: ForcedCurve, point: ForcedPoint) -> Followed:
+    """Return a point of the response as it was found on the way."""
+    kind: Kind = point.stage if point.stage in KINDS else "point"
+    level = curve.supports.index(point.support)
+    start = point.start if point.start.size else None
+    judged = Judged(point.predicted_error, tuple(int(h) for h in point.asked), start)
+    there = curve.forced.branch_point(point)
+    return Followed(kind, point.index, level, there, judged, point.seconds_total)
