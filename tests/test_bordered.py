@@ -71,7 +71,7 @@ def peak_at_level(balance: HarmonicBalance, field: str, amplitude: float = 0.3) 
         return Setting(member, omega, np.array([omega, 0.0]))
 
     driven = Driven(0, (1,))
-    conditions = HorizontalTangent(driven, 2.0), GivenAmplitude(driven, amplitude)
+    conditions = HorizontalTangent(driven), GivenAmplitude(driven, amplitude)
     return PeriodicProblem(setting, conditions, LU)
 
 
@@ -106,8 +106,8 @@ def duffing() -> tuple[System, HarmonicLoad]:
 
 BOTH = Driven(0, (1, 2))
 PROBLEMS = {
-    "horizontal tangent": lambda b, f: peak(b, HorizontalTangent(Driven(0, (1,)), 2.0), f),
-    "horizontal tangent of two harmonics": lambda b, f: peak(b, HorizontalTangent(BOTH, 2.0), f),
+    "horizontal tangent": lambda b, f: peak(b, HorizontalTangent(Driven(0, (1,))), f),
+    "horizontal tangent of two harmonics": lambda b, f: peak(b, HorizontalTangent(BOTH), f),
     "phase quadrature": lambda b, f: peak(b, PhaseQuadrature(BOTH, 0.3), f),
     "quadrature of the second harmonic": lambda b, f: peak(b, PhaseQuadrature(Driven(0, (2, 1)), 0.3), f),
     "amplitude by level": lambda b, _: at_level(b),
@@ -145,6 +145,27 @@ def test_derivatives_are_those_of_the_residual(case, name):
     h = 1e-4 * p
     by_p = (problem.residual(y, p + h) - problem.residual(y, p - h)) / (2 * h)
     assert np.max(np.abs(at.jac_p - by_p)) < 1e-4 * max(np.max(np.abs(by_p)), 1e-3)
+
+
+@given(
+    st.integers(0, 2**31), st.integers(1, 6), st.lists(st.integers(1, 3), min_size=1, max_size=3)
+)
+@settings(max_examples=40, deadline=None)
+def test_borders_around_borders_are_one_matrix(seed, n, widths):
+    rng = np.random.default_rng(seed)
+    jac = whole = rng.standard_normal((n, n))
+    for m in widths:
+        column, row = rng.standard_normal((len(whole), m)), rng.standard_normal((m, len(whole)))
+        corner = rng.standard_normal((m, m))
+        jac, whole = Bordered(jac, column, row, corner), np.block([[whole, column], [row, corner]])
+    v = rng.standard_normal(len(whole))
+    assert jac.shape == whole.shape
+    assert np.array_equal(array_of(jac), whole)
+    assert np.array_equal(array_of(jac.transposed), whole.T)
+    # sums of some ten numbers of size one
+    for made in (jac, jac.flat):
+        assert np.allclose(made.matvec(v), whole @ v, rtol=0, atol=1e-13)
+        assert np.allclose(made.rmatvec(v), v @ whole, rtol=0, atol=1e-13)
 
 
 # ---- closed forms --------------------------------------------------------------------------------------------------------

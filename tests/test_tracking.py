@@ -18,6 +18,7 @@ from stickslip.harmonic.parameters import AtFrequency, law_field, load_level
 from stickslip.harmonic.peak import Driven, PeakProblem
 from stickslip.model.matrices import lumped
 from stickslip.operators import array_of
+from stickslip.response.follow import following_vibration, steps_through
 from stickslip.response.parameter import (
     Discretisation,
     branch_in_parameter,
@@ -26,6 +27,7 @@ from stickslip.response.parameter import (
 )
 from stickslip.response.system import System
 from stickslip.response.tracking import smallest_peak, track_peak
+from stickslip.solve.continuation import start_point, trace
 from stickslip.solve.krylov import Automatic, Krylov
 from stickslip.solve.linear import Dense, factorised
 from stickslip.solve.newton_method import Newton, newton
@@ -106,7 +108,7 @@ def test_derivatives_of_the_peak_problem(case, condition):
     value = {"damped": 0.2, "block": 0.5, "duffing": 0.4}[case.__name__]
     invert = partial(factorised, Dense())
     driven = Driven(0, (1,))
-    problem = PeakProblem(law_field(balance, name), condition, driven, 0.3, 1.1, invert, 2.0)
+    problem = PeakProblem(law_field(balance, name), condition, driven, 0.3, 1.1, invert)
     x = first_guess(system, balance, 1.05, FINE)
     y = np.append(
         x + 0.05 * np.max(np.abs(x)) * np.random.default_rng(1).standard_normal(x.size), -0.04
@@ -189,6 +191,31 @@ def test_tracked_peak_of_a_condensed_output_beside_a_fold():
     omegas = np.append(np.linspace(0.55, 0.999 * near[0], 60), near)
     height, _ = dense_peak(system, load, "excitation", 1.0, how, omegas)
     assert points[0].amplitude == pytest.approx(height, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "form"), [(0.03, "dense"), (0.01, "structured"), (0.004, "dense")]
+)
+def test_a_peak_that_almost_is_a_fold_is_tracked(ratio, form, monkeypatch):
+    # the lighter the damping, the nearer the fold: by the frequency the response has no slope there, along itself it has
+    system, load = duffing()
+    stiffness = system.structure.stiffness
+    system = replace(system, structure=lumped(np.eye(2), stiffness, ratio * stiffness))
+    monkeypatch.setattr(balance_module, "CROSSOVER", 1 if form == "structured" else 10**9)
+    how = Discretisation(order=3, samples=64)
+    levels = ratio / 0.03 * np.array([1.0, 1.5, 2.0])
+    points = list(track_peak(system, load, "excitation", levels, (0.5, 0.9), discretisation=how))
+    assert all(p.converged and p.is_maximum for p in points)
+    last = points[-1]
+    balance = replace(member(system, load, "excitation", levels[-1], how), jacobian="dense")
+    control = replace(steps_through(0.4, 40), largest=0.05, max_points=5000)
+    following = following_vibration(balance, control, FINE)
+    start = start_point(balance, first_guess(system, balance, 0.5, FINE), 0.5, following)
+    branch = list(trace(balance, start, last.omega * 1.02, following))
+    heights = [amplitude(balance, system.outputs[0], p.x) for p in branch]
+    # nothing is higher, and what is nearest lies within half a step: (0.05 / 2)² / 2
+    assert max(heights) <= last.amplitude * (1 + 1e-9)
+    assert max(heights) == pytest.approx(last.amplitude, rel=4e-4)
 
 
 def test_samples_leave_a_peak_with_kinks_that_is_found_all_the_same():

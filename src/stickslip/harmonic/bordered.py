@@ -39,7 +39,7 @@ class Setting:
     slopes: FloatArray
 
 
-Invert = Callable[[Jacobian], Inverse | None]  # may overwrite an array
+Invert = Callable[[Jacobian], Inverse | None]
 Settings = Callable[[FloatArray, float], Setting]  # of the extra unknowns (m,) and the parameter
 
 
@@ -103,12 +103,6 @@ class State:
         return self.setting.balance.linearise(self.x, self.setting.omega)
 
     @cached_property
-    def inverse(self) -> Inverse | None:
-        """How systems with the balance's own Jacobian and its transpose are solved; None where it is singular, at a fold."""
-        jac = self.at.jac
-        return self.problem.invert(jac.copy(order="K") if isinstance(jac, np.ndarray) else jac)
-
-    @cached_property
     def columns(self) -> FloatArray:
         """(size, m) derivatives of the balance by the extra unknowns: exact by the frequency, else central differences."""
         own = [
@@ -120,9 +114,19 @@ class State:
         return np.stack(own, axis=1)
 
     @cached_property
+    def inverse(self) -> Inverse | None:
+        """How systems are solved with ``[J, ∂r/∂z; row]``, z the first extra unknown and `row` that of the problem; None if it is singular."""
+        n = self.x.size
+        row = np.eye(1, n + 1, n)[0] if self.problem.row is None else self.problem.row
+        return self.problem.invert(
+            Bordered(self.at.jac, self.columns[:, 0], row[:n], float(row[n]))
+        )
+
+    @cached_property
     def along(self) -> FloatArray | None:
-        """(size,) change of the motion with the first extra unknown, along solutions of the balance; None at a fold."""
-        return None if self.inverse is None else self.inverse(-self.columns[:, 0])
+        """(size + 1,) how the motion and the first extra unknown go on together, to where its product with the row is 1; None if it is unknown."""
+        n = self.x.size
+        return None if self.inverse is None else self.inverse(np.eye(1, n + 1, n)[0])
 
     def moved(self, step: FloatArray) -> "State":
         """Return the state a `step` (size + m,) away, for the same parameter."""
@@ -151,11 +155,15 @@ class PeriodicProblem:
         One for each extra unknown.
     invert
         How systems with a Jacobian are solved that conditions ask for, None for a singular one; its accuracy is theirs.
+    row
+        (size + 1,) what closes the equations of the tangent of the motion and the first extra unknown; None: that unknown grows by one, which
+        it cannot at a fold.
     """
 
     settings: Settings
     conditions: tuple[Condition, ...]
     invert: Invert
+    row: FloatArray | None = None
 
     def state(self, y: FloatArray, p: float) -> State:
         """Return the problem at the unknowns `y` and the parameter `p`; nothing is evaluated yet."""

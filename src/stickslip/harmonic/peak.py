@@ -7,8 +7,9 @@ drives, the condition is
   minimum and saddle of the amplitude (Krack et al. 2017, section 3.4 and note 22);
 - by phase quadrature, the coordinate lags the force by 90°: no second derivative is needed, and it is not exactly the maximum.
 
-The gradient of the first condition follows from the adjoint ``Jᵀ μ = ∂ ln|a|``. With ``v = dx/dω``, the matrix ``∂(J v + ∂r/∂ω)/∂x``
-is, by the symmetry of second derivatives, the derivative of J along the response, and two evaluations of the Jacobian give it.
+It is asked for along the response, by a tangent (v, τ) of x and ln ω that is there at folds too: ``v`` is τ times the sensitivity. Its gradient
+follows from an adjoint μ. The matrix ``∂(J v + τ ∂r/∂ω)/∂x`` is, by the symmetry of second derivatives, the derivative of J along the
+response, and two evaluations of the Jacobian give it.
 """
 
 from dataclasses import dataclass, replace
@@ -89,59 +90,84 @@ def driven_by(load: HarmonicLoad) -> tuple[tuple[int, ...], float]:
 
 @dataclass(frozen=True)
 class HorizontalTangent:
-    """The amplitude changes neither way with the first extra unknown, ``ln ω``.
+    """The amplitude changes neither way along the response, whose frequency is the first extra unknown: what changes stands across what is there.
 
     Parameters
     ----------
     driven
         What peaks.
-    sharpness
-        Typical ``|da / d ln ω| / |a|``, by which the slope is divided, so that the tolerance does not depend on the damping.
     """
 
     driven: Driven
-    sharpness: float = 1.0
 
     def value(self, state: State) -> float:
-        """Return the slope ``d ln|a| / d ln ω``; infinite at a fold."""
+        """Return the cosine of the angle between the amplitudes and their change along the response; infinite where that is unknown."""
         if state.along is None:
             return np.inf
-        slope = self.driven.gradient(state.setting.balance, state.x) @ state.along
-        return float(slope) / self.sharpness
+        own, change, cosine = self._three(state, state.along)
+        return cosine if np.any(own) and np.any(change) else np.inf
 
     def gradient(self, state: State) -> FloatArray:
-        """Return its (size + m,) derivative; zeros at a fold."""
-        size, v, row = state.x.size, state.along, np.zeros(state.y.size)
-        own = self.driven.gradient(state.setting.balance, state.x)
-        adjoint = None if state.inverse is None else state.inverse(own, transposed=True)
-        if v is None or adjoint is None:
-            return row
+        """Return its (size + m,) derivative; zeros where it is unknown."""
+        if state.along is None:
+            return np.zeros(state.y.size)
+        own, change, cosine = self._three(state, state.along)
+        squares = float(own @ own), float(change @ change)
+        both = np.sqrt(squares[0] * squares[1])
+        by_own = change / both - cosine * own / squares[0]
+        by_change = own / both - cosine * change / squares[1]
+        return _gradient(self.driven, state, state.along, by_own, by_change)
+
+    def _three(self, state: State, along: FloatArray) -> tuple[FloatArray, FloatArray, float]:
         places = self.driven.places(state.setting.balance)
-        row[places] = v[places] / (state.x[places] @ state.x[places])
-        second, by_frequency = _along(state, v, adjoint)
-        row[:size] -= 2.0 * float(own @ v) * own + second
-        row[size] = -by_frequency
-        for place in range(1, state.extra.size):
-            row[size + place] = -state.by_extra(place, lambda s: _weighted(s, v, adjoint)[0])
-        return row / self.sharpness
+        own, change = state.x[places], along[places]
+        size = float(np.linalg.norm(own) * np.linalg.norm(change))
+        return own, change, float(own @ change) / size if size > 0.0 else 0.0
 
 
-def _along(state: State, v: FloatArray, adjoint: FloatArray) -> tuple[FloatArray, float]:
-    """Return (size,) ``μᵀ ∂(J v + dr/d ln ω)/∂x`` and the same by ``ln ω``, from two evaluations along the response."""
+def _gradient(
+    driven: Driven, state: State, along: FloatArray, by_own: FloatArray, by_change: FloatArray
+) -> FloatArray:
+    """Return (size + m,) the derivative of a function of the driven amplitudes and of their change along the response; zeros where it is unknown.
+
+    Parameters
+    ----------
+    driven
+        Which amplitudes.
+    state
+        Where.
+    along
+        (size + 1,) the tangent there.
+    by_own, by_change
+        (2 k,) derivatives of the function by the amplitudes and by their change.
+    """
+    size, row, right = state.x.size, np.zeros(state.y.size), np.zeros(along.size)
+    places = driven.places(state.setting.balance)
+    right[places] = by_change
+    adjoint = None if state.inverse is None else state.inverse(right, transposed=True)
+    if adjoint is None:
+        return row
+    mu = adjoint[:-1]
+    row[places] = by_own
+    row[: size + 1] -= _turned(state, along, mu)
+    for place in range(1, state.extra.size):
+        row[size + place] = -state.by_extra(place, lambda s: _weighted(s, mu) @ along)
+    return row
+
+
+def _turned(state: State, along: FloatArray, adjoint: FloatArray) -> FloatArray:
+    """Return (size + 1,) ``μᵀ ∂(J v + τ ∂r/∂z)``, by x and by z, with (v, τ) and μ held: the derivative of ``μᵀ [J, ∂r/∂z]`` along (v, τ)."""
     balance, size = state.setting.balance, float(np.linalg.norm(state.x))
     relative = ALONG_SAMPLES / balance.samples if _is_sampled(balance) else ALONG
-    step = relative * size / max(float(np.linalg.norm(v)), size)
+    step = relative * size / max(float(np.linalg.norm(along[:-1])), size * abs(float(along[-1])))
     way = np.zeros(state.y.size)
-    way[: v.size], way[v.size] = v, 1.0
-    up, down = (_weighted(state.moved(s * way), v, adjoint) for s in (step, -step))
-    second, change = ((a - b) / (2.0 * step) for a, b in zip(up[::-1], down[::-1], strict=True))
-    return second, float(change - second @ v)
+    way[: along.size] = step * along
+    return (_weighted(state.moved(way), adjoint) - _weighted(state.moved(-way), adjoint)) / (2 * step)  # fmt: skip
 
 
-def _weighted(state: State, v: FloatArray, adjoint: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return ``μᵀ(J v + dr/d ln ω)`` and (size,) ``μᵀ J`` at a state, with direction v and adjoint μ of another one."""
-    rows = transposed_times(state.at.jac, adjoint)
-    return np.asarray(rows @ v + adjoint @ state.columns[:, 0]), rows
+def _weighted(state: State, adjoint: FloatArray) -> FloatArray:
+    """Return (size + 1,) ``μᵀ [J, ∂r/∂z]`` at a state, z the first extra unknown."""
+    return np.append(transposed_times(state.at.jac, adjoint), adjoint @ state.columns[:, 0])
 
 
 @dataclass(frozen=True)
@@ -202,7 +228,9 @@ class PeakProblem:
     invert
         How systems with the Jacobian of the balance are solved, as exactly as the peak is to be found.
     sharpness
-        That of the horizontal tangent.
+        Typical ``|da / d ln ω| / |a|``: what is long in ``ln ω``.
+    row
+        What closes the equations of the tangent; see `aligned`.
     """
 
     family: BalanceAt
@@ -212,15 +240,16 @@ class PeakProblem:
     omega_scale: float
     invert: Invert
     sharpness: float = 1.0
+    row: FloatArray | None = None
 
     @cached_property
     def bordered(self) -> PeriodicProblem:
         """The equation."""
-        condition: Condition = HorizontalTangent(self.driven, self.sharpness)
+        condition: Condition = HorizontalTangent(self.driven)
         if self.by == "phase_quadrature":
             condition = PhaseQuadrature(self.driven, self.phase)
         settings = unknown_frequency(self.family, self.omega_scale)
-        return PeriodicProblem(settings, (condition,), self.invert)
+        return PeriodicProblem(settings, (condition,), self.invert, self.row)
 
     def sharpened(self, state: State) -> "PeakProblem":
         """Return the problem with the sharpness that a `state` near the peak has."""
@@ -229,6 +258,19 @@ class PeakProblem:
         places = self.driven.places(state.setting.balance)
         sharp = np.linalg.norm(state.along[places]) / np.linalg.norm(state.x[places])
         return replace(self, sharpness=max(float(sharp), 1.0))
+
+    def aligned(self, state: State) -> "PeakProblem":
+        """Return the problem with a row along the response at a `state` near the peak, so that it is regular at folds beside it.
+
+        Length is measured in changes of the motion relative to its size and in those of ``ln ω`` over the width of the peak: neither units nor
+        the damping change what the tolerance means.
+        """
+        if state.along is None:
+            return self
+        measure = np.full(state.along.size, 1.0 / float(state.x @ state.x))
+        measure[-1] = self.sharpness**2
+        row = measure * state.along
+        return replace(self, row=row / np.sqrt(row @ state.along))
 
     def omega(self, y: FloatArray) -> float:
         """Return the frequency of the unknowns `y`, rad/s."""
@@ -239,19 +281,24 @@ class PeakProblem:
         return self.bordered.linearise(y, p)
 
     def state(self, y: FloatArray, p: float) -> State:
-        """Return the problem at the unknowns `y` and the design parameter `p`, for what follows."""
-        return self.bordered.state(y, p)
+        """Return the problem at the unknowns `y` and the design parameter `p`, its tangent by ``ln ω``."""
+        return replace(self.bordered, row=None).state(y, p)
 
     def rate(self, state: State) -> float:
-        """Return ``d ln|a| / d ln ω`` along the response; infinite at a fold."""
-        return HorizontalTangent(self.driven).value(state)
+        """Return ``d ln|a| / d ln ω`` along the response at a `state` of this problem; infinite at a fold."""
+        if state.along is None:
+            return np.inf
+        return float(self.driven.gradient(state.setting.balance, state.x) @ state.along[:-1])
 
     def curvature(self, state: State) -> float:
         """Return ``d² ln|a| / d(ln ω)²`` along the response: negative at a maximum; NaN at a fold."""
         if state.along is None:
             return np.nan
-        row = HorizontalTangent(self.driven).gradient(state)
-        return float(row[:-1] @ state.along + row[-1])
+        places = self.driven.places(state.setting.balance)
+        own, change = state.x[places], state.along[places]
+        square = float(own @ own)
+        by_own = change / square - 2.0 * float(own @ change) * own / square**2
+        return float(_gradient(self.driven, state, state.along, by_own, own / square) @ state.along)
 
     def amplitude_slope(self, state: State) -> float:
         """Return ``d ln|a| / dp`` along the curve of peaks; NaN where the problem is singular.
@@ -259,11 +306,9 @@ class PeakProblem:
         By horizontal tangent a shift of the frequency does not change the amplitude (envelope theorem): the slope is that at fixed frequency.
         """
         by_p = by_parameter(self.family, state.x, state.setting.omega, state.p)
-        inverse, right = state.inverse, -by_p
-        if self.by == "phase_quadrature":
-            inverse = self.invert(self.linearise(state.y, state.p).jac)
-            right = np.append(right, 0.0)
-        change = None if inverse is None else inverse(right)
+        quadrature = self.by == "phase_quadrature"
+        inverse = self.invert(self.linearise(state.y, state.p).jac) if quadrature else state.inverse
+        change = None if inverse is None else inverse(-np.append(by_p, 0.0))
         if change is None:
             return np.nan
         own = self.driven.gradient(state.setting.balance, state.x)

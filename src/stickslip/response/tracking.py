@@ -193,6 +193,7 @@ class _Tracker:
     newton: Newton
     known: list[tuple[float, FloatArray]]
     evaluations: int = 0
+    corner: bool = False  # whether the last peak sits on a corner of the response
 
     def point(self, value: float) -> PeakPoint:
         """Find the peak at a value of the parameter, from those known."""
@@ -203,6 +204,7 @@ class _Tracker:
         if solution.status.converged:
             state = problem.state(y, value)
             slope, curvature = problem.amplitude_slope(state), problem.curvature(state)
+            self.problem = problem.aligned(state)
             self.evaluations += 2 + EVALUATIONS["horizontal_tangent"]
         driven, omega = problem.motion(y, value), problem.omega(y)
         amplitude = float(np.linalg.norm(driven))
@@ -216,24 +218,33 @@ class _Tracker:
     def _reach(self, value: float, halvings: int) -> Solution:
         """Solve from the predicted peak; through the values between, or in a bracket, if that fails."""
         solution, last = self._solved(value), self.known[-1][0]
-        if (
-            not solution.status.converged
-            and halvings > 0
-            and last != value
-            and self._reach(0.5 * (last + value), halvings - 1).status.converged
-        ):
-            solution = self._solved(value)
-        if not solution.status.converged and self.problem.by == "horizontal_tangent":
-            solution = self._bracketed(value)
+        if not solution.status.converged and halvings > 0 and last != value:
+            between = self._reach(0.5 * (last + value), halvings - 1)
+            if between.status.converged and not self.corner:
+                return self._reach(value, halvings - 1)
+            if between.status.converged:
+                solution = self._solved(value)
+        if solution.status.converged:
+            self.corner = False
+        elif self.problem.by == "horizontal_tangent":
+            solution, self.corner = self._bracketed(value), True
         if solution.status.converged:
             self.known = [*self.known[-1:], (value, solution.x)]
         return solution
 
     def _predicted(self, value: float) -> FloatArray:
-        """Extrapolate the last two peaks; the last one, where that would go far."""
+        """Go on through the last two peaks, or along the tangent at the only one; the last one, where that would go far."""
         (before, earlier), (p, y) = self.known[0], self.known[-1]
-        share = (value - p) / (p - before) if p != before else np.inf
-        return y + share * (y - earlier) if abs(share) <= 2.0 else y
+        if p != before:
+            share = (value - p) / (p - before)
+            return y + share * (y - earlier) if abs(share) <= 2.0 else y
+        if value == p or self.corner:
+            return y
+        self.evaluations += 3 * EVALUATIONS[self.problem.by]
+        at = self.problem.linearise(y, p)
+        inverse = self.problem.invert(at.jac)
+        change = None if inverse is None else inverse((p - value) * at.jac_p)
+        return y if change is None or abs(change[-1]) > FARTHEST else y + change
 
     def _solved(self, value: float) -> Solution:
         """Solve from the predicted peak; another peak than the one that was followed is none."""
@@ -324,7 +335,8 @@ def _tracker(
     x, omega = _first_peak(problem, first, points)
     y = np.append(x, 0.0)
     problem = replace(problem, omega_scale=omega)
-    problem = problem.sharpened(problem.state(y, first))
+    here = problem.state(y, first)
+    problem = problem.sharpened(here).aligned(here)
     few = replace(
         how.newton,
         max_iterations=min(STEPS, how.newton.max_iterations),

@@ -86,7 +86,7 @@ class Krylov:
     tolerance
         Residual left by a Newton step, relative to the right side: an inexact Newton method (Dembo, Eisenstat & Steihaug 1982).
     tangent_tolerance
-        The same for the tangent of a branch, whose right side is zero but for the border.
+        The same for the tangent of a branch, whose right side is zero but for the border; `tolerance` where that is finer.
     max_products
         Products with the Jacobian in one system. What was reached then counts as a solution if its relative residual is below the root
         of the tolerance.
@@ -122,9 +122,9 @@ class Krylov:
     ) -> tuple[FloatArray | None, float]:
         """Solve the bordered system, whose preconditioner has the same border; the sign is not known. See `LinearSolver`."""
         whole = Bordered(jac, column, row, corner).flat
-        tolerance = (
-            self.tolerance if np.any(right[: whole.jac.shape[0]]) else self.tangent_tolerance
-        )
+        tolerance = self.tolerance
+        if not np.any(right[: whole.jac.shape[0]]):
+            tolerance = min(tolerance, self.tangent_tolerance)
         return self._solve(whole, right, tolerance), np.nan
 
     def _solve(self, jac: Jacobian, right: FloatArray, tolerance: float) -> FloatArray | None:
