@@ -148,6 +148,8 @@ def test_a_model_gives_the_numbers_of_its_study_without_files(
     for name in ("frequency_hz", "amplitude", "contact_force"):
         there, here = (r.data["forced_response"][name].values for r in (result, found))
         np.testing.assert_array_equal(there, here)
+    assert found.verdicts
+    assert found.verdicts == result.verdicts
     kept = model.forced_response(hz=[9.0, 10.0, 11.0], peak_points=0, folder=tmp_path / "made")
     assert kept.path == tmp_path / "made" / "result.nc"
     with pytest.raises(
