@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.selection.alert import jacobian_alert
+from stickslip.harmonic.selection.guarded_alert import doubled
 from stickslip.harmonic.support import Harmonics, harmonics_of
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, with_stiffness
 
@@ -81,6 +82,26 @@ def check_support(
         )
     enlarged = _enlarged(problem, int(factor))
     return tuple(_check(problem, enlarged, point) for point in points if point.converged)
+
+
+def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
+    """Predict what twice its own harmonics would change in a solution, a fraction; NaN where that cannot be told.
+
+    Parameters
+    ----------
+    problem
+        The forced response.
+    point
+        A point that converged.
+    """
+    if problem.system.interface.rigid:
+        return float("nan")
+    own = with_stiffness(problem.balance(point.support))
+    more = doubled(own)
+    if more.harmonics == own.harmonics:  # all waves of a wheel
+        return float("nan")
+    x = own.unknowns(point.coefficients)
+    return jacobian_alert(own, more, x, point.omega, problem.measure, problem.alert_solve).error
 
 
 def _enlarged(problem: ForcedProblem, factor: int) -> HarmonicBalance:

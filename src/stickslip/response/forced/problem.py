@@ -32,6 +32,7 @@ Balance = HarmonicBalance | DynamicLagrangian
 Stage = Literal["low", "high", "branch", "peak", "point", "audit", "trial", "found", "check"]
 FAINTEST = 1e-7  # excitation over static load: a thousand times the residual tolerance, which swallows the vibration
 ALERT_TOLERANCE = 1e-6  # relative residual of the alert's step where it is found by iteration
+SAMPLES_A_HARMONIC = 8  # at least, whatever the sweep says
 BRANCH_ITERATIONS = 10  # of a corrector along a branch
 
 
@@ -140,7 +141,9 @@ class ForcedProblem:
             if own.harmonics == harmonics:
                 return own
         if harmonics not in self.others:
-            self.others[harmonics] = self.low.with_harmonics(harmonics)
+            samples = max(self.low.samples, SAMPLES_A_HARMONIC * harmonics[-1])
+            enough = replace(self.low, samples=samples)
+            self.others[harmonics] = enough.with_harmonics(harmonics)
         return self.others[harmonics]
 
     def step(
@@ -241,7 +244,9 @@ def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedPr
             f"{dynamic:.3g} of {low.force_scale:.3g} N: below {FAINTEST:g} it is too faint for the tolerance of the solver",
             "Solve the stuck structure, which is linear, or raise the excitation.",
         )
-    return ForcedProblem(system, sweep, low, low.with_harmonics(reference))
+    high = low if sweep.auto else low.with_harmonics(reference)
+    made = ForcedProblem(system, sweep, low, high)
+    return replace(made, high=made.balance(reference)) if sweep.auto else made
 
 
 def _refuse_ill_posed(system: System) -> None:

@@ -246,7 +246,8 @@ def progress(point: ForcedPoint, sweep: Sweep) -> tuple[float, str]:
     shares = {"low": (0.0, 0.4), "high": (0.4, 0.35), "branch": (0.75, 0.2), "peak": (0.95, 0.05)}
     if sweep.single:  # repeats come in between
         shares |= {"low": (0.0, 0.95), "high": (0.0, 0.95)}
-    begin, width = shares[point.stage]
+    shares["check"] = shares["peak"]
+    begin, width = shares.get(point.stage, (0.0, 0.95))
     state = "" if point.converged else f", {point.status.advice}"
     return (
         begin + width * along,

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import fields
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from stickslip.errors import InputError, did_you_mean
@@ -12,10 +12,10 @@ from stickslip.harmonic.selection import STRATEGIES, strategy_named
 from stickslip.harmonic.selection.strategy import Strategy, always_kept
 from stickslip.harmonic.support import Harmonics as Support
 from stickslip.harmonic.support import harmonics_of
-from stickslip.response.forced.sweep import Passages, Sweep
+from stickslip.response.forced.sweep import PUBLISHED, RUNGS, Passages, Sweep
 from stickslip.study.file.section import Positive, Section, custom_error, refuse_all, shown
 
-HIGHEST = 30  # harmonic that a study may keep
+HIGHEST = RUNGS[-1]  # harmonic that a study may keep
 SELECTIONS = tuple(STRATEGIES)
 DEFAULT_SELECTION = str({f.name: f.default for f in fields(Sweep)}["selection"])
 PLACES = ("along", "outputs", "contacts")
@@ -32,9 +32,10 @@ class Harmonics(Section):
         1,
         description=f"harmonics of the first passage: the highest of all, 1 to {HIGHEST}, or a list such as [1, 3]",
     )
-    high: Kept = Field(
-        5,
-        description=f"harmonics beyond which none is kept: the highest of all, 1 to {HIGHEST}, or a list such as [1, 3, 5]",
+    high: Literal["auto"] | Kept = Field(
+        "auto",
+        description=f"auto: harmonics are raised ({', '.join(map(str, RUNGS))}) until the judgement of each point is quiet, and audited; or those beyond "
+        f"which none is kept, as published: the highest of all, 1 to {HIGHEST}, or a list such as [1, 3, 5]",
     )
     samples: int = Field(256, ge=16, le=8192, description="time samples of a period, 16 to 8192")
     selection: Selection = Field(
@@ -68,7 +69,9 @@ class Harmonics(Section):
 
     @field_validator("low", "high", mode="before")
     @classmethod
-    def _is_support(cls, given: Any) -> Any:
+    def _is_support(cls, given: Any, info: ValidationInfo) -> Any:
+        if info.field_name == "high" and given == "auto":
+            return given
         one = isinstance(given, int) and not isinstance(given, bool)
         entries = [given] if one else given
         if isinstance(entries, list) and entries and all(map(_harmonic, entries)):
@@ -103,7 +106,9 @@ class Harmonics(Section):
 
     @property
     def high_harmonics(self) -> Support:
-        """Harmonics of the reference, from 0."""
+        """Harmonics of the reference, from 0; with ``auto`` those of the published one, or of the first passage where it has more."""
+        if self.high == "auto":
+            return harmonics_of(max(PUBLISHED, self.low_harmonics[-1]))
         return harmonics_of(self.high)
 
     @property
@@ -136,7 +141,9 @@ def _harmonic(given: Any) -> bool:
 
 def _of_supports(table: Harmonics) -> Iterator[PydanticCustomError]:
     low, high = table.low_harmonics, table.high_harmonics
-    if isinstance(table.low, int) and isinstance(table.high, int) and table.high < table.low:
+    if table.high == "auto":
+        pass  # holds all up to its highest
+    elif isinstance(table.low, int) and isinstance(table.high, int) and table.high < table.low:
         yield custom_error(
             f"must not be below low = {table.low}, got {table.high}",
             "Raise it, or lower low.",

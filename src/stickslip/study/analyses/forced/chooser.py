@@ -12,6 +12,7 @@ from stickslip.harmonic.selection import STRATEGIES
 from stickslip.harmonic.selection.strategy import Strategy, always_kept
 from stickslip.harmonic.support import Harmonics, named
 from stickslip.response.forced.response import ForcedPoint, Sweep
+from stickslip.response.forced.sweep import RUNGS
 from stickslip.study.analyses.forced.points import Response
 from stickslip.units import HZ
 
@@ -45,6 +46,8 @@ class Chooser:
         Harmonics of which it is taken.
     first
         Harmonics with which the first passage is made.
+    auto
+        Whether harmonics are raised along the branch, up to the highest of `high`.
     """
 
     name: str
@@ -56,6 +59,7 @@ class Chooser:
     over: tuple[str, ...]
     harmonics: tuple[int, ...]
     first: Harmonics
+    auto: bool = False
 
     @property
     def decides(self) -> bool:
@@ -82,7 +86,7 @@ class Chooser:
         """Return it as attributes of a netCDF file: texts, numbers, lists of numbers."""
         own: dict[str, Any] = {
             "selection": self.name,
-            "passages": "single" if self.single else "double",
+            "passages": "auto" if self.auto else "single" if self.single else "double",
             "low_order": self.low[-1],
             "high_order": self.high[-1],
             "low_harmonics": list(self.low),
@@ -104,6 +108,18 @@ class Chooser:
         """
         if not self.decides:
             return [f"harmonics {named(self.first)} at every frequency ({self.name})"]
+        if self.auto:
+            of = ", ".join(map(str, self.harmonics))
+            most = f"up to {self.high[-1]}" + (
+                "" if self.high[-1] >= RUNGS[-1] else ", which the study's [limits] set"
+            )
+            return [
+                (
+                    f"raised along the branch from {named(self.low)} {most}, until the {self.indicator} of {self.name} is well below "
+                    f"{self.limit}; audits at every tenth point and at the peak"
+                ),
+                f"its error is that of harmonic {of} over {', '.join(self.over)}",
+            ]
         how = (
             "single passage: each frequency is settled before the next one"
             if self.single
@@ -130,8 +146,8 @@ class Chooser:
 
         An alert was asked at the points of the first passage, whatever took their places afterwards: a repeat, or a branch with many harmonics.
         """
-        if not self.is_error:
-            return f"{_kept(response)}."
+        if not self.is_error or self.auto:
+            return f"{_kept(response)}{_audited(response)}."
         passage = [p for p in response.solved if p.stage == "low"]
         said = np.array([p.predicted_error for p in passage])
         if np.all(np.isnan(said)):
@@ -147,6 +163,18 @@ class Chooser:
             f"{_listed(passage, over)} Hz, because leaving the higher harmonics out was predicted to change the response by "
             f"more than {self.limit} (largest: {self.shown(said[worst])} at {passage[worst].omega / HZ:.2f} Hz)."
         )
+
+
+def _audited(response: Response) -> str:
+    """Say what the audits found."""
+    found = [a.audit_error for a in response.accepted if not np.isnan(a.audit_error)]
+    solved = sum(e > 0.0 for e in found)
+    if not found:
+        return ""
+    exact = len(found) - solved
+    told = [f"{solved} solved with more to compare, differing by at most {error_text(max(found))}"] * bool(solved)  # fmt: skip
+    told += [f"at {exact} nothing acts on the harmonics left out"] * bool(exact)
+    return "; " + "; ".join(told)
 
 
 def chooser_of(sweep: Sweep, over: Sequence[str], driven: Sequence[int]) -> Chooser:
@@ -173,6 +201,7 @@ def chooser_of(sweep: Sweep, over: Sequence[str], driven: Sequence[int]) -> Choo
         over=tuple(over),
         harmonics=tuple(sweep.error_harmonics or driven),
         first=sweep.first_harmonics,
+        auto=sweep.auto,
     )
 
 

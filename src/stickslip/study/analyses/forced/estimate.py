@@ -1,6 +1,6 @@
 """What the response of a case will cost, told before anything long is computed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse
@@ -15,6 +15,7 @@ from stickslip.study.models.cost import SECONDS_A_NODE, above, memory_gb
 
 POINTS = 1.7  # points of a branch for each one asked: more are taken where the response turns
 NEWTON_A_POINT = 6  # repeats and failed tries included: the two blades took 1 to 19 in a case and 6 over all, four masses 11
+AT_THE_CAP = 0.1  # share of points that "auto" solves with the most harmonics there may be
 REPEATED = 0.6  # share of points that a strategy solves with many harmonics
 SECONDS_A_STEP = 1.5e-3  # of Newton, however few unknowns it has
 FLOPS = 2e9  # of a Newton step: a small dense factorisation on one core, and the contacts
@@ -60,9 +61,10 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
     grid = sweep.grid.size or (sweep.points if sweep.single else POINTS * sweep.points)
     points = grid + sweep.peak_points
     kept = always_kept(sweep.strategy)
-    share_high = {"low": 0.0, "high": 1.0}.get(kept or "", REPEATED)
+    some = AT_THE_CAP if sweep.auto else REPEATED
+    share_high = {"low": 0.0, "high": 1.0}.get(kept or "", some)
     # each strategy looks at the larger space about once a point
-    judged = points if kept is None else 0
+    judged = 0 if kept else points * some if sweep.auto else points
     steps_high = points * share_high * NEWTON_A_POINT
     steps_low = 0 if kept == "high" else points * NEWTON_A_POINT
     flops = steps_low * _flops(low) + (steps_high + judged) * _flops(high)
@@ -71,6 +73,18 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
     stored = points * (sweep.high_harmonics[-1] + 1) * 10 * coordinates * 16 / 1e9
     memory = memory_gb(nodes) + stored + 6 * high**2 * 8 / 1e9
     return Estimate(nodes, high, memory, round(steps_low + steps_high), seconds)
+
+
+def within_limits(model: Model, sweep: Sweep, limits: Limits) -> Sweep:
+    """Return the sweep, its cap of ``auto`` lowered as far as the study's limits ask; one that is above them all the same is left to `check_limits`."""
+    if not sweep.auto:
+        return sweep
+    for support in reversed(sweep.supports):
+        capped = replace(sweep, cap=support[-1])
+        cost = estimate(model, capped)
+        if above(limits, "", cost.memory_gb, cost.seconds) is None:
+            return capped
+    return capped
 
 
 def _flops(unknowns: int) -> int:

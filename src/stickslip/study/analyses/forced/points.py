@@ -10,6 +10,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, accepted_pairs
 from stickslip.response.recovery import Fields, fields
+from stickslip.response.verification import own_error
 from stickslip.units import HZ
 
 FLANK = 0.7  # share of the peak amplitude at which frequencies beside a peak are taken
@@ -31,6 +32,10 @@ class Accepted:
         Difference between both, a fraction; NaN unless the point repeats the first one.
     driven
         Harmonics that the load drives: those of its amplitudes.
+    own_error
+        Bound of its own error, a fraction: 0 where nothing acts on the harmonics left out; NaN where nobody can tell.
+    audit_error
+        Difference from the same motion solved with more harmonics to compare, a fraction; NaN where it was not.
     """
 
     point: ForcedPoint
@@ -39,6 +44,8 @@ class Accepted:
     low_fields: Fields | None
     real_error: float
     driven: Harmonics = (1,)
+    own_error: float = float("nan")
+    audit_error: float = float("nan")
 
     @property
     def indicator(self) -> float:
@@ -151,11 +158,47 @@ def collect(problem: ForcedProblem, points: Sequence[ForcedPoint], output: int) 
         Position of the output whose peak counts.
     """
     driven = driven_harmonics(problem.low.linear.load)
-    pairs = accepted_pairs(points)
-    accepted = tuple(replace(_accept(problem, *pair), driven=driven) for pair in pairs)
+    audits = _audits(points)
+    accepted = []
+    for point, low in accepted_pairs(points):
+        own = _own_error(problem, point)
+        audit = _audit_error(problem, point, audits.get(point.omega, []), own)
+        made = _accept(problem, point, low)
+        accepted.append(replace(made, driven=driven, own_error=own, audit_error=audit))
     amplitude = np.array([a.amplitudes(output + 1)[output] for a in accepted])
     peak = int(np.nanargmax(amplitude)) if np.any(np.isfinite(amplitude)) else -1
-    return Response(tuple(points), accepted, peak, output, problem.sweep.first_harmonics)
+    return Response(tuple(points), tuple(accepted), peak, output, problem.sweep.first_harmonics)
+
+
+def _own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
+    """Return the bound of a solution's own error: what was said of it on the way, else what one step with twice its harmonics changes."""
+    if not point.converged:
+        return float("nan")
+    if problem.strategy.verifies and not np.isnan(point.predicted_error):
+        return point.predicted_error
+    return own_error(problem, point)
+
+
+def _audits(points: Sequence[ForcedPoint]) -> dict[float, list[ForcedPoint]]:
+    """Return the solutions with more harmonics that were made to compare, by frequency."""
+    found: dict[float, list[ForcedPoint]] = {}
+    for p in points:
+        if p.stage in ("audit", "check") and p.converged:
+            found.setdefault(p.omega, []).append(p)
+    return found
+
+
+def _audit_error(
+    problem: ForcedProblem, point: ForcedPoint, audits: Sequence[ForcedPoint], own: float
+) -> float:
+    """Return by how much a solution differs from that with most harmonics at its frequency; NaN where there is none with more."""
+    if not point.converged:
+        return float("nan")
+    if own == 0.0:
+        return 0.0  # what has no force on it stays zero, with however many harmonics
+    most = max(audits, key=lambda p: p.harmonics.size, default=point)
+    more = most.harmonics.size > point.harmonics.size
+    return problem.real_error(point, most) if more else float("nan")
 
 
 def unknowns(point: ForcedPoint) -> int:

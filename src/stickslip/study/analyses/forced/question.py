@@ -17,7 +17,7 @@ from stickslip.response.time.sectors import different_sectors
 from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.forced.chooser import Chooser, chooser_of
-from stickslip.study.analyses.forced.estimate import check_limits, estimate
+from stickslip.study.analyses.forced.estimate import check_limits, estimate, within_limits
 from stickslip.study.analyses.forced.points import driven_harmonics
 from stickslip.study.analyses.forced.section import sweep_of
 from stickslip.study.analyses.verdict import said
@@ -112,7 +112,7 @@ def question_of(case: Case, model: Model) -> Question:
         exceeds the study's limits.
     """
     settings = case.settings
-    sweep = sweep_of(settings, _engine_order(model))
+    sweep = within_limits(model, sweep_of(settings, _engine_order(model)), settings.limits)
     _require_driven(model, sweep)
     if IN_TIME in case.checks:
         _require_integrable(model)

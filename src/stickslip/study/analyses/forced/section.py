@@ -107,7 +107,7 @@ def sweep_of(settings: Any, engine_order: int | None) -> Sweep:
         at=tuple(HZ * f for f in table.frequencies_hz or ()),
         direction=table.direction,
         low=h.low_harmonics,
-        high=h.high_harmonics,
+        high="auto" if h.high == "auto" else h.high_harmonics,
         samples=h.samples,
         evaluator=settings.solver.evaluator,
         threshold=h.alert_threshold_percent / 100,

@@ -154,7 +154,8 @@ def _of_points(question: Question, response: Response) -> Values:
         "status": _whole(int(p.status) for p in points),
         "indicator": asked if chooser.is_error else own,
         "predicted_error_percent": 100 * asked if chooser.is_error else np.full(asked.size, np.nan),
-        "own_error_percent": 100 * own if chooser.is_error else np.full(own.size, np.nan),
+        "own_error_percent": 100 * np.array([a.own_error for a in response.accepted]),
+        "audit_error_percent": 100 * np.array([a.audit_error for a in response.accepted]),
         "real_error_percent": 100 * np.array([a.real_error for a in response.accepted]),
         "newton_iterations": _whole(p.iterations for p in points),
         "seconds": np.array([p.seconds_total for p in points]),
@@ -163,7 +164,7 @@ def _of_points(question: Question, response: Response) -> Values:
 
 
 def _of_fields(question: Question, response: Response) -> Values:
-    low, high, every = question.chooser.low, question.chooser.high[-1], response.accepted
+    low, high, every = question.chooser.low, highest(response), response.accepted
     n_outputs, n_contacts = len(question.model.output_labels), len(question.model.contacts.names)
     n_retained = question.model.system.retained.size
 
@@ -204,11 +205,15 @@ def _of_attempts(question: Question, response: Response) -> Values:
     points = response.solved
     # the accepted points do not tell it all: a branch with many harmonics takes the place of points that the alert spoke of
     alert = question.chooser.is_error
-    asked = [p for p in points if alert and p.stage == "low" and not np.isnan(p.predicted_error)]
+    asked = [
+        p
+        for p in points
+        if alert and p.stage in ("low", "point") and not np.isnan(p.predicted_error)
+    ]
     return {
         "attempt_frequency_hz": np.array([p.omega / HZ for p in points]),
         "attempt_stage": _whole(STAGES.index(p.stage) for p in points),
-        "attempt_kept": _kept(points, question.chooser.high[-1]),
+        "attempt_kept": _kept(points, highest(response)),
         "attempt_unknowns": _whole(unknowns(p) for p in points),
         "attempt_indicator": np.array([p.predicted_error for p in points]),
         "attempt_repeated": _whole(int(p.asked.size > 0) for p in points),
@@ -219,6 +224,11 @@ def _of_attempts(question: Question, response: Response) -> Values:
         "alert_error_percent": np.array([100 * p.predicted_error for p in asked]),
         "alert_repeated": _whole(int(p.asked.size > 0) for p in asked),
     }
+
+
+def highest(response: Response) -> int:
+    """Return the highest harmonic that any solution keeps."""
+    return max((p.order for p in response.solved), default=1)
 
 
 def _kept(points: Sequence[ForcedPoint], high: int) -> IntArray:
