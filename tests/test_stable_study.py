@@ -165,9 +165,9 @@ def test_doubtful_points_near_the_peak_are_examined_too() -> None:
     response = response_of(asked)
 
     def with_errors(error: float) -> Response:
-        points = [replace(a.point, predicted_error=error) for a in response.accepted]
-        both = zip(response.accepted, points, strict=True)
-        return replace(response, accepted=tuple(replace(a, point=p) for a, p in both))
+        return replace(
+            response, accepted=tuple(replace(a, own_error=error) for a in response.accepted)
+        )
 
     assert to_examine(asked, with_errors(0.01)) == [response.peak]
     assert to_examine(asked, with_errors(float("nan"))) == [response.peak]

@@ -174,8 +174,8 @@ def _work(question: Question) -> float:
 
 
 def _off(question: Question, accepted: Accepted) -> bool:
-    """Whether the own error of a point is above the threshold."""
-    return question.chooser.is_error and bool(accepted.point.predicted_error > question.limit)
+    """Whether the own error of a point, or its difference from its audit, is above the threshold."""
+    return bool(accepted.own_error > question.limit or accepted.audit_error > question.limit)
 
 
 def _beside_jumps(response: Response) -> set[int]:
