@@ -20,7 +20,7 @@ from stickslip.harmonic.parameters import law_field, load_level
 from stickslip.harmonic.peak import Driven, HorizontalTangent, PhaseQuadrature
 from stickslip.model.matrices import lumped
 from stickslip.operators import Bordered, array_of
-from stickslip.response.follow import following_vibration, steps_through
+from stickslip.response.branch import following_vibration, steps_through
 from stickslip.response.parameter import Discretisation, first_guess
 from stickslip.response.system import System
 from stickslip.response.tracking import track_peak

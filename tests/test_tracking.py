@@ -18,7 +18,7 @@ from stickslip.harmonic.parameters import AtFrequency, law_field, load_level
 from stickslip.harmonic.peak import Driven, PeakProblem
 from stickslip.model.matrices import lumped
 from stickslip.operators import array_of
-from stickslip.response.follow import following_vibration, steps_through
+from stickslip.response.branch import following_vibration, steps_through
 from stickslip.response.parameter import (
     Discretisation,
     branch_in_parameter,
