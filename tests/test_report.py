@@ -262,6 +262,23 @@ def test_verdicts_are_listed_the_worst_first_with_their_remedies(tmp_path: Path)
     assert "Trusted, and what for: 1" in text
 
 
+def test_harmonics_that_were_raised_along_the_branch_are_told_as_such(tmp_path: Path) -> None:
+    data = synthetic_result(ratios=(5,), n=10)
+    n = data.sizes["point"]
+    data.attrs["passages"] = "auto"
+    data["own_error_percent"] = "point", np.linspace(0.5, 3.5, n)
+    data["audit_error_percent"] = "point", np.where(np.arange(n) == 4, 1.25, np.nan)
+    text = page_text(report(data, tmp_path))
+    assert "Harmonics are raised along the branch, from H = 1 up to 5" in text
+    assert "3.5 %; 1.2 %" in text
+    assert "predicts of each accepted solution's own harmonics" in text
+    assert "first solved with" not in text
+    assert "were asked to repeat" not in text
+    view = Response(data)
+    np.testing.assert_allclose(view.alert.error, data.own_error_percent)
+    assert "of points asked for more harmonics" not in [c.label for c in cards(view)]
+
+
 def test_warnings_of_older_results_are_doubts(tmp_path: Path) -> None:
     data = synthetic_result()
     data.attrs["warnings"] = json.dumps(["3 points did not converge. Take more."])

@@ -124,11 +124,12 @@ class Response(Node):
 
     @cached_property
     def alert(self) -> Alert:
-        """Where the strategy was asked; the accepted points that have an indicator in files which do not say."""
-        if "alert_error_percent" in self.data:
+        """Where the strategy was asked; the accepted points that have an indicator where harmonics were raised, or the file does not say."""
+        if "alert_error_percent" in self.data and not self.auto:
             found = (self.values(f"alert_{name}") for name in ("frequency_hz", "error_percent"))
             return Alert(self.integers("alert_case"), *found)
-        error = self.floats("predicted_error_percent" if self.is_error else "indicator")
+        first = "predicted_error_percent" if self.is_error else "indicator"
+        error = self.floats("own_error_percent" if self.auto else first)
         at = np.flatnonzero(~np.isnan(error))
         return Alert(self.point_case[at], self.hz[at], error[at])  # fmt: skip
 
@@ -147,6 +148,11 @@ class Response(Node):
         """Whether anything chose: not with the same harmonics at every frequency."""
         known = self.selection in STRATEGIES
         return not known or always_kept(strategy_named(self.selection)) is None
+
+    @property
+    def auto(self) -> bool:
+        """Whether harmonics were raised along the branch until each point's own error was small enough."""
+        return self.text("passages") == "auto"
 
     @property
     def threshold(self) -> float:

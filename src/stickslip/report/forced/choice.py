@@ -8,7 +8,7 @@ import numpy as np
 from stickslip.harmonic.support import named
 from stickslip.report.cases import ShownCase
 from stickslip.report.forced.contact import states
-from stickslip.report.quantities import number
+from stickslip.report.quantities import NONE, number, predicted
 from stickslip.report.response import Response
 from stickslip.study.analyses.forced.summary import cost_sentence
 
@@ -70,7 +70,10 @@ def choice(response: Response) -> str | None:
     if not response.alert.error.size:
         return None
     alert, middle, text = _other_row, ("harmonics kept", "largest indicator"), _other_text
-    if response.is_error:
+    if response.auto:
+        alert, text = _auto_row, _auto_text
+        middle = ("harmonics kept", "largest error predicted of what was accepted; found by audits")
+    elif response.is_error:
         middle = (f"{response.more_name} asked for", "largest predicted error")
         alert, text = _alert_row, _alert_text
     rows = [[c.short, *alert(response, c), _why(response, c)] for c in response.cases]
@@ -98,6 +101,22 @@ def _alert_text(response: Response) -> str:
         f"change with H = {response.high_name}; where that exceeds {response.shown(response.threshold)}, the point is solved again "
         f"with more harmonics. {_REASON}</p>"
     )
+
+
+def _auto_text(response: Response) -> str:
+    over = escape(response.text("error_over")) or "the output"
+    return (
+        f"<p>Harmonics are raised along the branch, from H = {response.low_name} up to {response.high_harmonics[-1]}, until "
+        f"<code>{response.selection}</code> predicts that more would change the motion of {over} by well below "
+        f"{response.shown(response.threshold)}. Some points and the peak are solved with more in any case, to compare: audits. {_REASON}</p>"
+    )
+
+
+def _auto_row(response: Response, case: ShownCase) -> tuple[str, str]:
+    mine = response.converged & (response.point_case == case.index)
+    each = [response.floats(f"{name}_error_percent")[mine] for name in ("own", "audit")]
+    told = [predicted(float(np.nanmax(e))) if np.isfinite(e).any() else NONE for e in each]
+    return _kept_where(response, case), "; ".join(told)
 
 
 def _other_text(response: Response) -> str:

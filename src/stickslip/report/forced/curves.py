@@ -46,7 +46,9 @@ def _curve(response: Response, case: ShownCase) -> go.Scatter:
     x, _, unit = _abscissa(response)
     high = response.more[at]
     kept = [named(np.flatnonzero(row)) for row in response.kept[at]]
-    error = response.floats("predicted_error_percent" if response.is_error else "indicator")[at]
+    first = "predicted_error_percent" if response.is_error else "indicator"
+    own = "own_error_percent" if response.is_error and response.has("own_error_percent") else first
+    error = response.floats(own)[at]
     said = [response.shown(float(e)) for e in error]
     reasons = _reasons(response)[at]
     about = "predicted error" if response.is_error else "indicator"

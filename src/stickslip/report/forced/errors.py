@@ -46,7 +46,12 @@ def _error_traces(figure: go.Figure, response: Response) -> None:
 def _caption(response: Response) -> str:
     asked, error = response.alert, response.alert.error
     above, real = error > response.threshold, np.isfinite(response.floats("real_error_percent"))
-    if response.is_error:
+    if response.auto:
+        text = (
+            f"The error that <code>{response.selection}</code> predicts of each accepted solution's own harmonics; the dashed line "
+            f"is the threshold of {percent(response.threshold)}. What lies above it is doubtful. "
+        )
+    elif response.is_error:
         text = (
             f"The error that <code>{response.selection}</code> predicts of the solution with few harmonics "
             f"(H = {response.low_name} at least); the dashed line is the threshold of {percent(response.threshold)}. "

@@ -105,5 +105,6 @@ def cards(response: Response) -> list[Card]:
         _shift_card(response),
         _loss_card(response),
     )
-    rest = _alert_cards if response.is_error and response.decides else _work_cards
+    alert = response.is_error and response.decides and not response.auto
+    rest = _alert_cards if alert else _work_cards
     return [card for card in first if card is not None] + rest(response)

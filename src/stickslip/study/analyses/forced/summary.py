@@ -40,7 +40,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     rows = tuple(_row(data.isel(case=i), label) for i, label in enumerate(labels))
     found = [
         TextTable("Forced response" + f", {name}" * (name != FIRST), head, rows),
-        _lines(f"Where {data.attrs['selection']} asked for more harmonics", choices(data)),
+        _lines(_choice_title(data), choices(data)),
         _lines("Against twice as many harmonics", _sentences(data, "reference_sentence", labels)),
         _lines("Is it stable?", _along(data, "stability", labels)),
         _lines("Against time integration", _along(data, "verify", labels)),
@@ -58,6 +58,13 @@ def amplitude_name(data: xr.Dataset) -> str:
         if len(driven) == 1
         else f"norm of harmonics {', '.join(map(str, driven))}"
     )
+
+
+def _choice_title(data: xr.Dataset) -> str:
+    chooser = data.attrs["selection"]
+    if data.attrs["passages"] == "auto":
+        return f"Which harmonics {chooser} asked for along the branch"
+    return f"Where {chooser} asked for more harmonics"
 
 
 def choices(data: xr.Dataset) -> tuple[str, ...]:
