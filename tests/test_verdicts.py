@@ -307,11 +307,16 @@ def test_the_last_line_names_the_cases_that_are_not_trusted() -> None:
 def test_a_journey_says_the_same_on_the_screen_on_the_page_in_the_file_and_in_python(
     tmp_path: Path,
 ) -> None:
-    changes = {"vary.load.shaker.force_n": "[0.01, 8.0]", "harmonics.selection": '"always_low"'}
+    # few harmonics everywhere: exact where all sticks, and off by more than a hundredth of a per mille where the brake slips
+    changes = {
+        "vary.load.shaker.force_n": "[0.01, 8.0]",
+        "harmonics.selection": '"always_low"',
+        "harmonics.alert_threshold_percent": "0.001",
+    }
     said = done("run", str(write_four_masses(tmp_path, changes)))
     result = ss.Result.open(tmp_path / "results")
     data = result["forced_response"]
-    assert set(data.case_verdict.values) == {1}
+    assert data.case_verdict.values.tolist() == [0, 1]
     assert data.case_verdict.attrs["flag_meanings"] == "trusted doubtful wrong"
     assert stored(data.attrs) == result.verdicts
     page = unescape(re.sub(r"<[^>]*>", "", (tmp_path / "results/report.html").read_text("utf-8")))
@@ -321,17 +326,12 @@ def test_a_journey_says_the_same_on_the_screen_on_the_page_in_the_file_and_in_py
         assert v.remedy in page
         assert str(v) in repr(result)
     assert said.rstrip().splitlines()[-1] == result.not_trusted
-    assert "2 of 2 cases doubtful (load.shaker.force_n = 0.01, load.shaker.force_n = 8)" in said
-    assert result.peaks["verdict"].tolist() == ["doubtful", "doubtful"]
+    assert "1 of 2 cases doubtful (load.shaker.force_n = 8)" in said
+    assert result.peaks["verdict"].tolist() == ["trusted", "doubtful"]
     assert math.isclose(result.verdicts[0].frequency_hz or 0.0, float(data.peak_frequency_hz[0]))
-    # what was not examined is examined: the weak force is trusted then
-    said = done("run", str(tmp_path / "study.toml"), "--verify-harmonics")
-    again = ss.Result.open(tmp_path / "results")["forced_response"]
-    assert int(again.case_verdict[0]) == 0
-    good = [v for v in stored(again.attrs) if v.case == "load.shaker.force_n = 0.01"]
-    assert [v.level for v in good] == ["trusted"]
-    assert "predicted change with twice as many harmonics" in good[0].why
-    assert "force_n = 0.01" not in said.rstrip().splitlines()[-1]
+    good = result.verdicts[0]
+    assert (good.level, good.case) == ("trusted", "load.shaker.force_n = 0.01")
+    assert str(good) not in said
 
 
 def test_an_integration_examines_the_harmonics_of_its_point() -> None:

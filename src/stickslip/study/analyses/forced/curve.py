@@ -183,6 +183,11 @@ class Curve:
         return -1.0 if self.data.attrs.get("direction", "up") == "down" else 1.0
 
     @property
+    def auto(self) -> bool:
+        """Whether harmonics were raised along the branch."""
+        return bool(self.data.attrs.get("passages", "") == "auto")
+
+    @property
     def stepped(self) -> bool:
         """Whether frequencies were given, instead of a branch followed."""
         return bool(self.data.attrs.get("stepped", 0))

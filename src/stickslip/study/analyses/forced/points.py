@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, accepted_pairs
 from stickslip.response.recovery import Fields, fields
@@ -157,14 +156,13 @@ def collect(problem: ForcedProblem, points: Sequence[ForcedPoint], output: int) 
     output
         Position of the output whose peak counts.
     """
-    driven = driven_harmonics(problem.low.linear.load)
     audits = _audits(points)
     accepted = []
     for point, low in accepted_pairs(points):
         own = _own_error(problem, point)
         audit = _audit_error(problem, point, audits.get(point.omega, []), own)
         made = _accept(problem, point, low)
-        accepted.append(replace(made, driven=driven, own_error=own, audit_error=audit))
+        accepted.append(replace(made, driven=problem.driven, own_error=own, audit_error=audit))
     amplitude = np.array([a.amplitudes(output + 1)[output] for a in accepted])
     peak = int(np.nanargmax(amplitude)) if np.any(np.isfinite(amplitude)) else -1
     return Response(tuple(points), tuple(accepted), peak, output, problem.sweep.first_harmonics)
@@ -214,11 +212,6 @@ def _accept(problem: ForcedProblem, point: ForcedPoint, low: ForcedPoint | None)
         return Accepted(point, low, found, found, float("nan"))
     error = problem.real_error(low, point) if point.converged else float("nan")
     return Accepted(point, low, found, fields(problem, low), error)
-
-
-def driven_harmonics(load: HarmonicLoad) -> Harmonics:
-    """Return the harmonics that a load drives; the first where it drives none."""
-    return tuple(h for h, force in sorted(load.harmonics.items()) if np.any(force)) or (1,)
 
 
 def _amplitudes(found: Fields | None, n_outputs: int, driven: Harmonics) -> FloatArray:

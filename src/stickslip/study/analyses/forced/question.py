@@ -5,6 +5,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
+import numpy as np
+
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
 from stickslip.contact.laws import law_name
@@ -18,7 +20,6 @@ from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.forced.chooser import Chooser, chooser_of
 from stickslip.study.analyses.forced.estimate import check_limits, estimate, within_limits
-from stickslip.study.analyses.forced.points import driven_harmonics
 from stickslip.study.analyses.forced.section import sweep_of
 from stickslip.study.analyses.verdict import said
 from stickslip.units import RPM
@@ -79,7 +80,8 @@ class Question:
     @property
     def driven(self) -> tuple[int, ...]:
         """Harmonics that the load drives."""
-        return driven_harmonics(self.model.load)
+        forces = self.model.load.harmonics
+        return tuple(h for h in sorted(forces) if np.any(forces[h])) or (1,)
 
     @property
     def chooser(self) -> Chooser:

@@ -14,7 +14,6 @@ from stickslip.study.analyses.verdict import Level, from_json
 
 LARGE_SHIFT = 0.01  # relative change of the peak with a tenth of the retention stiffness
 STUCK = 1e-18  # m/N: no structure is so stiff; what moves less sticks to rigid contacts or is held
-MORE_HARMONICS = "Raise harmonics.high, and compare"
 IN_TIME = "--verify integrates in time at the peak"
 IN_TIME_TELLS = (
     "; an integration in time (--verify) tells more"  # what a verdict says as its remedy
@@ -70,10 +69,16 @@ def few_harmonics(case: Curve) -> Iterator[Finding]:
             continue  # what was solved or integrated tells more than a prediction
         if own > case.limit:
             why = f"more harmonics than H = {case.kept[i]} are predicted to change it by {error_text(own)}"
-            yield Finding("doubtful", why, f"{MORE_HARMONICS}; {IN_TIME}.", (int(i),), float(own))
+            yield Finding("doubtful", why, f"{_more(case)}; {IN_TIME}.", (int(i),), float(own))
         elif np.isnan([own, solved, case.reference[i], case.integrated[i]]).all():
             why = f"its harmonics were not examined: nothing says how wrong H = {case.kept[i]} is"
             yield Finding("doubtful", why, f"{_examination(case)}.", (int(i),))
+
+
+def _more(case: Curve) -> str:
+    if case.auto:
+        return "As many harmonics were kept as there may be: raise [limits] where they set the most"
+    return 'Give harmonics.high = "auto", or a larger number'
 
 
 def _examination(case: Curve) -> str:
@@ -87,7 +92,7 @@ def audited(case: Curve) -> Iterator[Finding]:
     for i in np.flatnonzero(case.audit > case.limit):
         if not case.attained[i]:
             why = f"solved again with more harmonics than H = {case.kept[i]} it differs by {error_text(case.audit[i])}"
-            remedy = f"{MORE_HARMONICS}; {IN_TIME}."
+            remedy = f"{_more(case)}; {IN_TIME}."
             yield Finding("doubtful", why, remedy, (int(i),), float(case.audit[i]))
 
 
@@ -106,7 +111,7 @@ def twice_the_harmonics(case: Curve) -> Iterator[Finding]:
     for i in np.flatnonzero(case.reference > case.limit):
         if not case.attained[i]:
             why = f"twice as many harmonics are predicted to change it, in amplitude or phase, by {error_text(case.reference[i])}"
-            remedy = f"{MORE_HARMONICS}."
+            remedy = f"{_more(case)}."
             yield Finding("doubtful", why, remedy, (int(i),), float(case.reference[i]))
 
 
@@ -182,7 +187,7 @@ def in_time(case: Curve) -> Iterator[Finding]:
             yield Finding("doubtful", why, remedy, (point,))
         elif not abs(off) <= ATTAINED:
             why = f"time integration and harmonic balance differ by {off:+.3g} %, more than {ATTAINED:g} %"
-            remedy = f"{MORE_HARMONICS}; the table of checks says which of the two is wrong."
+            remedy = f"{_more(case)}; the table of checks says which of the two is wrong."
             yield Finding("doubtful", why, remedy, (point,), abs(off))
 
 
