@@ -259,15 +259,26 @@ def test_fold_is_told_with_the_label_of_its_case() -> None:
     assert any(t.startswith("load.f.force_n = 2: the response folds between") for t in told)
 
 
-def test_what_nothing_has_judged_is_doubtful_until_it_is() -> None:
-    asked = lifted(omega_range=(0.8, 1.0), points=5)
+def test_points_are_judged_by_their_own_errors_and_doubted_where_nothing_judged_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked = replace(lifted(points=10, peak_points=0), limit=1e-4)  # a hundredth of a per cent
     data = dataset(solved(asked))
-    assert set(data.verdict.values) == {1}
+    own = data.own_error_percent.values
+    assert 0 < np.count_nonzero(own > 0.01) < own.size
+    doubted = [
+        "are predicted to change it by" in text for text in data.verdict_reason.values.tolist()
+    ]
+    np.testing.assert_array_equal(doubted, own > 0.01)
+    monkeypatch.setattr("stickslip.study.analyses.forced.points.own_error", lambda *_: float("nan"))
+    data = dataset(solved(asked))
+    assert np.all(data.verdict.values >= 1)
     assert data.verdict_reason[0].item().startswith("its harmonics were not examined")
-    assert int(data.case_verdict[0]) == 1
+    assert int(data.case_verdict[0]) >= 1
     again = dataset(solved(replace(asked, checks=frozenset({"verify_harmonics"}))))
-    reference = again.reference_error_percent.values
-    np.testing.assert_array_equal(again.verdict.values, reference > 5.0)
+    doubted = ["twice as many harmonics" in text for text in again.verdict_reason.values.tolist()]
+    np.testing.assert_array_equal(doubted, again.reference_error_percent.values > 0.01)
+    assert not any("not examined" in text for text in again.verdict_reason.values.tolist())
 
 
 def test_peak_at_the_end_is_no_resonance() -> None:

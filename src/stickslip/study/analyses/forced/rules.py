@@ -100,8 +100,9 @@ def not_audited(case: Curve) -> Iterator[Finding]:
     """Doubt few harmonics that were accepted by predictions alone."""
     few = case.converged & case.few
     none = case.has("audit_error_percent") and bool(np.isnan(case.audit).all())
-    compared = case.attained[case.peak] or not np.isnan(case.reference[few]).any()
-    if none and case.decides and few.any() and not compared:
+    if not none or not case.decides or not few.any() or case.attained[case.peak]:
+        return
+    if np.isnan(case.reference[few]).any():
         why = f"H = {case.low} was accepted at {few.sum()} points by predictions alone: none of them was solved with more to compare"
         yield Finding("doubtful", why, f"{_examination(case)}.")
 
