@@ -20,7 +20,7 @@ from stickslip.solve.status import Status
 
 HZ = 2 * np.pi
 STEPS = Sweep(
-    omega_range=(155 * HZ, 166 * HZ), samples=64, frequencies=8, peak_points=0, threshold=np.inf
+    omega_range=(155 * HZ, 166 * HZ), samples=64, frequencies=8, peak_points=0, threshold=np.inf, high=5
 )
 SIZE = 1e-5  # gap amplitudes, m
 
@@ -63,7 +63,7 @@ def test_the_alert_evaluates_no_contact(evaluations, sweep):
 def test_contacts_on_samples_are_evaluated_once_a_point(evaluations):
     """Their events are not known: the price is one evaluation with many harmonics."""
     system, load = griffin(0.1)
-    sweep = Sweep(omega_range=(1.05, 1.2), samples=64, frequencies=4, peak_points=0, evaluator="intervals")  # fmt: skip
+    sweep = Sweep(omega_range=(1.05, 1.2), samples=64, frequencies=4, peak_points=0, evaluator="intervals", high=5)  # fmt: skip
     run(system, load, "always_low", sweep)
     without = len(evaluations)
     evaluations.clear()

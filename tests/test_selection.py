@@ -254,6 +254,7 @@ def test_strategy_takes_either_form():
         sweep = Sweep(
             omega_range=(0.6, 0.9),
             selection=JacobianAlert(form=form),
+            high=5,
             frequencies=4,
             peak_points=0,
         )
@@ -417,6 +418,7 @@ def test_error_over_contact_dofs_and_chosen_harmonics():
     sweep = Sweep(
         omega_range=(1005.0, 1006.0),
         selection="jacobian_alert",
+        high=5,
         error_harmonics=(0, 1),
         frequencies=2,
         peak_points=0,

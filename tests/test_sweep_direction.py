@@ -78,6 +78,7 @@ BENT = Sweep(omega_range=(1.0, 1.6), samples=64, points=16, peak_points=0, selec
 def test_the_jump_beside_folds_is_another_one_downward(steps):
     problem, up = solved(replace(BENT, **steps), lifting)
     down = solved(replace(BENT, direction="down", **steps), lifting)[1]
+    up, down = accepted_points(up), accepted_points(down)
     heights = [
         np.array([problem.amplitude(p) for p in sorted(points, key=lambda p: p.omega)])
         for points in (up, down)

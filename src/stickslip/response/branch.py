@@ -115,6 +115,10 @@ class Curve(Protocol):
         """Whether they differ by so little that they cannot stand on different sheets."""
         ...
 
+    def stored(self, found: Followed) -> Followed:
+        """Return a solution as it comes back from where it was written down, which rounds: what an interrupted run goes on from."""
+        ...
+
     def height(self, found: Followed) -> float:
         """Return what maxima are looked for in."""
         ...
@@ -170,14 +174,3 @@ def following_vibration(
     weights = np.ones(problem.size)
     weights[: problem.linear.n] = 0.0
     return Following(newton=newton, control=control, weights=weights)
-
-
-def branch_of(every: Sequence[Followed]) -> list[Followed]:
-    """Return the points of the branch among all that were yielded: those that no later one took the place of."""
-    branch: list[Followed] = []
-    for one in every:
-        if one.kind == "point":
-            branch = [*branch[: one.index], one]
-        elif one.kind == "found":
-            branch[one.index] = one
-    return branch

@@ -115,6 +115,7 @@ class _Walk:
             began = perf_counter()
             known = replace(make(), seconds=perf_counter() - began)
             yield known
+            known = self.curve.stored(known)
         return known
 
     def _onward(self, here: _Stop) -> Followed:

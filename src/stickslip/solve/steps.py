@@ -74,7 +74,8 @@ def take_step(
     y = point.y
     predicted = _prediction(unit, step, measure, following)
     if predicted is None:
-        return replace(point, solution=replace(point.solution, status=Status.STALLED, iterations=0))
+        free = replace(point.solution, iterations=0, seconds_contact=0.0, seconds_linear=0.0)
+        return replace(point, solution=replace(free, status=Status.STALLED))
     ahead, row = predicted
     guess = y + ahead
     reach = max(step, measure.of(ahead)) if following.parametrisation == "natural" else step

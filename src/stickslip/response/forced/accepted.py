@@ -18,7 +18,7 @@ def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, For
     """
     pairs: list[tuple[ForcedPoint, ForcedPoint | None]]
     if any(p.stage == "point" for p in points):
-        pairs = [(p, None) for p in _branch(points, "point")]
+        pairs = [(p, None) for p in points_of_branch(points, "point")]
     else:
         pairs = _of_passages(points)
     best: dict[float, ForcedPoint] = {}
@@ -38,7 +38,7 @@ def accepted_pairs(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, For
 
 def _of_passages(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, ForcedPoint | None]]:
     """Return the points of the published passages, each with that of the first passage which it repeats or is."""
-    low = _branch(points, "low")
+    low = points_of_branch(points, "low")
     high = {p.index: p for p in points if p.stage == "high"}
     kept: list[tuple[ForcedPoint, ForcedPoint | None]] = []
     passed = -1
@@ -52,8 +52,8 @@ def _of_passages(points: Sequence[ForcedPoint]) -> list[tuple[ForcedPoint, Force
     return kept + [(high.get(p.index, p), p) for p in low[passed + 1 :]]
 
 
-def _branch(points: Sequence[ForcedPoint], stage: Stage) -> list[ForcedPoint]:
-    """Return the points of a branch as `stickslip.response.branch.branch_of` does."""
+def points_of_branch(points: Sequence[ForcedPoint], stage: Stage) -> list[ForcedPoint]:
+    """Return the points of a branch, which have a `stage` of their own: those that no later one took the place of."""
     branch: list[ForcedPoint] = []
     for one in points:
         if one.stage == stage:

@@ -128,6 +128,10 @@ class ForcedCurve:
         one, other = (linear.recover(fewer.p, q[:rows]) for q in (a, b))
         return self.forced.measure.change(one, other - one)[0]
 
+    def stored(self, found: Followed) -> Followed:
+        """Return a solution as it comes back from where it was written down."""
+        return of_forced(self, to_forced(self, found))
+
     def height(self, found: Followed) -> float:
         """Return the amplitude of the first output, m."""
         q = self.problem(found.level).coefficients(found.point.x)

@@ -6,9 +6,13 @@ from time import perf_counter
 
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response.branch import branch_of
 from stickslip.response.follow import follow
-from stickslip.response.forced.accepted import branch_end, replaced, runs_of_repeats
+from stickslip.response.forced.accepted import (
+    branch_end,
+    points_of_branch,
+    replaced,
+    runs_of_repeats,
+)
 from stickslip.response.forced.along import ForcedCurve, of_forced, route_of, to_forced
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.forced.repeats import repeat
@@ -45,11 +49,12 @@ def double_passage(
         Points not in `done`: of the first passage as ``low`` and ``found``, repeats as ``high``, those of a branch as ``branch``.
     """
     curve = ForcedCurve(problem, load, (problem.low.harmonics,), raises=False)
-    passage = [of_forced(curve, p) for p in done if p.stage in ("low", "found")]
-    for found in follow(curve, route_of(problem), tuple(passage)):
-        passage.append(found)
-        yield to_forced(curve, found, "low" if found.kind == "point" else None)
-    low = [to_forced(curve, found, "low") for found in branch_of(passage)]
+    passage = [p for p in done if p.stage in ("low", "found")]
+    known = [of_forced(curve, p) for p in passage]
+    for found in follow(curve, route_of(problem), known):
+        passage.append(to_forced(curve, found, "low" if found.kind == "point" else None))
+        yield passage[-1]
+    low = [replace(p, stage="low") for p in points_of_branch(passage, "low")]
     stored = iter([p for p in done if p.stage in ("high", "branch")])
     yield from _Second(problem, low, static, stored).run()
 

@@ -194,7 +194,10 @@ class ForcedProblem:
     def branch_point(self, point: ForcedPoint) -> Point:
         """Return a point of a branch as one that it goes on from."""
         x = self.balance(point.support).unknowns(point.coefficients)
-        solution = Solution(x, point.status, 0, 0.0, 0.0, 0.0)
+        contact, linear = point.seconds_contact, point.seconds_linear
+        solution = Solution(
+            x, point.status, point.iterations, 0.0, contact, linear, rung=point.rescue
+        )
         return Point(x, point.omega, point.tangent, point.step, solution, point.orientation)
 
     def real_error(self, point: ForcedPoint, reference: ForcedPoint) -> float:
