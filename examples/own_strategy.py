@@ -46,7 +46,9 @@ friction = ss.Interface(
 )
 system = ss.System(structure, friction, outputs=np.array([0]))
 shaker = ss.HarmonicLoad(np.zeros(1), {1: np.array([0.1 + 0j])})
-sweep = ss.Sweep(omega_range=(0.1, 0.7), frequencies=13, peak_points=0, selection=Unbalanced())
+sweep = ss.Sweep(
+    omega_range=(0.1, 0.7), high=5, frequencies=13, peak_points=0, selection=Unbalanced()
+)  # high="auto" would ask it only where there are fewest harmonics, and go its own way beyond
 problem = ss.response.forced_problem(system, shaker, sweep)
 solved = list(ss.forced_response(system, shaker, sweep))
 points = ss.response.accepted_points(solved)

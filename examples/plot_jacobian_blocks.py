@@ -42,6 +42,7 @@ def solved(hertz, mu):
     system = ss.System(structure, interface, outputs=np.arange(4), free=np.array([4, 5]))
     sweep = ss.Sweep(
         omega_range=(2 * np.pi * (hertz - 1.0), 2 * np.pi * hertz),
+        high=5,
         selection=ss.harmonic.JacobianAlert(threshold=-1.0),  # repeat whatever it says
         frequencies=5,
         peak_points=0,

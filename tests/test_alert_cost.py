@@ -20,7 +20,12 @@ from stickslip.solve.status import Status
 
 HZ = 2 * np.pi
 STEPS = Sweep(
-    omega_range=(155 * HZ, 166 * HZ), samples=64, frequencies=8, peak_points=0, threshold=np.inf, high=5
+    omega_range=(155 * HZ, 166 * HZ),
+    samples=64,
+    frequencies=8,
+    peak_points=0,
+    threshold=np.inf,
+    high=5,
 )
 SIZE = 1e-5  # gap amplitudes, m
 

@@ -10,6 +10,7 @@ from models import lifting
 from evidence.models.lumped import blades_and_damper, griffin
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.follow import BACKWARD
 from stickslip.response.forced import ladder
 from stickslip.response.forced.response import (
     Sweep,
@@ -18,7 +19,6 @@ from stickslip.response.forced.response import (
     forced_problem,
     forced_response,
 )
-from stickslip.response.follow import BACKWARD
 from stickslip.solve.newton_method import Newton, newton
 
 HZ = 2 * np.pi

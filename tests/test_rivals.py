@@ -320,7 +320,7 @@ def test_rivals_take_the_single_passage_and_keep_their_own_threshold(made):
 def response(system, load, hertz, frequencies, selection, **options):
     sweep = Sweep(
         omega_range=(hertz[0] * HZ, hertz[1] * HZ), frequencies=frequencies, selection=selection,
-        samples=SAMPLES, peak_points=0, **{"passages": "single", **options},
+        samples=SAMPLES, peak_points=0, **{"passages": "single", "high": 5, **options},
     )  # fmt: skip
     points = list(forced_response(system, load, sweep))
     return forced_problem(system, load, sweep), points

@@ -21,6 +21,7 @@ def evidence():
     sweep = Sweep(
         omega_range=(2 * np.pi * 156, 2 * np.pi * 168),
         points=8,
+        high=5,
         peak_points=2,
         evaluator="intervals",
     )

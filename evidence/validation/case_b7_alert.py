@@ -46,6 +46,7 @@ def both_passages(
     problem, load = blades_and_damper(excitation=factor)
     sweep = Sweep(
         omega_range=(2 * np.pi * (hertz - 0.5), 2 * np.pi * hertz),
+        high=5,
         selection="jacobian_alert",  # as published, of which the table speaks
         threshold=-1.0,
         frequencies=5,
