@@ -243,7 +243,7 @@ CHECK = Check(180.0, 1.02e-3, 1e-3, settled=True, periods=90, order=5, refined=1
     ],
 )
 def test_motions_in_time_decide(motion: str, verdict: str) -> None:
-    found = with_motion(EXAMINED, replace(CHECK, motion=motion))  # type: ignore[arg-type]
+    found = with_motion(EXAMINED, replace(CHECK, motion=motion, scatter=0.02))  # type: ignore[arg-type]
     assert (found.verdict, found.motion) == (verdict, motion)
     settled = replace(EXAMINED, verdict="stable")
     assert with_motion(settled, replace(CHECK, motion=motion)) == settled  # type: ignore[arg-type]
@@ -254,6 +254,13 @@ def test_a_poor_balance_without_a_better_one_is_not_called_unstable() -> None:
     assert with_motion(EXAMINED, near).verdict == "undecided"
     assert with_motion(EXAMINED, replace(near, balance=1.6e-3)).verdict == "unstable"
     assert with_motion(EXAMINED, replace(near, transient=float("nan"))).verdict == "unstable"
+
+
+def test_what_wanders_closely_about_the_balance_is_not_called_unstable() -> None:
+    near = replace(CHECK, motion="not periodic", scatter=6e-3, balance=1.001e-3)
+    assert with_motion(EXAMINED, near).verdict == "undecided"
+    assert with_motion(EXAMINED, replace(near, scatter=2e-2)).verdict == "unstable"
+    assert with_motion(EXAMINED, replace(near, balance=1.05e-3)).verdict == "unstable"
 
 
 def test_periods_after_which_a_disturbance_has_shown() -> None:

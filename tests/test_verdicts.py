@@ -170,6 +170,7 @@ RULES: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
     "unstable beside the peak": (examined("unstable", 11.0), "trusted", {1: "wrong"}, "a machine does not stay there"),
     "left": (checked(motion="left"), "wrong", {TOP: "wrong"}, "leaves it for another motion"),
     "not periodic": (checked(motion="not periodic"), "wrong", {TOP: "wrong"}, "is not periodic"),
+    "wanders a little": (checked(motion="not periodic", scatter=0.006), "doubtful", {TOP: "doubtful"}, "it wanders by 0.6 %"),
     "not settled": (checked(settled=0), "doubtful", {TOP: "doubtful"}, "did not settle"),
     "attained": (checked(motion="attained"), "trusted", {}, "attained in time integration"),
     "attained, though something rings": (

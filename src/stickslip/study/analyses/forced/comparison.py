@@ -72,6 +72,12 @@ class Check:
         return 100 * (self.balance - self.transient) / self.transient
 
     @property
+    def wanders_near(self) -> bool:
+        """Whether a motion in time that is not periodic stays within 1 % of the balance's amplitude."""
+        near = max(100 * self.scatter, abs(self.difference_percent)) <= LARGE
+        return self.motion == "not periodic" and near
+
+    @property
     def sentence(self) -> str:
         """What was compared and what happened."""
         return (

@@ -177,7 +177,11 @@ def in_time(case: Curve) -> Iterator[Finding]:
     """Judge by time integration."""
     for point, said in case.examined("verify_difference_percent"):
         motion, off = motion_of(said), float(said["verify_difference_percent"])
-        if motion in ("left", "not periodic"):
+        wanders = 100 * float(said.get("verify_scatter", np.inf))
+        if motion == "not periodic" and max(wanders, abs(off)) <= ATTAINED:
+            why = f"the motion in time is not periodic: it wanders by {wanders:.2g} % about an average {off:+.2g} % away"
+            yield Finding("doubtful", why, "Believe the amplitude to as much.", (point,))
+        elif motion in ("left", "not periodic"):
             what = "leaves it for another motion" if motion == "left" else "is not periodic"
             why = f"the motion in time, started from it, {what}: {without_place(said['verify_sentence'])}"
             remedy = "Believe the time integration; sweep the other way for the motion it goes to."

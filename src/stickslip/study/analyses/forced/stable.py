@@ -116,6 +116,8 @@ def with_motion(examined: Examined, check: Check | None) -> Examined:
     alone = np.isfinite(check.transient) and not np.isfinite(check.refined)
     if check.motion == "left" and alone and abs(check.difference_percent) < FAR:
         verdict = "undecided"  # few harmonics may be so far off the motion that they stand for
+    if check.wanders_near:
+        verdict = "undecided"  # a machine does not leave it by more than it is known
     return replace(examined, verdict=verdict, motion=check.motion)
 
 
