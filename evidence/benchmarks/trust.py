@@ -93,7 +93,9 @@ def trial(seed: int, planar: bool, number: int) -> Trial:
         judged.append(Judged(a.point.omega, a.point.order, said, truth(problem, a.point)))
     unknowns = sum(p.coefficients.shape[1] * (2 * p.harmonics.size - 1) for p in points)
     failed = len(found) - len(solved) + unsolved
-    return Trial(number, drawn.note, len(found) + unsolved, failed, seconds, unknowns, tuple(judged))
+    return Trial(
+        number, drawn.note, len(found) + unsolved, failed, seconds, unknowns, tuple(judged)
+    )
 
 
 def by_default(drawn: Drawn) -> Drawn:
@@ -126,7 +128,9 @@ def show(trials: Sequence[Trial], threshold: float = 0.05) -> None:
     wrong = [j for j in trusted if j.true > threshold]
     doubted = [j for j in known if not j.said <= threshold]
     false = [j for j in doubted if j.true <= threshold]
-    print(f"{len(trials)} systems: {points - failed} of {points} points converged, {100 * (1 - failed / points):.2f} %")
+    print(
+        f"{len(trials)} systems: {points - failed} of {points} points converged, {100 * (1 - failed / points):.2f} %"
+    )
     print(
         f"{len(judged)} points judged, {len(judged) - len(known)} without a truth; trusted {len(trusted)}, of these wrong {len(wrong)}; "
         f"doubted {len(doubted)}, of these right {len(false)}"

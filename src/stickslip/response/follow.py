@@ -18,17 +18,19 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 
-import numpy as np
-
-from stickslip.response.branch import Curve, Followed, Judged, Kind, Route
-from stickslip.solve.branch import Latest
-from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to
-from stickslip.solve.newton_method import Solution, charged
+from stickslip.response.branch import Curve, Followed, Route
+from stickslip.response.steps import accepted, again, beside, fresh, lost, onward, retraced
 
 IDLE = 2.0  # multiples of the smallest number of points without a step's gain after which a branch is left
 BACKWARD = 0.1  # share of the range by which a branch may fall back behind its start
 AUDITED = 10  # points at most from one audit to the next
 CALM = 3  # quiet points with many harmonics before fewer are tried
+LEAPS = (
+    1.0,
+    0.25,
+    0.05,
+)  # steps by which a lost branch is taken up, as far as one correction leads
+LADDER = 1  # last level at which all that may help is tried: with more harmonics it costs too much, and they are found from these
 LONGEST_CALM = 48  # the same after trials that failed
 MOST = 40  # multiples of the smallest number of points at which any branch ends
 
@@ -61,6 +63,7 @@ class _Stop:
     ahead: Followed
     audited: bool = False
     more: Followed | None = None  # its audit, if it was made before the branch needed it
+    begins: bool = False  # whether no branch led here
 
 
 Taken = Generator[Followed, None, Followed]
@@ -119,27 +122,17 @@ class _Walk:
         return known
 
     def _onward(self, here: _Stop) -> Followed:
-        """Take a step along the branch."""
-        level, index = here.ahead.level, len(self.branch)
-        latest = Latest(self.curve.problem(level))
-        following = self.curve.following(level)
-        target = self._target()
-        if target is None:
-            point = advance(latest, here.ahead.point, self.route.last, following)
-        else:
-            point = step_to(latest, here.ahead.point, target, following)
-        return self._made("point", index, level, point, latest)
+        """Take a step along the branch; one that only goes back where the branch came from is none."""
+        made = onward(self.curve, here.ahead, len(self.branch), self._target(), self.route.last)
+        before = [stop.point for stop in self.branch if stop.point.converged]
+        return lost(made) if not self.route.listed and retraced(self.curve, before, made) else made
 
-    def _made(self, kind: Kind, index: int, level: int, point: Point, latest: Latest) -> Followed:
-        judged = Judged()
-        if point.solution.status.converged and kind != "audit":
-            judged = self.curve.judge(level, point, latest)
-        return Followed(kind, index, level, point, judged, 0.0)
-
-    def _kept(self, made: Followed, audit: Followed | None = None) -> Iterator[Followed]:
+    def _kept(
+        self, made: Followed, audit: Followed | None = None, *, begins: bool = False
+    ) -> Iterator[Followed]:
         """Accept a point, and look at it or at the one before more closely where that is due."""
         silent = made.judged.bound == 0.0
-        self.branch.append(_Stop(made, made, silent or audit is not None, audit))
+        self.branch.append(_Stop(made, made, silent or audit is not None, audit, begins))
         if not made.converged:
             return
         if audit is not None or self.curve.quiet(made.level, made.judged):
@@ -160,7 +153,7 @@ class _Walk:
             return False
         check = None
         if made.converged:
-            check = yield from self._take(lambda: self._again("audit", made, index, level))
+            check = yield from self._take(lambda: again(self.curve, "audit", made, index, level))
             if check.converged and self.curve.agree(made, check):
                 yield from self._kept(made, check)
                 return True
@@ -170,8 +163,8 @@ class _Walk:
             return (yield from self._thrown_back(last, level))
         if check is None or not check.converged or not self.curve.near(made, check):
             return True  # the branch with more harmonics leads on from the last point
-        accepted = check
-        more = yield from self._take(lambda: self._accepted(accepted, index))
+        known = check
+        more = yield from self._take(lambda: accepted(self.curve, known, index))
         if not self.curve.quiet(more.level, more.judged) and (yield from self._raised(more)):
             return True
         yield from self._kept(more)
@@ -184,7 +177,9 @@ class _Walk:
             return True
         audit = stop.more
         if audit is None or audit.level != level:
-            audit = yield from self._take(lambda: self._again("audit", stop.ahead, index, level))
+            audit = yield from self._take(
+                lambda: again(self.curve, "audit", stop.ahead, index, level)
+            )
         if audit.converged and (stop.audited or self.curve.agree(stop.point, audit)):
             stop.audited, stop.ahead = True, audit
             self.quiet_for = 0
@@ -197,7 +192,7 @@ class _Walk:
         level = stop.point.level + 1
         if stop.audited or level >= self.curve.levels or index in self.given_up:
             return
-        audit = yield from self._take(lambda: self._again("audit", stop.ahead, index, level))
+        audit = yield from self._take(lambda: again(self.curve, "audit", stop.ahead, index, level))
         if audit.converged and self.curve.agree(stop.point, audit):
             stop.audited, stop.more = True, audit
             return
@@ -209,10 +204,9 @@ class _Walk:
         """Go back to the last point before `index` that more harmonics have confirmed; return whether there is one."""
         if index in self.given_up:
             return False
-        for place in range(index - 1, -1, -1):
+        begin = self._beginning(index)
+        for place in range(index - 1, begin - 1, -1):
             stop = self.branch[place]
-            if not stop.point.converged:
-                break
             if not stop.audited:
                 continue
             held = yield from self._compared(place, level)
@@ -223,14 +217,13 @@ class _Walk:
             break
         # nothing before it is sure: begin where this stretch of the branch began
         # nothing before it is sure: begin where this stretch of the branch began
-        begin = self._beginning(index)
         known = self.branch[begin].ahead
         if known.level < level and begin not in self.given_up:
-            audit = yield from self._take(lambda: self._again("audit", known, begin, level))
+            audit = yield from self._take(lambda: again(self.curve, "audit", known, begin, level))
             if audit.converged:
-                made = yield from self._take(lambda: self._accepted(audit, begin))
+                made = yield from self._take(lambda: accepted(self.curve, audit, begin))
                 del self.branch[begin:]
-                self.branch.append(_Stop(made, made, audited=made.judged.bound == 0.0))
+                self.branch.append(_Stop(made, made, made.judged.bound == 0.0, begins=True))
                 self.quiet_for, self.hold = 0, index + CALM
                 return True
         self.given_up |= {begin, index}
@@ -239,7 +232,7 @@ class _Walk:
     def _beginning(self, index: int) -> int:
         """Return the index at which the stretch of the branch that leads to `index` began."""
         for place in range(index, 0, -1):
-            if not self.branch[place - 1].point.converged:
+            if self.branch[place].begins:
                 return place
         return 0
 
@@ -249,23 +242,12 @@ class _Walk:
         level = stop.ahead.level - 1
         if level < 0 or self.quiet_for < self.calm or index < self.hold:
             return
-        trial = yield from self._take(lambda: self._again("trial", stop.ahead, index, level))
+        trial = yield from self._take(lambda: again(self.curve, "trial", stop.ahead, index, level))
         if trial.converged and self.curve.agree(trial, stop.point):
             stop.ahead, stop.audited = trial, True
         else:
             self.calm = min(2 * self.calm, LONGEST_CALM)
         self.quiet_for = 0
-
-    def _again(self, kind: Kind, known: Followed, index: int, level: int) -> Followed:
-        """Solve at the value of a known solution with the harmonics of another level; the direction of travel stays."""
-        curve = self.curve
-        x = curve.lifted(known.point.x, known.level, level)
-        latest = Latest(curve.problem(level))
-        point = start_point(latest, x, known.p, curve.following(level))
-        if point.solution.status.converged and _against(curve, known, point, level):
-            point = reversed_point(point)
-        point = replace(point, step=known.point.step)
-        return self._made(kind, index, level, point, latest)
 
     # --- where to look closer -----------------------------------------------------------------
 
@@ -323,26 +305,36 @@ class _Walk:
         return ahead if route.before(ahead, route.last) else route.last
 
     def _begun(self, p: float) -> Iterator[Followed]:
-        """Solve where no branch leads, with more harmonics until it is quiet."""
-        index = len(self.branch)
-        level = self.branch[-1].ahead.level if self.branch else 0
-        made = yield from self._take(lambda: self._fresh(index, level, p, self._last()))
+        """Solve where no branch leads: from the last point a little further on, then by all that may help; with more harmonics until it is quiet."""
+        index, near = len(self.branch), self._last()
+        made: Followed | None = None
+        for share in LEAPS if near and not self.route.listed else ():
+            ahead = p + (share - 1.0) * self.route.gap
+            if not self.route.before(self._farthest(), ahead):
+                break
+            made = yield from self._fresh(index, near[0].level, ahead, near, most=False)
+            if made.converged:
+                break
+        if made is None or not made.converged:
+            level = min(near[0].level if near else 0, LADDER)
+            made = yield from self._fresh(index, level, p, near, most=True)
         while made.converged and not self.curve.quiet(made.level, made.judged):
-            level = made.level + 1
-            if level >= self.curve.levels:
+            more = yield from self._in_place(made)
+            if more is None:
                 break
-            more = yield from self._take(
-                lambda at=made, to=level: self._again("audit", at, index, to)  # type: ignore[misc]
-            )
-            if more.converged:
-                made = yield from self._take(lambda at=more: self._accepted(at, index))  # type: ignore[misc]
-                continue
-            anew = yield from self._anew(made)
-            if anew is None:
-                break
-            made = anew
+            made = more
         self.quiet_for = 0
-        yield from self._kept(made)
+        yield from self._kept(made, begins=True)
+
+    def _in_place(self, made: Followed) -> Generator[Followed, None, Followed | None]:
+        """Give a point that no other leads to the harmonics of the next level; None where that is not found."""
+        index, level = len(self.branch), made.level + 1
+        if level >= self.curve.levels:
+            return None
+        more = yield from self._take(lambda: again(self.curve, "audit", made, index, level))
+        if more.converged:
+            return (yield from self._take(lambda: accepted(self.curve, more, index)))
+        return (yield from self._anew(made))
 
     def _anew(self, made: Followed) -> Generator[Followed, None, Followed | None]:
         """Solve by all that may help what has no solution with more harmonics beside that with few; now and then in a row of these."""
@@ -350,30 +342,23 @@ class _Walk:
         if level >= self.curve.levels or index < self.anew_from:
             return None
         self.anew_from = index + AUDITED
-        found = yield from self._take(lambda: self._fresh(index, level, made.p, [made]))
+        found = yield from self._fresh(index, level, made.p, [made], most=level <= LADDER)
         if found.converged:
             return found
         return (yield from self._take(lambda: made))
 
+    def _fresh(
+        self, index: int, level: int, p: float, near: Sequence[Followed], *, most: bool
+    ) -> Taken:
+        return (
+            yield from self._take(
+                lambda: fresh(self.curve, self.route, index, level, p, near, most=most)
+            )
+        )
+
     def _last(self) -> list[Followed]:
         """Return the last solution, if there is one."""
         return [stop.ahead for stop in self.branch if stop.ahead.converged][-1:]
-
-    def _accepted(self, audit: Followed, index: int) -> Followed:
-        latest = Latest(self.curve.problem(audit.level))
-        return self._made("point", index, audit.level, audit.point, latest)
-
-    def _fresh(self, index: int, level: int, p: float, near: Sequence[Followed]) -> Followed:
-        solution = self.curve.fresh(level, p, near, True)
-        latest = Latest(self.curve.problem(level))
-        following = self.curve.following(level)
-        upward = np.append(np.zeros(solution.x.size), 1.0)
-        point = Point(solution.x, p, upward, following.control.first, solution, 0.0)
-        if solution.status.converged:
-            point = replace(start_point(latest, solution.x, p, following), solution=solution)
-            if self.route.forward < 0.0 and not self.route.listed:
-                point = reversed_point(point)
-        return self._made("point", index, level, point, latest)
 
     def _looked_for(self) -> Iterator[Followed]:
         """Look once more for what was not found, from the neighbours on both sides, the last ones first."""
@@ -384,33 +369,8 @@ class _Walk:
             near = [self.branch[i].point for i in sides if self.branch[i].point.converged]
             if not near:
                 continue
-            found = yield from self._take(lambda n=near, i=index: self._beside(n, i))  # type: ignore[misc]
+            found = yield from self._take(
+                lambda n=near, i=index: beside(self.curve, n, self.branch[i].point)  # type: ignore[misc]
+            )
             if found.converged:
                 self.branch[index] = _Stop(found, found)
-
-    def _beside(self, near: Sequence[Followed], index: int) -> Followed:
-        """Solve a value from the branches of its neighbours."""
-        lost = self.branch[index].point
-        spent: list[Solution] = []
-        for end in near:
-            latest = Latest(self.curve.problem(end.level))
-            following = self.curve.following(end.level)
-            start = end.point if end.point.tangent[-1] > 0.0 else reversed_point(end.point)
-            point = step_to(latest, start, lost.p, following)
-            spent.append(point.solution)
-            if point.solution.status.converged:
-                made = self._made("found", index, end.level, point, latest)
-                solution = charged(point.solution, spent)
-                return replace(made, point=replace(point, solution=solution))
-        solution = charged(lost.point.solution, spent)
-        return replace(lost, kind="found", point=replace(lost.point, solution=solution))
-
-
-def _against(curve: Curve, known: Followed, point: Point, level: int) -> bool:
-    """Whether a point of another level looks the other way than a known one."""
-    state = curve.lifted(known.point.tangent[:-1], known.level, level)
-    before = np.append(state, known.point.tangent[-1])
-    weights = curve.following(level).weights
-    size = float(np.linalg.norm(weights * point.x)) or 1.0
-    scaled = np.append(weights**2 / size**2, 1.0 / curve.following(level).control.scale ** 2)
-    return bool((scaled * before) @ point.tangent < 0.0)

@@ -31,6 +31,7 @@ from stickslip.solve.newton_method import Solution
 KINDS: tuple[Kind, ...] = ("point", "audit", "trial", "found")
 # shares of the threshold that bounds may have, with the fewest harmonics and with more: those at the very threshold were wrong at times
 QUIET = (0.5, 0.8)
+START = 0.3  # share of the threshold above which what was predicted is kept as a start
 ROUGHLY = 1e-3  # relative residual of that step where it is found by iteration
 AGREE = 0.5  # share of the threshold by which motions of neighbouring levels may differ: the next levels add to it
 NEAR = 0.3  # relative difference of motions that stand on the same sheet
@@ -105,7 +106,13 @@ class ForcedCurve:
         alert = jacobian_alert(
             step.balance, more, step.x, step.omega, step.measure, solve, events=step.events
         )
-        return Judged(alert.error)
+        if not alert.error > START * self.forced.strategy.threshold:
+            return Judged(alert.error)
+        return (
+            Judged(alert.error, (), more.coefficients(alert.start))
+            if not last
+            else Judged(alert.error)
+        )
 
     def quiet(self, level: int, judged: Judged) -> bool:
         """Whether a bound is well below the threshold, or nobody can tell."""

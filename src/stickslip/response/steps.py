@@ -1,0 +1,143 @@
+"""The single solves of the follower: a step on, the same point with other harmonics, a point that no branch leads to."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.response.branch import Curve, Followed, Judged, Kind, Route
+from stickslip.solve.branch import Latest
+from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to
+from stickslip.solve.natural import NaturalLevel
+from stickslip.solve.newton_method import Solution, charged, newton
+from stickslip.solve.status import Status
+
+PATIENT = 16  # iterations from a solution with other harmonics
+RECENT = 12  # points behind the last one that a step may go back along
+BACK = 0.3  # distance from the branch behind, as a share of the step, within which a step goes back along it
+
+
+def onward(curve: Curve, here: Followed, index: int, target: float | None, last: float) -> Followed:
+    """Take a step along the branch towards `last`, or go to the listed value `target`."""
+    latest = Latest(curve.problem(here.level))
+    following = curve.following(here.level)
+    if target is None:
+        point = advance(latest, here.point, last, following)
+    else:
+        point = step_to(latest, here.point, target, following)
+    return _made(curve, "point", index, here.level, point, latest)
+
+
+def again(curve: Curve, kind: Kind, known: Followed, index: int, level: int) -> Followed:
+    """Solve at the value of a known solution with the harmonics of another level; the direction of travel stays."""
+    problem, following, p = curve.problem(level), curve.following(level), known.p
+    latest = Latest(problem)
+    starts = [curve.lifted(known.point.x, known.level, level)]
+    if known.judged.start is not None and level == known.level + 1:
+        starts.insert(0, problem.unknowns(known.judged.start))
+    patient = replace(following.newton, max_iterations=PATIENT)
+    spent: list[Solution] = []
+    for x in starts:
+        spent.append(newton(lambda v: latest.linearise(v, p), x, patient, NaturalLevel()))
+        if spent[-1].status.converged:
+            break
+    point = start_point(latest, spent[-1].x, p, following)
+    spent.append(point.solution)
+    if point.solution.status.converged and _against(curve, known, point, level):
+        point = reversed_point(point)
+    point = replace(point, step=known.point.step, solution=charged(point.solution, spent))
+    return _made(curve, kind, index, level, point, latest)
+
+
+def accepted(curve: Curve, audit: Followed, index: int) -> Followed:
+    """Return an audit as a point of the branch, judged."""
+    latest = Latest(curve.problem(audit.level))
+    return _made(curve, "point", index, audit.level, audit.point, latest)
+
+
+def fresh(
+    curve: Curve,
+    route: Route,
+    index: int,
+    level: int,
+    p: float,
+    near: Sequence[Followed],
+    *,
+    most: bool,
+) -> Followed:
+    """Solve where no branch leads; `most`: by all that may help."""
+    solution = curve.fresh(level, p, near, most)
+    latest = Latest(curve.problem(level))
+    following = curve.following(level)
+    upward = np.append(np.zeros(solution.x.size), 1.0)
+    point = Point(solution.x, p, upward, following.control.first, solution, 0.0)
+    if solution.status.converged:
+        point = replace(start_point(latest, solution.x, p, following), solution=solution)
+        if route.forward < 0.0 and not route.listed:
+            point = reversed_point(point)
+    return _made(curve, "point", index, level, point, latest)
+
+
+def beside(curve: Curve, near: Sequence[Followed], missing: Followed) -> Followed:
+    """Solve a value that was not found from the branches of its neighbours."""
+    spent: list[Solution] = [missing.point.solution]
+    for end in near:
+        latest = Latest(curve.problem(end.level))
+        start = end.point if end.point.tangent[-1] > 0.0 else reversed_point(end.point)
+        point = step_to(latest, start, missing.p, curve.following(end.level))
+        spent.append(point.solution)
+        if point.solution.status.converged:
+            point = replace(point, solution=charged(point.solution, spent))
+            return _made(curve, "found", missing.index, end.level, point, latest)
+    solution = charged(missing.point.solution, spent)
+    return replace(missing, kind="found", point=replace(missing.point, solution=solution))
+
+
+def lost(made: Followed) -> Followed:
+    """Return a step as one that led nowhere."""
+    solution = replace(made.point.solution, status=Status.STEP_TOO_SMALL)
+    return replace(made, point=replace(made.point, solution=solution), judged=Judged())
+
+
+def retraced(curve: Curve, before: Sequence[Followed], made: Followed) -> bool:
+    """Whether a step beyond a corner goes back along the branch that led there."""
+    behind = [b for b in before[-RECENT:] if b.level == made.level]
+    if not made.converged or len(behind) < 3:
+        return False
+    last = behind[-1]
+    if (made.p - last.p) * (last.p - behind[-2].p) >= 0.0:
+        return False
+    weights = curve.following(made.level).weights
+    step = _length(weights, made.point.x - last.point.x)
+    for a, b in pairwise(behind):
+        if a.p != b.p and (made.p - a.p) * (made.p - b.p) <= 0.0:
+            share = (made.p - a.p) / (b.p - a.p)
+            there = a.point.x + share * (b.point.x - a.point.x)
+            if _length(weights, made.point.x - there) < BACK * step:
+                return True
+    return False
+
+
+def _length(weights: FloatArray, x: FloatArray) -> float:
+    return float(np.linalg.norm(weights * x))
+
+
+def _made(
+    curve: Curve, kind: Kind, index: int, level: int, point: Point, latest: Latest
+) -> Followed:
+    judged = Judged()
+    if point.solution.status.converged and kind != "audit":
+        judged = curve.judge(level, point, latest)
+    return Followed(kind, index, level, point, judged, 0.0)
+
+
+def _against(curve: Curve, known: Followed, point: Point, level: int) -> bool:
+    """Whether a point of another level looks the other way than a known one."""
+    state = curve.lifted(known.point.tangent[:-1], known.level, level)
+    before = np.append(state, known.point.tangent[-1])
+    following = curve.following(level)
+    size = _length(following.weights, point.x) or 1.0
+    scaled = np.append(following.weights**2 / size**2, 1.0 / following.control.scale**2)
+    return bool((scaled * before) @ point.tangent < 0.0)
