@@ -27,7 +27,8 @@ from stickslip.harmonic.support import (
 )
 
 JacobianForm = Literal["auto", "dense", "structured"]
-CROSSOVER = 700  # unknowns above which products and a Krylov method cost less than an array and its LU factors
+CROSSOVER = 620  # unknowns above which products and a Krylov method cost less than an array and its LU factors ...
+MANY = 32  # ... and twice as many with so many harmonics: a product goes through them one by one
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +110,13 @@ class HarmonicBalance:
     @property
     def structured(self) -> bool:
         """Whether the Jacobian is given by its products; without harmonics it is an array."""
-        large = self.size > CROSSOVER if self.jacobian == "auto" else self.jacobian == "structured"
+        large = self.large if self.jacobian == "auto" else self.jacobian == "structured"
         return large and self.order > 0
+
+    @property
+    def large(self) -> bool:
+        """Whether products cost less than an array."""
+        return self.size > CROSSOVER * (1.0 + (len(self.harmonics) - 1) / MANY)
 
     def coefficients(self, x: FloatArray) -> ComplexArray:
         """Return the (order+1, n) complex coefficients in metres of scaled unknowns `x`; zeros at harmonics left out."""
@@ -166,7 +172,7 @@ class HarmonicBalance:
             period = self.forces(x, omega)
         seconds = perf_counter() - start
         jac: FloatArray | StructuredJacobian
-        if self.size > CROSSOVER or self.structured:
+        if self.large or self.structured:
             linear, slope, jac = self._by_products(x, omega, period)
         else:
             linear, slope, jac = self._by_matrices(x, omega, period)

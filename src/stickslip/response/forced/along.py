@@ -9,7 +9,6 @@ from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import Linearisation
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection.alert import jacobian_alert
-from stickslip.harmonic.selection.guarded_alert import doubled
 from stickslip.harmonic.selection.strategy import Step, always_kept, judged
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.branch import Followed, Judged, Kind, Route
@@ -26,7 +25,7 @@ from stickslip.response.forced.problem import (
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Following, Point
 from stickslip.solve.krylov import to_tolerance
-from stickslip.solve.newton_method import Solution
+from stickslip.solve.newton_method import Solution, newton
 
 KINDS: tuple[Kind, ...] = ("point", "audit", "trial", "found")
 # shares of the threshold that bounds may have, with the fewest harmonics and with more: those at the very threshold were wrong at times
@@ -89,6 +88,8 @@ class ForcedCurve:
         left = known.events if isinstance(known, Linearisation) else None
         balance = self.problem(level)
         step = forced.step(balance, point.x, point.p, left=left)
+        if self.raises and level + 1 == self.levels > 1:
+            return self._at_the_cap(level, point)
         if self.raises and level > 0:
             return self._predicted(level, step)
         if level + 1 < self.levels:
@@ -99,20 +100,23 @@ class ForcedCurve:
         return Judged(verdict.indicator, verdict.again, verdict.start)
 
     def _predicted(self, level: int, step: Step) -> Judged:
-        """Predict the error by one Newton step with the harmonics of the next level, or with twice the most that there are; audits look further."""
-        last = level + 1 == self.levels
-        more = doubled(step.balance) if last else with_stiffness(self.problem(level + 1))
+        """Predict the error by one Newton step with the harmonics of the next level; audits look further."""
+        more = with_stiffness(self.problem(level + 1))
         solve = to_tolerance(self.forced.sweep.newton.linear, ROUGHLY).solve
         alert = jacobian_alert(
             step.balance, more, step.x, step.omega, step.measure, solve, events=step.events
         )
-        if not alert.error > START * self.forced.strategy.threshold:
-            return Judged(alert.error)
-        return (
-            Judged(alert.error, (), more.coefficients(alert.start))
-            if not last
-            else Judged(alert.error)
-        )
+        far = alert.error > START * self.forced.strategy.threshold
+        return Judged(alert.error, (), more.coefficients(alert.start) if far else None)
+
+    def _at_the_cap(self, level: int, point: Point) -> Judged:
+        """Bound the error where no level follows by the difference from the level before, which is larger as long as more harmonics change less."""
+        before = self.problem(level - 1)
+        x = self.lifted(point.x, level, level - 1)
+        fewer = newton(lambda v: before.linearise(v, point.p), x, self.following(level - 1).newton)
+        if not fewer.status.converged:
+            return Judged(np.inf)
+        return Judged(self._difference(point.p, (level - 1, fewer.x), (level, point.x)))
 
     def quiet(self, level: int, judged: Judged) -> bool:
         """Whether a bound is well below the threshold, or nobody can tell."""
@@ -130,9 +134,14 @@ class ForcedCurve:
 
     def change(self, fewer: Followed, more: Followed) -> float:
         """Return the largest relative difference between two motions, a fraction."""
-        a, b = (self.problem(f.level).coefficients(f.point.x) for f in (fewer, more))
+        return self._difference(fewer.p, (fewer.level, fewer.point.x), (more.level, more.point.x))
+
+    def _difference(
+        self, omega: float, fewer: tuple[int, FloatArray], more: tuple[int, FloatArray]
+    ) -> float:
+        a, b = (self.problem(level).coefficients(x) for level, x in (fewer, more))
         rows, linear = min(len(a), len(b)), self.forced.low.linear
-        one, other = (linear.recover(fewer.p, q[:rows]) for q in (a, b))
+        one, other = (linear.recover(omega, q[:rows]) for q in (a, b))
         return self.forced.measure.change(one, other - one)[0]
 
     def stored(self, found: Followed) -> Followed:
