@@ -436,8 +436,13 @@ def model(**others: object) -> Model:
     return Model(**given | others)  # type: ignore[arg-type]
 
 
-def refused(asked: Model, checks: frozenset[str] = frozenset(), **limits: float) -> str:
-    own = settings(frequency_hz=[1.0, 2.0])
+def refused(
+    asked: Model,
+    checks: frozenset[str] = frozenset(),
+    high: int | str = "auto",
+    **limits: float,
+) -> str:
+    own = settings({"high": high}, frequency_hz=[1.0, 2.0])
     own.limits = SimpleNamespace(**{"memory_gb": 4.0, "work_s": 7200.0} | limits)
     case = Case(0, "", {}, own, lambda: asked, "", Path(), checks)
     with pytest.raises(InputError) as error:
@@ -455,12 +460,12 @@ def test_what_cannot_be_answered_is_refused_by_key() -> None:
         "contact.root.law: --verify integrates in time, and rigid_coulomb has no stiffness: its force is no function of the gap. "
         "Run without --verify, or give a law with stiffnesses, such as elastic_coulomb."
     )
-    assert refused(model(), memory_gb=0.1).startswith(
-        "limits.memory_gb: a case of the forced response (1 nodes, 33 unknowns, "
-    )
-    assert refused(model(), work_s=1e-9).startswith(
-        "limits.work_s: a case of the forced response (1 nodes, 33 unknowns, "
-    )
+    # the limits first lower the harmonics of auto, to one: 9 unknowns; those of a number stay
+    for high, unknowns in (("auto", 9), (5, 33)):
+        case = f"a case of the forced response (1 nodes, {unknowns} unknowns, "
+        told = refused(model(), high=high, memory_gb=0.1)
+        assert told.startswith(f"limits.memory_gb: {case}")
+        assert refused(model(), high=high, work_s=1e-9).startswith(f"limits.work_s: {case}")
 
 
 def test_static_loads_need_no_harmonic_of_their_own() -> None:

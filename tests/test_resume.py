@@ -22,8 +22,8 @@ SLIPPING = {
     "vary.load.shaker.force_n": "[5.0, 8.0]",
     "modes.number": "3",
 }
-# a user's interrupt in the first passage, a lost machine in the repeats
-STOPS = {signal.SIGINT: "  low 6:", signal.SIGKILL: "  high 15:"}
+# a user's interrupt before harmonics are raised, a lost machine after some were raised, audited and lowered
+STOPS = {signal.SIGINT: "  point 6:", signal.SIGKILL: "  point 22:"}
 SCRIPT = """
 import logging, signal, sys
 from pathlib import Path

@@ -264,11 +264,22 @@ REFUSED = {
     ),
     "harmonics of no kind": (
         {"low": 0},
-        "harmonics.low: must be a harmonic from 1 to 30 or a list of them, got 0. 5 keeps all up to the fifth",
+        "harmonics.low: must be a harmonic from 1 to 41 or a list of them, got 0. 5 keeps all up to the fifth",
     ),
     "harmonics in words": (
         {"high": [1, "3"]},
-        "harmonics.high: must be a harmonic from 1 to 30 or a list of them, got [1, '3']. 5 keeps all",
+        (
+            "harmonics.high: must be 'auto', a harmonic from 1 to 41 or a list of them, got [1, '3']. "
+            "'auto' raises them until each point is quiet; 5 keeps all"
+        ),
+    ),
+    "harmonics by a wrong name": (
+        {"high": "automatic"},
+        "harmonics.high: must be 'auto', a harmonic from 1 to 41 or a list of them, got 'automatic'.",
+    ),
+    "auto for the first passage": (
+        {"low": "auto"},
+        "harmonics.low: must be a harmonic from 1 to 41 or a list of them, got 'auto'. 5 keeps",
     ),
     "high without low": (
         {"low": [1, 2], "high": [1, 3, 5]},

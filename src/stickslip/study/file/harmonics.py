@@ -70,15 +70,18 @@ class Harmonics(Section):
     @field_validator("low", "high", mode="before")
     @classmethod
     def _is_support(cls, given: Any, info: ValidationInfo) -> Any:
-        if info.field_name == "high" and given == "auto":
-            return given
+        kinds, remedy = "", ""
+        if info.field_name == "high":
+            kinds, remedy = "'auto', ", "'auto' raises them until each point is quiet; "
+            if given == "auto":
+                return given
         one = isinstance(given, int) and not isinstance(given, bool)
         entries = [given] if one else given
         if isinstance(entries, list) and entries and all(map(_harmonic, entries)):
             return given
         raise custom_error(
-            f"must be a harmonic from 1 to {HIGHEST} or a list of them, got {shown(given)}",
-            "5 keeps all up to the fifth; [1, 3, 5] keeps these alone. The static term is always kept.",
+            f"must be {kinds}a harmonic from 1 to {HIGHEST} or a list of them, got {shown(given)}",
+            f"{remedy}5 keeps all up to the fifth; [1, 3, 5] keeps these alone. The static term is always kept.",
         )
 
     @field_validator("alert_over", mode="before")
