@@ -138,6 +138,9 @@ RULES: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
     "no audit": (
         {"audit_error_percent": np.full(6, np.nan)}, "doubtful", {}, "by predictions alone",
     ),
+    "no audit of points beside the peak": (
+        {"audit_error_percent": np.full(6, np.nan), "harmonic_kept": many((TOP,))}, "trusted", {}, "at 5 points by predictions alone",
+    ),
     "no audit, but twice the harmonics": (
         {"audit_error_percent": np.full(6, np.nan), "reference_error_percent": np.ones(6)}, "trusted", {}, "peak with H = 1",
     ),

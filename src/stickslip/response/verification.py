@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from stickslip.errors import input_error
+from stickslip.errors import InputError, input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.guarded_alert import doubled
@@ -98,10 +98,17 @@ def own_error(problem: ForcedProblem, point: ForcedPoint) -> float:
         return float("nan")
     own = with_stiffness(problem.balance(point.support))
     more = doubled(own)
-    if more.harmonics == own.harmonics:  # all waves of a wheel
-        return float("nan")
+    if more.harmonics == own.harmonics:  # all waves of a wheel that were condensed
+        return _of_more_waves(problem, point)
     x = own.unknowns(point.coefficients)
     return jacobian_alert(own, more, x, point.omega, problem.measure, problem.alert_solve).error
+
+
+def _of_more_waves(problem: ForcedProblem, point: ForcedPoint) -> float:
+    try:
+        return check_support(problem, [point], 2)[0].error
+    except InputError:
+        return float("nan")  # the wheel has no more
 
 
 def _enlarged(problem: ForcedProblem, factor: int) -> HarmonicBalance:

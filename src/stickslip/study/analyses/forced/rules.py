@@ -97,14 +97,20 @@ def audited(case: Curve) -> Iterator[Finding]:
 
 
 def not_audited(case: Curve) -> Iterator[Finding]:
-    """Doubt few harmonics that were accepted by predictions alone."""
+    """Doubt a peak whose few harmonics were accepted by predictions alone; tell of such points elsewhere."""
     few = case.converged & case.few
     none = case.has("audit_error_percent") and bool(np.isnan(case.audit).all())
     if not none or not case.decides or not few.any() or case.attained[case.peak]:
         return
     if np.isnan(case.reference[few]).any():
-        why = f"H = {case.low} was accepted at {few.sum()} points by predictions alone: none of them was solved with more to compare"
-        yield Finding("doubtful", why, f"{_examination(case)}.")
+        at_peak = case.peak >= 0 and bool(few[case.peak])
+        where = ", the peak among them" if at_peak else ""
+        why = (
+            f"H = {case.low} was accepted at {few.sum()} points by predictions alone{where}: none of them was solved with more to "
+            "compare"
+        )
+        remedy = f'harmonics.high = "auto" audits some; {_examination(case)}.'
+        yield Finding("doubtful" if at_peak else "trusted", why, remedy)
 
 
 def twice_the_harmonics(case: Curve) -> Iterator[Finding]:
