@@ -99,6 +99,10 @@ class Curve(Protocol):
         """Solve where no branch leads; `most`: by all that may help."""
         ...
 
+    def cost(self, level: int) -> float:
+        """Return the work of a Newton step, beside that of a small system."""
+        ...
+
     def judge(self, level: int, point: Point, latest: Latest) -> Judged:
         """Judge the error of a solution."""
         ...

@@ -31,7 +31,13 @@ LEAPS = (
     0.05,
 )  # steps by which a lost branch is taken up, as far as one correction leads
 LADDER = 1  # last level at which all that may help is tried: with more harmonics it costs too much, and they are found from these
+MOST_PATIENT = (
+    16  # points between attempts to raise harmonics on a branch that with more is not there
+)
 LONGEST_CALM = 48  # the same after trials that failed
+EFFORT = 0.75  # work of a branch beside that of the most harmonics at each of its points, beyond half of which fewer are allowed
+STEPS_A_POINT = 6  # of Newton
+BESIDES = 200.0  # work for each point that is always allowed
 MOST = 40  # multiples of the smallest number of points at which any branch ends
 
 
@@ -79,8 +85,12 @@ class _Walk:
     calm: int = CALM  # of them before fewer are tried
     hold: int = 0  # index up to which fewer are not tried
     given_up: set[int] = field(default_factory=set)  # indices whose audit failed for good
+    patience: int = 1  # points between attempts to raise what cannot be raised
+    patient_until: int = 0  # index of the next attempt
+    looked: int = 0  # index of the last audit
     anew_from: int = 0  # index from which solutions without a branch are looked for again
     taken: int = 0
+    spent: float = 0.0  # work, in the unit of `Curve.cost`
 
     def run(self) -> Iterator[Followed]:
         """Go from the first value to the last."""
@@ -93,12 +103,18 @@ class _Walk:
                     return
                 yield from self._begun(self._further())
                 continue
+            yield from self._cheaper(here)
             made = yield from self._take(lambda at=here: self._onward(at))  # type: ignore[misc]
             raised = not made.converged or not self.curve.quiet(made.level, made.judged)
-            if raised and (yield from self._raised(made)):
+            trying = raised and (not made.converged or len(self.branch) >= self.patient_until)
+            if trying and (yield from self._raised(made)):
+                self.patience = 1
                 continue
             if made.converged:
-                anew = (yield from self._anew(made)) if raised else None
+                anew = (yield from self._anew(made)) if trying else None
+                if trying:  # nothing is near with more harmonics: not every point of such a branch is worth the attempt
+                    self.patience = min(2 * self.patience, MOST_PATIENT)
+                    self.patient_until = len(self.branch) + self.patience
                 yield from self._kept(anew or made)
             elif self.route.recovers:
                 yield from self._begun(self._further())
@@ -144,12 +160,30 @@ class _Walk:
         if self.branch and self.branch[-1].point is made:
             yield from self._lowered()
 
+    # --- work ---------------------------------------------------------------------------------
+
+    def _levels(self) -> int:
+        """Return how many levels are left: all while less than half of the work is done, then fewer and fewer."""
+        levels = self.curve.levels
+        most = self.route.points * (BESIDES + STEPS_A_POINT * EFFORT * self.curve.cost(levels - 1))
+        over = int((self.spent / most - 0.5) * 2.0 * levels) + 1 if self.spent > 0.5 * most else 0
+        return max(levels - over, min(levels, LADDER + 1))
+
+    def _cheaper(self, here: _Stop) -> Iterator[Followed]:
+        """Go on with fewer harmonics where no more are left."""
+        level, index = self._levels() - 1, len(self.branch) - 1
+        if here.ahead.level > level:
+            known = here.ahead
+            trial = yield from self._take(lambda: again(self.curve, "trial", known, index, level))
+            if trial.converged:
+                here.ahead = trial
+
     # --- harmonics ----------------------------------------------------------------------------
 
     def _raised(self, made: Followed) -> Generator[Followed, None, bool]:
         """Do what a point needs that is not quiet or was not found; return whether the branch goes on."""
         level, index = made.level + 1, len(self.branch)
-        if level >= self.curve.levels:
+        if level >= self._levels():
             return False
         check = None
         if made.converged:
@@ -180,6 +214,7 @@ class _Walk:
             audit = yield from self._take(
                 lambda: again(self.curve, "audit", stop.ahead, index, level)
             )
+            stop.more = audit
         if audit.converged and (stop.audited or self.curve.agree(stop.point, audit)):
             stop.audited, stop.ahead = True, audit
             self.quiet_for = 0
@@ -190,11 +225,13 @@ class _Walk:
         """Audit a point of the branch; go back where it fails."""
         stop = self.branch[index]
         level = stop.point.level + 1
-        if stop.audited or level >= self.curve.levels or index in self.given_up:
+        if stop.audited or level >= self._levels() or index in self.given_up:
             return
+        self.looked = index
         audit = yield from self._take(lambda: again(self.curve, "audit", stop.ahead, index, level))
+        stop.more = audit
         if audit.converged and self.curve.agree(stop.point, audit):
-            stop.audited, stop.more = True, audit
+            stop.audited = True
             return
         back = yield from self._thrown_back(index, level)
         if not back:
@@ -254,9 +291,9 @@ class _Walk:
     def _due(self) -> bool:
         """Whether the last audit is long ago, or this is the first or the last point."""
         last = len(self.branch) - 1
-        recent = self.branch[max(last - AUDITED + 1, 0) :]
+        recent = any(stop.audited for stop in self.branch[max(last - AUDITED + 1, 0) :])
         ends = last == 0 or self.branch[-1].point.p == self.route.last
-        return ends or not any(stop.audited for stop in recent)
+        return ends or not (recent or self.looked > last - AUDITED)
 
     def _passed_maximum(self) -> bool:
         """Whether the point before the last is higher than its neighbours."""
@@ -329,7 +366,7 @@ class _Walk:
     def _in_place(self, made: Followed) -> Generator[Followed, None, Followed | None]:
         """Give a point that no other leads to the harmonics of the next level; None where that is not found."""
         index, level = len(self.branch), made.level + 1
-        if level >= self.curve.levels:
+        if level >= self._levels():
             return None
         more = yield from self._take(lambda: again(self.curve, "audit", made, index, level))
         if more.converged:
@@ -339,7 +376,7 @@ class _Walk:
     def _anew(self, made: Followed) -> Generator[Followed, None, Followed | None]:
         """Solve by all that may help what has no solution with more harmonics beside that with few; now and then in a row of these."""
         index, level = len(self.branch), made.level + 1
-        if level >= self.curve.levels or index < self.anew_from:
+        if level >= self._levels() or index < self.anew_from:
             return None
         self.anew_from = index + AUDITED
         found = yield from self._fresh(index, level, made.p, [made], most=level <= LADDER)
