@@ -20,7 +20,7 @@ from evidence.models.random_machines import Drawn, draw
 from stickslip.errors import StickslipError
 from stickslip.harmonic.support import harmonics_of
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
-from stickslip.response.forced.response import accepted_points, forced_problem, forced_response
+from stickslip.response.forced.response import forced_problem, forced_response
 from stickslip.solve.newton_method import Newton, newton
 from stickslip.study.analyses.forced.points import collect
 

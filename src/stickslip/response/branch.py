@@ -14,6 +14,8 @@ from stickslip.solve.continuation import Following, Point, StepControl
 from stickslip.solve.newton_method import Newton, Solution
 
 LARGEST = 0.25  # arc length of the largest step: a quarter of the size of the vibration, or `1 / points` of the range
+IDLE = 2.0  # multiples of the smallest number of points without a step's gain after which a branch is left
+BACKWARD = 0.1  # share of the range by which a branch may fall back behind its start
 
 Kind = Literal["point", "audit", "trial", "found"]
 
@@ -163,6 +165,23 @@ class Route:
     def before(self, one: float, other: float) -> bool:
         """Whether one value comes before another on the way."""
         return self.forward * one < self.forward * other
+
+    def farthest(self, values: Sequence[float]) -> float:
+        """Return which of some values lies farthest along the way."""
+        return max(values, key=lambda p: self.forward * p)
+
+    def idle(self, values: Sequence[float]) -> bool:
+        """Whether a branch left the range backwards, or gained less than a step in its last points.
+
+        Stiff contacts that lift off under little damping fold it hundreds of times within a step: there it is left, as a machine would leave it.
+        """
+        if self.listed:
+            return False
+        if self.before(values[-1], self.first - BACKWARD * (self.last - self.first)):
+            return True
+        count = int(IDLE * self.points)
+        ways = [self.forward * p for p in values]
+        return len(ways) > count and max(ways) - max(ways[:-count]) < abs(self.gap)
 
 
 def steps_through(length: float, points: int) -> StepControl:

@@ -19,25 +19,25 @@ from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 from stickslip.response.branch import Curve, Followed, Route
-from stickslip.response.steps import accepted, again, beside, fresh, lost, onward, retraced
+from stickslip.response.steps import (
+    accepted,
+    again,
+    beside,
+    fresh,
+    levels_left,
+    lost,
+    onward,
+    retraced,
+)
 
-IDLE = 2.0  # multiples of the smallest number of points without a step's gain after which a branch is left
-BACKWARD = 0.1  # share of the range by which a branch may fall back behind its start
 AUDITED = 10  # points at most from one audit to the next
 CALM = 3  # quiet points with many harmonics before fewer are tried
-LEAPS = (
-    1.0,
-    0.25,
-    0.05,
-)  # steps by which a lost branch is taken up, as far as one correction leads
+LEAPS = (1.0, 0.25, 0.05)  # steps by which a lost branch is taken up
 LADDER = 1  # last level at which all that may help is tried: with more harmonics it costs too much, and they are found from these
 MOST_PATIENT = (
     16  # points between attempts to raise harmonics on a branch that with more is not there
 )
 LONGEST_CALM = 48  # the same after trials that failed
-EFFORT = 0.75  # work of a branch beside that of the most harmonics at each of its points, beyond half of which fewer are allowed
-STEPS_A_POINT = 6  # of Newton
-BESIDES = 200.0  # work for each point that is always allowed
 MOST = 40  # multiples of the smallest number of points at which any branch ends
 
 
@@ -163,11 +163,7 @@ class _Walk:
     # --- work ---------------------------------------------------------------------------------
 
     def _levels(self) -> int:
-        """Return how many levels are left: all while less than half of the work is done, then fewer and fewer."""
-        levels = self.curve.levels
-        most = self.route.points * (BESIDES + STEPS_A_POINT * EFFORT * self.curve.cost(levels - 1))
-        over = int((self.spent / most - 0.5) * 2.0 * levels) + 1 if self.spent > 0.5 * most else 0
-        return max(levels - over, min(levels, LADDER + 1))
+        return levels_left(self.curve, self.route, self.spent)
 
     def _cheaper(self, here: _Stop) -> Iterator[Followed]:
         """Go on with fewer harmonics where no more are left."""
@@ -317,21 +313,10 @@ class _Walk:
         return reached or self.taken > MOST * self.route.points
 
     def _farthest(self) -> float:
-        forward = self.route.forward
-        return max((stop.point.p for stop in self.branch), key=lambda p: forward * p)
+        return self.route.farthest([stop.point.p for stop in self.branch])
 
     def _idle(self) -> bool:
-        """Whether the last points gained less than a step, or the branch left the range backwards."""
-        route, last = self.route, self.branch[-1].point.p
-        if route.listed:
-            return False
-        if route.before(last, route.first - BACKWARD * (route.last - route.first)):
-            return True
-        count = int(IDLE * route.points)
-        if len(self.branch) <= count:
-            return False
-        ways = [route.forward * stop.point.p for stop in self.branch]
-        return max(ways) - max(ways[:-count]) < abs(route.gap)
+        return self.route.idle([stop.point.p for stop in self.branch])
 
     def _further(self) -> float:
         """Return the value at which a lost branch is taken up."""
