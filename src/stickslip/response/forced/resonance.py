@@ -18,6 +18,8 @@ from stickslip.solve.newton_method import Solution, charged, newton
 from stickslip.solve.status import Rung
 
 NEARBY = 0.002  # half the bracket about a known peak, relative to its frequency
+PEAK_CHANGE = 0.005  # relative change of a peak by more harmonics that ends its audit
+ALMOST = 0.95  # share of the peak above which points get its harmonics
 PEAK_RESOLUTION = 5e-4  # width of the bracket of the peak, relative to its frequency, at which it counts as resolved
 
 
@@ -45,13 +47,36 @@ def resolve_peak(
     """
     known = [p for p in accepted if p.converged][:: int(problem.sweep.forward)]
     search = _Search(problem, load, iter(done))
-    heights = [problem.amplitude(p) for p in known]
-    for _ in range(problem.sweep.peak_points):
-        top = int(np.argmax(heights)) if heights else 0
+    yield from _refined(problem, search, known, problem.sweep.peak_points)
+    if not known or not problem.sweep.auto or not problem.sweep.peak_points:
+        return
+    top = known[_highest(problem, known)]
+    made = yield from search.settled(top, audit=True)
+    if made is top:
+        return
+    # what is nearly as high with fewer harmonics may only be so high because it has few
+    height = ALMOST * problem.amplitude(made)
+    for place, point in enumerate(known):
+        if point is top:
+            known[place] = made
+        elif problem.amplitude(point) >= height and point.harmonics.size < made.harmonics.size:
+            known[place] = yield from search.raised(point, made.support)
+    yield from _refined(problem, search, known, problem.sweep.peak_points)
+
+
+def _refined(
+    problem: ForcedProblem, search: "_Search", known: list[ForcedPoint], most: int
+) -> Iterator[ForcedPoint]:
+    """Add points around the highest of `known` until its bracket is narrow, at most so many."""
+    for _ in range(most):
+        if not known:
+            return
+        heights = [problem.amplitude(p) for p in known]
+        top = _highest(problem, known)
         seam = _on_seam(known, top)
         omega = known[top].omega if seam else _vertex(known, heights)
         if omega is None:
-            break
+            return
         aside = top - 1 if omega <= known[top].omega else min(top + 1, len(known) - 1)
         sides = known[max(top - 1, 0) : top + 2] if seam else (known[top], known[aside])
         point = yield from search.point(sides, omega)
@@ -59,9 +84,10 @@ def resolve_peak(
             return
         place = top if omega <= known[top].omega else top + 1
         known[place : place + seam] = [point]
-        heights[place : place + seam] = [problem.amplitude(point)]
-    if heights and problem.sweep.auto and problem.sweep.peak_points:
-        yield from search.settled(known[int(np.argmax(heights))], audit=True)
+
+
+def _highest(problem: ForcedProblem, known: Sequence[ForcedPoint]) -> int:
+    return int(np.argmax([problem.amplitude(p) for p in known]))
 
 
 def peak_from(problem: ForcedProblem, load: HarmonicLoad, point: ForcedPoint) -> ForcedPoint | None:
@@ -123,10 +149,26 @@ class _Search:
             more = yield from self._take(lambda: self._more(curve, now, level, stage))  # noqa: B023
             if not auto:
                 return more
-            if not more.converged or curve.agree(now, of_forced(curve, more)):
+            if not more.converged or self._enough(curve, made, more, audit=audit):
                 break
             made = yield from self._take(lambda: self._accepted(curve, more))  # noqa: B023
         return made
+
+    def _enough(
+        self, curve: ForcedCurve, made: ForcedPoint, more: ForcedPoint, *, audit: bool
+    ) -> bool:
+        """Whether more harmonics change a point by little; a peak by very little."""
+        change = self.problem.amplitude(more) / self.problem.amplitude(made) - 1.0
+        if audit and abs(change) > PEAK_CHANGE:
+            return False
+        return curve.agree(of_forced(curve, made), of_forced(curve, more))
+
+    def raised(self, point: ForcedPoint, support: Harmonics) -> Taken:
+        """Solve a point with the harmonics of a support; the point itself where that is not found."""
+        curve = self._curve(support)
+        now, level = of_forced(curve, point), curve.supports.index(support)
+        made = yield from self._take(lambda: self._more(curve, now, level, "peak"))
+        return made if made.converged else point
 
     def _take(self, make: Callable[[], ForcedPoint]) -> Taken:
         self.count += 1
