@@ -111,9 +111,11 @@ def truth(problem: ForcedProblem, point: ForcedPoint) -> float:
         at = partial(many.linearise, omega=point.omega)
         solution = newton(at, many.unknowns(point.coefficients), PATIENT)
         if solution.status.converged:
-            exact = many.coefficients(solution.x)[: len(point.coefficients)]
+            exact = many.coefficients(solution.x)
+            rows = min(len(exact), len(point.coefficients))
             one, other = (
-                problem.low.linear.recover(point.omega, q) for q in (point.coefficients, exact)
+                problem.low.linear.recover(point.omega, q[:rows])
+                for q in (point.coefficients, exact)
             )
             return problem.measure.change(one, other - one)[0]
     return float("nan")

@@ -92,7 +92,7 @@ class ForcedCurve:
     def judge(self, level: int, point: Point, latest: Latest) -> Judged:
         """Bound the error of a solution by what the strategy says of the harmonics of the next level."""
         strategy, forced = self.forced.strategy, self.forced
-        if always_kept(strategy) is not None:
+        if always_kept(strategy) is not None or (self.raises and self.levels == 1):
             return Judged()
         known = latest.known(point.x, point.p)
         left = known.events if isinstance(known, Linearisation) else None

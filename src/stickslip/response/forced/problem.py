@@ -20,6 +20,7 @@ from stickslip.harmonic.selection.strategy import (
     always_kept,
 )
 from stickslip.harmonic.support import Harmonics, is_full
+from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.branch import following_vibration
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
@@ -226,8 +227,10 @@ class ForcedProblem:
 
 
 def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedProblem:
-    """Set up the forced response of `system` under `load`."""
+    """Set up the forced response of `system` under `load`; a tuned wheel made for fewer harmonics than ``auto`` may take lowers its cap."""
     _refuse_ill_posed(system)
+    if sweep.auto and isinstance(system.structure, TunedWheel):
+        sweep = replace(sweep, cap=max(min(sweep.cap, system.structure.harmonics), 1))
     first, reference = sweep.first_harmonics, sweep.high_harmonics
     for h, force in load.harmonics.items():
         if h not in first and np.any(force):

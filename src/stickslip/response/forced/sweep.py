@@ -153,8 +153,8 @@ class Sweep:
     def supports(self) -> tuple[Harmonics, ...]:
         """Harmonics that ``auto`` goes through, the fewest first."""
         low = self.low_harmonics
-        more = [harmonics_of(rung) for rung in RUNGS if low[-1] < rung <= self.cap]
-        return (low, *more)
+        rungs = sorted({*(rung for rung in RUNGS if rung < self.cap), self.cap})
+        return (low, *(harmonics_of(rung) for rung in rungs if rung > low[-1]))
 
     @property
     def strategy(self) -> Strategy:
