@@ -416,6 +416,7 @@ def test_a_response_has_the_accuracy_of_the_reference_with_fewer_unknowns(passag
         omega_range=(HZ * 159.0, HZ * 164.0),
         frequencies=11,
         selection="goal_oriented",
+        high=5,
         passages=passages,
         peak_points=0,
     )
