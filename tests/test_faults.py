@@ -226,7 +226,7 @@ def test_a_run_at_work_keeps_its_files_from_a_fresh_one(tmp_path: Path) -> None:
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as first:
         assert first.stdout is not None
         for line in first.stdout:
-            if "low " in line:
+            if "point " in line:
                 break
         first.send_signal(signal.SIGSTOP)
         second = subprocess.run([*command, "--fresh"], capture_output=True, text=True, check=False)
