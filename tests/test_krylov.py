@@ -563,7 +563,11 @@ def test_size_chooses_the_form(monkeypatch):
     made = replace(problem(1.0), jacobian="auto")
     assert not made.structured
     assert isinstance(made.linearise(np.zeros(made.size), OMEGA).jac, np.ndarray)
-    monkeypatch.setattr(balance_module, "CROSSOVER", made.size - 1)
+    # products go through the harmonics one by one: with more of them there have to be more unknowns
+    more = 1.0 + (len(made.harmonics) - 1) / balance_module.MANY
+    monkeypatch.setattr(balance_module, "CROSSOVER", (made.size + 1) / more)
+    assert not made.structured
+    monkeypatch.setattr(balance_module, "CROSSOVER", (made.size - 1) / more)
     assert made.structured
     assert isinstance(made.linearise(np.zeros(made.size), OMEGA).jac, StructuredJacobian)
     # without harmonics nothing is saved, and the static problem is small

@@ -69,7 +69,7 @@ def judging_problem(case: SelectionCase) -> ForcedProblem:
 def low_order_points(case: SelectionCase) -> list[ForcedPoint]:
     """Return the first passage of a case, found and not found."""
     sweep = case.sweep(selection="always_low")
-    return list(forced_response(case.system, case.load, sweep))
+    return accepted_points(list(forced_response(case.system, case.load, sweep)))
 
 
 def truths(case: SelectionCase, points: Sequence[ForcedPoint]) -> list[Truth]:
