@@ -105,7 +105,8 @@ def by_default(drawn: Drawn) -> Drawn:
 
 def truth(problem: ForcedProblem, point: ForcedPoint) -> float:
     """Return the error of a point against many harmonics, a fraction; NaN where no solution is found from it."""
-    for order in TRUTHS:
+    most = getattr(problem.system.structure, "harmonics", TRUTHS[0])  # of a tuned wheel
+    for order in sorted({min(order, most) for order in TRUTHS}, reverse=True):
         samples = max(problem.low.samples, SAMPLES * order)
         many = replace(problem.low, samples=samples).with_harmonics(harmonics_of(order))
         at = partial(many.linearise, omega=point.omega)
