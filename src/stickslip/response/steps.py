@@ -18,7 +18,7 @@ PATIENT = 16  # iterations from a solution with other harmonics
 RECENT = 12  # points behind the last one that a step may go back along
 BACK = 0.3  # distance from the branch behind, as a share of the step, within which a step goes back along it
 
-EFFORT = 0.75  # work of a branch beside that of the most harmonics at each of its points, beyond half of which fewer are allowed
+EFFORT = 0.1  # work of a branch beside that of the most harmonics at each of its points, beyond half of which fewer are allowed
 STEPS_A_POINT = 6  # of Newton
 BESIDES = 200.0  # work for each point that is always allowed
 FEWEST = 2  # levels that are always allowed

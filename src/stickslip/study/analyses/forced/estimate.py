@@ -76,10 +76,10 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
 
 
 def within_limits(model: Model, sweep: Sweep, limits: Limits) -> Sweep:
-    """Return the sweep, its cap of ``auto`` lowered as far as the study's limits ask; one that is above them all the same is left to `check_limits`."""
+    """Return the sweep, its cap of ``auto`` lowered as far as the study's limits ask, but not below its second level; what is above them then is left to `check_limits`."""
     if not sweep.auto:
         return sweep
-    for support in reversed(sweep.supports):
+    for support in reversed(sweep.supports[1:] or sweep.supports):
         capped = replace(sweep, cap=support[-1])
         cost = estimate(model, capped)
         if above(limits, "", cost.memory_gb, cost.seconds) is None:

@@ -69,8 +69,10 @@ def _of_loss(loss: FloatArray, elastic: float) -> list[Jump]:
     found = []
     for k, (low, high) in enumerate(map(sorted, pairwise(loss))):
         beside = max([*step[max(k - 1, 0) : k], *step[k + 1 : k + 2]], default=0.0)
+        if low <= LOSS_SEEN * elastic:
+            continue  # rounding: this is where slip begins
         if high > max(least, LOSS_JUMP * low) and step[k] > LOSS_STEP * beside:
-            ratio = float(high / low) if low > 0.0 else np.inf
+            ratio = float(high / low)
             found.append(Jump(k, f"dissipation {ratio:.3g} times", ratio))
     return found
 
