@@ -305,7 +305,7 @@ WRONG = [
     ({"forced_response.peak_points": "true"}, "forced_response.peak_points: must be a whole number, got True."),
     ({"harmonics.selection": '"always_hihg"'}, "harmonics.selection: is not known, got 'always_hihg'. Did you mean 'always_high'?"),
     ({"solver.evaluator": '"event"'}, "solver.evaluator: is not known, got 'event'. Did you mean 'events'?"),
-    ({"harmonics.low": "7"}, "harmonics.high: must not be below low = 7, got 5. Raise it, or lower low."),
+    ({"harmonics.low": "7", "harmonics.high": "5"}, "harmonics.high: must not be below low = 7, got 5. Raise it, or lower low."),
     ({"harmonics.samples": "32"}, "harmonics.samples: must be at least 8 times high = 5, got 32."),
     ({"harmonics.alert_over": '"contact"'}, "harmonics.alert_over: must be along, outputs, contacts or a list of labels, got 'contact'. Did you mean 'contacts'?"),
     ({"part.damper.inertia_kg_m2": "[1.0e-5, 1.0e-6, 1.0e-6]"}, "part.damper.inertia_kg_m2: the largest moment exceeds the sum of the other two"),
