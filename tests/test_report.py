@@ -254,11 +254,13 @@ def test_verdicts_are_listed_the_worst_first_with_their_remedies(tmp_path: Path)
     )
     data.attrs["verdicts"] = to_json(each)
     text = page_text(report(data, tmp_path, complete=0))
-    assert "Verdicts: 1 wrong, 2 doubtful" in text
-    assert f"wrong {KEY} = 2: 170.00 Hz: did not converge. Take more points." in text
-    assert text.index("did not converge. Take") < text.index("doubtful the run is not complete")
-    assert "doubtful the damper may drift along y. Hold it." in text
-    assert "the response folds. Points outside belong to the fold." in text
+    told = "Not to be trusted as it stands: the run is not complete; forced response: wrong. See the verdicts."
+    assert told in text
+    assert f"WRONG: {KEY} = 2: 170.00 Hz: did not converge. Take more points." in text
+    assert text.index("did not converge. Take") < text.index("DOUBTFUL: The run is not complete")
+    assert "DOUBTFUL: The damper may drift along y. Hold it." in text
+    assert "NOTE: The response folds. Points outside belong to the fold." in text
+    assert f"TRUSTED: {KEY} = 5: 171.00 Hz: peak with H = 5, stable." in text
     assert "Trusted, and what for: 1" in text
 
 
@@ -282,7 +284,7 @@ def test_harmonics_that_were_raised_along_the_branch_are_told_as_such(tmp_path: 
 def test_warnings_of_older_results_are_doubts(tmp_path: Path) -> None:
     data = synthetic_result()
     data.attrs["warnings"] = json.dumps(["3 points did not converge. Take more."])
-    assert "doubtful 3 points did not converge. Take more." in page_text(report(data, tmp_path))
+    assert "DOUBTFUL: 3 points did not converge. Take more." in page_text(report(data, tmp_path))
 
 
 def test_symbols_say_what_is_doubtful_and_what_is_wrong() -> None:
@@ -305,11 +307,24 @@ def test_symbols_say_what_is_doubtful_and_what_is_wrong() -> None:
     assert "1 doubtful point (open symbols), 1 wrong (crosses)" in plot.caption
     assert {"doubtful", "wrong"} <= {t.name for t in plot.figure.data}
     assert "<td>doubtful</td>" in peaks(view)
-    assert ("doubtful", "verdict on the peak") in [(c.value, c.label) for c in cards(view)]
+    told = {c.label: (c.value, c.note) for c in cards(view)}
+    assert told["verdict on the case"] == ("doubtful", "of 13 points 1 doubtful, 1 wrong")
+
+
+def test_the_tile_counts_the_doubtful_points_of_trusted_cases() -> None:
+    data = synthetic_result(ratios=(20, 5), n=10)
+    levels = np.zeros(data.sizes["point"], dtype=np.int64)
+    levels[[2, 3]] = 1
+    data["verdict"], data["case_verdict"] = ("point", levels), ("case", [0, 0])
+    (card,) = (c for c in cards(Response(data)) if c.label == "cases to be trusted")
+    assert (card.value, card.note) == ("2 of 2", "of 26 points 2 doubtful")
+    data["case_verdict"] = ("case", [0, 1])
+    (card,) = (c for c in cards(Response(data)) if c.label == "cases to be trusted")
+    assert (card.value, card.note) == ("1 of 2", "1 doubtful; of 26 points 2 doubtful")
 
 
 def test_a_clean_run_says_so(page: Path) -> None:
-    assert "Nothing is doubtful. The run is complete." in page_text(page)
+    assert "Every answer is trusted." in page_text(page)
 
 
 def _without(*prefixes: str) -> Callable[[xr.Dataset], xr.Dataset]:
@@ -512,7 +527,7 @@ def test_a_toy_analysis_adds_its_section_by_a_line(monkeypatch: pytest.MonkeyPat
     assert "<h2>The toy</h2>" in html
     assert "Figure 1. A toy." in html
     assert list(plots(tree)) == ["toy"]
-    assert '<li><b class="doubtful">doubtful</b> so so.</li>' in html
+    assert '<li><b class="doubtful">DOUBTFUL:</b> So so.</li>' in html
 
 
 def test_flagged_ranges_are_runs_of_neighbouring_points(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from stickslip.study.analyses.forced.verdicts import verdicts, with_levels
 from stickslip.study.analyses.verdict import (
     LEVELS,
     Verdict,
+    conclusion,
     doubt,
     from_json,
     not_trusted,
@@ -302,7 +303,17 @@ def test_the_last_line_names_the_cases_that_are_not_trusted() -> None:
         "Not to be trusted as it stands: forced response: 1 of 3 cases wrong (c), 1 of 3 cases doubtful (b); modes: doubtful. "
         "See the verdicts."
     )
-    assert not_trusted(xr.DataTree.from_dict({"forced_response": data.isel(case=[0])})) == ""
+    first = data.isel(case=[0]).assign(verdict=("point", [0, 1, 2, 1]))
+    good = xr.DataTree.from_dict({"forced_response": first})
+    assert not_trusted(good) == ""
+    assert conclusion(good) == (
+        "Every answer is trusted. Of 4 points 1 wrong, 2 doubtful, none of them the peak of its case."
+    )
+    good.attrs["complete"] = 0
+    assert (
+        conclusion(good)
+        == "Not to be trusted as it stands: the run is not complete. See the verdicts."
+    )
     one = xr.DataTree.from_dict({"forced_response": data.isel(case=[2])})
     assert "forced response: wrong. See" in not_trusted(one)
     assert of_tree(tree) == (doubt("rough"),)
@@ -324,18 +335,19 @@ def test_a_journey_says_the_same_on_the_screen_on_the_page_in_the_file_and_in_py
     assert data.case_verdict.attrs["flag_meanings"] == "trusted doubtful wrong"
     assert stored(data.attrs) == result.verdicts
     page = unescape(re.sub(r"<[^>]*>", "", (tmp_path / "results/report.html").read_text("utf-8")))
-    for v in (v for v in result.verdicts if v.told):
+    for v in result.verdicts:
         assert str(v) in said
-        assert v.why in page
-        assert v.remedy in page
-        assert str(v) in repr(result)
-    assert said.rstrip().splitlines()[-1] == result.not_trusted
+        assert str(v) in page
+        assert (str(v) in repr(result)) is v.told
+    assert said.rstrip().splitlines()[-1] == result.not_trusted == result.conclusion
+    assert result.conclusion in page
+    assert result.conclusion in repr(result)
     assert "1 of 2 cases doubtful (load.shaker.force_n = 8)" in said
     assert result.peaks["verdict"].tolist() == ["trusted", "doubtful"]
     assert math.isclose(result.verdicts[0].frequency_hz or 0.0, float(data.peak_frequency_hz[0]))
     good = result.verdicts[0]
     assert (good.level, good.case) == ("trusted", "load.shaker.force_n = 0.01")
-    assert str(good) not in said
+    assert str(good).startswith("TRUSTED: load.shaker.force_n = 0.01: ")
 
 
 def test_an_integration_examines_the_harmonics_of_its_point() -> None:

@@ -235,18 +235,19 @@ def _say(text: str) -> None:
 
 
 def _print_result(result: "Result", files: Sequence[Path]) -> None:
-    """Print the tables of all analyses, the verdicts, which files there are, and last what is not to be trusted."""
+    """Print the tables of all analyses, the verdicts, which files there are, and last whether to trust it."""
+    from stickslip.study.analyses.verdict import worst_first
+
     for table in (t for tables in result.summaries.values() for t in tables):
         _print_table(table)
-    _print_lines("Verdicts", [str(v) for v in result.verdicts if v.told])
+    _print_lines("Verdicts", [str(v) for v in worst_first(result.verdicts)])
     if result.failed:
         told = (
             f"{result.failed} of the points: marked in the result and in the report, not filled in"
         )
         _print_lines("Not converged", [told])
     _print_lines("Files", [str(f) for f in files])
-    if result.not_trusted:
-        _say(f"\n{result.not_trusted}")
+    _say(f"\n{result.conclusion}")
 
 
 def _print_table(found: "TextTable") -> None:

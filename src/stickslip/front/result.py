@@ -14,7 +14,7 @@ from stickslip.front.table import Table
 from stickslip.report.page import plots, write_report
 from stickslip.report.result import RESULT, open_result
 from stickslip.study.analyses.analysis import TextTable
-from stickslip.study.analyses.verdict import LEVELS, Verdict, not_trusted, of_tree
+from stickslip.study.analyses.verdict import LEVELS, Verdict, conclusion, not_trusted, of_tree
 from stickslip.study.keep.netcdf import write_tree
 from stickslip.study.outcome import Outcome
 
@@ -149,6 +149,11 @@ class Result:
         """A line that says which cases are doubtful or wrong; empty where all are trusted."""
         return not_trusted(self.data)
 
+    @property
+    def conclusion(self) -> str:
+        """The last line of a run: `not_trusted`, or that every answer is trusted and how many single points are not."""
+        return conclusion(self.data)
+
     def saved(self, folder: Path) -> "Result":
         """Return the result with a file in a folder, which is made."""
         folder.mkdir(parents=True, exist_ok=True)
@@ -163,6 +168,7 @@ class Result:
             lines.append(f"  {name}: {size}" + (f", {points} points" if points else ""))
         lines.append(f"  plots: {', '.join(self.plots)}")
         lines += [f"  {v}" for v in self.verdicts if v.told]
+        lines.append(f"  {self.conclusion}")
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:

@@ -1,6 +1,5 @@
 """What every page is made of: numbered figures, chapters, boxes, and the frame around them."""
 
-from collections import Counter
 from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
@@ -10,7 +9,7 @@ from plotly.offline import get_plotlyjs
 
 from stickslip.report.plot import Plot
 from stickslip.report.section import Card
-from stickslip.study.analyses.verdict import LEVELS, Verdict
+from stickslip.study.analyses.verdict import Verdict, worst_first
 from stickslip.study.keep.whole import write_whole
 
 _CONFIG = {
@@ -54,29 +53,34 @@ def cards_html(cards: Sequence[Card]) -> str:
     return f'<div class="cards">{boxes}</div>' if boxes else ""
 
 
-def verdicts_html(verdicts: Sequence[Verdict]) -> str:
-    """Return what is doubtful or wrong, why, and what to do, the worst first; below it what is trusted."""
-    bad = sorted((v for v in verdicts if v.rank), reverse=True)
-    notes = [v for v in verdicts if v.told and not v.rank]
-    good = [v for v in verdicts if not v.told]
-    top = '<div class="box good"><b>Nothing is doubtful.</b> The run is complete.</div>'
-    if bad:
-        counts = Counter(v.level for v in bad)
-        said = ", ".join(f"{counts[level]} {level}" for level in LEVELS[::-1] if counts[level])
-        top = f'<div class="box bad"><b>Verdicts: {said}</b><ul>{"".join(map(_verdict, bad))}</ul></div>'
-    top += f'<div class="box"><ul>{"".join(map(_verdict, notes))}</ul></div>' if notes else ""
+def verdicts_html(verdicts: Sequence[Verdict], told: str, *, bad: bool) -> str:
+    """Return what is not trusted, why, and what to do, the worst first; folded below it what is trusted.
+
+    Parameters
+    ----------
+    verdicts
+        All of a result.
+    told
+        The conclusion, as the last line of a run says it.
+    bad
+        Whether a case or an analysis is not trusted.
+    """
+    every = worst_first(verdicts)
+    shown = [v for v in every if v.told]
+    good = [v for v in every if not v.told]
+    kind = "bad" if bad else "some" if any(v.rank for v in shown) else "good"
+    items = f"<ul>{''.join(map(_verdict, shown))}</ul>" if shown else ""
+    top = f'<div class="box {kind}"><b>{escape(told)}</b>{items}</div>'
     if not good:
         return top
-    items = "".join(map(_verdict, good))
-    return f"{top}<details><summary>Trusted, and what for: {len(good)}</summary><ul>{items}</ul></details>"
+    rest = "".join(map(_verdict, good))
+    return f"{top}<details><summary>Trusted, and what for: {len(good)}</summary><ul>{rest}</ul></details>"
 
 
 def _verdict(verdict: Verdict) -> str:
-    place = "" if verdict.frequency_hz is None else f"{verdict.frequency_hz:.2f} Hz: "
-    case = f"{escape(verdict.case)}: " if verdict.case else ""
-    level = f'<b class="{verdict.level}">{verdict.level}</b> ' if verdict.rank else ""
     remedy = f" <i>{escape(verdict.remedy)}</i>" if verdict.remedy else ""
-    return f"<li>{level}{case}{place}{escape(verdict.why)}.{remedy}</li>"
+    word = f'<b class="{verdict.word}">{verdict.word.upper()}:</b>'
+    return f"<li>{word} {escape(verdict.finding)}{remedy}</li>"
 
 
 def page_html(title: str, made: str, body: str) -> str:

@@ -28,7 +28,7 @@ from stickslip.report.result import analysis, open_result, versions
 from stickslip.report.section import Card, Part, Section, Shown
 from stickslip.report.sections import campbell, forced_response, modes, safe
 from stickslip.report.tables import html_table
-from stickslip.study.analyses.verdict import of_tree
+from stickslip.study.analyses.verdict import conclusion, not_trusted, of_tree
 from stickslip.study.keep.netcdf import alike, one_case
 
 SECTIONS: tuple[Section, ...] = (
@@ -151,7 +151,9 @@ def report_html(tree: xr.DataTree) -> str:
     chapters.append(chapter("provenance", "Provenance", _provenance(tree)))
     root = Node(tree.to_dataset())
     made = f"stickslip {root.text('stickslip_version')} · {root.text('created')}"
-    top = cards_html(cards) + verdicts_html(of_tree(tree))
+    top = cards_html(cards) + verdicts_html(
+        of_tree(tree), conclusion(tree), bad=bool(not_trusted(tree))
+    )
     return page_html(root.text("title") or "Result", made, top + "".join(chapters))
 
 

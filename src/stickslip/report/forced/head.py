@@ -86,15 +86,22 @@ def _work_cards(response: Response) -> list[Card]:
 
 
 def _verdict_card(response: Response) -> Card | None:
-    """Return how many cases are trusted; of one case its verdict."""
+    """Return how many cases are trusted, of one case its verdict; and how many points are not."""
     levels = [response.level(c) for c in response.cases]
     if not levels[0]:
         return None
+    points = {level: int(np.sum(response.levels == k)) for k, level in enumerate(LEVELS) if k}
+    off = [f"{n} {level}" for level, n in points.items() if n]
+    note = f"of {counted(response.levels.size, 'point')} {', '.join(off) or 'none is doubtful'}"
     if len(levels) == 1:
-        return Card(levels[0], "verdict on the peak", "the list below says why")
-    counts = {level: levels.count(level) for level in LEVELS[1:]}
-    note = ", ".join(f"{n} {level}" for level, n in counts.items() if n) or "none is doubtful"
-    return Card(f"{levels.count('trusted')} of {len(levels)}", "cases to be trusted", note)
+        return Card(levels[0], "verdict on the case", note)
+    cases = {level: levels.count(level) for level in LEVELS[1:]}
+    others = [f"{n} {level}" for level, n in cases.items() if n]
+    return Card(
+        f"{levels.count('trusted')} of {len(levels)}",
+        "cases to be trusted",
+        "; ".join([*([", ".join(others)] if others else []), note]),
+    )
 
 
 def cards(response: Response) -> list[Card]:

@@ -11,6 +11,7 @@ import xarray as xr
 Level = Literal["trusted", "doubtful", "wrong"]
 LEVELS: tuple[Level, ...] = get_args(Level)  # the number of a level in a dataset is its place
 ATTRIBUTE = "verdicts"  # of the dataset of an analysis
+INCOMPLETE = "the run is not complete"
 
 
 @dataclass(frozen=True)
@@ -50,13 +51,23 @@ class Verdict:
         return self.rank > 0 or bool(self.remedy)
 
     @property
+    def word(self) -> str:
+        """What begins it wherever it is shown: its level, or ``note`` where it is trusted and there is something to do or to know."""
+        return "note" if self.told and not self.rank else self.level
+
+    @property
+    def finding(self) -> str:
+        """The verdict in words, but for its level and what to do."""
+        place = "" if self.frequency_hz is None else f"{self.frequency_hz:.2f} Hz: "
+        return said(self.case, f"{place}{self.why}.")
+
+    @property
     def sentence(self) -> str:
         """The verdict in words, but for its level."""
-        place = "" if self.frequency_hz is None else f"{self.frequency_hz:.2f} Hz: "
-        return said(self.case, f"{place}{self.why}. {self.remedy}".rstrip())
+        return f"{self.finding} {self.remedy}".rstrip()
 
     def __str__(self) -> str:
-        return f"{self.level.upper() if self.rank else 'NOTE'}: {self.sentence}"
+        return f"{self.word.upper()}: {self.sentence}"
 
     def __lt__(self, other: "Verdict") -> bool:
         return self.rank < other.rank
@@ -90,6 +101,11 @@ def of_all_cases(each: Sequence[Verdict], labels: Sequence[str]) -> tuple[Verdic
     return tuple(found)
 
 
+def worst_first(verdicts: Iterable[Verdict]) -> list[Verdict]:
+    """Return verdicts as they are read: wrong, doubtful, notes, trusted; the order of the cases within each."""
+    return sorted(verdicts, key=lambda v: (-v.rank, not v.told))
+
+
 def to_json(verdicts: Iterable[Verdict]) -> str:
     """Return verdicts as the text of a JSON list."""
     return json.dumps([asdict(v) for v in verdicts])
@@ -110,21 +126,40 @@ def stored(attributes: Mapping[Any, Any]) -> tuple[Verdict, ...]:
     return tuple(doubt(str(text)) for text in json.loads(str(attributes.get("warnings", "[]"))))
 
 
+def _incomplete(tree: xr.DataTree) -> bool:
+    nodes = [tree, *tree.children.values()]
+    return any(int(node.attrs.get("complete", 1)) == 0 for node in nodes)
+
+
 def of_tree(tree: xr.DataTree) -> tuple[Verdict, ...]:
     """Return the verdicts of all analyses of a result."""
     nodes = [tree, *tree.children.values()]
     found: list[Verdict] = []
-    if any(int(node.attrs.get("complete", 1)) == 0 for node in nodes):
+    if _incomplete(tree):
         remedy = "Run the study again: it resumes where it stopped."
-        found = [Verdict("doubtful", why="the run is not complete", remedy=remedy)]
+        found = [Verdict("doubtful", why=INCOMPLETE, remedy=remedy)]
     return tuple(dict.fromkeys([*found, *(v for node in nodes for v in stored(node.attrs))]))
 
 
 def not_trusted(tree: xr.DataTree) -> str:
     """Say in a line which analyses, and which of their cases, are doubtful or wrong; empty where all are trusted."""
-    each = [_not_trusted(str(name), node.to_dataset()) for name, node in tree.children.items()]
+    each = [INCOMPLETE] * _incomplete(tree)
+    each += [_not_trusted(str(name), node.to_dataset()) for name, node in tree.children.items()]
     told = "; ".join(text for text in each if text)
     return f"Not to be trusted as it stands: {told}. See the verdicts." if told else ""
+
+
+def conclusion(tree: xr.DataTree) -> str:
+    """Say in a line whether a result is to be trusted: `not_trusted`, or else which single points are not."""
+    told = not_trusted(tree)
+    if told:
+        return told
+    found = [node["verdict"].values for node in tree.children.values() if "verdict" in node]
+    every = np.concatenate([np.zeros(0, dtype=np.int64), *found])
+    counts = {LEVELS[k]: int(np.sum(every == k)) for k in (2, 1)}
+    off = ", ".join(f"{n} {level}" for level, n in counts.items() if n)
+    aside = f" Of {every.size} points {off}, none of them the peak of its case." if off else ""
+    return f"Every answer is trusted.{aside}"
 
 
 def _not_trusted(name: str, data: xr.Dataset) -> str:
