@@ -8,6 +8,7 @@ import scipy.sparse
 from stickslip.assembly.model import Model
 from stickslip.harmonic.balance import CROSSOVER
 from stickslip.harmonic.selection.strategy import always_kept
+from stickslip.harmonic.support import named
 from stickslip.model.part import Part
 from stickslip.response.forced.response import Sweep
 from stickslip.study.file.loads import Limits
@@ -34,26 +35,43 @@ class Estimate:
     memory_gb
         Largest memory.
     newton_steps
-        Of all points.
-    seconds
-        Of one core: model and solver together, without time integration.
+        Of all points, at most.
+    model_seconds
+        Of one core, to mesh and reduce the parts and find their frequencies; cases with the same parts share it.
+    least_seconds, most_seconds
+        Of one core, to solve the response: where the fewest harmonics do at every point, and where as many points as may be need the most.
+        Stability and time integration are not counted.
+    most
+        What the most stands for, in words; empty where both are the same.
     """
 
     nodes: int
     unknowns: int
     memory_gb: float
     newton_steps: int
-    seconds: float
+    model_seconds: float
+    least_seconds: float
+    most_seconds: float
+    most: str = ""
+
+    @property
+    def seconds(self) -> float:
+        """What ``limits.work_s`` is held against: the model and the most that its response takes."""
+        return self.model_seconds + self.most_seconds
 
     def __str__(self) -> str:
+        least, most = (f"{s:.1g}" if s < 10 else f"{s:.0f}" for s in (self.least_seconds, self.most_seconds))  # fmt: skip
+        solving = f"{least} to {most} s" if least != most else f"{most} s"
+        meant = f" (the most: {self.most})" if self.most else ""
         return (
-            f"estimate: {self.unknowns} unknowns at most, {self.memory_gb:.1f} GB of memory, "
-            f"{self.newton_steps} Newton steps, {self.seconds:.0f} s"
+            f"estimate: about {self.model_seconds:.0f} s for the parts, once, and {solving} to solve this case{meant}; stability and time "
+            f"integration not counted. At most {self.newton_steps} Newton steps, {self.unknowns} unknowns, {self.memory_gb:.1f} GB of "
+            f"memory. limits.work_s is held against {self.seconds:.0f} s"
         )
 
 
 def estimate(model: Model, sweep: Sweep) -> Estimate:
-    """Estimate memory and work of the response of a model that is not assembled yet."""
+    """Estimate memory and work of the response of a model that is not assembled yet: how many points slip nobody knows before."""
     nodes, coordinates = nodes_of(model), retained_of(model)
     low, high = (
         (2 * len(own) - 1) * coordinates for own in (sweep.low_harmonics, sweep.high_harmonics)
@@ -67,12 +85,27 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
     judged = 0 if kept else points * some if sweep.auto else points
     steps_high = points * share_high * NEWTON_A_POINT
     steps_low = 0 if kept == "high" else points * NEWTON_A_POINT
-    flops = steps_low * _flops(low) + (steps_high + judged) * _flops(high)
-    steps = (steps_low + steps_high + judged) * SECONDS_A_STEP
-    seconds = flops / FLOPS + steps + nodes * SECONDS_A_NODE
+    of_low, of_high = (_flops(n) / FLOPS + SECONDS_A_STEP for n in (low, high))
+    most_seconds = steps_low * of_low + (steps_high + judged) * of_high
+    # without a budget strategies look at the larger space wherever they stand
+    least_seconds = (
+        most_seconds if kept else steps_low * of_low + (0 if sweep.auto else judged * of_high)
+    )
+    harmonics = (
+        f"H = {named(sweep.high_harmonics)} at {100 * share_high:.0f} % of {points:.0f} points"
+    )
     stored = points * (sweep.high_harmonics[-1] + 1) * 10 * coordinates * 16 / 1e9
     memory = memory_gb(nodes) + stored + 6 * high**2 * 8 / 1e9
-    return Estimate(nodes, high, memory, round(steps_low + steps_high), seconds)
+    return Estimate(
+        nodes=nodes,
+        unknowns=high,
+        memory_gb=memory,
+        newton_steps=round(steps_low + steps_high),
+        model_seconds=nodes * SECONDS_A_NODE,
+        least_seconds=least_seconds,
+        most_seconds=most_seconds,
+        most="" if kept else harmonics,
+    )
 
 
 def within_limits(model: Model, sweep: Sweep, limits: Limits) -> Sweep:
