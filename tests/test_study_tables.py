@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import tomllib
 from pathlib import Path
 from typing import get_args
@@ -28,6 +29,7 @@ from stickslip.model.mesh.sector_parts import Shroud
 from stickslip.model.rigid.damper import FlatCurvedDamper
 from stickslip.study.file.contacts import ContactTable, keys_of
 from stickslip.study.file.example import Kind, example_text
+from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.file.quantities import build, table_of
 from stickslip.study.file.study import read_file
 from stickslip.study.file.tables import json_schema
@@ -306,7 +308,10 @@ WRONG = [
     ({"harmonics.selection": '"always_hihg"'}, "harmonics.selection: is not known, got 'always_hihg'. Did you mean 'always_high'?"),
     ({"solver.evaluator": '"event"'}, "solver.evaluator: is not known, got 'event'. Did you mean 'events'?"),
     ({"harmonics.low": "7", "harmonics.high": "5"}, "harmonics.high: must not be below low = 7, got 5. Raise it, or lower low."),
-    ({"harmonics.samples": "32"}, "harmonics.samples: must be at least 8 times high = 5, got 32."),
+    ({"harmonics.samples": "32", "harmonics.high": "5"}, "harmonics.samples: must be at least 8 times high = 5, got 32."),
+    ({"harmonics.low": "9"}, "harmonics.samples: must be at least 8 times low = 9, got 64. Give at least 72, better 128."),
+    ({"harmonics.samples": "32"}, "harmonics.samples: must be at least 8 times the harmonic 5 that high = 'auto' begins with, got 32. Give at least 40, better 64."),
+    ({"forced_response.stability": '"yes"'}, "forced_response.stability: is not known, got 'yes'. Known: all, off, peak. It says whether a disturbance dies, by Floquet multipliers. peak: at the peak"),
     ({"harmonics.alert_over": '"contact"'}, "harmonics.alert_over: must be along, outputs, contacts or a list of labels, got 'contact'. Did you mean 'contacts'?"),
     ({"part.damper.inertia_kg_m2": "[1.0e-5, 1.0e-6, 1.0e-6]"}, "part.damper.inertia_kg_m2: the largest moment exceeds the sum of the other two"),
     ({"part.damper.inertia_kg_m2": "[1.0e-5, 1.0e-6]"}, "part.damper.inertia_kg_m2: has the wrong number of entries"),
@@ -320,6 +325,18 @@ WRONG = [
     ({"vary.load.shaker.ratio": "20"}, "vary.load.shaker.ratio: must be a list of values, got 20."),
     ({"vary.contact.flat.friction_coefficient": "[0.1, 0.2]"}, "must be of one length: contact.flat.friction_coefficient has 2, load.shaker.ratio has 1."),
 ]  # fmt: skip
+
+
+@pytest.mark.parametrize("given", [{"high": 41}, {"low": 41}, {"low": 2, "high": [2, 41]}])
+def test_without_samples_the_harmonics_are_named_that_need_more(given):
+    key, value = [*given.items()][-1]
+    said = f"needs at least 328 samples of a period.*256 where it is not given, got {re.escape(str(value))}"
+    with pytest.raises(
+        ValidationError, match=rf"{said}.*Add samples = 512, or lower {key}"
+    ) as told:
+        Harmonics.model_validate(given)
+    assert told.value.errors()[0]["ctx"]["key"] == key
+    Harmonics.model_validate(given | {"samples": 512})
 
 
 @pytest.mark.parametrize(("changes", "said"), WRONG, ids=[said[:50] for _, said in WRONG])

@@ -151,9 +151,9 @@ def new(
         except OSError as error:
             raise unwritable(target, error) from None
         write_whole(target, example_text(kind).encode())
-        step = "name your model's file in it, " if kind == "file" else ""
-        command = "check" if kind == "file" else "run"
-        typer.echo(f"{target} written. Next: {step}stickslip {command} {target}")
+        step = "name your model's file in it, then " if kind == "file" else ""
+        typer.echo(f"{target} written. Next: {step}stickslip check {target}")
+        typer.echo(f"and when that is good to run: stickslip run {target}")
 
 
 @app.command()

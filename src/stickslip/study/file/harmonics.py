@@ -18,6 +18,7 @@ from stickslip.study.file.section import Positive, Section, custom_error, refuse
 HIGHEST = RUNGS[-1]  # harmonic that a study may keep
 SELECTIONS = tuple(STRATEGIES)
 DEFAULT_SELECTION = str({f.name: f.default for f in fields(Sweep)}["selection"])
+SAMPLES_A_HARMONIC = 8  # of a period, at least
 PLACES = ("along", "outputs", "contacts")
 
 Harmonic = Annotated[int, Field(ge=1, le=HIGHEST)]
@@ -159,11 +160,34 @@ def _of_supports(table: Harmonics) -> Iterator[PydanticCustomError]:
             f"Add {lacking}, or leave that out of low.",
             "high",
         )
-    if table.samples < 8 * high[-1]:
+    yield from _of_samples(table, high[-1])
+
+
+def _of_samples(table: Harmonics, highest: int) -> Iterator[PydanticCustomError]:
+    """Refuse too few samples by the key that the file has: ``samples``, or the one that asks for the highest harmonic."""
+    fewest = SAMPLES_A_HARMONIC * highest
+    if table.samples >= fewest:
+        return
+    key = "low" if table.high == "auto" and table.low_harmonics[-1] == highest else "high"
+    value = getattr(table, key)
+    better = 2 ** (fewest - 1).bit_length()
+    if "samples" in table.model_fields_set:
+        of = (
+            f"the harmonic {highest} that {key} = {value!r} begins with"
+            if value == "auto"
+            else f"{key} = {value}"
+        )
         yield custom_error(
-            f"must be at least 8 times high = {high[-1]}, got {table.samples}",
-            f"Give at least {8 * high[-1]}, better a power of two.",
+            f"must be at least {SAMPLES_A_HARMONIC} times {of}, got {table.samples}",
+            f"Give at least {fewest}, better {better}.",
             "samples",
+        )
+    else:
+        yield custom_error(
+            f"needs at least {fewest} samples of a period, {SAMPLES_A_HARMONIC} times its highest harmonic, and samples is "
+            f"{table.samples} where it is not given, got {value}",
+            f"Add samples = {better}, or lower {key}.",
+            key,
         )
 
 

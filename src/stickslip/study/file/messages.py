@@ -155,11 +155,18 @@ def _problem(spot: Spot, details: ErrorDetails, context: dict[str, Any]) -> tupl
         return f"unknown key {spot.keys[-1]!r}", did_you_mean(spot.keys[-1], known)
     if kind == "literal_error":
         known = context["expected"].replace("'", "").replace(" or ", ", ").split(", ")
-        return f"is not known, got {got}", did_you_mean(str(details["input"]), known)
+        return f"is not known, got {got}", _one_of(str(details["input"]), known, spot.about)
     said = _KINDS.get(kind) or details["msg"]
     for of_pydantic, ours in _WORDS:
         said = said.replace(of_pydantic, ours)
     return f"{said[0].lower()}{said[1:]}, got {got}", f"Give {spot.about}."
+
+
+def _one_of(word: str, known: list[str], about: str) -> str:
+    """Return the word that was meant, or all that are known with what they mean, where the list alone is not that."""
+    remedy = did_you_mean(word, known)
+    listed = about == NO_ABOUT or about.endswith(", ".join(known))
+    return remedy if listed or not remedy.startswith("Known: ") else f"{remedy} It says {about}."
 
 
 _KINDS = {
