@@ -327,7 +327,7 @@ WRONG = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("given", [{"high": 41}, {"low": 41}, {"low": 2, "high": [2, 41]}])
+@pytest.mark.parametrize("given", [{"high": 41}, {"low": 41}, {"low": [2], "high": [2, 41]}])
 def test_without_samples_the_harmonics_are_named_that_need_more(given):
     key, value = [*given.items()][-1]
     said = f"needs at least 328 samples of a period.*256 where it is not given, got {re.escape(str(value))}"
