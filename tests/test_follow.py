@@ -1,6 +1,6 @@
 """The follower with harmonics that change along the branch: closed forms, folds, audits, and runs that are taken up again."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -12,7 +12,8 @@ from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
-from stickslip.response.follow import AUDITED
+from stickslip.response.branch import OneLevel, Route, branch_of, steps_through
+from stickslip.response.follow import AUDITED, follow
 from stickslip.response.forced.along import ForcedCurve
 from stickslip.response.forced.response import (
     Sweep,
@@ -21,6 +22,7 @@ from stickslip.response.forced.response import (
     forced_response,
 )
 from stickslip.response.system import System
+from stickslip.solve.branch import Following
 from stickslip.solve.newton_method import Newton, newton
 
 HZ = 2 * np.pi
@@ -263,3 +265,55 @@ def test_an_interrupted_run_goes_on_to_the_same_points_bit_for_bit(way):
             for name in ARRAYS:
                 assert np.array_equal(getattr(new, name), getattr(old, name)), (known, name)
             assert np.array_equal(new.predicted_error, old.predicted_error, equal_nan=True)
+
+
+# ---- one level ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Parted:
+    """``x² = (p - 1) (p - 2)``: two branches, and nothing between p = 1 and p = 2."""
+
+    residual: np.ndarray
+    jac: np.ndarray
+    jac_p: np.ndarray
+    seconds_contact: float = 0.0
+
+
+class Parabolas:
+    """See `Parted`; the second unknown is 1 and gives the first a size to be measured by."""
+
+    def linearise(self, x, p):
+        return Parted(
+            np.array([x[0] ** 2 - (p - 1.0) * (p - 2.0), x[1] - 1.0]),
+            np.array([[2.0 * x[0], 0.0], [0.0, 1.0]], order="F"),
+            np.array([3.0 - 2.0 * p, 0.0]),
+        )
+
+
+@pytest.mark.parametrize("leaves", [True, False])
+def test_a_branch_that_leads_back_is_left_and_taken_up_where_the_next_one_is(leaves):
+    exact = Newton(tolerance=1e-12)
+
+    def begin(p, near, most):
+        return newton(lambda x: Parabolas().linearise(x, p), [*near, np.ones(2)][0], exact)
+
+    way = Following(newton=exact, control=steps_through(3.0, 30), weights=np.ones(2))
+    curve = OneLevel(Parabolas(), way, begin)
+    found = branch_of(follow(curve, Route(first=0.0, last=3.0, points=30, leaves=leaves)))
+    lost = [f.p for f in found if not f.converged]
+    kept = [f for f in found if f.converged]
+    assert [f.index for f in found] == list(range(len(found)))
+    assert found[-1].p == 3.0
+    assert found[-1].converged
+    assert max(abs(f.point.x[0] ** 2 - (f.p - 1.0) * (f.p - 2.0)) for f in kept) < 1e-10
+    assert not any(1.0 < f.p < 2.0 for f in kept)
+    if (
+        leaves
+    ):  # back beyond its start by a tenth of the range, then on by a step of the range each time
+        assert -0.6 < min(f.p for f in kept) < -0.3
+        assert all(1.0 < p < 2.0 for p in lost)
+        assert len(lost) >= 9
+    else:  # the second sheet leads away for good, and only the end is looked for
+        assert lost == []
+        assert min(f.p for f in kept) < -10.0

@@ -10,8 +10,8 @@ from models import lifting
 from evidence.models.lumped import blades_and_damper, griffin
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response import ladder
 from stickslip.response.branch import BACKWARD
-from stickslip.response.forced import ladder
 from stickslip.response.forced.response import (
     Sweep,
     accepted_pairs,

@@ -8,8 +8,8 @@ import pytest
 
 from evidence.models.random_machines import draw
 from stickslip.response.equilibrium import preload
-from stickslip.response.forced.homotopies import growing_load, homotopies, with_friction
 from stickslip.response.forced.response import accepted_points, forced_problem, forced_response
+from stickslip.response.homotopies import growing_load, homotopies, with_friction
 from stickslip.solve.newton_method import Newton, newton
 from stickslip.solve.rescue import solve_robustly
 from stickslip.solve.status import Rung, Status

@@ -19,7 +19,6 @@ from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.response.forced.accepted import accepted_points
-from stickslip.response.forced.ladder import along_branch
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.response.forced.response import forced_response
 from stickslip.solve.newton_method import Newton, newton
@@ -135,7 +134,7 @@ def _led(
     candidates = []
     for neighbour in (index - 1, index + 1):
         if neighbour in known:
-            end = along_branch(problem, known[neighbour], point.omega, problem.high)
+            end = problem.along_branch(known[neighbour], point.omega, problem.high)
             if end.solution.status.converged and end.p == point.omega:
                 error = _error(problem, point, problem.high, end.x)
                 candidates.append((error, np.nan, _reference(problem.high, point, end.x)))

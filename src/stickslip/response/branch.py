@@ -1,6 +1,6 @@
 """What the follower is told and what it tells: the curve, its way, the points on it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -9,7 +9,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.dlft import DynamicLagrangian
-from stickslip.solve.branch import Latest
+from stickslip.solve.branch import Latest, Problem
 from stickslip.solve.continuation import Following, Point, StepControl
 from stickslip.solve.newton_method import Newton, Solution
 
@@ -79,14 +79,14 @@ class Followed:
 
 
 class Curve(Protocol):
-    """What is followed: one equation with several levels of harmonics."""
+    """What is followed: one equation with several levels of harmonics; what is said here of levels holds where there is only one."""
 
     @property
     def levels(self) -> int:
         """Number of levels, at least one."""
-        ...
+        return 1
 
-    def problem(self, level: int) -> HarmonicBalance | DynamicLagrangian:
+    def problem(self, level: int) -> Problem:
         """Return the equation."""
         ...
 
@@ -94,41 +94,79 @@ class Curve(Protocol):
         """Return how its branch is followed."""
         ...
 
-    def lifted(self, x: FloatArray, level: int, to: int) -> FloatArray:
-        """Return unknowns of one level as those of another."""
-        ...
-
     def fresh(self, level: int, p: float, near: Sequence[Followed], most: bool) -> Solution:
         """Solve where no branch leads; `most`: by all that may help."""
         ...
 
+    def lifted(self, x: FloatArray, level: int, to: int) -> FloatArray:
+        """Return unknowns of one level as those of another."""
+        return x
+
+    def starts(self, known: Followed, to: int) -> list[FloatArray]:
+        """Return states from which a known solution is solved on another level, the likeliest first."""
+        return [self.lifted(known.point.x, known.level, to)]
+
     def cost(self, level: int) -> float:
         """Return the work of a Newton step, beside that of a small system."""
-        ...
+        return 1.0
 
     def judge(self, level: int, point: Point, latest: Latest) -> Judged:
         """Judge the error of a solution."""
-        ...
+        return Judged()
 
     def quiet(self, level: int, judged: Judged) -> bool:
         """Whether a solution needs no more harmonics."""
-        ...
+        return True
 
     def agree(self, fewer: Followed, more: Followed) -> bool:
         """Whether two levels tell the same motion."""
-        ...
+        return True
 
     def near(self, fewer: Followed, more: Followed) -> bool:
         """Whether they differ by so little that they cannot stand on different sheets."""
-        ...
+        return True
 
     def stored(self, found: Followed) -> Followed:
         """Return a solution as it comes back from where it was written down, which rounds: what an interrupted run goes on from."""
-        ...
+        return found
 
     def height(self, found: Followed) -> float:
         """Return what maxima are looked for in."""
-        ...
+        return 0.0
+
+
+Begin = Callable[[float, Sequence[FloatArray], bool], Solution]
+
+
+@dataclass(frozen=True, eq=False)
+class OneLevel(Curve):
+    """A curve whose harmonics stay as they are.
+
+    Parameters
+    ----------
+    equation
+        What is solved.
+    way
+        How its branch is followed.
+    begin
+        Solves a value of the parameter to which no branch leads, from states that may be near; the last argument: by all that may help.
+    """
+
+    equation: Problem
+    way: Following
+    begin: Begin
+
+    def problem(self, level: int) -> Problem:
+        """Return the equation."""
+        return self.equation
+
+    def following(self, level: int) -> Following:
+        """Return how its branch is followed."""
+        return self.way
+
+    def fresh(self, level: int, p: float, near: Sequence[Followed], most: bool) -> Solution:
+        """Solve where no branch leads."""
+        return self.begin(p, [n.point.x for n in near], most)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,15 +181,15 @@ class Route:
         Smallest number of points.
     listed
         Values to step through, in their order; empty: by arc length.
-    recovers
-        Whether a branch that is lost is taken up further on.
+    leaves
+        Whether a branch that leads back, or nowhere for long, is left and taken up further on; otherwise it is followed to where it leads.
     """
 
     first: float
     last: float
     points: int = 40
     listed: tuple[float, ...] = ()
-    recovers: bool = True
+    leaves: bool = True
 
     @property
     def forward(self) -> float:
@@ -176,7 +214,7 @@ class Route:
 
         Stiff contacts that lift off under little damping fold it hundreds of times within a step: there it is left, as a machine would leave it.
         """
-        if self.listed:
+        if self.listed or not self.leaves:
             return False
         if self.before(values[-1], self.first - BACKWARD * (self.last - self.first)):
             return True
@@ -194,7 +232,23 @@ def steps_through(length: float, points: int) -> StepControl:
 def following_vibration(
     problem: HarmonicBalance | DynamicLagrangian, control: StepControl, newton: Newton
 ) -> Following:
-    """Return how a branch of a periodic problem is followed: the static part would hide the growth of the vibration."""
+    """Return how a branch of a periodic problem is followed."""
+    return Following(newton=newton, control=control, weights=vibration_weights(problem))
+
+
+def vibration_weights(problem: HarmonicBalance | DynamicLagrangian) -> FloatArray:
+    """Return the share of each unknown in the length of a step: the static part would hide the growth of the vibration."""
     weights = np.ones(problem.size)
     weights[: problem.linear.n] = 0.0
-    return Following(newton=newton, control=control, weights=weights)
+    return weights
+
+
+def branch_of(every: Iterable[Followed]) -> list[Followed]:
+    """Return the points of a branch among all that were found on the way: those that no later one took the place of."""
+    branch: list[Followed] = []
+    for one in every:
+        if one.kind == "point":
+            branch = [*branch[: one.index], one]
+        elif one.kind == "found":
+            branch[one.index] = one
+    return branch

@@ -99,8 +99,6 @@ class _Walk:
         while not self._over():
             here = self.branch[-1]
             if not here.ahead.converged or self._idle():
-                if not self.route.recovers:
-                    return
                 yield from self._begun(self._further())
                 continue
             yield from self._cheaper(here)
@@ -116,10 +114,8 @@ class _Walk:
                     self.patience = min(2 * self.patience, MOST_PATIENT)
                     self.patient_until = len(self.branch) + self.patience
                 yield from self._kept(anew or made)
-            elif self.route.recovers:
-                yield from self._begun(self._further())
             else:
-                return
+                yield from self._begun(self._further())
         if not listed and self.branch[-1].point.p != self.route.last:
             yield from self._begun(self.route.last)
         yield from self._looked_for()

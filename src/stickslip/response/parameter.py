@@ -1,7 +1,7 @@
 """Periodic motion as any parameter varies: solution branches at one frequency, and what analyses along a parameter share."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -12,23 +12,18 @@ from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import AtFrequency, BalanceAt, law_field, load_level, rebuilt
-from stickslip.response.branch import following_vibration, steps_through
-from stickslip.response.equilibrium import bonded_start, preload
+from stickslip.response.branch import OneLevel, Route, branch_of, following_vibration, steps_through
+from stickslip.response.follow import follow
+from stickslip.response.ladder import without_branch
 from stickslip.response.system import System
-from stickslip.solve.continuation import (
-    Point,
-    reversed_point,
-    start_point,
-    trace,
-)
-from stickslip.solve.newton_method import Newton, newton
+from stickslip.solve.continuation import Point
+from stickslip.solve.newton_method import Newton, Solution
 from stickslip.solve.status import Status
 from stickslip.units import check_quantities, quantity
 
 Build = Callable[[float], tuple[System, HarmonicLoad]]
 Parameter = str | Build
 LoadName = Literal["excitation", "static_load"]
-RAMP = (0.1, 0.3, 0.6, 1.0)  # shares of the load where the first point does not converge at once
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,7 +145,8 @@ def branch_in_parameter(
     Yields
     ------
     ParameterPoint
-        Points in the order of the branch; the last one is at the end of the span, or says why the branch could not be followed.
+        Points in the order of the branch, the last one at the end of the span. Where the branch cannot be followed, a point that did not
+        converge, and a new beginning a little further on.
 
     Raises
     ------
@@ -170,57 +166,30 @@ def branch_in_parameter(
     family = parameter_family(
         system, load, parameter, first, lambda s, f: how.balance(s, f, np.zeros(0, dtype=np.int64))
     )
-    problem = AtFrequency(family, omega)
-    balance = family(first)
-    control = steps_through(abs(last - first), points)
-    following = following_vibration(balance, control, how.newton)
-    changed = parameter(first) if callable(parameter) else (system, load)
-    start = start_point(
-        problem, first_guess(changed[0], balance, omega, how.newton), first, following
-    )
-    forward = last > first
-    yield _parameter_point(family, omega, start, growing=forward)
-    if not start.solution.status.converged:
-        return
-    onward = start if forward else reversed_point(start)
-    for point in trace(problem, onward, last, following):
-        yield _parameter_point(family, omega, point, growing=bool(point.tangent[-1] > 0.0))
+    way = following_vibration(family(first), steps_through(abs(last - first), points), how.newton)
+
+    def begin(value: float, near: Sequence[FloatArray], most: bool) -> Solution:
+        changed = system_at(system, parameter, value, family(value))
+        return without_branch(changed, family(value), omega, how.newton, near, most)
+
+    curve = OneLevel(AtFrequency(family, omega), way, begin)
+    route = Route(first=first, last=last, points=points, leaves=False)
+    for found in branch_of(follow(curve, route)):
+        yield _parameter_point(family, omega, found.point)
 
 
-def first_guess(
-    system: System, balance: HarmonicBalance, omega: float, options: Newton
-) -> FloatArray:
-    """Return unknowns near the solution at `omega`: bonded contacts, or, if they do not lead there, what a ramp of the load does.
-
-    Parameters
-    ----------
-    system
-        What `balance` was made of.
-    balance
-        The periodic problem; its load is the one that is meant.
-    omega
-        Frequency, rad/s.
-    options
-        Corrector.
-    """
-    guess = balance.coefficients(bonded_start(balance, omega, system))
-    retained = np.searchsorted(balance.linear.retained, system.retained)
-    guess[0, retained] = preload(system, balance.linear.load.static)
-    x = balance.unknowns(guess)
-    if newton(lambda v: balance.linearise(v, omega), x, options).status.converged:
-        return x
-    x = balance.unknowns(np.concatenate([guess[:1], RAMP[0] * guess[1:]]))
-    for share in RAMP:
-        eased = load_level(balance, "excitation")(share)
-        x = newton(lambda v, b=eased: b.linearise(v, omega), x, options).x  # type: ignore[misc]
-    return x
+def system_at(
+    system: System, parameter: Parameter, value: float, balance: HarmonicBalance
+) -> System:
+    """Return the system that a member of a family is the `balance` of."""
+    changed = parameter(value)[0] if callable(parameter) else system
+    return replace(changed, interface=replace(changed.interface, laws=balance.interface.laws))
 
 
-def _parameter_point(
-    family: BalanceAt, omega: float, point: Point, *, growing: bool
-) -> ParameterPoint:
+def _parameter_point(family: BalanceAt, omega: float, point: Point) -> ParameterPoint:
     balance = family(point.p)
     motion = balance.linear.recover(omega, balance.coefficients(point.x))
+    growing = bool(point.tangent[-1] > 0.0)
     return ParameterPoint(
         point.p, omega, motion, point.solution.status, point.solution.iterations, growing
     )

@@ -1,6 +1,6 @@
 """Forced response with rigid contacts, by the dynamic Lagrangian method; contacts with a stiffness may stand beside them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,11 +9,13 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.dlft import DynamicLagrangian, dynamic_lagrangian
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response.branch import following_vibration, steps_through
+from stickslip.response.branch import OneLevel, Route, branch_of, following_vibration, steps_through
+from stickslip.response.follow import follow
+from stickslip.response.ladder import without_branch
 from stickslip.response.parameter import Discretisation
 from stickslip.response.system import System
-from stickslip.solve.continuation import Following, Point, start_point, trace
-from stickslip.solve.newton_method import newton
+from stickslip.solve.continuation import Point
+from stickslip.solve.newton_method import Solution
 from stickslip.solve.status import Status
 
 
@@ -100,37 +102,14 @@ def rigid_response(
     problem = dynamic_lagrangian(
         linear, system.interface, how.order, how.samples, penalty, how.evaluator
     )
-    gap = (last - first) / points
-    following = following_vibration(problem, steps_through(last - first, points), how.newton)
-    omega, guess = first, np.zeros((1, linear.n), dtype=complex)
-    while True:
-        point = start = _begin(problem, guess, omega, following)
-        yield _rigid_point(problem, start)
-        if start.solution.status.converged and start.p < last:
-            for point in trace(problem, start, last, following):
-                yield _rigid_point(problem, point)
-                if point.solution.status.converged:
-                    guess = problem.coefficients(point.x)
-        if point.p >= last:
-            return
-        omega = min(max(point.p, omega) + gap, last)
+    way = following_vibration(problem, steps_through(last - first, points), how.newton)
 
+    def begin(omega: float, near: Sequence[FloatArray], most: bool) -> Solution:
+        return without_branch(system, problem, omega, how.newton, near, most)
 
-def _begin(
-    problem: DynamicLagrangian, guess: ComplexArray, omega: float, following: Following
-) -> Point:
-    """Solve at `omega` from a guess; if that fails with twice as many harmonics each time, from one upward."""
-    point = start_point(problem, problem.unknowns(guess), omega, following)
-    if point.solution.status.converged:
-        return point
-    order, q = 1, np.zeros((1, problem.linear.n), dtype=complex)
-    while order < problem.order:
-        few = problem.with_order(order)
-        q = few.coefficients(
-            newton(lambda v, p=few: p.linearise(v, omega), few.unknowns(q), following.newton).x  # type: ignore[misc]
-        )
-        order *= 2
-    return start_point(problem, problem.unknowns(q), omega, following)
+    route = Route(first=first, last=last, points=points)
+    for found in branch_of(follow(OneLevel(problem, way, begin), route)):
+        yield _rigid_point(problem, found.point)
 
 
 def _rigid_point(problem: DynamicLagrangian, point: Point) -> RigidPoint:

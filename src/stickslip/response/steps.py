@@ -45,14 +45,11 @@ def onward(curve: Curve, here: Followed, index: int, target: float | None, last:
 
 def again(curve: Curve, kind: Kind, known: Followed, index: int, level: int) -> Followed:
     """Solve at the value of a known solution with the harmonics of another level; the direction of travel stays."""
-    problem, following, p = curve.problem(level), curve.following(level), known.p
-    latest = Latest(problem)
-    starts = [curve.lifted(known.point.x, known.level, level)]
-    if known.judged.start is not None and level == known.level + 1:
-        starts.insert(0, problem.unknowns(known.judged.start))
+    following, p = curve.following(level), known.p
+    latest = Latest(curve.problem(level))
     patient = replace(following.newton, max_iterations=PATIENT)
     spent: list[Solution] = []
-    for x in starts:
+    for x in curve.starts(known, level):
         spent.append(newton(lambda v: latest.linearise(v, p), x, patient, NaturalLevel()))
         if spent[-1].status.converged:
             break

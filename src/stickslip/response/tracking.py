@@ -18,15 +18,17 @@ from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import ParameterLinearisation
 from stickslip.harmonic.peak import EVALUATIONS, Driven, Peak, PeakProblem, driven_by
-from stickslip.response.branch import following_vibration, steps_through
+from stickslip.response.branch import OneLevel, Route, branch_of, following_vibration, steps_through
+from stickslip.response.follow import follow
+from stickslip.response.ladder import without_branch
 from stickslip.response.parameter import (
     Discretisation,
     Parameter,
-    first_guess,
     parameter_family,
+    system_at,
 )
 from stickslip.response.system import System
-from stickslip.solve.continuation import Point, start_point, trace
+from stickslip.solve.continuation import Point
 from stickslip.solve.krylov import to_tolerance
 from stickslip.solve.linear import factorised
 from stickslip.solve.newton_method import Newton, Solution, charged, newton
@@ -325,8 +327,7 @@ def _tracker(
         system, load, parameter, first, lambda s, f: how.balance(s, f, np.array([dof]))
     )
     balance = family(first)
-    changed = parameter(first)[0] if callable(parameter) else system
-    changed = replace(changed, interface=replace(changed.interface, laws=balance.interface.laws))
+    changed = system_at(system, parameter, first, balance)
     harmonics, phase = driven_by(balance.linear.load)
     driven = Driven(int(np.searchsorted(balance.linear.retained, dof)), harmonics)
     invert = partial(factorised, to_tolerance(how.newton.linear, EXACT))
@@ -355,11 +356,14 @@ def _sweep(
         raise input_error(
             "omega_range", f"must be positive and growing, got {begin} to {end} rad/s", "Swap them."
         )
-    following = following_vibration(balance, steps_through(end - begin, SWEEP_POINTS), options)
-    points = [start_point(balance, first_guess(system, balance, begin, options), begin, following)]
-    if points[0].solution.status.converged:
-        points += trace(balance, points[0], end, following)
-    return [p for p in points if p.solution.status.converged]
+    way = following_vibration(balance, steps_through(end - begin, SWEEP_POINTS), options)
+    curve = OneLevel(
+        balance,
+        way,
+        lambda omega, near, most: without_branch(system, balance, omega, options, near, most),
+    )
+    found = branch_of(follow(curve, Route(first=begin, last=end, points=SWEEP_POINTS)))
+    return [f.point for f in found if f.converged]
 
 
 def _first_peak(

@@ -7,13 +7,11 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import Linearisation
-from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import Step, always_kept, judged
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.branch import Followed, Judged, Kind, Route
 from stickslip.response.follow import follow
-from stickslip.response.forced.ladder import without_branch
 from stickslip.response.forced.problem import (
     Balance,
     ForcedPoint,
@@ -22,6 +20,7 @@ from stickslip.response.forced.problem import (
     forced_point,
     with_stiffness,
 )
+from stickslip.response.ladder import without_branch
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Following, Point
 from stickslip.solve.krylov import to_tolerance
@@ -46,7 +45,7 @@ class ForcedCurve:
 
     Parameters
     ----------
-    forced, load
+    forced
         What vibrates, and what drives it.
     supports
         Harmonics of each level, each holding the one before.
@@ -55,7 +54,6 @@ class ForcedCurve:
     """
 
     forced: ForcedProblem
-    load: HarmonicLoad
     supports: tuple[Harmonics, ...]
     raises: bool = True
 
@@ -78,10 +76,19 @@ class ForcedCurve:
             return x
         return self.problem(to).unknowns(self.problem(level).coefficients(x))
 
+    def starts(self, known: Followed, to: int) -> list[FloatArray]:
+        """Return what the judgement foretells of the next level, and the solution itself."""
+        own = [self.lifted(known.point.x, known.level, to)]
+        if known.judged.start is not None and to == known.level + 1:
+            own.insert(0, self.problem(to).unknowns(known.judged.start))
+        return own
+
     def fresh(self, level: int, p: float, near: Sequence[Followed], most: bool) -> Solution:
         """Solve at a frequency to which no branch leads."""
-        known = [self.problem(n.level).coefficients(n.point.x) for n in near]
-        return without_branch(self.forced, self.load, self.problem(level), p, known, most)
+        forced, known = self.forced, [self.lifted(n.point.x, n.level, level) for n in near]
+        return without_branch(
+            forced.system, self.problem(level), p, forced.sweep.newton, known, most
+        )
 
     def cost(self, level: int) -> float:
         """Return the work of a Newton step: that of a factorisation, or of products where there are many unknowns."""
@@ -164,14 +171,12 @@ class ForcedCurve:
         return self.forced.amplitude_of(found.p, q)
 
 
-def along_the_branch(
-    problem: ForcedProblem, load: HarmonicLoad, done: Sequence[ForcedPoint]
-) -> Iterator[ForcedPoint]:
+def along_the_branch(problem: ForcedProblem, done: Sequence[ForcedPoint]) -> Iterator[ForcedPoint]:
     """Follow the response with as many harmonics as each point needs.
 
     Parameters
     ----------
-    problem, load
+    problem
         The forced response.
     done
         Points of an interrupted run, in the order in which they came.
@@ -181,7 +186,7 @@ def along_the_branch(
     ForcedPoint
         Points not in `done`, their stage the kind of `stickslip.response.follow.Followed`.
     """
-    curve = ForcedCurve(problem, load, problem.sweep.supports)
+    curve = ForcedCurve(problem, problem.sweep.supports)
     yield from followed(curve, route_of(problem), done)
 
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 from stickslip.arrays import FloatArray
-from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.follow import follow
 from stickslip.response.forced.accepted import (
     branch_end,
@@ -25,7 +24,6 @@ BACKWARD = 0.1  # share of the range by which it may leave the range
 
 def double_passage(
     problem: ForcedProblem,
-    load: HarmonicLoad,
     done: Sequence[ForcedPoint],
     static: Callable[[], FloatArray],
 ) -> Iterator[ForcedPoint]:
@@ -36,7 +34,7 @@ def double_passage(
 
     Parameters
     ----------
-    problem, load
+    problem
         The forced response.
     done
         Points of an interrupted run, in the order in which they came.
@@ -48,7 +46,7 @@ def double_passage(
     ForcedPoint
         Points not in `done`: of the first passage as ``low`` and ``found``, repeats as ``high``, those of a branch as ``branch``.
     """
-    curve = ForcedCurve(problem, load, (problem.low.harmonics,), raises=False)
+    curve = ForcedCurve(problem, (problem.low.harmonics,), raises=False)
     passage = [p for p in done if p.stage in ("low", "found")]
     known = [of_forced(curve, p) for p in passage]
     for found in follow(curve, route_of(problem), known):

@@ -24,7 +24,7 @@ from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.branch import following_vibration
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
-from stickslip.solve.continuation import Following, Point
+from stickslip.solve.continuation import Following, Point, start_point, step_to
 from stickslip.solve.krylov import to_tolerance
 from stickslip.solve.newton_method import Solution
 from stickslip.solve.status import Rung, Status
@@ -35,6 +35,7 @@ FAINTEST = 1e-7  # excitation over static load: a thousand times the residual to
 ALERT_TOLERANCE = 1e-6  # relative residual of the alert's step where it is found by iteration
 SAMPLES_A_HARMONIC = 8  # at least, whatever the sweep says
 BRANCH_ITERATIONS = 10  # of a corrector along a branch
+DETOUR = 30  # most points on the way from a neighbour
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,6 +179,15 @@ class ForcedProblem:
             max_iterations=min(BRANCH_ITERATIONS, self.sweep.newton.max_iterations),
         )
         return following_vibration(balance, self.sweep.control, few)
+
+    def along_branch(self, point: ForcedPoint, omega: float, balance: Balance) -> Point:
+        """Go from a solution to another frequency on the branch with the harmonics of `balance`."""
+        following = self.following(balance)
+        following = replace(following, control=replace(following.control, max_points=DETOUR))
+        start = start_point(balance, balance.unknowns(point.coefficients), point.omega, following)
+        if not start.solution.status.converged:
+            return start
+        return step_to(balance, start, omega, following)
 
     def alerted(self, point: ForcedPoint) -> bool:
         """Whether the alert asks for more harmonics at a point of the first passage."""

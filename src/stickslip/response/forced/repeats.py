@@ -10,9 +10,8 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import Linearisation
 from stickslip.harmonic.selection.strategy import judged
-from stickslip.response.forced.homotopies import homotopies
-from stickslip.response.forced.ladder import along_branch
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
+from stickslip.response.homotopies import homotopies
 from stickslip.solve.linear import factorised
 from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Newton, Solution, charged, newton
@@ -62,7 +61,7 @@ def repeat(
         for end in ends:
             if found():
                 return
-            detour = along_branch(problem, end, omega, balance).solution
+            detour = problem.along_branch(end, omega, balance).solution
             spent.append(replace(detour, rung=max(detour.rung, Rung.SHORTER_STEP)))
 
     # between two points of the branch a solution is near: a dozen evaluations where other starts take a hundred

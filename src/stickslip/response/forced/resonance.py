@@ -6,12 +6,11 @@ from time import perf_counter
 
 import numpy as np
 
-from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.support import Harmonics
 from stickslip.response.branch import Followed, Judged
 from stickslip.response.forced.along import ForcedCurve, of_forced, to_forced
-from stickslip.response.forced.ladder import along_branch, without_branch
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, Stage, forced_point
+from stickslip.response.ladder import without_branch
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Point, start_point, step_to
 from stickslip.solve.newton_method import Solution, charged, newton
@@ -25,7 +24,6 @@ PEAK_RESOLUTION = 5e-4  # width of the bracket of the peak, relative to its freq
 
 def resolve_peak(
     problem: ForcedProblem,
-    load: HarmonicLoad,
     accepted: Sequence[ForcedPoint],
     done: Sequence[ForcedPoint] = (),
 ) -> Iterator[ForcedPoint]:
@@ -33,7 +31,7 @@ def resolve_peak(
 
     Parameters
     ----------
-    problem, load
+    problem
         The forced response.
     accepted
         Points of the response in the order of the branch.
@@ -46,7 +44,7 @@ def resolve_peak(
         Points not in `done`: ``peak``, of which that with most harmonics counts at its frequency, and ``check``: more harmonics, to compare.
     """
     known = [p for p in accepted if p.converged][:: int(problem.sweep.forward)]
-    search = _Search(problem, load, iter(done))
+    search = _Search(problem, iter(done))
     yield from _refined(problem, search, known, problem.sweep.peak_points)
     if not known or not problem.sweep.auto or not problem.sweep.peak_points:
         return
@@ -90,12 +88,12 @@ def _highest(problem: ForcedProblem, known: Sequence[ForcedPoint]) -> int:
     return int(np.argmax([problem.amplitude(p) for p in known]))
 
 
-def peak_from(problem: ForcedProblem, load: HarmonicLoad, point: ForcedPoint) -> ForcedPoint | None:
+def peak_from(problem: ForcedProblem, point: ForcedPoint) -> ForcedPoint | None:
     """Return the peak of `problem` near a peak of a slightly different one; None if no solution is found there.
 
     Parameters
     ----------
-    problem, load
+    problem
         The changed problem; the order of its first passage, or its high one, is that of `point`.
     point
         The known peak.
@@ -113,7 +111,7 @@ def peak_from(problem: ForcedProblem, load: HarmonicLoad, point: ForcedPoint) ->
         forced_point(balance, p.solution, "peak", 0, p.p, 0.0) for p in (sides[0], middle, sides[1])
     ]
     points = points[:: int(problem.sweep.forward)]
-    found = [p for p in [*points, *resolve_peak(problem, load, points)] if p.converged]
+    found = [p for p in [*points, *resolve_peak(problem, points)] if p.converged]
     return max(found, key=problem.amplitude)
 
 
@@ -125,7 +123,6 @@ class _Search:
     """Solves points of a peak, or takes them from an interrupted run."""
 
     problem: ForcedProblem
-    load: HarmonicLoad
     stored: Iterator[ForcedPoint]
     count: int = 0
 
@@ -184,10 +181,10 @@ class _Search:
         """Return the levels of harmonics that a point may have."""
         problem, strategy = self.problem, self.problem.strategy
         if problem.sweep.auto:
-            return ForcedCurve(problem, self.load, problem.sweep.supports)
+            return ForcedCurve(problem, problem.sweep.supports)
         few = strategy.verifies and support == problem.low.harmonics != problem.high.harmonics
         supports = (support, problem.high.harmonics) if few else (support,)
-        return ForcedCurve(problem, self.load, supports, raises=few)
+        return ForcedCurve(problem, supports, raises=few)
 
     def _between(self, sides: Sequence[ForcedPoint], omega: float) -> ForcedPoint:
         """Solve along the branch from either side, then as without one."""
@@ -197,14 +194,15 @@ class _Search:
         balance = curve.problem(level)
         spent: list[Solution] = []
         for end in sides:
-            found = along_branch(self.problem, end, omega, balance).solution
+            found = self.problem.along_branch(end, omega, balance).solution
             rung = max(found.rung, Rung.SHORTER_STEP) if spent else found.rung
             spent.append(replace(found, rung=rung))
             if found.status.converged:
                 break
         if not spent[-1].status.converged:
-            near = [end.coefficients for end in sides]
-            spent.append(without_branch(self.problem, self.load, balance, omega, near))
+            near = [balance.unknowns(end.coefficients) for end in sides]
+            options = self.problem.sweep.newton
+            spent.append(without_branch(self.problem.system, balance, omega, options, near))
         return self._point(curve, level, omega, charged(spent[-1], spent), "peak")
 
     def _more(self, curve: ForcedCurve, now: Followed, level: int, stage: Stage) -> ForcedPoint:

@@ -61,14 +61,14 @@ def forced_response(
     solved = [p for p in done if p.stage not in OF_PEAK]
     before = tuple(solved)
     if sweep.auto:
-        passage = along_the_branch(problem, load, before)
+        passage = along_the_branch(problem, before)
     elif sweep.single:
-        passage = single_passage(problem, load, before)
+        passage = single_passage(problem, before)
     else:
         static = cache(lambda: preload(system, load.static))
-        passage = double_passage(problem, load, before, static)
+        passage = double_passage(problem, before, static)
     for point in passage:
         solved.append(point)
         yield point
     peak = [p for p in done if p.stage in OF_PEAK]
-    yield from resolve_peak(problem, load, accepted_points(solved), peak)
+    yield from resolve_peak(problem, accepted_points(solved), peak)

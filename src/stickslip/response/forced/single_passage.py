@@ -7,10 +7,8 @@ from time import perf_counter
 import numpy as np
 
 from stickslip.arrays import ComplexArray
-from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.selection.strategy import Step, Verdict, judged
 from stickslip.harmonic.support import Harmonics
-from stickslip.response.forced.ladder import along_branch, without_branch
 from stickslip.response.forced.problem import (
     BRANCH_ITERATIONS,
     Balance,
@@ -19,12 +17,11 @@ from stickslip.response.forced.problem import (
     Stage,
     forced_point,
 )
+from stickslip.response.ladder import without_branch
 from stickslip.solve.newton_method import Solution, charged, newton
 
 
-def single_passage(
-    problem: ForcedProblem, load: HarmonicLoad, done: Sequence[ForcedPoint]
-) -> Iterator[ForcedPoint]:
+def single_passage(problem: ForcedProblem, done: Sequence[ForcedPoint]) -> Iterator[ForcedPoint]:
     """Go through equally spaced or listed frequencies and let the strategy choose the harmonics of each.
 
     A frequency whose solution asks for more is solved again with what it had and what it asks for; the last solution counts. One
@@ -32,7 +29,7 @@ def single_passage(
 
     Parameters
     ----------
-    problem, load
+    problem
         The forced response.
     done
         Points of an interrupted run, in the order in which they came.
@@ -57,7 +54,7 @@ def single_passage(
             kept = next(stored, None)
             if kept is None:
                 balance = problem.balance(harmonics)
-                solution = _solution(problem, load, balance, tried, omega, start)
+                solution = _solution(problem, balance, tried, omega, start)
                 stage: Stage = "low" if first else "high"
                 point = forced_point(balance, solution, stage, index, omega, 0.0)
             else:
@@ -92,7 +89,7 @@ def _from_behind(
         point = next(stored, None)
         if point is None:
             omega, balance = last[index].omega, problem.high
-            solution = along_branch(problem, last[index + 1], omega, balance).solution
+            solution = problem.along_branch(last[index + 1], omega, balance).solution
             point = forced_point(balance, solution, "high", index, omega, perf_counter() - began)
             yield point
         last[index] = point
@@ -100,7 +97,6 @@ def _from_behind(
 
 def _solution(
     problem: ForcedProblem,
-    load: HarmonicLoad,
     balance: Balance,
     tried: Sequence[ForcedPoint],
     omega: float,
@@ -121,10 +117,10 @@ def _solution(
         if spent[-1].status.converged:
             break
         if point.omega != omega:
-            spent.append(along_branch(problem, point, omega, balance).solution)
+            spent.append(problem.along_branch(point, omega, balance).solution)
     if not (spent and spent[-1].status.converged):
-        found = [p.coefficients for p in tried if p.converged][-1:]
-        spent.append(without_branch(problem, load, balance, omega, found))
+        found = [balance.unknowns(p.coefficients) for p in tried if p.converged][-1:]
+        spent.append(without_branch(problem.system, balance, omega, problem.sweep.newton, found))
     return charged(spent[-1], spent)
 
 

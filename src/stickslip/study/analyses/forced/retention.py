@@ -31,7 +31,7 @@ def peak_shift(question: Question, response: Response) -> tuple[float, float]:
     for share in WEAKER:
         held = model.bare.with_retention(share * model.retention)
         problem = forced_problem(held, model.load, sweep)
-        again = peak_from(problem, model.load, point)
+        again = peak_from(problem, point)
         if again is None:
             return NO_SHIFT
         point = again

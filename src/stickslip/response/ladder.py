@@ -1,0 +1,91 @@
+"""How a periodic motion is found where no branch leads to it: one ladder, every rung counted and bounded in Newton steps."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.dlft import DynamicLagrangian
+from stickslip.response.branch import vibration_weights
+from stickslip.response.equilibrium import bonded_start, preload
+from stickslip.response.homotopies import homotopies
+from stickslip.response.system import System
+from stickslip.solve.newton_method import Newton, Solution, charged, newton
+from stickslip.solve.rescue import Homotopy, solve_robustly
+
+
+def without_branch(
+    system: System,
+    balance: HarmonicBalance | DynamicLagrangian,
+    omega: float,
+    options: Newton,
+    near: Sequence[FloatArray] = (),
+    most: bool = True,
+) -> Solution:
+    """Solve a frequency from motions nearby, from the static equilibrium with the bonded vibration, from few harmonics, then by all that `solve_robustly` knows.
+
+    Parameters
+    ----------
+    system
+        What `balance` was made of.
+    balance
+        The periodic problem.
+    omega
+        Frequency, rad/s.
+    options
+        Corrector.
+    near
+        (size,) unknowns of motions that may be near.
+    most
+        Whether other globalisations and homotopies are tried as well.
+    """
+    starts = _starts(system, balance, omega, options, near)
+    if most:
+        return solve_robustly(
+            lambda x: balance.linearise(x, omega),
+            starts,
+            options,
+            _ways(system, balance, omega),
+            vibration_weights(balance),
+        )
+    spent: list[Solution] = []
+    for start in starts:
+        spent.append(newton(lambda x: balance.linearise(x, omega), start, options))
+        if spent[-1].status.converged:
+            break
+    return charged(spent[-1], spent)
+
+
+def _ways(
+    system: System, balance: HarmonicBalance | DynamicLagrangian, omega: float
+) -> Iterator[Homotopy]:
+    yield from homotopies(balance, omega, _at_rest(system, balance)[0].real)
+
+
+def _at_rest(system: System, balance: HarmonicBalance | DynamicLagrangian) -> ComplexArray:
+    """Return the (1, n_retained) static equilibrium, m; zero at coordinates that are retained beside those of the system."""
+    rest = np.zeros((1, balance.linear.n), dtype=complex)
+    own = np.searchsorted(balance.linear.retained, system.retained)
+    rest[0, own] = preload(system, balance.linear.load.static)
+    return rest
+
+
+def _starts(
+    system: System,
+    balance: HarmonicBalance | DynamicLagrangian,
+    omega: float,
+    options: Newton,
+    near: Sequence[FloatArray],
+) -> Iterator[FloatArray]:
+    """Yield scaled unknowns to start Newton from."""
+    yield from near
+    guess = balance.coefficients(bonded_start(balance, omega, system))
+    guess[:1] = _at_rest(system, balance)
+    yield balance.unknowns(guess)
+    driven = max(balance.linear.load.harmonics, default=balance.order)
+    few = balance.with_harmonics(tuple(h for h in balance.harmonics if h <= max(driven, 1)))
+    if few.order < balance.order:
+        solution = newton(lambda x: few.linearise(x, omega), few.unknowns(guess), options)
+        if solution.status.converged:
+            yield balance.unknowns(few.coefficients(solution.x))
