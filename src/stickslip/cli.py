@@ -194,6 +194,64 @@ def inspect(
 
 
 @app.command()
+def fit(
+    loops: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LOOPS.csv", help="Columns displacement_um (_mm, _m) and force_n (_kn)."
+        ),
+    ],
+    *,
+    normal_load: Annotated[
+        float | None, typer.Option(metavar="N", help="Constant normal force; left out: not known.")
+    ] = None,
+    normal_load_deviation: Annotated[
+        float, typer.Option(metavar="N", help="Its standard deviation.")
+    ] = 0.0,
+    machine_stiffness: Annotated[
+        float | None,
+        typer.Option(metavar="N/m", help="What lies in series with the contact; left out: rigid."),
+    ] = None,
+    offset: Annotated[
+        bool,
+        typer.Option("--offset/--no-offset", help="Whether the force may have an unknown offset."),
+    ] = True,
+    drift: Annotated[
+        bool, typer.Option("--drift", help="Let the force drift, linearly in time.")
+    ] = False,
+    page: Annotated[
+        Path | None,
+        typer.Option(help="The page to write; left out: LOOPS.fit.html beside the file."),
+    ] = None,
+) -> None:
+    """Fit friction coefficient and tangential stiffness to measured hysteresis loops."""
+    with _errors_as_text():
+        from stickslip.study.fit_file import estimates, fit_file, study_lines
+
+        with on_screen(Screen(_console())):
+            found = fit_file(
+                loops,
+                normal_load=normal_load,
+                normal_load_deviation=normal_load_deviation,
+                machine_stiffness=machine_stiffness,
+                offset=offset,
+                drift=drift,
+            )
+        from stickslip.report.loop_fit import write_loop_page
+
+        target = page or loops.with_suffix(".fit.html")
+        told, lines = estimates(found), study_lines(found)
+        write_loop_page(found, loops, target, told, lines)
+        for line in told:
+            _say(line)
+        _print_lines(
+            "What the loops cannot tell, and what is doubtful", [f"{n}." for n in found.notes]
+        )
+        _print_lines("For the table of a contact in the study file", lines)
+        _print_lines("Files", [str(target)])
+
+
+@app.command()
 def schema() -> None:
     """Print the JSON Schema of study files."""
     from stickslip.study.file.tables import json_schema

@@ -6,6 +6,8 @@ from .law_check import check_law as check_law
 from .laws.iwan_populations import FirstLoading as FirstLoading
 from .laws.iwan_populations import FourParameter as FourParameter
 from .laws.iwan_populations import UniformBand as UniformBand
+from .loop_fit import LoopFit as LoopFit
+from .loop_fit import fit_loops as fit_loops
 from .neighbours import neighbour_gaps as neighbour_gaps
 from .neighbours import neighbour_interface as neighbour_interface
 from .pairing import Pairing as Pairing

@@ -51,6 +51,7 @@ from .readers.calculix_deck import read_deck as read_deck
 from .readers.frd import FrdResults as FrdResults
 from .readers.frd import NodalField as NodalField
 from .readers.frd import read_frd as read_frd
+from .readers.hysteresis import read_loops as read_loops
 from .readers.matrix_files import read_matrix_files as read_matrix_files
 from .readers.nastran import NastranResults as NastranResults
 from .readers.nastran import read_nastran_op2 as read_nastran_op2

@@ -1,0 +1,339 @@
+"""Friction coefficient and tangential stiffness from measured hysteresis loops, by least squares, with their covariance."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from stickslip.arrays import FloatArray
+from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
+from stickslip.contact.loop_doubts import doubts
+from stickslip.contact.loop_model import RIGID, Loop, LoopModel
+from stickslip.errors import input_error
+
+FEWEST = 8  # samples of a recording
+CLEAR = 25.0  # what slip, or stick, must take off the sum of squares, in variances of a sample
+SURE = 5.0  # standard deviations beyond which a slope has a sign
+FLOOR = 1e-9  # of the force's swing: residuals below are rounding
+KEPT = 1e-7  # singular value, relative to the largest, below which a combination of unknowns is not told
+TOLD = 1e-3  # part of a parameter in such a combination from which on it is not told
+TRIED = (
+    np.geomspace(1.0, 300.0, 24),
+    np.linspace(0.4, 1.0, 13),
+)  # stiffnesses and limits, in those of the loop
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LoopFit:
+    """What measured loops tell of a contact of elastic Coulomb friction; NaN for what they do not tell.
+
+    Parameters
+    ----------
+    k_t
+        Tangential stiffness, N/m, without the machine's where that was given.
+    limit
+        Friction force at which all slips, N.
+    covariance
+        (2, 2) of `k_t` and `limit`.
+    normal_load, normal_load_deviation
+        Constant normal force and its standard deviation, N; None where the load is not known.
+    least
+        Stiffness and limit that are certainly reached; NaN where they are told themselves.
+    residual
+        Standard deviation of the measured force about the fitted one, N.
+    loops
+        Displacements and forces of each recording.
+    fitted
+        (n,) fitted forces of each recording, offset and drift included.
+    notes
+        What the loops cannot tell, and what is doubtful.
+    """
+
+    k_t: float
+    limit: float
+    covariance: FloatArray
+    normal_load: float | None
+    normal_load_deviation: float
+    least: tuple[float, float]
+    residual: float
+    loops: tuple[Loop, ...] = field(repr=False)
+    fitted: tuple[FloatArray, ...] = field(repr=False)
+    notes: tuple[str, ...]
+
+    @property
+    def mu(self) -> float:
+        """Friction coefficient; NaN without a normal load or without slip."""
+        return self.limit / self.normal_load if self.normal_load else math.nan
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """Standard deviations of `k_t`, `limit` and `mu`."""
+        of_k, of_limit = (float(s) for s in np.sqrt(np.diag(self.covariance)))
+        of_load = self.normal_load_deviation / self.normal_load if self.normal_load else math.nan
+        of_mu = self.mu * math.hypot(of_limit / self.limit, of_load)
+        return {"k_t": of_k, "limit": of_limit, "mu": of_mu}
+
+    @property
+    def law(self) -> ElasticCoulomb | None:
+        """The law of one point under the constant load; None where the loops do not tell all of it."""
+        if not (math.isfinite(self.k_t) and math.isfinite(self.limit)):
+            return None
+        load = self.normal_load or 1.0
+        return ElasticCoulomb(k_t=self.k_t, k_w=0.0, k_n=0.0, mu=self.limit / load, preload=load)
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A fit in the terms of the measurement."""
+
+    stiffness: float
+    limit: float
+    covariance: FloatArray
+    squares: float
+    unknowns: int
+    fitted: FloatArray
+    slips: FloatArray  # (samples,) 1 forward, -1 backward, 0 sticks
+
+
+def fit_loops(
+    loops: Sequence[Loop],
+    *,
+    normal_load: float | None = None,
+    normal_load_deviation: float = 0.0,
+    machine_stiffness: float | None = None,
+    offset: bool = True,
+    drift: bool = False,
+) -> LoopFit:
+    """Fit tangential stiffness and friction coefficient to hysteresis loops of force over displacement.
+
+    The law is `ElasticCoulomb` under a constant normal load, walked along the measured displacements. Whether the loops show slip and
+    stick at all is decided first: each must improve the sum of squares by 25 variances.
+
+    Parameters
+    ----------
+    loops
+        Recordings: displacements (n,) in m and forces (n,) in N, in the order of time; such as `read_loops` gives.
+    normal_load, normal_load_deviation
+        Normal force in N, the same in all recordings, and its standard deviation; without it only the limit force is found.
+    machine_stiffness
+        Stiffness in N/m of what lies in series with the contact between the places whose displacement was measured; left out: rigid.
+    offset, drift
+        Whether the force of each recording has an unknown offset, and a drift linear in time.
+
+    Returns
+    -------
+    LoopFit
+        Estimates with their covariance, as if the errors of the forces were independent and equally large.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to fit, or a number is out of its range.
+    """
+    model = LoopModel(_checked(loops), offset, drift)
+    _check_numbers(normal_load, normal_load_deviation, machine_stiffness)
+    found = _simplest(model)
+    least = _least(model, found)
+    variance = found.squares / max(model.measured.size - found.unknowns, 1)
+    k_t, covariance = _without_machine(found, machine_stiffness)
+    told = doubts(
+        model, found.fitted, found.slips, k_t=found.stiffness, limit=found.limit, least=least
+    )
+    return LoopFit(
+        k_t=k_t,
+        limit=found.limit,
+        covariance=covariance,
+        normal_load=normal_load,
+        normal_load_deviation=normal_load_deviation,
+        least=least,
+        residual=math.sqrt(variance),
+        loops=model.loops,
+        fitted=tuple(np.split(found.fitted, model.first[1:])),
+        notes=(*told, *_of_setup(normal_load, machine_stiffness, found)),
+    )
+
+
+def _checked(loops: Sequence[Loop]) -> tuple[Loop, ...]:
+    """Return the recordings as arrays; refuse what no contact can be fitted to."""
+    found = []
+    for j, loop in enumerate(loops):
+        x, force = (np.asarray(values, dtype=float) for values in loop)
+        place = f"fit_loops: loops[{j}]"
+        if x.ndim != 1 or x.shape != force.shape:
+            problem = f"displacements have the shape {x.shape}, forces {force.shape}"
+            raise input_error(place, problem, "Give two arrays of one length.")
+        if x.size < FEWEST:
+            problem = f"has {x.size} samples"
+            raise input_error(place, problem, f"Give {FEWEST} at least, better a hundred a cycle.")
+        for what, values in (("displacement", x), ("force", force)):
+            if not np.isfinite(values).all():
+                raise input_error(place, f"a {what} is not finite", "Leave such samples out.")
+            if np.ptp(values) == 0.0:
+                problem = f"the {what} is {values[0]:g} at every sample"
+                raise input_error(place, problem, "Give a loop in which both change.")
+        found.append((x, force))
+    if not found:
+        raise input_error("fit_loops: loops", "is empty", "Give one recording or more.")
+    return tuple(found)
+
+
+def _check_numbers(load: float | None, deviation: float, machine: float | None) -> None:
+    for name, value in (("normal_load", load), ("machine_stiffness", machine)):
+        if value is not None and not (math.isfinite(value) and value > 0):
+            raise input_error(f"fit_loops: {name}", f"must be positive, got {value:g}", "Leave it out where it is not known.")  # fmt: skip
+    if not (math.isfinite(deviation) and deviation >= 0):
+        raise input_error("fit_loops: normal_load_deviation", f"must not be negative, got {deviation:g}", "Give the standard deviation in N.")  # fmt: skip
+
+
+def _simplest(model: LoopModel) -> _Found:
+    """Return the fit of a contact that only sticks, or only slips, where the loops do not show that it does both."""
+    line, always = _stuck(model), _slipping(model)
+    stiff, moving = (one.values[0] / one.deviation for one in (model.line(), model.direction()))
+    if min(stiff, moving) < -SURE and max(stiff, moving) < SURE:
+        raise input_error(
+            "fit_loops: loops",
+            "the force falls while the contact moves forward: it would give energy",
+            "Change the sign of the force, or of the displacement.",
+        )
+    both = _both(model)
+    floor = (FLOOR * model.swing) ** 2
+    variance = max(both.squares / max(model.measured.size - both.unknowns, 1), floor)
+    slips, sticks = (one.squares - both.squares > CLEAR * variance for one in (line, always))
+    if slips and sticks:
+        return both
+    return always if slips or (not sticks and stiff < SURE) else line
+
+
+def _least(model: LoopModel, found: _Found) -> tuple[float, float]:
+    """Return what stiffness and limit certainly reach where they are not told."""
+    if not found.slips.any():
+        return math.nan, found.stiffness * model.stroke
+    return (_least_stiffness(model, found) if math.isnan(found.stiffness) else math.nan), math.nan
+
+
+def _stuck(model: LoopModel) -> _Found:
+    fit = model.line()
+    covariance = np.diag([fit.deviation**2, math.nan])
+    slips = np.zeros(fit.fitted.size)
+    return _Found(float(fit.values[0]), math.nan, covariance, fit.squares, fit.values.size, fit.fitted, slips)  # fmt: skip
+
+
+def _slipping(model: LoopModel) -> _Found:
+    fit = model.direction()
+    told = fit.whole and fit.values[0] > 0
+    limit = float(fit.values[0]) if told else math.nan
+    covariance = np.diag([math.nan, fit.deviation**2 if told else math.nan])
+    unknowns = fit.values.size + len(model.loops)  # first samples are not fitted
+    return _Found(math.nan, limit, covariance, fit.squares, unknowns, fit.fitted, model.signs)
+
+
+def _both(model: LoopModel) -> _Found:
+    """Fit a contact that sticks and slips."""
+    n, k_unit, unit = len(model.loops), model.stuck, model.swing
+
+    def friction(z: FloatArray) -> FloatArray:
+        return model.friction(z[0] * k_unit, z[1] * unit, unit * z[2 : 2 + n])[0]
+
+    def residual(z: FloatArray) -> FloatArray:
+        away: FloatArray = friction(z) / unit + model.sensor @ z[2 + n :] - model.measured / unit
+        return away
+
+    start = _start(model)
+    lowest = np.full(start.size, -np.inf)
+    lowest[:2] = 1e-6
+    solved = least_squares(
+        residual, start, jac="3-point", bounds=(lowest, np.inf), x_scale=1.0, xtol=1e-12, ftol=1e-12, gtol=1e-12
+    )  # fmt: skip
+    z = solved.x
+    units = np.array([k_unit, unit])
+    freedom = max(model.measured.size - z.size, 1)
+    own = 2 * solved.cost / freedom * _covariance(solved.jac) * np.outer(units, units)
+    slips = model.friction(z[0] * k_unit, z[1] * unit, unit * z[2 : 2 + n])[1]
+    slips[model.first] = 0.0  # of before
+    if model.offset and not model.both_ways(slips):
+        own[1, :], own[:, 1] = math.nan, math.nan
+    values = np.where(np.isfinite(np.diag(own)), z[:2] * units, math.nan)
+    fitted = unit * (residual(z) + model.measured / unit)
+    squares = 2 * solved.cost * unit**2
+    return _Found(float(values[0]), float(values[1]), own, squares, z.size, fitted, slips)
+
+
+def _start(model: LoopModel) -> FloatArray:
+    """Return the unknowns that fit best among a grid of stiffnesses and limits."""
+    unit = model.swing
+    middle = [(f.max() + f.min()) / 2 if model.offset else 0.0 for _, f in model.loops]
+    held = np.array([f[0] - m for (_, f), m in zip(model.loops, middle, strict=True)])
+    best, smallest = np.zeros(0), np.inf
+    project = np.linalg.pinv(model.sensor) if model.sensor.shape[1] else model.sensor.T
+    for k in TRIED[0]:
+        for limit in TRIED[1]:
+            force, _ = model.friction(k * model.stuck, limit * unit, held)
+            sensor = project @ (model.measured - force)
+            squares = float(np.sum((model.measured - force - model.sensor @ sensor) ** 2))
+            if squares < smallest:
+                best, smallest = np.array([k, limit, *(held / unit), *(sensor / unit)]), squares
+    return best
+
+
+def _covariance(jac: FloatArray) -> FloatArray:
+    """Return the (2, 2) covariance of the first two unknowns for residuals of variance one; NaN for what is not told."""
+    sizes = np.linalg.norm(jac, axis=0)
+    sizes[sizes == 0.0] = 1.0
+    _, values, right = np.linalg.svd(jac / sizes, full_matrices=False)
+    good = values > KEPT * values[0]
+    own = (right[good, :2] / values[good, None]) / sizes[:2]
+    found: FloatArray = own.T @ own
+    lost = np.linalg.norm(right[~good, :2], axis=0) > TOLD
+    found[lost, :] = math.nan
+    found[:, lost] = math.nan
+    return found
+
+
+def _least_stiffness(model: LoopModel, found: _Found) -> float:
+    """Return the smallest stiffness whose sum of squares is not worse by four variances: two standard deviations."""
+    size = model.measured.size
+    variance = max(found.squares / max(size - found.unknowns, 1), (FLOOR * model.swing) ** 2)
+    if math.isnan(found.limit) or not model.both_ways(found.slips):
+        return math.nan
+    sensor = found.fitted - found.slips * found.limit
+    low, high = model.stuck, RIGID * model.stuck
+    known = np.delete(np.arange(size), model.first)
+    for _ in range(40):
+        middle = math.sqrt(low * high)
+        held = found.limit * found.slips[model.first]
+        force = model.friction(middle, found.limit, held)[0] + sensor
+        worse = float(np.sum((model.measured - force)[known] ** 2)) - found.squares
+        low, high = (low, middle) if worse < 4 * variance else (middle, high)
+    return high
+
+
+def _without_machine(found: _Found, machine: float | None) -> tuple[float, FloatArray]:
+    """Take the stiffness in series out of what was found."""
+    if machine is None or math.isnan(found.stiffness):
+        return found.stiffness, found.covariance
+    if found.stiffness >= machine:
+        raise input_error(
+            "fit_loops: machine_stiffness",
+            f"is {machine:.4g} N/m, not above the {found.stiffness:.4g} N/m of machine and contact in series",
+            "Give the stiffness of the machine alone, or measure the displacement nearer to the contact.",
+        )
+    share = machine / (machine - found.stiffness)
+    slope = np.array([share**2, 1.0])  # derivatives by what was found
+    return found.stiffness * share, found.covariance * np.outer(slope, slope)
+
+
+def _of_setup(load: float | None, machine: float | None, found: _Found) -> list[str]:
+    """Say what no loop tells."""
+    told = []
+    if load is None and math.isfinite(found.limit):
+        told.append(
+            "The normal load is not given: the limit force is told, the friction coefficient is not"
+        )
+    if machine is None and math.isfinite(found.stiffness):
+        told.append(
+            "The stiffness is that of everything between the two places whose relative displacement was measured: a loop cannot tell "
+            "the contact from the machine in series with it"
+        )
+    return told

@@ -1,0 +1,155 @@
+"""Columns of measured numbers from a CSV file, with the unit at the end of each name."""
+
+import csv
+import io
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.model.readers.text import SHOWN, read_text
+
+MOST_ROWS = 2_000_000
+LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
+FORCES = {"n": 1.0, "kn": 1e3}
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredColumns:
+    """A table of text whose first line names the columns.
+
+    Parameters
+    ----------
+    path
+        The file.
+    names
+        Of the columns, in small letters.
+    lines
+        Number of each row's line in the file.
+    rows
+        Cells of each row.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    lines: tuple[int, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+    def numbers(self, name: str, *, gaps: bool = False) -> FloatArray:
+        """Return a column as finite numbers; with `gaps` an empty cell is NaN.
+
+        Raises
+        ------
+        InputError
+            Naming the line and the cell.
+        """
+        at = self.names.index(name)
+        return np.array(
+            [self._number(line, name, row[at], gaps=gaps) for line, row in zip(self.lines, self.rows, strict=True)]
+        )  # fmt: skip
+
+    def named(self, stem: str, units: Mapping[str, float]) -> tuple[str, float]:
+        """Return the name of the column ``STEM_UNIT``, and what makes SI of its numbers; an empty name where there is none.
+
+        Raises
+        ------
+        InputError
+            If there are two.
+        """
+        found = [(f"{stem}_{unit}", factor) for unit, factor in units.items() if f"{stem}_{unit}" in self.names]  # fmt: skip
+        if len(found) > 1:
+            raise input_error(
+                f"{self.path}: line 1",
+                f"has both {found[0][0]} and {found[1][0]}",
+                "Leave one of them out.",
+            )
+        return found[0] if found else ("", 1.0)
+
+    def required(self, stem: str, units: Mapping[str, float]) -> FloatArray:
+        """Return the column ``STEM_UNIT`` in SI.
+
+        Raises
+        ------
+        InputError
+            If there is none, or two.
+        """
+        name, factor = self.named(stem, units)
+        if not name:
+            choices = [f"{stem}_{unit}" for unit in units]
+            near = next((n for n in self.names if n.startswith(stem) or stem.startswith(n)), "")
+            remedy = f"Rename the column {near!r}." if near else did_you_mean(stem, [*self.names])
+            raise input_error(
+                f"{self.path}: line 1", f"has no column {' or '.join(choices)}", remedy
+            )
+        return factor * self.numbers(name)
+
+    def wrong(self, row: int, name: str, problem: str, remedy: str) -> InputError:
+        """Return the complaint about the cell of a row in the column `name`."""
+        got = self.rows[row][self.names.index(name)][:SHOWN]
+        return input_error(
+            f"{self.path}: line {self.lines[row]}: {name}", f"{problem}, got {got!r}", remedy
+        )
+
+    def _number(self, line: int, name: str, text: str, *, gaps: bool) -> float:
+        if gaps and not text:
+            return math.nan
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if math.isfinite(value):
+            return value
+        remedy = "Leave the cell empty where nothing was measured." if gaps else "Mend the line."
+        raise input_error(
+            f"{self.path}: line {line}: {name}", f"is no finite number, got {text[:SHOWN]!r}", remedy
+        )  # fmt: skip
+
+
+def read_columns(path: Path) -> MeasuredColumns:
+    """Read a CSV file with a line of names; lines that are empty or begin with ``#`` are passed over.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, names a column twice, or a line has another number of cells.
+    """
+    table: list[tuple[int, list[str]]] = []
+    reader = csv.reader(io.StringIO(read_text(path)))
+    try:
+        for row in reader:
+            if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#"):
+                table.append((reader.line_num, [cell.strip() for cell in row]))
+            if len(table) > MOST_ROWS:
+                raise input_error(str(path), f"has over {MOST_ROWS} lines", "Cut or thin it out.")
+    except csv.Error as error:
+        raise input_error(str(path), f"is no CSV file ({error})", "Separate by commas.") from None
+    if len(table) < 2:
+        raise input_error(
+            str(path), "holds no numbers", "The first line names the columns, each further line is a row."
+        )  # fmt: skip
+    names = tuple(name.lower() for name in table[0][1])
+    _check(path, names, table)
+    return MeasuredColumns(
+        path, names, tuple(line for line, _ in table[1:]), tuple(tuple(row) for _, row in table[1:])
+    )
+
+
+def _check(path: Path, names: tuple[str, ...], table: list[tuple[int, list[str]]]) -> None:
+    place = f"{path}: line {table[0][0]}"
+    if len(names) == 1 and (";" in names[0] or "\t" in names[0]):
+        remedy = "Separate the columns by commas, and write 1.5 with a point."
+        raise input_error(place, f"is one column, got {names[0][:SHOWN]!r}", remedy)
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise input_error(place, f"names the column {twice[0]!r} twice", "Leave one of them out.")
+    for line, row in table[1:]:
+        if len(row) != len(names):
+            raise input_error(
+                f"{path}: line {line}",
+                f"has {len(row)} cells, the first line {len(names)}",
+                "Mend the line; the file may be cut short, or have commas in its numbers.",
+            )

@@ -1,0 +1,76 @@
+"""The page of a fit to hysteresis loops: what was measured, what the law makes of it, and what is left."""
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from stickslip.contact.loop_fit import LoopFit
+from stickslip.report.frame import chapter, figure_html, page_html, write_page
+from stickslip.report.plot import COLOURS, MUTED, Plot, legend_above, styled
+from stickslip.report.quantities import counted, number, scale_for
+
+MOST_DRAWN = 20_000  # samples of a recording: more are thinned out
+
+
+def loop_figure(fit: LoopFit) -> go.Figure:
+    """Draw force over displacement, measured and fitted, and the residual in the order of time."""
+    length = scale_for(np.concatenate([x for x, _ in fit.loops]), "m")
+    newton = scale_for(np.concatenate([f for _, f in fit.loops]), "N")
+    figure = make_subplots(1, 2, horizontal_spacing=0.12, column_widths=[0.58, 0.42])
+    begin = 0
+    for j, ((x, force), fitted) in enumerate(zip(fit.loops, fit.fitted, strict=True)):
+        every = slice(None, None, 1 + x.size // MOST_DRAWN)
+        own = {"legendgroup": str(j), "showlegend": j == 0}
+        dots = {"mode": "markers", "marker": {"size": 4, "color": MUTED}, **own}
+        figure.add_scatter(
+            x=x[every] * length.factor, y=force[every] * newton.factor, name="measured", row=1, col=1, **dots
+        )  # fmt: skip
+        figure.add_scatter(
+            x=x[every] * length.factor, y=fitted[every] * newton.factor, name="fitted", mode="lines",
+            line={"width": 2, "color": COLOURS[j % len(COLOURS)]}, row=1, col=1, **own,
+        )  # fmt: skip
+        at = (begin + np.arange(x.size))[every]
+        left = (force - fitted)[every] * newton.factor
+        figure.add_scatter(x=at, y=left, name="residual", row=1, col=2, **(dots | {"showlegend": False}))  # fmt: skip
+        begin += x.size
+    styled(figure, 480)
+    legend_above(figure)
+    figure.update_xaxes(title_text=f"displacement ({length.unit})", col=1)
+    figure.update_xaxes(title_text="sample", col=2)
+    figure.update_yaxes(title_text=f"force ({newton.unit})", col=1)
+    figure.update_yaxes(title_text=f"measured − fitted ({newton.unit})", col=2)
+    return figure
+
+
+def write_loop_page(
+    fit: LoopFit, source: Path, target: Path, estimates: Sequence[str], lines: Sequence[str]
+) -> None:
+    """Write the page of a fit.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    source
+        File of the loops.
+    target
+        The page; its folder must exist.
+    estimates, lines
+        Estimates, and lines for a study file, as the terminal has them.
+    """
+    n = counted(sum(x.size for x, _ in fit.loops), "sample")
+    caption = f"Left: the measured loop and the law walked along its displacements. Right: what is left, {number(fit.residual)} N as a standard deviation over {n}."
+    drawing = figure_html(Plot("loops", "Hysteresis loop and fit", caption, loop_figure(fit)), 1)
+    notes = "".join(f"<li>{escape(note)}.</li>" for note in fit.notes)
+    body = chapter("estimates", "Estimates", f"<pre>{escape(chr(10).join(estimates))}</pre>")
+    body += chapter("loops", "Loop and fit", drawing)
+    if notes:
+        body += chapter(
+            "notes", "What the loops cannot tell, and what is doubtful", f"<ul>{notes}</ul>"
+        )
+    body += chapter("study", "For the study file", f"<pre>{escape(chr(10).join(lines))}</pre>")
+    write_page(page_html("Friction contact from measured loops", source.name, body), target)
