@@ -10,6 +10,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.contact.law import PAIRS
 
 _PAIRS = np.array(PAIRS)  # force and gap direction of each block
+_SUMS = {"reassoc", "contract"}  # sums in any order: else no sum is vectorised
 
 
 @numba.njit(cache=True, nogil=True)
@@ -24,7 +25,7 @@ def _gap(columns, values, vector, gap):  # type: ignore[no-untyped-def]
                     gap[d, q] += value * vector[q, columns[j]]
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, fastmath=_SUMS)
 def _force(blocks, gap, transposed, force):  # type: ignore[no-untyped-def]
     """Set `force` (3, m) to the product of the blocks of one contact with `gap`."""
     m = gap.shape[1]
@@ -72,7 +73,7 @@ def contact_product(blocks, columns, values, vector, transposed, gap, force, out
                         out[p, columns[c, j]] += value * force[d, p]
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, fastmath=_SUMS)
 def subtract_lower(blocks, columns, values, vector, before, first, last, factor, gap, out):  # type: ignore[no-untyped-def]
     """Subtract from the rows `first` to `last` of `out` what the coefficients before them contribute to ``factor Bᵀ K B v``.
 

@@ -23,6 +23,13 @@ from stickslip.contact.product import (
 )
 from stickslip.harmonic.factors import Factors, factorise
 from stickslip.harmonic.linear import Products
+from stickslip.harmonic.small_blocks import (
+    SMALL,
+    SmallBlocks,
+    dynamic_stiffness,
+    small_blocks,
+    sweep,
+)
 
 Solve = Callable[[FloatArray], FloatArray]
 Product = Callable[[FloatArray, FloatArray], FloatArray]
@@ -40,11 +47,14 @@ class HarmonicFactors:
         (len(harmonics), n_contacts, 3, 3) the contact stiffness they were made of, N/m.
     factors
         Of each harmonic, in the scale of the Jacobian; harmonic 0 is real.
+    inverses
+        The inverses, where the matrices are small.
     """
 
     linear: Products
     means: ComplexArray
     factors: tuple[Factors, ...]
+    inverses: SmallBlocks | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +92,9 @@ class StructuredJacobian:
     def matvec(self, v: FloatArray) -> FloatArray:
         """Return ``J v``."""
         q = self._by_row(v)
-        return self.scale * self._add_contacts(self.blocks, q, False, self.linear.product(q))
+        small = self.linear.n <= SMALL
+        moved = dynamic_stiffness(self.linear).product(q) if small else self.linear.product(q)
+        return self.scale * self._add_contacts(self.blocks, q, False, moved)
 
     def rmatvec(self, v: FloatArray) -> FloatArray:
         """Return ``Jᵀ v``."""
@@ -115,7 +127,13 @@ class StructuredJacobian:
             if own is None:
                 return None
             factors.append(own)
-        return HarmonicFactors(self.linear, means, tuple(factors))
+        inverses = None
+        if self.linear.n <= SMALL:
+            unit = np.eye(self.linear.n, dtype=complex)
+            inverses = small_blocks(
+                [np.stack([own.solve(e) for e in unit], axis=1) for own in factors]
+            )
+        return HarmonicFactors(self.linear, means, tuple(factors), inverses)
 
     def preconditioned_by(self, kept: HarmonicFactors) -> tuple[Solve, Product]:
         """Return how to solve ``P x = y`` with kept factors and the coupling of this Jacobian, and ``J v`` as a function of v and ``P v``."""
@@ -161,6 +179,12 @@ class StructuredJacobian:
         """Solve harmonic by harmonic, from the static one up."""
         rows = self._by_row(right).copy()
         gap = np.zeros((len(self.blocks), 3, len(rows)))
+        if kept.inverses is not None:
+            out = np.empty_like(rows)
+            sweep(
+                kept.inverses.real, kept.inverses.imaginary, self.blocks, self.rows.columns, self.rows.values, self.scale, rows, gap, out
+            )  # fmt: skip
+            return out.reshape(-1)
         before = first = 0
         for h, factors in enumerate(kept.factors):
             last = 2 * h + 1

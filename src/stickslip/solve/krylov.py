@@ -1,4 +1,4 @@
-"""Linear systems whose matrix is known by its products: preconditioned Krylov methods (SciPy's), and the choice between these and LU.
+"""Linear systems whose matrix is known by its products: preconditioned Krylov methods, and the choice between these and LU.
 
 A system ``J x = b`` is solved as ``(J P⁻¹) y = b, x = P⁻¹ y``: preconditioned from the right, so that the residual that is made small is the
 one that Newton sees.
@@ -16,6 +16,7 @@ import scipy.sparse.linalg
 from stickslip.arrays import FloatArray
 from stickslip.errors import check_choice, input_error
 from stickslip.operators import Bordered, Corner, Jacobian, JacobianOperator, array_of, times
+from stickslip.solve.gmres import gmres
 from stickslip.solve.linear import Dense, LinearSolver
 
 Solve = Callable[[FloatArray], FloatArray]
@@ -187,17 +188,15 @@ class Krylov:
             self.counts.products += 1
             return system.product(y)
 
+        if self.method == "gmres":
+            y, left = gmres(product, right, tolerance, self.max_products)
+            return system.precondition(y), left
         operator = scipy.sparse.linalg.LinearOperator(
             (right.size, right.size), matvec=product, dtype=float
         )
-        if self.method == "gmres":
-            y, failed = scipy.sparse.linalg.gmres(
-                operator, right, rtol=tolerance, restart=self.max_products, maxiter=1
-            )
-        else:
-            y, failed = scipy.sparse.linalg.bicgstab(
-                operator, right, rtol=tolerance, maxiter=self.max_products // 2
-            )
+        y, failed = scipy.sparse.linalg.bicgstab(
+            operator, right, rtol=tolerance, maxiter=self.max_products // 2
+        )
         left = tolerance
         if failed:
             left = float(np.linalg.norm(right - system.product(y)) / np.linalg.norm(right))
