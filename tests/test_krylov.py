@@ -14,6 +14,7 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.product import add_stiffness, contact_product, harmonic_means, less_means
 from stickslip.errors import InputError
 from stickslip.harmonic import balance as balance_module
+from stickslip.harmonic import structured as structured_module
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -31,6 +32,7 @@ from stickslip.response.forced.response import forced_problem, forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
+from stickslip.solve.gmres import gmres
 from stickslip.solve.krylov import YOUNG, Automatic, Krylov, to_tolerance
 from stickslip.solve.linear import Dense
 from stickslip.solve.newton_method import Newton, newton
@@ -251,6 +253,43 @@ def test_factors_solve_the_transposed_system(n, dtype):
     # as above: exact for a matrix that differs by rounding, times a growth of at most n
     left = np.linalg.norm(matrix.T @ found - right)
     assert left <= n * 1e-14 * np.linalg.norm(matrix) * np.linalg.norm(found)
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_few_coordinates_take_one_loop_and_many_one_harmonic_at_a_time(name, monkeypatch):
+    balance = problem(STATES[name])
+    rng = np.random.default_rng(7)
+    x, y = rng.standard_normal((2, balance.size))
+    for omega in (OMEGA, 1.1 * OMEGA):  # with factors of this frequency, and of another
+        jac = replace(balance, jacobian="structured").linearise(x, omega).jac
+        told = []
+        for small in (0, 1000):
+            monkeypatch.setattr(structured_module, "SMALL", small)
+            kept = replace(balance, jacobian="structured").linearise(x, OMEGA).jac.preconditioner()
+            assert (kept.inverses is None) == (small == 0)
+            solve, product = jac.preconditioned_by(kept)
+            told.append((jac.matvec(y), solve(y), product(solve(y), y)))
+        for one, other in zip(*told, strict=True):
+            assert_same(one, other)
+
+
+@given(st.integers(0, 10**6), st.integers(1, 40))
+@settings(deadline=None, max_examples=40)
+def test_gmres_is_exact_after_as_many_products_as_unknowns(seed, n):
+    rng = np.random.default_rng(seed)
+    matrix, right = rng.standard_normal((n, n)) + 2.0 * np.eye(n), rng.standard_normal(n)
+    most = int(rng.integers(1, n + 1))
+    solution, left = gmres(lambda v: matrix @ v, right, 1e-10, most)
+    assert left == pytest.approx(
+        np.linalg.norm(right - matrix @ solution) / np.linalg.norm(right), abs=1e-8
+    )
+    # the smallest residual of the Krylov space, by least squares over its powers
+    powers = [right / np.linalg.norm(right)]
+    for _ in range(most - 1):
+        powers.append(np.linalg.qr(np.stack([*powers, matrix @ powers[-1]], axis=1))[0][:, -1])
+    space = matrix @ np.stack(powers, axis=1)
+    best = right - space @ np.linalg.lstsq(space, right, rcond=None)[0]
+    assert left <= max(np.linalg.norm(best) / np.linalg.norm(right), 1e-10) + 1e-7
 
 
 def test_singular_matrix_has_no_factors():
@@ -563,11 +602,9 @@ def test_size_chooses_the_form(monkeypatch):
     made = replace(problem(1.0), jacobian="auto")
     assert not made.structured
     assert isinstance(made.linearise(np.zeros(made.size), OMEGA).jac, np.ndarray)
-    # products go through the harmonics one by one: with more of them there have to be more unknowns
-    more = 1.0 + (len(made.harmonics) - 1) / balance_module.MANY
-    monkeypatch.setattr(balance_module, "CROSSOVER", (made.size + 1) / more)
+    monkeypatch.setattr(balance_module, "CROSSOVER", made.size + 1)
     assert not made.structured
-    monkeypatch.setattr(balance_module, "CROSSOVER", (made.size - 1) / more)
+    monkeypatch.setattr(balance_module, "CROSSOVER", made.size - 1)
     assert made.structured
     assert isinstance(made.linearise(np.zeros(made.size), OMEGA).jac, StructuredJacobian)
     # without harmonics nothing is saved, and the static problem is small

@@ -27,8 +27,7 @@ from stickslip.harmonic.support import (
 )
 
 JacobianForm = Literal["auto", "dense", "structured"]
-CROSSOVER = 620  # unknowns above which products and a Krylov method cost less than an array and its LU factors ...
-MANY = 32  # ... and twice as many with so many harmonics: a product goes through them one by one
+CROSSOVER = 500  # unknowns above which products and a Krylov method cost less than an array and its LU factors
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +115,7 @@ class HarmonicBalance:
     @property
     def large(self) -> bool:
         """Whether products cost less than an array."""
-        return self.size > CROSSOVER * (1.0 + (len(self.harmonics) - 1) / MANY)
+        return self.size > CROSSOVER
 
     def coefficients(self, x: FloatArray) -> ComplexArray:
         """Return the (order+1, n) complex coefficients in metres of scaled unknowns `x`; zeros at harmonics left out."""

@@ -21,7 +21,7 @@ Lossy = tuple[
 ]  # products with K, C, M and structural damping
 # interior dynamic stiffness of each harmonic: its diagonal, or its state-space eigenvectors and ihω, or its LU factors
 InnerOne = ComplexArray | tuple[StateSpace, complex] | tuple[ComplexArray, IntArray]
-Inner = tuple[InnerOne, ...]
+Inner = ComplexArray | tuple[InnerOne, ...]  # an array: diagonals
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,10 +159,10 @@ def _inner(linear: Interior, omega: float, harmonics: Harmonics) -> Inner:
     states = linear.states if np.any(s) else None
     if states is not None:
         return tuple((states, 1j * w) for w in s)
-    each = (k + 1j * w * c - w**2 * m for w in s)
+    each = [k + 1j * w * c - w**2 * m for w in s]
     if loss is not None:
-        each = (d + 1j * (w > 0.0) * loss for d, w in zip(each, s, strict=True))
-    return tuple(each) if linear.diagonal else tuple(scipy.linalg.lu_factor(d) for d in each)
+        each = [d + 1j * (w > 0.0) * loss for d, w in zip(each, s, strict=True)]
+    return np.array(each) if linear.diagonal else tuple(scipy.linalg.lu_factor(d) for d in each)
 
 
 def _across(blocks: Parts, loss: Parts | None, s: float) -> ComplexArray:
@@ -173,6 +173,8 @@ def _across(blocks: Parts, loss: Parts | None, s: float) -> ComplexArray:
 
 
 def _solve_inner(inner: Inner, rows: FloatArray) -> FloatArray:
+    if isinstance(inner, np.ndarray):
+        return to_real(to_complex(rows) / inner)
     each = zip(inner, to_complex(rows), strict=True)
     return to_real(np.array([_solve_one(own, right) for own, right in each]))
 

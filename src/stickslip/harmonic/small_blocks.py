@@ -9,7 +9,7 @@ from functools import lru_cache
 import numba
 import numpy as np
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.contact.product import subtract_lower
 from stickslip.harmonic.linear import Products
 

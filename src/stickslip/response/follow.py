@@ -131,6 +131,7 @@ class _Walk:
             known = replace(make(), seconds=perf_counter() - began)
             yield known
             known = self.curve.stored(known)
+        self.spent += known.point.solution.iterations * self.curve.cost(known.level)
         return known
 
     def _onward(self, here: _Stop) -> Followed:
@@ -244,7 +245,6 @@ class _Walk:
                 self.quiet_for, self.hold = 0, index + CALM
                 return True
             break
-        # nothing before it is sure: begin where this stretch of the branch began
         # nothing before it is sure: begin where this stretch of the branch began
         known = self.branch[begin].ahead
         if known.level < level and begin not in self.given_up:

@@ -18,16 +18,15 @@ PATIENT = 16  # iterations from a solution with other harmonics
 RECENT = 12  # points behind the last one that a step may go back along
 BACK = 0.3  # distance from the branch behind, as a share of the step, within which a step goes back along it
 
-EFFORT = 0.1  # work of a branch beside that of the most harmonics at each of its points, beyond half of which fewer are allowed
-STEPS_A_POINT = 6  # of Newton
-BESIDES = 200.0  # work for each point that is always allowed
+# work of a branch for each of its points, in Newton steps with the most harmonics, beyond half of which fewer harmonics are allowed
+EFFORT = 20.0
 FEWEST = 2  # levels that are always allowed
 
 
 def levels_left(curve: Curve, route: Route, spent: float) -> int:
     """Return how many levels may be used after so much work: all while less than half of it is done, then fewer and fewer."""
     levels = curve.levels
-    most = route.points * (BESIDES + STEPS_A_POINT * EFFORT * curve.cost(levels - 1))
+    most = EFFORT * route.points * curve.cost(levels - 1)
     over = int((spent / most - 0.5) * 2.0 * levels) + 1 if spent > 0.5 * most else 0
     return max(levels - over, min(levels, FEWEST))
 

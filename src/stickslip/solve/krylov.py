@@ -238,6 +238,8 @@ def _system(jac: Jacobian, kept: object) -> _System:
 
 def _inverse(matrix: FloatArray) -> FloatArray:
     """Return the inverse; where a singular value is zero any number will do, for what is inverted belongs to an approximation."""
+    if matrix.shape == (1, 1):
+        return 1.0 / np.where(matrix == 0.0, 1.0, matrix)
     left, sizes, right = np.linalg.svd(matrix)
     return np.asarray((right.T / np.where(sizes > 0.0, sizes, 1.0)) @ left.T)
 

@@ -29,10 +29,7 @@ from stickslip.solve.newton_method import Solution, newton
 KINDS: tuple[Kind, ...] = ("point", "audit", "trial", "found")
 # shares of the threshold that bounds may have, with the fewest harmonics and with more: those at the very threshold were wrong at times
 QUIET = (0.5, 0.8)
-SMALL, FACTORISED = (
-    100.0,
-    1200,
-)  # unknowns from which a factorisation costs more than the rest, and from which it is avoided
+SMALL = 100.0  # unknowns whose part of a Newton step costs as much as the rest
 START = 0.3  # share of the threshold above which what was predicted is kept as a start
 ROUGHLY = 1e-3  # relative residual of that step where it is found by iteration
 AGREE = 0.5  # share of the threshold by which motions of neighbouring levels may differ: the next levels add to it
@@ -91,10 +88,8 @@ class ForcedCurve:
         )
 
     def cost(self, level: int) -> float:
-        """Return the work of a Newton step: that of a factorisation, or of products where there are many unknowns."""
-        size = self.problem(level).size
-        factorised = min(size, FACTORISED) / SMALL
-        return 1.0 + float(factorised**2.2) * max(size / FACTORISED, 1.0)
+        """Return the work of a Newton step, which grows with the unknowns: few are factorised, many solved by products."""
+        return 1.0 + self.problem(level).size / SMALL
 
     def judge(self, level: int, point: Point, latest: Latest) -> Judged:
         """Bound the error of a solution by what the strategy says of the harmonics of the next level."""
