@@ -105,6 +105,61 @@ def subtract_lower(blocks, columns, values, vector, before, first, last, factor,
                         out[p, columns[c, j]] -= factor * values[c, row, j] * total
 
 
+@numba.njit(cache=True, nogil=True)
+def _multiply(real, imaginary, h, rows, out):  # type: ignore[no-untyped-def]
+    """Set the rows of harmonic `h` of `out` to the product with those of `rows`; both may be the same array for one row alone."""
+    n = rows.shape[1]
+    first = max(2 * h - 1, 0)
+    if h == 0:
+        out[0] = 0.0
+        for k in range(n):
+            c = rows[0, k]
+            for j in range(n):
+                out[0, j] += real[0, k, j] * c
+        return
+    out[first : first + 2] = 0.0
+    for k in range(n):
+        c, s = rows[first, k], rows[first + 1, k]
+        for j in range(n):
+            a, b = real[h, k, j], imaginary[h, k, j]
+            out[first, j] += a * c + b * s
+            out[first + 1, j] += a * s - b * c
+
+
+@numba.njit(cache=True, nogil=True)
+def multiply_blocks(real, imaginary, rows, out):  # type: ignore[no-untyped-def]
+    """Set `out` (m, n) to the products with `rows` (m, n); see `stickslip.harmonic.small_blocks`."""
+    for h in range(real.shape[0]):
+        _multiply(real, imaginary, h, rows, out)
+
+
+@numba.njit(cache=True, nogil=True)
+def sweep(real, imaginary, blocks, columns, values, scale, rows, gap, out):  # type: ignore[no-untyped-def]
+    """Solve harmonic by harmonic, from the static one up, each with what those below it do at the contacts.
+
+    Parameters
+    ----------
+    real, imaginary
+        The inverses, as `stickslip.harmonic.small_blocks` has them.
+    blocks, columns, values, scale
+        As in `subtract_lower`.
+    rows
+        (m, n) right side; overwritten.
+    gap
+        Work: (n_contacts, 3, m).
+    out
+        Out: (m, n) solution.
+    """
+    before = first = 0
+    for h in range(real.shape[0]):
+        last = 2 * h + 1
+        if first > 0:
+            # what is subtracted comes from solved rows; it goes into rows that are not solved yet
+            subtract_lower(blocks, columns, values, out, before, first, last, scale, gap, rows)
+        _multiply(real, imaginary, h, rows, out)
+        before, first = first, last
+
+
 def harmonic_means(blocks: FloatArray) -> ComplexArray:
     """Return what is left of `blocks` when each harmonic of a force depends on the same harmonic of a gap by a complex number.
 

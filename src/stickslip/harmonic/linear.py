@@ -1,5 +1,6 @@
 """What vibrates, and the same condensed, as the harmonic balance sees it."""
 
+from collections.abc import Hashable
 from typing import Protocol, Self
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
@@ -64,7 +65,7 @@ def one_structure(side: LinearSide, analysis: str) -> Structure:
     return structure
 
 
-class Products(Protocol):
+class Products(Hashable, Protocol):
     """A condensed dynamic stiffness and its load at one frequency, by its products.
 
     Vectors are real and harmonic-major: (m, n) rows, the static one and two for each other harmonic of the support.

@@ -20,6 +20,7 @@ from stickslip.contact.product import (
     harmonic_means,
     less_means,
     subtract_lower,
+    sweep,
 )
 from stickslip.harmonic.factors import Factors, factorise
 from stickslip.harmonic.linear import Products
@@ -28,7 +29,6 @@ from stickslip.harmonic.small_blocks import (
     SmallBlocks,
     dynamic_stiffness,
     small_blocks,
-    sweep,
 )
 
 Solve = Callable[[FloatArray], FloatArray]

@@ -6,8 +6,8 @@ more than half of the time.
 
 from collections.abc import Callable
 
-import numba
 import numpy as np
+import scipy.linalg
 
 from stickslip.arrays import FloatArray
 
@@ -40,7 +40,9 @@ def gmres(
     basis = np.empty((most + 1, right.size))
     basis[0] = right / size
     triangle = np.zeros((most, most))
-    turns = np.zeros((most, 2))
+    turns = np.eye(
+        most + 1
+    )  # the product of all rotations that made the Hessenberg matrix a triangle
     rest = np.zeros(most + 1)
     rest[0] = 1.0
     count = 0
@@ -53,39 +55,18 @@ def gmres(
             new = new - share @ before
             column[:-1] += share
         column[-1] = length = float(np.linalg.norm(new))
-        _rotate(column, turns, rest, count)
-        triangle[: count + 1, count] = column[:-1]
+        scale = float(np.linalg.norm(column))
+        column[:-1] = turns[: count + 1, : count + 1] @ column[:-1]
+        pivot = float(np.hypot(column[-2], column[-1])) or 1.0
+        c, s = column[-2] / pivot, column[-1] / pivot
+        turns[count : count + 2] = c * turns[count] + s * turns[count + 1], c * turns[count + 1] - s * turns[count]  # fmt: skip
+        rest[count], rest[count + 1] = c * rest[count], -s * rest[count]
+        triangle[:count, count], triangle[count, count] = column[:-2], pivot
         count += 1
-        if length <= np.finfo(float).eps * float(np.linalg.norm(column)) or not np.isfinite(length):
+        if not length > np.finfo(float).eps * scale:
             break
         basis[count] = new / length
-    shares = _back(triangle[:count, :count], rest[:count])
+    shares = scipy.linalg.solve_triangular(
+        triangle[:count, :count], rest[:count], check_finite=False
+    )
     return size * (shares @ basis[:count]), abs(float(rest[count]))
-
-
-@numba.njit(cache=True, nogil=True)
-def _rotate(column, turns, rest, count):  # type: ignore[no-untyped-def]
-    """Turn a new column of the Hessenberg matrix, its last entry to zero, and the right side with it."""
-    for k in range(count):
-        c, s = turns[k]
-        column[k], column[k + 1] = (
-            c * column[k] + s * column[k + 1],
-            c * column[k + 1] - s * column[k],
-        )
-    size = np.hypot(column[count], column[count + 1])
-    c, s = (column[count] / size, column[count + 1] / size) if size > 0.0 else (1.0, 0.0)
-    turns[count] = c, s
-    column[count], column[count + 1] = size, 0.0
-    rest[count + 1] = -s * rest[count]
-    rest[count] = c * rest[count]
-
-
-@numba.njit(cache=True, nogil=True)
-def _back(triangle, rest):  # type: ignore[no-untyped-def]
-    """Solve with an upper triangle."""
-    out = rest.copy()
-    for k in range(out.size - 1, -1, -1):
-        out[k] = out[k] / triangle[k, k] if triangle[k, k] != 0.0 else 0.0
-        for j in range(k):
-            out[j] -= triangle[j, k] * out[k]
-    return out
