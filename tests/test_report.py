@@ -12,18 +12,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from synthetic_result import KEY, provenance, synthetic_result, tree_of, write_result
+from synthetic_result import HIGH, KEY, provenance, synthetic_result, tree_of, write_result
 
 from stickslip.errors import InputError
 from stickslip.report.forced.bodies import body_motion, rigid_bodies
 from stickslip.report.forced.choice import choice, flagged_ranges
 from stickslip.report.forced.curves import frequency_response, optimisation
 from stickslip.report.forced.errors import errors
+from stickslip.report.forced.harmonics import kept_harmonics
 from stickslip.report.forced.head import cards
 from stickslip.report.forced.tables import peaks
 from stickslip.report.page import plots, report_file, report_html
 from stickslip.report.plot import log_ticks
-from stickslip.report.quantities import number, percent, quantity, scale_for
+from stickslip.report.quantities import number, percent, quantity, runs, scale_for
 from stickslip.report.response import NEEDED, Response
 from stickslip.report.skin import edges
 from stickslip.study.analyses.verdict import Verdict, to_json
@@ -321,6 +322,37 @@ def test_the_tile_counts_the_doubtful_points_of_trusted_cases() -> None:
     data["case_verdict"] = ("case", [0, 1])
     (card,) = (c for c in cards(Response(data)) if c.label == "cases to be trusted")
     assert (card.value, card.note) == ("1 of 2", "1 doubtful; of 26 points 2 doubtful")
+
+
+def test_the_smallest_peak_is_one_of_resonance() -> None:
+    data = synthetic_result(ratios=(50, 20, 5), n=24)
+    view = Response(data)
+    peaks = [view.peak_response(c) for c in view.cases]
+    assert all(map(view.resonates, view.cases))
+    least = int(np.argmin(peaks))
+    data["highest_hz"] = "case", [np.nan] * 3
+    data["lowest_hz"] = (
+        "case",
+        [view.peak_hz(c) if c.index == least else np.nan for c in view.cases],
+    )
+    card = cards(Response(data))[0]
+    assert card.label != view.cases[least].label
+    assert card.note.startswith("smallest peak of 2 cases, ")
+    assert card.note.endswith("; of 1 other the largest amplitude stands at the end of the sweep")
+    plot = optimisation(Response(data))
+    assert plot is not None
+    assert f"which is no resonance: {view.cases[least].label}." in plot.caption
+
+
+def test_the_panels_of_harmonics_end_at_the_highest_that_is_kept() -> None:
+    data = synthetic_result(ratios=(20, 5), n=10)
+    data.attrs["high_order"] = 41
+    data.attrs.pop("high_harmonics", None)
+    plot = kept_harmonics(Response(data))
+    assert plot is not None
+    assert plot.figure.layout.yaxis.range[1] < HIGH + 1
+    assert "; no point keeps 6 to 41." in plot.caption
+    assert runs([1, 3, 4, 6, 7, 8, 10]) == "1, 3, 4, 6 to 8, 10"
 
 
 def test_a_clean_run_says_so(page: Path) -> None:

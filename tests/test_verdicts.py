@@ -12,6 +12,7 @@ from small_v2 import write_four_masses
 from test_cli import done
 
 import stickslip as ss
+from stickslip.study.analyses.forced.curve import Curve, branch_length
 from stickslip.study.analyses.forced.verdicts import verdicts, with_levels
 from stickslip.study.analyses.verdict import (
     LEVELS,
@@ -42,7 +43,9 @@ def response(attrs: dict[str, object] | None = None, **changes: object) -> xr.Da
         "refinement": np.zeros(n, dtype=int), "own_error_percent": np.full(n, 1.0),
     }  # fmt: skip
     amplitude = np.array([1.0, 1.3, 1.6, 1.9, 1.5, 1.2])
-    case = {"peak_point": [TOP], "excitation_n": [1.0], "retention_peak_shift": [np.nan]}
+    case = {
+        "peak_point": [TOP], "excitation_n": [1.0], "retention_peak_shift": [np.nan], "lowest_hz": [np.nan], "highest_hz": [np.nan],
+    }  # fmt: skip
     rows = {"verify": "check", "stability": "examined"}
     found: dict[str, object] = {
         "harmonic_kept": (("point", "harmonic"), kept),
@@ -142,6 +145,14 @@ RULES: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
     "no audit of points beside the peak": (
         {"audit_error_percent": np.full(6, np.nan), "harmonic_kept": many((TOP,))}, "trusted", {}, "at 5 points by predictions alone",
     ),
+    "no audit, as nothing acts on what is left out": (
+        {"audit_error_percent": np.full(6, np.nan), "own_error_percent": np.zeros(6)}, "trusted", {},
+        "peak with H = 1, exact, as no force acts on the harmonics left out;",
+    ),
+    "no audit, where something acts beside the peak": (
+        {"audit_error_percent": np.full(6, np.nan), "own_error_percent": values(0, 1.0, 0.0)}, "trusted", {},
+        "at 1 point by predictions alone",
+    ),
     "no audit, but twice the harmonics": (
         {"audit_error_percent": np.full(6, np.nan), "reference_error_percent": np.ones(6)}, "trusted", {}, "peak with H = 1",
     ),
@@ -164,6 +175,18 @@ RULES: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
     ),
     "fold at the peak": (
         {"frequency_hz": np.array([10.0, 11.0, 14.0, 13.0, 12.0, 15.0])}, "doubtful", {}, "the peak stands among them",
+    ),
+    "peak beyond the range, round a fold": (
+        {"frequency_hz": np.array([10.0, 11.0, 12.0, 13.0, 12.5, 12.0]), "lowest_hz": [10.0], "highest_hz": [12.0]}, "doubtful", {},
+        "stands at 13.00 Hz, beyond what was asked for (10.00 to 12.00 Hz)",
+    ),
+    "peak at the end of the range, a fold beyond it": (
+        {"frequency_hz": np.array([10.0, 11.0, 12.0, 13.0, 13.5, 12.7]), "lowest_hz": [10.0], "highest_hz": [13.0]}, "doubtful", {},
+        "stands at the end of the sweep (13.00 Hz)",
+    ),
+    "peak within the range, a fold beyond it": (
+        {"frequency_hz": np.array([10.0, 11.0, 12.0, 13.0, 14.2, 14.0]), "lowest_hz": [10.0], "highest_hz": [14.0]}, "trusted", {},
+        "folds between 14.00 and 14.20",
     ),
     "unstable": (examined("unstable"), "wrong", {TOP: "wrong"}, "a machine does not stay there: unstable: the multiplier is 1.2"),
     "undecided": (examined("undecided"), "doubtful", {TOP: "doubtful"}, "whether it is stable: undecided: the multiplier"),
@@ -265,6 +288,15 @@ def test_points_of_a_rule_are_told_in_one_sentence_with_the_peak_first() -> None
     assert "the like" not in found.why
 
 
+def test_remedies_name_the_frequency_of_a_point_that_is_not_the_peak() -> None:
+    for hz, said in (
+        (13.0, "--verify integrates in time at the peak, and"),
+        (11.0, "frequencies_hz = [11.00] alone, --verify"),
+    ):
+        found = [v for v in judged(response(**examined("undecided", hz)))[0] if v.rank]
+        assert said in found[0].remedy
+
+
 def test_remedies_fit_rigid_contacts() -> None:
     data = response(own_error_percent=np.full(6, np.nan))
     assert "--verify-harmonics predicts" in verdicts(data, [""])[0].remedy
@@ -307,7 +339,7 @@ def test_the_last_line_names_the_cases_that_are_not_trusted() -> None:
     good = xr.DataTree.from_dict({"forced_response": first})
     assert not_trusted(good) == ""
     assert conclusion(good) == (
-        "Every answer is trusted. Of 4 points 1 wrong, 2 doubtful, none of them the peak of its case."
+        "Every case is trusted; of 4 points 1 wrong, 2 doubtful, none of them the peak of its case."
     )
     good.attrs["complete"] = 0
     assert (
@@ -353,3 +385,12 @@ def test_a_journey_says_the_same_on_the_screen_on_the_page_in_the_file_and_in_py
 def test_an_integration_examines_the_harmonics_of_its_point() -> None:
     data = response(own_error_percent=values(TOP, np.nan, 1.0), **checked(difference_percent=3.0))
     assert [v.why for v in verdicts(data, [""]) if "not examined" in v.why] == []
+
+
+def test_points_of_the_peak_that_took_the_place_of_others_stand_along_the_branch() -> None:
+    assert branch_length(np.array([0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0])) == 5
+    assert branch_length(np.array([0.0, np.nan])) == 2
+    assert branch_length(np.array([1.0, 1.0])) == 0
+    amplitude = [1.0, 1.3, 1.6, 1.9, 1.5, 1.2]
+    own = Curve(response(refinement=np.array([0, 0, 1, 1, 0, 1]), amplitude=amplitude), 0)
+    assert own.branch.tolist() == [0, 1, 2, 3, 4]

@@ -83,6 +83,18 @@ def joined(words: list[str]) -> str:
     return ", ".join(words[:-1]) + " and " + words[-1]
 
 
+def runs(numbers: list[int]) -> str:
+    """Write rising whole numbers, three and more in a row as a range: ``2, 4, 10 to 41``."""
+    found: list[list[int]] = []
+    for n in numbers:
+        if found and n == found[-1][-1] + 1:
+            found[-1].append(n)
+        else:
+            found.append([n])
+    each = [[f"{run[0]} to {run[-1]}"] if len(run) > 2 else map(str, run) for run in found]
+    return ", ".join(text for own in each for text in own)
+
+
 def counted(n: int, word: str) -> str:
     """Write a count with its noun."""
     return f"{n} {word}" if n == 1 else f"{n} {word}s"

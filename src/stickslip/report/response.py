@@ -16,6 +16,7 @@ from stickslip.report.cases import ShownCase, cases_of, varied
 from stickslip.report.node import Node
 from stickslip.report.quantities import Scale, number, predicted, scale_for
 from stickslip.report.tables import html_table
+from stickslip.study.analyses.forced.curve import Curve, branch_length
 from stickslip.study.analyses.verdict import LEVELS
 
 NEEDED = ("point_case", "frequency_hz", "order", "status", "amplitude", "harmonic_kept")
@@ -237,14 +238,14 @@ class Response(Node):
     def points(self, case: ShownCase) -> IntArray:
         """Points of a case in the order in which a curve joins them, the unconverged ones included.
 
-        A branch that folds back keeps its order and leaves out the peak refinements, whose place on it is
+        A branch that folds back keeps its order and leaves out the peak refinements behind its end, whose place on it is
         not stored; otherwise the order is that of frequency.
         """
         index = np.flatnonzero(self.point_case == case.index)
-        refined = np.nan_to_num(self.floats("refinement")[index]) > 0
-        along = np.diff(self.hz[index][~refined])
+        branch = index[: branch_length(self.floats("refinement")[index])]
+        along = np.diff(self.hz[branch])
         if np.any(along > 0) and np.any(along < 0):
-            return index[~refined]
+            return branch
         return index[np.argsort(self.hz[index], kind="stable")]
 
     def peak(self, case: ShownCase) -> int:
@@ -260,6 +261,12 @@ class Response(Node):
     def peak_hz(self, case: ShownCase) -> float:
         """Frequency of the peak in Hz; NaN without a peak."""
         return float(self.hz[self.peak(case)]) if self.peak(case) >= 0 else float("nan")
+
+    def resonates(self, case: ShownCase) -> bool:
+        """Whether the peak of a case is known and lies within its sweep: at the end of it the largest amplitude is no resonance."""
+        own = Curve(self.data, case.index)
+        known = self.peak(case) >= 0 and np.isfinite(self.peak_response(case))
+        return bool(known and not own.at_the_end and not own.outside)
 
     @cached_property
     def peaked(self) -> tuple[ShownCase, ...]:

@@ -140,7 +140,9 @@ def _caption(response: Response) -> str:
         )
     doubtful, wrong = (int(np.sum(converged & (response.levels == k))) for k in (1, 2))
     if doubtful or wrong:
-        text += f" Not trusted: {counted(doubtful, 'doubtful point')} (open symbols), {wrong} wrong (crosses)."
+        told = [f"{counted(doubtful, 'doubtful point')} (open symbols)"] * bool(doubtful)
+        told += [f"{wrong} wrong (crosses)"] * bool(wrong)
+        text += f" Not trusted: {', '.join(told)}."
     if not converged.all():
         n = counted(int((~converged).sum()), "point")
         text += f" {n} did not converge (crosses); the curve is left open there."
@@ -221,15 +223,21 @@ def low_order(response: Response) -> Plot | None:
 
 def _optimum_caption(response: Response, cases: list[ShownCase]) -> str:
     peak, hz = ([of(c) for c in cases] for of in (response.peak_response, response.peak_hz))
-    best = int(np.argmin(peak))
+    within = [response.resonates(c) for c in cases]
+    best = int(np.argmin(np.where(within, peak, np.inf) if any(within) else peak))
     text = (
         f"Among the cases computed the peak is smallest{cases[best].where}: "
         f"{percent(100 * peak[best] / max(peak))} of the largest one. "
     )
     if best in (0, len(peak) - 1):
-        text += "That is the end of the range: the optimum may lie beyond it. "
+        text += "No value beyond it was computed: the optimum may lie there. "
+    if not all(within):
+        ends = joined([c.label for c, inside in zip(cases, within, strict=True) if not inside])
+        text += (
+            f"The largest amplitude stands at the end of the sweep, which is no resonance: {ends}. "
+        )
     return text + (
-        f"Over the range the peak moves by {number(hz[-1] - hz[0])} Hz, "
+        f"From the first to the last value the peak moves by {number(hz[-1] - hz[0])} Hz, "
         f"from {number(hz[0], 5)} Hz{cases[0].where} to {number(hz[-1], 5)} Hz{cases[-1].where}."
     )
 

@@ -31,6 +31,9 @@ def _error_traces(figure: go.Figure, response: Response) -> None:
     for case in response.cases:
         own = np.flatnonzero(asked.case == case.index)
         x, y = asked.hz[own], asked.error[own]
+        if response.auto:
+            along = response.points(case)
+            x, y = response.hz[along], response.floats("own_error_percent")[along]
         drawn = {"mode": "lines", "name": case.short, "line": {"color": case.colour, "width": 1.6}}
         add(case, x, y, 1, **drawn, showlegend=named, legendgrouptitle={"text": response.varied})
         if case in both:
@@ -90,11 +93,15 @@ def errors(response: Response) -> Plot | None:
     if not error.size or not response.decides:
         return None
     two = response.is_error and bool(np.isfinite(real).any())
-    titles = ["predicted (line) and real (circles)"] if two else [""]
+    titles = ["predicted (line) and real (circles)"] if two else []
     if two and len(response.cases) > 1:
         titles.insert(0, "predicted, all cases")
     figure = make_subplots(
-        1, len(titles), shared_yaxes=True, horizontal_spacing=0.04, subplot_titles=titles
+        1,
+        max(len(titles), 1),
+        shared_yaxes=True,
+        horizontal_spacing=0.04,
+        subplot_titles=titles or None,
     )
     _error_traces(figure, response)
     styled(figure, 430)
@@ -107,7 +114,9 @@ def errors(response: Response) -> Plot | None:
     figure.update_yaxes(type="log", range=[np.log10(floor), np.log10(2 * top)], **ticks)
     what = "error (%)" if response.is_error else f"indicator of {response.selection}"
     figure.update_yaxes(title_text=what, col=1)
-    title = "Predicted and real error against frequency"
+    title = f"Predicted{' and real' * two} error of first solutions against frequency"
+    if response.auto:
+        title = "Predicted error of the accepted solutions against frequency"
     if not response.is_error:
         title = "The strategy's indicator against frequency"
     return Plot("errors", title, _caption(response), figure)

@@ -7,12 +7,17 @@ from plotly.subplots import make_subplots
 from stickslip.arrays import IntArray
 from stickslip.report.cases import ShownCase
 from stickslip.report.plot import ALARM, Plot, styled
-from stickslip.report.quantities import counted
+from stickslip.report.quantities import counted, runs
 from stickslip.report.response import Response
 
 _SHOWN = 12  # cases that stay legible below one another
 _EDGE = 0.01  # of the frequency range, so that marks at its ends are whole
-_ROW, _LINE = 46, 13  # height of a panel and of each of its harmonics, pixels
+_ROW, _LINE, _PANEL = (
+    46,
+    13,
+    200,
+)  # height of a panel, of each of its harmonics, and of all of these at most, pixels
+_TICKS = 12  # harmonics that an axis names
 
 
 def kept_harmonics(response: Response) -> Plot | None:
@@ -25,15 +30,17 @@ def kept_harmonics(response: Response) -> Plot | None:
     figure = make_subplots(
         len(cases), 1, shared_xaxes=True, vertical_spacing=spacing, subplot_titles=titles
     )
-    highest = int(response.high_harmonics[-1])
+    highest = max((int(h) for h in np.flatnonzero(response.kept.any(axis=0))), default=1)
     for row, case in enumerate(cases, 1):
         figure.add_trace(_marks(response, case), row=row, col=1)
         lost = np.flatnonzero(~response.converged & (response.point_case == case.index))
         if lost.size:
             figure.add_trace(_lost(response, lost, highest), row=row, col=1)
-    styled(figure, 90 + len(cases) * (_ROW + _LINE * highest))
+    styled(figure, 90 + len(cases) * (_ROW + min(_LINE * highest, _PANEL)))
     figure.update_layout(showlegend=False)
-    ticks = [int(h) for h in response.high_harmonics if h > 0]
+    ticks = [int(h) for h in response.high_harmonics if 0 < h <= highest]
+    if len(ticks) > _TICKS:
+        ticks = [1, *range(5, highest + 1, 5)]
     figure.update_yaxes(tickvals=ticks, range=[0.3, highest + 0.9])
     figure.update_yaxes(title_text="harmonic", row=(len(cases) + 1) // 2, col=1)
     hz = response.hz
@@ -49,7 +56,7 @@ def _marks(response: Response, case: ShownCase) -> go.Scatter:
     row, harmonic = np.nonzero(response.kept[at, 1:])
     return go.Scatter(
         x=response.hz[at][row], y=harmonic + 1, mode="markers", name=case.short,
-        marker={"symbol": "square", "size": 6, "color": case.colour},
+        marker={"symbol": "square", "size": 6 if response.kept.shape[1] <= _TICKS else 4, "color": case.colour},
         hovertemplate="%{x:.2f} Hz: harmonic %{y} is kept<extra></extra>",
     )  # fmt: skip
 
@@ -69,8 +76,8 @@ def _caption(response: Response, cases: list[ShownCase]) -> str:
         f"keep other harmonics than H = {response.low_name}"
     )
     used = np.flatnonzero(response.kept[good].any(axis=0)) if good.any() else np.zeros(0, dtype=int)
-    unused = [str(h) for h in response.high_harmonics if h not in used]
-    text += f"; no point keeps {', '.join(unused)}." if unused and good.any() else "."
+    unused = [int(h) for h in response.high_harmonics if h not in used]
+    text += f"; no point keeps {runs(unused)}." if unused and good.any() else "."
     if len(cases) < len(response.cases):
         text += f" The last {len(cases)} of {len(response.cases)} cases are drawn."
     return text

@@ -20,18 +20,28 @@ def _peak_card(response: Response) -> Card:
     cases = [c for c in response.peaked if np.isfinite(response.peak_response(c))]
     if not cases:
         return Card(NONE, "peak", "no case has its peak yet")
-    peaks = np.array([response.peak_response(c) for c in cases])
+    within = [c for c in cases if response.resonates(c)]
+    peaks = np.array([response.peak_response(c) for c in within or cases])
     best = int(np.argmin(peaks))
     scale = scale_for(peaks[best : best + 1], response.unit)
     size = f"{number(float(peaks[best]) * scale.factor)} {scale.unit}"
+    no_resonance = "the largest amplitude stands at the end of the sweep: no resonance"
     if len(cases) == 1:
         whole = quantity(float(peaks[0]) * cases[0].excitation, response.length)
         more = f", {whole}" if response.per_force else ""
         at = f"at {number(response.peak_hz(cases[0]), 5)} Hz{more}"
-        return Card(size, f"peak of {response.output_name}", at)
-    end = "; at the end of the range" if best in (0, len(cases) - 1) else ""
-    note = f"smallest peak of the cases, {percent(100 * float(peaks[best] / peaks.max()))} of the largest{end}"
-    return Card(size, cases[best].label, note)
+        return Card(
+            size, f"peak of {response.output_name}", at if within else f"{at}; {no_resonance}"
+        )
+    if not within:
+        return Card(size, cases[best].label, f"in every case {no_resonance}")
+    left_out = len(cases) - len(within)
+    note = f"smallest peak of {counted(len(within), 'case')}, {percent(100 * float(peaks[best] / peaks.max()))} of the largest"
+    if within[best] in (response.cases[0], response.cases[-1]):
+        note += f"; the {'first' if within[best] is response.cases[0] else 'last'} case, so that a smaller one may lie beyond"
+    if left_out:
+        note += f"; of {counted(left_out, 'other')} the largest amplitude stands at the end of the sweep"
+    return Card(size, within[best].label, note)
 
 
 def _shift_card(response: Response) -> Card | None:

@@ -18,7 +18,7 @@ def stability(response: Response) -> str | None:
     rows = [
         [response.cases[int(case[i])].short, fixed(float(hz[i]), 3), verdict[i],
          number(float(size[i]), 5) if np.isfinite(size[i]) else NONE,
-         number(float(error[i]), 2) if np.isfinite(error[i]) else "not known"]
+         _error(float(error[i]))]
         for i in range(len(verdict))
     ]  # fmt: skip
     text = (
@@ -27,3 +27,10 @@ def stability(response: Response) -> str | None:
     )
     head = ["frequency (Hz)", "verdict", "largest multiplier", "its error"]
     return text + response.table(head, rows) + sentences(response, "stability_sentence")
+
+
+def _error(error: float) -> str:
+    """Write the error of a multiplier; it has none where no force acts on more harmonics."""
+    if not np.isfinite(error):
+        return "not known"
+    return number(error, 2) if error > 0.0 else "none"

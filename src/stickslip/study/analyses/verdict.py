@@ -158,8 +158,11 @@ def conclusion(tree: xr.DataTree) -> str:
     every = np.concatenate([np.zeros(0, dtype=np.int64), *found])
     counts = {LEVELS[k]: int(np.sum(every == k)) for k in (2, 1)}
     off = ", ".join(f"{n} {level}" for level, n in counts.items() if n)
-    aside = f" Of {every.size} points {off}, none of them the peak of its case." if off else ""
-    return f"Every answer is trusted.{aside}"
+    if not off:
+        return "Every answer is trusted."
+    return (
+        f"Every case is trusted; of {every.size} points {off}, none of them the peak of its case."
+    )
 
 
 def _not_trusted(name: str, data: xr.Dataset) -> str:

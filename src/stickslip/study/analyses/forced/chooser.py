@@ -166,15 +166,29 @@ class Chooser:
 
 
 def _audited(response: Response) -> str:
-    """Say what the audits found."""
-    found = [a.audit_error for a in response.accepted if not np.isnan(a.audit_error)]
-    solved = sum(e > 0.0 for e in found)
-    if not found:
-        return ""
-    exact = len(found) - solved
-    told = [f"{solved} solved with more to compare, differing by at most {error_text(max(found))}"] * bool(solved)  # fmt: skip
-    told += [f"at {exact} nothing acts on the harmonics left out"] * bool(exact)
-    return "; " + "; ".join(told)
+    """Say on what the points rest: solved again, exact, or predicted."""
+    every = [a for a in response.accepted if a.point.converged]
+    again = [a.audit_error for a in every if not np.isnan(a.audit_error)]
+    rest = [a for a in every if np.isnan(a.audit_error)]
+    exact = sum(a.exact for a in rest)
+    alone = [a.own_error for a in rest if not a.exact and not np.isnan(a.own_error)]
+    told = []
+    if again:
+        told.append(
+            f"audits: {_points(len(again))} solved again with more harmonics, which changed the motion by at most "
+            f"{error_text(max(again))}"
+        )
+    if exact:
+        told.append(f"{_points(exact)} exact, as no force acts on the harmonics left out")
+    if alone:
+        told.append(
+            f"{_points(len(alone))} judged by prediction alone, of at most {error_text(max(alone))}"
+        )
+    return "".join(f"; {text}" for text in told)
+
+
+def _points(n: int) -> str:
+    return f"{n} point{'s' * (n != 1)}"
 
 
 def chooser_of(sweep: Sweep, over: Sequence[str], driven: Sequence[int]) -> Chooser:

@@ -24,6 +24,18 @@ def motion_of(said: Mapping[str, Any]) -> str:
     return str(said.get("verify_motion", "")) or settled
 
 
+def branch_length(refinement: FloatArray) -> int:
+    """Return how many points stand along the branch; behind them stand those that were added to resolve the peak.
+
+    Parameters
+    ----------
+    refinement
+        (n,) 1 for points of the peak; one in the place of a point of the branch keeps the place.
+    """
+    along = np.flatnonzero(np.nan_to_num(refinement) == 0)
+    return int(along[-1]) + 1 if along.size else 0
+
+
 @dataclass(frozen=True, eq=False)
 class Curve:
     """A case.
@@ -81,8 +93,8 @@ class Curve:
 
     @cached_property
     def branch(self) -> IntArray:
-        """Positions of the points in the order of the branch; those that resolve the peak are left out."""
-        return np.flatnonzero(np.nan_to_num(self.floats("refinement")) == 0)
+        """Positions of the points in the order of the branch; those that resolve the peak and stand behind its end are left out."""
+        return np.arange(branch_length(self.floats("refinement")))
 
     @cached_property
     def output(self) -> str:
@@ -161,6 +173,11 @@ class Curve:
         """(n,) error predicted of each point's own solution, a fraction; NaN where it was not judged."""
         return self.floats("own_error_percent") / 100
 
+    @property
+    def exact(self) -> BoolArray:
+        """(n,) whether no force acts on the harmonics that a point leaves out."""
+        return np.asarray(self.own_error == 0.0)
+
     @cached_property
     def audit(self) -> FloatArray:
         """(n,) difference from a solution with more harmonics, a fraction; NaN where none was made."""
@@ -191,6 +208,18 @@ class Curve:
     def stepped(self) -> bool:
         """Whether frequencies were given, instead of a branch followed."""
         return bool(self.data.attrs.get("stepped", 0))
+
+    @property
+    def outside(self) -> bool:
+        """Whether the peak lies beyond the frequencies that were asked for, where a branch goes round a fold."""
+        low, high = self.number("lowest_hz"), self.number("highest_hz")
+        return bool(self.peak_hz < low * (1 - SAME) or self.peak_hz > high * (1 + SAME))
+
+    @property
+    def at_the_end(self) -> bool:
+        """Whether the peak is the end of the sweep, or the last point that was found there."""
+        ends = [self.hz.min(), self.hz.max(), self.number("lowest_hz"), self.number("highest_hz")]
+        return bool(np.any(np.abs(np.array(ends) - self.peak_hz) <= SAME * self.peak_hz))
 
     @property
     def range_key(self) -> str:

@@ -47,6 +47,11 @@ class Accepted:
     audit_error: float = float("nan")
 
     @property
+    def exact(self) -> bool:
+        """Whether no force acts on the harmonics left out: with however many it stays the same, and no audit is needed."""
+        return self.own_error == 0.0
+
+    @property
     def indicator(self) -> float:
         """What the strategy said of the first solution: of an alert the predicted error, a fraction; NaN where it was not asked."""
         return (self.low or self.point).predicted_error
@@ -160,7 +165,7 @@ def collect(problem: ForcedProblem, points: Sequence[ForcedPoint], output: int) 
     accepted = []
     for point, low in accepted_pairs(points):
         own = _own_error(problem, point)
-        audit = _audit_error(problem, point, audits.get(point.omega, []), own)
+        audit = _audit_error(problem, point, audits.get(point.omega, []))
         made = _accept(problem, point, low)
         accepted.append(replace(made, driven=problem.driven, own_error=own, audit_error=audit))
     amplitude = np.array([a.amplitudes(output + 1)[output] for a in accepted])
@@ -189,13 +194,11 @@ def _audits(points: Sequence[ForcedPoint]) -> dict[float, list[ForcedPoint]]:
 
 
 def _audit_error(
-    problem: ForcedProblem, point: ForcedPoint, audits: Sequence[ForcedPoint], own: float
+    problem: ForcedProblem, point: ForcedPoint, audits: Sequence[ForcedPoint]
 ) -> float:
     """Return by how much a solution differs from that with most harmonics at its frequency; NaN where there is none with more."""
     if not point.converged:
         return float("nan")
-    if own == 0.0:
-        return 0.0  # what has no force on it stays zero, with however many harmonics
     most = max(audits, key=lambda p: p.harmonics.size, default=point)
     more = most.harmonics.size > point.harmonics.size
     return problem.real_error(point, most) if more else float("nan")

@@ -69,15 +69,23 @@ def few_harmonics(case: Curve) -> Iterator[Finding]:
             continue  # what was solved or integrated tells more than a prediction
         if own > case.limit:
             why = f"more harmonics than H = {case.kept[i]} are predicted to change it by {error_text(own)}"
-            yield Finding("doubtful", why, f"{_more(case)}; {IN_TIME}.", (int(i),), float(own))
+            remedy = f"{_more(case)}; {_in_time(case, int(i))}."
+            yield Finding("doubtful", why, remedy, (int(i),), float(own))
         elif np.isnan([own, solved, case.reference[i], case.integrated[i]]).all():
             why = f"its harmonics were not examined: nothing says how wrong H = {case.kept[i]} is"
             yield Finding("doubtful", why, f"{_examination(case)}.", (int(i),))
 
 
+def _in_time(case: Curve, point: int) -> str:
+    """Say how a point is integrated in time: of a sweep it is the peak that is."""
+    if point == case.peak:
+        return IN_TIME
+    return f"with forced_response.frequencies_hz = [{case.hz[point]:.2f}] alone, --verify integrates in time there"
+
+
 def _more(case: Curve) -> str:
     if case.auto:
-        return "As many harmonics were kept as there may be: raise [limits] where they set the most"
+        return "As many harmonics were kept as there may be: where limits.work_s or limits.memory_gb set the most, raise them"
     return 'Give harmonics.high = "auto", or a larger number'
 
 
@@ -92,13 +100,13 @@ def audited(case: Curve) -> Iterator[Finding]:
     for i in np.flatnonzero(case.audit > case.limit):
         if not case.attained[i]:
             why = f"solved again with more harmonics than H = {case.kept[i]} it differs by {error_text(case.audit[i])}"
-            remedy = f"{_more(case)}; {IN_TIME}."
+            remedy = f"{_more(case)}; {_in_time(case, int(i))}."
             yield Finding("doubtful", why, remedy, (int(i),), float(case.audit[i]))
 
 
 def not_audited(case: Curve) -> Iterator[Finding]:
     """Doubt a peak whose few harmonics were accepted by predictions alone; tell of such points elsewhere."""
-    few = case.converged & case.few
+    few = case.converged & case.few & ~case.exact
     none = case.has("audit_error_percent") and bool(np.isnan(case.audit).all())
     if not none or not case.decides or not few.any() or case.attained[case.peak]:
         return
@@ -106,10 +114,11 @@ def not_audited(case: Curve) -> Iterator[Finding]:
         at_peak = case.peak >= 0 and bool(few[case.peak])
         where = ", the peak among them" if at_peak else ""
         why = (
-            f"H = {case.low} was accepted at {few.sum()} points by predictions alone{where}: none of them was solved with more to "
-            "compare"
+            f"H = {case.low} was accepted at {few.sum()} point{'s' * int(few.sum() != 1)} by predictions alone{where}: none of them "
+            "was solved with more to compare"
         )
-        remedy = f'harmonics.high = "auto" audits some; {_examination(case)}.'
+        audits = "" if case.auto else 'harmonics.high = "auto" audits some; '
+        remedy = f"{audits}{_examination(case)}."
         yield Finding("doubtful" if at_peak else "trusted", why, remedy)
 
 
@@ -169,7 +178,7 @@ def stability(case: Curve) -> Iterator[Finding]:
             yield Finding("wrong", why, remedy, (point,))
         elif said["stability_verdict"] == "undecided" and not case.attained[point]:
             why = f"whether it is stable: {why}"
-            remedy = f"{IN_TIME}, and sees whether the motion stays."
+            remedy = f"{_in_time(case, point)}, and sees whether the motion stays."
             yield Finding("doubtful", why, remedy, (point,))
 
 
@@ -210,7 +219,14 @@ def at_the_end(case: Curve) -> Iterator[Finding]:
         why = f"the output {case.output} does not move: a rigid contact holds it at all frequencies"
         remedy = "Name an output that moves, or raise the load until it slips."
         yield Finding("doubtful", why, remedy)
-    elif case.peak_hz in (case.hz.min(), case.hz.max()):
+    elif case.outside:
+        asked = f"{case.number('lowest_hz'):.2f} to {case.number('highest_hz'):.2f} Hz"
+        why = (
+            f"the largest amplitude stands at {case.peak_hz:.2f} Hz, beyond what was asked for ({asked}), where the branch goes round a "
+            "fold"
+        )
+        yield Finding("doubtful", why, f"Widen forced_response.{case.range_key}.")
+    elif case.at_the_end:
         why = f"the largest amplitude stands at the end of the sweep ({case.peak_hz:.2f} Hz); it is no resonance"
         yield Finding("doubtful", why, f"Widen forced_response.{case.range_key}.")
 

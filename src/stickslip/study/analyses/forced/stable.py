@@ -9,6 +9,7 @@ from stickslip.errors import InputError, StickslipError
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.stability import stability
 from stickslip.study.analyses.forced.comparison import Check
+from stickslip.study.analyses.forced.curve import branch_length
 from stickslip.study.analyses.forced.in_time import seconds_in_time
 from stickslip.study.analyses.forced.jumps import jumps, stored_energy
 from stickslip.study.analyses.forced.points import Accepted, Response
@@ -183,7 +184,8 @@ def _off(question: Question, accepted: Accepted) -> bool:
 def _beside_jumps(response: Response) -> set[int]:
     """Return positions of the points on either side of a jump."""
     every = response.accepted
-    branch = [i for i, a in enumerate(every) if a.point.stage != "peak" and a.fields is not None]
+    along = branch_length(np.array([a.point.stage == "peak" for a in every], dtype=float))
+    branch = [i for i, a in enumerate(every[:along]) if a.fields is not None]
     shown = [f for f in (every[i].fields for i in branch) if f is not None]
     amplitude = np.array([response.amplitude(every[i]) for i in branch])
     few = np.array([every[i].point.support == response.low_harmonics for i in branch], dtype=bool)

@@ -121,6 +121,8 @@ def _of_case(question: Question, response: Response, shift: tuple[float, float])
     contact, linear, rest = response.seconds
     return {
         "excitation_n": question.model.excitation,
+        "lowest_hz": question.sweep.omega_range[0] / HZ,
+        "highest_hz": question.sweep.omega_range[1] / HZ,
         "peak_amplitude": response.peak_amplitude,
         "peak_frequency_hz": response.peak_hz,
         "peak_point": response.peak,

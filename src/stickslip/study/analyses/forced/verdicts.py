@@ -74,8 +74,9 @@ def _examined(case: Curve) -> str:
     if case.peak < 0:
         return "nothing to judge"
     peak, said = case.peak, [f"peak with H = {case.kept[case.peak]}"]
+    said += ["exact, as no force acts on the harmonics left out"] * bool(case.exact[peak])
     for value, about in (
-        (case.own_error[peak], "predicted error"),
+        (np.nan if case.exact[peak] else case.own_error[peak], "predicted error"),
         (case.audit[peak], "difference from more harmonics"),
         (case.reference[peak], "predicted change with twice as many harmonics"),
     ):
