@@ -21,6 +21,7 @@ from stickslip.report.forced.curves import frequency_response, optimisation
 from stickslip.report.forced.errors import errors
 from stickslip.report.forced.harmonics import kept_harmonics
 from stickslip.report.forced.head import cards
+from stickslip.report.forced.stability import stability
 from stickslip.report.forced.tables import peaks
 from stickslip.report.page import plots, report_file, report_html
 from stickslip.report.plot import log_ticks
@@ -322,6 +323,21 @@ def test_the_tile_counts_the_doubtful_points_of_trusted_cases() -> None:
     data["case_verdict"] = ("case", [0, 1])
     (card,) = (c for c in cards(Response(data)) if c.label == "cases to be trusted")
     assert (card.value, card.note) == ("1 of 2", "1 doubtful; of 26 points 2 doubtful")
+
+
+def test_checks_name_their_case_and_what_decided() -> None:
+    data = synthetic_result(ratios=(20, 5), n=10)
+    rows = {
+        "case": [0, 1], "frequency_hz": [180.0, 181.0], "verdict": ["stable", "undecided"], "multiplier": [1.05, 0.9],
+        "multiplier_error": [0.2, 0.0],
+        "sentence": ["180.000 Hz: stable, the motion in time being attained; by the multipliers undecided: x", "181.000 Hz: undecided: y"],
+    }  # fmt: skip
+    for name, own in rows.items():
+        data[f"stability_{name}"] = "examined", own
+    html = stability(Response(data)) or ""
+    assert "<td>stable</td><td>motion in time</td><td>1.05</td><td>0.2</td>" in html
+    assert "<td>undecided</td><td>–</td><td>0.9</td><td>none</td>" in html
+    assert f"<li>{KEY} = 5: 181.000 Hz: undecided: y</li>" in html
 
 
 def test_the_smallest_peak_is_one_of_resonance() -> None:

@@ -122,11 +122,16 @@ def test_more_harmonics_leave_a_linear_response_as_it_is(stuck: tuple[Question, 
 
 def test_sentence_tells_what_happened() -> None:
     assert "balance 1.02000e-03 m (H = 5)" in CHECK.sentence
-    assert CHECK.sentence.endswith("difference +2.00 %; periodic after 90 periods")
+    assert CHECK.sentence.endswith("difference +2 %; periodic after 90 periods")
     unsettled = replace(CHECK, settled=False, scatter=0.012, drifting="damper.y")
     assert unsettled.sentence.endswith(
         "not periodic after 90 periods: average over the last third, scatter 1.2 %, "
         "and these coordinates drift: damper.y"
+    )
+    stays = replace(CHECK, settled=False, scatter=3e-7, motion="attained")
+    assert (
+        "periodic but for the scatter after 90 periods: average over the last third, scatter 3e-05 %"
+        in stays.sentence
     )
     lost = replace(CHECK, settled=False, transient=float("nan"))
     assert "overflowed after 90 periods" in lost.sentence

@@ -6,6 +6,10 @@ from stickslip.report.forced.tables import sentences
 from stickslip.report.quantities import NONE, fixed, number
 from stickslip.report.response import Response
 
+BY_MOTION = (
+    ", the motion in time being "  # in the sentence of a point whose multipliers leave it undecided
+)
+
 
 def stability(response: Response) -> str | None:
     """One row a point that was examined: verdict and multiplier."""
@@ -15,17 +19,24 @@ def stability(response: Response) -> str | None:
     case = response.integers(names[0])
     hz, size, error = (response.floats(name) for name in (names[1], *names[3:]))
     verdict = [str(text) for text in response.data[names[2]].values]
+    told = (
+        response.labels_of("stability_sentence")
+        if response.has("stability_sentence")
+        else [""] * len(verdict)
+    )
+    by = ["motion in time" if BY_MOTION in text else "multiplier" for text in told]
     rows = [
         [response.cases[int(case[i])].short, fixed(float(hz[i]), 3), verdict[i],
+         by[i] if verdict[i] in ("stable", "unstable") else NONE,
          number(float(size[i]), 5) if np.isfinite(size[i]) else NONE,
          _error(float(error[i]))]
         for i in range(len(verdict))
     ]  # fmt: skip
     text = (
-        "<h3>Stability</h3><p>Whether a small disturbance of the motion dies. Each is multiplied by so much in a period; above 1 a "
-        "machine does not stay there.</p>"
+        "<h3>Stability</h3><p>Whether a small disturbance of the motion dies. Each is multiplied by so much in a period; above 1 by more "
+        "than its error a machine does not stay there. Where the error reaches 1 the motion in time decides, or nothing does.</p>"
     )
-    head = ["frequency (Hz)", "verdict", "largest multiplier", "its error"]
+    head = ["frequency (Hz)", "verdict", "decided by", "largest multiplier", "its error"]
     return text + response.table(head, rows) + sentences(response, "stability_sentence")
 
 

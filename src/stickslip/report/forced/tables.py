@@ -7,6 +7,7 @@ import numpy as np
 from stickslip.harmonic.support import named
 from stickslip.report.quantities import NONE, fixed, number, percent, predicted, quantity, scale_for
 from stickslip.report.response import Response
+from stickslip.study.analyses.verdict import said
 
 
 def peaks(response: Response) -> str:
@@ -82,8 +83,14 @@ def sentences(response: Response, name: str) -> str:
     """List what each check said, in words."""
     if not response.has(name):
         return ""
-    said = (f"<li>{escape(str(s))}</li>" for s in response.data[name].values)
-    return f"<ul>{''.join(said)}</ul>"
+    each = [str(s) for s in response.data[name].values]
+    rows = f"{name.partition('_')[0]}_case"
+    at = response.integers(rows) if response.has(rows) else np.arange(len(each))
+    labels = [response.cases[int(k)].label for k in at]
+    items = (
+        f"<li>{said(label, escape(text))}</li>" for label, text in zip(labels, each, strict=True)
+    )
+    return f"<ul>{''.join(items)}</ul>"
 
 
 def more_harmonics(response: Response) -> str | None:
@@ -110,20 +117,24 @@ def time_integration(response: Response) -> str | None:
     if not response.has(*names):
         return None
     columns = [response.floats(name) for name in names]
-    settled, periods = (
-        response.floats(n) if n in response.data else np.full(len(columns[0]), np.nan)
-        for n in ("verify_settled", "verify_periods")
-    )
+    nothing = np.full(len(columns[0]), np.nan)
+    periods = response.floats("verify_periods") if response.has("verify_periods") else nothing
+    motion = [NONE] * len(columns[0])
+    if response.has("verify_settled"):
+        motion = [("not settled", "settled")[int(k)] for k in response.integers("verify_settled")]
+    if response.has("verify_motion"):
+        told = response.labels_of("verify_motion")
+        motion = [word or known for word, known in zip(told, motion, strict=True)]
     rows = [
         [response.cases[int(case)].short if np.isfinite(case) else NONE, fixed(float(hz), 3), quantity(float(transient), response.length, 5),
          quantity(float(balance), response.length, 5), percent(float(off)),
-         NONE if not np.isfinite(done) else ("yes" if done else "no"), fixed(float(n), 0)]
-        for case, hz, transient, balance, off, done, n in zip(*columns, settled, periods, strict=True)
+         word, fixed(float(n), 0)]
+        for case, hz, transient, balance, off, word, n in zip(*columns, motion, periods, strict=True)
     ]  # fmt: skip
     finite = np.abs(columns[-1][np.isfinite(columns[-1])])
     worst = percent(float(finite.max())) if finite.size else NONE
     ways = ["by time integration", "by harmonic balance"]
-    head = ["frequency (Hz)", *ways, "difference", "settled", "periods"]
+    head = ["frequency (Hz)", *ways, "difference", "motion in time", "periods"]
     text = (
         f"<h3>Time integration</h3><p>Amplitude of {response.output_name}: the two independent ways differ by at most "
         f"{worst}.</p>"

@@ -82,7 +82,7 @@ class Check:
         """What was compared and what happened."""
         return (
             f"{self.frequency_hz:.3f} Hz: balance {self.balance:.5e} m (H = {self.order}), "
-            f"time integration {self.transient:.5e} m, difference {self.difference_percent:+.2f} %; "
+            f"time integration {self.transient:.5e} m, difference {self.difference_percent:+.3g} %; "
             f"{self._motion}{self._step}{self._verdict}{self._became}"
         )
 
@@ -94,6 +94,8 @@ class Check:
             return f"periodic after {self.periods} periods"
         drifting = f", and these coordinates drift: {self.drifting}" if self.drifting else ""
         word = "not settled" if self.motion == "not settled" else "not periodic"
+        if self.motion == "attained":
+            word = "periodic but for the scatter"
         return (
             f"{word} after {self.periods} periods: average over the last third, "
             f"scatter {100 * self.scatter:.2g} %{drifting}"

@@ -78,7 +78,7 @@ def few_harmonics(case: Curve) -> Iterator[Finding]:
 
 def _in_time(case: Curve, point: int) -> str:
     """Say how a point is integrated in time: of a sweep it is the peak that is."""
-    if point == case.peak:
+    if point == case.peak or case.range_key == "speed_rpm":
         return IN_TIME
     return f"with forced_response.frequencies_hz = [{case.hz[point]:.2f}] alone, --verify integrates in time there"
 
