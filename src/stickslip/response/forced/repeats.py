@@ -20,6 +20,9 @@ from stickslip.solve.status import Rung
 
 PATIENT = 16  # iterations of a repeat from one start
 ISOLATED = 25  # iterations of a repeat beside none that is accepted: damped steps of planar friction need them, and one that comes through leads to the others
+CLOSE = (
+    1.0  # relative distance from a repeat beside a frequency within which it leads there at once
+)
 NEIGHBOURS = 1  # points on each side from which a repeat that fails is tried
 
 
@@ -69,6 +72,9 @@ def repeat(
     beside = [] if found() else [p for p in near if abs(p.index - point.index) <= 1]
     alone = not beside and not branch and static is None
     options = replace(problem.sweep.newton, max_iterations=ISOLATED if alone else PATIENT)
+    led = None if found() else _leading(balance, point, beside)
+    if led is not None:
+        spent.append(newton(lambda v: balance.linearise(v, omega), led, options, NaturalLevel()))
     if not found():
         starts = [*_predicted(problem, point), *(balance.unknowns(p.coefficients) for p in near)]
         nearest, *further = _nearest_first(balance, omega, q, starts, options)
@@ -90,6 +96,20 @@ def repeat(
         spent.append(solution)
     solution = charged(spent[-1], spent)
     return forced_point(balance, solution, "high", point.index, omega, perf_counter() - began)
+
+
+def _leading(
+    balance: Balance, point: ForcedPoint, beside: Sequence[ForcedPoint]
+) -> FloatArray | None:
+    """Return the repeat of a frequency beside this one, if it is near: comparing it with other starts costs more than it saves."""
+    low = point.coefficients
+    for known in beside:
+        if known.order < balance.order:
+            continue
+        away = np.linalg.norm(known.coefficients[1 : len(low)] - low[1:])
+        if away < CLOSE * np.linalg.norm(low[1:]):
+            return balance.unknowns(known.coefficients)
+    return None
 
 
 def _nearest_first(
