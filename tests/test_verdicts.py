@@ -297,6 +297,17 @@ def test_remedies_name_the_frequency_of_a_point_that_is_not_the_peak() -> None:
         assert said in found[0].remedy
 
 
+@pytest.mark.parametrize(
+    ("cap", "said"),
+    [(41, "give more forced_response.points"), (5, "raise limits.work_s or limits.memory_gb"), (None, 'Give harmonics.high = "auto"')],
+)  # fmt: skip
+def test_remedies_name_what_kept_a_point_from_more_harmonics(cap: int | None, said: str) -> None:
+    auto = {} if cap is None else {"passages": "auto", "high_order": cap}
+    data = response(auto, own_error_percent=values(TOP, 9.0, 1.0), harmonic_kept=many((TOP,)))
+    (found,) = (v for v in judged(data)[0] if v.rank)
+    assert said in found.remedy
+
+
 def test_remedies_fit_rigid_contacts() -> None:
     data = response(own_error_percent=np.full(6, np.nan))
     assert "--verify-harmonics predicts" in verdicts(data, [""])[0].remedy

@@ -205,6 +205,11 @@ class Curve:
         return bool(self.data.attrs.get("passages", "") == "auto")
 
     @property
+    def cap(self) -> int:
+        """Highest harmonic that the response might keep."""
+        return int(self.data.attrs.get("high_order", max(s[-1] for s in self.supports)))
+
+    @property
     def stepped(self) -> bool:
         """Whether frequencies were given, instead of a branch followed."""
         return bool(self.data.attrs.get("stepped", 0))

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from stickslip.response.forced.sweep import RUNGS
 from stickslip.solve.status import Status
 from stickslip.study.analyses.forced.chooser import error_text
 from stickslip.study.analyses.forced.curve import ATTAINED, Curve, motion_of
@@ -69,7 +70,7 @@ def few_harmonics(case: Curve) -> Iterator[Finding]:
             continue  # what was solved or integrated tells more than a prediction
         if own > case.limit:
             why = f"more harmonics than H = {case.kept[i]} are predicted to change it by {error_text(own)}"
-            remedy = f"{_more(case)}; {_in_time(case, int(i))}."
+            remedy = f"{_more(case, int(i))}; {_in_time(case, int(i))}."
             yield Finding("doubtful", why, remedy, (int(i),), float(own))
         elif np.isnan([own, solved, case.reference[i], case.integrated[i]]).all():
             why = f"its harmonics were not examined: nothing says how wrong H = {case.kept[i]} is"
@@ -83,10 +84,18 @@ def _in_time(case: Curve, point: int) -> str:
     return f"with forced_response.frequencies_hz = [{case.hz[point]:.2f}] alone, --verify integrates in time there"
 
 
-def _more(case: Curve) -> str:
-    if case.auto:
-        return "As many harmonics were kept as there may be: where limits.work_s or limits.memory_gb set the most, raise them"
-    return 'Give harmonics.high = "auto", or a larger number'
+def _more(case: Curve, point: int) -> str:
+    """Say how a point gets more harmonics: what kept it from them is the study, the response's work, its limits, or the most there are."""
+    if not case.auto:
+        return 'Give harmonics.high = "auto", or a larger number'
+    if case.supports[point][-1] < case.cap:
+        return (
+            f"Up to {case.cap} harmonics were allowed, and the work that a response may take, or the want of a solution nearby, ended "
+            "before: give more forced_response.points, which allow more work, or a narrower range"
+        )
+    if case.cap < RUNGS[-1]:
+        return f"No more than {case.cap} harmonics were allowed: raise limits.work_s or limits.memory_gb, which set them"
+    return f"There are no more than {case.cap} harmonics to be had"
 
 
 def _examination(case: Curve) -> str:
@@ -100,7 +109,7 @@ def audited(case: Curve) -> Iterator[Finding]:
     for i in np.flatnonzero(case.audit > case.limit):
         if not case.attained[i]:
             why = f"solved again with more harmonics than H = {case.kept[i]} it differs by {error_text(case.audit[i])}"
-            remedy = f"{_more(case)}; {_in_time(case, int(i))}."
+            remedy = f"{_more(case, int(i))}; {_in_time(case, int(i))}."
             yield Finding("doubtful", why, remedy, (int(i),), float(case.audit[i]))
 
 
@@ -127,7 +136,7 @@ def twice_the_harmonics(case: Curve) -> Iterator[Finding]:
     for i in np.flatnonzero(case.reference > case.limit):
         if not case.attained[i]:
             why = f"twice as many harmonics are predicted to change it, in amplitude or phase, by {error_text(case.reference[i])}"
-            remedy = f"{_more(case)}."
+            remedy = f"{_more(case, int(i))}."
             yield Finding("doubtful", why, remedy, (int(i),), float(case.reference[i]))
 
 
@@ -207,7 +216,7 @@ def in_time(case: Curve) -> Iterator[Finding]:
             yield Finding("doubtful", why, remedy, (point,))
         elif not abs(off) <= ATTAINED:
             why = f"time integration and harmonic balance differ by {off:+.3g} %, more than {ATTAINED:g} %"
-            remedy = f"{_more(case)}; the table of checks says which of the two is wrong."
+            remedy = f"{_more(case, point)}; the table of checks says which of the two is wrong."
             yield Finding("doubtful", why, remedy, (point,), abs(off))
 
 
