@@ -17,7 +17,7 @@ PARTS_OF_THE_PAGE = {
     "parts": ("part",),
     "contacts": ("contact", "join"),
     "loads": ("load", "rotation"),
-    "output": ("output",),
+    "output": ("output", "measured"),
     "analyses": ("forced_response", "modes", "campbell", "safe"),
     "settings": ("harmonics", "solver", "retention", "limits"),
 }

@@ -139,6 +139,12 @@ class Result:
         name = next((n for n in ("modes", "safe") if n in self.data.children), None)
         return _frequencies(self.data[name].to_dataset()) if name else Table({})
 
+    @property
+    def measured(self) -> Table:
+        """The measured peaks that the study names, as they were read, in SI units and Hz; empty where it names none."""
+        name = "forced_response"
+        return _measured(self.data[name].to_dataset()) if name in self.data.children else Table({})
+
     @cached_property
     def verdicts(self) -> tuple[Verdict, ...]:
         """What is to be trusted, and what not, why, and what to do: of each case, and of its points where they differ from it."""
@@ -186,6 +192,26 @@ def _peaks(data: xr.Dataset) -> Table:
     found |= {name: np.asarray(data[key].values) for key, name in units.items() if key in data}
     if "case_verdict" in data:
         found["verdict"] = np.array([LEVELS[int(v)] for v in data["case_verdict"].values])
+    return Table(found)
+
+
+def _measured(data: xr.Dataset) -> Table:
+    if "measured_value" not in data:
+        return Table({})
+    found = {str(data.attrs["measured_key"]): np.asarray(data["measured_value"].values)}
+    names = {
+        "measured_others": "beside it",
+        "measured_excitation_n": "excitation (N)",
+        "measured_frequency_hz": "frequency (Hz)",
+        "measured_frequency_hz_error": "its {} (Hz)",
+        "measured_amplitude": "amplitude ({})",
+        "measured_amplitude_error": "its {} ({})",
+    }
+    for key, text in names.items():
+        values = data[key].values if key in data else np.zeros(0)
+        if values.size and (any(values) if values.dtype.kind == "U" else np.isfinite(values).any()):
+            told = [data[key].attrs.get(name, "") for name in ("error", "units")]
+            found[text.format(*filter(None, told))] = np.asarray(values)
     return Table(found)
 
 

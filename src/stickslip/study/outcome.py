@@ -14,6 +14,8 @@ from stickslip.study.keep.journal import read_note, read_sealed
 from stickslip.study.keep.netcdf import variable
 from stickslip.study.keep.progress import LOG
 from stickslip.study.keep.provenance import Provenance
+from stickslip.study.measured_variables import with_measured
+from stickslip.study.models.measured import MeasuredPeaks
 
 UNSOLVED, CHECKED = "no solution", "checks"  # notes that the runner itself puts down
 
@@ -73,6 +75,7 @@ class Book:
     solved: dict[Path, tuple[list[Any], dict[str, dict[str, Any]]]] = field(default_factory=dict)
     nodes: dict[str, xr.Dataset] = field(default_factory=dict)
     told: set[str] = field(default_factory=set)
+    measured: MeasuredPeaks | None = None
 
     def read(self, tasks: Sequence[Task], unfinished: Container[Path]) -> None:
         """Put together the nodes of the analyses of which jobs have been sealed since."""
@@ -86,6 +89,8 @@ class Book:
     def enter(self, asked: Analysis, solved: Sequence[Solved]) -> None:
         """Make the node of an analysis from what its cases have found."""
         node = asked.dataset(solved).assign(case_variables([s.case for s in solved]))
+        if asked.name == "forced_response":
+            node = with_measured(node, self.measured)
         unsolved = [_unsolved(s) for s in solved if UNSOLVED in s.notes]
         found = (*unsolved, *asked.verdicts(node))
         new = dict.fromkeys(v.sentence for v in found if v.told)

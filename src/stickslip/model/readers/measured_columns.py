@@ -9,13 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import BoolArray, FloatArray
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.readers.text import SHOWN, read_text
 
 MOST_ROWS = 2_000_000
 LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 FORCES = {"n": 1.0, "kn": 1e3}
+SAME = 1e-9  # relative difference of two values that are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +137,11 @@ def read_columns(path: Path) -> MeasuredColumns:
     return MeasuredColumns(
         path, names, tuple(line for line, _ in table[1:]), tuple(tuple(row) for _, row in table[1:])
     )
+
+
+def same(a: FloatArray | float, b: FloatArray | float) -> BoolArray:
+    """Whether two values of a varied key are one: files round them."""
+    return np.asarray(np.isclose(a, b, rtol=SAME, atol=0.0))
 
 
 def _check(path: Path, names: tuple[str, ...], table: list[tuple[int, list[str]]]) -> None:

@@ -9,6 +9,7 @@ from plotly.subplots import make_subplots
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.support import named
 from stickslip.report.cases import ShownCase, first_number
+from stickslip.report.forced.measured import measured_of
 from stickslip.report.plot import ALARM, GRID, MUTED, Plot, key_marker, log_ticks, styled
 from stickslip.report.quantities import counted, joined, number, percent, scale_for
 from stickslip.report.response import Response
@@ -256,7 +257,8 @@ def optimisation(response: Response) -> Plot | None:
     key = first_number(response.data)[0]
     known = (c for c in response.peaked if np.isfinite(response.peak_response(c)))
     cases = sorted(known, key=lambda c: c.value)
-    if not key or len(cases) < _FEWEST:
+    measured = measured_of(response, key)
+    if not key or len(cases) < (1 if measured else _FEWEST):
         return None
     peak = {c: response.peak_response(c) for c in cases}
     scale = scale_for(np.array(list(peak.values())), response.unit)
@@ -274,6 +276,8 @@ def optimisation(response: Response) -> Plot | None:
                 name=name, showlegend=column == 1 and len(families) > 1, text=[c.named for c in family],
                 hovertemplate=f"%{{text}}<br>%{{y:.4g}} {unit}<extra></extra>", row=1, col=column,
             )  # fmt: skip
+    if measured:
+        measured.draw(figure, scale)
     styled(figure, 380)
     values = np.unique([c.value for c in cases])
     wide = values[0] > 0 and values[-1] > 5 * values[0]
@@ -281,10 +285,10 @@ def optimisation(response: Response) -> Plot | None:
     figure.update_xaxes(
         title_text=key, type="log" if wide else "linear", **(ticks if len(values) < 15 else {})
     )
-    drawn = np.array(list(peak.values())) * scale.factor
+    drawn = np.array([*peak.values(), *(measured.ends if measured else ())]) * scale.factor
     figure.update_yaxes(
         title_text=f"peak {response.quantity} ({scale.unit})", type="log", **log_ticks(drawn), col=1
     )
     figure.update_yaxes(title_text="peak frequency (Hz)", col=2)
-    caption = _optimum_caption(response, cases)
+    caption = _optimum_caption(response, cases) + (measured.caption(cases) if measured else "")
     return Plot("optimisation", "Optimisation curves", caption, figure)

@@ -13,6 +13,7 @@ from stickslip.study.file.contacts import ContactTable, JoinTable
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.file.loads import Limits, LoadTable, Output, Retention, Rotation
 from stickslip.study.file.material import DampingTable, MaterialTable, StudyReduction
+from stickslip.study.file.measured import Measured
 from stickslip.study.file.parts import AnyPart
 from stickslip.study.file.section import Name, Section
 
@@ -70,6 +71,9 @@ class Tables(Section):
     solver: Solver = Field(default_factory=Solver, description="the table [solver]")
     retention: Retention = Field(default_factory=Retention, description="the table [retention]")
     limits: Limits = Field(default_factory=Limits, description="the table [limits]")
+    measured: Measured | None = Field(
+        None, description="the table [measured], of peaks from a test"
+    )
     vary: Any = Field(
         None,
         description="the table [vary], or several [[vary]]: keys of the file and the lists of their values; the lists of one table "

@@ -15,6 +15,7 @@ from stickslip.study.file.study import StudyFile, TablesOfCase, read_file, valid
 from stickslip.study.file.tables import OF_THE_MODEL, Tables, asked_of
 from stickslip.study.file.vary import with_values
 from stickslip.study.models.checks import refusals
+from stickslip.study.models.measured import measured_peaks
 from stickslip.study.models.model import model_of, newton
 from stickslip.study.models.parts import Memo, digest
 
@@ -144,4 +145,5 @@ def _checked(study: Study) -> Study:
             found.setdefault(str(error), error.inside(str(study.path)))
     if found:
         raise together(found.values())
+    measured_peaks(study.file)
     return study
