@@ -165,6 +165,23 @@ def test_noise_of_the_displacement_is_told() -> None:
     assert "jumps" not in said(ss.contact.fit_loops([(x, noisy(force))]))
 
 
+def test_a_loop_with_rounded_corners_is_told() -> None:
+    """Three Jenkins elements side by side slip one after the other; the smallest sum of squares is still near."""
+    x, falls = cycles(8e-6)
+    force = np.zeros(x.size)
+    for share in (0.5, 1.0, 1.5):
+        limit = share * LIMIT / 3
+        down = np.maximum(-limit, limit - K / 3 * (x.max() - x))
+        up = np.minimum(limit, -limit + K / 3 * (x - x.min()))
+        force += np.where(falls, down, up)
+    fit = ss.contact.fit_loops([(x, noisy(force, size=0.3))])
+    assert "say nothing of what the law leaves out" in said(fit)
+    factor = float(re.search(r"factor of about ([\d.]+)", said(fit))[1])
+    assert factor > 2
+    assert fit.limit == pytest.approx(LIMIT, rel=0.05)
+    assert 0.6 * K < fit.k_t < K
+
+
 def test_recordings_have_offsets_of_their_own() -> None:
     loops = [parallelogram(a) for a in (8e-6, 2e-5)]
     shifted = [(x, noisy(f, i) + 30.0 * i) for i, (x, f) in enumerate(loops)]

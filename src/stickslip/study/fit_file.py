@@ -48,7 +48,9 @@ def estimates(fit: LoopFit) -> list[str]:
     if fit.normal_load is not None:
         load = fit.normal_load
         rows["friction coefficient"] = _value(fit.mu, off["mu"], "", fit.least[1] / load)
-        rows["normal load"] = f"{_value(load, fit.normal_load_deviation, 'N')}, given"
+        exact = not fit.normal_load_deviation
+        own = f"{load:g} N" if exact else _value(load, fit.normal_load_deviation, "N")
+        rows["normal load"] = f"{own}, given{', taken for exact' * exact}"
     both = float(fit.covariance[0, 1]) / (off["k_t"] * off["limit"])
     if math.isfinite(both):
         rows["correlation"] = f"{both:.2f} of stiffness and limit force"
