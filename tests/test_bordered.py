@@ -126,7 +126,7 @@ def test_derivatives_are_those_of_the_residual(case, name):
     problem = PROBLEMS[name](balance, field)
     extra = {"amplitude by level": [0.8], "peak of an amplitude": [-0.04, 0.8]}.get(name, [-0.04])
     p = 1.05 if name == "amplitude by level" else value
-    x = without_branch(system, balance, 1.05, FINE).x
+    x = without_branch(system, balance, FINE, 1.05).x
     rng = np.random.default_rng(1)
     y = np.append(x + 0.05 * np.max(np.abs(x)) * rng.standard_normal(x.size), extra)
     at = problem.linearise(y, p)
@@ -228,7 +228,7 @@ def test_a_level_is_found_for_every_frequency():
     problem = at_level(balance)
     following = following_vibration(balance, steps_through(0.2, 10), FINE)
     following = replace(following, weights=np.append(following.weights, 1.0))
-    y = np.append(without_branch(system, balance, 0.35, FINE).x, 1.0)
+    y = np.append(without_branch(system, balance, FINE, 0.35).x, 1.0)
     start = start_point(problem, y, 0.35, following)
     points = [start, *trace(problem, start, 0.55, following)]
     assert all(p.solution.status.converged for p in points)
@@ -272,7 +272,7 @@ def test_at_a_fold_the_border_is_solved_by_iteration_as_by_lu():
     balance = Discretisation(order=5, samples=64).balance(system, load, system.outputs)
     balance = replace(balance, jacobian="structured")
     following = following_vibration(balance, steps_through(0.2, 40), FINE)
-    start = start_point(balance, without_branch(system, balance, 0.35, FINE).x, 0.35, following)
+    start = start_point(balance, without_branch(system, balance, FINE, 0.35).x, 0.35, following)
     folds = [p for p in trace(balance, start, 0.6, following, (FOLD,)) if p.mark]
     assert len(folds) == 2
     rng = np.random.default_rng(0)

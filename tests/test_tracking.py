@@ -82,7 +82,7 @@ def amplitude(balance, dof, x):
 def dense_peak(system, load, parameter, value, how, omegas):
     """Largest amplitude over closely spaced frequencies, each solved from the one before; the top by a parabola."""
     balance = member(system, load, parameter, value, how)
-    x = without_branch(system, balance, omegas[0], FINE).x
+    x = without_branch(system, balance, FINE, omegas[0]).x
     heights = []
     for omega in omegas:
         solution = newton(lambda v, w=omega: balance.linearise(v, w), x, FINE)
@@ -109,7 +109,7 @@ def test_derivatives_of_the_peak_problem(case, condition):
     invert = partial(factorised, Dense())
     driven = Driven(0, (1,))
     problem = PeakProblem(law_field(balance, name), condition, driven, 0.3, 1.1, invert)
-    x = without_branch(system, balance, 1.05, FINE).x
+    x = without_branch(system, balance, FINE, 1.05).x
     y = np.append(
         x + 0.05 * np.max(np.abs(x)) * np.random.default_rng(1).standard_normal(x.size), -0.04
     )
@@ -210,7 +210,7 @@ def test_a_peak_that_almost_is_a_fold_is_tracked(ratio, form, monkeypatch):
     balance = replace(member(system, load, "excitation", levels[-1], how), jacobian="dense")
     control = replace(steps_through(0.4, 40), largest=0.05, max_points=5000)
     following = following_vibration(balance, control, FINE)
-    start = start_point(balance, without_branch(system, balance, 0.5, FINE).x, 0.5, following)
+    start = start_point(balance, without_branch(system, balance, FINE, 0.5).x, 0.5, following)
     branch = list(trace(balance, start, last.omega * 1.02, following))
     heights = [amplitude(balance, system.outputs[0], p.x) for p in branch]
     # nothing is higher, and what is nearest lies within half a step: (0.05 / 2)² / 2
@@ -286,7 +286,7 @@ def test_phase_quadrature_is_where_a_dense_sweep_crosses_it(case, parameter, val
     balance = member(system, load, parameter, value, how)
     n, place = balance.linear.n, int(np.searchsorted(balance.linear.retained, system.outputs[0]))
     omegas = point.omega * (1 + np.linspace(-5e-3, 5e-3, 42))  # 42: none is the tracked one
-    x = without_branch(system, balance, omegas[0], FINE).x
+    x = without_branch(system, balance, FINE, omegas[0]).x
     found = []
     for omega in omegas:
         x = newton(lambda v, w=omega: balance.linearise(v, w), x, FINE).x
@@ -374,7 +374,7 @@ def test_branch_ends_where_a_fresh_solution_lies(parameter, span):
     x = balance.unknowns(points[-1].coefficients[:, balance.linear.retained])
     assert np.max(np.abs(balance.linearise(x, 0.9).residual)) < 1e-9
     fresh = newton(
-        lambda v: balance.linearise(v, 0.9), without_branch(system, balance, 0.9, FINE).x, FINE
+        lambda v: balance.linearise(v, 0.9), without_branch(system, balance, FINE, 0.9).x, FINE
     )
     assert fresh.status.converged
     assert np.max(np.abs(fresh.x - x)) < 1e-7 * np.max(np.abs(x))

@@ -1,14 +1,24 @@
 """How a periodic motion is found where no branch leads to it: one ladder, every rung counted and bounded in Newton steps."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.dlft import DynamicLagrangian
-from stickslip.response.branch import vibration_weights
+from stickslip.response.branch import (
+    Followed,
+    OneLevel,
+    Route,
+    branch_of,
+    following_vibration,
+    steps_through,
+    vibration_weights,
+)
 from stickslip.response.equilibrium import bonded_start, preload
+from stickslip.response.follow import follow
 from stickslip.response.homotopies import homotopies
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton, Solution, charged, newton
@@ -18,8 +28,8 @@ from stickslip.solve.rescue import Homotopy, solve_robustly
 def without_branch(
     system: System,
     balance: HarmonicBalance | DynamicLagrangian,
-    omega: float,
     options: Newton,
+    omega: float,
     near: Sequence[FloatArray] = (),
     most: bool = True,
 ) -> Solution:
@@ -31,16 +41,16 @@ def without_branch(
         What `balance` was made of.
     balance
         The periodic problem.
-    omega
-        Frequency, rad/s.
     options
         Corrector.
+    omega
+        Frequency, rad/s.
     near
         (size,) unknowns of motions that may be near.
     most
         Whether other globalisations and homotopies are tried as well.
     """
-    starts = _starts(system, balance, omega, options, near)
+    starts = _starts(system, balance, options, omega, near)
     if most:
         return solve_robustly(
             lambda x: balance.linearise(x, omega),
@@ -55,6 +65,20 @@ def without_branch(
         if spent[-1].status.converged:
             break
     return charged(spent[-1], spent)
+
+
+def plain_sweep(
+    system: System,
+    balance: HarmonicBalance | DynamicLagrangian,
+    omega_range: tuple[float, float],
+    points: int,
+    options: Newton,
+) -> list[Followed]:
+    """Return the response of `balance` between two frequencies, in the order of the branch; it may hold points that were not found."""
+    first, last = omega_range
+    way = following_vibration(balance, steps_through(last - first, points), options)
+    curve = OneLevel(balance, way, partial(without_branch, system, balance, options))
+    return branch_of(follow(curve, Route(first=first, last=last, points=points)))
 
 
 def _ways(
@@ -74,8 +98,8 @@ def _at_rest(system: System, balance: HarmonicBalance | DynamicLagrangian) -> Co
 def _starts(
     system: System,
     balance: HarmonicBalance | DynamicLagrangian,
-    omega: float,
     options: Newton,
+    omega: float,
     near: Sequence[FloatArray],
 ) -> Iterator[FloatArray]:
     """Yield scaled unknowns to start Newton from."""

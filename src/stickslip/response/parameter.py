@@ -170,7 +170,7 @@ def branch_in_parameter(
 
     def begin(value: float, near: Sequence[FloatArray], most: bool) -> Solution:
         changed = system_at(system, parameter, value, family(value))
-        return without_branch(changed, family(value), omega, how.newton, near, most)
+        return without_branch(changed, family(value), how.newton, omega, near, most)
 
     curve = OneLevel(AtFrequency(family, omega), way, begin)
     route = Route(first=first, last=last, points=points, leaves=False)

@@ -1,6 +1,6 @@
 """Forced response with rigid contacts, by the dynamic Lagrangian method; contacts with a stiffness may stand beside them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,13 +9,10 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.dlft import DynamicLagrangian, dynamic_lagrangian
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response.branch import OneLevel, Route, branch_of, following_vibration, steps_through
-from stickslip.response.follow import follow
-from stickslip.response.ladder import without_branch
+from stickslip.response.ladder import plain_sweep
 from stickslip.response.parameter import Discretisation
 from stickslip.response.system import System
 from stickslip.solve.continuation import Point
-from stickslip.solve.newton_method import Solution
 from stickslip.solve.status import Status
 
 
@@ -102,13 +99,7 @@ def rigid_response(
     problem = dynamic_lagrangian(
         linear, system.interface, how.order, how.samples, penalty, how.evaluator
     )
-    way = following_vibration(problem, steps_through(last - first, points), how.newton)
-
-    def begin(omega: float, near: Sequence[FloatArray], most: bool) -> Solution:
-        return without_branch(system, problem, omega, how.newton, near, most)
-
-    route = Route(first=first, last=last, points=points)
-    for found in branch_of(follow(OneLevel(problem, way, begin), route)):
+    for found in plain_sweep(system, problem, omega_range, points, how.newton):
         yield _rigid_point(problem, found.point)
 
 

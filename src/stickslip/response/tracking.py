@@ -14,13 +14,10 @@ import scipy.optimize
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import check_choice, input_error
-from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import ParameterLinearisation
 from stickslip.harmonic.peak import EVALUATIONS, Driven, Peak, PeakProblem, driven_by
-from stickslip.response.branch import OneLevel, Route, branch_of, following_vibration, steps_through
-from stickslip.response.follow import follow
-from stickslip.response.ladder import without_branch
+from stickslip.response.ladder import plain_sweep
 from stickslip.response.parameter import (
     Discretisation,
     Parameter,
@@ -321,6 +318,11 @@ def _tracker(
     if not 0 <= output < system.outputs.size:
         have = system.outputs.size
         raise input_error("output", f"is {output}, of {have} outputs", f"Give 0 to {have - 1}.")
+    begin, end = omega_range
+    if not 0.0 < begin < end < np.inf:
+        raise input_error(
+            "omega_range", f"must be positive and growing, got {begin} to {end} rad/s", "Swap them."
+        )
     how = discretisation or Discretisation()
     dof = int(system.outputs[output])
     family = parameter_family(
@@ -332,7 +334,8 @@ def _tracker(
     driven = Driven(int(np.searchsorted(balance.linear.retained, dof)), harmonics)
     invert = partial(factorised, to_tolerance(how.newton.linear, EXACT))
     problem = PeakProblem(family, by, driven, phase, omega_range[1], invert)
-    points = _sweep(changed, balance, omega_range, how.newton)
+    found = plain_sweep(changed, balance, omega_range, SWEEP_POINTS, how.newton)
+    points = [f.point for f in found if f.converged]
     x, omega = _first_peak(problem, first, points)
     y = np.append(x, 0.0)
     problem = replace(problem, omega_scale=omega)
@@ -345,25 +348,6 @@ def _tracker(
     )
     spent = sum(p.solution.iterations + EVALUATIONS_BESIDE for p in points)
     return _Tracker(problem, few, [(first, y)], spent)
-
-
-def _sweep(
-    system: System, balance: HarmonicBalance, omega_range: tuple[float, float], options: Newton
-) -> list[Point]:
-    """Return the solutions of the response between two frequencies."""
-    begin, end = omega_range
-    if not 0.0 < begin < end < np.inf:
-        raise input_error(
-            "omega_range", f"must be positive and growing, got {begin} to {end} rad/s", "Swap them."
-        )
-    way = following_vibration(balance, steps_through(end - begin, SWEEP_POINTS), options)
-    curve = OneLevel(
-        balance,
-        way,
-        lambda omega, near, most: without_branch(system, balance, omega, options, near, most),
-    )
-    found = branch_of(follow(curve, Route(first=begin, last=end, points=SWEEP_POINTS)))
-    return [f.point for f in found if f.converged]
 
 
 def _first_peak(

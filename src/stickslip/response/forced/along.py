@@ -84,7 +84,7 @@ class ForcedCurve:
         """Solve at a frequency to which no branch leads."""
         forced, known = self.forced, [self.lifted(n.point.x, n.level, level) for n in near]
         return without_branch(
-            forced.system, self.problem(level), p, forced.sweep.newton, known, most
+            forced.system, self.problem(level), forced.sweep.newton, p, known, most
         )
 
     def cost(self, level: int) -> float:

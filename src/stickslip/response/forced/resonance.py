@@ -202,17 +202,14 @@ class _Search:
         if not spent[-1].status.converged:
             near = [balance.unknowns(end.coefficients) for end in sides]
             options = self.problem.sweep.newton
-            spent.append(without_branch(self.problem.system, balance, omega, options, near))
+            spent.append(without_branch(self.problem.system, balance, options, omega, near))
         return self._point(curve, level, omega, charged(spent[-1], spent), "peak")
 
     def _more(self, curve: ForcedCurve, now: Followed, level: int, stage: Stage) -> ForcedPoint:
         """Solve with more harmonics, from what the strategy foretells and from the padded solution."""
         balance = curve.problem(level)
-        starts = [curve.lifted(now.point.x, now.level, level)]
-        if now.judged.start is not None:
-            starts.insert(0, balance.unknowns(now.judged.start))
         spent: list[Solution] = []
-        for start in starts:
+        for start in curve.starts(now, level):
             spent.append(
                 newton(lambda x: balance.linearise(x, now.p), start, self.problem.sweep.newton)
             )
