@@ -113,7 +113,8 @@ def _scale_buttons(*, logarithmic: bool) -> list[dict[str, object]]:
 
 def _peaks(response: Response) -> str:
     """Say where the peaks of the first and the last case lie."""
-    scale, ends = response.scale, (*response.peaked[:1], *response.peaked[1:][-1:])
+    known = [c for c in response.peaked if response.resonates(c)] or response.peaked
+    scale, ends = response.scale, (*known[:1], *known[1:][-1:])
     peaks = [
         f"{number(response.peak_response(c) * scale.factor)} {scale.unit} at {number(response.peak_hz(c), 5)} Hz{c.where}"
         for c in ends
@@ -237,9 +238,13 @@ def _optimum_caption(response: Response, cases: list[ShownCase]) -> str:
         text += (
             f"The largest amplitude stands at the end of the sweep, which is no resonance: {ends}. "
         )
+    known = [k for k, inside in enumerate(within) if inside]
+    if len(known) < 2:
+        return text
+    a, b = known[0], known[-1]
     return text + (
-        f"From the first to the last value the peak moves by {number(hz[-1] - hz[0])} Hz, "
-        f"from {number(hz[0], 5)} Hz{cases[0].where} to {number(hz[-1], 5)} Hz{cases[-1].where}."
+        f"Between the values the peak moves by {number(hz[b] - hz[a])} Hz, "
+        f"from {number(hz[a], 5)} Hz{cases[a].where} to {number(hz[b], 5)} Hz{cases[b].where}."
     )
 
 

@@ -45,9 +45,10 @@ def _peak_card(response: Response) -> Card:
 
 
 def _shift_card(response: Response) -> Card | None:
-    if len(response.peaked) < 2:
+    within = [c for c in response.peaked if response.resonates(c)]
+    if len(within) < 2:
         return None
-    first, last = response.peaked[0], response.peaked[-1]
+    first, last = within[0], within[-1]
     a, b = response.peak_hz(first), response.peak_hz(last)
     note = f"from {number(a, 5)} Hz{first.where} to {number(b, 5)} Hz{last.where}"
     label = f"shift of the peak over the cases ({percent(100 * (b / a - 1))})"
