@@ -21,7 +21,7 @@ from stickslip.response.equilibrium import bonded_start, preload
 from stickslip.response.follow import follow
 from stickslip.response.homotopies import homotopies
 from stickslip.response.system import System
-from stickslip.solve.newton_method import Newton, Solution, charged, newton
+from stickslip.solve.newton_method import Newton, Solution, first_converged, newton
 from stickslip.solve.rescue import Homotopy, solve_robustly
 
 
@@ -59,12 +59,9 @@ def without_branch(
             _ways(system, balance, omega),
             vibration_weights(balance),
         )
-    spent: list[Solution] = []
-    for start in starts:
-        spent.append(newton(lambda x: balance.linearise(x, omega), start, options))
-        if spent[-1].status.converged:
-            break
-    return charged(spent[-1], spent)
+    return first_converged(
+        newton(lambda x: balance.linearise(x, omega), start, options) for start in starts
+    )
 
 
 def plain_sweep(

@@ -11,7 +11,7 @@ from stickslip.response.branch import Curve, Followed, Judged, Kind, Route
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Point, advance, reversed_point, start_point, step_to
 from stickslip.solve.natural import NaturalLevel
-from stickslip.solve.newton_method import Solution, charged, newton
+from stickslip.solve.newton_method import Solution, charged, first_converged, newton
 from stickslip.solve.status import Status
 
 PATIENT = 16  # iterations from a solution with other harmonics
@@ -47,16 +47,15 @@ def again(curve: Curve, kind: Kind, known: Followed, index: int, level: int) -> 
     following, p = curve.following(level), known.p
     latest = Latest(curve.problem(level))
     patient = replace(following.newton, max_iterations=PATIENT)
-    spent: list[Solution] = []
-    for x in curve.starts(known, level):
-        spent.append(newton(lambda v: latest.linearise(v, p), x, patient, NaturalLevel()))
-        if spent[-1].status.converged:
-            break
-    point = start_point(latest, spent[-1].x, p, following)
-    spent.append(point.solution)
+    near = first_converged(
+        newton(lambda v: latest.linearise(v, p), x, patient, NaturalLevel())
+        for x in curve.starts(known, level)
+    )
+    point = start_point(latest, near.x, p, following)
+    solution = charged(point.solution, [near, point.solution])
     if point.solution.status.converged and _against(curve, known, point, level):
         point = reversed_point(point)
-    point = replace(point, step=known.point.step, solution=charged(point.solution, spent))
+    point = replace(point, step=known.point.step, solution=solution)
     return _made(curve, kind, index, level, point, latest)
 
 

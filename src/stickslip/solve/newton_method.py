@@ -1,7 +1,7 @@
 """Newton's method for equations that are smooth between kinks, with a choice of what keeps it from going astray."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -88,6 +88,16 @@ def charged(solution: Solution, spent: Sequence[Solution]) -> Solution:
         seconds_contact=sum(s.seconds_contact for s in spent),
         seconds_linear=sum(s.seconds_linear for s in spent),
     )
+
+
+def first_converged(attempts: Iterable[Solution]) -> Solution:
+    """Return the first attempt that converged, or the last one, charged with all that were made; those after it are not asked for."""
+    spent: list[Solution] = []
+    for attempt in attempts:
+        spent.append(attempt)
+        if attempt.status.converged:
+            break
+    return charged(spent[-1], spent)
 
 
 def newton(

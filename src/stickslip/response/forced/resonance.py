@@ -13,7 +13,7 @@ from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, Stage,
 from stickslip.response.ladder import without_branch
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Point, start_point, step_to
-from stickslip.solve.newton_method import Solution, charged, newton
+from stickslip.solve.newton_method import Solution, charged, first_converged, newton
 from stickslip.solve.status import Rung
 
 NEARBY = 0.002  # half the bracket about a known peak, relative to its frequency
@@ -207,15 +207,12 @@ class _Search:
 
     def _more(self, curve: ForcedCurve, now: Followed, level: int, stage: Stage) -> ForcedPoint:
         """Solve with more harmonics, from what the strategy foretells and from the padded solution."""
-        balance = curve.problem(level)
-        spent: list[Solution] = []
-        for start in curve.starts(now, level):
-            spent.append(
-                newton(lambda x: balance.linearise(x, now.p), start, self.problem.sweep.newton)
-            )
-            if spent[-1].status.converged:
-                break
-        return self._point(curve, level, now.p, charged(spent[-1], spent), stage)
+        balance, options = curve.problem(level), self.problem.sweep.newton
+        solution = first_converged(
+            newton(lambda x: balance.linearise(x, now.p), start, options)
+            for start in curve.starts(now, level)
+        )
+        return self._point(curve, level, now.p, solution, stage)
 
     def _accepted(self, curve: ForcedCurve, check: ForcedPoint) -> ForcedPoint:
         found = of_forced(curve, check)
