@@ -56,14 +56,18 @@ def traces(result: ss.Result, panel: str) -> list:
 
 
 def test_points_are_drawn_with_their_bars(run: tuple[Path, ss.Result]) -> None:
-    (left,), (right,) = (traces(run[1], panel) for panel in ("x", "x2"))
-    assert list(left.x) == [1, 2, 3, 5]
+    (left, bare), (right, other) = (traces(run[1], panel) for panel in ("x", "x2"))
     # the page divides by the force: 240 µm at 1 N, 300 µm at 2 N, which was not computed
-    np.testing.assert_allclose(left.y, [240, 150, 400 / 3, 260])
-    assert list(left.error_y.array) == pytest.approx([20, 15, None, 20])
-    assert list(right.x) == [1, 2, 3]
-    assert list(right.error_y.array) == pytest.approx([0.1, 0.1, None])
-    assert left.name == "measured"
+    assert list(left.x) == [1, 2, 5]
+    np.testing.assert_allclose(left.y, [240, 150, 260])
+    np.testing.assert_allclose(left.error_y.array, [20, 15, 20])
+    np.testing.assert_allclose([*bare.x, *bare.y], [3, 400 / 3])
+    assert list(right.x) == [1, 2]
+    np.testing.assert_allclose(right.error_y.array, [0.1, 0.1])
+    np.testing.assert_allclose([*other.x, *other.y], [3, 12.9])
+    assert bare.error_y.array is None
+    assert other.error_y.array is None
+    assert [t.name for t in (left, bare, right, other) if t.showlegend] == ["measured"]
 
 
 def test_the_caption_tells_source_bars_and_agreement(run: tuple[Path, ss.Result]) -> None:

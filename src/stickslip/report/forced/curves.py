@@ -281,9 +281,9 @@ def optimisation(response: Response) -> Plot | None:
                 name=name, showlegend=column == 1 and len(families) > 1, text=[c.named for c in family],
                 hovertemplate=f"%{{text}}<br>%{{y:.4g}} {unit}<extra></extra>", row=1, col=column,
             )  # fmt: skip
+    styled(figure, 380)
     if measured:
         measured.draw(figure, scale)
-    styled(figure, 380)
     values = np.unique([c.value for c in cases])
     wide = values[0] > 0 and values[-1] > 5 * values[0]
     ticks = {"tickvals": values, "ticktext": [number(float(v), 4) for v in values]}

@@ -3,12 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import BoolArray, FloatArray
 from stickslip.model.readers.measured_columns import same
 from stickslip.report.cases import ShownCase
 from stickslip.report.plot import INK
@@ -55,26 +54,33 @@ class Measured:
 
     def draw(self, figure: go.Figure, scale: Scale) -> None:
         """Draw the points with their bars into both panels, a symbol for each value of what else was varied."""
-        source = escape(self.response.text("measured_source"))
+        figure.update_layout(legend_groupclick="togglegroup")
+        of_amplitude = (self.amplitude * scale.factor, self.amplitude_error * scale.factor)
         for k, name in enumerate(dict.fromkeys(self.others)):
             at = np.array([other == name for other in self.others])
-            mark = {"symbol": _SYMBOLS[k % len(_SYMBOLS)], "size": 9, "color": INK, "line": {"width": 1.6}}  # fmt: skip
-            for column, (unit, y, error) in enumerate(
-                (
-                    (scale.unit, self.amplitude * scale.factor, self.amplitude_error * scale.factor),
-                    ("Hz", self.hz, self.hz_error),
-                ),
-                1,
-            ):  # fmt: skip
-                at_y = at & np.isfinite(y)
-                if not at_y.any():
-                    continue
-                figure.add_scatter(
-                    x=self.values[at_y], y=y[at_y], error_y=_bars(y[at_y], error[at_y]), mode="markers", marker=mark,
-                    name=", ".join(filter(None, ["measured", name])), legendgroup=f"measured{k}",
-                    showlegend=not any(t.legendgroup == f"measured{k}" for t in figure.data), text=[source] * int(at_y.sum()),
-                    hovertemplate=f"measured, %{{x:.4g}}<br>%{{y:.4g}} {unit}<br>%{{text}}<extra></extra>", row=1, col=column,
-                )  # fmt: skip
+            for column, unit, (y, error) in ((1, scale.unit, of_amplitude), (2, "Hz", (self.hz, self.hz_error))):  # fmt: skip
+                barred = np.isfinite(error)
+                for own in (at & np.isfinite(y) & barred, at & np.isfinite(y) & ~barred):
+                    if own.any():
+                        points = self._points(own, y, error, unit)
+                        label = ", ".join(filter(None, ["measured", name]))
+                        told = any(t.legendgroup == f"measured{k}" for t in figure.data)
+                        points.update(name=label, legendgroup=f"measured{k}", showlegend=not told)
+                        points.marker.symbol = _SYMBOLS[k % len(_SYMBOLS)]
+                        figure.add_trace(points, row=1, col=column)
+
+    def _points(self, own: BoolArray, y: FloatArray, error: FloatArray, unit: str) -> go.Scatter:
+        """Return some of the points, all with bars or all without."""
+        source = escape(self.response.text("measured_source"))
+        points = go.Scatter(
+            x=self.values[own], y=y[own], mode="markers", text=[source] * int(own.sum()),
+            marker={"size": 9, "color": INK, "line": {"width": 1.6}},
+            hovertemplate=f"measured, %{{x:.4g}}<br>%{{y:.4g}} {unit}<br>%{{text}}<extra></extra>",
+        )  # fmt: skip
+        if np.isfinite(error[own]).any():
+            down = np.minimum(error[own], _LOWEST * y[own])
+            points.error_y = {"array": error[own], "arrayminus": down, "thickness": 1.4, "width": 5}
+        return points
 
     def caption(self, cases: Sequence[ShownCase]) -> str:
         """Say where the points come from, what their bars are, and how many computed peaks agree with them."""
@@ -88,16 +94,7 @@ class Measured:
             if (kind := self._bar(name))
         ]  # fmt: skip
         text += f"; bars: {joined(bars)}." if bars else ", without error bars."
-        lost = int(np.sum(np.isnan(self.amplitude) & self._was_measured))
-        if lost:
-            text += f" {counted(lost, 'amplitude')} cannot be drawn: the force in the test is not known."
         return text + self._agreement(cases)
-
-    @property
-    def _was_measured(self) -> FloatArray:
-        name = "measured_amplitude"
-        known = self.response.values(name) if self.response.has(name) else np.nan * self.values
-        return np.asarray(np.isfinite(known))
 
     def _bar(self, name: str) -> str:
         found = self.response.data.get(f"{name}_error")
@@ -167,10 +164,3 @@ def _per_page(response: Response, values: FloatArray) -> FloatArray:
 def _agrees(others: str, case: ShownCase) -> bool:
     """Whether a case has the values of other varied keys that a point tells."""
     return not others or set(others.split(", ")) <= set(case.label.split(", "))
-
-
-def _bars(y: FloatArray, error: FloatArray) -> dict[str, Any]:
-    """Return error bars, none where the error is not known."""
-    ends = {"array": error, "arrayminus": np.minimum(error, _LOWEST * y)}
-    told = {side: [e if np.isfinite(e) else None for e in ends[side].tolist()] for side in ends}
-    return {"type": "data", "thickness": 1.4, "width": 5, **told}
