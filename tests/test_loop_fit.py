@@ -298,6 +298,15 @@ def test_recordings_of_a_file_are_told_apart(tmp_path: Path) -> None:
     assert other.size == 1
 
 
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_marks_and_line_ends_of_other_programs_are_read(tmp_path: Path, end: str) -> None:
+    path = tmp_path / "loops.csv"
+    path.write_bytes(b"\xef\xbb\xbf" + end.join(["Displacement_um, Force_N", "1, 2", "", "3,4"]).encode())  # fmt: skip
+    ((x, force),) = ss.model.read_loops(path)
+    np.testing.assert_allclose(x, [1e-6, 3e-6])
+    np.testing.assert_allclose(force, [2.0, 4.0])
+
+
 def test_the_page_of_the_documentation_runs(tmp_path: Path, monkeypatch, capsys) -> None:
     recorded(tmp_path)
     monkeypatch.chdir(tmp_path)

@@ -1,7 +1,6 @@
 """Columns of measured numbers from a CSV file, with the unit at the end of each name."""
 
 import csv
-import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -119,7 +118,7 @@ def read_columns(path: Path) -> MeasuredColumns:
         If it cannot be read, names a column twice, or a line has another number of cells.
     """
     table: list[tuple[int, list[str]]] = []
-    reader = csv.reader(io.StringIO(read_text(path)))
+    reader = csv.reader(read_text(path).splitlines())  # whatever ends the lines
     try:
         for row in reader:
             if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#"):
