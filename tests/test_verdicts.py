@@ -291,7 +291,10 @@ def test_points_of_a_rule_are_told_in_one_sentence_with_the_peak_first() -> None
 def test_remedies_name_the_frequency_of_a_point_that_is_not_the_peak() -> None:
     for hz, said in (
         (13.0, "--verify integrates in time at the peak, and"),
-        (11.0, "frequencies_hz = [11.00] alone, --verify"),
+        (
+            11.0,
+            "--verify with forced_response.frequencies_hz = [11.00] alone integrates in time there, and",
+        ),
     ):
         found = [v for v in judged(response(**examined("undecided", hz)))[0] if v.rank]
         assert said in found[0].remedy
@@ -306,6 +309,14 @@ def test_remedies_name_what_kept_a_point_from_more_harmonics(cap: int | None, sa
     data = response(auto, own_error_percent=values(TOP, 9.0, 1.0), harmonic_kept=many((TOP,)))
     (found,) = (v for v in judged(data)[0] if v.rank)
     assert said in found.remedy
+    quiet = response(auto, harmonic_kept=many((TOP,)), **checked(difference_percent=3.0))
+    (found,) = (v for v in judged(quiet)[0] if v.rank)
+    assert ("lower that" in found.remedy) is (cap is not None)
+
+
+def test_a_frequency_alone_is_no_end_of_a_sweep() -> None:
+    alone = response().isel(point=[TOP]).assign(peak_point=("case", [0]))
+    assert judged(alone)[1] == "trusted"
 
 
 def test_remedies_fit_rigid_contacts() -> None:

@@ -81,13 +81,15 @@ def _in_time(case: Curve, point: int) -> str:
     """Say how a point is integrated in time: of a sweep it is the peak that is."""
     if point == case.peak or case.range_key == "speed_rpm":
         return IN_TIME
-    return f"with forced_response.frequencies_hz = [{case.hz[point]:.2f}] alone, --verify integrates in time there"
+    return f"--verify with forced_response.frequencies_hz = [{case.hz[point]:.2f}] alone integrates in time there"
 
 
 def _more(case: Curve, point: int) -> str:
     """Say how a point gets more harmonics: what kept it from them is the study, the response's work, its limits, or the most there are."""
     if not case.auto:
         return 'Give harmonics.high = "auto", or a larger number'
+    if case.own_error[point] <= case.limit:
+        return "Its own error was predicted below harmonics.alert_threshold_percent: lower that, and more harmonics are kept"
     if case.supports[point][-1] < case.cap:
         return (
             f"Up to {case.cap} harmonics were allowed, and the work that a response may take, or the want of a solution nearby, ended "
@@ -235,7 +237,7 @@ def at_the_end(case: Curve) -> Iterator[Finding]:
             "fold"
         )
         yield Finding("doubtful", why, f"Widen forced_response.{case.range_key}.")
-    elif case.at_the_end:
+    elif case.at_the_end and case.hz.size > 1:  # of a frequency alone nobody asked for a peak
         why = f"the largest amplitude stands at the end of the sweep ({case.peak_hz:.2f} Hz); it is no resonance"
         yield Finding("doubtful", why, f"Widen forced_response.{case.range_key}.")
 
