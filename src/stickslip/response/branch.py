@@ -114,6 +114,10 @@ class Curve(Protocol):
         """Judge the error of a solution."""
         return Judged()
 
+    def at_the_cap(self, level: int, point: Point) -> Judged:
+        """Judge a solution where more harmonics are not to be had, by fewer."""
+        return Judged()
+
     def quiet(self, level: int, judged: Judged) -> bool:
         """Whether a solution needs no more harmonics."""
         return True

@@ -28,6 +28,7 @@ from stickslip.response.steps import (
     lost,
     onward,
     retraced,
+    without_more,
 )
 
 AUDITED = 10  # points at most from one audit to the next
@@ -128,7 +129,8 @@ class _Walk:
         known = next(self.stored, None)
         if known is None:
             began = perf_counter()
-            known = replace(make(), seconds=perf_counter() - began)
+            made = without_more(self.curve, self._levels(), make())
+            known = replace(made, seconds=perf_counter() - began)
             yield known
             known = self.curve.stored(known)
         self.spent += known.point.solution.iterations * self.curve.cost(known.level)
@@ -165,11 +167,13 @@ class _Walk:
     def _cheaper(self, here: _Stop) -> Iterator[Followed]:
         """Go on with fewer harmonics where no more are left."""
         level, index = self._levels() - 1, len(self.branch) - 1
-        if here.ahead.level > level:
+        if here.ahead.level > level and index >= self.hold:
             known = here.ahead
             trial = yield from self._take(lambda: again(self.curve, "trial", known, index, level))
             if trial.converged:
                 here.ahead = trial
+            else:
+                self.hold = index + CALM
 
     # --- harmonics ----------------------------------------------------------------------------
 

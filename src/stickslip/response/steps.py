@@ -19,7 +19,7 @@ RECENT = 12  # points behind the last one that a step may go back along
 BACK = 0.3  # distance from the branch behind, as a share of the step, within which a step goes back along it
 
 # work of a branch for each of its points, in Newton steps with the most harmonics, beyond half of which fewer harmonics are allowed
-EFFORT = 20.0
+EFFORT = 12.0
 FEWEST = 2  # levels that are always allowed
 
 
@@ -29,6 +29,14 @@ def levels_left(curve: Curve, route: Route, spent: float) -> int:
     most = EFFORT * route.points * curve.cost(levels - 1)
     over = int((spent / most - 0.5) * 2.0 * levels) + 1 if spent > 0.5 * most else 0
     return max(levels - over, min(levels, FEWEST))
+
+
+def without_more(curve: Curve, levels: int, made: Followed) -> Followed:
+    """Return a solution judged by fewer harmonics where no audit is to come: a prediction that none confirms was wrong at times."""
+    last = made.kind != "audit" and 0 < made.level == levels - 1 < curve.levels - 1
+    if not (last and made.converged) or made.judged.bound == 0.0:
+        return made
+    return replace(made, judged=curve.at_the_cap(made.level, made.point))
 
 
 def onward(curve: Curve, here: Followed, index: int, target: float | None, last: float) -> Followed:

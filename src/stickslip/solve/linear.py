@@ -1,16 +1,36 @@
 """The linear systems of Newton and continuation: what a solver of them is, and the dense one."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import scipy.linalg
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
-from stickslip.operators import Bordered, Corner, Inverse, Jacobian, array_of, transpose_of
+from stickslip.operators import (
+    Bordered,
+    Corner,
+    Inverse,
+    Jacobian,
+    JacobianOperator,
+    array_of,
+    transpose_of,
+)
 
 SINGULAR = 1e-15  # smallest pivot over largest; below, the matrix has no usable inverse
+
+
+ASSEMBLED = 1500  # unknowns up to which one factorisation costs less than some five iterative solutions
+
+
+@runtime_checkable
+class Assembling(JacobianOperator, Protocol):
+    """A Jacobian known by its products that can be had as an array."""
+
+    def dense(self) -> FloatArray:
+        """Return the array."""
+        ...
 
 
 class LinearSolver(Protocol):
@@ -88,9 +108,12 @@ def solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
 def factorised(linear: LinearSolver, jac: Jacobian) -> Inverse | None:
     """Return how systems with `jac` and with its transpose are solved; None if `jac` is singular.
 
-    An array is factorised once, and overwritten; a Jacobian known by its products is solved by `linear` for each right side.
+    An array is factorised once, and overwritten. So is a Jacobian known by its products that can be put together and is not large, for many
+    right sides follow; a large one is solved by `linear` for each of them.
     """
     matrix = array_of(jac)
+    if matrix is None and isinstance(jac, Assembling) and jac.shape[0] <= ASSEMBLED:
+        matrix = jac.dense()
     if matrix is None:
         return _Iterated(linear, jac)
     lu, pivots = _factors(matrix)

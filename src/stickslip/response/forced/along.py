@@ -24,15 +24,17 @@ from stickslip.response.ladder import without_branch
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Following, Point
 from stickslip.solve.krylov import to_tolerance
+from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Solution, newton
 
 KINDS: tuple[Kind, ...] = ("point", "audit", "trial", "found")
-# shares of the threshold that bounds may have, with the fewest harmonics and with more: those at the very threshold were wrong at times
-QUIET = (0.5, 0.8)
+# factors on predictions, with the fewest harmonics and with more: motions predicted to be right by less than that were wrong at times
+SAFETY = (2.0, 1.25)
 SMALL = 100.0  # unknowns whose part of a Newton step costs as much as the rest
 START = 0.3  # share of the threshold above which what was predicted is kept as a start
 ROUGHLY = 1e-3  # relative residual of that step where it is found by iteration
 AGREE = 0.5  # share of the threshold by which motions of neighbouring levels may differ: the next levels add to it
+NEARLY = 8  # iterations to a solution with fewer harmonics that is near
 NEAR = 0.3  # relative difference of motions that stand on the same sheet
 
 
@@ -101,15 +103,16 @@ class ForcedCurve:
         balance = self.problem(level)
         step = forced.step(balance, point.x, point.p, left=left)
         if self.raises and level + 1 == self.levels > 1:
-            return self._at_the_cap(level, point)
+            return self.at_the_cap(level, point)
         if self.raises and level > 0:
             return self._predicted(level, step)
         if level + 1 < self.levels:
             step = replace(step, reference=with_stiffness(self.problem(level + 1)))
         verdict = judged(strategy, step)
+        bound = (SAFETY[0] if self.raises else 1.0) * verdict.indicator
         if verdict.again is None:
-            return Judged(verdict.indicator)
-        return Judged(verdict.indicator, verdict.again, verdict.start)
+            return Judged(bound)
+        return Judged(bound, verdict.again, verdict.start)
 
     def _predicted(self, level: int, step: Step) -> Judged:
         """Predict the error by one Newton step with the harmonics of the next level; audits look further."""
@@ -119,22 +122,25 @@ class ForcedCurve:
             step.balance, more, step.x, step.omega, step.measure, solve, events=step.events
         )
         far = alert.error > START * self.forced.strategy.threshold
-        return Judged(alert.error, (), more.coefficients(alert.start) if far else None)
+        start = more.coefficients(alert.start) if far else None
+        return Judged(SAFETY[1] * alert.error, (), start)
 
-    def _at_the_cap(self, level: int, point: Point) -> Judged:
-        """Bound the error where no level follows by the difference from the level before, which is larger as long as more harmonics change less."""
+    def at_the_cap(self, level: int, point: Point) -> Judged:
+        """Bound the error where no level follows, or none is allowed, by the difference from the level before, which is larger as long as more harmonics change less."""
         before = self.problem(level - 1)
         x = self.lifted(point.x, level, level - 1)
-        fewer = newton(lambda v: before.linearise(v, point.p), x, self.following(level - 1).newton)
+        few_steps = replace(self.following(level - 1).newton, max_iterations=NEARLY)
+        fewer = newton(lambda v: before.linearise(v, point.p), x, few_steps, NaturalLevel())
         if not fewer.status.converged:
             return Judged(np.inf)
-        return Judged(self._difference(point.p, (level - 1, fewer.x), (level, point.x)))
+        safety = SAFETY[min(level - 1, 1)]
+        return Judged(safety * self._difference(point.p, (level - 1, fewer.x), (level, point.x)))
 
     def quiet(self, level: int, judged: Judged) -> bool:
-        """Whether a bound is well below the threshold, or nobody can tell."""
+        """Whether a bound is below the threshold, or nobody can tell."""
         if not self.raises:
             return True
-        return not judged.bound > QUIET[min(level, 1)] * self.forced.strategy.threshold
+        return not judged.bound > self.forced.strategy.threshold
 
     def agree(self, fewer: Followed, more: Followed) -> bool:
         """Whether the motions differ by clearly less than the threshold."""

@@ -202,7 +202,9 @@ class _Search:
         if not spent[-1].status.converged:
             near = [balance.unknowns(end.coefficients) for end in sides]
             options = self.problem.sweep.newton
-            spent.append(without_branch(self.problem.system, balance, options, omega, near))
+            spent.append(
+                without_branch(self.problem.system, balance, options, omega, near, most=False)
+            )
         return self._point(curve, level, omega, charged(spent[-1], spent), "peak")
 
     def _more(self, curve: ForcedCurve, now: Followed, level: int, stage: Stage) -> ForcedPoint:
