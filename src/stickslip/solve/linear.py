@@ -21,7 +21,9 @@ from stickslip.operators import (
 SINGULAR = 1e-15  # smallest pivot over largest; below, the matrix has no usable inverse
 
 
-ASSEMBLED = 1500  # unknowns up to which one factorisation costs less than some five iterative solutions
+ASSEMBLED = (
+    1500  # unknowns up to which one factorisation costs less than some five iterative solutions
+)
 
 
 @runtime_checkable

@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.harmonic.balance import Linearisation
+from stickslip.harmonic.balance import HarmonicBalance, Linearisation
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import Step, always_kept, judged
 from stickslip.harmonic.support import Harmonics
+from stickslip.operators import Inverse, Jacobian
 from stickslip.response.branch import Followed, Judged, Kind, Route
 from stickslip.response.follow import follow
 from stickslip.response.forced.problem import (
@@ -24,6 +25,7 @@ from stickslip.response.ladder import without_branch
 from stickslip.solve.branch import Latest
 from stickslip.solve.continuation import Following, Point
 from stickslip.solve.krylov import to_tolerance
+from stickslip.solve.linear import factorised
 from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Solution, newton
 
@@ -34,6 +36,7 @@ SMALL = 100.0  # unknowns whose part of a Newton step costs as much as the rest
 START = 0.3  # share of the threshold above which what was predicted is kept as a start
 ROUGHLY = 1e-3  # relative residual of that step where it is found by iteration
 AGREE = 0.5  # share of the threshold by which motions of neighbouring levels may differ: the next levels add to it
+DOUBT = 2.0  # times the second step, by which a prediction may be off
 NEARLY = 8  # iterations to a solution with fewer harmonics that is near
 NEAR = 0.3  # relative difference of motions that stand on the same sheet
 
@@ -115,15 +118,41 @@ class ForcedCurve:
         return Judged(bound, verdict.again, verdict.start)
 
     def _predicted(self, level: int, step: Step) -> Judged:
-        """Predict the error by one Newton step with the harmonics of the next level; audits look further."""
+        """Predict the error by a Newton step with the harmonics of the next level, and doubt it by what the step after it would change."""
         more = with_stiffness(self.problem(level + 1))
-        solve = to_tolerance(self.forced.sweep.newton.linear, ROUGHLY).solve
+        linear = to_tolerance(self.forced.sweep.newton.linear, ROUGHLY)
+        kept: list[tuple[Inverse | None, float]] = []
+
+        def solve(jac: Jacobian, right: FloatArray) -> FloatArray | None:
+            inverse = factorised(linear, jac)
+            kept.append((inverse, float(np.linalg.norm(right))))
+            return None if inverse is None else inverse(right)
+
         alert = jacobian_alert(
             step.balance, more, step.x, step.omega, step.measure, solve, events=step.events
         )
-        far = alert.error > START * self.forced.strategy.threshold
-        start = more.coefficients(alert.start) if far else None
-        return Judged(SAFETY[1] * alert.error, (), start)
+        bound = SAFETY[1] * alert.error
+        if kept and bound <= self.forced.strategy.threshold:
+            bound += self._doubt(step, more, alert.start, *kept[0])
+        far = bound > START * self.forced.strategy.threshold
+        return Judged(bound, (), more.coefficients(alert.start) if far else None)
+
+    def _doubt(
+        self,
+        step: Step,
+        more: HarmonicBalance,
+        x: FloatArray,
+        inverse: Inverse | None,
+        residual: float,
+    ) -> float:
+        """Return how far a prediction may be off: contacts that change their states on the way make the next step as large, or larger."""
+        rest = more.linearise(x, step.omega).residual
+        chord = None if inverse is None else inverse(-rest)
+        if chord is None or not float(np.linalg.norm(rest)) <= residual:
+            return np.inf
+        linear, q = more.linear, step.balance.coefficients(step.x)
+        moved = linear.recover_change(step.omega, more.coefficients(chord)[: len(q)])
+        return DOUBT * step.measure.change(linear.recover(step.omega, q), moved)[0]
 
     def at_the_cap(self, level: int, point: Point) -> Judged:
         """Bound the error where no level follows, or none is allowed, by the difference from the level before, which is larger as long as more harmonics change less."""
