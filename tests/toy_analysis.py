@@ -111,6 +111,7 @@ class ToyStudy:
     title: str = "toy"
     text: str = "[toy]"
     asked: tuple[str, ...] = ("toy",)
+    measured: None = None
     built: list[float] = field(default_factory=list)
 
     @property

@@ -4,7 +4,6 @@ import math
 
 from stickslip.assembly.model import Model
 from stickslip.study.keep.progress import LOG
-from stickslip.study.models.measured import measured_peaks
 from stickslip.study.models.study import Study
 from stickslip.study.run import asked_for, of_task
 
@@ -34,7 +33,7 @@ def check_study(study: Study) -> tuple[str, ...]:
         _tell(case.label, [line for line in new if not line.startswith(WARNING)])
         if not new:
             alike.append(case.label)
-    measured = measured_peaks(study.file)
+    measured = study.measured
     if measured is not None:
         LOG.info(measured.sentence)
     if alike:

@@ -27,7 +27,6 @@ from stickslip.study.keep.provenance import Provenance, library_versions
 from stickslip.study.keep.store import PartStore
 from stickslip.study.keep.whole import whole_file
 from stickslip.study.keep.workers import executor
-from stickslip.study.models.measured import measured_peaks
 from stickslip.study.models.study import Study
 from stickslip.study.outcome import CHECKED, UNSOLVED, Book, Outcome, Task, checked
 
@@ -124,7 +123,7 @@ def _run(
     study: Study, asked: Sequence[Analysis], workers: int, fresh: bool, checks: frozenset[str]
 ) -> Outcome:
     origin = Provenance(study.title, study.text, library_versions())
-    book = Book(origin, measured=measured_peaks(study.file))
+    book = Book(origin, measured=study.measured)
     store = PartStore(study.folder / PARTS, fresh=fresh)
     cases = [replace(c, build=cache(c.build), store=store.kept) for c in study.cases()]
     tasks = _tasks(study, asked, cases, checks, book.origin.versions)

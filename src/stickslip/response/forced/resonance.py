@@ -164,8 +164,10 @@ class _Search:
         """Solve a point with the harmonics of a support; the point itself where that is not found."""
         curve = self._curve(support)
         now, level = of_forced(curve, point), curve.supports.index(support)
-        made = yield from self._take(lambda: self._more(curve, now, level, "peak"))
-        return made if made.converged else point
+        more = yield from self._take(lambda: self._more(curve, now, level, "check"))
+        if not more.converged:
+            return point
+        return (yield from self._take(lambda: self._accepted(curve, more)))
 
     def _take(self, make: Callable[[], ForcedPoint]) -> Taken:
         self.count += 1

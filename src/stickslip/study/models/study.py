@@ -15,7 +15,7 @@ from stickslip.study.file.study import StudyFile, TablesOfCase, read_file, valid
 from stickslip.study.file.tables import OF_THE_MODEL, Tables, asked_of
 from stickslip.study.file.vary import with_values
 from stickslip.study.models.checks import refusals
-from stickslip.study.models.measured import measured_peaks
+from stickslip.study.models.measured import MeasuredPeaks, measured_peaks
 from stickslip.study.models.model import model_of, newton
 from stickslip.study.models.parts import Memo, digest
 
@@ -64,6 +64,11 @@ class Study:
     def asked(self) -> tuple[str, ...]:
         """Names of the analyses that the file has tables of."""
         return asked_of(self.tables)
+
+    @property
+    def measured(self) -> MeasuredPeaks | None:
+        """Measured peaks that the file names."""
+        return measured_peaks(self.file)
 
     def cases(self) -> tuple[Case, ...]:
         """Return what [vary] spans; one case without it. Models are built when they are asked for."""
