@@ -155,8 +155,12 @@ def main() -> int:
     parser.add_argument("--planar", action="store_true")
     asked = parser.parse_args()
     numbers = range(asked.first, asked.first + asked.systems)
+    trials = []
     with get_context("spawn").Pool(asked.workers) as pool:
-        show(pool.map(partial(trial, asked.seed, asked.planar), numbers, chunksize=1))
+        for made in pool.imap(partial(trial, asked.seed, asked.planar), numbers):
+            trials.append(made)
+            print(f"{made.number}: {made.failed} of {made.points} failed, {made.seconds:.1f} s", file=sys.stderr, flush=True)  # fmt: skip
+    show(trials)
     return 0
 
 
