@@ -134,4 +134,4 @@ def of_trials(trials: list[Trial]) -> list[dict[str, Any]]:
 
 def run() -> list[dict[str, Any]]:
     """Count on random systems; compare the cost on the cases of the strategies page."""
-    return [*of_trials([trial(SEED, False, n) for n in range(SYSTEMS)]), *of_cases()]
+    return [*of_trials([trial(SEED, "random", n) for n in range(SYSTEMS)]), *of_cases()]

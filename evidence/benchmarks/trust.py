@@ -16,6 +16,7 @@ from time import process_time
 import numpy as np
 
 from evidence.benchmarks.robustness import CPU_SECONDS, OutOfTimeError, at_most, missing
+from evidence.models.fresh_machines import FAMILIES, draw_fresh
 from evidence.models.random_machines import Drawn, draw
 from stickslip.errors import StickslipError
 from stickslip.harmonic.support import harmonics_of
@@ -65,9 +66,12 @@ class Trial:
     judged: tuple[Judged, ...]
 
 
-def trial(seed: int, planar: bool, number: int) -> Trial:
-    """Solve a system by default and judge a sample of what was accepted."""
-    drawn = by_default(draw(seed, number, planar=planar))
+def trial(seed: int, family: str, number: int) -> Trial:
+    """Solve a system of the benchmark, of its planar variant or of a fresh family by default and judge a sample of what was accepted."""
+    if family in FAMILIES:
+        drawn = by_default(draw_fresh(family, seed, number))
+    else:
+        drawn = by_default(draw(seed, number, planar=family == "planar"))
     points: list[ForcedPoint] = []
     next(iter(forced_response(drawn.system, drawn.load, drawn.sweep)))  # compiles, off the clock
     began, unsolved = process_time(), 0
@@ -152,12 +156,12 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--planar", action="store_true")
+    parser.add_argument("--family", choices=("random", "planar", *FAMILIES), default="random")
     asked = parser.parse_args()
     numbers = range(asked.first, asked.first + asked.systems)
     trials = []
     with get_context("spawn").Pool(asked.workers) as pool:
-        for made in pool.imap(partial(trial, asked.seed, asked.planar), numbers):
+        for made in pool.imap(partial(trial, asked.seed, asked.family), numbers):
             trials.append(made)
             print(f"{made.number}: {made.failed} of {made.points} failed, {made.seconds:.1f} s", file=sys.stderr, flush=True)  # fmt: skip
     show(trials)
