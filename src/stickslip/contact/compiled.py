@@ -47,6 +47,9 @@ class CompiledContacts:
         Contacts with isotropic planar friction, and their (len(planar), 7) rows.
     marched
         All other contacts.
+    sliders
+        (n_contacts, 3) gaps at which the springs of evaluated (not marched) contacts are unstretched before t = 0, m, zero along
+        the normal; None: zeros.
     """
 
     evaluator: Evaluator
@@ -59,6 +62,7 @@ class CompiledContacts:
     planar: IntArray
     planar_elements: FloatArray
     marched: tuple[MarchedLaws, ...]
+    sliders: FloatArray | None = None
 
     @property
     def needs_samples(self) -> bool:
@@ -69,6 +73,14 @@ class CompiledContacts:
     def keeps_events(self) -> bool:
         """Whether an evaluation without samples tells when every contact changes its state."""
         return self.evaluator == "events" and not self.marched and not self.planar.size
+
+    def from_sliders(self, gap_coefficients: FloatArray) -> FloatArray:
+        """Return the (2H+1, 3 n_contacts) coefficients of the gaps measured from where springs start unstretched; evaluators start at zero."""
+        if self.sliders is None:
+            return gap_coefficients
+        moved = gap_coefficients.copy()
+        moved[0] -= self.sliders.reshape(-1)
+        return moved
 
 
 def check_evaluator(evaluator: str) -> None:
@@ -138,7 +150,19 @@ def compile_contacts(
         np.array(list(planar), dtype=np.int64),
         np.array(list(planar.values())).reshape(-1, 7),
         tuple(_marched(laws, np.array(indices), kind[0]) for kind, indices in others.items()),
+        _sliders(laws, [*piecewise, *planar]),
     )
+
+
+def _sliders(laws: Sequence[ContactLaw], evaluated: Sequence[int]) -> FloatArray | None:
+    """Return where springs start unstretched, of the contacts that are not marched: those start with their state."""
+    given = {c: at for c in evaluated if (at := getattr(laws[c], "slider", None)) is not None}
+    if not given:
+        return None
+    out = np.zeros((len(laws), 3))
+    for c, at in given.items():
+        out[c, :2] = at
+    return out
 
 
 def _planar_row(law: ContactLaw) -> FloatArray | None:

@@ -80,6 +80,10 @@ def _step(displacement, velocity, state, parameters, force, new_state, jac, stat
 element_step = law_kernel(_step)
 
 
-def slider_start(residual_traction: float | None) -> FloatArray:
-    """Return the (2,) slider positions before t = 0: zero, or NaN where a residual traction decides."""
-    return np.full(2, 0.0 if residual_traction is None else np.nan)
+def slider_start(
+    residual_traction: float | None, slider: tuple[float, float] | None = None
+) -> FloatArray:
+    """Return the (2,) slider positions before t = 0: `slider`, zero without one, or NaN where a residual traction decides."""
+    if residual_traction is not None:
+        return np.full(2, np.nan)
+    return np.zeros(2) if slider is None else np.array(slider)

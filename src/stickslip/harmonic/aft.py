@@ -106,6 +106,7 @@ def contact_forces(
     if not history and not contacts.needs_samples:
         samples = 0
     tables = _tables((m - 1) // 2, samples)
+    gap_coefficients = contacts.from_sliders(gap_coefficients)
     # one row a gap, so that an evaluator runs along it
     gap = (gap_coefficients.T @ tables.basis.T).reshape(contacts.n_contacts, 3, samples)
     parts = []
@@ -121,6 +122,8 @@ def contact_forces(
         parts.append((laws.contacts, period))
     # no contact at all is put together from nothing
     whole = parts[0][1] if len(parts) == 1 else _put_together(parts, gap, contacts.pairs, m)
+    if contacts.sliders is not None:
+        whole = replace(whole, gap=whole.gap + contacts.sliders[:, :, None])
     return whole if contacts.weights is None else _weighted(whole, contacts.weights)
 
 

@@ -2,6 +2,7 @@
 
 from .contributions import HarmonicContributions as HarmonicContributions
 from .contributions import harmonic_contributions as harmonic_contributions
+from .equilibrium import frozen_sliders as frozen_sliders
 from .forced.accepted import accepted_points as accepted_points
 from .forced.problem import ForcedPoint as ForcedPoint
 from .forced.problem import ForcedProblem as ForcedProblem

@@ -5,10 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.contact.frozen import freezable, left_behind, sharing_friction
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.product import add_stiffness
-from stickslip.errors import SingularError
+from stickslip.errors import SingularError, input_error
+from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_balance
 from stickslip.harmonic.dlft import DynamicLagrangian
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -81,6 +83,54 @@ def preload(system: System, static_load: FloatArray) -> FloatArray:
             "or give it a retention stiffness."
         )
     return np.asarray(balance.coefficients(solution.x)[0].real)
+
+
+def frozen_sliders(system: System, static_load: FloatArray, friction_share: float = 1.0) -> System:
+    """Place the structure under a static load first, and start every slider from where that leaves it.
+
+    A vibration during which no contact slips or opens is then that of plain springs, with the static state as its mean: harmonics
+    and static part do not feel each other (Gastaldi & Berruti 2017, eq. 17). A slider that slips or lifts off forgets.
+
+    Parameters
+    ----------
+    system
+        Structure and contacts.
+    static_load
+        (n,) static forces on all dofs, N.
+    friction_share
+        Share of the friction coefficients, above 0 to 1, with which the static state is found: no contact holds more than this
+        share of ``mu N``, and the rest is left to the vibration. With 1 a contact that slips under the static load stands on its
+        limit, and the least vibration moves its slider.
+
+    Returns
+    -------
+    System
+        With laws whose `slider` is set; `preload` finds the same static state of it.
+
+    Raises
+    ------
+    InputError
+        If the share is not above 0 to 1, or a law has no single slider.
+    SingularError
+        If the static load finds no equilibrium.
+    """
+    if not 0.0 < friction_share <= 1.0:
+        raise input_error(
+            "frozen_sliders: friction_share",
+            f"must be above 0 to 1, got {friction_share}",
+            "Without friction nothing may hold a body along the contacts.",
+        )
+    own = system.interface
+    if not any(freezable(n, law) for n, law in zip(own.names, own.laws, strict=True)):
+        return system
+    weaker = replace(own, laws=tuple(sharing_friction(law, friction_share) for law in own.laws))
+    static = preload(replace(system, interface=weaker), static_load)
+    gaps = own.gap_operator[:, system.retained] @ static
+    compiled = replace(weaker, weights=None).compiled()
+    force = contact_forces(gaps[None], compiled, samples=1).force[:, :, 0]
+    each = zip(own.laws, gaps.reshape(-1, 3), force, strict=True)
+    frozen = tuple(left_behind(law, gap, own_force) for law, gap, own_force in each)
+    return replace(system, interface=replace(own, laws=frozen))
 
 
 def _unstretched(law: ContactLaw) -> ContactLaw:

@@ -205,6 +205,9 @@ class CoupledCoulomb:
         Normal force at zero normal gap, N; negative for a contact with a clearance. With ``k_n = 0`` the normal force is constant.
     k_w
         Contact stiffness along w, N/m; None: as along t.
+    slider
+        Tangential gaps (t, w) at which the spring is unstretched before t = 0, m, such as `stickslip.response.frozen_sliders`
+        finds them; None: zero.
 
     Raises
     ------
@@ -230,6 +233,7 @@ class CoupledCoulomb:
         least=0,
         shared=True,
     )
+    slider: tuple[float, float] | None = None
 
     kernel: ClassVar[Any] = law_kernel(_step)
     pairs: ClassVar[int] = COUPLED_TANGENTS
@@ -253,8 +257,9 @@ class CoupledCoulomb:
         return np.array([self.k_t, self.k_n, self.mu, self.preload])
 
     def initial_state(self) -> FloatArray:
-        """Return the (5,) position of the slider, displacement (m) and normal force (N) before t = 0: the spring is unstretched at zero displacement, and t = 0 is reached while N grows from nothing."""
-        return np.zeros(5)
+        """Return the (5,) position of the slider, displacement (m) and normal force (N) before t = 0: the spring is unstretched there, and t = 0 is reached while N grows from nothing."""
+        at = (0.0, 0.0) if self.slider is None else self.slider
+        return np.array([*at, *at, 0.0])
 
     def stuck_stiffness(self) -> FloatArray:
         """Return the (3,) stiffnesses t, w, n of the contact that neither slips nor opens, N/m."""

@@ -15,6 +15,7 @@ from stickslip.contact.laws.quantities import (
     normal_stiffness,
     tangential_stiffness,
 )
+from stickslip.errors import input_error
 from stickslip.units import check_quantities, quantity
 
 
@@ -36,9 +37,12 @@ class ElasticCoulomb:
     preload
         Normal force at zero normal gap, N; negative for a contact with a clearance.
     residual_traction
-        None: each tangential spring is unstretched at zero displacement, so that full stick is a plain spring, static part
-        included. A number m in [-1, 1]: the tangential force just before t = 0 is ``m mu N`` (Ferhatoglu & Zucca's start
-        value), which chooses one of the admissible mean forces of a contact that does not slip.
+        None: each tangential spring is unstretched at zero displacement, or where `slider` says. A number m in [-1, 1]: the
+        tangential force just before t = 0 is ``m mu N`` (Ferhatoglu & Zucca's start value), which chooses one of the
+        admissible mean forces of a contact that does not slip.
+    slider
+        Tangential gaps (t, w) at which the springs are unstretched before t = 0, m, such as `stickslip.response.frozen_sliders`
+        finds them; None: zero. Not beside a residual traction.
 
     Raises
     ------
@@ -57,6 +61,7 @@ class ElasticCoulomb:
         least=-1,
         most=1,
     )
+    slider: tuple[float, float] | None = None
 
     kernel: ClassVar[Any] = element_step
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
@@ -64,6 +69,12 @@ class ElasticCoulomb:
     def __post_init__(self) -> None:
         check_quantities(self)
         check_any_stiffness(self, "k_t", "k_w", "k_n")
+        if self.slider is not None and self.residual_traction is not None:
+            raise input_error(
+                "ElasticCoulomb",
+                "has both a slider and a residual traction, and each says where the springs start",
+                "Give one of them.",
+            )
 
     def parameters(self) -> FloatArray:
         """Return the (7,) row of the elementary contact."""
@@ -78,7 +89,7 @@ class ElasticCoulomb:
 
     def initial_state(self) -> FloatArray:
         """Return the (2,) slider positions before t = 0, m."""
-        return slider_start(self.residual_traction)
+        return slider_start(self.residual_traction, self.slider)
 
     def stuck_stiffness(self) -> FloatArray:
         """Return the (3,) stiffnesses t, w, n of the contact that neither slips nor opens, N/m."""

@@ -263,8 +263,9 @@ def _located(
     compiled = compile_contacts([laws[c] for c in own], interface.factors[own], "events")
     events = room_for_events((len(gap_coefficients) - 1) // 2, len(compiled.elements))
     gaps = gap_coefficients.reshape(len(gap_coefficients), -1, 3)[:, own]
+    gaps = compiled.from_sliders(gaps.reshape(len(gaps), -1))
     none = np.zeros((own.size, 3, 0))
-    exact_period(gaps.reshape(len(gaps), -1), compiled.elements, compiled.first, none, kept=events)
+    exact_period(gaps, compiled.elements, compiled.first, none, kept=events)
     return contact_states(events, compiled, own, interface.n_contacts) if events.whole else None
 
 

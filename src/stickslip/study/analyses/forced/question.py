@@ -8,12 +8,14 @@ from typing import Any, Literal
 import numpy as np
 
 from stickslip.assembly.assembled import Assembled
+from stickslip.assembly.build import static_state
 from stickslip.assembly.model import Model
 from stickslip.contact.laws import law_name
 from stickslip.errors import InputError, input_error, together
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.support import is_full, named
 from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.equilibrium import frozen_sliders
 from stickslip.response.forced.response import ForcedProblem, Sweep, forced_problem
 from stickslip.response.time.sectors import different_sectors
 from stickslip.study.analyses.analysis import Case
@@ -127,6 +129,8 @@ def question_of(case: Case, model: Model) -> Question:
     assembled = model.assembled(harmonics, case.store)
     if IN_TIME in case.checks:
         _require_sectors(model, assembled)
+    if (share := settings.forced_response.static_friction_share) is not None:
+        assembled = _with_frozen_sliders(assembled, share)
     try:
         forced_problem(assembled.system, assembled.load, sweep)
     except InputError as error:
@@ -144,6 +148,17 @@ def question_of(case: Case, model: Model) -> Question:
         first=case.index == 0,
         examine=settings.forced_response.stability,
     )
+
+
+def _with_frozen_sliders(model: Assembled, share: float) -> Assembled:
+    """Return the model whose sliders start from the static state under a share of the friction, and that state."""
+    try:
+        system = frozen_sliders(model.system, model.load.static, share)
+    except InputError as error:
+        raise error.at(f"forced_response.static_friction_share: {error.place}") from None
+    gap, force = static_state(system, model.load.static)
+    bare = replace(model.bare, interface=system.interface)
+    return replace(model, system=system, bare=bare, static_gap=gap, static_force=force)
 
 
 def _driving(loads: Mapping[str, Any]) -> str:

@@ -58,6 +58,15 @@ class ForcedResponse(Section):
         "points, the nearest to it; all: at every point; off: nowhere",
     )
 
+    static_friction_share: float | None = Field(
+        None,
+        gt=0,
+        le=1,
+        description="static state first, then frozen sliders: share of the friction coefficients, above 0 to 1, that may carry the static "
+        "load before every slider stays where that has left it, the rest is for the vibration; left out: springs start "
+        "unstretched, static and dynamic part are found together",
+    )
+
     @property
     def range_key(self) -> str:
         """The key that says where: one of three."""
