@@ -57,8 +57,8 @@ class Outcome:
     note: str
     points: int
     failed: int
-    first: tuple[int, int]  # points of the first passage, and failed ones
-    repeats: tuple[int, int]
+    few: tuple[int, int]  # points with the harmonics of the first passage, and failed ones
+    many: tuple[int, int]  # those with more
     reasons: dict[str, int]
     rescues: dict[str, int]
     seconds: float
@@ -114,8 +114,8 @@ def outcome(seed: int, number: int, *, planar: bool = False) -> Outcome:
     unsolved = missing(drawn, points) if early else 0
     if unsolved:
         reasons[early] += unsolved
-    low = [p for p in points if p.stage == "low"]
-    high = list({p.index: p for p in points if p.stage == "high"}.values())
+    low = [p for p in accepted if p.order <= drawn.sweep.supports[0][-1]]
+    high = [p for p in accepted if p.order > drawn.sweep.supports[0][-1]]
     judged = (
         not planar
         and number >= 0
@@ -171,14 +171,14 @@ def show(outcomes: list[Outcome], seed: int) -> None:
     print(f"\nseed {seed}; {sum(o.seconds for o in outcomes):.0f} CPU seconds in sweeps, "
           f"the slowest {max(o.seconds for o in outcomes):.1f} s")  # fmt: skip
     print(
-        f"{'family':10} {'systems':>8} {'clean':>8} {'points':>8} {'converged':>10} {'first passage':>14} {'repeats':>10}"
+        f"{'family':10} {'systems':>8} {'clean':>8} {'points':>8} {'converged':>10} {'few harmonics':>14} {'more':>10}"
     )
     families = [*sorted({o.family for o in outcomes}), "all"]
     for family in families:
         own = [o for o in outcomes if family in ("all", o.family)]
         points, failed = sum(o.points for o in own), sum(o.failed for o in own)
-        shares = [share(sum(o.first[1] for o in own), sum(o.first[0] for o in own)),
-                  share(sum(o.repeats[1] for o in own), sum(o.repeats[0] for o in own))]  # fmt: skip
+        shares = [share(sum(o.few[1] for o in own), sum(o.few[0] for o in own)),
+                  share(sum(o.many[1] for o in own), sum(o.many[0] for o in own))]  # fmt: skip
         clean = sum(o.failed == 0 for o in own)
         print(
             f"{family:10} {len(own):8} {clean:8} {points:8} {share(failed, points):>10} {shares[0]:>14} {shares[1]:>10}"

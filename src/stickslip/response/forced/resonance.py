@@ -19,6 +19,7 @@ from stickslip.solve.status import Rung
 NEARBY = 0.002  # half the bracket about a known peak, relative to its frequency
 PEAK_CHANGE = 0.005  # relative change of a peak by more harmonics that ends its audit
 ALMOST = 0.95  # share of the peak above which points get its harmonics
+SAME = 1e-5  # relative distance of frequencies at which another point would tell nothing
 PEAK_RESOLUTION = 5e-4  # width of the bracket of the peak, relative to its frequency, at which it counts as resolved
 
 
@@ -250,7 +251,9 @@ def _vertex(known: Sequence[ForcedPoint], heights: Sequence[float]) -> float | N
     if not a < b < c or c - a < PEAK_RESOLUTION * b:
         return None
     below, above = (b - a) * (v - w), (b - c) * (v - u)
+    wider = 0.5 * (b + c) if c - b > b - a else 0.5 * (a + b)
     # a kink holds the parabola on one side of the peak: halve the other side once it is three times as wide
     if max(c - b, b - a) > 3.0 * min(c - b, b - a) or below == above:
-        return 0.5 * (b + c) if c - b > b - a else 0.5 * (a + b)
-    return float(b - 0.5 * ((b - a) * below - (b - c) * above) / (below - above))
+        return wider
+    vertex = float(b - 0.5 * ((b - a) * below - (b - c) * above) / (below - above))
+    return wider if abs(vertex - b) < SAME * b else vertex

@@ -104,7 +104,7 @@ class Stability:
                 f"as it was solved the motion has a largest multiplier of modulus {size:.4g}; what more harmonics would change in it "
                 "is not known, no motion with more was found nearby"
             )
-        said = f"{size:.4g} ± {error:.2g}"
+        said = f"{size:.4g} ± {error:.2g}" if error > 0.0 else f"{size:.4g}"
         return {
             "unstable": f"a multiplier of modulus {said} lies outside the unit circle: a disturbance grows by as much in a period",
             "stable": f"the largest multiplier that is not neutral has the modulus {said}: disturbances die",
