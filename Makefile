@@ -35,7 +35,7 @@ $(INSTALLED): requirements.lock pyproject.toml
 	@touch $@
 
 run: $(INSTALLED)  ## solve the example of two blades and a damper, and write its report
-	@status=0; $(BIN)/stickslip run $(STUDY) || status=$$?; page=$(dir $(STUDY))results/report.html; \
+	@status=0; $(BIN)/stickslip run $(STUDY) --workers $(WORKERS) || status=$$?; page=$(dir $(STUDY))results/report.html; \
 	if [ -e "$$page" ]; then echo "Open $$page in a browser."; fi; exit $$status
 
 test: $(INSTALLED)  ## run the tests
