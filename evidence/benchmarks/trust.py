@@ -23,7 +23,7 @@ from stickslip.harmonic.support import harmonics_of
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.forced.response import forced_problem, forced_response
 from stickslip.solve.newton_method import Newton, newton
-from stickslip.study.analyses.forced.points import collect
+from stickslip.study.analyses.forced.points import Accepted, collect
 
 TRUTHS = (63, 31)  # harmonics
 SAMPLES = 8  # a harmonic, at least
@@ -93,8 +93,7 @@ def trial(seed: int, family: str, number: int) -> Trial:
     judged = []
     for i in sorted(int(i) for i in some):
         a = solved[i]
-        said = a.own_error if np.isnan(a.audit_error) else min(a.own_error, a.audit_error)
-        judged.append(Judged(a.point.omega, a.point.order, said, truth(problem, a.point)))
+        judged.append(Judged(a.point.omega, a.point.order, said(a), truth(problem, a.point)))
     unknowns = sum(p.coefficients.shape[1] * (2 * p.harmonics.size - 1) for p in points)
     failed = len(found) - len(solved) + unsolved
     return Trial(
@@ -105,6 +104,11 @@ def trial(seed: int, family: str, number: int) -> Trial:
 def by_default(drawn: Drawn) -> Drawn:
     """Return a drawn system with the sweep that a user gets who asks for nothing."""
     return replace(drawn, sweep=replace(drawn.sweep, selection="guarded_alert", high="auto"))
+
+
+def said(found: Accepted) -> float:
+    """Return what is said of the error of a point, a fraction: its audit where there is one, and that is less."""
+    return float(np.nanmin([found.own_error, found.audit_error]))
 
 
 def truth(problem: ForcedProblem, point: ForcedPoint) -> float:
