@@ -383,6 +383,34 @@ def test_lag_behind_a_sudden_change_of_contact_state(made):
     assert wrong.max() < 0.01
 
 
+@pytest.mark.parametrize("made", FORETELLING)
+def test_no_lag_where_a_frequency_is_repeated_until_it_has_what_it_foretells(made):
+    """Section 4.5.3: with `repeats` 161 Hz is solved again at 161 Hz."""
+    system, load = blades_and_damper()
+    strategy = made(repeats=True)
+    supports, wrong = errors(system, load, (155.0, 173.0), 7, strategy)
+    assert supports[:2] == [(0, 1)] * 2, "nothing is repeated in stick"
+    assert len(supports[2]) > 3
+    assert wrong.max() < 0.01
+    problem, points = response(system, load, (155.0, 173.0), 7, strategy)
+    grid = sorted({p.omega for p in points})
+    tried = [p for p in points if p.omega == grid[2]]
+    foretold = [
+        strategy.judge(
+            problem.step(
+                problem.balance(p.support),
+                problem.balance(p.support).unknowns(p.coefficients), p.omega, grid[3],
+            )
+        ).following
+        for p in tried
+    ]  # fmt: skip
+    for point, own, following in zip(tried, foretold, tried[1:], strict=False):
+        assert following.support == tuple(sorted({*point.support, *own}))
+        assert set(own) - set(point.support), "there was a reason to repeat it"
+    assert len(tried) > 1
+    assert set(foretold[-1]) <= set(tried[-1].support), "the last has all that it foretells"
+
+
 def test_maple_never_drops_a_harmonic_and_laxalde_does():
     system, load = blades_and_damper()
     for made, last in ((Maple, 6), (Laxalde, 2)):

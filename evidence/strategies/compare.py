@@ -14,6 +14,7 @@ import numpy as np
 from evidence.strategies.cases import CASES, SelectionCase
 from evidence.strategies.truth import judging_problem, reference_points
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
+from stickslip.harmonic.selection.strategy import Strategy
 from stickslip.response.forced.accepted import accepted_points
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.forced.response import forced_response
@@ -36,10 +37,14 @@ class Entry:
 
     selection: str
     passages: Passages = "double"
+    own: Strategy | None = None  # with other parameters than those of its name
+    keys: str = ""  # which, in tables
 
     @property
     def title(self) -> str:
         """Name in tables."""
+        if self.own is not None:
+            return f"{self.selection}, {self.keys}"
         return f"{self.selection}, single" if self.passages == "single" else self.selection
 
 
@@ -99,10 +104,10 @@ def entries() -> list[Entry]:
     return [Entry(FEW), Entry(MANY), *doubles, Entry(PUBLISHED, "single"), *map(Entry, others)]
 
 
-def compared(case: SelectionCase) -> Comparison:
-    """Run every strategy on a case and judge it."""
+def compared(case: SelectionCase, chosen: Sequence[Entry] = ()) -> Comparison:
+    """Run every strategy, or those `chosen` (the first keeps few harmonics everywhere), on a case and judge it."""
     judge = _Judge(case)
-    runs = [(entry, *_timed(case, entry)) for entry in entries()]
+    runs = [(entry, *_timed(case, entry)) for entry in chosen or entries()]
     few = [judge.error(p) for p in accepted_points(runs[0][1])]
     outcomes = [_outcome(judge, few, *run) for run in runs]
     return Comparison(case, tuple(outcomes), sum(not p.converged for p in judge.references))
@@ -110,7 +115,7 @@ def compared(case: SelectionCase) -> Comparison:
 
 def _timed(case: SelectionCase, entry: Entry) -> tuple[list[ForcedPoint], float]:
     """Return all points that a strategy solves, and the CPU time of its fastest run."""
-    sweep = case.sweep(selection=entry.selection, passages=entry.passages)
+    sweep = case.sweep(selection=entry.own or entry.selection, passages=entry.passages)
     list(forced_response(case.system, case.load, replace(sweep, frequencies=WARM)))
     points: list[ForcedPoint] = []
     seconds: list[float] = []
@@ -160,7 +165,7 @@ class _Judge:
 def _outcome(
     judge: _Judge, few: Sequence[float], entry: Entry, points: Sequence[ForcedPoint], seconds: float
 ) -> Outcome:
-    n, smallest = judge.problem.low.linear.n, len(judge.problem.low.harmonics)
+    smallest = len(judge.problem.low.harmonics)
     accepted = accepted_points(points)
     by_omega = {p.omega: p for p in accepted}
     errors = np.array([judge.error(p) for p in accepted])
@@ -171,7 +176,7 @@ def _outcome(
     top = by_omega.get(judge.references[judge.peak].omega)
     return Outcome(
         entry,
-        unknowns=sum(n * (2 * p.harmonics.size - 1) for p in points),
+        unknowns=sum(p.unknowns for p in points),
         iterations=sum(p.iterations for p in points),
         seconds=seconds,
         lost=sum(not p.converged for p in accepted),

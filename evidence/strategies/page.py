@@ -49,7 +49,7 @@ def table(comparison: Comparison) -> list[str]:
     ]
     for o in comparison.outcomes:
         cells = [
-            f"`{o.entry.selection}`" + (", single" if o.entry.passages == "single" else ""),
+            f"`{o.entry.selection}`" + o.entry.title.removeprefix(o.entry.selection),
             f"{100 * o.unknowns / many.unknowns:.0f} %",
             f"{100 * o.iterations / many.iterations:.0f} %",
             f"{100 * o.seconds / many.seconds:.0f} %",

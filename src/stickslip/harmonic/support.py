@@ -4,11 +4,12 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.fourier import padded, to_complex, to_real
 
 Harmonics = tuple[int, ...]  # growing, from 0: the static term is always kept
+ByDof = tuple[Harmonics, ...]  # one support a coordinate
 
 
 def harmonics_of(chosen: int | Iterable[int], place: str = "harmonics") -> Harmonics:
@@ -72,3 +73,25 @@ def complex_rows(rows: FloatArray, harmonics: Harmonics) -> ComplexArray:
     out = np.zeros((harmonics[-1] + 1, *rows.shape[1:]), dtype=complex)
     out[list(harmonics)] = kept
     return out
+
+
+def of_all(by_dof: ByDof) -> Harmonics:
+    """Return the harmonics of all coordinates together."""
+    return tuple(sorted({h for own in by_dof for h in own}))
+
+
+def joined(one: ByDof, other: ByDof) -> ByDof:
+    """Return what each coordinate has in either of two."""
+    return tuple(tuple(sorted({*a, *b})) for a, b in zip(one, other, strict=True))
+
+
+def kept_by_dof(by_dof: ByDof, harmonics: Harmonics) -> BoolArray:
+    """Return the (len(harmonics), n) pairs of harmonic and coordinate that are kept."""
+    return np.array([[h in own for own in by_dof] for h in harmonics], dtype=bool)
+
+
+def supports_of(kept: BoolArray, harmonics: Harmonics) -> ByDof:
+    """Return the support of each coordinate from the (len(harmonics), n) pairs that are kept."""
+    return tuple(
+        tuple(h for h, own in zip(harmonics, column, strict=True) if own) for column in kept.T
+    )

@@ -7,8 +7,7 @@ from typing import Literal, Protocol
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
-from stickslip.harmonic.balance import HarmonicBalance
-from stickslip.harmonic.dlft import DynamicLagrangian
+from stickslip.harmonic.local import AnyBalance
 from stickslip.solve.branch import Latest, Problem
 from stickslip.solve.continuation import Following, Point, StepControl
 from stickslip.solve.newton_method import Newton, Solution
@@ -233,14 +232,12 @@ def steps_through(length: float, points: int) -> StepControl:
     return StepControl(scale=length / (points * LARGEST) or 1.0, first=0.05, largest=LARGEST)
 
 
-def following_vibration(
-    problem: HarmonicBalance | DynamicLagrangian, control: StepControl, newton: Newton
-) -> Following:
+def following_vibration(problem: AnyBalance, control: StepControl, newton: Newton) -> Following:
     """Return how a branch of a periodic problem is followed."""
     return Following(newton=newton, control=control, weights=vibration_weights(problem))
 
 
-def vibration_weights(problem: HarmonicBalance | DynamicLagrangian) -> FloatArray:
+def vibration_weights(problem: AnyBalance) -> FloatArray:
     """Return the share of each unknown in the length of a step: the static part would hide the growth of the vibration."""
     weights = np.ones(problem.size)
     weights[: problem.linear.n] = 0.0

@@ -12,9 +12,9 @@ from stickslip.contact.product import add_stiffness
 from stickslip.errors import SingularError, input_error
 from stickslip.harmonic.aft import contact_forces
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation, harmonic_balance
-from stickslip.harmonic.dlft import DynamicLagrangian
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex
+from stickslip.harmonic.local import AnyBalance
 from stickslip.response.system import System
 from stickslip.solve.continuation import Following, StepControl, reversed_point, start_point, trace
 from stickslip.solve.linear import solve_dense
@@ -153,9 +153,7 @@ def _released(balance: HarmonicBalance, options: Newton) -> Solution:
     return last.solution
 
 
-def bonded_start(
-    balance: HarmonicBalance | DynamicLagrangian, omega: float, system: System
-) -> FloatArray:
+def bonded_start(balance: AnyBalance, omega: float, system: System) -> FloatArray:
     """Return the scaled solution with every contact bonded: the start of all that follows.
 
     Raises

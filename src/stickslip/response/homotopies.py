@@ -7,7 +7,7 @@ from typing import Any
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import ContactLaw
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation
-from stickslip.harmonic.dlft import DynamicLagrangian
+from stickslip.harmonic.local import AnyBalance
 from stickslip.solve.rescue import ByDifference, Evaluate, Homotopy
 
 # shares of the excitation at which contacts hardly change: the problem is linear there
@@ -55,9 +55,7 @@ def _with_friction(law: ContactLaw, factor: float) -> ContactLaw:
     return changed
 
 
-def homotopies(
-    balance: HarmonicBalance | DynamicLagrangian, omega: float, static: FloatArray
-) -> Iterator[Homotopy]:
+def homotopies(balance: AnyBalance, omega: float, static: FloatArray) -> Iterator[Homotopy]:
     """Yield ways from an easy problem to the balance at one frequency.
 
     First the excitation grows from next to nothing: there nothing changes its state and the problem is linear. As damping bounds the
@@ -74,7 +72,9 @@ def homotopies(
     static
         (n_retained,) static equilibrium, m.
     """
-    if isinstance(balance, DynamicLagrangian):  # its residual is not linear in the excitation
+    if not isinstance(
+        balance, HarmonicBalance
+    ):  # of rigid contacts not linear in the excitation, or not all of the equations
         return
     at_rest = balance.unknowns(static[None].astype(complex))
     yield Homotopy((growing_load(balance, omega),), at_rest, FAINT, BACK * FAINT[-1])

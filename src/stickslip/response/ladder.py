@@ -6,8 +6,7 @@ from functools import partial
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
-from stickslip.harmonic.balance import HarmonicBalance
-from stickslip.harmonic.dlft import DynamicLagrangian
+from stickslip.harmonic.local import AnyBalance
 from stickslip.response.branch import (
     Followed,
     OneLevel,
@@ -27,7 +26,7 @@ from stickslip.solve.rescue import Homotopy, solve_robustly
 
 def without_branch(
     system: System,
-    balance: HarmonicBalance | DynamicLagrangian,
+    balance: AnyBalance,
     options: Newton,
     omega: float,
     near: Sequence[FloatArray] = (),
@@ -66,7 +65,7 @@ def without_branch(
 
 def plain_sweep(
     system: System,
-    balance: HarmonicBalance | DynamicLagrangian,
+    balance: AnyBalance,
     omega_range: tuple[float, float],
     points: int,
     options: Newton,
@@ -78,13 +77,11 @@ def plain_sweep(
     return branch_of(follow(curve, Route(first=first, last=last, points=points)))
 
 
-def _ways(
-    system: System, balance: HarmonicBalance | DynamicLagrangian, omega: float
-) -> Iterator[Homotopy]:
+def _ways(system: System, balance: AnyBalance, omega: float) -> Iterator[Homotopy]:
     yield from homotopies(balance, omega, _at_rest(system, balance)[0].real)
 
 
-def _at_rest(system: System, balance: HarmonicBalance | DynamicLagrangian) -> ComplexArray:
+def _at_rest(system: System, balance: AnyBalance) -> ComplexArray:
     """Return the (1, n_retained) static equilibrium, m; zero at coordinates that are retained beside those of the system."""
     rest = np.zeros((1, balance.linear.n), dtype=complex)
     own = np.searchsorted(balance.linear.retained, system.retained)
@@ -94,7 +91,7 @@ def _at_rest(system: System, balance: HarmonicBalance | DynamicLagrangian) -> Co
 
 def _starts(
     system: System,
-    balance: HarmonicBalance | DynamicLagrangian,
+    balance: AnyBalance,
     options: Newton,
     omega: float,
     near: Sequence[FloatArray],

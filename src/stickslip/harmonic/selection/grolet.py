@@ -3,9 +3,19 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
+from stickslip.arrays import FloatArray
 from stickslip.harmonic.selection.alert import solve_array
-from stickslip.harmonic.selection.spectrum import above, padded_solution, spectral_shares
+from stickslip.harmonic.selection.spectrum import (
+    above,
+    foretold,
+    padded_solution,
+    shares_by_dof,
+    spectral_shares,
+)
 from stickslip.harmonic.selection.strategy import Step, Verdict
+from stickslip.harmonic.support import kept_by_dof, of_all, supports_of
 
 
 @dataclass(frozen=True)
@@ -13,27 +23,47 @@ class Grolet:
     """Keep at the next frequency the harmonics that have a share in the energy of its tangent prediction.
 
     ``∂r/∂q Δq = -∂r/∂ω Δω`` in the space of all harmonics of the reference (Gastaldi & Berruti 2017, eq. 11, 12), then the share of
-    each harmonic in ``q + Δq``. All dofs get the same harmonics.
+    each harmonic in ``q + Δq``.
 
     Parameters
     ----------
     threshold
         Share of the square of the motion above which a harmonic is kept; the review gives no number: 1e-4 is a hundredth of
         the amplitude.
+    per_dof
+        Take the shares of each retained coordinate by itself, and let it keep harmonics of its own, as the source does (section
+        4.5.2.1); otherwise all coordinates get the same harmonics.
+    repeats
+        Solve a frequency again until it has the harmonics that it foretells (section 4.5.3); the rule as published does not.
     """
 
     verifies: ClassVar[bool] = False
     threshold: float = 1e-4
+    per_dof: bool = False
+    repeats: bool = False
 
     def judge(self, step: Step) -> Verdict:
-        """Predict the next solution; this frequency is not solved again. The indicator is the largest share left out."""
+        """Predict the next solution; this frequency is solved again with `repeats` alone. The indicator is the largest share left out."""
         q = padded_solution(step)
         at = step.reference.linearise(q, step.omega)
         ahead = step.next_omega - step.omega
         change = (step.solve or solve_array)(at.jac, -ahead * at.jac_p)
         if change is None:  # a fold: nothing can be foretold, all harmonics are kept
-            return Verdict(float("inf"), None, step.reference.harmonics)
+            return foretold(step, float("inf"), step.reference.harmonics, repeats=self.repeats)
+        if self.per_dof:
+            return self._judge_each(step, shares_by_dof(step.reference, q + change))
         shares = spectral_shares(step.reference, q + change)
         had = step.balance.harmonics
         missed = [s for h, s in zip(step.reference.harmonics, shares, strict=True) if h not in had]
-        return Verdict(max(missed, default=0.0), None, above(step, shares, self.threshold))
+        following = above(step, shares, self.threshold)
+        return foretold(step, max(missed, default=0.0), following, repeats=self.repeats)
+
+    def _judge_each(self, step: Step, shares: FloatArray) -> Verdict:
+        """Choose what each coordinate keeps from the shares that are foretold for it."""
+        reference = step.reference.harmonics
+        smallest = np.isin(reference, step.smallest)
+        wanted = (shares > self.threshold) | smallest[:, None]
+        missed = shares[~kept_by_dof(step.supports, reference)]
+        by_dof = supports_of(wanted, reference)
+        largest = float(missed.max(initial=0.0))
+        return foretold(step, largest, of_all(by_dof), repeats=self.repeats, by_dof=by_dof)

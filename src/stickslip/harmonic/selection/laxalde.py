@@ -7,7 +7,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.fourier import to_complex
-from stickslip.harmonic.selection.spectrum import contacts_of_reference, up_to
+from stickslip.harmonic.selection.spectrum import contacts_of_reference, foretold, up_to
 from stickslip.harmonic.selection.strategy import Step, Verdict
 
 
@@ -22,18 +22,22 @@ class Laxalde:
     ----------
     threshold
         Largest error of the forces that is accepted, a fraction; the review gives no number.
+    repeats
+        Solve a frequency again until it has the harmonics that it foretells (section 4.5.3); the rule as published does not.
     """
 
     verifies: ClassVar[bool] = False
     threshold: float = 0.05
+    repeats: bool = False
 
     def judge(self, step: Step) -> Verdict:
-        """Choose the lowest order whose error is small; this frequency is not solved again."""
+        """Choose the lowest order whose error is small; this frequency is solved again with `repeats` alone."""
         errors = left_out(step)
         orders = list(step.reference.harmonics)
         own = errors[orders.index(step.balance.order)]
         enough = [h for h, e in zip(orders, errors, strict=True) if e <= self.threshold]
-        return Verdict(float(own), None, up_to(step, min(enough, default=orders[-1])))
+        following = up_to(step, min(enough, default=orders[-1]))
+        return foretold(step, float(own), following, repeats=self.repeats)
 
 
 def left_out(step: Step) -> FloatArray:

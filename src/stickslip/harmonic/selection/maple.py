@@ -3,8 +3,16 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from stickslip.harmonic.selection.spectrum import raised, spectral_shares
+import numpy as np
+
+from stickslip.harmonic.selection.spectrum import (
+    next_up,
+    raised,
+    shares_by_dof,
+    spectral_shares,
+)
 from stickslip.harmonic.selection.strategy import Step, Verdict
+from stickslip.harmonic.support import of_all
 
 
 @dataclass(frozen=True)
@@ -12,20 +20,41 @@ class Maple:
     """Solve a frequency with one harmonic more while the last one has too large a share of the spectral energy.
 
     The share is that of Gastaldi & Berruti 2017, eq. 10. What was needed here is kept at the next frequency; nothing is ever
-    dropped. All dofs get the same harmonics.
+    dropped.
 
     Parameters
     ----------
     threshold
         Largest share of the last harmonic that is accepted, of the square of the motion; the review gives no number: 1e-4 is a
         hundredth of the amplitude.
+    per_dof
+        Look at the last harmonic of each retained coordinate by itself, and raise those that need it, as the source does (section
+        4.5.2.1); otherwise all coordinates get the same harmonics.
     """
 
     verifies: ClassVar[bool] = False
     threshold: float = 1e-4
+    per_dof: bool = False
 
     def judge(self, step: Step) -> Verdict:
         """Compare the last harmonic with all."""
+        if self.per_dof:
+            return self._judge_each(step)
         share = float(spectral_shares(step.balance, step.x)[-1])
         again = raised(step) if share > self.threshold else None
         return Verdict(share, again, step.balance.harmonics)
+
+    def _judge_each(self, step: Step) -> Verdict:
+        """Compare the last harmonic of each coordinate with all that it has."""
+        shares = shares_by_dof(step.balance, step.x)
+        place = {h: i for i, h in enumerate(step.balance.harmonics)}
+        own = step.supports
+        last = np.array([shares[place[s[-1]], i] for i, s in enumerate(own)])
+        more = tuple(
+            next_up(step, s) if share > self.threshold else s
+            for s, share in zip(own, last, strict=True)
+        )
+        largest = float(last.max(initial=0.0))
+        if more == own:
+            return Verdict(largest, None, of_all(own), following_by_dof=own)
+        return Verdict(largest, of_all(more), of_all(own), None, more, own)

@@ -7,8 +7,8 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.aft import ContactPeriod
 from stickslip.harmonic.balance import HarmonicBalance
-from stickslip.harmonic.selection.strategy import Step
-from stickslip.harmonic.support import Harmonics
+from stickslip.harmonic.selection.strategy import NOISE, Step, Verdict
+from stickslip.harmonic.support import ByDof, Harmonics, joined, of_all
 
 
 def padded_solution(step: Step) -> FloatArray:
@@ -46,6 +46,29 @@ def spectral_shares(balance: HarmonicBalance, x: FloatArray) -> FloatArray:
     return each / total if total > 0.0 else np.zeros_like(each)
 
 
+def shares_by_dof(balance: HarmonicBalance, x: FloatArray) -> FloatArray:
+    """Return the share of each harmonic in the spectral energy of each coordinate by itself (Gastaldi & Berruti 2017, eq. 10 for one dof).
+
+    Parameters
+    ----------
+    balance
+        The periodic problem.
+    x
+        Its (size,) scaled unknowns.
+
+    Returns
+    -------
+    FloatArray
+        (len(harmonics), n), the static term first; zeros where a coordinate moves less than a millionth of the largest, which is
+        what a solver leaves of zero.
+    """
+    square = x.reshape(balance.n_rows, balance.linear.n) ** 2
+    each = np.concatenate([square[:1], square[1::2] + square[2::2]])
+    total = each.sum(axis=0)
+    moves = total > NOISE**2 * total.max(initial=0.0)
+    return np.asarray(np.where(moves, each / np.where(moves, total, 1.0), 0.0))
+
+
 def above(step: Step, indicators: Iterable[float], threshold: float) -> Harmonics:
     """Return the harmonics of the reference whose indicator exceeds a threshold, and those below which no strategy goes."""
     pairs = zip(step.reference.harmonics, indicators, strict=True)
@@ -57,7 +80,36 @@ def up_to(step: Step, order: int) -> Harmonics:
     return tuple(sorted({*step.smallest, *(h for h in step.reference.harmonics if h <= order)}))
 
 
+def next_up(step: Step, had: Harmonics) -> Harmonics:
+    """Return some harmonics and the reference's next one above them; the same where there is none."""
+    more = [h for h in step.reference.harmonics if h > had[-1]]
+    return tuple(sorted({*had, *more[:1]}))
+
+
 def raised(step: Step) -> Harmonics | None:
     """Return the harmonics of a solution and the reference's next one above them; None where there is none."""
-    more = [h for h in step.reference.harmonics if h > step.balance.order]
-    return tuple(sorted({*step.balance.harmonics, more[0]})) if more else None
+    more = next_up(step, step.balance.harmonics)
+    return None if more == step.balance.harmonics else more
+
+
+def foretold(
+    step: Step,
+    indicator: float,
+    following: Harmonics,
+    *,
+    repeats: bool,
+    by_dof: ByDof | None = None,
+) -> Verdict:
+    """Return the verdict of a rule that foretells the next frequency.
+
+    `by_dof` are the harmonics that are foretold for each coordinate, None: for all the same. With `repeats` this one is solved again, with what it has and what is foretold, until nothing is foretold that it lacks
+    (Gastaldi & Berruti 2017, section 4.5.3). Harmonics are only added on the way, so that it ends.
+    """
+    if by_dof is None:
+        lacks = set(following) - set(step.balance.harmonics)
+        again = tuple(sorted({*step.balance.harmonics, *following})) if repeats and lacks else None
+        return Verdict(indicator, again, following)
+    both = joined(step.supports, by_dof)
+    if not repeats or both == step.supports:
+        return Verdict(indicator, None, of_all(by_dof), following_by_dof=by_dof)
+    return Verdict(indicator, of_all(both), of_all(by_dof), None, both, by_dof)

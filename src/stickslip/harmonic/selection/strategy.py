@@ -18,7 +18,7 @@ from stickslip.contact.event_integrals import Events
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.structured import StructuredJacobian
-from stickslip.harmonic.support import Harmonics
+from stickslip.harmonic.support import ByDof, Harmonics, of_all
 
 Kept = Literal["low", "high"]
 Solve = Callable[[FloatArray | StructuredJacobian, FloatArray], FloatArray | None]
@@ -101,6 +101,8 @@ class Step:
         Solution with fewer harmonics at the same frequency, where this one repeats it.
     left
         Events that the accepted evaluation left, see `events`.
+    by_dof
+        Harmonics of each retained coordinate, where these differ: all others of `x` are zero; None: those of `balance` in all.
     """
 
     balance: HarmonicBalance
@@ -113,6 +115,12 @@ class Step:
     solve: Solve | None = None
     before: "Step | None" = None
     left: Events | None = None
+    by_dof: ByDof | None = None
+
+    @property
+    def supports(self) -> ByDof:
+        """Harmonics of each retained coordinate."""
+        return self.by_dof or (self.balance.harmonics,) * self.balance.linear.n
 
     @cached_property
     def events(self) -> Events | None:
@@ -140,12 +148,16 @@ class Verdict:
         Harmonics with which the next frequency begins, in a single passage.
     start
         (H+1, n) coefficients from which the repeat starts, m; None: from the solution.
+    again_by_dof, following_by_dof
+        The same for each retained coordinate, where these differ; `again` and `following` are those of all together.
     """
 
     indicator: float
     again: Harmonics | None
     following: Harmonics
     start: ComplexArray | None = None
+    again_by_dof: ByDof | None = None
+    following_by_dof: ByDof | None = None
 
 
 class Strategy(Protocol):
@@ -222,7 +234,8 @@ def judged(strategy: Strategy, step: Step) -> Verdict:
     place = f"{type(strategy).__name__}.judge"
     if not isinstance(verdict, Verdict):
         raise input_error(place, f"returned a {type(verdict).__name__}", "Return a Verdict.")
-    beyond = {*(verdict.again or ()), *verdict.following} - set(step.reference.harmonics)
+    each = of_all((verdict.again_by_dof or ()) + (verdict.following_by_dof or ()))
+    beyond = {*(verdict.again or ()), *verdict.following, *each} - set(step.reference.harmonics)
     if beyond:
         raise input_error(
             place,

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.harmonic.selection.spectrum import above, contacts_of_reference
+from stickslip.harmonic.selection.spectrum import above, contacts_of_reference, foretold
 from stickslip.harmonic.selection.strategy import Step, Verdict
 from stickslip.harmonic.support import rows_of
 
@@ -23,17 +23,21 @@ class SuessJacobian:
     ----------
     threshold
         Norm above which a harmonic is kept; the review gives no number.
+    repeats
+        Solve a frequency again until it has the harmonics that it foretells (section 4.5.3); the rule as published does not.
     """
 
     verifies: ClassVar[bool] = False
     threshold: float = 0.05
+    repeats: bool = False
 
     def judge(self, step: Step) -> Verdict:
-        """Measure the columns; this frequency is not solved again. The indicator is the largest column left out."""
+        """Measure the columns; this frequency is solved again with `repeats` alone. The indicator is the largest column left out."""
         columns = column_norms(step)
         had = step.balance.harmonics
         missed = [c for h, c in zip(step.reference.harmonics, columns, strict=True) if h not in had]
-        return Verdict(max(missed, default=0.0), None, above(step, columns, self.threshold))
+        following = above(step, columns, self.threshold)
+        return foretold(step, max(missed, default=0.0), following, repeats=self.repeats)
 
 
 def column_norms(step: Step) -> FloatArray:

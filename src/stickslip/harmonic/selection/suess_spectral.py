@@ -8,7 +8,7 @@ import numpy as np
 from stickslip.arrays import BoolArray, FloatArray
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.selection.alert import solve_array
-from stickslip.harmonic.selection.spectrum import above, padded_solution, spectral_shares
+from stickslip.harmonic.selection.spectrum import above, foretold, padded_solution, spectral_shares
 from stickslip.harmonic.selection.strategy import Step, Verdict
 
 
@@ -27,22 +27,26 @@ class SuessSpectral:
     frozen
         Leave the contact forces as they are while the missing harmonics grow (eq. 14): then their stiffness is that of the structure
         alone.
+    repeats
+        Solve a frequency again until it has the harmonics that it foretells (section 4.5.3); the rule as published does not.
     """
 
     verifies: ClassVar[bool] = False
     threshold: float = 1e-4
     frozen: bool = False
+    repeats: bool = False
 
     def judge(self, step: Step) -> Verdict:
-        """Add the missing harmonics; this frequency is not solved again. The indicator is their largest share."""
+        """Add the missing harmonics; this frequency is solved again with `repeats` alone. The indicator is their largest share."""
         q = padded_solution(step)
         missing = np.array([h not in step.balance.harmonics for h in step.reference.harmonics])
         change = self._change(step, q, missing)
         if change is None:  # all harmonics are kept where nothing can be foretold
-            return Verdict(float("inf"), None, step.reference.harmonics)
+            return foretold(step, float("inf"), step.reference.harmonics, repeats=self.repeats)
         shares = spectral_shares(step.reference, q + change)
         largest = float(np.max(shares[missing], initial=0.0))
-        return Verdict(largest, None, above(step, shares, self.threshold))
+        following = above(step, shares, self.threshold)
+        return foretold(step, largest, following, repeats=self.repeats)
 
     def _change(self, step: Step, q: FloatArray, missing: BoolArray) -> FloatArray | None:
         """Return the change of all scaled unknowns, zero at the present harmonics."""

@@ -12,6 +12,7 @@ from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.dlft import DynamicLagrangian, dynamic_lagrangian
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import DynamicStiffness
+from stickslip.harmonic.local import AnyBalance, LocalBalance
 from stickslip.harmonic.selection.strategy import (
     ErrorMeasure,
     Solve,
@@ -19,7 +20,7 @@ from stickslip.harmonic.selection.strategy import (
     Strategy,
     always_kept,
 )
-from stickslip.harmonic.support import Harmonics, is_full
+from stickslip.harmonic.support import ByDof, Harmonics, is_full, kept_by_dof, supports_of
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.branch import following_vibration
 from stickslip.response.forced.sweep import Sweep
@@ -74,6 +75,8 @@ class ForcedPoint:
         Harmonics with which the strategy wants this frequency solved again; empty: none.
     start
         (H+1, n_retained) coefficients from which it is solved again, m; empty: the strategy has none, or asks for nothing.
+    kept
+        (n_harmonics, n_retained) 1 where a coordinate keeps a harmonic, 0 where it does not; empty: all keep all.
     """
 
     stage: Stage
@@ -93,6 +96,19 @@ class ForcedPoint:
     harmonics: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     asked: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     start: ComplexArray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
+    kept: IntArray = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
+
+    @property
+    def unknowns(self) -> int:
+        """Real coefficients that were solved for."""
+        if self.kept.size:
+            return 2 * int(self.kept.sum()) - int(self.kept[0].sum())
+        return (2 * int(self.harmonics.size) - 1) * int(self.coefficients.shape[1])
+
+    @property
+    def by_dof(self) -> ByDof | None:
+        """Harmonics of each retained coordinate, where these differ."""
+        return supports_of(self.kept > 0, self.support) if self.kept.size else None
 
     @property
     def order(self) -> int:
@@ -148,9 +164,16 @@ class ForcedProblem:
             self.others[harmonics] = enough.with_harmonics(harmonics)
         return self.others[harmonics]
 
+    def local(self, harmonics: Harmonics, by_dof: ByDof | None) -> AnyBalance:
+        """Return the periodic problem with the harmonics of each retained coordinate; without them with these `harmonics` in all."""
+        whole = self.balance(harmonics)
+        if by_dof is None or all(own == harmonics for own in by_dof):
+            return whole
+        return LocalBalance(with_stiffness(whole), by_dof)
+
     def step(
         self,
-        balance: Balance,
+        balance: AnyBalance,
         x: FloatArray,
         omega: float,
         next_omega: float | None = None,
@@ -158,6 +181,9 @@ class ForcedProblem:
     ) -> Step:
         """Return a scaled solution of `balance` as a strategy sees it, with the events that its evaluation `left`."""
         smallest = self.sweep.low_harmonics
+        by_dof = None
+        if isinstance(balance, LocalBalance):
+            by_dof, x, balance = balance.by_dof, balance.whole(x), balance.balance
         following = omega if next_omega is None else next_omega
         return Step(
             with_stiffness(balance),
@@ -169,9 +195,10 @@ class ForcedProblem:
             self.measure,
             self.alert_solve,
             left=left,
+            by_dof=by_dof,
         )
 
-    def following(self, balance: Balance) -> Following:
+    def following(self, balance: AnyBalance) -> Following:
         """Return how a branch of `balance` is followed."""
         # along a branch a shorter step is cheaper than a long correction
         few = replace(
@@ -180,7 +207,7 @@ class ForcedProblem:
         )
         return following_vibration(balance, self.sweep.control, few)
 
-    def along_branch(self, point: ForcedPoint, omega: float, balance: Balance) -> Point:
+    def along_branch(self, point: ForcedPoint, omega: float, balance: AnyBalance) -> Point:
         """Go from a solution to another frequency on the branch with the harmonics of `balance`."""
         following = self.following(balance)
         following = replace(following, control=replace(following.control, max_points=DETOUR))
@@ -284,14 +311,16 @@ def _refuse_ill_posed(system: System) -> None:
         )
 
 
-def with_stiffness(balance: Balance) -> HarmonicBalance:
-    """Return a periodic problem whose contact forces are functions of the gaps.
+def with_stiffness(balance: AnyBalance) -> HarmonicBalance:
+    """Return a periodic problem whose contact forces are functions of the gaps, with all its harmonics at all coordinates.
 
     Raises
     ------
     InputError
         If a contact is rigid.
     """
+    if isinstance(balance, LocalBalance):
+        return balance.balance
     if isinstance(balance, DynamicLagrangian):
         raise input_error(
             "rigid contacts",
@@ -321,7 +350,7 @@ def _periodic(system: System, linear: DynamicStiffness, sweep: Sweep) -> Balance
 
 
 def forced_point(
-    balance: Balance,
+    balance: AnyBalance,
     solution: Solution,
     stage: Stage,
     index: int,
@@ -329,8 +358,11 @@ def forced_point(
     seconds: float,
 ) -> ForcedPoint:
     """Return a solution as a point of the response."""
-    return ForcedPoint(
+    point = ForcedPoint(
         stage, index, omega, balance.coefficients(solution.x), np.zeros(0), 0.0, solution.status, solution.iterations,
         np.nan, solution.seconds_contact, solution.seconds_linear, seconds, rescue=solution.rung,
         harmonics=np.array(balance.harmonics),
     )  # fmt: skip
+    if not isinstance(balance, LocalBalance):
+        return point
+    return replace(point, kept=kept_by_dof(balance.by_dof, balance.harmonics).astype(np.int64))

@@ -7,11 +7,11 @@ from time import perf_counter
 import numpy as np
 
 from stickslip.arrays import ComplexArray
+from stickslip.harmonic.local import AnyBalance
 from stickslip.harmonic.selection.strategy import Step, Verdict, judged
-from stickslip.harmonic.support import Harmonics
+from stickslip.harmonic.support import ByDof, Harmonics, joined, of_all
 from stickslip.response.forced.problem import (
     BRANCH_ITERATIONS,
-    Balance,
     ForcedPoint,
     ForcedProblem,
     Stage,
@@ -45,6 +45,7 @@ def single_passage(problem: ForcedProblem, done: Sequence[ForcedPoint]) -> Itera
     stored = iter(done)
     tried: list[ForcedPoint] = []
     harmonics = problem.low.harmonics
+    by_dof: ByDof | None = None
     for index, (omega, following) in enumerate(zip(grid, [*grid[1:], grid[-1]], strict=True)):
         before: Step | None = None
         start: ComplexArray | None = None
@@ -53,14 +54,14 @@ def single_passage(problem: ForcedProblem, done: Sequence[ForcedPoint]) -> Itera
             began = perf_counter()
             kept = next(stored, None)
             if kept is None:
-                balance = problem.balance(harmonics)
+                balance = problem.local(harmonics, by_dof)
                 solution = _solution(problem, balance, tried, omega, start)
                 stage: Stage = "low" if first else "high"
                 point = forced_point(balance, solution, stage, index, omega, 0.0)
             else:
                 point = kept
             step, verdict = _judged(problem, point, following, before)
-            again = _more(harmonics, verdict.again)
+            again, again_by_dof = _more(problem, harmonics, by_dof, verdict)
             if kept is None:
                 yield replace(
                     point,
@@ -72,8 +73,8 @@ def single_passage(problem: ForcedProblem, done: Sequence[ForcedPoint]) -> Itera
             if again is None:
                 break
             start = verdict.start
-            harmonics, before, first = again, step, False
-        harmonics = verdict.following
+            harmonics, by_dof, before, first = again, again_by_dof, step, False
+        harmonics, by_dof = verdict.following, verdict.following_by_dof
     yield from _from_behind(problem, tried, stored)
 
 
@@ -97,7 +98,7 @@ def _from_behind(
 
 def _solution(
     problem: ForcedProblem,
-    balance: Balance,
+    balance: AnyBalance,
     tried: Sequence[ForcedPoint],
     omega: float,
     start: ComplexArray | None,
@@ -140,13 +141,21 @@ def _judged(
     if not point.converged:
         # one that is not found may be so because its harmonics are too few
         return None, Verdict(np.nan, reference, problem.sweep.low_harmonics)
-    balance = problem.balance(point.support)
+    balance = problem.local(point.support, point.by_dof)
     x = balance.unknowns(point.coefficients)
     step = replace(problem.step(balance, x, point.omega, following), before=before)
     return step, judged(problem.strategy, step)
 
 
-def _more(had: Harmonics, asked: Harmonics | None) -> Harmonics | None:
-    """Return the harmonics of a repeat, None if it would have no more than there were: that ends every quarrel."""
-    wanted = tuple(sorted({*had, *(asked or ())}))
-    return None if wanted == had else wanted
+def _more(
+    problem: ForcedProblem, had: Harmonics, by_dof: ByDof | None, verdict: Verdict
+) -> tuple[Harmonics | None, ByDof | None]:
+    """Return the harmonics of a repeat, and those of each coordinate; None if it would have no more than there were: that ends every quarrel."""
+    asked = verdict.again or ()
+    if by_dof is None and verdict.again_by_dof is None:
+        wanted = tuple(sorted({*had, *asked}))
+        return (None if wanted == had else wanted), None
+    n = problem.low.linear.n
+    before = by_dof or (had,) * n
+    both = joined(before, verdict.again_by_dof or (asked,) * n)
+    return (None, None) if both == before else (of_all(both), both)

@@ -122,7 +122,7 @@ class Response:
     @property
     def unknowns(self) -> int:
         """Unknowns of all solutions together, accepted or not: the work in harmonics, whatever chose them."""
-        return sum(unknowns(p) for p in self.solved)
+        return sum(p.unknowns for p in self.solved)
 
     @property
     def newton_steps(self) -> int:
@@ -202,11 +202,6 @@ def _audit_error(
     most = max(audits, key=lambda p: p.harmonics.size, default=point)
     more = most.harmonics.size > point.harmonics.size
     return problem.real_error(point, most) if more else float("nan")
-
-
-def unknowns(point: ForcedPoint) -> int:
-    """Return the number of real unknowns of a solution."""
-    return int(point.coefficients.shape[1] * (2 * point.harmonics.size - 1))
 
 
 def _accept(problem: ForcedProblem, point: ForcedPoint, low: ForcedPoint | None) -> Accepted:

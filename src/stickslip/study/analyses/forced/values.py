@@ -12,7 +12,7 @@ from stickslip.response.forced.response import ForcedPoint
 from stickslip.response.recovery import signals
 from stickslip.study.analyses.forced.comparison import Check
 from stickslip.study.analyses.forced.more_harmonics import ReferenceDoubt
-from stickslip.study.analyses.forced.points import Response, unknowns
+from stickslip.study.analyses.forced.points import Response
 from stickslip.study.analyses.forced.quantities import STAGES
 from stickslip.study.analyses.forced.question import Question
 from stickslip.study.analyses.forced.stable import Examined
@@ -152,7 +152,7 @@ def _of_points(question: Question, response: Response) -> Values:
         "frequency_hz": omega / HZ,
         "speed_rpm": speed,
         "order": _whole(p.order for p in points),
-        "unknowns": _whole(unknowns(p) for p in points),
+        "unknowns": _whole(p.unknowns for p in points),
         "status": _whole(int(p.status) for p in points),
         "indicator": asked if chooser.is_error else own,
         "predicted_error_percent": 100 * asked if chooser.is_error else np.full(asked.size, np.nan),
@@ -216,7 +216,7 @@ def _of_attempts(question: Question, response: Response) -> Values:
         "attempt_frequency_hz": np.array([p.omega / HZ for p in points]),
         "attempt_stage": _whole(STAGES.index(p.stage) for p in points),
         "attempt_kept": _kept(points, highest(response)),
-        "attempt_unknowns": _whole(unknowns(p) for p in points),
+        "attempt_unknowns": _whole(p.unknowns for p in points),
         "attempt_indicator": np.array([p.predicted_error for p in points]),
         "attempt_repeated": _whole(int(p.asked.size > 0) for p in points),
         "attempt_status": _whole(int(p.status) for p in points),
