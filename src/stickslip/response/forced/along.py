@@ -1,7 +1,8 @@
 """The forced response as a branch whose harmonics change on the way: raised until the judgement is quiet, audited, lowered again."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from stickslip.harmonic.balance import HarmonicBalance, Linearisation
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import Step, always_kept, judged
 from stickslip.harmonic.support import Harmonics
-from stickslip.operators import Inverse, Jacobian
+from stickslip.operators import Jacobian
 from stickslip.response.branch import Followed, Judged, Kind, Route
 from stickslip.response.follow import follow
 from stickslip.response.forced.problem import (
@@ -29,6 +30,7 @@ from stickslip.solve.linear import factorised
 from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Solution, newton
 
+_Inverse = Callable[[FloatArray], FloatArray | None]
 KINDS: tuple[Kind, ...] = ("point", "audit", "trial", "found")
 # factors on predictions, with the fewest harmonics and with more: motions predicted to be right by less than that were wrong at times
 SAFETY = (2.0, 1.25)
@@ -121,10 +123,12 @@ class ForcedCurve:
         """Predict the error by a Newton step with the harmonics of the next level, and doubt it by what the step after it would change."""
         more = with_stiffness(self.problem(level + 1))
         linear = to_tolerance(self.forced.sweep.newton.linear, ROUGHLY)
-        kept: list[tuple[Inverse | None, float]] = []
+        kept: list[tuple[_Inverse | None, float]] = []
 
         def solve(jac: Jacobian, right: FloatArray) -> FloatArray | None:
-            inverse = factorised(linear, jac)
+            # two right sides alone: what is known by its products is not put together for them
+            array = isinstance(jac, np.ndarray)
+            inverse = factorised(linear, jac) if array else partial(linear.solve, jac)
             kept.append((inverse, float(np.linalg.norm(right))))
             return None if inverse is None else inverse(right)
 
@@ -142,7 +146,7 @@ class ForcedCurve:
         step: Step,
         more: HarmonicBalance,
         x: FloatArray,
-        inverse: Inverse | None,
+        inverse: _Inverse | None,
         residual: float,
     ) -> float:
         """Return how far a prediction may be off: contacts that change their states on the way make the next step as large, or larger."""
