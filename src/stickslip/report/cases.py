@@ -8,6 +8,7 @@ import xarray as xr
 
 from stickslip.report.plot import ramp
 from stickslip.report.quantities import number
+from stickslip.study.analyses.varied import as_number, first_varied_number, varied_values
 
 
 @dataclass(frozen=True)
@@ -48,48 +49,27 @@ class ShownCase:
         return self.label or "the response"
 
 
-def _number(value: object) -> float:
-    try:
-        return float(str(value))
-    except ValueError:
-        return float("nan")
-
-
-def _varied(data: xr.Dataset) -> tuple[list[str], np.ndarray]:
-    """Return the varied keys and their values (case, key)."""
-    n = data.sizes.get("case", 1)
-    if "vary_value" not in data or not data["vary_value"].size:
-        return [], np.zeros((n, 0), dtype=object)
-    keys = [str(k) for k in data["vary"].values] if "vary" in data.coords else [""]
-    return keys, np.asarray(data["vary_value"].transpose("case", "vary").values, dtype=object)
-
-
 def varied(data: xr.Dataset) -> str:
     """Return the varied keys as the heading of a legend or column, escaped."""
-    return escape(", ".join(_varied(data)[0])) or "case"
+    return escape(", ".join(varied_values(data)[0])) or "case"
 
 
 def first_number(data: xr.Dataset) -> tuple[str, np.ndarray]:
     """Return the first varied key whose values are numbers, escaped, and its values (case,); NaN without one."""
-    keys, values = _varied(data)
-    numbers = np.array([[_number(v) for v in row] for row in values]).reshape(values.shape)
-    for column, key in enumerate(keys):
-        found = numbers[:, column]
-        if np.isfinite(found).all() and len(set(found)) > 1:
-            return escape(key), found
-    return "", np.full(len(values), np.nan)
+    key, values = first_varied_number(data)
+    return escape(key), values
 
 
 def _short(row: np.ndarray) -> str:
     return ", ".join(
-        number(_number(v), 4) if np.isfinite(_number(v)) else escape(str(v)) for v in row
+        number(as_number(v), 4) if np.isfinite(as_number(v)) else escape(str(v)) for v in row
     )
 
 
 def cases_of(data: xr.Dataset) -> tuple[ShownCase, ...]:
     """Return the cases of an analysis in the order of the study."""
     n = data.sizes.get("case", 1)
-    values, numbers = _varied(data)[1], first_number(data)[1]
+    values, numbers = varied_values(data)[1], first_number(data)[1]
     labels = [str(v) for v in data["case_label"].values] if "case_label" in data else [""] * n
     force = (
         np.asarray(data["excitation_n"].values) if "excitation_n" in data else np.full(n, np.nan)

@@ -9,6 +9,7 @@ import xarray as xr
 
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.analysis import Analysis, Case, Solved, TextTable
+from stickslip.study.analyses.forced.working_range import with_regimes
 from stickslip.study.analyses.verdict import ATTRIBUTE, Verdict, of_tree, to_json
 from stickslip.study.keep.journal import read_note, read_sealed
 from stickslip.study.keep.netcdf import variable
@@ -90,7 +91,7 @@ class Book:
         """Make the node of an analysis from what its cases have found."""
         node = asked.dataset(solved).assign(case_variables([s.case for s in solved]))
         if asked.name == "forced_response":
-            node = with_measured(node, self.measured)
+            node = with_regimes(with_measured(node, self.measured))
         unsolved = [_unsolved(s) for s in solved if UNSOLVED in s.notes]
         found = (*unsolved, *asked.verdicts(node))
         new = dict.fromkeys(v.sentence for v in found if v.told)

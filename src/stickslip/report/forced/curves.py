@@ -10,6 +10,7 @@ from stickslip.arrays import FloatArray
 from stickslip.harmonic.support import named
 from stickslip.report.cases import ShownCase, first_number
 from stickslip.report.forced.measured import measured_of
+from stickslip.report.forced.working import shade_working_range
 from stickslip.report.plot import ALARM, GRID, MUTED, Plot, key_marker, log_ticks, styled
 from stickslip.report.quantities import counted, joined, number, percent, scale_for
 from stickslip.report.response import Response
@@ -296,4 +297,5 @@ def optimisation(response: Response) -> Plot | None:
     )
     figure.update_yaxes(title_text="peak frequency (Hz)", col=2)
     caption = _optimum_caption(response, cases) + (measured.caption(cases) if measured else "")
+    caption += shade_working_range(figure, response, logarithmic=bool(wide))
     return Plot("optimisation", "Optimisation curves", caption, figure)

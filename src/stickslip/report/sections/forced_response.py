@@ -10,6 +10,7 @@ from stickslip.report.forced.harmonics import kept_harmonics
 from stickslip.report.forced.head import cards
 from stickslip.report.forced.stability import stability
 from stickslip.report.forced.surface import surface_map
+from stickslip.report.forced.working import where_friction_works
 from stickslip.report.response import NEEDED, Response
 from stickslip.report.section import Block, Section
 
@@ -22,7 +23,15 @@ SECTION: Section = Section(
         Block(
             "response",
             "Forced response",
-            (frequency_response, low_order, kept_harmonics, errors, error_scatter, optimisation),
+            (
+                frequency_response,
+                low_order,
+                kept_harmonics,
+                errors,
+                error_scatter,
+                optimisation,
+                where_friction_works,
+            ),
         ),
         Block(
             "contact",

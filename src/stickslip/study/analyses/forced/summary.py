@@ -5,6 +5,7 @@ import xarray as xr
 
 from stickslip.harmonic.support import named
 from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.analyses.forced.working_words import TITLE, range_lines
 from stickslip.study.analyses.verdict import LEVELS, said
 
 FIRST = "first harmonic"  # what amplitudes are as a rule
@@ -40,6 +41,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     rows = tuple(_row(data.isel(case=i), label) for i, label in enumerate(labels))
     found = [
         TextTable("Forced response" + f", {name}" * (name != FIRST), head, rows),
+        _lines(TITLE, range_lines(data)),
         _lines(_choice_title(data), choices(data)),
         _lines("Against twice as many harmonics", _sentences(data, "reference_sentence", labels)),
         _lines("Is it stable?", _along(data, "stability", labels)),

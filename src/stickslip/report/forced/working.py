@@ -1,0 +1,37 @@
+"""Where friction works, on the page: the ends of the optimisation curves in words, and a band behind them."""
+
+from html import escape
+
+import numpy as np
+import plotly.graph_objects as go
+
+from stickslip.report.plot import GRID
+from stickslip.report.response import Response
+from stickslip.study.analyses.forced.working_range import working_ranges
+from stickslip.study.analyses.forced.working_words import TITLE, range_lines
+
+
+def where_friction_works(response: Response) -> str | None:
+    """Say where all contacts stick, where friction works, and where it lets go."""
+    lines = range_lines(response.data)
+    if not lines:
+        return None
+    items = "".join(f"<li>{escape(line)}</li>" for line in lines)
+    return f"<h3>{TITLE}</h3><ul>{items}</ul>"
+
+
+def shade_working_range(figure: go.Figure, response: Response, *, logarithmic: bool) -> str:
+    """Draw a band over the values at which friction works; return what the caption says of it, nothing where none is drawn."""
+    ranges = working_ranges(response.data)
+    working = ranges[0].of("works") if len(ranges) == 1 else []
+    if not working:
+        return ""
+    values = np.unique([p.value for p in ranges[0].peaks])
+    middles = np.sqrt(values[1:] * values[:-1]) if logarithmic else (values[1:] + values[:-1]) / 2
+    edges = np.array([values[0], *middles, values[-1]])
+    at = np.searchsorted(values, sorted(p.value for p in working))
+    figure.add_vrect(
+        x0=float(edges[at[0]]), x1=float(edges[at[-1] + 1]),
+        fillcolor=GRID, opacity=0.6, line_width=0, layer="below",
+    )  # fmt: skip
+    return " Shaded, to halfway to the neighbouring cases: where friction works."

@@ -1,0 +1,46 @@
+"""What a study varies, read from the dataset of an analysis."""
+
+import numpy as np
+import xarray as xr
+
+from stickslip.arrays import FloatArray
+
+
+def varied_values(data: xr.Dataset) -> tuple[list[str], np.ndarray]:
+    """Return the varied keys and their values (case, key)."""
+    n = data.sizes.get("case", 1)
+    if "vary_value" not in data or not data["vary_value"].size:
+        return [], np.zeros((n, 0), dtype=object)
+    keys = [str(k) for k in data["vary"].values] if "vary" in data.coords else [""]
+    return keys, np.asarray(data["vary_value"].transpose("case", "vary").values, dtype=object)
+
+
+def as_number(value: object) -> float:
+    """Return a varied value as a number, NaN where it is none."""
+    try:
+        return float(str(value))
+    except ValueError:
+        return float("nan")
+
+
+def first_varied_number(data: xr.Dataset) -> tuple[str, FloatArray]:
+    """Return the first varied key whose values are numbers, and its values (case,); no key and NaN without one."""
+    keys, values = varied_values(data)
+    numbers = np.array([[as_number(v) for v in row] for row in values]).reshape(values.shape)
+    for column, key in enumerate(keys):
+        found = numbers[:, column]
+        if np.isfinite(found).all() and len(set(found)) > 1:
+            return key, found
+    return "", np.full(len(values), np.nan)
+
+
+def other_values(data: xr.Dataset, key: str) -> list[str]:
+    """Return what else is varied in each case, as labels of cases have it; empty where nothing is."""
+    keys, values = varied_values(data)
+    others = [i for i, k in enumerate(keys) if k != key]
+    return [", ".join(f"{keys[i]} = {_written(row[i])}" for i in others) for row in values]
+
+
+def _written(value: object) -> str:
+    number = as_number(value)
+    return str(value) if np.isnan(number) else f"{number:g}"

@@ -1,0 +1,215 @@
+"""The ends of an optimisation curve: those of one Jenkins element in closed form, the words for each kind of damper, the page."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic_result import synthetic_result
+
+import stickslip as ss
+from stickslip.report.forced.curves import optimisation
+from stickslip.report.forced.working import where_friction_works
+from stickslip.report.response import Response
+from stickslip.study.analyses.forced.working_range import (
+    REGIMES,
+    ContactsAtPeak,
+    CurvePeak,
+    contacts_at_peak,
+    regimes_of,
+    with_regimes,
+    working_range,
+    working_ranges,
+)
+from stickslip.study.analyses.forced.working_words import range_lines, range_sentences
+
+MASS, SPRING, DASHPOT, STIFFNESS, LIMIT = 1.0, 4e4, 4.0, 2e4, 2.0  # kg, N/m, N s/m, N/m, N
+KEY = "load.shaker.force_n"
+STUDY = f"""schema_version = 2
+[part.mass]
+shape = "lumped"
+masses_kg = [{MASS}]
+springs_n_per_m = [["ground", 1, {SPRING}]]
+dashpots_n_s_per_m = [["ground", 1, {DASHPOT}]]
+[contact]
+brake = {{ between = ["mass.m1", "ground"], law = "jenkins", tangential_stiffness_n_per_m = {STIFFNESS}, slip_limit_n = {LIMIT} }}
+[load.shaker]
+on = "mass.m1"
+force_n = 1.0
+[forced_response]
+frequency_hz = [30.0, 41.0]
+points = 8
+stability = "off"
+[harmonics]
+high = 1
+selection = "always_low"
+[output]
+points = {{ mass = "mass.m1" }}
+peak = "mass.x"
+[vary]
+{KEY} = FORCES
+"""
+
+
+def linear_peak(stiffness: float) -> float:
+    """Amplitude over the force at the resonance of a mass on a spring and a dashpot."""
+    omega, ratio = np.sqrt(stiffness / MASS), DASHPOT / 2 / np.sqrt(stiffness * MASS)
+    return float(1 / (DASHPOT * omega * np.sqrt(1 - ratio**2)))
+
+
+def jenkins_peak(force: float) -> float:
+    """Largest amplitude at which the balance of one harmonic has a frequency, m."""
+    amplitude = np.geomspace(1e-6, 1e-1, 200_000)
+    share = np.minimum(1.0, LIMIT / (STIFFNESS * amplitude))
+    angle = np.arccos(1 - 2 * share)
+    real = SPRING + STIFFNESS * (angle - np.sin(2 * angle) / 2) / np.pi
+    loss = 4 * LIMIT * (1 - share) / np.pi / amplitude
+    omega2 = np.linspace(0.6, 1.6, 1500) * SPRING / MASS
+    low, high = 0, amplitude.size - 1
+    while high - low > 1:
+        k = (low + high) // 2
+        rest = np.abs(real[k] - MASS * omega2 + 1j * (loss[k] + DASHPOT * np.sqrt(omega2)))
+        low, high = (k, high) if np.any(rest * amplitude[k] <= force) else (low, k)
+    return float(amplitude[low])
+
+
+@pytest.fixture(scope="module")
+def brake(tmp_path_factory: pytest.TempPathFactory) -> ss.Result:
+    onset = LIMIT / STIFFNESS / linear_peak(SPRING + STIFFNESS)
+    forces = [0.99 * onset, 1.01 * onset, 2.4, 80.0]
+    path = tmp_path_factory.mktemp("brake") / "study.toml"
+    path.write_text(STUDY.replace("FORCES", str([float(f) for f in forces])))
+    return ss.Study.from_file(path).run()
+
+
+def test_a_jenkins_element_sticks_up_to_its_limit_and_no_further(brake: ss.Result) -> None:
+    (own,) = working_ranges(brake["forced_response"])
+    assert not own.falling
+    assert own.regimes == ("stuck", "stiffens", "works", "lets go")
+    assert own.stuck is not None
+    assert own.stuck.size == pytest.approx(linear_peak(SPRING + STIFFNESS), rel=1e-4)
+
+
+def test_the_regimes_of_a_jenkins_element_are_those_of_its_closed_form(brake: ss.Result) -> None:
+    (own,) = working_ranges(brake["forced_response"])
+    sizes = np.array([p.size for p in own.peaks])
+    exact = np.array([jenkins_peak(p.value) / p.value for p in own.peaks])
+    np.testing.assert_allclose(sizes, exact, rtol=2e-3)
+    known = linear_peak(SPRING + STIFFNESS) / np.sqrt(2)
+    below = exact <= known
+    best = int(np.argmin(exact))
+    lets_go = (np.arange(exact.size) > best) & (exact > min(known, np.sqrt(2) * exact[best]))
+    expected = np.where(lets_go, "lets go", np.where(below, "works", "stiffens"))
+    expected[0] = "stuck"
+    assert list(own.regimes) == list(expected)
+    # far beyond its limit the element is nearly gone: the resonance of the free system
+    assert own.peaks[-1].size == pytest.approx(linear_peak(SPRING), rel=0.05)
+    assert own.peaks[-1].hertz == pytest.approx(np.sqrt(SPRING / MASS) / 2 / np.pi, rel=2e-3)
+
+
+def test_the_loss_of_a_sliding_element_saturates(brake: ss.Result) -> None:
+    (own,) = working_ranges(brake["forced_response"])
+    for p in own.of("works", "lets go"):
+        assert p.loss == pytest.approx(4 * LIMIT * (p.amplitude - LIMIT / STIFFNESS), rel=2e-3)
+    best, last = own.smallest, own.peaks[-1]
+    grown = last.loss / last.amplitude / (best.loss / best.amplitude)
+    assert f"over the amplitude grows {grown:.3g} times" in range_lines(brake["forced_response"])[2]
+    assert grown < 2 < last.amplitude / best.amplitude
+
+
+def test_the_run_says_where_friction_works(brake: ss.Result, tmp_path: Path) -> None:
+    data = brake["forced_response"]
+    (own,) = working_ranges(data)
+    stuck, works, gone = range_lines(data)
+    assert stuck.startswith(f"From {KEY} = {own.peaks[0].value:g} down all contacts stick")
+    (only,) = own.of("works")
+    assert works.startswith(f"Friction works at {KEY} = {only.value:g}: there the peak per unit")
+    assert gone.startswith(f"Out of the working range above {KEY} = {only.value:g}: ")
+    assert "no contact sticks throughout the cycle" in gone
+    flags = data["friction_regime"]
+    assert [REGIMES[k] for k in flags.values] == list(own.regimes)
+    assert str(flags.attrs["flag_meanings"]).split()[3] == "lets_go"
+    page = tmp_path / "page.html"
+    brake.report(page)
+    assert stuck in page.read_text()
+
+
+STICKS, SLIPS = ContactsAtPeak(1.0, True, True), ContactsAtPeak(0.6, False, True)
+SLIDES = ContactsAtPeak(0.05, False, False)
+
+
+def curve(*peaks: tuple[float, float, ContactsAtPeak]) -> list[CurvePeak]:
+    return [CurvePeak(value, size, 100.0, contacts) for value, size, contacts in peaks]
+
+
+def test_a_damper_that_never_takes_the_peak_down_hardly_damps() -> None:
+    own = working_range(curve((5, 0.9, SLIPS), (20, 0.8, SLIPS), (250, 1.0, STICKS)))
+    assert own is not None
+    assert own.regimes == ("stuck", "stiffens", "stiffens")
+    assert range_sentences(own)[-1] == (
+        "Down to  = 5 the peak per unit of force stays within 20 % of that of the stuck system: the contacts stiffen but hardly damp."
+    )
+
+
+def test_without_a_stuck_case_the_range_is_that_around_the_smallest_peak() -> None:
+    peaks = curve((50, 1.0, SLIPS), (20, 0.3, SLIPS), (10, 0.25, SLIPS), (5, 0.3, SLIDES))
+    own = working_range(peaks)
+    assert own is not None
+    assert own.regimes == ("stiffens", "works", "works", "works")
+    stuck, works, other = range_sentences(own)
+    assert stuck.startswith("At no value do all contacts stick at the peak: ")
+    assert "within 3 dB of the smallest one, at 10" in works
+    assert other.startswith("The other end was not reached: at  = 5, the last value, ")
+
+
+def test_a_peak_that_rises_above_the_stuck_one_is_no_work() -> None:
+    peaks = curve((250, 1.0, STICKS), (20, 0.6, SLIPS), (5, 0.75, SLIDES), (2, 1.4, SLIDES))
+    assert regimes_of(peaks) == ("stuck", "works", "lets go", "lets go")
+
+
+@pytest.mark.parametrize(
+    "peaks",
+    [
+        curve((1, 1.0, STICKS), (2, 1.0, STICKS), (3, 1.0, STICKS)),  # nothing slips
+        curve((1, 1.0, STICKS), (2, 0.5, SLIPS)),  # too few
+        curve((1, 1.0, SLIPS), (2, 0.9, SLIDES), (3, 1.0, SLIPS)),  # no end sticks more
+    ],
+)
+def test_what_has_no_ends_is_not_judged(peaks: list[CurvePeak]) -> None:
+    assert working_range(peaks) is None
+
+
+def test_states_of_a_cycle() -> None:
+    state = np.zeros((2, 2, 4), dtype=int)
+    assert contacts_at_peak(state) == ContactsAtPeak(1.0, True, True)
+    state[1] = 2  # open all the time: linear, and the other one holds
+    assert contacts_at_peak(state) == ContactsAtPeak(0.5, True, True)
+    state[1, :, 0] = 0  # it touches
+    assert not contacts_at_peak(state).linear
+    state[0, 1, 2] = 1  # one of two directions slips
+    assert contacts_at_peak(state) == ContactsAtPeak(0.5, False, False)
+
+
+def test_wrong_cases_are_left_out_and_named() -> None:
+    data = synthetic_result(ratios=(250, 50, 10, 5, 2), n=24)
+    before = working_ranges(data)[0]
+    data["case_verdict"] = "case", [0, 0, 0, 0, 2]
+    (own,) = working_ranges(data)
+    assert len(own.peaks) == len(before.peaks) - 1
+    assert range_lines(data)[-1].endswith("wrong or the peak no resonance: load.shaker.ratio = 2.")
+    assert with_regimes(data)["friction_regime"].values[-1] == -1
+
+
+def test_the_page_shades_where_friction_works() -> None:
+    response = Response(synthetic_result(ratios=(250, 50, 10, 5, 2), n=24))
+    (own,) = working_ranges(response.data)
+    plot = optimisation(response)
+    assert plot is not None
+    assert plot.caption.endswith(": where friction works.")
+    bands = plot.figure.layout.shapes
+    assert len(bands) == 2  # amplitude and frequency
+    values = [p.value for p in own.of("works")]
+    assert bands[0].x0 < min(values)
+    assert max(values) < bands[0].x1
+    text = where_friction_works(response)
+    assert text is not None
+    assert text.count("<li>") == len(range_sentences(own))
