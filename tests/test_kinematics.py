@@ -490,7 +490,7 @@ def test_node_to_node_with_a_rigid_damper_is_the_damper_gap_operator():
     t = tuple(points.frame[flat[0], :, 0])
     pairing = node_to_node(a, b, tolerance=1e-9, direction=t)
     small = type(points)(*(tuple(x[i] for i in flat) for x in (points.names, points.side)),
-                         points.position[flat], points.frame[flat])  # fmt: skip
+                         points.position[flat], points.frame[flat], points.area[flat])  # fmt: skip
     want = gap_operator(small, blade_dofs, np.arange(6), n, damper.body())
     assert np.abs(pairing.gap_operator.toarray() - want).max() < 1e-15
     assert np.allclose(pairing.frames, points.frame[flat], rtol=0, atol=1e-15)

@@ -161,6 +161,7 @@ def one_contact(places: Places, name: str, contact: Contact, turn: Turn | None) 
     on_facets = contact.pairing == "segment_to_segment" and second is not None
     has_area = on_facets or whole(first.surface)
     area = pairing.weights if has_area else np.full(p, np.nan)
+    area = area if first.area is None else first.area
     refuse_held(key, operator)
     labels = first.labels if len(first.labels) == p else tuple(f"{name}.{i + 1}" for i in range(p))
     rims = (text for side in (first, second) if side for text in rim_warning(places, key, side))

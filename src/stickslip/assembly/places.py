@@ -43,6 +43,8 @@ class Spot:
         Names of the points; empty: they have none.
     nodes
         (p, 3) dofs of points that are nodes, -1 where they are held; None for points of rigid bodies.
+    area
+        (p,) areas in m² that belong to the points of a rigid body; None where they have none of their own.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Spot:
     frame: FloatArray | None = None
     labels: tuple[str, ...] = ()
     nodes: IntArray | None = None
+    area: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +148,7 @@ class Places:
         assert part.body is not None
         own = self.own(head)
         surface = rigid_surface(part.body, points.position, own, self.n, NO_FACETS)
-        return Spot(name, head, surface, own[:0], points.frame, points.names)
+        return Spot(name, head, surface, own[:0], points.frame, points.names, area=points.area)
 
     def _mesh_nodes(self, name: str, head: str, nodes: IntArray) -> Spot:
         mesh = self.parts[head].mesh

@@ -129,7 +129,7 @@ def _moved_points(points: BodyPoints, place: Place) -> BodyPoints:
     frame = place.turn @ points.frame
     if place.mirrors:  # frames stay right-handed: w turns round
         frame = frame * np.array([1.0, -1.0, 1.0])
-    return BodyPoints(points.names, place.put(points.position), frame)
+    return replace(points, position=place.put(points.position), frame=frame)
 
 
 def _moved_solid(solid: RotatingSolid, place: Place, structure: Structure) -> RotatingSolid:

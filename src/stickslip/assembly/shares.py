@@ -60,8 +60,8 @@ def shared(key: str, contact: Contact, law: ContactLaw, area: FloatArray) -> tup
     else:
         raise input_error(
             f"{key}.law",
-            f"is given per area, and the points of {contact.between[0]!r} have none: they span no facets",
-            "Give the law of the whole interface or of a point, or name a set that holds whole facets.",
+            f"is given per area, and the points of {contact.between[0]!r} have none: they span no facets, and no body tells their areas",
+            "Give the law of the whole interface or of a point, name a set that holds whole facets, or let a rigid body with areas come first.",
         )
     made: dict[float, ContactLaw] = {}
     try:

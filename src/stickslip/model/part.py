@@ -49,16 +49,19 @@ class BodyPoints:
         (p, 3) in m, global axes.
     frame
         (p, 3, 3) columns t, w, n; n points out of the body.
+    area
+        (p,) area in m² that each stands for, for laws per area; None where it is not known.
 
     Raises
     ------
     InputError
-        If the numbers of names, positions and frames differ.
+        If the numbers of names, positions, frames and areas differ, or an area is not positive.
     """
 
     names: tuple[str, ...]
     position: FloatArray
     frame: FloatArray
+    area: FloatArray | None = None
 
     def __post_init__(self) -> None:
         p = len(self.names)
@@ -67,6 +70,12 @@ class BodyPoints:
                 "BodyPoints",
                 f"{p} names, positions {self.position.shape}, frames {self.frame.shape}",
                 "Give (p, 3) positions and (p, 3, 3) frames.",
+            )
+        if self.area is not None and not (self.area.shape == (p,) and np.all(self.area > 0)):
+            raise input_error(
+                "BodyPoints.area",
+                f"must be {p} positive numbers, got {self.area.tolist()}",
+                "Give each point its part of the side's area in m², or none.",
             )
 
 
@@ -239,7 +248,7 @@ def damper_part(damper: Damper, **others: Any) -> Part:
     points = damper.contact_points()
     surfaces = {}
     for side in dict.fromkeys(points.side):
-        own = [i for i, word in enumerate(points.side) if word == side]
-        names = tuple(points.names[i] for i in own)
-        surfaces[side] = BodyPoints(names, points.position[own], points.frame[own])
+        own = points.on_sides((side,))
+        area = own.area if np.all(np.isfinite(own.area)) else None
+        surfaces[side] = BodyPoints(own.names, own.position, own.frame, area)
     return rigid_part(damper.body(), surfaces, **others)

@@ -15,6 +15,7 @@ this family of dampers: Gola & Gastaldi, "Understanding complexities in underpla
 mechanics", ASME Turbo Expo 2014.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +23,15 @@ import numpy as np
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.model.rigid.body import RigidBody
-from stickslip.model.rigid.sides import ContactPoints, Line, points_of_lines, side_frame
+from stickslip.model.rigid.sides import (
+    ContactPoints,
+    Line,
+    grow_within,
+    nearest,
+    points_of_lines,
+    side_frame,
+    strip_width,
+)
 from stickslip.units import angle, check_quantities, length, quantity
 
 CURVED_SEGMENTS = 24
@@ -40,13 +49,20 @@ class FlatCurvedDamper:
         Inclination in rad of the contact plane on either side, measured from the circumferential
         direction x: the underside angle of the platform it touches.
     flat_distances
-        Distances in metres of L1 and L2 from the apex along the flat side.
+        Distances in metres of the lines L1, L2 and further ones from the apex along the flat side.
     curved_distance
         Distance in metres of R from the apex along the right platform's underside.
     curved_radius
         Radius in metres of the curved side.
     sections
         Axial positions y in metres of the sections that hold one point of each line, increasing.
+    length
+        Extent in metres along y over which the sides touch, half of it on either side of y = 0.
+    flat_between
+        Distances in metres from the apex between which the flat side touches.
+    curved_width
+        Width in metres of the strip in which the curved side touches. These three give each point its area, for laws per area;
+        None: nobody told.
     mass
         In kg.
     inertia
@@ -62,8 +78,11 @@ class FlatCurvedDamper:
     curved_angle: float = angle(
         "inclination from x of the plane that touches the curved side", 45, above=0, below=90
     )
-    flat_distances: tuple[float, float] = length(
-        "distances of the lines [L1, L2] from the apex, the nearer first", (0.002, 0.029)
+    flat_distances: tuple[float, ...] = length(
+        "distances of the lines [L1, L2, ...] from the apex, the nearest first",
+        (0.002, 0.029),
+        above=0,
+        entries=(2, 100),
     )
     curved_distance: float = length("distance of the line R from the apex", 0.0045)
     curved_radius: float = length("radius of the curved side", 0.05)
@@ -74,6 +93,21 @@ class FlatCurvedDamper:
         entries=(1, 100),
         usual=100,
     )
+    length: float | None = quantity(
+        "extent along y over which the sides touch, with y = 0 in its middle, for laws per area",
+        "m",
+        default=None,
+        above=0,
+        usual=100,
+    )
+    flat_between: tuple[float, float] | None = quantity(
+        "distances from the apex between which the flat side touches, for laws per area",
+        "m",
+        default=None,
+        least=0,
+        usual=100,
+    )
+    curved_width: float | None = strip_width()
     mass: float = quantity("mass of the damper", "kg", default=0.12, above=0)
     inertia: tuple[float, float, float] = quantity(
         "moments of inertia [x, y, z] about the centre of mass",
@@ -87,12 +121,11 @@ class FlatCurvedDamper:
 
     def __post_init__(self) -> None:
         check_quantities(self)
-        first, second = self.flat_distances
-        if not first < second:
+        if not np.all(np.diff(self.flat_distances) > 0):
             raise input_error(
                 "FlatCurvedDamper.flat_distances",
                 f"need 0 < L1 < L2 (metres from the apex), got {self.flat_distances}",
-                "L1 is the line nearer to the apex.",
+                "L1 is the line nearest to the apex.",
             )
         if not np.all(np.diff(self.sections) > 0):
             raise input_error(
@@ -100,7 +133,27 @@ class FlatCurvedDamper:
                 f"need axial positions in increasing order, got {self.sections}",
                 "Give metres.",
             )
+        self._check_extents()
         self.body()  # checks mass, inertia and centre
+
+    def _check_extents(self) -> None:
+        """Refuse points beyond the stretches that are told to touch."""
+        if self.length is not None and not grow_within(
+            self.sections, -self.length / 2, self.length / 2
+        ):
+            raise input_error(
+                "FlatCurvedDamper.length",
+                f"must hold all sections within half of it, {self.length / 2:.6g} m, of y = 0; they are {self.sections}, got {self.length}",
+                "Give the whole length, or move the sections.",
+            )
+        if self.flat_between is not None and not grow_within(
+            self.flat_distances, *self.flat_between
+        ):
+            raise input_error(
+                "FlatCurvedDamper.flat_between",
+                f"must hold all lines of the flat side, at {self.flat_distances} m from the apex, got {self.flat_between}",
+                "Give the nearer and the farther end of the flat that touches.",
+            )
 
     @property
     def flat_normal(self) -> FloatArray:
@@ -123,27 +176,29 @@ class FlatCurvedDamper:
         return RigidBody(mass=self.mass, inertia=self.inertia, centre=(x, y, z))
 
     def contact_points(self) -> ContactPoints:
-        """Return the points in the order L1, L2, R, each line in order of y.
+        """Return the points in the order L1, L2, ..., R, each line in order of y.
 
         The tangent t points towards the apex on both sides, so w = +y on the flat side and −y on
         the curved one.
         """
+        widths = nearest(self.flat_distances, *(self.flat_between or (math.nan, math.nan)))
         lines = [
-            Line("L1", "flat", self.flat_angle, True, self.flat_distances[0]),
-            Line("L2", "flat", self.flat_angle, True, self.flat_distances[1]),
-            Line("R", "curved", self.curved_angle, False, self.curved_distance),
+            Line(f"L{i + 1}", "flat", self.flat_angle, True, distance, float(widths[i]))
+            for i, distance in enumerate(self.flat_distances)
         ]
-        return points_of_lines(lines, self.sections, self.apex)
+        width = math.nan if self.curved_width is None else self.curved_width
+        lines.append(Line("R", "curved", self.curved_angle, False, self.curved_distance, width))
+        return points_of_lines(lines, self.sections, self.length, self.apex)
 
     def outline(self) -> FloatArray:
         """Return the section's polygon (k, 2) in x and z, metres, from L1 clockwise.
 
         Cut off level at L1, then the arc that touches the right platform at R, the base level with
-        L2, and the flat side from L2 to L1. It is for pictures and for estimating mass: contact
+        the last line of the flat side, and the flat side from there to L1. It is for pictures and for estimating mass: contact
         uses the points only.
         """
         corner = self.contact_points()
-        first, second, right = corner.position[:: len(self.sections)][:, [0, 2]]
+        first, *_, second, right = corner.position[:: len(self.sections)][:, [0, 2]]
         centre = right - self.curved_radius * self.curved_normal[[0, 2]]
         # the arc holds R even if R lies above L1 or below L2; it ends at the circle's top or bottom
         heights = np.array([max(first[1], right[1]), min(second[1], right[1])])

@@ -14,7 +14,16 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.errors import InputError, input_error
 from stickslip.model.rigid.body import RigidBody, body_of_tensor
-from stickslip.model.rigid.sides import ContactPoints, Line, middles, points_of_lines, side_frame
+from stickslip.model.rigid.sides import (
+    ContactPoints,
+    Line,
+    grow_within,
+    middles,
+    nearest,
+    points_of_lines,
+    side_frame,
+    strip_width,
+)
 from stickslip.units import check_quantities, quantity
 from stickslip.units import length as metres
 
@@ -102,7 +111,7 @@ class WedgeDamper:
         for side, angle in zip(("left", "right"), self.angles, strict=True):
             given = getattr(self, f"{side}_distances")
             low, high = (depth / math.sin(angle) for depth in self.depths)
-            if given is not None and not _growing_within(given, low, high):
+            if given is not None and not grow_within(given, low, high):
                 raise _bad(
                     self,
                     f"{side}_distances",
@@ -148,10 +157,12 @@ class WedgeDamper:
             low, high = (depth / math.sin(angle) for depth in self.depths)
             places = getattr(self, f"{side}_distances") or middles(low, high)
             lines += [
-                Line(f"{side[0].upper()}{i + 1}", side, angle, side == "left", place)
-                for i, place in enumerate(places)
+                Line(f"{side[0].upper()}{i + 1}", side, angle, side == "left", place, width)
+                for i, (place, width) in enumerate(
+                    zip(places, nearest(places, low, high), strict=True)
+                )
             ]
-        return points_of_lines(lines, self.sections or _evenly(self.length))
+        return points_of_lines(lines, self.sections or _evenly(self.length), self.length)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,6 +177,8 @@ class CylinderDamper:
         Inclination in rad from x of the underside that it touches on either side. Right None: as the left one.
     mass, density, sections
         As of a `WedgeDamper`.
+    contact_width
+        Width in metres of the strip in which it touches either underside, for laws per area; None: nobody knows.
 
     Raises
     ------
@@ -188,6 +201,7 @@ class CylinderDamper:
     mass: float | None = _own_mass()
     density: float | None = _density()
     sections: tuple[float, ...] | None = _axial()
+    contact_width: float | None = strip_width()
 
     def __post_init__(self) -> None:
         check_quantities(self)
@@ -224,15 +238,16 @@ class CylinderDamper:
 
     def contact_points(self) -> ContactPoints:
         """Return the points of the surfaces ``left`` (line L) and ``right`` (line R), each in order of y."""
+        width = math.nan if self.contact_width is None else self.contact_width
         touch = [
             self.axis + self.radius * side_frame(angle, left=i == 0)[[0, 2], 2]
             for i, angle in enumerate(self.angles)
         ]
         lines = [
-            Line(side[0].upper(), side, angle, side == "left", float(np.linalg.norm(point)))
+            Line(side[0].upper(), side, angle, side == "left", float(np.linalg.norm(point)), width)
             for side, angle, point in zip(("left", "right"), self.angles, touch, strict=True)
         ]
-        return points_of_lines(lines, self.sections or _evenly(self.length))
+        return points_of_lines(lines, self.sections or _evenly(self.length), self.length)
 
 
 def _evenly(extent: float) -> Places:
@@ -252,19 +267,13 @@ def _check_mass(given: WedgeDamper | CylinderDamper) -> None:
 def _check_sections(
     given: WedgeDamper | CylinderDamper, sections: Places | None, extent: float
 ) -> None:
-    if sections is not None and not _growing_within(sections, -extent / 2, extent / 2):
+    if sections is not None and not grow_within(sections, -extent / 2, extent / 2):
         raise _bad(
             given,
             "sections",
             f"must grow and lie within half the length, {extent / 2:.6g} m, of the middle, got {sections}",
             "They are positions y; y = 0 is the middle of the length.",
         )
-
-
-def _growing_within(values: Places, low: float, high: float) -> bool:
-    slack = 1e-9 * (high - low)
-    rising = bool(np.all(np.diff(values) > 0))
-    return rising and low - slack <= values[0] and values[-1] <= high + slack
 
 
 def _bad(given: object, field: str, problem: str, remedy: str) -> InputError:

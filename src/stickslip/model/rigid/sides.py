@@ -10,12 +10,14 @@ described from the apex, the point of a section where the planes of the two unde
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.units import quantity
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +35,15 @@ class ContactPoints:
     frame
         (n, 3, 3) frames; columns t, w, n: two tangents and the outward normal of the damper,
         which points into the blade.
+    area
+        (n,) area in m² that each stands for, NaN where the shape does not tell.
     """
 
     names: tuple[str, ...]
     side: tuple[str, ...]
     position: FloatArray
     frame: FloatArray
+    area: FloatArray
 
     def __len__(self) -> int:
         return len(self.names)
@@ -46,6 +51,12 @@ class ContactPoints:
     def on_line(self, line: str) -> IntArray:
         """Return the indices of the points of ``L1``, ``L2`` or ``R``, in order of y."""
         return np.array([i for i, name in enumerate(self.names) if name.split(".")[0] == line])
+
+    def on_sides(self, sides: Collection[str]) -> "ContactPoints":
+        """Return the points of some surfaces."""
+        own = [i for i, side in enumerate(self.side) if side in sides]
+        names, words = (tuple(given[i] for i in own) for given in (self.names, self.side))
+        return ContactPoints(names, words, self.position[own], self.frame[own], self.area[own])
 
 
 @dataclass(frozen=True)
@@ -62,6 +73,8 @@ class Line:
         Whether it is the left one.
     distance
         From the apex along the side, in metres.
+    width
+        Of the strip along y that it stands for, in metres; NaN where the shape does not tell.
     """
 
     name: str
@@ -69,6 +82,13 @@ class Line:
     angle: float
     left: bool
     distance: float
+    width: float = math.nan
+
+
+def strip_width() -> Any:
+    """Return the field of the width of a line contact."""
+    about = "width of the strip along y in which the curved side touches, for laws per area"
+    return quantity(about, "m", default=None, above=0, usual=1)
 
 
 def side_frame(angle: float, *, left: bool) -> FloatArray:
@@ -80,9 +100,15 @@ def side_frame(angle: float, *, left: bool) -> FloatArray:
 
 
 def points_of_lines(
-    lines: Sequence[Line], sections: Sequence[float], apex: tuple[float, float] = (0.0, 0.0)
+    lines: Sequence[Line],
+    sections: Sequence[float],
+    extent: float | None,
+    apex: tuple[float, float] = (0.0, 0.0),
 ) -> ContactPoints:
-    """Return the points of `lines` at the `sections` (y in metres), line by line; the `apex` is at (x, z)."""
+    """Return the points of `lines` at the `sections` (y in metres), line by line; the `apex` is at (x, z).
+
+    The side reaches over the `extent` along y, half of it on either side of y = 0; None: nobody told.
+    """
     names, sides, positions, frames = [], [], [], []
     for line in lines:
         frame = side_frame(line.angle, left=line.left)
@@ -91,7 +117,22 @@ def points_of_lines(
             sides.append(line.side)
             positions.append(np.array([apex[0], y, apex[1]]) - line.distance * frame[:, 0])
             frames.append(frame)
-    return ContactPoints(tuple(names), tuple(sides), np.array(positions), np.array(frames))
+    half = math.nan if extent is None else extent / 2
+    area = np.outer([line.width for line in lines], nearest(sections, -half, half)).ravel()
+    return ContactPoints(tuple(names), tuple(sides), np.array(positions), np.array(frames), area)
+
+
+def nearest(places: Sequence[float], low: float, high: float) -> FloatArray:
+    """Return how much of a stretch from `low` to `high` lies nearest to each of the growing `places` on it; the parts add up to it."""
+    between = np.asarray(places, dtype=float)
+    return np.diff([low, *(between[:-1] + between[1:]) / 2, high])
+
+
+def grow_within(places: Sequence[float], low: float, high: float) -> bool:
+    """Whether places grow and lie between two others, but for rounding."""
+    slack = 1e-9 * (high - low)
+    rising = bool(np.all(np.diff(places) > 0))
+    return rising and low - slack <= places[0] and places[-1] <= high + slack
 
 
 def middles(low: float, high: float, count: int = 3) -> tuple[float, ...]:

@@ -10,7 +10,7 @@ from stickslip.model.rigid.body import RigidBody
 from stickslip.model.rigid.damper import FlatCurvedDamper
 from stickslip.model.rigid.prisms import CylinderDamper, WedgeDamper
 from stickslip.study.file.quantities import table_of
-from stickslip.study.file.section import Name, Section, custom_error, once, shown
+from stickslip.study.file.section import Name, Positive, Section, custom_error, once, shown
 
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 Triple = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
@@ -113,6 +113,11 @@ class Surface(Section):
     names: list[Name] | None = Field(
         None, max_length=10_000, description="names of the points; left out: NAME.1, NAME.2, ..."
     )
+    areas_m2: list[Positive] | None = Field(
+        None,
+        max_length=10_000,
+        description='area in m² that each point stands for, greater than zero; contacts with per = "area" need it',
+    )
 
     @property
     def directions(self) -> FloatArray:
@@ -128,7 +133,7 @@ class Surface(Section):
             raise custom_error(
                 problem, "Give normal for all points alike, or normals, one a point.", "normal"
             )
-        for key in ("normals", "names"):
+        for key in ("normals", "names", "areas_m2"):
             own = getattr(self, key)
             if own is not None and len(own) != len(self.points_m):
                 raise custom_error(

@@ -24,6 +24,7 @@ from stickslip.study.file.parts import (
 )
 from stickslip.study.file.section import Section
 from stickslip.study.file.tables import Tables
+from stickslip.study.models.areas import without_areas
 from stickslip.study.models.cost import too_large
 from stickslip.study.models.files import MESHES
 
@@ -49,6 +50,7 @@ def refusals(tables: Tables, home: Path) -> Iterator[InputError]:
         large = too_large(tables, home)
         yield from [large] if large else []
         yield from _surfaces(tables)
+        yield from without_areas(tables)
         yield from _shapes_of_joins(tables)
         yield from _loads(tables)
         yield from _outputs(tables)

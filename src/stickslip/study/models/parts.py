@@ -262,15 +262,8 @@ def contact_nodes(tables: Tables, table: Any) -> ContactPoints:
     """Return the points at which blades have nodes."""
     sides: list[str] = [word.partition(".")[2] for word in table.nodes_at]
     if not sides:
-        return ContactPoints((), (), np.zeros((0, 3)), np.zeros((0, 3, 3)))
-    points = damper_of(tables, _owners(table)[0]).contact_points()
-    own = [i for i, side in enumerate(points.side) if side in sides]
-    return ContactPoints(
-        tuple(points.names[i] for i in own),
-        tuple(points.side[i] for i in own),
-        points.position[own],
-        points.frame[own],
-    )
+        return ContactPoints((), (), np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros(0))
+    return damper_of(tables, _owners(table)[0]).contact_points().on_sides(sides)
 
 
 def digest(tables: Tables, name: str, home: Path) -> str:
@@ -333,4 +326,6 @@ def _body_points(name: str, surface: Surface) -> BodyPoints:
         tangent /= np.linalg.norm(tangent)
         frames.append(np.column_stack([tangent, np.cross(normal, tangent), normal]))
     names = surface.names or [f"{name}.{i + 1}" for i in range(len(normals))]
-    return BodyPoints(tuple(names), np.array(surface.points_m, dtype=float), np.array(frames))
+    area = None if surface.areas_m2 is None else np.array(surface.areas_m2, dtype=float)
+    places = np.array(surface.points_m, dtype=float)
+    return BodyPoints(tuple(names), places, np.array(frames), area)

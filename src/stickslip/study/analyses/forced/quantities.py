@@ -157,7 +157,7 @@ _OF = {
     "contact": {
         "contact_law": ("1", "law of the contact"),
         "contact_group": ("1", "name of the contact in the model"),
-        "contact_area": ("m2", "area that belongs to the contact, NaN where there are no facets"),
+        "contact_area": ("m2", "area that belongs to the contact, NaN where nothing tells"),
     },
     "contact xyz": {
         "contact_position": ("m", "position of the contact points"),
