@@ -5,13 +5,14 @@ import sys
 from pathlib import Path
 from time import process_time
 
-from evidence.figures.evidence import Plan, gather
-from evidence.figures.model import GLUED, model
+from evidence.figures.evidence import gather
+from evidence.figures.model import FIRST, FIRST_PLAN, SECOND, SECOND_PLAN, model
 from evidence.figures.page import page
-from evidence.figures.solve import PATIENCE, STEPS
 from evidence.figures.statements import statements
+from evidence.figures.statements.statement import numbered, tally
 
 DOCS = Path(__file__).parents[2] / "docs"
+PAGE, IMAGES = "seed_figures.md", "images"
 
 
 def say(line: str) -> None:
@@ -21,11 +22,15 @@ def say(line: str) -> None:
 
 def main() -> int:
     """Compute, draw and write."""
-    argparse.ArgumentParser(
+    parser = argparse.ArgumentParser(
         prog="python -m evidence.figures",
-        description="Draw the counterparts of the figures of Gastaldi & Berruti (2017) for the two blades into docs/images, "
-        "and write docs/seed_figures.md. Takes some five minutes; needs matplotlib, which `make figures` installs.",
-    ).parse_args()
+        description="Draw the counterparts of the figures of Gastaldi & Berruti (2017) for the two cases of evidence/figures/model.py into docs/images, "
+        "and write docs/seed_figures.md. Takes some minutes; needs matplotlib, which `make figures` installs.",
+    )
+    parser.add_argument(
+        "--into", type=Path, default=DOCS, help="another folder than docs, for a trial"
+    )
+    docs: Path = parser.parse_args().into
     try:
         from evidence.figures.draw import (
             draw_all,  # matplotlib belongs to what builds the documentation
@@ -38,16 +43,17 @@ def main() -> int:
         )
         return 1
     say("meshing and reducing both models")
-    evidence = gather(model(), model(**GLUED), Plan(), say)
+    evidence = gather(model(FIRST), model(SECOND), FIRST_PLAN, SECOND_PLAN, say)
     rows = statements(evidence)
     say("pictures")
-    for file in draw_all(evidence, DOCS / "images"):
+    (docs / IMAGES).mkdir(parents=True, exist_ok=True)
+    for file in draw_all(evidence, docs / IMAGES):
         say(f"{file.name}, {file.stat().st_size / 1000:.0f} kB")
-    glued = ", ".join(f"`{key} = {value}`" for key, value in GLUED.items())
-    text = page(evidence, rows, glued, (STEPS, PATIENCE, process_time()))
-    (DOCS / "seed_figures.md").write_text(text, encoding="utf-8")
-    for row in rows:
-        say(f"{row.place}: {row.claim}: {row.verdict}")
+    text = page(evidence, rows, (FIRST.said(), SECOND.said()), process_time())
+    (docs / PAGE).write_text(text, encoding="utf-8")
+    for name, row in numbered(rows):
+        say(f"{name} {row.claim}: {row.said}")
+    say(tally(rows))
     return 0
 
 

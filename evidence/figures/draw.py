@@ -7,6 +7,7 @@ import matplotlib as mpl
 import numpy as np
 
 from evidence.figures.evidence import Evidence, Marker, Peaks
+from evidence.figures.model import Model
 from evidence.figures.solve import STEPS, Curve, Pair, time_signal
 from stickslip.response import signals
 
@@ -31,8 +32,8 @@ def draw_all(evidence: Evidence, folder: Path) -> list[Path]:
         "seed_fig6": errors_by_frequency,
         "seed_fig7": errors_and_times,
         "seed_fig9": optimisation,
-        "seed_fig10": glued_responses,
-        "seed_fig11": glued_cycles,
+        "seed_fig10": second_responses,
+        "seed_fig11": second_cycles,
     }
     files = []
     for name, draw in pictures.items():
@@ -46,10 +47,12 @@ def draw_all(evidence: Evidence, folder: Path) -> list[Path]:
 def block_norms(evidence: Evidence) -> Figure:
     """Draw fig. 1: how strongly harmonics are coupled."""
     found = evidence.norms
-    figure, axes = plt.subplots(1, 3, figsize=(12, 4.0), layout="constrained")
-    titles = ("a) J, full stick", "b) J, weak coupling", "c) ΔJ, strong coupling")
+    figure, axes = plt.subplots(1, 4, figsize=(15.5, 4.0), layout="constrained")
+    titles = (
+        "a) J, full stick", "a) the same, frozen sliders", "b) J, weak coupling", "c) ΔJ, strong coupling",
+    )  # fmt: skip
     for axis, matrix, title in zip(
-        axes, (found.stuck, found.weak, found.missing), titles, strict=True
+        axes, (found.stuck, found.frozen, found.weak, found.missing), titles, strict=True
     ):
         shown = np.log10(np.where(matrix > 0.0, np.maximum(matrix, 1e-4), np.nan))
         image = axis.imshow(shown, cmap="viridis", vmin=-4, vmax=0.5)
@@ -67,10 +70,11 @@ def forced_responses(evidence: Evidence) -> Figure:
     """Draw fig. 4: responses, motions in time, and what the alert chooses, at the weak and the strong ratio."""
     plan = evidence.plan
     figure, rows = plt.subplots(2, 2, figsize=(11, 7.4), layout="constrained")
+    timed = evidence.in_time
     for row, ratio, markers in zip(
-        rows, (plan.strong, plan.weak), (evidence.markers, evidence.weak_markers), strict=True
+        rows, (timed.ratio, plan.weak), (timed.markers, evidence.weak_markers), strict=True
     ):
-        peaks = next(p for p in evidence.peaks if p.ratio == ratio)
+        peaks = evidence.at(ratio)
         _both(row[0], peaks)
         _markers(row[0], markers)
         _both(row[1], peaks)
@@ -78,7 +82,9 @@ def forced_responses(evidence: Evidence) -> Figure:
         centre = peaks.high.hertz[np.argmax(peaks.high.amplitudes)]
         for axis, letter in zip(row, "ab", strict=True):
             axis.set(
-                xlim=(max(centre - 14, 160), min(centre + 7, 184)),
+                xlim=(
+                    max(centre - 14, plan.branch_hertz[0]), min(centre + 9, plan.branch_hertz[1]),
+                ),
                 title=f"{letter}) $F_{{CL}}/F_{{HE}}$ = {ratio:g}",
                 xlabel="frequency, Hz", ylabel="tip amplitude, µm",
             )  # fmt: skip
@@ -124,7 +130,7 @@ def _alert(axis: Axes, response: Curve) -> None:
 
 def time_and_cycles(evidence: Evidence) -> Figure:
     """Draw fig. 5: the damper's rotation and the cycles of three contact points at the peak."""
-    pair, orbit = evidence.at_peak, evidence.at_peak_orbit
+    pair, orbit = evidence.in_time.pair, evidence.in_time.orbit
     figure, axes = plt.subplots(2, 2, figsize=(10.5, 7.2), layout="constrained")
     axis = axes[0, 0]
     phase = np.arange(1, STEPS + 1) / STEPS
@@ -139,8 +145,7 @@ def time_and_cycles(evidence: Evidence) -> Figure:
     axis.legend(fontsize=8)
     axis.grid(alpha=0.3)
     names = evidence.model.system.interface.names
-    middle = [i for i, name in enumerate(names) if name.endswith(".2")][:3]
-    for axis, contact, letter in zip(axes.flat[1:], middle, "bcd", strict=False):
+    for axis, contact, letter in zip(axes.flat[1:], _middle(evidence.model), "bcd", strict=False):
         _cycles(axis, pair, contact)
         axis.plot(
             MICRO * _closed(orbit.gap[:, contact, 0]), _closed(orbit.force[:, contact, 0]), ":",
@@ -149,6 +154,13 @@ def time_and_cycles(evidence: Evidence) -> Figure:
         axis.set_title(f"{letter}) contact point {names[contact]}")
         axis.legend(fontsize=8)
     return figure
+
+
+def _middle(model: Model) -> list[int]:
+    """Return the middle contact point of each of three lines."""
+    lines = list(dict.fromkeys(model.lines))
+    places = [[i for i, own in enumerate(model.lines) if own == line] for line in lines]
+    return [own[len(own) // 2] for own in places][:3]
 
 
 def _closed(values: np.ndarray) -> np.ndarray:
@@ -171,7 +183,7 @@ def errors_by_frequency(evidence: Evidence) -> Figure:
     plan = evidence.plan
     figure, axes = plt.subplots(1, 3, figsize=(13, 4.0), layout="constrained")
     for axis, ratio, letter in zip(
-        axes, (plan.weak, plan.paper_weak, plan.strong), "abc", strict=True
+        axes, (plan.weak, plan.strong, plan.strongest), "abc", strict=True
     ):
         found = evidence.pairs[ratio]
         hertz = [p.hertz for p in found]
@@ -182,7 +194,7 @@ def errors_by_frequency(evidence: Evidence) -> Figure:
         for lost in evidence.unsolved[ratio]:
             axis.axvline(lost, color="grey", lw=0.6, ls=":")
         axis.set(
-            yscale="log", title=f"{letter}) $F_{{CL}}/F_{{HE}}$ = {ratio:g}",
+            xlim=plan.hertz, yscale="log", title=f"{letter}) $F_{{CL}}/F_{{HE}}$ = {ratio:g}",
             xlabel="frequency, Hz", ylabel=f"error, % (at least {SMALLEST:g})",
         )  # fmt: skip
         axis.legend(fontsize=8)
@@ -219,19 +231,22 @@ def _times(axis: Axes, evidence: Evidence) -> None:
     for name, colour, style, label in (
         ("low", LOW, "--o", "H = 1"), ("high", HIGH, "-s", "H = 5"), ("alert", ALERT, "-D", "alert"),
     ):  # fmt: skip
-        x = [getattr(t, name).seconds for t in evidence.timing]
-        y = [max(100 * abs(t.error(name)), 1e-2) for t in evidence.timing]
+        some = [t for t in evidence.timing if np.isfinite(t.reference)]
+        x = [t.median(name) for t in some]
+        ends = np.array([np.quantile(t.seconds[name], (0.25, 0.75)) for t in some]).reshape(-1, 2)
+        y = [max(100 * abs(t.error(name)), 1e-2) for t in some]
         axis.plot(x, y, style, color=colour, ms=5, lw=1.0, label=label, mfc="none")
-        full = [i for i, t in enumerate(evidence.timing) if t.periodic]
+        axis.hlines(y, ends[:, 0], ends[:, 1], color=colour, lw=2.5, alpha=0.4)
+        full = [i for i, t in enumerate(some) if t.periodic]
         axis.plot([x[i] for i in full], [y[i] for i in full], style[-1], color=colour, ms=5)
-        for t, a, b in zip(evidence.timing, x, y, strict=True):
+        for t, a, b in zip(some, x, y, strict=True):
             axis.annotate(
                 f"{t.ratio:g}", (a, b), fontsize=7, xytext=(3, 3), textcoords="offset points"
             )
     axis.axhline(THRESHOLD, color="grey", lw=0.8)
     axis.set(
-        xscale="log", yscale="log", title="b) numbers: $F_{CL}/F_{HE}$; hollow: no periodic reference",
-        xlabel=f"CPU time of {evidence.plan.timing_frequencies} frequencies, s",
+        xscale="log", yscale="log", title="b) numbers: $F_{CL}/F_{HE}$; hollow: not all motions periodic",
+        xlabel=f"CPU time of {evidence.plan.timing_frequencies} frequencies, median and quartiles, s",
         ylabel="error at resonance against time integration, %",
     )  # fmt: skip
     axis.legend(fontsize=8)
@@ -239,44 +254,54 @@ def _times(axis: Axes, evidence: Evidence) -> None:
 
 
 def optimisation(evidence: Evidence) -> Figure:
-    """Draw fig. 9: amplitude and frequency of the peak against the ratio."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.4), layout="constrained")
-    ratios = [p.ratio for p in evidence.peaks]
-    static = evidence.plan.ratios[0]
-    largest = next(p for p in evidence.peaks if p.ratio == static)
-    unit = static * largest.high.amplitudes.max()
+    """Draw fig. 9: amplitude and frequency of the peak against the ratio, for the second and the first damper."""
+    figure, rows = plt.subplots(2, 2, figsize=(11, 8.2), layout="constrained")
+    mode = evidence.second_plan.mode
+    for row, peaks, title in zip(
+        rows, (evidence.second_peaks, evidence.peaks), (f"second damper, {mode}", "first damper, first bending"), strict=True,
+    ):  # fmt: skip
+        _optimisation(row[0], row[1], peaks)
+        row[0].set_title(title)
+    return figure
+
+
+def _optimisation(left: Axes, right: Axes, peaks: list[Peaks]) -> None:
+    ratios = [p.ratio for p in peaks]
+    unit = ratios[0] * peaks[0].high.amplitudes.max()
     for name, colour, style, label in (
         ("low", LOW, "--o", "H = 1"), ("high", HIGH, "-s", "H = 5"), ("alert", ALERT, ":D", "alert"),
     ):  # fmt: skip
-        curves: list[Curve] = [getattr(p, name) for p in evidence.peaks]
+        curves: list[Curve] = [getattr(p, name) for p in peaks]
         per_force = [r * c.amplitudes.max() / unit for r, c in zip(ratios, curves, strict=True)]
         left.plot(ratios, per_force, style, color=colour, ms=4, lw=1.0, label=label)
         hertz = [c.hertz[np.argmax(c.amplitudes)] for c in curves]
         right.plot(ratios, hertz, style, color=colour, ms=4, lw=1.0, label=label)
-    judged = [(p.ratio, p.orbit) for p in evidence.peaks if p.orbit is not None]
-    left.plot(
-        [r for r, _ in judged], [r * o.amplitude / unit for r, o in judged], "x", color=TIME,
-        ms=8, label="time integration at the peak of H = 5",
-    )  # fmt: skip
+    judged = [(p.ratio, p.orbit) for p in peaks if p.orbit is not None and p.orbit.found]
+    if judged:
+        left.plot(
+            [r for r, _ in judged], [r * o.amplitude / unit for r, o in judged], "x", color=TIME,
+            ms=8, label="time integration at the peak of H = 5",
+        )  # fmt: skip
     left.set(yscale="log", ylabel="peak amplitude for a unit of force, stuck = 1")
     right.set(ylabel="frequency of the peak, Hz")
     for axis in (left, right):
         axis.set(xscale="log", xlabel="$F_{CL}/F_{HE}$")
         axis.legend(fontsize=8)
         axis.grid(alpha=0.3, which="both")
-    return figure
 
 
-def glued_responses(evidence: Evidence) -> Figure:
-    """Draw fig. 10: responses with the damper whose flat side does not slip."""
+def second_responses(evidence: Evidence) -> Figure:
+    """Draw fig. 10: responses with the second damper."""
     figure, axes = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
-    shown = [p for p in evidence.glued if p.ratio in evidence.plan.glued_ratios]
+    plan = evidence.second_plan
+    shown = [p for p in evidence.second_peaks if p.ratio in plan.ratios]
     for axis, peaks, letter in zip(axes, shown, "ab", strict=True):
         _both(axis, peaks)
         _alert(axis, peaks.alert)
         centre = peaks.high.hertz[np.argmax(peaks.high.amplitudes)]
         axis.set(
-            xlim=(centre - 12, centre + 10), title=f"{letter}) $F_{{CL}}/F_{{HE}}$ = {peaks.ratio:g}",
+            xlim=(max(0.94 * centre, plan.hertz[0]), min(1.06 * centre, plan.hertz[1])),
+            title=f"{letter}) $F_{{CL}}/F_{{HE}}$ = {peaks.ratio:g}",
             xlabel="frequency, Hz", ylabel="tip amplitude, µm",
         )  # fmt: skip
         axis.legend(fontsize=8)
@@ -284,15 +309,14 @@ def glued_responses(evidence: Evidence) -> Figure:
     return figure
 
 
-def glued_cycles(evidence: Evidence) -> Figure:
+def second_cycles(evidence: Evidence) -> Figure:
     """Draw fig. 11: cycles of three contact points at the peak of the second damper."""
-    ratio = evidence.plan.glued_ratios[-1]
-    pair = max(evidence.glued_pairs[ratio], key=lambda p: p.problem.amplitude(p.high))
-    names = evidence.glued_model.system.interface.names
-    middle = [i for i, name in enumerate(names) if name.endswith(".2")][:3]
+    ratio = evidence.second_plan.ratios[-1]
+    pair = max(evidence.second_pairs[ratio], key=lambda p: p.problem.amplitude(p.high))
+    names = evidence.second.system.interface.names
     figure, axes = plt.subplots(1, 3, figsize=(12, 3.8), layout="constrained")
-    for axis, contact in zip(axes, middle, strict=False):
+    for axis, contact in zip(axes, _middle(evidence.second), strict=False):
         _cycles(axis, pair, contact)
-        axis.set_title(f"{names[contact]}, {pair.hertz:.2f} Hz")
+        axis.set_title(f"{names[contact]}, {pair.hertz:.2f} Hz, $F_{{CL}}/F_{{HE}}$ = {ratio:g}")
         axis.legend(fontsize=8)
     return figure

@@ -3,61 +3,66 @@
 from collections.abc import Sequence
 
 from evidence.figures.evidence import Evidence
-from evidence.figures.statements import Statement
+from evidence.figures.solve import PATIENCE, STEPS
+from evidence.figures.statements.responses import which
+from evidence.figures.statements.statement import Statement, numbered, tally
+from evidence.models.two_blades import COARSER
 
 HEAD = """# The figures of Gastaldi and Berruti
 
 Gastaldi & Berruti {{cite}}`gastaldi2017` show the Jacobian Alert on two blades with a damper. `make figures` draws the counterparts of their figures for this
-package's own two blades and compares every statement that they make about them with what comes out. The numbers on this page, and
-the verdicts, are written by that command; where a statement does not hold, that is a result, and a sentence says what is known of the reason.
+package's own two blades and judges every statement that they make about them on the case that tests it. Numbers, verdicts and reasons are written by that command.
 
-The blades and the damper are those of the example study, **on a mesh with elements twice as large** (as in {{doc}}`validation`; a reduced model is
-compared with itself here, not one mesh with another). The second damper, for figures 10 and 11, has other angles and contact lines: {glued}. The alert is the
-published rule (`jacobian_alert`, threshold 5 %), not this package's default. Time integration is shooting with {steps} steps a period, begun at the balance with five
-harmonics; where it finds no periodic motion, the motion is integrated for {patience} periods and averaged, and its marker is hollow. Times are CPU times of one core, all in one
-process ({seconds:.0f} s for the whole command), and differ from run to run.
+- **Figures 1 and 4 to 7** (first bending, {hertz[0]:g} to {hertz[1]:g} Hz): {first}.
+- **Figures 9 to 11** ({mode}, {second_hertz[0]:g} to {second_hertz[1]:g} Hz): {second}.
 
-Numbers for the same two blades at the same ratio differ from page to page: here times are those of 20 frequencies from 160.25 to 184 Hz and
-errors those of the amplitude at the peak against time integration; {{doc}}`theory/alert_cost` times 20 frequencies from 165 to 184 Hz on the example's own
-mesh, {{doc}}`strategies` 49 frequencies from 160 to 184 Hz with errors, phases included, against harmonics 0 to 10; {{doc}}`theory/shooting` has the error of
-five harmonics at the peak with its phase, {{doc}}`theory/transient` the amplitudes on the example's own mesh.
+Both **on a mesh with elements {coarser:g} times as large** (as in {{doc}}`validation`; a reduced model is compared with itself here, not one mesh with another). The alert is the
+published rule (`jacobian_alert`, threshold 5 %), not this package's default, and the harmonics of the repeats are the published five. Time integration is shooting with {steps} steps a period, begun at the balance with five
+harmonics, and plain integration where shooting fails. The paper compares with it at {paper:g}; here it is {in_time}. A motion is given up after {patience} periods there.
 
-**{holding} of {judged} statements hold here.** Figures 2, 3 and 8 of the paper are sketches and photographs; the measured curves of its figures 9 and 10 belong to its test rig.
+**How it is judged.** *Holds* and *does not hold* compare the numbers of a row; the reason of what does not hold is computed, too. *Not tested*: the case does not do what the statement is about, and the row says what is missing.
+*Undecided*: the limit lies within the spread of the times, counts and times disagree, or the paper can be read in two ways that differ. Costs are counts, which are the same in every run, and CPU times of one core ({seconds:.0f} s for the
+whole command), medians of {repeats} interleaved repeats with their quartiles, at least 7 % to either side. What the paper says twice is one row; what is wrong in its own arithmetic stands in {{doc}}`misprints`.
+
+Numbers for two blades at the same ratio differ from page to page: here times are those of {few} frequencies from {timing[0]:g} to {timing[1]:g} Hz and errors those of the amplitude at the peak against time integration; {{doc}}`theory/alert_cost`
+and {{doc}}`strategies` say what theirs are of.
+
+**{tally}, of {count} statements.** Figures 2, 3 and 8 of the paper are sketches and photographs; the measured curves of its figures 9 and 10 belong to its test rig.
 """
 
 CAPTIONS = (
     (
         "seed_fig1",
         (
-            "Figure 1. Norms of the Jacobian's blocks between harmonics 0 to 5, in units in which a stuck contact is 1: a) full stick, b) the accepted frequency with "
+            "Figure 1. Norms of the Jacobian's blocks between harmonics 0 to 5, in units in which a stuck contact is 1: a) full stick, static and dynamic part found together, and with sliders frozen where the static load leaves them, b) the accepted frequency with "
             "the largest predicted error, c) ΔJ, what one harmonic neglects, where the actual error is largest at the strong ratio."
         ),
     ),
     (
         "seed_fig4",
         (
-            "Figure 4. Forced response with one and five harmonics and time integration (a), and what the alert chooses (b), at the strong ratio (above) and a weak one (below). "
+            "Figure 4. Forced response with one and five harmonics and time integration (a), and what the alert chooses (b), at the ratio of time integration (above) and the weak one (below). "
             "Dotted vertical lines: frequencies that were not found."
         ),
     ),
     (
         "seed_fig5",
-        "Figure 5. Rotation of the damper about the axial direction y, and hysteresis cycles at the middle contact points of the lines L1, L2 and R, at the resonance of the strong ratio.",
+        "Figure 5. Rotation of the damper about the axial direction y, and hysteresis cycles at the middle contact points of the lines L1, L2 and R, next to the peak at the ratio of time integration.",
     ),
     (
         "seed_fig6",
-        "Figure 6. Predicted and actual error against frequency: a) a weak case of this damper, b) the ratio of the paper's weak case, c) the strong case.",
+        "Figure 6. Predicted and actual error against frequency: a) the paper's weak ratio, b) and c) the two that it names for its strong case.",
     ),
     (
         "seed_fig7",
         (
             "Figure 7. a) Actual against predicted error, with the diagonal and the 5 % lines; frequencies in full stick have no error and are left out. b) Error of the peak among equally spaced frequencies "
-            "against the CPU time of the whole response."
+            "against the CPU time of the whole response, median and quartiles."
         ),
     ),
     (
         "seed_fig9",
-        "Figure 9. Optimisation curves: amplitude for a unit of force and frequency of the peak against F_CL/F_HE, for the first damper.",
+        "Figure 9. Optimisation curves: amplitude for a unit of force and frequency of the peak against F_CL/F_HE, for the second damper (above) and the first (below).",
     ),
     ("seed_fig10", "Figure 10. Responses with the second damper."),
     (
@@ -68,7 +73,7 @@ CAPTIONS = (
 
 
 def page(
-    evidence: Evidence, rows: Sequence[Statement], glued: str, settings: tuple[int, int, float]
+    evidence: Evidence, rows: Sequence[Statement], cases: tuple[str, str], seconds: float
 ) -> str:
     """Return the page.
 
@@ -76,22 +81,18 @@ def page(
     ----------
     evidence, rows
         What was computed, and the table.
-    glued
-        Description of the second damper.
-    settings
-        Steps a period and patience of the time integration, and CPU seconds of the command.
+    cases
+        The two cases in words.
+    seconds
+        CPU time of the command.
     """
-    steps, patience, seconds = settings
-    judged = [row for row in rows if row.holds is not None]
-    parts = [
-        HEAD.format(
-            glued=glued, steps=steps, patience=patience, seconds=seconds,
-            holding=sum(bool(row.holds) for row in judged), judged=len(judged),
-        ),
-        "## Statements\n",
-        table(rows),
-        "## Figures\n",
-    ]  # fmt: skip
+    plan, second = evidence.plan, evidence.second_plan
+    head = HEAD.format(
+        first=cases[0], second=cases[1], hertz=plan.hertz, second_hertz=second.hertz, mode=second.mode, coarser=COARSER,
+        steps=STEPS, patience=PATIENCE, seconds=seconds, repeats=plan.repeats, few=plan.timing_frequencies,
+        timing=plan.timing_hertz, paper=plan.time_ratios[0], in_time=which(evidence), tally=tally(rows), count=len(rows),
+    )  # fmt: skip
+    parts = [head, "## Statements\n", table(rows), "## Figures\n"]
     parts += [f"![{text.split('.')[0]}](images/{name}.png)\n\n{text}\n" for name, text in CAPTIONS]
     parts += ["## What was not found\n", lost(evidence)]
     return "\n".join(parts)
@@ -100,13 +101,13 @@ def page(
 def table(rows: Sequence[Statement]) -> str:
     """Return the rows as a Markdown table."""
     lines = [
-        "| where | the paper says | its number | here | verdict | why |",
-        "|---|---|---|---|---|---|",
+        "| | where | the paper says | its number | here | verdict | why |",
+        "|---|---|---|---|---|---|---|",
     ]
-    for row in rows:
-        verdict = row.verdict if row.holds else f"**{row.verdict}**"
-        why = "" if row.holds else row.why
-        cells = (row.place, row.claim, row.number, row.own, verdict, why)
+    for name, row in numbered(rows):
+        verdict = row.said if row.verdict == "holds" else f"**{row.said}**"
+        why = row.why if row.verdict == "does not hold" else ""
+        cells = (name, row.place, row.claim, row.number, row.own, verdict, why)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n"
 
@@ -114,8 +115,8 @@ def table(rows: Sequence[Statement]) -> str:
 def lost(evidence: Evidence) -> str:
     """Return the frequencies that were not found, and motions in time that are not periodic."""
     lines = []
-    for peaks in [*evidence.peaks, *evidence.glued]:
-        which = "second damper, " if peaks in evidence.glued else ""
+    for peaks in [*evidence.peaks, *evidence.second_peaks]:
+        which = "second damper, " if peaks in evidence.second_peaks else ""
         for name, text in (("low", "one harmonic"), ("high", "five harmonics"), ("alert", "alert")):
             hertz = getattr(peaks, name).lost
             if hertz:

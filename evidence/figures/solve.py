@@ -1,6 +1,7 @@
 """What the figures are drawn from: responses, pairs of solutions at one frequency, and periodic motions found in time."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import process_time
@@ -11,7 +12,9 @@ import numpy as np
 from evidence.figures.model import Model
 from stickslip import forced_response
 from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.contact.law import OPEN, SLIP
 from stickslip.harmonic import jacobian_similarity
+from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.similarity import JacobianSimilarity
 from stickslip.harmonic.selection.strategy import ErrorMeasure
@@ -29,7 +32,8 @@ from stickslip.response.time.start import start_from_harmonics
 
 HZ = 2 * np.pi
 STEPS = 512  # of a period; the error of the step is printed
-PATIENCE = 250  # periods of an integration that does not settle
+PATIENCE = 250  # periods that shooting takes, and the integrations that decide at which ratio there is a periodic motion
+BRIEF = 40  # periods of the other integrations, where shooting fails
 ORBIT = 1e-6  # length of shooting's last correction, relative to the vibration
 Motion = Literal["periodic", "unstable", "settled", "not periodic", "overflow"]
 
@@ -50,6 +54,8 @@ class Curve:
         Every point that was solved.
     seconds
         CPU time.
+    sizes
+        Number of unknowns of every evaluation of contact forces with their Jacobian.
     """
 
     problem: ForcedProblem
@@ -58,6 +64,22 @@ class Curve:
     lost: tuple[float, ...]
     solved: tuple[ForcedPoint, ...]
     seconds: float
+    sizes: tuple[int, ...]
+
+    @property
+    def unknowns(self) -> int:
+        """Unknowns of all frequencies that were solved, those of both passages."""
+        return sum(p.unknowns for p in self.solved)
+
+    @property
+    def steps(self) -> int:
+        """Newton steps."""
+        return sum(p.iterations for p in self.solved)
+
+    @property
+    def repeats(self) -> int:
+        """Points that were solved with more harmonics than the first passage has."""
+        return sum(p.stage in {"high", "branch"} for p in self.solved)
 
     @cached_property
     def amplitudes(self) -> FloatArray:
@@ -102,9 +124,10 @@ def curve(
     if hertz:
         sweep = replace(sweep, omega_range=(HZ * hertz[0], HZ * hertz[1]))
     load = model.load(ratio)
-    begun = process_time()
-    solved = tuple(forced_response(model.system, load, sweep))
-    seconds = process_time() - begun
+    with evaluations() as sizes:
+        begun = process_time()
+        solved = tuple(forced_response(model.system, load, sweep))
+        seconds = process_time() - begun
     kept = accepted_points(solved)
     return Curve(
         curve_problem(model, ratio, selection),
@@ -113,7 +136,25 @@ def curve(
         tuple(float(p.omega / HZ) for p in kept if not p.converged),
         solved,
         seconds,
+        tuple(sizes),
     )
+
+
+@contextmanager
+def evaluations() -> Iterator[list[int]]:
+    """Note the number of unknowns of every linearisation while it lasts."""
+    sizes: list[int] = []
+    plain = HarmonicBalance.linearise
+
+    def linearise(self, *args, **values):  # type: ignore[no-untyped-def]
+        sizes.append(self.size)
+        return plain(self, *args, **values)
+
+    HarmonicBalance.linearise = linearise  # type: ignore[method-assign]
+    try:
+        yield sizes
+    finally:
+        HarmonicBalance.linearise = plain  # type: ignore[method-assign]
 
 
 def curve_problem(model: Model, ratio: float, selection: str) -> ForcedProblem:
@@ -139,8 +180,14 @@ class Pair:
         Whether every contact sticks all the time at both solutions.
     states
         Share of contact directions and samples whose state differs between the two.
+    slip, opened
+        Share of contact directions and samples that slip, and of contacts and samples that are open, with many.
+    higher, higher_predicted
+        Largest harmonic above one over the first one at the output of the peak, with many harmonics and in q + Δq.
     similarity
-        Of the two Jacobians.
+        Of the two Jacobians, in units in which every stuck contact weighs the same.
+    change_si
+        ΔJ of the two in metres and radians.
     """
 
     problem: ForcedProblem
@@ -155,7 +202,12 @@ class Pair:
     real_contact: FloatArray
     stuck: bool
     states: float
+    slip: float
+    opened: float
+    higher: float
+    higher_predicted: float
     similarity: JacobianSimilarity
+    change_si: float
 
     @property
     def hertz(self) -> float:
@@ -190,18 +242,25 @@ def _pair(
     alert = jacobian_alert(problem.low, problem.high, x, low.omega, ErrorMeasure(outputs, (1,)))
     linear = problem.low.linear
     few, predicted, many = (
-        linear.recover(low.omega, c)[:2]
+        linear.recover(low.omega, c)
         for c in (low.coefficients, problem.high.coefficients(alert.start), high.coefficients)
     )
     states = [signals(problem, p).state for p in (low, high)]
     errors = [_errors(few, other, outputs, model.contact_dofs) for other in (predicted, many)]
     padded, reference = (problem.high.unknowns(p.coefficients) for p in (low, high))
+    where = problem.high, padded, reference, low.omega
+    top = outputs[0]
+    higher = [float(np.max(np.abs(v[2:, top])) / np.abs(v[1, top])) for v in (many, predicted)]
     return Pair(
         problem, ratio, low, high,
         *(errors[i][j] for j in range(3) for i in range(2)),
         stuck=not any(np.any(s) for s in states),
         states=float(np.mean(states[0] != states[1])),
-        similarity=jacobian_similarity(problem.high, padded, reference, low.omega),
+        slip=float(np.mean(states[1] == SLIP)),
+        opened=float(np.mean(states[1] == OPEN)),
+        higher=higher[0], higher_predicted=higher[1],
+        similarity=jacobian_similarity(*where),
+        change_si=jacobian_similarity(*where, scales=np.ones(problem.high.linear.n)).change,
     )  # fmt: skip
 
 
@@ -209,6 +268,7 @@ def _errors(
     few: ComplexArray, other: ComplexArray, outputs: FloatArray, contact: FloatArray
 ) -> tuple[float, float, FloatArray]:
     """Return the errors of harmonic 1 and 0 over the outputs, and that of harmonic 1 of each contact dof."""
+    few, other = few[:2], other[:2]
     moved = other - few
     first, static = (ErrorMeasure(outputs, (h,)).change(few, moved)[0] for h in (1, 0))
     return first, static, np.abs(moved[1, contact]) / np.abs(few[1, contact])
@@ -247,8 +307,14 @@ class Orbit:
         return self.motion in {"periodic", "unstable", "settled"}
 
 
-def orbit(model: Model, problem: ForcedProblem, point: ForcedPoint, steps: int = STEPS) -> Orbit:
-    """Find the motion in time that begins at a solution of the balance: by shooting, or period by period where that fails."""
+def orbit(
+    model: Model,
+    problem: ForcedProblem,
+    point: ForcedPoint,
+    steps: int = STEPS,
+    patience: int = BRIEF,
+) -> Orbit:
+    """Find the motion in time that begins at a solution of the balance: by shooting, or by at most `patience` periods where that fails."""
     begun = process_time()
     system = model.system
     motion = problem.low.linear.recover(point.omega, point.coefficients)
@@ -267,7 +333,7 @@ def orbit(model: Model, problem: ForcedProblem, point: ForcedPoint, steps: int =
         kind, found = "periodic" if shot.stable else "unstable", shot
         amplitude = shot.harmonics[1, 0]
     else:
-        found = integrate(*where, TimeStepping(steps_per_period=steps, max_periods=PATIENCE))
+        found = integrate(*where, TimeStepping(steps_per_period=steps, max_periods=patience))
         kind = "settled" if found.settled else "not periodic"
         amplitude = (found.harmonics[1] if found.settled else found.average)[0]
         if not np.isfinite(amplitude):

@@ -18,7 +18,7 @@ from stickslip.study.analyses.forced.question import Question, question_of
 from stickslip.study.models.study import read_study
 
 STUDY = Path(__file__).parents[2] / "examples" / "two_blades" / "study.toml"
-SIZES = {"airfoil_size_m": 0.006, "platform_size_m": 0.0055, "foot_size_m": 0.008}  # the example's
+SIZES = ("airfoil_size_m", "platform_size_m", "foot_size_m")
 COARSER = 2.0  # times the element sizes of the example: minutes where it needs hours
 RATIO = "load.shaker.ratio"
 
@@ -103,21 +103,25 @@ class TwoBlades:
 
 
 @lru_cache(maxsize=2)
-def two_blades(coarser: float = 1.0, **values: Any) -> TwoBlades:
+def two_blades(coarser: float = 1.0, path: Path = STUDY, **values: Any) -> TwoBlades:
     """Mesh and reduce the example, once a process.
 
     Parameters
     ----------
     coarser
         Factor on the element sizes of the blades.
+    path
+        Another study of the same parts, points and loads.
     values
         Of other keys of the study, lists as tuples: ``**{"part.blades.flat_angle_deg": 50.0}``.
     """
     # what is compared here are the published passages
     changed: dict[str, Any] = {"harmonics.high": 5}
-    changed |= {f"part.blades.{k}": coarser * v for k, v in SIZES.items()}
     changed |= {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
-    study = read_study(STUDY).replace(changed)
+    study = read_study(path)
+    sizes = study.file.raw["part"]["blades"]
+    changed |= {f"part.blades.{k}": coarser * sizes[k] for k in SIZES if k in sizes}
+    study = study.replace(changed)
     cases = study.cases()
     ratios = tuple(float(case.values[RATIO]) for case in cases)
     return TwoBlades(question_of(cases[0], cases[0].build()), ratios)
