@@ -1,0 +1,1 @@
+"""The search for a damper that does at the second bending mode what the paper says of its second one."""
