@@ -76,7 +76,7 @@ class SecondPlan:
 
     mode: str = "second bending"
     ratios: tuple[float, float] = (23.4, 11.7)
-    all_ratios: tuple[float, ...] = (250.0, 100.0, 50.0, 23.4, 11.7, 9.0)
+    all_ratios: tuple[float, ...] = (250.0, 100.0, 50.0, 23.4, 11.7)
     hertz: tuple[float, float] = (440.0, 680.0)
     frequencies: int = 49
 

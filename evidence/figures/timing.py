@@ -11,7 +11,7 @@ from stickslip.arrays import FloatArray
 from stickslip.response import ForcedPoint
 
 NAMES = {"low": "always_low", "high": "always_high", "alert": "jacobian_alert"}
-LEAST = 0.07  # of a median: what repeats in one process cannot tell apart
+LEAST = 0.25  # of a median: beside other work the same counts took 43 % in one run and 53 % in the next, with quartiles of 7 % in each
 
 
 class Share(NamedTuple):

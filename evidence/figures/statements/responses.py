@@ -84,7 +84,7 @@ def why_five(e: Evidence) -> str:
     names = [x.name for x in own]
     opens = [f"{x.name} {percent(shut[x.name], 2)} in time, {percent(x.open, 2)} with five" for x in own if max(shut[x.name], x.open) > 0.0]  # fmt: skip
     lifted = f"Open: {'; '.join(opens)}" if opens else "Nothing opens"
-    forces = f"smallest normal forces on {'/'.join(names)} {'/'.join(f'{timed[n]:.1f}' for n in names)} N in time, {'/'.join(f'{x.smallest:.1f}' for x in own)} N with five"
+    forces = f"smallest normal forces on {'/'.join(names)} {'/'.join(f'{max(timed[n], 0.0):.1f}' for n in names)} N in time, {'/'.join(f'{max(x.smallest, 0.0):.1f}' for x in own)} N with five"
     worst = max(cut.by_line, key=lambda n: abs(cut.by_line[n]))
     ladder = ", ".join(f"{signed(v)} with {k}" for k, v in cut.errors.items())
     reached = f"within 1 % from {cut.within} on" if cut.within else "never within 1 %"

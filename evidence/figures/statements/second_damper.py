@@ -57,7 +57,9 @@ def _tested(
 ) -> str:
     """Say what is missing at each of some ratios; nothing if all are tested."""
     said = [_missing(e, r, state[r], slip) for r in ratios]
-    return "; ".join(text for text in said if text)
+    found = [text for text in said if text]
+    more = f"; the same or alike at {len(found) - 2} more" if len(found) > 2 else ""
+    return "; ".join(found[:2]) + more
 
 
 def _verdict(missing: str, holds: bool) -> Verdict:

@@ -143,7 +143,10 @@ def rank_correlation(x: Sequence[float], y: Sequence[float]) -> float:
 def states_said(alike: Sequence[Pair], apart: Sequence[Pair]) -> str:
     """Say how much the contact states of one and five harmonics differ, where a prediction is right and where it is not."""
     parts = [
-        f"{percent(median([p.states for p in some]), 2)} of the contact directions and instants where it {word} ({len(some)} frequencies)"
+        f"{percent(median([p.states for p in some]), 2)} where it {word} ({len(some)} frequencies)"
         for word, some in (("does not hold", apart), ("holds", alike)) if some
     ]  # fmt: skip
-    return "contact states that differ between one and five harmonics, medians: " + ", ".join(parts)
+    return (
+        "share of contact directions and instants whose state differs between one and five harmonics, medians: "
+        + ", ".join(parts)
+    )
