@@ -16,7 +16,7 @@ LOCK_FLAGS := --quiet --generate-hashes --strip-extras \
 # Two test workers on two cores: a threaded BLAS under each would only make them wait for each other.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help install run test coverage readers test-readers sparse test-sparse lint docs figures second-damper bench bench-rival calculix validate baseline strategies alarms lock clean
+.PHONY: help install run test coverage readers test-readers sparse test-sparse lint docs figures second-damper bench bench-rival calculix validate baseline strategies alarms sections lock clean
 .DELETE_ON_ERROR:
 
 help:  ## list the targets
@@ -97,6 +97,9 @@ second-damper: $(INSTALLED)  ## look for a damper for the second bending mode; w
 
 alarms: $(INSTALLED)  ## count missed and false alarms of the strategies that verify; writes docs/strategies_alarms.md (ten to twenty minutes)
 	$(ONE_THREAD) $(BIN)/python -m evidence.strategies alarms
+
+sections: $(DOCS_INSTALLED)  ## two blades with 1 to 15 sections of contact points; writes docs/contact_points_numbers.md and its picture (some ten minutes)
+	$(ONE_THREAD) $(BIN)/python -m evidence.sections
 
 calculix:  ## install CalculiX with apt, for the comparisons of `make validate` that need it (as root)
 	apt-get update -qq

@@ -24,7 +24,7 @@ extensions = [
     "sphinxcontrib.bibtex",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
-exclude_patterns = ["_build", "generated", "strategies_alarms.md"]
+exclude_patterns = ["_build", "generated", "strategies_alarms.md", "contact_points_numbers.md"]
 html_theme = "furo"
 html_title = "stickslip"
 html_static_path: list[str] = []
