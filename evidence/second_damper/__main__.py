@@ -3,6 +3,7 @@
 import sys
 from pathlib import Path
 
+from evidence.second_damper.mesh import FACTORS, reduction_error, refined
 from evidence.second_damper.page import page
 from evidence.second_damper.search import first_stage, searched, second_stage
 
@@ -13,7 +14,10 @@ def main() -> int:
     """Search, and write the page."""
     first, none = searched(first_stage())
     second, _ = searched(second_stage(first[0].candidate))
-    PAGE.write_text(page(first, second, none), encoding="utf-8")
+    best = first[0].candidate
+    meshes = [refined(best, factor) for factor in FACTORS]
+    text = page(first, second, none, meshes, reduction_error(best))
+    PAGE.write_text(text, encoding="utf-8")
     return 0
 
 

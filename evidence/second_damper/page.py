@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from evidence.models.two_blades import COARSER, STUDY
+from evidence.second_damper.mesh import Refined
 from evidence.second_damper.search import (
     ALIKE,
     ASKED,
@@ -52,8 +53,24 @@ def _table(rows: Sequence[Found]) -> list[str]:
     return ["| " + " | ".join(row) + " |" for row in cells]
 
 
-def page(first: Sequence[Found], second: Sequence[Found], none: int) -> str:
-    """Return the page of the documentation."""
+def page(
+    first: Sequence[Found],
+    second: Sequence[Found],
+    none: int,
+    meshes: Sequence[Refined],
+    reduction: float,
+) -> str:
+    """Return the page of the documentation.
+
+    Parameters
+    ----------
+    first, second
+        What was found, the best first: of all angles and lines, and of the best one with other damping, place of the force and mass.
+    none
+        How many could not be built or held.
+    meshes, reduction
+        The second bending on finer and finer meshes, and the error of the reduced frequencies.
+    """
     whole = [f for f in first if f.score == ASKED]
     best = first[0]
     counts = [
@@ -92,6 +109,10 @@ def page(first: Sequence[Found], second: Sequence[Found], none: int) -> str:
         "",
         *_table(second),
         "",
+        "## Mesh and modes",
+        "",
+        f"The second bending of the free blades, not reduced, the lowest mode above the first pair that moves by more than nine tenths along the circumference: {_meshes(meshes)}. Reduction with the study's fixed-interface modes changes the frequencies up to it, free and stuck, by at most {100 * reduction:.2f} %.",
+        "",
         "## What no candidate shows",
         "",
         f"The paper finds the damper *quite close to the full stick case* at 11.7. None of the dampers that show all of it is: the nearest ({named(closest.candidate)}) has {100 * closest.of_stuck(PUBLISHED[-1]):.0f} % of the peak in full stick. Slip must begin between 230 and 30, so that at 11.7 the force is at least {30 / PUBLISHED[-1]:.1f} times that of the first slip, and what R dissipates is large beside the damping of the blades, {damping:g} % here; with more of it the peak is nearer to that in full stick (see above). The frequency stays near: of the first damper of the table it falls by {_fall(best)} from full stick to 11.7.",
@@ -100,6 +121,15 @@ def page(first: Sequence[Found], second: Sequence[Found], none: int) -> str:
         "",
     ]
     return "\n".join(lines)
+
+
+def _meshes(meshes: Sequence[Refined]) -> str:
+    told = [
+        f"{m.hertz:.1f} Hz with {m.dofs} dofs (elements {m.factor:g} times those of the example)"
+        for m in meshes
+    ]
+    last = abs(meshes[-1].hertz / meshes[-2].hertz - 1)
+    return f"{', '.join(told)}; the last refinement changes it by {100 * last:.2f} %"
 
 
 def _near(found: Found) -> float:
