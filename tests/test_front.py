@@ -170,7 +170,7 @@ def test_two_blades_in_fifteen_lines(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert len(code) <= 15
     changes = {
         "ss.BladePair()": "ss.BladePair(airfoil_size=0.012, platform_size=0.012, foot_size=0.016)",
-        "hz=(150, 184), high=5, peak_points=12": "hz=(185, 207), points=8, peak_points=2, samples=64",
+        "hz=(150, 187), high=5, peak_points=12": "hz=(185, 207), points=8, peak_points=2, samples=64",
         "newton=22.1": "newton=0.221",
     }
     for old, new in changes.items():

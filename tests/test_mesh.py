@@ -97,6 +97,15 @@ def test_force_stands_on_the_first_airfoil_at_its_span(mesh, span):
     assert abs(force[0]) < pair.hub_thickness + pair.camber * pair.hub_chord
 
 
+def test_below_zero_the_force_stands_on_the_shank_away_from_the_damper():
+    pair = BladePair(**COARSE, force_span=-0.25)
+    mesh = mesh_blade_pair(pair, FlatCurvedDamper().contact_points())
+    (force,) = mesh.points[mesh.node_sets["force"]]
+    np.testing.assert_allclose(
+        force, [-pair.shank_thickness / 2, 0.0, 0.75 * pair.shank_tops[1]], atol=1e-9
+    )
+
+
 def test_meshing_in_a_thread_gives_the_same_mesh(mesh):
     made = []
     points = FlatCurvedDamper().contact_points()
@@ -135,7 +144,7 @@ def test_unknown_mesh_format_is_refused(mesh, tmp_path):
         ({"flat_angle": 2.0}, r"BladePair.flat_angle: must lie in \(0, 1.571\), got 2.0"),
         ({"pitch": 0.008}, "BladePair.pitch: 0.008 m leaves no room.*overlap"),
         ({"platform_height": 0.010}, "BladePair.platform_height.*above the foot"),
-        ({"force_span": 0.5}, r"BladePair.force_span: must lie in \[0, 0.5\), got 0.5"),
+        ({"force_span": 0.5}, r"BladePair.force_span: must lie in \(-1, 0.5\), got 0.5"),
         ({"hub_chord": 0.060}, "overhangs the platform"),
         ({"foot_depth": 0.010}, "smaller than the shank"),
         ({"foot_width": 0.057}, "the feet overlap"),
@@ -150,7 +159,7 @@ def test_bad_geometry_is_named(change, message):
     ("damper", "missed"),
     [
         (FlatCurvedDamper(apex=(0.025, BladePair().wedge_apex[1] + 1e-4)), "L1.1 at"),
-        (FlatCurvedDamper(curved_distance=0.031), "R.1 at"),
+        (FlatCurvedDamper(curved_distance=0.045), "R.1 at"),
         (FlatCurvedDamper(sections=(-0.03, 0.0, 0.01)), "L2.1 at"),
         (FlatCurvedDamper(flat_angle=math.radians(44)), "L1.2 at"),
     ],

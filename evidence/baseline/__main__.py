@@ -15,7 +15,7 @@ from evidence.baseline.stored import store, stored
 
 HERE = Path(__file__).parent
 STUDIES = {
-    "two_blades": HERE.parents[1] / "examples" / "two_blades" / "study.toml",
+    "two_blades": HERE.parents[0] / "models" / "two_blades.toml",
     "shrouded_sector": HERE / "shrouded_sector.toml",
 }
 

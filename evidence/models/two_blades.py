@@ -17,7 +17,8 @@ from stickslip.study.analyses.forced.points import Response, collect
 from stickslip.study.analyses.forced.question import Question, question_of
 from stickslip.study.models.study import read_study
 
-STUDY = Path(__file__).parents[2] / "examples" / "two_blades" / "study.toml"
+STUDY = Path(__file__).with_suffix(".toml")
+SHIPPED = Path(__file__).parents[2] / "examples" / "two_blades" / "study.toml"
 SIZES = ("airfoil_size_m", "platform_size_m", "foot_size_m")
 COARSER = 2.0  # times the element sizes of the example: minutes where it needs hours
 RATIO = "load.shaker.ratio"

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from evidence.models.two_blades import COARSER, STUDY
+from evidence.models.two_blades import COARSER, SHIPPED
 from evidence.second_damper.mesh import Refined
 from evidence.second_damper.search import (
     ALIKE,
@@ -82,7 +82,7 @@ def page(
         if k.startswith("part.") or k.endswith("share")
     ]
     closest = max((f for f in (*first, *second) if f.score == ASKED), key=_near, default=best)
-    damping = 100 * float(read_study(STUDY).file.raw["damping"]["ratio"])
+    damping = 100 * float(read_study(SHIPPED).file.raw["damping"]["ratio"])
     held = f" ({none} more could not be built or held)" if none else ""
     lines = [
         "# A damper for the second bending mode",

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from evidence.models.two_blades import COARSER, TwoBlades, two_blades
+from evidence.models.two_blades import COARSER, SHIPPED, TwoBlades, two_blades
 from stickslip import forced_response
 from stickslip.arrays import FloatArray
 from stickslip.contact.law import OPEN, SLIP
@@ -37,7 +37,7 @@ ALIKE = 0.05  # difference of peaks with one and with five harmonics
 FLAT_ANGLES, CURVED_ANGLES = (38.0, 44.0, 50.0, 56.0), (66.0, 72.0, 78.0)
 DISTANCES = (0.002, 0.025), (0.005, 0.02)
 OTHERS = (
-    {"damping.ratio": 0.0075},
+    {"damping.ratio": 0.003},
     {"damping.ratio": 0.012},
     {"part.blades.force_span": 0.4},
 )
@@ -223,7 +223,7 @@ class Found:
 def judged(candidate: Candidate) -> Found | None:
     """Follow the responses of a damper; None if its lines do not lie on the platforms, or nothing holds it."""
     try:
-        blades = two_blades(COARSER, **candidate.values)
+        blades = two_blades(COARSER, SHIPPED, **candidate.values)
         forces = np.abs(blades.question.model.static_force[:, 2])
         static = tuple(float(forces[k].sum()) for k in _of_lines(blades))
         few = {r: at_peak(blades, r, "always_low") for r in RATIOS}

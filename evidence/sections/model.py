@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from evidence.models.two_blades import RATIO, STUDY, TwoBlades
+from evidence.models.two_blades import RATIO, SHIPPED, TwoBlades
 from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.rigid.sides import middles
 from stickslip.study.analyses.forced.question import question_of
@@ -54,7 +54,7 @@ class Patch:
 @cache
 def example() -> tuple[Study, Patch]:
     """Return the study, on a mesh that does not depend on the contact points, and what the damper touches."""
-    study = read_study(STUDY)
+    study = read_study(SHIPPED)
     blades: Any = study.tables.part["blades"]
     damper: Any = study.tables.part["damper"]
     shape = build(BladePair, blades)

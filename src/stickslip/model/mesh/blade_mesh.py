@@ -32,7 +32,7 @@ def mesh_blade_pair(geometry: BladePair, contacts: ContactPoints) -> SolidMesh:
     -------
     SolidMesh
         With the sets ``root``, ``underside_1`` and ``underside_2`` (nodes at the contact points on the flat and on the
-        curved side, in their order; all nodes of the face where a side has no points), ``force`` (on blade 1's airfoil, at `force_span`), ``tip1``, ``edge1`` (tip and
+        curved side, in their order; all nodes of the face where a side has no points), ``force`` (on blade 1, at `force_span`), ``tip1``, ``edge1`` (tip and
         mid-span leading edge of blade 1) and ``tip2`` (of blade 2). Further ``contact`` (in the order of `contacts`),
         ``contact_L1`` and so on (one a line) and ``output``.
 
@@ -48,11 +48,14 @@ def mesh_blade_pair(geometry: BladePair, contacts: ContactPoints) -> SolidMesh:
     on_second = np.array([side == "curved" for side in contacts.side], dtype=bool)
     targets = contacts.position - on_second[:, None] * offset
     marks = {
-        "force": _section(geometry, geometry.force_span)[7],
+        "force": _force_place(geometry),
         "edge": _section(geometry, 0.5)[0],
     }
     marks["tip"] = _section(geometry, 1.0)[2]
-    points, cells = _mesh_blade(geometry, targets)
+    on_shank = geometry.force_span < 0.0
+    points, cells = _mesh_blade(
+        geometry, np.vstack([targets, marks["force"]]) if on_shank else targets
+    )
     nearest = _match(points, np.vstack([targets, *(marks[k] for k in ("force", "edge", "tip"))]))
     n = len(points)
     contact = nearest[:-3] + n * on_second
@@ -105,6 +108,14 @@ def check_on_undersides(geometry: BladePair, contacts: ContactPoints) -> None:
             f"({geometry.wedge_apex[0]:.6g}, {geometry.wedge_apex[1]:.6g}) m, give both the same "
             "angles, and keep its lines and sections on the faces.",
         )
+
+
+def _force_place(geometry: BladePair) -> FloatArray:
+    """Return where the force node is (3,): on the airfoil's pressure side or on the shank's face away from the damper."""
+    if geometry.force_span >= 0.0:
+        return np.asarray(_section(geometry, geometry.force_span)[7])
+    height = (1.0 + geometry.force_span) * geometry.shank_tops[1]
+    return np.array([-geometry.shank_thickness / 2, 0.0, height])
 
 
 def _section(geometry: BladePair, span: float) -> FloatArray:
@@ -181,7 +192,9 @@ def _build(occ: Any, geometry: BladePair) -> None:
     lines = [occ.addLine(a, b) for a, b in zip(corners, corners[1:] + corners[:1], strict=True)]
     face = occ.addPlaneSurface([occ.addCurveLoop(lines)])
     body = [e for e in occ.extrude([(2, face)], 0, g.platform_depth, 0) if e[0] == 3]
-    wires = [_wire(occ, _section(g, span)) for span in sorted({0.0, g.force_span, 0.5, 1.0})]
+    wires = [
+        _wire(occ, _section(g, span)) for span in sorted({0.0, max(g.force_span, 0.0), 0.5, 1.0})
+    ]
     airfoil = occ.addThruSections(wires, makeSolid=True, makeRuled=True)
     occ.fuse([(3, foot)], body + [e for e in airfoil if e[0] == 3])
 

@@ -46,7 +46,8 @@ class BladePair:
     twist
         Rotation of the tip section against the hub section about z.
     force_span
-        Place of the force node on the airfoil's face, as a fraction of the span from hub to tip: low, as a shaker near the root.
+        Place of the force node on blade 1: on the airfoil, as a fraction of the span from hub to tip; below zero on the shank, as a
+        fraction of its height from the platform down to the foot.
     airfoil_size, platform_size, foot_size
         Element sizes.
 
@@ -71,7 +72,7 @@ class BladePair:
         "inclination from x of the underside of blade 1", 45, above=0, below=90
     )
     curved_angle: float = angle(
-        "inclination from x of the underside of blade 2", 45, above=0, below=90
+        "inclination from x of the underside of blade 2", 60, above=0, below=90
     )
     airfoil_length: float = length("length of the airfoil from the platform to the tip", 0.160)
     hub_chord: float = length("chord of the airfoil at the platform", 0.046)
@@ -81,9 +82,10 @@ class BladePair:
     camber: float = quantity("height of the camber line over the chord", default=0.04, usual=0.3)
     twist: float = angle("rotation of the tip against the hub", 8, usual=90)
     force_span: float = quantity(
-        "place of the node set force on blade 1's airfoil, a fraction of the span from the hub",
+        "place of the node set force on blade 1: on the airfoil, a fraction of the span from the hub; below zero on the shank, "
+        "a fraction of its height from the platform down",
         default=0.0,
-        least=0,
+        above=-1,
         below=0.5,
     )
     airfoil_size: float = length("element size in the airfoil", 0.0060)

@@ -35,6 +35,9 @@ from stickslip.model.rigid.sides import (
 from stickslip.units import angle, check_quantities, length, quantity
 
 CURVED_SEGMENTS = 24
+RISE = (
+    0.001 * math.sqrt(3) / (1 + math.sqrt(3))
+)  # m: planes of 45° and 60° from edges 1 mm apart meet that much higher
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,11 +75,14 @@ class FlatCurvedDamper:
     """
 
     apex: tuple[float, float] = quantity(
-        "the point [x, z] where the contact planes meet", "m", default=(0.028, 0.1065), usual=100
+        "the point [x, z] where the contact planes meet",
+        "m",
+        default=(0.0275 + RISE, 0.106 + RISE),
+        usual=100,
     )
     flat_angle: float = angle("inclination of the flat side from x", 45, above=0, below=90)
     curved_angle: float = angle(
-        "inclination from x of the plane that touches the curved side", 45, above=0, below=90
+        "inclination from x of the plane that touches the curved side", 60, above=0, below=90
     )
     flat_distances: tuple[float, ...] = length(
         "distances of the lines [L1, L2, ...] from the apex, the nearest first",
@@ -84,7 +90,7 @@ class FlatCurvedDamper:
         above=0,
         entries=(2, 100),
     )
-    curved_distance: float = length("distance of the line R from the apex", 0.0045)
+    curved_distance: float = length("distance of the line R from the apex", 0.0105)
     curved_radius: float = length("radius of the curved side", 0.05)
     sections: tuple[float, ...] = quantity(
         "axial positions y of the sections, growing; each holds one point a line",
@@ -108,15 +114,15 @@ class FlatCurvedDamper:
         usual=100,
     )
     curved_width: float | None = strip_width()
-    mass: float = quantity("mass of the damper", "kg", default=0.12, above=0)
+    mass: float = quantity("mass of the damper", "kg", default=0.057, above=0)
     inertia: tuple[float, float, float] = quantity(
         "moments of inertia [x, y, z] about the centre of mass",
         "kg_m2",
-        default=(1.89e-5, 9.45e-6, 2.26e-5),
+        default=(8.82e-6, 3.64e-6, 9.93e-6),
         above=0,
     )
     centre: tuple[float, float, float] = quantity(
-        "centre of mass [x, y, z], from the apex", "m", default=(-0.0014, 0.0, -0.0134), usual=100
+        "centre of mass [x, y, z], from the apex", "m", default=(-0.0033, 0.0, -0.0137), usual=100
     )
 
     def __post_init__(self) -> None:
