@@ -16,7 +16,7 @@ LOCK_FLAGS := --quiet --generate-hashes --strip-extras \
 # Two test workers on two cores: a threaded BLAS under each would only make them wait for each other.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help install run test coverage readers test-readers sparse test-sparse lint docs figures second-damper bench bench-rival calculix validate baseline strategies alarms sections lock clean
+.PHONY: help install run test coverage readers test-readers sparse test-sparse lint docs figures second-damper reconstruction bench bench-rival calculix validate baseline strategies alarms sections lock clean
 .DELETE_ON_ERROR:
 
 help:  ## list the targets
@@ -94,6 +94,9 @@ strategies: $(DOCS_INSTALLED)  ## compare all ways of choosing harmonics; writes
 
 second-damper: $(INSTALLED)  ## look for a damper for the second bending mode; writes docs/second_damper.md (some fifteen minutes)
 	$(ONE_THREAD) $(BIN)/python -m evidence.second_damper
+
+reconstruction: $(INSTALLED)  ## look for the two blades and damper that show most of what the paper tells; writes docs/reconstruction.md (some thirty minutes)
+	$(ONE_THREAD) $(BIN)/python -m evidence.reconstruction
 
 alarms: $(INSTALLED)  ## count missed and false alarms of the strategies that verify; writes docs/strategies_alarms.md (ten to twenty minutes)
 	$(ONE_THREAD) $(BIN)/python -m evidence.strategies alarms

@@ -6,25 +6,26 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from evidence.reconstruction.candidates import Candidate, candidates
+from evidence.reconstruction.candidates import CHOSEN, Candidate, candidates
 from evidence.reconstruction.judge import cheap, costly
 from evidence.reconstruction.page import page
 from stickslip.errors import StickslipError
 
-DOCS = Path(__file__).parents[2] / "docs"
+HERE = Path(__file__).parent
+DOCS = HERE.parents[1] / "docs"
 
 
 def main() -> None:
     """Judge every candidate cheaply and the best of them in full; what a folder holds already is not computed again."""
     parser = argparse.ArgumentParser(prog="python -m evidence.reconstruction", description=__doc__)
-    parser.add_argument("--folder", type=Path, default=Path("reconstruction"), help="for the results, one line a candidate")  # fmt: skip
+    parser.add_argument("--folder", type=Path, default=HERE / "out", help="for the results, one line a candidate")  # fmt: skip
     parser.add_argument("--best", type=int, default=24, help="how many are judged in full")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     rows = _judged(list(candidates()), given.folder / "cheap.jsonl", cheap)
     ranked = sorted(rows, key=lambda row: -_score(row))
     best = [Candidate(**_plain(row["candidate"])) for row in ranked[: given.best]]
-    full = _judged(best, given.folder / "costly.jsonl", costly)
+    full = _judged(list(dict.fromkeys([*best, CHOSEN])), given.folder / "costly.jsonl", costly)
     (DOCS / "reconstruction.md").write_text(page(rows, full), encoding="utf-8")
 
 

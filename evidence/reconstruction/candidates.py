@@ -126,6 +126,7 @@ class Candidate:
 
 
 OLD = Candidate(0.003, 0.0, (0.002, 0.029), 0.0045, 45.0)  # shipped until November 2026
+CHOSEN = Candidate(0.0075, 0.0, (0.002, 0.029), 0.0105, 60.0, TITANIUM)  # the example's
 # what becomes of dampers that do not rest on both lines
 LIFTING = (
     Candidate(0.0075, 0.0, (0.002, 0.029), 0.0115, 45.0),

@@ -118,11 +118,11 @@ class FlatCurvedDamper:
     inertia: tuple[float, float, float] = quantity(
         "moments of inertia [x, y, z] about the centre of mass",
         "kg_m2",
-        default=(8.82e-6, 3.64e-6, 9.93e-6),
+        default=(8.83e-6, 3.66e-6, 9.99e-6),
         above=0,
     )
     centre: tuple[float, float, float] = quantity(
-        "centre of mass [x, y, z], from the apex", "m", default=(-0.0033, 0.0, -0.0137), usual=100
+        "centre of mass [x, y, z], from the apex", "m", default=(-0.0032, 0.0, -0.0137), usual=100
     )
 
     def __post_init__(self) -> None:
