@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from evidence.models.two_blades import COARSER, SHIPPED, TwoBlades, two_blades
+from evidence.models.two_blades import SHIPPED, TwoBlades, two_blades
 from stickslip import ElasticCoulomb, HarmonicLoad, Sweep, System
 from stickslip.arrays import IntArray
 from stickslip.response import frozen_sliders
@@ -96,13 +96,10 @@ class Case:
         Its file, of the same parts, points and loads as the example's.
     changed
         Values of other keys, lists as tuples; harmonics are set to the published 1 and 5 anyway.
-    coarser
-        Factor on the element sizes of the blades.
     """
 
     study: Path = SHIPPED
     changed: Mapping[str, object] = field(default_factory=dict)
-    coarser: float = COARSER
 
     def said(self) -> str:
         """Return the study and its changes as the page shows them."""
@@ -169,5 +166,5 @@ class Model:
 
 def model(case: Case) -> Model:
     """Mesh and reduce a case."""
-    own: TwoBlades = two_blades(case.coarser, case.study, **case.changed)
+    own: TwoBlades = two_blades(path=case.study, **case.changed)
     return Model(own.system, own.sweep, own.load, own.rotation, own.contact_dofs, own.flat)
