@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as sl
 
-from evidence.models.two_blades import COARSER, SIZES, STUDY, two_blades
+from evidence.models.two_blades import COARSER, SHIPPED, SIZES, two_blades
 from evidence.second_damper.search import Candidate
 from stickslip.study.models.study import read_study
 from stickslip.units import HZ
@@ -36,7 +36,7 @@ class Refined:
 def refined(candidate: Candidate, factor: float) -> Refined:
     """Find the lowest mode above the first bending that moves along the circumference."""
     values = {k: list(v) if isinstance(v, tuple) else v for k, v in candidate.values.items()}
-    study = read_study(STUDY)
+    study = read_study(SHIPPED)
     known = study.file.raw["part"]["blades"]
     sizes = {f"part.blades.{k}": factor * known[k] for k in SIZES}
     blades = study.replace(values | sizes).model(0).parts["blades"].structure
@@ -53,7 +53,7 @@ def refined(candidate: Candidate, factor: float) -> Refined:
 
 def reduction_error(candidate: Candidate) -> float:
     """Return the largest error of the reduced frequencies up to the second bending, free and stuck, a fraction."""
-    known = two_blades(COARSER, **candidate.values).question.model.frequencies
+    known = two_blades(COARSER, SHIPPED, **candidate.values).question.model.frequencies
     errors = [
         np.abs(reduced / full - 1)[: np.sum(full < 700.0)].max()
         for full, reduced in (

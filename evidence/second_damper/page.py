@@ -146,9 +146,10 @@ def _below(first: Sequence[Found]) -> str:
     whole = [f for f in first if f.score == ASKED]
     glued = sum(f.few[LOWEST].glued for f in whole)
     alike = sum(f.off(LOWEST) <= ALIKE for f in whole)
+    slips = [100 * f.few[LOWEST].slips[2] for f in whole]
     return (
-        f"At {LOWEST:g}, far below the rig's ratios, the flat side of {glued} of these {len(whole)} still does not slip; one harmonic is within "
-        f"{100 * ALIKE:g} % of five for {alike}: R slides nearly all the time there."
+        f"At {LOWEST:g}, far below the rig's ratios, the flat side of {glued} of these {len(whole)} still does not slip, and R slips for {min(slips):.0f} to "
+        f"{max(slips):.0f} % of the period; one harmonic is within {100 * ALIKE:g} % of five for {alike} of them."
     )
 
 
