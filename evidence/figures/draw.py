@@ -286,7 +286,7 @@ def _optimisation(left: Axes, right: Axes, peaks: list[Peaks]) -> None:
     right.set(ylabel="frequency of the peak, Hz")
     for axis in (left, right):
         axis.set(xscale="log", xlabel="$F_{CL}/F_{HE}$")
-        axis.set_xticks(ratios, [f"{r:g}" for r in ratios])
+        axis.set_xticks(ratios, [f"{r:g}" for r in ratios], rotation=45, fontsize=8)
         axis.tick_params(axis="x", which="minor", bottom=False, labelbottom=False)
         axis.legend(fontsize=8)
         axis.grid(alpha=0.3, which="both")
