@@ -166,6 +166,42 @@ def test_a_peak_that_rises_above_the_stuck_one_is_no_work() -> None:
     assert regimes_of(peaks) == ("stuck", "works", "lets go", "lets go")
 
 
+def test_stretches_that_a_hump_parts_are_said_apart() -> None:
+    before = working_range(curve((250, 1.0, STICKS), (100, 0.6, SLIPS), (50, 0.9, SLIPS), (20, 0.4, SLIPS), (5, 0.95, SLIDES)))  # fmt: skip
+    after = working_range(curve((250, 1.0, STICKS), (100, 0.5, SLIPS), (50, 0.8, SLIPS), (20, 0.6, SLIPS), (5, 0.95, SLIDES)))  # fmt: skip
+    for own in (before, after):
+        assert own is not None
+        _, works, gone = range_sentences(own)
+        assert works.startswith("Friction works at  = 100 and at  = 20: ")
+        assert gone.startswith("Out of the working range below  = 20: ")
+
+
+def test_a_peak_that_never_falls_but_rises_is_not_said_to_stay_near() -> None:
+    own = working_range(curve((250, 1.0, STICKS), (100, 0.8, SLIPS), (50, 2.5, SLIDES), (20, 3.2, SLIDES)))  # fmt: skip
+    assert own is not None
+    assert range_sentences(own)[-1] == (
+        "At no value does friction take the peak per unit of force 3 dB below that of the stuck system: it is smallest at 100, 80 % of the "
+        "stuck one, and largest at 20, 320 %."
+    )
+
+
+def test_contacts_that_are_open_all_the_time_do_not_stick() -> None:
+    half = ContactsAtPeak(0.5, True, True)
+    own = working_range(curve((250, 1.0, half), (100, 0.9, SLIDES), (20, 0.5, SLIDES)))
+    assert own is not None
+    assert range_sentences(own)[0].startswith("From  = 250 up no contact slips, opens or closes")
+
+
+def test_what_dissipates_is_not_stuck_and_what_does_not_is_no_friction() -> None:
+    data = synthetic_result(ratios=(250, 50, 10, 5, 2), n=24)
+    data["peak_state"] = data["peak_state"].where(data["case"] > 0, 0)
+    assert working_ranges(data)[0].regimes[0] == "stuck"
+    lossy = data.assign(dissipated_energy=data["dissipated_energy"] + 1.0)  # as dahl before slip
+    assert "stuck" not in working_ranges(lossy)[0].regimes
+    lossless = data.assign(dissipated_energy=0.0 * data["dissipated_energy"])
+    assert working_ranges(lossless) == ()  # unilateral springs that open
+
+
 @pytest.mark.parametrize(
     "peaks",
     [

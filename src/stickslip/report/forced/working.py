@@ -21,17 +21,18 @@ def where_friction_works(response: Response) -> str | None:
 
 
 def shade_working_range(figure: go.Figure, response: Response, *, logarithmic: bool) -> str:
-    """Draw a band over the values at which friction works; return what the caption says of it, nothing where none is drawn."""
+    """Draw a band over each stretch of values at which friction works; return what the caption says of it, nothing where none is drawn."""
     ranges = working_ranges(response.data)
-    working = ranges[0].of("works") if len(ranges) == 1 else []
-    if not working:
+    stretches = ranges[0].stretches if len(ranges) == 1 else []
+    if not stretches:
         return ""
     values = np.unique([p.value for p in ranges[0].peaks])
     middles = np.sqrt(values[1:] * values[:-1]) if logarithmic else (values[1:] + values[:-1]) / 2
     edges = np.array([values[0], *middles, values[-1]])
-    at = np.searchsorted(values, sorted(p.value for p in working))
-    figure.add_vrect(
-        x0=float(edges[at[0]]), x1=float(edges[at[-1] + 1]),
-        fillcolor=GRID, opacity=0.6, line_width=0, layer="below",
-    )  # fmt: skip
+    for stretch in stretches:
+        at = np.searchsorted(values, sorted(p.value for p in stretch))
+        figure.add_vrect(
+            x0=float(edges[at[0]]), x1=float(edges[at[-1] + 1]),
+            fillcolor=GRID, opacity=0.6, line_width=0, layer="below",
+        )  # fmt: skip
     return " Shaded, to halfway to the neighbouring cases: where friction works."

@@ -5,7 +5,8 @@ last lets go: its force no longer grows with the motion, and the peak over the f
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import groupby, takewhile
 from typing import Literal, get_args
 
 import numpy as np
@@ -14,6 +15,7 @@ import xarray as xr
 from stickslip.arrays import IntArray
 from stickslip.contact.law import OPEN, SLIP
 from stickslip.study.analyses.forced.curve import Curve
+from stickslip.study.analyses.forced.jumps import LOSS_SEEN
 from stickslip.study.analyses.varied import first_varied_number, other_values
 from stickslip.study.analyses.verdict import LEVELS
 
@@ -32,7 +34,7 @@ class ContactsAtPeak:
     sticking
         Share of the cycle that they stick, the mean over all.
     linear
-        Whether none slips, and none opens or closes: the peak is that of a linear system.
+        Whether none slips, none opens or closes, and they dissipate nothing: the peak is that of a linear system.
     holding
         Whether any sticks from the beginning of the cycle to its end.
     """
@@ -71,7 +73,7 @@ class CurvePeak:
     amplitude
         The largest amplitude itself, m.
     loss
-        Energy that the contacts dissipate in a cycle of it, J.
+        Energy that the contacts dissipate in a cycle of it, J; zero where it is rounding, NaN where it is not known.
     case
         Position along ``case``.
     """
@@ -118,6 +120,20 @@ class WorkingRange:
         return [p for p, own in zip(self.peaks, self.regimes, strict=True) if own in regimes]
 
     @property
+    def stretches(self) -> list[list[CurvePeak]]:
+        """Neighbours at which friction works."""
+        pairs = zip(self.peaks, self.regimes, strict=True)
+        runs = groupby(pairs, key=lambda pair: pair[1])
+        return [[p for p, _ in run] for regime, run in runs if regime == "works"]
+
+    @property
+    def loose(self) -> list[CurvePeak]:
+        """The last peaks, beyond the last one at which friction works; empty where it works to the end or nowhere lets go."""
+        backwards = zip(self.peaks[::-1], self.regimes[::-1], strict=True)
+        gone = takewhile(lambda pair: pair[1] == "lets go", backwards)
+        return [p for p, _ in gone][::-1]
+
+    @property
     def smallest(self) -> CurvePeak:
         """The optimum among the values computed."""
         return min(self.peaks, key=lambda p: p.size)
@@ -153,9 +169,9 @@ def regimes_of(peaks: Sequence[CurvePeak]) -> tuple[Regime, ...]:
 
 
 def working_range(peaks: Sequence[CurvePeak]) -> WorkingRange | None:
-    """Put a curve in order and judge it; None where there are too few peaks, none slips, or no end sticks more than the other."""
+    """Put a curve in order and judge it; None where there are too few peaks, no friction, or no end that sticks more than the other."""
     rising = sorted(peaks, key=lambda p: p.value)
-    if len(rising) < FEWEST or all(p.contacts.linear for p in rising):
+    if len(rising) < FEWEST or all(p.contacts.linear or p.loss == 0.0 for p in rising):
         return None
     low, high = (rising[k].contacts.sticking for k in (0, -1))
     if low == high:
@@ -195,10 +211,18 @@ def _peak(data: xr.Dataset, case: int, value: float, force: float) -> CurvePeak 
     state = data["peak_state"].isel(case=case).transpose("contact", "tangent", "sample").values
     if not np.isfinite(amplitude) or np.any(state < 0):
         return None
-    return CurvePeak(
-        value, amplitude / force, curve.peak_hz, contacts_at_peak(state),
-        amplitude, float(curve.dissipation[curve.peak]), case,
-    )  # fmt: skip
+    contacts, loss = contacts_at_peak(state), _loss(curve)
+    if loss > 0.0:  # some laws, such as dahl, dissipate before they slip
+        contacts = replace(contacts, linear=False)
+    return CurvePeak(value, amplitude / force, curve.peak_hz, contacts, amplitude, loss, case)
+
+
+def _loss(curve: Curve) -> float:
+    """Return the energy that contacts dissipate at a peak, J: zero where it is rounding, NaN where the dataset does not tell."""
+    if not curve.elastic > 0.0:
+        return float("nan")
+    loss = float(curve.dissipation[curve.peak])
+    return loss if loss > LOSS_SEEN * curve.elastic else 0.0
 
 
 def with_regimes(data: xr.Dataset) -> xr.Dataset:

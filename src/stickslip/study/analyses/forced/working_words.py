@@ -4,7 +4,12 @@ from collections.abc import Sequence
 
 import xarray as xr
 
-from stickslip.study.analyses.forced.working_range import CurvePeak, WorkingRange, working_ranges
+from stickslip.study.analyses.forced.working_range import (
+    HALF_POWER,
+    CurvePeak,
+    WorkingRange,
+    working_ranges,
+)
 from stickslip.study.analyses.verdict import said
 
 TITLE = "Where friction works"
@@ -40,19 +45,19 @@ def _stuck_end(own: WorkingRange) -> str:
         side = "above" if own.falling else "below"
         return f"At no value do all contacts stick at the peak: that end of the curve lies {side} {_of(own, own.peaks[0])}."
     side = "up" if own.falling else "down"
+    shut = all(p.contacts.sticking == 1.0 for p in own.of("stuck"))
+    still = "all contacts stick" if shut else "no contact slips, opens or closes"
     return (
-        f"From {_of(own, own.stuck)} {side} all contacts stick at the peak: friction dissipates nothing, and the resonance is that of the stuck "
+        f"From {_of(own, own.stuck)} {side} {still} at the peak: friction dissipates nothing, and the resonance is that of the stuck "
         f"system, at {own.stuck.hertz:.5g} Hz."
     )
 
 
 def _middle(own: WorkingRange) -> str:
-    best, stuck, working = own.smallest, own.stuck, own.of("works")
-    if not working:
+    best, stuck = own.smallest, own.stuck
+    if not own.stretches:
         return "" if stuck is None else _hardly(own, stuck)
-    where = f"at {_of(own, working[0])}"
-    if len(working) > 1:
-        where = f"from {_of(own, working[0])} to {working[-1].value:g}"
+    where = " and ".join(_stretch(own, peaks) for peaks in own.stretches)
     if stuck is None:
         return f"Friction works {where}: there the {_size(own)} lies within 3 dB of the smallest one, at {best.value:g}."
     return (
@@ -61,9 +66,23 @@ def _middle(own: WorkingRange) -> str:
     )
 
 
+def _stretch(own: WorkingRange, peaks: Sequence[CurvePeak]) -> str:
+    """Return from where to where, in words."""
+    first, last = peaks[0], peaks[-1]
+    if first is last:
+        return f"at {_of(own, first)}"
+    return f"from {_of(own, first)} to {last.value:g}"
+
+
 def _hardly(own: WorkingRange, stuck: CurvePeak) -> str:
     """Say of friction that never takes the peak 3 dB down how near it stays to full stick."""
     off = [p.size / stuck.size - 1 for p in own.peaks]
+    if max(off) > 1 / HALF_POWER - 1:
+        best, worst = own.smallest, max(own.peaks, key=lambda p: p.size)
+        return (
+            f"At no value does friction take the {_size(own)} 3 dB below that of the stuck system: it is smallest at {best.value:g}, "
+            f"{_percent(best.size / stuck.size)} of the stuck one, and largest at {worst.value:g}, {_percent(worst.size / stuck.size)}."
+        )
     word = "Down" if own.falling else "Up"
     return (
         f"{word} to {_of(own, own.peaks[-1])} the {_size(own)} stays within {_percent(max(map(abs, off)))} of that of the stuck system: "
@@ -72,7 +91,7 @@ def _hardly(own: WorkingRange, stuck: CurvePeak) -> str:
 
 
 def _loose_end(own: WorkingRange) -> str:
-    gone, best, last = own.of("lets go"), own.smallest, own.peaks[-1]
+    gone, best, last = own.loose, own.smallest, own.peaks[-1]
     if gone:
         side = "below" if own.falling else "above"
         held = own.peaks[own.peaks.index(gone[0]) - 1]
@@ -99,7 +118,11 @@ def _saturated(best: CurvePeak, last: CurvePeak) -> str:
     if not (best.loss > 0.0 and last.loss > 0.0 and last is not best):
         return ""
     grown, loss = last.amplitude / best.amplitude, last.loss / last.amplitude
-    return f"; while the amplitude grows {grown:.3g} times, the energy lost in a cycle over the amplitude grows {loss * best.amplitude / best.loss:.3g} times"
+    more = loss * best.amplitude / best.loss
+    if grown <= 1.0:
+        return ""
+    becomes = f"grows {more:.3g} times" if more >= 1.0 else f"falls to {_percent(more)}"
+    return f"; while the amplitude grows {grown:.3g} times, the energy lost in a cycle over the amplitude {becomes}"
 
 
 def _percent(share: float) -> str:
