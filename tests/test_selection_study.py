@@ -14,6 +14,7 @@ from small_v2 import write_four_masses, write_two_blades
 
 from stickslip.errors import InputError
 from stickslip.harmonic.selection import STRATEGIES, strategy_named
+from stickslip.harmonic.selection.grolet import Grolet
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.report.forced.choice import choice
 from stickslip.report.forced.errors import errors
@@ -29,7 +30,7 @@ from stickslip.study.run import run_study
 
 # a damper that slips around the peak, at few frequencies
 SLIPPING = {
-    "load.shaker.ratio": "20",
+    "load.shaker.ratio": "8",
     "forced_response.frequency_hz": "[177.6, 179.2]",
     "forced_response.peak_points": "0",
     "forced_response.frequencies": "2",
@@ -245,6 +246,24 @@ def test_check_tells_where_resonances_are_and_what_it_will_cost(base: Study) -> 
     assert any("no natural frequency lies between 20.00 and 30.00 Hz" in x for x in beside)
 
 
+def test_the_options_of_a_rival_reach_the_response(tmp_path: Path) -> None:
+    keys = {
+        "harmonics.selection": '"grolet"', "harmonics.high": "5", "harmonics.strategy_threshold": "1e-6",
+        "forced_response.frequencies": "10",
+    }  # fmt: skip
+    solved = {}
+    for options in ({}, {"per_dof": "true"}, {"per_dof": "true", "repeats": "true"}):
+        own = keys | {f"harmonics.{name}": value for name, value in options.items()}
+        study = read_study(write_four_masses(tmp_path / "_".join(options), own))
+        assert study.tables.harmonics.chooser == Grolet(
+            threshold=1e-6, **dict.fromkeys(options, True)
+        )
+        solved[tuple(options)] = int(run(study).data.unknowns_solved.sum())
+    # of each coordinate by itself fewer are kept, and what is repeated is solved twice
+    assert solved[("per_dof",)] < solved[()]
+    assert solved[("per_dof",)] < solved[("per_dof", "repeats")]
+
+
 REFUSED = {
     "unknown strategy": (
         {"selection": "jacobian_allert"},
@@ -260,6 +279,14 @@ REFUSED = {
     "threshold of nothing": (
         {"selection": "always_low", "strategy_threshold": 0.1},
         "harmonics.strategy_threshold: has no meaning for selection = 'always_low', got 0.1. Remove it: nothing is decided.",
+    ),
+    "harmonics of each dof by a rule that knows none": (
+        {"selection": "laxalde", "per_dof": True},
+        "harmonics.per_dof: has no meaning for selection = 'laxalde', got true. Remove it, or choose one of grolet, maple.",
+    ),
+    "repeats of a rule that repeats anyway": (
+        {"selection": "maple", "repeats": True},
+        "harmonics.repeats: has no meaning for selection = 'maple', got true. Remove it, or choose one of grolet, laxalde, suess_jacobian, suess_spectral.",
     ),
     "threshold below nothing": (
         {"alert_threshold_percent": -5},

@@ -32,7 +32,7 @@ class Plan:
     all_ratios, timing_ratios
         Of the optimisation curves (fig. 9) and of the costs (fig. 7b), largest first.
     branch_hertz
-        Range of responses that are followed along their branch.
+        Range of responses that are followed along their branch, and in which their peak is looked for: below the next mode.
     hertz, frequencies
         Equally spaced frequencies of the errors.
     timing_hertz, timing_frequencies, repeats
@@ -48,10 +48,10 @@ class Plan:
     time_ratios: tuple[float, ...] = (2.0, 3.0, 5.0)
     all_ratios: tuple[float, ...] = (250.0, 100.0, 50.0, 20.0, 10.0, 5.0, 3.0, 2.0)
     timing_ratios: tuple[float, ...] = (250.0, 100.0, 50.0, 20.0, 10.0, 5.0, 3.0)
-    branch_hertz: tuple[float, float] = (150.0, 190.0)
+    branch_hertz: tuple[float, float] = (150.0, 187.0)
     hertz: tuple[float, float] = (150.0, 190.0)
     frequencies: int = 81
-    timing_hertz: tuple[float, float] = (166.25, 190.0)
+    timing_hertz: tuple[float, float] = (163.25, 187.0)
     timing_frequencies: int = 20
     repeats: int = 5
     markers: int = 7

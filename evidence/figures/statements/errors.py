@@ -64,7 +64,8 @@ def _strong(e: Evidence) -> Statement:
         asked = [p.predicted > THRESHOLD for p in found]
         runs = int(np.sum(np.diff(np.array([False, *asked]).astype(int)) == 1))
         hertz = [p.hertz for p, a in zip(found, asked, strict=True) if a]
-        peak = max(found, key=lambda p: p.problem.amplitude(p.high))
+        below = [p for p in found if p.hertz <= e.plan.branch_hertz[1]]
+        peak = max(below or found, key=lambda p: p.problem.amplitude(p.high))
         inside = bool(hertz) and min(hertz) <= peak.hertz <= max(hertz)
         ends = asked[0] or asked[-1]
         verdicts.append(inside and runs == 1 and not ends)

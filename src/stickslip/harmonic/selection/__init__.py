@@ -1,5 +1,6 @@
 """Which harmonics a frequency needs: strategies, one a file, and their names."""
 
+from dataclasses import fields
 from importlib import import_module
 from typing import Any
 
@@ -19,10 +20,11 @@ STRATEGIES = {
     "always_low": ("fixed", "AlwaysLow"),
     "always_high": ("fixed", "AlwaysHigh"),
 }
+OPTIONS = ("per_dof", "repeats")
 
 
-def strategy_named(name: str, threshold: float | None = None) -> Strategy:
-    """Return a strategy with its own parameters, but for a threshold; its file is loaded when it is first asked for.
+def strategy_named(name: str, threshold: float | None = None, **options: bool) -> Strategy:
+    """Return a strategy with its own parameters, but for a threshold and options; its file is loaded when it is first asked for.
 
     Parameters
     ----------
@@ -30,8 +32,22 @@ def strategy_named(name: str, threshold: float | None = None) -> Strategy:
         One of `STRATEGIES`.
     threshold
         Indicator above which more harmonics are asked for; None: that of the strategy's source.
+    options
+        ``per_dof`` and ``repeats`` of those that have them (`options_of`).
     """
-    file, own = STRATEGIES[name]
-    made: Any = getattr(import_module(f"{__name__}.{file}"), own)
-    strategy: Strategy = made() if threshold is None else made(threshold=threshold)
+    own = _class_of(name)
+    strategy: Strategy = (
+        own(**options) if threshold is None else own(threshold=threshold, **options)
+    )
     return strategy
+
+
+def options_of(name: str) -> tuple[str, ...]:
+    """Return which of the options ``per_dof`` and ``repeats`` a strategy has."""
+    known = {field.name for field in fields(_class_of(name))}
+    return tuple(option for option in OPTIONS if option in known)
+
+
+def _class_of(name: str) -> Any:
+    file, own = STRATEGIES[name]
+    return getattr(import_module(f"{__name__}.{file}"), own)

@@ -8,7 +8,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from stickslip.errors import InputError, did_you_mean
-from stickslip.harmonic.selection import STRATEGIES, strategy_named
+from stickslip.harmonic.selection import OPTIONS, STRATEGIES, options_of, strategy_named
 from stickslip.harmonic.selection.strategy import Strategy, always_kept
 from stickslip.harmonic.support import Harmonics as Support
 from stickslip.harmonic.support import harmonics_of
@@ -57,6 +57,14 @@ class Harmonics(Section):
         None,
         description="threshold of a selection whose indicator is no error, greater than zero; left out: that of its source",
     )
+    per_dof: bool = Field(
+        False,
+        description="harmonics of each retained coordinate by itself, as their sources have it (for maple and grolet)",
+    )
+    repeats: bool = Field(
+        False,
+        description="solve a frequency again until it has the harmonics that it foretells (for grolet, laxalde, suess_spectral and suess_jacobian)",
+    )
     alert_over: Literal["along", "outputs", "contacts"] | list[str] = Field(
         "along",
         description="where the error is taken: along (the outputs' motion along the excitation), outputs (all of it), contacts "
@@ -100,7 +108,9 @@ class Harmonics(Section):
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
-        refuse_all([*_of_supports(self), *_of_threshold(self), *_of_alert(self)])
+        refuse_all(
+            [*_of_supports(self), *_of_options(self), *_of_threshold(self), *_of_alert(self)]
+        )
         return self
 
     @property
@@ -118,18 +128,22 @@ class Harmonics(Section):
     @property
     def strategy(self) -> Strategy:
         """What chooses, with this table's threshold where it has one."""
-        strategy = strategy_named(self.selection)
+        strategy = strategy_named(self.selection, **self._options)
         if strategy.verifies:
             return strategy_named(self.selection, self.alert_threshold_percent / 100)
         if self.strategy_threshold is None:
             return strategy
-        return strategy_named(self.selection, self.strategy_threshold)
+        return strategy_named(self.selection, self.strategy_threshold, **self._options)
+
+    @property
+    def _options(self) -> dict[str, bool]:
+        return {name: True for name in options_of(self.selection) if getattr(self, name)}
 
     @property
     def chooser(self) -> str | Strategy:
         """What a sweep takes as its selection: the name, or the strategy with this table's own threshold."""
-        own = None if self.strategy_threshold is None else self.strategy
-        return self.selection if own is None else own
+        as_named = self.strategy_threshold is None and not self._options
+        return self.selection if as_named else self.strategy
 
     @property
     def single(self) -> bool:
@@ -189,6 +203,17 @@ def _of_samples(table: Harmonics, highest: int) -> Iterator[PydanticCustomError]
             f"Add samples = {better}, or lower {key}.",
             key,
         )
+
+
+def _of_options(table: Harmonics) -> Iterator[PydanticCustomError]:
+    for option in OPTIONS:
+        if getattr(table, option) and option not in options_of(table.selection):
+            having = ", ".join(name for name in STRATEGIES if option in options_of(name))
+            yield custom_error(
+                f"has no meaning for selection = {table.selection!r}, got true",
+                f"Remove it, or choose one of {having}.",
+                option,
+            )
 
 
 def _of_threshold(table: Harmonics) -> Iterator[PydanticCustomError]:
