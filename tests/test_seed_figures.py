@@ -10,6 +10,7 @@ from evidence.figures.evidence import gather
 from evidence.figures.model import Model, Plan, SecondPlan
 from evidence.figures.page import page, table
 from evidence.figures.statements import statements
+from evidence.figures.statements.errors import _middle_half
 from evidence.figures.statements.statement import Statement, below, numbered, tally
 from evidence.figures.timing import Share
 from evidence.models.lumped import blades_and_damper
@@ -132,3 +133,33 @@ def test_every_row_is_printed_with_its_reason_only_where_it_fails(evidence):
     assert f"**{tally(rows)}, of {len(rows)} statements.**" in text
     assert sum(int(n) for n in re.findall(r"\d+", tally(rows))) == len(rows)
     assert len({(r.section, r.claim) for r in rows}) == len(rows)
+
+
+def test_a_verdict_on_spread_does_not_grow_with_the_number_of_frequencies():
+    """The range of 119 values is nearly always larger than that of 11 of the same distribution."""
+    rng = np.random.default_rng(0)
+    wider = [
+        _middle_half(np.exp(rng.normal(size=119))) > _middle_half(np.exp(rng.normal(size=11)))
+        for _ in range(1000)
+    ]
+    assert 0.4 < np.mean(wider) < 0.7
+    assert _middle_half(np.array([1.0, 2.0, 4.0])) == pytest.approx(np.log(2.0))
+
+
+def test_a_peak_in_time_among_unknown_frequencies_decides_no_shift(evidence):
+    t = evidence.in_time
+    lost = [m._replace(orbit=replace(m.orbit, motion="not periodic", hertz=m.orbit.hertz + 0.1)) for m in t.markers]  # fmt: skip
+    own = row(
+        statements(replace(evidence, in_time=replace(t, markers=[*t.markers, *lost]))),
+        "One harmonic overestimates",
+    )
+    assert own.verdict == "undecided"
+
+
+def test_full_stick_with_two_readings_that_differ_is_undecided(evidence):
+    first = "In full stick harmonics are not coupled"
+    alike = replace(evidence.norms, stuck=evidence.norms.frozen)
+    coupled = np.where(np.eye(len(alike.stuck)) > 0, alike.stuck, 1.0)
+    assert row(statements(replace(evidence, norms=alike)), first).verdict == "holds"
+    apart = replace(evidence.norms, stuck=coupled)
+    assert row(statements(replace(evidence, norms=apart)), first).verdict == "undecided"

@@ -42,8 +42,8 @@ def _of_blocks(e: Evidence) -> list[Statement]:
             number="blank off the diagonal",
             own=f"largest block off the diagonal, a stuck contact being 1: sliders frozen where the static load leaves them (with {n.share:g} of the friction) {frozen:.2g}; "
             f"static and dynamic part found together {together:.2g}, of the forces of harmonics 1 and above {dynamic:.2g}",
-            verdict=judged(frozen < ZERO),
-            by="" if frozen >= ZERO else "in both conventions" if together < ZERO else "where the static state is found first, not where both are found together ({doc}`theory/contact`)",
+            verdict=judged(frozen < ZERO) if (frozen < ZERO) == (together < ZERO) else "undecided",
+            by="" if frozen >= ZERO else "in both conventions" if together < ZERO else f"block-diagonal up to {frozen:.2g} where the static state is found first, not where both are found together ({{doc}}`theory/contact`)",
             why=f"Even frozen sliders couple blocks by {frozen:.2g}.",
         ),
         Statement(

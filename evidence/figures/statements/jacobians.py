@@ -5,7 +5,6 @@ import numpy as np
 from evidence.figures.evidence import Evidence
 from evidence.figures.solve import Pair
 from evidence.figures.statements.statement import (
-    ONE_PERCENT,
     THRESHOLD,
     Statement,
     judged,
@@ -15,6 +14,9 @@ from evidence.figures.statements.statement import (
     span,
 )
 
+ALERTED_OFF = (
+    1 - 0.994
+)  # how far the mean of Γ's diagonal is from 1 in the paper's case above tolerance
 WEAK, STRONG = 0.032, 0.04  # ΔJ of the paper's weak case, and what is exceeded beyond the tolerance
 ZEROS = (
     0.997,
@@ -76,7 +78,7 @@ def _weak_trace(quiet: list[Pair]) -> Statement:
     off = abs(weak.similarity.mean_diagonal - 1)
     return Statement(
         section="6.2", claim="Γ is quite similar to the identity in a weak case: its trace is its size", number="363.002 of 363; mean of the diagonal 0.9995",
-        own=_said(weak), verdict=judged(off < ONE_PERCENT), by=f"{percent(off)} off",
+        own=_said(weak), verdict=judged(off < ALERTED_OFF), by=f"{percent(off)} off, the paper's alerted case {percent(ALERTED_OFF)}",
         why=f"{percent(weak.states, 2)} of the contact directions and instants differ in state there, median of all accepted {percent(median([p.states for p in quiet]), 2)}; these have a median of {percent(median([abs(p.similarity.mean_diagonal - 1) for p in quiet]), 2)} off.",
     )  # fmt: skip
 

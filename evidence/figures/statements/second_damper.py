@@ -191,7 +191,7 @@ def _cycles(e: Evidence, state: dict[float, list[Line]]) -> list[Statement]:
         Statement(
             section="7", place="Fig. 11", claim="The hysteresis cycles with one and five harmonics overlap at resonance", number="overlap",
             own=f"{where}: root-mean-square difference of the tangential forces {percent(cycles)} of their swing, of the outputs {percent(pair.real, 2)}",
-            verdict=_verdict(missing, cycles < THRESHOLD), by=missing, why=f"{lines} of the time; contact states differ at {percent(pair.states, 2)} of the directions and instants.",
+            verdict=_verdict(missing, cycles < OVERLAP), by=missing, why=f"{lines} of the time; contact states differ at {percent(pair.states, 2)} of the directions and instants.",
         ),
         Statement(
             section="7", claim="The first harmonic of the contact forces is equal in both cases", number="equal", own=f"{where}: difference {percent(first, 2)}",
@@ -219,7 +219,7 @@ def _not_effective(e: Evidence, state: dict[float, list[Line]]) -> Statement:
     (at, own), (beyond, lowest), (first_at, first) = (_best(p) for p in (measured, e.second_peaks, e.peaks))  # fmt: skip
     missing = _tested(e, state, [p.ratio for p in measured], slip=False)
     return Statement(
-        section="7", claim="Down to 11.7 such a damper is out of its working range: it should be much more nonlinear to be effective",
+        section="7", claim="Such a damper should be much more nonlinear to be effective (judged: how far it lowers the peak down to 11.7)",
         own=f"smallest peak for a unit of force down to {min(e.second_plan.ratios):g}: {percent(own)} of the stuck one, at {at:g}; down to {e.second_peaks[-1].ratio:g}: {percent(lowest)} at {beyond:g}; first damper, first bending: {percent(first)} at {first_at:g}",
         verdict=_verdict(missing, own > TIMES * first), by=missing, why=f"It lowers the peak to {percent(own)}, the first damper to {percent(first)}.",
     )  # fmt: skip
