@@ -192,6 +192,12 @@ def test_contacts_that_are_open_all_the_time_do_not_stick() -> None:
     assert range_sentences(own)[0].startswith("From  = 250 up no contact slips, opens or closes")
 
 
+def test_a_setting_of_the_computation_makes_no_curve() -> None:
+    data = synthetic_result(ratios=(250, 50, 10, 5, 2), n=24)
+    assert working_ranges(data)
+    assert working_ranges(data.assign_coords(vary=["harmonics.high"])) == ()
+
+
 def test_what_dissipates_is_not_stuck_and_what_does_not_is_no_friction() -> None:
     data = synthetic_result(ratios=(250, 50, 10, 5, 2), n=24)
     data["peak_state"] = data["peak_state"].where(data["case"] > 0, 0)

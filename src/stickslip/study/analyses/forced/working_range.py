@@ -23,6 +23,9 @@ Regime = Literal["stuck", "stiffens", "works", "lets go"]
 REGIMES: tuple[Regime, ...] = get_args(Regime)  # the number of a regime in a dataset is its place
 HALF_POWER = 0.5**0.5  # 3 dB: a peak of half the energy
 FEWEST = 3  # peaks of a curve
+SETTINGS = (
+    "forced_response", "harmonics", "limits", "output", "reduction", "retention", "solver",
+)  # tables of how things are computed: over them no joint goes from stick to slip  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -183,7 +186,7 @@ def working_range(peaks: Sequence[CurvePeak]) -> WorkingRange | None:
 def working_ranges(data: xr.Dataset) -> tuple[WorkingRange, ...]:
     """Return the curves of a forced response over the first varied number, one for each set of other values."""
     key, values = first_varied_number(data)
-    if not key or "peak_state" not in data:
+    if not key or key.split(".")[0] in SETTINGS or "peak_state" not in data:
         return ()
     force = data["excitation_n"].values if "excitation_n" in data else np.full(len(values), np.nan)
     per_force = bool(np.all(force > 0))
