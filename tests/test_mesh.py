@@ -145,6 +145,11 @@ def test_unknown_mesh_format_is_refused(mesh, tmp_path):
         ({"pitch": 0.008}, "BladePair.pitch: 0.008 m leaves no room.*overlap"),
         ({"platform_height": 0.010}, "BladePair.platform_height.*above the foot"),
         ({"force_span": 0.5}, r"BladePair.force_span: must lie in \(-1, 0.5\), got 0.5"),
+        (
+            {"force_span": -1e-6},
+            "BladePair.force_span: -1e-06 puts the force 6.98e-08 m from an end",
+        ),
+        ({"force_span": -1 + 1e-9}, "BladePair.force_span: .*from an end of the shank"),
         ({"hub_chord": 0.060}, "overhangs the platform"),
         ({"foot_depth": 0.010}, "smaller than the shank"),
         ({"foot_width": 0.057}, "the feet overlap"),

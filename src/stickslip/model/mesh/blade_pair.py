@@ -108,6 +108,18 @@ class BladePair:
                 "It must lie above the foot (z = 0): raise the platform or flatten its angles.",
             )
         self._check_supports()
+        self._check_force()
+
+    def _check_force(self) -> None:
+        """Refuse a place on the shank so near to one of its ends that only slivers fit between."""
+        top = self.shank_tops[1]
+        place, least = (1.0 + self.force_span) * top, self.foot_size / 20
+        if self.force_span < 0.0 and not least <= place <= top - least:
+            raise _bad(
+                "force_span",
+                f"{self.force_span:.9g} puts the force {min(place, top - place):.3g} m from an end of the shank, with elements of {self.foot_size} m",
+                f"Keep it between {1.1 * least / top - 1:.3g} and {-1.1 * least / top:.3g} on the shank, or give zero: the hub.",
+            )
 
     def _check_supports(self) -> None:
         reach = abs(self.camber) * self.hub_chord + self.hub_thickness / 2
