@@ -47,8 +47,14 @@ def _stuck_end(own: WorkingRange) -> str:
     side = "up" if own.falling else "down"
     shut = all(p.contacts.sticking == 1.0 for p in own.of("stuck"))
     still = "all contacts stick" if shut else "no contact slips, opens or closes"
+    first = own.stuck is own.peaks[0]
+    where = (
+        f"At {_of(own, own.stuck)}, the first value,"
+        if first
+        else f"From {_of(own, own.stuck)} {side}"
+    )
     return (
-        f"From {_of(own, own.stuck)} {side} {still} at the peak: friction dissipates nothing, and the resonance is that of the stuck "
+        f"{where} {still} at the peak: friction dissipates nothing, and the resonance is that of the stuck "
         f"system, at {own.stuck.hertz:.5g} Hz."
     )
 
