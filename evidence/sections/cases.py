@@ -32,12 +32,12 @@ OFF = (
     1 / 6
 )  # of the length: how far from the middle the pull acts; there the pressure at the other end would vanish
 SWEPT = {
-    "bending": (0.975, 1.006),
-    "leaning": (0.955, 1.006),
+    "bending": (0.95, 1.02),
+    "leaning": (0.9, 1.02),
     "lines": (0.9, 1.02),
 }  # over the lowest stuck frequency
-TORSION = (1450.0, 1490.0)  # Hz
-POINTS, PEAK_POINTS = 12, 20  # of a sweep
+TORSION = (1350.0, 1600.0)  # Hz
+POINTS, PEAK_POINTS = 24, 20  # of a sweep
 ORDERS, FITS = (0.1, 6.0), 0.2  # of convergence that are looked for; misfit that is let pass
 HZ = 2 * np.pi
 Kept = Literal["5", "auto"]
@@ -87,7 +87,7 @@ class Case:
 CASES = (
     Case("bending", "bending", (20.0, 5.0), ("5", "auto")),
     Case("leaning", "bending, the pull a sixth of the length off the middle", (20.0, 5.0)),
-    Case("torsion", "torsion of the airfoils", (50.0, 20.0)),
+    Case("torsion", "torsion of the airfoils", (20.0, 5.0)),
 )
 
 

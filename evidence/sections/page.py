@@ -74,8 +74,16 @@ def _table(found: Found) -> str:
     return "\n".join("| " + " | ".join(row) + " |" for row in rows) + (
         f"\n\n*Amplitude and frequency of the peak, as differences from {MOST} sections, whose own values stand in their row. Order: the p with which "
         f"differences between {FEW} and {MOST} sections are like $n^{{-p}} - {MOST}^{{-p}}$, in amplitude and frequency; – where they are not. Bending: output `tip1.x`; leaning: the same with the centre of mass, where the pull acts, a sixth of "
-        "the length off the middle; torsion: force and output at the edge of a tip, `edge1.x`.*"
+        f"the length off the middle; torsion: force and output at the edge of a tip, `edge1.x`. {_lost(found)}*"
     )
+
+
+def _lost(found: Found) -> str:
+    """Say how many points of the sweeps were not found."""
+    lost = [
+        f"{p.lost} with {p.count} ({_heading(s)})" for s in found.series for p in s.peaks if p.lost
+    ]
+    return f"Points of the sweeps without a solution: {'; '.join(lost) or 'none'}."
 
 
 def _cell(series: Series, count: int) -> str:
@@ -122,7 +130,8 @@ def _said(found: Found) -> list[str]:
     limits = f"{100 * HEIGHT:g} % of the amplitude or {100 * PLACE:g} % of the frequency"
     first = (
         f"**Bending.** Between {FEW} and {MOST} sections the peak changes by at most {100 * height:.2g} % in amplitude and {100 * place:.2g} % in frequency, over both "
-        f"ratios and both choices of harmonics. With a change of {limits} called significant, the paper's statement that there is none {verdict}."
+        f"ratios and both choices of harmonics. With a change of {limits} called significant, the paper's statement that there is none {verdict}. "
+        f"Harmonics by need went up to {' and up to '.join(f'{max(p.highest for p in s.peaks)} at ratio {s.ratio:g}' for s in bending if s.kept == 'auto')}."
     )
     rows = [
         f"* {_heading(s)}: {_needed(s)}; with {FEW} of them {pair(s.off(FEW))}, with one {pair(s.off(1))}."
@@ -152,10 +161,19 @@ def _of_lines(found: Found) -> str:
         f"two lines stand at the ends of the same area:\n\n{table}\n\nAt rest the resultant of the example's flat side acts {1e3 * found.resultant:.1f} mm from the apex, and a side that only pushes carries "
         "a load between its outer lines alone. They stand at "
         + "; ".join(_outer(n) for n in LINES)
-        + ". A damper whose resultant is not between them tips and lets the blades go. Pressed evenly, two lines in the middles of halves would make the side $1 - 1/2^2$ = 3/4 as "
+        + f". {_between(found.resultant)} Pressed evenly, two lines in the middles of halves would make the side $1 - 1/2^2$ = 3/4 as "
         "stiff against rocking as the area is, two at its ends three times as stiff. Lines of the flat side are therefore no matter of resolution alone: two at the ends say that "
         "the flat touches at its edges."
     )
+
+
+def _between(resultant: float) -> str:
+    """Say for which numbers of lines the resultant lies between the outer ones."""
+    ends = {n: (example()[1].lines(n)[0], example()[1].lines(n)[-1]) for n in LINES}
+    out = [str(n) for n, (low, high) in ends.items() if not low <= resultant <= high]
+    if not out:
+        return "The resultant is between them with all of these numbers."
+    return f"With {' and '.join(out)} the resultant is not between them: the damper tips and lets the blades go."
 
 
 def _outer(count: int) -> str:
