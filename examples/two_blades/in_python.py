@@ -23,7 +23,7 @@ system = ss.System(both, contacts, outputs=both.sets["blades.output"], free=both
 
 static, force = np.zeros(both.n), np.zeros(both.n, dtype=complex)
 static[both.sets["damper"][2]] = 442.0  # N, centrifugal load on the damper
-force[both.sets["blades.force"][0]] = 442.0 / 20  # N, harmonic force on blade 1
+force[both.sets["blades.force"][0]] = 442.0 / 10  # N, harmonic force on blade 1
 load = ss.HarmonicLoad(static, {1: force})
 sweep = ss.Sweep(omega_range=(2 * np.pi * 150, 2 * np.pi * 187))
 problem = ss.response.forced_problem(system, load, sweep)
