@@ -120,7 +120,9 @@ def test_the_run_says_where_friction_works(brake: ss.Result, tmp_path: Path) -> 
     data = brake["forced_response"]
     (own,) = working_ranges(data)
     stuck, works, gone = range_lines(data)
-    assert stuck.startswith(f"At {KEY} = {own.peaks[0].value:g}, the first value, all contacts stick")
+    assert stuck.startswith(
+        f"At {KEY} = {own.peaks[0].value:g}, the first value, all contacts stick"
+    )
     (only,) = own.of("works")
     assert works.startswith(f"Friction works at {KEY} = {only.value:g}: there the peak per unit")
     assert gone.startswith(f"Out of the working range above {KEY} = {only.value:g}: ")
@@ -189,7 +191,9 @@ def test_contacts_that_are_open_all_the_time_do_not_stick() -> None:
     half = ContactsAtPeak(0.5, True, True)
     own = working_range(curve((250, 1.0, half), (100, 0.9, SLIDES), (20, 0.5, SLIDES)))
     assert own is not None
-    assert range_sentences(own)[0].startswith("At  = 250, the first value, no contact slips, opens or closes")
+    assert range_sentences(own)[0].startswith(
+        "At  = 250, the first value, no contact slips, opens or closes"
+    )
 
 
 def test_a_setting_of_the_computation_makes_no_curve() -> None:
