@@ -148,13 +148,16 @@ def hands() -> tuple[Structure, np.ndarray, tuple[ElasticCoulomb, ...], np.ndarr
             columns = first + 3 * at[int(node)] + np.arange(3)
             gaps[3 * p : 3 * p + 3, columns] += share * frames[p].T
         gaps[3 * p : 3 * p + 3, -6:] -= frames[p].T @ motion[p]
-    law = ElasticCoulomb(k_t=4e7 / 9, k_w=4e7 / 9, k_n=5e7 / 9, mu=0.5)
+    # three lines in the middles of equal strips; along the damper, 40 mm long, each point has what is nearest to it
+    borders = np.array([-0.02, *(np.array(SECTIONS[1:]) + SECTIONS[:-1]) / 2, 0.02])
+    shares = np.tile(np.diff(borders) / 0.04 / 3, 6)
+    laws = tuple(ElasticCoulomb(k_t=4e7 * s, k_w=4e7 * s, k_n=5e7 * s, mu=0.5) for s in shares)
     static, force = np.zeros(both.n), np.zeros(both.n, dtype=complex)
     pull = np.array([0.0871557, 0.0, 0.9961947])
     static[-6:-3] = PULL * pull / np.linalg.norm(pull)
     for n in mesh.numbers[tip]:
         force[3 * at[int(n)]] += PULL / RATIO / len(tip)
-    return both, gaps, (law,) * 18, static, force
+    return both, gaps, laws, static, force
 
 
 def test_the_study_is_the_model_put_together_by_hand(tmp_path: Path) -> None:
