@@ -3,12 +3,12 @@
 import tomllib
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from evidence.second_damper.search import JUDGED, RATIOS, STUCK, AtPeak, Candidate, Found, section
+from evidence.second_damper.search import JUDGED, RATIOS, STUCK, AtPeak, Candidate, Found
+from stickslip.model.rigid.prisms import section_moments
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 OWN = Candidate(50.0, 78.0, (0.002, 0.025), 0.1)
@@ -40,9 +40,9 @@ def test_the_study_has_the_damper_that_the_search_found() -> None:
 def test_moments_of_a_section() -> None:
     corners = np.array([(1.0, 2.0), (5.0, 2.0), (5.0, 8.0), (1.0, 8.0)])
     for order in (1, -1):
-        area, squares, centre = section(SimpleNamespace(outline=lambda o=order: corners[::o]))
+        area, centre, second = section_moments(corners[::order])
         assert area == pytest.approx(24)
-        assert squares == pytest.approx((4**2 / 12, 6**2 / 12))
+        assert second == pytest.approx((4**2 / 12, 6**2 / 12, 0.0))
         assert centre == pytest.approx((3, 5))
 
 

@@ -12,10 +12,11 @@ import stickslip as ss
 from evidence.baseline.compare import Finding, compare_forced, compare_table, differing
 from evidence.baseline.results import read_nodes, timeless
 from evidence.baseline.stored import store, stored
+from evidence.models.two_blades import STUDY
 
 HERE = Path(__file__).parent
 STUDIES = {
-    "two_blades": HERE.parents[0] / "models" / "two_blades.toml",
+    "two_blades": STUDY,
     "shrouded_sector": HERE / "shrouded_sector.toml",
 }
 

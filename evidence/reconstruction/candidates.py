@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
-import numpy as np
-
 from evidence.models.two_blades import COARSER, TwoBlades, two_blades
 from stickslip.model.rigid.damper import FlatCurvedDamper
+from stickslip.model.rigid.prisms import section_moments
 
 LENGTH = 0.04  # m: of the damper along its axis
 STEEL, TITANIUM = 7850.0, 4430.0  # kg/m^3
@@ -66,19 +65,11 @@ class Candidate:
             curved_distance=self.curved,
             curved_angle=math.radians(self.curved_angle),
         )
-        x, z = (damper.outline() - damper.apex).T
-        other, next_z = np.roll(x, -1), np.roll(z, -1)
-        cross = z * other - x * next_z
-        area = float(cross.sum()) / 2
+        area, centre, second = section_moments(damper.outline() - damper.apex)
         mass = self.density * area * LENGTH
-        centre = [float(((a + b) * cross).sum()) / (6 * area) for a, b in ((x, other), (z, next_z))]
-        second = [
-            mass * (float(((a**2 + a * b + b**2) * cross).sum()) / (12 * area) - c**2)
-            for a, b, c in ((x, other, centre[0]), (z, next_z, centre[1]))
-        ]
-        axial = mass * LENGTH**2 / 12
-        inertia = (second[1] + axial, second[0] + second[1], second[0] + axial)
-        return mass, inertia, (centre[0], centre[1])
+        xx, zz = (float(mass * v) for v in second[:2])
+        along = mass * LENGTH**2 / 12
+        return mass, (zz + along, xx + zz, xx + along), (float(centre[0]), float(centre[1]))
 
     @property
     def keys(self) -> dict[str, Any]:

@@ -17,10 +17,10 @@ import numpy as np
 
 from evidence.models.two_blades import COARSER, SHIPPED, TwoBlades, two_blades
 from stickslip import forced_response
-from stickslip.arrays import FloatArray
 from stickslip.contact.law import OPEN, SLIP
 from stickslip.errors import StickslipError
 from stickslip.model.rigid.damper import FlatCurvedDamper
+from stickslip.model.rigid.prisms import section_moments
 from stickslip.response import accepted_points, forced_problem, signals
 from stickslip.units import HZ
 
@@ -82,7 +82,7 @@ class Candidate:
         f, c = math.radians(self.flat_deg), math.radians(self.curved_deg)
         normal = np.array([math.sin(c), math.cos(c)])
         at = right * np.array([math.cos(c), -math.sin(c)])
-        centre = section(self._damper(right))[2]
+        centre = section_moments(self._damper(right).outline())[1]
         meeting = at - (at[0] - centre[0]) / normal[0] * normal
         return float(-(meeting @ [math.cos(f), math.sin(f)]) - np.mean(self.flat))
 
@@ -95,9 +95,9 @@ class Candidate:
     @property
     def values(self) -> dict[str, Any]:
         """Keys of the study."""
-        area, turned, centre = section(self._damper(self.right))
+        area, centre, second = section_moments(self._damper(self.right).outline())
         mass = self.filling * STEEL * LENGTH * area
-        x, z = turned
+        x, z = second[:2]
         about = mass * np.array([z + LENGTH**2 / 12, x + z, x + LENGTH**2 / 12])
         own = {
             "part.blades.flat_angle_deg": self.flat_deg,
@@ -118,24 +118,6 @@ class Candidate:
 
 def _rounded(value: float) -> float:
     return float(f"{value:.3g}")
-
-
-def section(damper: FlatCurvedDamper) -> tuple[float, tuple[float, float], tuple[float, float]]:
-    """Return area, mean squares of x and z about the centre, and centre (x, z) of a damper's cross-section, in m."""
-    here = damper.outline()
-    double = _doubles(here)
-    area = float(double.sum() / 2)
-    centre = (here + np.roll(here, -1, axis=0)).T @ double / (6 * area)
-    here = here - centre
-    there = np.roll(here, -1, axis=0)
-    squares = (here**2 + here * there + there**2).T @ _doubles(here) / (12 * area)
-    return abs(area), (float(squares[0]), float(squares[1])), (float(centre[0]), float(centre[1]))
-
-
-def _doubles(corners: FloatArray) -> FloatArray:
-    """Return twice the areas of the triangles from the origin to each side of a polygon."""
-    after = np.roll(corners, -1, axis=0)
-    return np.asarray(corners[:, 0] * after[:, 1] - after[:, 0] * corners[:, 1])
 
 
 @dataclass(frozen=True)

@@ -5,22 +5,21 @@ the case doubtful or wrong.
 """
 
 import tempfile
-from pathlib import Path
 
 import numpy as np
 
+from evidence.models.two_blades import SHIPPED
 from evidence.validation.compare import Record, record
 from stickslip.front.study import Study
 
 CASE = "Two blades and a damper, as shipped"
-STUDY = Path(__file__).parents[2] / "examples" / "two_blades" / "study.toml"
 TOLERANCE = 0.01
 
 
 def run() -> list[Record]:
     """Run the example with ``--verify`` and compare at the peak of each ratio."""
     with tempfile.TemporaryDirectory() as folder:
-        result = Study.from_file(STUDY).run(verify=True, folder=folder)
+        result = Study.from_file(SHIPPED).run(verify=True, folder=folder)
         data = result["forced_response"].load()
     records = []
     for i, label in enumerate(data.case_label.values):

@@ -143,7 +143,7 @@ class WedgeDamper:
 
     def body(self) -> RigidBody:
         """Return the wedge as a rigid body, its centre and inertia those of a homogeneous prism."""
-        area, centre, second = _section_moments(self.outline())
+        area, centre, second = section_moments(self.outline())
         mass = self.mass if self.mass is not None else (self.density or 0.0) * area * self.length
         xx, zz, xz = mass * second
         along = mass * self.length**2 / 12
@@ -280,7 +280,7 @@ def _bad(given: object, field: str, problem: str, remedy: str) -> InputError:
     return input_error(f"{type(given).__name__}.{field}", problem, remedy)
 
 
-def _section_moments(corners: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+def section_moments(corners: FloatArray) -> tuple[float, FloatArray, FloatArray]:
     """Return area, centroid (2,) and the means of x², z² and x z about it (3,) of a polygon (k, 2), by its edges (Green)."""
     after = np.roll(corners, -1, axis=0)
     twice = corners[:, 0] * after[:, 1] - after[:, 0] * corners[:, 1]
