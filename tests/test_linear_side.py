@@ -22,6 +22,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.support import harmonics_of
 from stickslip.harmonic.travelling import TravellingStiffness, condense_side
+from stickslip.harmonic.wave_condensation import ModalWave, SolvedWave, condense_wave
 from stickslip.model.dofs import modal_dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.basis import in_coordinates
@@ -78,6 +79,13 @@ def odd(seed):
     return Structure(*own, modal_dofs(N), loss=part(0.1))
 
 
+def hermitian(seed):
+    """Return a wave with Rayleigh and structural damping, whose interior falls apart into its modes."""
+    mass, stiffness = ((a + a.conj().T) / 2 for a in (odd(seed).mass, odd(seed).stiffness))
+    damping = 0.1 * mass + 0.03 * stiffness
+    return Structure(mass, damping, stiffness, modal_dofs(N), loss=0.02 * stiffness)
+
+
 def some_load(seed=1):
     rng = np.random.default_rng(seed)
     pairs = rng.standard_normal((2, 2, N))
@@ -87,6 +95,7 @@ def some_load(seed=1):
 SIDES = {
     "one structure": odd(0),
     "waves": Side(tuple(odd(i) for i in range(ORDER + 1))),
+    "hermitian waves": Side(tuple(hermitian(i) for i in range(ORDER + 1))),
 }
 
 
@@ -135,6 +144,25 @@ def test_complex_unsymmetric_matrices_against_direct_solutions(side):
     x = moved[2]
     expected = 0.25 * (x.conj() @ side.of_harmonic(2).stiffness @ x).real
     assert energy[2] == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_interior_is_written_in_modes_where_they_decouple_it():
+    """So that the tests with `SIDES` are of both roads."""
+
+    def kind(structure):
+        return condense_wave(structure, NEAR, np.setdiff1d(np.arange(N), NEAR), mean=False)
+
+    wave = hermitian(3)
+    assert isinstance(kind(wave), ModalWave)
+    other = wave.damping.copy()
+    other[0, 0] += 0.1
+    skew = wave.damping + 1e-3 * (np.triu(np.ones((N, N)), 1) - np.tril(np.ones((N, N)), -1))
+    near_loss = wave.loss.copy()
+    near_loss[0, 1] += 0.1
+    near_loss[1, 0] += 0.1
+    for part in ({"damping": other}, {"damping": skew}, {"loss": near_loss}):
+        assert isinstance(kind(replace(wave, **part)), SolvedWave)
+    assert isinstance(kind(replace(wave, stiffness=wave.stiffness - 9 * np.eye(N))), SolvedWave)
 
 
 def test_derivatives_and_products_of_complex_unsymmetric_matrices(side):

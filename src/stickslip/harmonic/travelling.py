@@ -4,7 +4,8 @@ M. Krack, L. Salles and F. Thouverez, "Vibration prediction of bladed disks coup
 Computational Methods in Engineering 24 (2017) 589-636, section 3 and appendices 1, 2 and 5.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,36 +21,89 @@ from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.linear import DynamicStiffness, LinearSide
 from stickslip.harmonic.matrices import checked_matrix, is_real_symmetric
 from stickslip.harmonic.spectral import Blocks
-from stickslip.harmonic.support import Harmonics, real_rows
+from stickslip.harmonic.support import Harmonics
+from stickslip.harmonic.wave_condensation import (
+    Array,
+    ModalWave,
+    SolvedWave,
+    WaveAt,
+    condense_wave,
+)
 from stickslip.model.structure import Structure
 
-Stack = ComplexArray  # (H+1, rows, columns)
+
+@dataclass(frozen=True, eq=False)
+class Waves:
+    """The waves that the harmonics vibrate as, condensed each when it is first needed, and kept.
+
+    Parameters
+    ----------
+    structures
+        Of harmonics 0, 1, ...
+    near, far
+        Retained dofs and interior.
+    """
+
+    structures: tuple[Structure, ...]
+    near: IntArray
+    far: IntArray
+    known: dict[tuple[int, bool], SolvedWave | ModalWave] = field(default_factory=dict)
+
+    def of_harmonic(self, h: int) -> SolvedWave | ModalWave:
+        """Return the wave of a harmonic."""
+        if h >= len(self.structures):
+            raise input_error(
+                "TravellingStiffness",
+                f"has waves for harmonics up to {len(self.structures) - 1}, asked for {h}",
+                "Give tuned_wheel as many harmonics as the sweep's `high`.",
+            )
+        structure = self.structures[h]
+        key = id(structure), h == 0
+        if key not in self.known:
+            self.known[key] = condense_wave(structure, self.near, self.far, mean=h == 0)
+        return self.known[key]
+
+    def at(self, omega: float, harmonics: Sequence[int]) -> list[WaveAt]:
+        """Return the waves of some harmonics at `omega` (rad/s); the mean has one frequency, zero."""
+        return [self._mean if h == 0 else self.of_harmonic(h).at(h * omega) for h in harmonics]
+
+    @cached_property
+    def _mean(self) -> WaveAt:
+        return self.of_harmonic(0).at(0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class TravellingStiffness:
     """The waves of a wheel and its load, seen from the retained coordinates; `condense_waves` makes one.
 
-    The interior is solved at each frequency: reduced waves have few interior coordinates. The mean of a real motion feels the real
-    part of the matrices.
+    The mean of a real motion feels the real part of the matrices.
     """
 
-    structures: tuple[Structure, ...]  # of harmonics 0, 1, ...
-    retained: IntArray
-    interior: IntArray
+    waves: Waves
     load: HarmonicLoad
+
+    @property
+    def retained(self) -> IntArray:
+        """Dof indices that stay unknown."""
+        return self.waves.near
+
+    @property
+    def interior(self) -> IntArray:
+        """Dof indices that are condensed."""
+        return self.waves.far
 
     @property
     def n(self) -> int:
         """Number of retained coordinates."""
         return int(self.retained.size)
 
-    @property
+    @cached_property
     def nn(self) -> Blocks:
         """Stiffness, damping and mass of the first harmonic on the retained coordinates; for scales."""
-        k, c, m, _ = (part[min(1, len(part) - 1)] for part in self._matrices)
+        one = self.waves.structures[min(1, len(self.waves.structures) - 1)]
         own = np.ix_(self.retained, self.retained)
-        return np.abs(k[own]), np.abs(c[own]), np.abs(m[own])
+        k, c, m = (checked_matrix(one, name)[own] for name in ("stiffness", "damping", "mass"))
+        return np.abs(k), np.abs(c), np.abs(m)
 
     def with_load(self, load: HarmonicLoad) -> "TravellingStiffness":
         """Return the same waves under another load."""
@@ -57,24 +111,31 @@ class TravellingStiffness:
 
     def condensed(self, omega: float, order: int) -> Condensed:
         """Return stiffness, load and their ω-derivatives for harmonics 0..`order` at `omega` (rad/s)."""
-        D, G = self._dynamic(omega, order)
-        f = self.load.coefficients(order)
-        near, far = self.retained, self.interior
-        d_ll, d_ln = _block(D, far, far), _block(D, far, near)
-        right = np.concatenate([d_ln, f[:, far, None]], axis=2)
-        solved = np.linalg.solve(d_ll, right)
-        x, x_load = solved[:, :, :-1], solved[:, :, -1:]
-        y = np.linalg.solve(d_ll.transpose(0, 2, 1), _block(D, near, far).transpose(0, 2, 1))
-        y = y.transpose(0, 2, 1)
-        across = _block(G, near, far) - y @ _block(G, far, far)
-        stiffness = _block(D, near, near) - _block(D, near, far) @ x
-        derivative = _block(G, near, near) - y @ _block(G, far, near) - across @ x
-        load = f[:, near] - (_block(D, near, far) @ x_load)[:, :, 0]
-        return Condensed(stiffness, derivative, load, -(across @ x_load)[:, :, 0])
+        waves = self.at(omega, range(order + 1))
+        h = np.arange(order + 1)
+        slopes = np.array([wave.slope(np.eye(self.n)) for wave in waves])
+        loads, load_slopes = self.loads(waves, range(order + 1))
+        stiffness = np.array([wave.stiffness for wave in waves])
+        return Condensed(stiffness, h[:, None, None] * slopes, loads, h[:, None] * load_slopes)
 
     def products(self, omega: float, harmonics: Harmonics) -> "CondensedWaves":
         """Return the same by its products, at `omega` (rad/s) and for the `harmonics` of a support."""
-        return CondensedWaves(self, omega, harmonics, self.condensed(omega, harmonics[-1]))
+        return CondensedWaves(self, omega, harmonics)
+
+    def at(self, omega: float, harmonics: Sequence[int]) -> list[WaveAt]:
+        """Return the waves of some harmonics at `omega` (rad/s)."""
+        return self.waves.at(omega, harmonics)
+
+    def loads(
+        self, waves: Sequence[WaveAt], harmonics: Sequence[int]
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Return the condensed loads (k, n) of some harmonics and their derivatives by hω."""
+        f = self.load.coefficients(harmonics[-1])
+        found = [
+            wave.load(f[h, self.retained], f[h, self.interior])
+            for wave, h in zip(waves, harmonics, strict=True)
+        ]
+        return np.array([load for load, _ in found]), np.array([slope for _, slope in found])
 
     def recover(self, omega: float, q: ComplexArray) -> ComplexArray:
         """Return the (H+1, n_all) coefficients of every dof from those of the retained ones (H+1, n)."""
@@ -87,54 +148,26 @@ class TravellingStiffness:
 
     def output_rows(self, omega: float, harmonic: int, dofs: IntArray) -> ComplexArray:
         """Return the (k, n) matrix that makes of a change of the retained coordinates in one harmonic that of `dofs` (k,)."""
-        D = self._dynamic(omega, harmonic)[0][harmonic]
-        near, far = self.retained, self.interior
-        spread = np.zeros((near.size + far.size, near.size), dtype=complex)
-        spread[near] = np.eye(near.size)
-        spread[far] = -np.linalg.solve(D[np.ix_(far, far)], D[np.ix_(far, near)])
+        (wave,) = self.at(omega, [harmonic])
+        spread = np.zeros((self.n + self.interior.size, self.n), dtype=complex)
+        spread[self.retained] = np.eye(self.n)
+        spread[self.interior] = wave.inside(np.eye(self.n), np.zeros((self.interior.size, self.n)))
         return spread[dofs]
 
     def strain_energy(self, omega: float, q: ComplexArray) -> FloatArray:
         """Return the (H+1,) strain energy of a sector in each harmonic, mean over the period, J."""
-        x = self.recover(omega, q)
-        bent = self._matrices[0][: len(x)] @ x[:, :, None]
-        twice = np.sum(x.conj() * bent[:, :, 0], axis=1).real
-        return np.asarray((0.25 + 0.25 * (np.arange(len(x)) == 0)) * twice)
+        twice = []
+        for h, x in enumerate(self.recover(omega, q)):
+            stiffness = self.waves.structures[h].stiffness
+            twice.append(np.vdot(x, (stiffness if h else stiffness.real) @ x).real)
+        return np.asarray((0.25 + 0.25 * (np.arange(len(twice)) == 0)) * twice)
 
     def _spread(self, omega: float, q: ComplexArray, f: ComplexArray) -> ComplexArray:
-        D, _ = self._dynamic(omega, q.shape[0] - 1)
-        near, far = self.retained, self.interior
-        right = f[:, far, None] - _block(D, far, near) @ q[:, :, None]
         out = np.empty(f.shape, dtype=complex)
-        out[:, near] = q
-        out[:, far] = np.linalg.solve(_block(D, far, far), right)[:, :, 0]
+        out[:, self.retained] = q
+        for h, wave in enumerate(self.at(omega, range(len(q)))):
+            out[h, self.interior] = wave.inside(q[h], f[h, self.interior])
         return out
-
-    def _dynamic(self, omega: float, order: int) -> tuple[Stack, Stack]:
-        """Return D of harmonics 0..`order` and its derivative by ω."""
-        if order >= len(self.structures):
-            raise input_error(
-                "TravellingStiffness",
-                f"has waves for harmonics up to {len(self.structures) - 1}, asked for {order}",
-                "Give tuned_wheel as many harmonics as the sweep's `high`.",
-            )
-        k, c, m, loss = (part[: order + 1] for part in self._matrices)
-        h = np.arange(order + 1)[:, None, None]
-        s = h * omega
-        D = k + 1j * s * c - s**2 * m + 1j * (s > 0) * loss
-        return D, h * (1j * c - 2 * s * m)
-
-    @cached_property
-    def _matrices(self) -> tuple[Stack, Stack, Stack, Stack]:
-        """Stiffness, damping, mass and loss of all harmonics."""
-
-        def stacked(name: str) -> Stack:
-            known = {id(s): _checked(s, name) for s in self.structures}
-            stack = np.array([known[id(s)] for s in self.structures])
-            stack[0] = stack[0].real
-            return stack
-
-        return stacked("stiffness"), stacked("damping"), stacked("mass"), stacked("loss")
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,22 +177,30 @@ class CondensedWaves:
     linear: TravellingStiffness
     omega: float
     harmonics: Harmonics
-    waves: Condensed
+
+    @cached_property
+    def waves(self) -> list[WaveAt]:
+        """Of each of the harmonics."""
+        return self.linear.at(self.omega, self.harmonics)
 
     @property
     def n(self) -> int:
         """Number of retained coordinates."""
         return self.linear.n
 
-    @property
+    @cached_property
+    def _loads(self) -> tuple[ComplexArray, ComplexArray]:
+        return self.linear.loads(self.waves, self.harmonics)
+
+    @cached_property
     def load(self) -> FloatArray:
         """(m, n) load, N."""
-        return real_rows(self.waves.load, self.harmonics)
+        return to_real(self._loads[0])
 
-    @property
+    @cached_property
     def load_slope(self) -> FloatArray:
         """(m, n) its derivative by ω."""
-        return real_rows(self.waves.load_derivative, self.harmonics)
+        return to_real(np.array(self.harmonics)[:, None] * self._loads[1])
 
     def same(self, other: object) -> bool:
         """Whether `other` has the same dynamic stiffness; loads may differ."""
@@ -167,27 +208,29 @@ class CondensedWaves:
             isinstance(other, CondensedWaves)
             and self.omega == other.omega
             and self.harmonics == other.harmonics
-            and self.linear.structures is other.linear.structures
+            and self.linear.waves is other.linear.waves
         )
 
     def product(self, rows: FloatArray) -> FloatArray:
         """Return the rows of ``Z q`` for the `rows` of q."""
-        return _times(self._own(self.waves.stiffness), rows)
+        return self._each(rows, lambda wave, q: wave.stiffness @ q)
 
     def transposed_product(self, rows: FloatArray) -> FloatArray:
         """Return the rows of the product with the transpose of the real form of Z, which is that of the conjugate transpose."""
-        return _times(self._own(self.waves.stiffness).conj().transpose(0, 2, 1), rows)
+        return self._each(rows, lambda wave, q: (q.conj() @ wave.stiffness).conj())
 
     def product_and_slope(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return ``Z q`` and ``∂Z/∂ω q``."""
-        return self.product(rows), _times(self._own(self.waves.derivative), rows)
+        slope = [wave.slope(q) for wave, q in zip(self.waves, to_complex(rows), strict=True)]
+        return self.product(rows), to_real(np.array(self.harmonics)[:, None] * np.array(slope))
 
     def block(self, harmonic: int) -> ComplexArray:
         """Return ``Z_h``, (n, n) complex in Fortran order, to be changed at will."""
-        return np.array(self.waves.stiffness[harmonic], order="F")
+        return np.array(self.waves[self.harmonics.index(harmonic)].stiffness, order="F")
 
-    def _own(self, stack: Stack) -> Stack:
-        return np.asarray(stack[list(self.harmonics)])
+    def _each(self, rows: FloatArray, times: Callable[[WaveAt, ComplexArray], Array]) -> FloatArray:
+        pairs = zip(self.waves, to_complex(rows), strict=True)
+        return to_real(np.array([times(wave, q) for wave, q in pairs]))
 
 
 def condense_side(
@@ -240,19 +283,5 @@ def condense_waves(
             "Give tuned_wheel more harmonics.",
         )
     retained = np.asarray(retained, dtype=np.int64)
-    return TravellingStiffness(structures, retained, np.setdiff1d(np.arange(n), retained), load)
-
-
-def _times(stack: Stack, rows: FloatArray) -> FloatArray:
-    """Return the rows of the products of a matrix a harmonic."""
-    return to_real((stack @ to_complex(rows)[:, :, None])[:, :, 0])
-
-
-def _block(stack: Stack, rows: IntArray, columns: IntArray) -> Stack:
-    return np.asarray(stack[:, rows[:, None], columns])
-
-
-def _checked(structure: Structure, name: str) -> FloatArray | ComplexArray:
-    if getattr(structure, name) is None:
-        return np.zeros((structure.n, structure.n))
-    return checked_matrix(structure, name)
+    waves = Waves(structures, retained, np.setdiff1d(np.arange(n), retained))
+    return TravellingStiffness(waves, load)

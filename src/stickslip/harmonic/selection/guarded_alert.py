@@ -176,7 +176,7 @@ def doubled(reference: HarmonicBalance) -> HarmonicBalance:
     """Return the same problem with all harmonics up to twice the highest, or as many as there are waves of a tuned wheel."""
     order = 2 * reference.order
     if isinstance(reference.linear, TravellingStiffness):
-        order = min(order, len(reference.linear.structures) - 1)
+        order = min(order, len(reference.linear.waves.structures) - 1)
     samples = max(reference.samples, SAMPLES_A_HARMONIC * order)
     return replace(reference, samples=samples).with_harmonics(harmonics_of(order))
 
