@@ -67,6 +67,9 @@ class Side:
     def of_harmonic(self, harmonic):
         return self.structures[harmonic]
 
+    def feedback_of(self, harmonic):
+        return None
+
 
 def odd(seed):
     """Return complex matrices without any symmetry."""

@@ -11,6 +11,7 @@ from stickslip.harmonic.spectral import Blocks
 from stickslip.harmonic.support import Harmonics
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
+from stickslip.reduction.aerodynamics import Feedback
 
 
 class LinearSide(Protocol):
@@ -36,6 +37,10 @@ class LinearSide(Protocol):
 
     def of_harmonic(self, harmonic: int) -> Structure:
         """Return the structure that temporal harmonic `harmonic` (0: the mean) vibrates as; the same object where it is the same."""
+        ...
+
+    def feedback_of(self, harmonic: int) -> Feedback | None:
+        """Return the aerodynamic force on a harmonic, of which `of_harmonic` holds the frozen form; None for none."""
         ...
 
     def grounded(self, springs: Matrix) -> Self:

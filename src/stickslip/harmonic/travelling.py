@@ -30,6 +30,7 @@ from stickslip.harmonic.wave_condensation import (
     condense_wave,
 )
 from stickslip.model.structure import Structure
+from stickslip.reduction.aerodynamics import Feedback
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +43,14 @@ class Waves:
         Of harmonics 0, 1, ...
     near, far
         Retained dofs and interior.
+    feedback
+        Aerodynamic force on each, of which the structures hold the frozen form; empty: none.
     """
 
     structures: tuple[Structure, ...]
     near: IntArray
     far: IntArray
+    feedback: tuple[Feedback | None, ...] = ()
     known: dict[tuple[int, bool], SolvedWave | ModalWave] = field(default_factory=dict)
 
     def of_harmonic(self, h: int) -> SolvedWave | ModalWave:
@@ -60,8 +64,14 @@ class Waves:
         structure = self.structures[h]
         key = id(structure), h == 0
         if key not in self.known:
-            self.known[key] = condense_wave(structure, self.near, self.far, mean=h == 0)
+            self.known[key] = condense_wave(
+                structure, self.near, self.far, mean=h == 0, feedback=self.force_on(h)
+            )
         return self.known[key]
+
+    def force_on(self, h: int) -> Feedback | None:
+        """Return the aerodynamic force on a harmonic; None for none."""
+        return self.feedback[h] if self.feedback else None
 
     def at(self, omega: float, harmonics: Sequence[int]) -> list[WaveAt]:
         """Return the waves of some harmonics at `omega` (rad/s); the mean has one frequency, zero."""
@@ -76,7 +86,8 @@ class Waves:
 class TravellingStiffness:
     """The waves of a wheel and its load, seen from the retained coordinates; `condense_waves` makes one.
 
-    The mean of a real motion feels the real part of the matrices.
+    The mean of a real motion feels the real part of the matrices. Aerodynamic coefficients that depend on the frequency are taken at that
+    of each harmonic; the mean feels their frozen form.
     """
 
     waves: Waves
@@ -155,10 +166,12 @@ class TravellingStiffness:
         return spread[dofs]
 
     def strain_energy(self, omega: float, q: ComplexArray) -> FloatArray:
-        """Return the (H+1,) strain energy of a sector in each harmonic, mean over the period, J."""
+        """Return the (H+1,) strain energy of a sector in each harmonic, mean over the period, J; none is in the fluid."""
         twice = []
         for h, x in enumerate(self.recover(omega, q)):
-            stiffness = self.waves.structures[h].stiffness
+            stiffness, force = self.waves.structures[h].stiffness, self.waves.force_on(h)
+            if force is not None:
+                stiffness = stiffness + force.stiffness()
             twice.append(np.vdot(x, (stiffness if h else stiffness.real) @ x).real)
         return np.asarray((0.25 + 0.25 * (np.arange(len(twice)) == 0)) * twice)
 
@@ -242,14 +255,18 @@ def condense_side(
     `condense_waves` otherwise.
     """
     structures = tuple(side.of_harmonic(h) for h in range(order + 1))
-    one = structures[0]
-    if all(s is one for s in structures) and is_real_symmetric(one):
+    feedback = tuple(side.feedback_of(h) for h in range(order + 1))
+    one, still = structures[0], all(force is None for force in feedback)
+    if still and all(s is one for s in structures) and is_real_symmetric(one):
         return condense(one, retained, load)
-    return condense_waves(structures, retained, load)
+    return condense_waves(structures, retained, load, () if still else feedback)
 
 
 def condense_waves(
-    structures: tuple[Structure, ...], retained: IntArray, load: HarmonicLoad
+    structures: tuple[Structure, ...],
+    retained: IntArray,
+    load: HarmonicLoad,
+    feedback: tuple[Feedback | None, ...] = (),
 ) -> TravellingStiffness:
     """Prepare the exact condensation of the waves of a tuned wheel.
 
@@ -261,6 +278,8 @@ def condense_waves(
         Dof indices that stay unknown.
     load
         Load on all dofs, each harmonic in the coordinates of its wave, N.
+    feedback
+        Aerodynamic force on each harmonic, of which the structures hold the frozen form; empty: none.
 
     Raises
     ------
@@ -283,5 +302,5 @@ def condense_waves(
             "Give tuned_wheel more harmonics.",
         )
     retained = np.asarray(retained, dtype=np.int64)
-    waves = Waves(structures, retained, np.setdiff1d(np.arange(n), retained))
+    waves = Waves(structures, retained, np.setdiff1d(np.arange(n), retained), feedback)
     return TravellingStiffness(waves, load)

@@ -17,6 +17,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.harmonic.matrices import SYMMETRY, checked_matrix
 from stickslip.harmonic.spectral import PARALLEL
 from stickslip.model.structure import Structure
+from stickslip.reduction.aerodynamics import Feedback
 
 Array = FloatArray | ComplexArray
 Four = tuple[Array, Array, Array, Array]  # of stiffness, damping, mass and structural damping
@@ -58,11 +59,14 @@ class SolvedWave:
         Stiffness, damping, mass and structural damping of all dofs.
     near, far
         Retained dofs and interior.
+    feedback
+        Aerodynamic force that depends on the frequency, of which the matrices hold the frozen form; None for none.
     """
 
     matrices: Four
     near: IntArray
     far: IntArray
+    feedback: Feedback | None = None
 
     def at(self, s: float) -> WaveAt:
         """Return the wave at ``s = hω`` in rad/s."""
@@ -70,6 +74,10 @@ class SolvedWave:
         D, G = k, 1j * c - 2 * s * m
         if s > 0:
             D = k + 1j * (s * c + loss) - s**2 * m
+        if self.feedback is not None:
+            P = self.feedback.patterns
+            force, slope = self.feedback.beyond_frozen(s)
+            D, G = D - P @ force @ P.conj().T, G - P @ slope @ P.conj().T
         return _SolvedAt(_blocks(D, self.near, self.far), _blocks(G, self.near, self.far))
 
 
@@ -195,7 +203,12 @@ class _ModalAt:
 
 
 def condense_wave(
-    structure: Structure, near: IntArray, far: IntArray, *, mean: bool
+    structure: Structure,
+    near: IntArray,
+    far: IntArray,
+    *,
+    mean: bool,
+    feedback: Feedback | None = None,
 ) -> SolvedWave | ModalWave:
     """Prepare the condensation of a wave.
 
@@ -207,9 +220,13 @@ def condense_wave(
         Dofs that are retained and those that are condensed.
     mean
         Whether it is the mean of a real motion, which feels the real part of the matrices and has one frequency, zero.
+    feedback
+        Aerodynamic force on it, of which the structure holds the frozen form; None for none.
     """
     names = ("stiffness", "damping", "mass", "loss")
     k, c, m, loss = (_matrix(structure, name, mean) for name in names)
+    if feedback is not None and feedback.influence.depends_on_frequency and not mean:
+        return SolvedWave((k, c, m, loss), near, far, feedback)
     solved = SolvedWave((k, c, m, loss), near, far)
     if mean or not 0 < far.size <= LARGEST_MODAL or not all(map(_hermitian, (k, c, m, loss))):
         return solved

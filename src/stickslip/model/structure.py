@@ -92,6 +92,9 @@ class Structure:
         """Return the structure: it vibrates as itself in every harmonic (see `LinearSide`)."""
         return self
 
+    def feedback_of(self, harmonic: int) -> None:
+        """No force of its own depends on the frequency (see `LinearSide`)."""
+
     def dof_set(self, name: str) -> IntArray:
         """Return the dof indices of the set `name`; an `InputError` names the known sets."""
         if name not in self.sets:

@@ -1,5 +1,9 @@
 """Public names of `stickslip.reduction`, written once."""
 
+from .aerodynamics import Feedback as Feedback
+from .aerodynamics import InfluenceCoefficients as InfluenceCoefficients
+from .aerodynamics import from_phase_angles as from_phase_angles
+from .aerodynamics import to_phase_angles as to_phase_angles
 from .cache import cached as cached
 from .choice import Reduction as Reduction
 from .cyclic import CyclicSector as CyclicSector

@@ -13,6 +13,7 @@ from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import InputError, input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
+from stickslip.reduction.aerodynamics import Feedback
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave
 from stickslip.reduction.fixed_interface import craig_bampton
 from stickslip.reduction.nodal import nodal_coordinates
@@ -52,6 +53,8 @@ class TunedWheel:
     multipliers
         Coordinates that are forces of constraints: between the motion of a sector and that of a neighbour, where contacts touch the
         same dof of both.
+    feedback
+        Wave number -> aerodynamic force on it, in these coordinates; the waves hold its frozen form (`with_aerodynamics`).
     """
 
     waves: Mapping[int, Structure]
@@ -59,6 +62,7 @@ class TunedWheel:
     engine_order: int
     harmonics: int
     multipliers: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    feedback: Mapping[int, Feedback] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return what it is in a line, without its matrices."""
@@ -83,6 +87,21 @@ class TunedWheel:
                 "Give tuned_wheel more harmonics.",
             )
         return self.waves[excited_wave(self.engine_order, self.sectors, harmonic)]
+
+    def feedback_of(self, harmonic: int) -> Feedback | None:
+        """Return the aerodynamic force on temporal harmonic `harmonic`, of which `of_harmonic` holds the frozen form; None for none."""
+        return self.feedback.get(excited_wave(self.engine_order, self.sectors, harmonic))
+
+    def with_aerodynamics(self, feedback: Mapping[int, Feedback]) -> "TunedWheel":
+        """Return the wheel with an aerodynamic force on each wave: frozen in its matrices, whole where frequencies are known.
+
+        Parameters
+        ----------
+        feedback
+            Wave number -> force, in the coordinates of the wheel.
+        """
+        waves = {k: feedback[k].frozen(own) for k, own in self.waves.items()}
+        return replace(self, waves=waves, feedback=dict(feedback))
 
     @property
     def dofs(self) -> Dofs:

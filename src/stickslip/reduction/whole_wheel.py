@@ -13,6 +13,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
+from stickslip.reduction.aerodynamics import Feedback
 from stickslip.reduction.basis import dof_indices, is_hermitian
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave
 from stickslip.reduction.fixed_interface import craig_bampton
@@ -20,6 +21,7 @@ from stickslip.reduction.turning import dof_rotation
 from stickslip.reduction.waves import to_sectors, to_waves, wave
 
 Reduce = Callable[[Structure, IntArray, int], Structure]
+ForceOnWave = Callable[[int, Structure], Feedback]
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +122,7 @@ def reduced_wheel(
     n_modes: int,
     *,
     reduce: Reduce = craig_bampton,
+    feedback: ForceOnWave | None = None,
 ) -> ReducedWheel:
     """Reduce all travelling waves of a wheel and return to the coordinates of its sectors.
 
@@ -135,6 +138,9 @@ def reduced_wheel(
     reduce
         `craig_bampton`, `rubin`, or any function ``(wave, keep, n_modes) -> Structure`` whose first coordinates are the
         dofs `keep` of the wave, as many coordinates in every wave.
+    feedback
+        From a wave number and the reduced wave to the aerodynamic force on it, which is added in its frozen form; None: none. It has to
+        give waves k and n_s − k each other's conjugates (`Feedback.conjugate`).
 
     Returns
     -------
@@ -166,6 +172,8 @@ def reduced_wheel(
             reduced_wave("reduced_wheel", reduce, sector, k, place, n_modes) for k in rest
         )
     refuse_unequal("reduced_wheel", dict(enumerate(waves)))
+    if feedback is not None:
+        waves = tuple(feedback(k, own).frozen(own) for k, own in enumerate(waves))
     size = waves[0].n
     turn = np.eye(size)
     if sector.axis is not None:

@@ -2,7 +2,8 @@
 
 The coordinates of a tuned wheel mean the same in every wave, and so do its gaps. The motion of sector s is the sum of its waves,
 ``y_s = Σ_k exp(2πi k s / n_s) y_k``, and the matrices between sectors are the transforms of those of the waves. An engine order
-m that has a divisor g in common with the number of sectors makes the same motion in n_s/g sectors; they stand for all.
+m that has a divisor g in common with the number of sectors makes the same motion in n_s/g sectors; they stand for all. Aerodynamic
+forces are those of their frozen form, whose matrices are real for the wheel as a whole.
 """
 
 from collections.abc import Mapping
@@ -18,7 +19,6 @@ from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.reduction.basis import is_hermitian
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.reduction.waves import excited_wave
 from stickslip.response.system import System
@@ -166,13 +166,6 @@ def _wave(wheel: TunedWheel, k: int) -> Structure:
     """Return the structure of a wave number, of which a harmonic comes first, or the conjugate of that of the other direction."""
     chosen = _chosen(wheel.waves, k % wheel.sectors, wheel)
     structure = wheel.waves[chosen]
-    for name in ("mass", "stiffness"):
-        if not is_hermitian(getattr(structure, name)):
-            raise input_error(
-                "all_sectors",
-                f"the {name} of wave {k} is not Hermitian",
-                "Leave aerodynamic forces out.",
-            )
     return structure if chosen == k % wheel.sectors else _conjugate(structure)
 
 

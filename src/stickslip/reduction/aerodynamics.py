@@ -1,0 +1,342 @@
+"""Aerodynamic influence coefficients of a bladed disk: the force that a blade feels where it and its neighbours vibrate.
+
+Sector n carries the force ``f_n = P Σ_j L_j(ω) Pᴴ u_{n+j}`` on the right-hand side, the columns of P being patterns of force: of a mode
+its shape times the mass matrix, of a point a unit force. In a wave each sector leads the one before it by θ, and the sum is
+``G(ω) = Σ_j L_j(ω) e^{ijθ}``.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.errors import input_error
+from stickslip.model.structure import Structure
+from stickslip.units import HZ, RPM
+
+Beyond = Literal["refuse", "nearest"]
+LARGEST = 5000  # dofs of a full matrix: 0.4 GB of complex numbers
+SAME_ANGLE = 1e-6  # rad by which phase angles that come from a file may be off
+
+
+def _none() -> FloatArray:
+    return np.zeros(0)
+
+
+@dataclass(frozen=True, eq=False)
+class InfluenceCoefficients:
+    """Complex coefficients by neighbour, frequency and speed.
+
+    Parameters
+    ----------
+    distances
+        (d,) whole numbers j: sector n feels the motion of sector n + j. None twice; those that are left out are zero.
+    values
+        (s, f, d, m, m) at each speed and frequency the L_j between m patterns: the row feels, the column moves.
+    frequencies
+        (f,) ascending, rad/s; empty where f is 1 and the coefficients hold at any frequency. Between them real and imaginary part
+        are interpolated by monotone cubics (PCHIP), whose slope is continuous.
+    speeds
+        (s,) ascending, rad/s; empty where s is 1 and the coefficients hold at any speed. Between them: linear.
+    beyond
+        What happens at frequencies outside: ``refuse``, or take the ``nearest``. Speeds outside are always refused.
+
+    Raises
+    ------
+    InputError
+        If shapes do not agree, numbers are not finite, or something does not ascend.
+    """
+
+    distances: IntArray
+    values: ComplexArray
+    frequencies: FloatArray = field(default_factory=_none)
+    speeds: FloatArray = field(default_factory=_none)
+    beyond: Beyond = "refuse"
+
+    def __post_init__(self) -> None:
+        values = np.asarray(self.values, dtype=complex)
+        own = {
+            "values": values,
+            "distances": np.asarray(self.distances, dtype=np.int64),
+            "frequencies": np.asarray(self.frequencies, dtype=float),
+            "speeds": np.asarray(self.speeds, dtype=float),
+        }
+        for name, array in own.items():
+            object.__setattr__(self, name, array)
+        wanted = (
+            max(self.speeds.size, 1),
+            max(self.frequencies.size, 1),
+            self.distances.size,
+        )
+        if values.ndim != 5 or values.shape[:3] != wanted or values.shape[3] != values.shape[4]:
+            raise input_error(
+                "InfluenceCoefficients.values",
+                f"has shape {values.shape} for {wanted} speeds, frequencies and distances",
+                "Give (speeds, frequencies, distances, m, m).",
+            )
+        if not np.all(np.isfinite(values)):
+            raise input_error(
+                "InfluenceCoefficients.values", "has NaN or infinite entries", "Check the table."
+            )
+        if np.unique(self.distances).size != self.distances.size:
+            raise input_error(
+                "InfluenceCoefficients.distances",
+                f"has a neighbour twice: {self.distances.tolist()}",
+                "Give each once.",
+            )
+        for name in ("frequencies", "speeds"):
+            axis = getattr(self, name)
+            if axis.size and (axis[0] < 0 or np.any(np.diff(axis) <= 0)):
+                raise input_error(
+                    f"InfluenceCoefficients.{name}", "do not ascend from zero on", "Sort them."
+                )
+
+    def __repr__(self) -> str:
+        """Return what it is in a line, without its numbers."""
+        return (
+            f"<InfluenceCoefficients: neighbours {self.distances.tolist()}; {self.patterns} patterns; "
+            f"{max(self.frequencies.size, 1)} frequencies; {max(self.speeds.size, 1)} speeds>"
+        )
+
+    @property
+    def patterns(self) -> int:
+        """Number m of modes or points."""
+        return int(self.values.shape[-1])
+
+    @property
+    def depends_on_frequency(self) -> bool:
+        """Whether the coefficients are those of several frequencies."""
+        return self.frequencies.size > 1
+
+    def at_speed(self, speed: float) -> "InfluenceCoefficients":
+        """Return the coefficients at a speed in rad/s; an `InputError` tells the range where it is outside."""
+        if not self.speeds.size:
+            return self
+        low, high = self.speeds[[0, -1]]
+        if not low * (1 - 1e-12) <= speed <= high * (1 + 1e-12):
+            raise input_error(
+                "aero.file",
+                f"has coefficients for {low / RPM:.6g} to {high / RPM:.6g} rpm, and the rotor turns at {speed / RPM:.6g} rpm",
+                "Add rows of this speed, or leave the column speed_rpm out if they hold at any.",
+            )
+        flat = self.values.reshape(self.speeds.size, -1)
+        mixed = np.array([np.interp(speed, self.speeds, part) for part in flat.real.T], dtype=float)
+        other = np.array([np.interp(speed, self.speeds, part) for part in flat.imag.T], dtype=float)
+        values = (mixed + 1j * other).reshape(1, *self.values.shape[1:])
+        return replace(self, values=values, speeds=_none())
+
+    def at(self, omega: float) -> ComplexArray:
+        """Return the (d, m, m) coefficients at ω in rad/s, of coefficients that hold at any speed.
+
+        Raises
+        ------
+        InputError
+            If ω is outside of the table, with its range.
+        """
+        if not self.depends_on_frequency:
+            return np.asarray(self._one_speed[0])
+        here = self._inside(omega)
+        return np.asarray(self._through(here)[..., 0] + 1j * self._through(here)[..., 1])
+
+    def slope(self, omega: float) -> ComplexArray:
+        """Return the (d, m, m) derivatives by ω."""
+        if not self.depends_on_frequency or self._inside(omega) != omega:
+            return np.zeros(self.values.shape[2:], dtype=complex)
+        parts = self._through(omega, 1)
+        return np.asarray(parts[..., 0] + 1j * parts[..., 1])
+
+    def of_wave(self, phase_angle: float, omega: float) -> ComplexArray:
+        """Return the (m, m) ``G = Σ_j L_j e^{ijθ}`` of an inter-blade phase angle θ in rad."""
+        return _summed(self.at(omega), self._phases(phase_angle))
+
+    def slope_of_wave(self, phase_angle: float, omega: float) -> ComplexArray:
+        """Return the (m, m) derivative of `of_wave` by ω."""
+        return _summed(self.slope(omega), self._phases(phase_angle))
+
+    def frozen(self, phase_angle: float, reference: float) -> tuple[ComplexArray, ComplexArray]:
+        """Return the (m, m) stiffness and damping, to be subtracted, that give the force of ω_r at that frequency.
+
+        Parameters
+        ----------
+        phase_angle
+            θ in rad.
+        reference
+            ω_r in rad/s.
+        """
+        L, phases = self.at(reference), self._phases(phase_angle)
+        return _summed(L.real, phases), _summed(L.imag / reference, phases)
+
+    def _phases(self, phase_angle: float) -> ComplexArray:
+        return np.asarray(np.exp(1j * phase_angle * self.distances))
+
+    @property
+    def _one_speed(self) -> ComplexArray:
+        if self.speeds.size > 1:
+            raise input_error(
+                "InfluenceCoefficients", "are those of several speeds", "Take at_speed first."
+            )
+        return np.asarray(self.values[0])
+
+    def _inside(self, omega: float) -> float:
+        """Return ω, or the end of the table that is nearest where that is wanted."""
+        low, high = (float(f) for f in self.frequencies[[0, -1]])
+        held = min(max(omega, low), high)
+        if abs(held - omega) <= 1e-9 * high or self.beyond == "nearest":
+            return held
+        raise input_error(
+            "aero.file",
+            f"has coefficients for {low / HZ:.6g} to {high / HZ:.6g} Hz, asked for {omega / HZ:.6g} Hz",
+            'Add rows of more frequencies, keep fewer harmonics, or say beyond = "nearest" in [aero].',
+        )
+
+    @cached_property
+    def _through(self) -> Any:
+        from scipy.interpolate import PchipInterpolator
+
+        parts = np.stack([self._one_speed.real, self._one_speed.imag], axis=-1)
+        return PchipInterpolator(self.frequencies, parts)
+
+
+def from_phase_angles(
+    angles: Sequence[float] | FloatArray, values: ComplexArray, *, sectors: int | None = None
+) -> tuple[IntArray, ComplexArray]:
+    """Return distances and influence coefficients from those of waves, by the discrete Fourier transform.
+
+    Parameters
+    ----------
+    angles
+        (N,) inter-blade phase angles in rad, N of them spread evenly over the whole circle from zero on, in any order.
+    values
+        (N, ...) G of each.
+    sectors
+        Number of sectors; None: not looked at. N may be smaller: blades farther apart than N/2 then feel nothing of each other.
+
+    Returns
+    -------
+    distances
+        (N,) from −(N−1)/2 to N/2.
+    values
+        (N, ...) ``L_j = Σ G(θ) e^{−ijθ} / N``.
+
+    Raises
+    ------
+    InputError
+        If the angles are not spread evenly, or there are more than sectors.
+    """
+    turned = np.mod(np.asarray(angles, dtype=float) + SAME_ANGLE, 2 * np.pi) - SAME_ANGLE
+    order = np.argsort(turned)
+    count = turned.size
+    even = 2 * np.pi * np.arange(count) / max(count, 1)
+    if not count or np.abs(turned[order] - even).max() > SAME_ANGLE:
+        raise input_error(
+            "from_phase_angles: angles",
+            f"{count} angles are not spread evenly over the circle from zero on",
+            "Give all wave numbers, or coefficients by neighbour.",
+        )
+    if sectors is not None and count > sectors:
+        raise input_error(
+            "from_phase_angles: angles",
+            f"there are {count} of them on {sectors} sectors",
+            "A wheel has no more waves than sectors.",
+        )
+    spread = np.fft.fft(np.asarray(values)[order], axis=0) / count
+    distances = np.arange(count) - (count - 1) // 2
+    return distances, np.asarray(spread[distances % count])
+
+
+def to_phase_angles(
+    distances: IntArray, values: ComplexArray, angles: Sequence[float] | FloatArray
+) -> ComplexArray:
+    """Return G (a, ...) at inter-blade phase angles in rad (a,) from coefficients (d, ...) by neighbour."""
+    phases = np.exp(1j * np.outer(np.asarray(angles), distances))
+    return np.asarray(np.tensordot(phases, values, axes=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Feedback:
+    """The aerodynamic force on one wave, in coordinates of it: ``f = P G(ω) Pᴴ q``.
+
+    Parameters
+    ----------
+    patterns
+        (n, m) P.
+    phase_angle
+        θ in rad.
+    influence
+        Coefficients of one speed.
+    reference
+        ω_r in rad/s: where matrices stand for the force, they are those of this frequency.
+    """
+
+    patterns: Matrix
+    phase_angle: float
+    influence: InfluenceCoefficients
+    reference: float
+
+    def __post_init__(self) -> None:
+        if not 0 < self.reference < np.inf:
+            raise input_error(
+                "Feedback.reference", f"must be above zero, got {self.reference}", "Give rad/s."
+            )
+        if self.patterns.shape[1] != self.influence.patterns:
+            raise input_error(
+                "Feedback.patterns",
+                f"are {self.patterns.shape[1]}, and the coefficients are those of {self.influence.patterns}",
+                "Give a column for each mode or point.",
+            )
+
+    @property
+    def conjugate(self) -> "Feedback":
+        """That on the wave that travels the other way, whose patterns are the conjugates."""
+        return replace(self, patterns=np.conj(self.patterns), phase_angle=-self.phase_angle)
+
+    def in_coordinates(self, way: Matrix) -> "Feedback":
+        """Return it in other coordinates, given the matrix (n, n_new) from them to its own."""
+        return replace(self, patterns=np.asarray(way.conj().T @ self.patterns))
+
+    def stiffness(self) -> Matrix:
+        """Return the (n, n) stiffness that the frozen form subtracts, N/m; its real forces do work over no period."""
+        return self._outer(self.influence.frozen(self.phase_angle, self.reference)[0])
+
+    def frozen(self, structure: Structure) -> Structure:
+        """Return a wave with the force as matrices: exact at ω_r, and real for the wheel as a whole.
+
+        ``K − P Σ_j Re(L_j) e^{ijθ} Pᴴ`` and ``C − P Σ_j Im(L_j)/ω_r e^{ijθ} Pᴴ``: not Hermitian in general; the wave that travels
+        the other way has the conjugates.
+        """
+        if structure.n > LARGEST:
+            raise input_error(
+                "aero",
+                f"its force would fill a matrix of {structure.n} dofs",
+                "Reduce the sector first: give it a table [reduction].",
+            )
+        stiff, damp = self.influence.frozen(self.phase_angle, self.reference)
+        K, C = (_dense(m) for m in (structure.stiffness, structure.damping))
+        return replace(structure, stiffness=K - self._outer(stiff), damping=C - self._outer(damp))
+
+    def force(self, omega: float) -> ComplexArray:
+        """Return the (m, m) G at ω in rad/s."""
+        return self.influence.of_wave(self.phase_angle, omega)
+
+    def beyond_frozen(self, omega: float) -> tuple[ComplexArray, ComplexArray]:
+        """Return what G at ω has beyond the frozen form, (m, m), and the derivative by ω."""
+        stiff, damp = self.influence.frozen(self.phase_angle, self.reference)
+        slope = self.influence.slope_of_wave(self.phase_angle, omega)
+        return self.force(omega) - stiff - 1j * omega * damp, slope - 1j * damp
+
+    def _outer(self, inner: ComplexArray) -> Matrix:
+        product = self.patterns @ inner @ self.patterns.conj().T
+        standing = abs(np.sin(self.phase_angle)) < 1e-12 and np.isrealobj(self.patterns)
+        return np.asarray(product.real if standing else product)
+
+
+def _dense(matrix: Matrix) -> Matrix:
+    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
+
+
+def _summed(values: Matrix, phases: ComplexArray) -> ComplexArray:
+    return np.asarray(np.tensordot(phases, values, axes=1), dtype=complex)
