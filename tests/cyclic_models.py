@@ -4,6 +4,7 @@ from itertools import permutations
 
 import numpy as np
 import scipy.sparse
+import scipy.spatial
 
 from stickslip.model.axis import Axis
 from stickslip.model.dofs import Dofs, nodal_dofs
@@ -104,3 +105,42 @@ def wedge(sectors, *, cells=(2, 2, 1), inner=0.5, outer=1.0, height=0.1, start=N
         sets["root"] = number[0].ravel()
         sets["cyclic_low"], sets["cyclic_high"] = number[1:, 0].ravel(), number[1:, -1].ravel()
     return SolidMesh(points.reshape(-1, 3), np.array(tets), sets)
+
+
+def unlike_wedge(
+    sectors, low, high, *, inner=0.5, outer=1.0, height=0.2, seed=0, clamp=False, around=2
+):
+    """One sector of a ring as quadratic tetrahedra, its cut faces meshed with `low` and `high` cells along radius and axis."""
+    rng = np.random.default_rng(seed)
+    layers = []
+    for along in np.linspace(0, 1, around + 1):
+        cells = np.ceil((1 - along) * np.array(low) + along * np.array(high)).astype(int)
+        grids = np.meshgrid(*(np.linspace(0, 1, n + 1) for n in cells), indexing="ij")
+        r, z = (grid.ravel() for grid in grids)
+        for values, n in zip((r, z), cells, strict=True):
+            inside = (values > 0) & (values < 1)
+            values[inside] += 0.25 / n * rng.uniform(-1, 1, np.count_nonzero(inside))
+        layers.append(np.column_stack([r, np.full(r.size, along), z]))
+    at = np.vstack(layers)
+    tets = scipy.spatial.Delaunay(at * [outer - inner, 1.0, height]).simplices
+    volume = np.linalg.det(at[tets[:, 1:]] - at[tets[:, :1]])
+    tets[volume < 0] = tets[volume < 0][:, [1, 0, 2, 3]]
+    tets = tets[np.abs(volume) > 1e-6]  # the others lie flat in a face
+    edges = np.array([(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)])
+    ends, which = np.unique(
+        np.sort(tets[:, edges].reshape(-1, 2), axis=1), axis=0, return_inverse=True
+    )
+    cells = np.hstack([tets, len(at) + which.reshape(-1, 6)])
+    at = np.vstack([at, at[ends].mean(axis=1)])
+    radius = inner + (outer - inner) * at[:, 0]
+    angle = 2 * np.pi / sectors * (at[:, 1] - 0.5)
+    points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height * at[:, 2]])
+
+    def where(column, value):
+        return np.flatnonzero(np.abs(at[:, column] - value) < 1e-12)
+
+    sets = {"cyclic_low": where(1, 0), "cyclic_high": where(1, 1), "rim": where(0, 1)}
+    if clamp:
+        root = where(0, 0)
+        sets = {name: np.setdiff1d(nodes, root) for name, nodes in sets.items()} | {"root": root}
+    return SolidMesh(points, cells, sets)

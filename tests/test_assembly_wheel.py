@@ -397,14 +397,6 @@ def test_shrouds_joined_from_sector_to_sector_are_one_ring():
             )
         },
     )
-    for pairing in (
-        "node_to_segment",
-        "segment_to_segment",
-    ):  # nodes of the two faces lie elsewhere
-        other = {"ring": replace(joined.joins["ring"], pairing=pairing)}
-        unlike = replace(sector_model(shrouded_sector()), contacts={}, joins=other)
-        with pytest.raises(InputError, match="join them by node_to_node"):
-            unlike.at(SPEED)
     sets = dict(mesh.node_sets)
     for side in ("low", "high"):
         sets[f"cyclic_{side}"] = np.unique(
@@ -414,6 +406,13 @@ def test_shrouds_joined_from_sector_to_sector_are_one_ring():
     for k in range(3):
         found, expected = (natural_frequencies(m.at(SPEED, k), 6) for m in (joined, ring))
         np.testing.assert_allclose(found, expected, rtol=1e-9)
+        for pairing in ("node_to_segment", "segment_to_segment"):
+            tied = {"ring": replace(joined.joins["ring"], pairing=pairing)}
+            # nodes of the two shroud faces lie elsewhere
+            unlike = replace(sector_model(shrouded_sector()), contacts={}, joins=tied)
+            found = natural_frequencies(unlike.at(SPEED, k), 6)
+            np.testing.assert_allclose(found, expected, rtol=0.05)
+            assert np.abs(found / expected - 1).max() > 1e-6
 
 
 def test_what_is_wrong_with_a_wheel_is_named():

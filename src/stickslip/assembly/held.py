@@ -180,7 +180,7 @@ def _holding(model: Model, holds: BoolArray) -> list[Matrix]:
     found = [
         (pairs.own + pairs.following)[rows],
         picked(ties.followers, n) - ties.weights,
-        picked(ties.high, n) - picked(ties.low, n),
+        picked(ties.high, n) - ties.onward @ picked(ties.low, n),
     ]
     if model.retention > 0:
         found.append(picked(model.places.bodies(), n))

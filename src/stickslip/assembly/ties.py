@@ -11,14 +11,13 @@ from stickslip.arrays import IntArray, Matrix
 from stickslip.assembly.contact import Join
 from stickslip.assembly.facing import named
 from stickslip.assembly.pairs import Turn, match, sides
-from stickslip.assembly.places import NO_FACETS, Places, Spot, picked, stacked
+from stickslip.assembly.places import NO_FACETS, Places, Spot, picked
 from stickslip.contact.mortar import mortar_tie
 from stickslip.contact.surface import Surface
 from stickslip.errors import InputError, input_error
 
 MEAN = "segment_to_segment"
 TINY = 1e-12  # weights of partners below are rounding
-MATCH = "Mesh both sides alike and join them by node_to_node, with a tolerance that reaches: sectors are tied node to node."
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,13 +31,16 @@ class Ties:
     weights
         (m, N) CSR: each as a sum of dofs that do not follow.
     low, high
-        (k,) dofs tied from sector to sector: those of this sector's `high` follow `low` of the next.
+        Dofs tied from sector to sector: those of this sector's `high` follow `low` of the next.
+    onward
+        (high, low) CSR weights of the latter.
     """
 
     followers: IntArray
     weights: Matrix
     low: IntArray
     high: IntArray
+    onward: Matrix
 
     def matrix(self, index: IntArray) -> tuple[Matrix, IntArray]:
         """Return the tie of some of the dofs, and which of them stay.
@@ -79,7 +81,7 @@ def tie_joins(places: Places, joins: Mapping[str, Join], turn: Turn | None) -> T
     """
     n = places.n
     rows: dict[int, Matrix] = {}
-    low, high = [], []
+    ahead_of: dict[int, Matrix] = {}
     for name, join in joins.items():
         key = f"join.{name}"
         first, second, ahead = sides(places, key, join, turn)
@@ -91,9 +93,7 @@ def tie_joins(places: Places, joins: Mapping[str, Join], turn: Turn | None) -> T
             )
         found = _followed(key, join, first, second, ahead)
         if ahead is not None:
-            _refuse_unlike(key, join, found)
-            low.append(np.array([int(row.indices[0]) for row in found.values()], dtype=np.int64))
-            high.append(np.array(list(found), dtype=np.int64))
+            ahead_of |= {dof: row for dof, row in found.items() if dof not in ahead_of}
             continue
         _refuse_twice(places, key, found, rows)
         rows |= found
@@ -102,7 +102,10 @@ def tie_joins(places: Places, joins: Mapping[str, Join], turn: Turn | None) -> T
         [scipy.sparse.csr_array((0, n)), *(rows[d] for d in followers)], format="csr"
     )
     weights = _resolved(places, followers, weights, len(joins))
-    return Ties(followers, weights, stacked(low), stacked(high))
+    onward = scipy.sparse.vstack([scipy.sparse.csr_array((0, n)), *ahead_of.values()], format="csr")
+    low = np.unique(onward.indices).astype(np.int64)
+    high = np.array(list(ahead_of), dtype=np.int64)
+    return Ties(followers, weights, low, high, onward[:, low])
 
 
 def _followed(
@@ -121,9 +124,9 @@ def _followed(
     if turn is not None:
         b = Surface(turn.points(b.points), b.displacement, b.facets, b.normals, b.numbers)
     theirs = (
-        _in_the_mean(key, join, a, b, turn)
+        _in_the_mean(key, join, a, b)
         if join.pairing == MEAN
-        else _by_nodes(key, join, _towards(a, b), b, turn)
+        else _by_nodes(key, join, _towards(a, b), b)
     )
     theirs.data[np.abs(theirs.data) < TINY] = 0.0
     theirs.eliminate_zeros()
@@ -132,14 +135,14 @@ def _followed(
     return {int(d): theirs[[i]] for i, d in enumerate(dofs) if d >= 0}
 
 
-def _by_nodes(key: str, join: Join, a: Surface, b: Surface, turn: Turn | None) -> Matrix:
+def _by_nodes(key: str, join: Join, a: Surface, b: Surface) -> Matrix:
     """Return the motion (3 n_A, N) of the partners of all nodes of side A."""
     try:
         pairing = named(key, join, lambda: match(join, a, b, _across(a)))
     except InputError as error:
-        if turn is None and join.pairing != "node_to_node":
+        if join.pairing != "node_to_node":
             raise
-        remedy = MATCH if turn is not None else "Use node_to_segment, or raise the tolerance."
+        remedy = "Use node_to_segment, or raise the tolerance."
         raise input_error(error.place, error.problem, remedy) from None
     # gap = frameᵀ (u_b - u_a): back to global axes
     p = pairing.n_points
@@ -148,10 +151,8 @@ def _by_nodes(key: str, join: Join, a: Surface, b: Surface, turn: Turn | None) -
     return scipy.sparse.csr_array(back @ pairing.gap_operator + a.displacement)
 
 
-def _in_the_mean(key: str, join: Join, a: Surface, b: Surface, turn: Turn | None) -> Matrix:
+def _in_the_mean(key: str, join: Join, a: Surface, b: Surface) -> Matrix:
     """Return the motion (3 n_A, N) that side B gives the nodes of side A in the mean."""
-    if turn is not None:
-        raise input_error(f"{key}.pairing", f"{MEAN} ties no nodes one to one", MATCH)
     weights = named(key, join, lambda: mortar_tie(a, b, reach=join.tolerance))
     return scipy.sparse.csr_array(scipy.sparse.kron(weights, np.eye(3)) @ b.displacement)
 
@@ -184,12 +185,6 @@ def _refuse_clamped(key: str, first: Spot, dofs: IntArray, theirs: Matrix) -> No
             f"node {node} of {first.name!r} is clamped and cannot follow, {stuck.size} such dofs in all",
             "Clamp its partner as well, or take it out of the set.",
         )
-
-
-def _refuse_unlike(key: str, join: Join, found: Mapping[int, Matrix]) -> None:
-    if any(row.nnz != 1 or abs(row.data[0] - 1.0) > TINY for row in found.values()):
-        one, two = join.between
-        raise input_error(f"{key}.pairing", f"{one!r} and {two!r} do not match node by node", MATCH)
 
 
 def _refuse_twice(

@@ -19,7 +19,7 @@ from stickslip.assembly.reduced import (
 )
 from stickslip.assembly.wheel import (
     ReducedSector,
-    partners,
+    leaders,
     reduced_wave,
     wave_numbers,
     wheel_of,
@@ -67,8 +67,10 @@ def reduced_sector(
     reduction, damping, whole = _reduction(model)
     needed = np.unique(np.concatenate([kept, whole]))
     needed = needed[~np.isin(needed, model.ties.followers)]
-    kept = np.unique(partners(sector)[at.of_dofs(needed, model.places.dofs, "part")])
-    wheel = (sector.structure, sector.low, sector.high, sector.sectors, sector.axis)
+    kept = leaders(sector, at.of_dofs(needed, model.places.dofs, "part"))
+    wheel = (
+        sector.structure, sector.low, sector.high, sector.sectors, sector.axis, sector.weights,
+    )  # fmt: skip
     content = content_hash("wave", *wheel, kept, damping, steady)
     memo = next(iter(model.parts.values())).memo
     mirrored = goes_both_ways(sector, sector.structure)

@@ -1,6 +1,6 @@
 """A model that is a sector of a wheel: how its parts meet their neighbours, and its waves reduced."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,8 @@ from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.coordinates import Coordinates
 from stickslip.assembly.pairs import Pairs, Turn
 from stickslip.assembly.places import Places, picked, stacked
-from stickslip.assembly.ties import Ties
+from stickslip.assembly.ties import MEAN, Ties
+from stickslip.assembly.unlike_faces import unlike_faces
 from stickslip.errors import InputError, input_error
 from stickslip.model.damping import Damping
 from stickslip.model.part import Part
@@ -35,7 +36,9 @@ class Neighbours:
     turn
         Number of sectors and axis.
     low, high
-        (m,) dofs of all parts that are partners.
+        Dofs of all parts: those of `high` follow those of `low`.
+    weights
+        (high, low) CSR as in `CyclicSector`; None: they are partners, in the same order.
     ties
         Part -> tie of its static displacement, which all sectors have alike.
     warnings
@@ -45,6 +48,7 @@ class Neighbours:
     turn: Turn
     low: IntArray
     high: IntArray
+    weights: Matrix | None
     ties: Mapping[str, Matrix]
     warnings: tuple[str, ...]
 
@@ -54,15 +58,22 @@ class Neighbours:
         known = at.stays[at.ids[at.stays] >= 0]
         untied[at.ids[known]] = np.flatnonzero(at.ids[at.stays] >= 0)
         low, high = untied[self.low], untied[self.high]
-        torn = np.flatnonzero((low < 0) != (high < 0))
+        weights = self.weights
+        if weights is None:
+            here, torn = low >= 0, np.flatnonzero((low < 0) != (high < 0))
+            low, high = low[here], high[here]
+        else:
+            followed, follow = low >= 0, high >= 0
+            across = (weights[follow][:, ~followed], weights[~follow][:, followed])
+            torn = np.concatenate([np.unique(part.nonzero()[0]) for part in across])
+            low, high, weights = low[followed], high[follow], weights[follow][:, followed]
         if torn.size:
             raise input_error(
                 "join",
                 f"{torn.size} dofs of a cyclic face follow a join, and their partners on the other face do not",
                 "Join both faces alike.",
             )
-        both = low >= 0
-        return CyclicSector(structure, self.turn.sectors, low[both], high[both], self.turn.axis)
+        return CyclicSector(structure, self.turn.sectors, low, high, self.turn.axis, weights)
 
 
 def neighbours(places: Places, parts: Mapping[str, Part]) -> Neighbours | None:
@@ -77,7 +88,7 @@ def neighbours(places: Places, parts: Mapping[str, Part]) -> Neighbours | None:
     if not counts:
         return None
     _refuse_others(parts, counts)
-    low, high, ties, warnings, axes = [], [], {}, [], []
+    tied, ties, warnings, axes = [], {}, [], []
     for name in counts:
         part = parts[name]
         sector = _faces(name, part)
@@ -87,24 +98,42 @@ def neighbours(places: Places, parts: Mapping[str, Part]) -> Neighbours | None:
             continue
         ties[name] = sector.tie
         axes.append(sector.axis)
-        low.append(sector.low + places.offset(name))
-        high.append(sector.high + places.offset(name))
+        first = places.offset(name)
+        tied.append((sector.low + first, sector.high + first, sector.weights))
     axis = axes[0] if axes else parts[next(iter(counts))].axis
     if any((a is None) != (axis is None) or (a is not None and a != axis) for a in axes):
         raise input_error(
             "part", "turn about different axes", "Give all parts of a wheel one axis."
         )
     turn = Turn(next(iter(counts.values())), axis)
-    return Neighbours(turn, stacked(low), stacked(high), ties, tuple(warnings))
+    return Neighbours(turn, *_one_after_the_other(tied), ties, tuple(warnings))
 
 
 def with_joins(found: Neighbours | None, ties: Ties) -> Neighbours | None:
     """Return the neighbours with what joins tie from sector to sector."""
-    if found is None or not ties.low.size:
+    if found is None or not ties.high.size:
         return found
-    low, high = np.concatenate([found.low, ties.low]), np.concatenate([found.high, ties.high])
+    both = (found.low, found.high, found.weights), (ties.low, ties.high, ties.onward)
+    low, high, weights = _one_after_the_other(both)
     first = np.sort(np.unique(high, return_index=True)[1])  # corners of faces that meet
-    return replace(found, low=low[first], high=high[first])
+    low = low if weights is not None else low[first]
+    weights = None if weights is None else weights[first]
+    return replace(found, low=low, high=high[first], weights=weights)
+
+
+def _one_after_the_other(
+    tied: Sequence[tuple[IntArray, IntArray, Matrix | None]],
+) -> tuple[IntArray, IntArray, Matrix | None]:
+    """Put what is tied together; with weights, each dof of the low faces is there once."""
+    low, high = stacked(one[0] for one in tied), stacked(one[1] for one in tied)
+    if all(one[2] is None for one in tied):
+        return low, high, None
+    weights = scipy.sparse.block_diag(
+        [scipy.sparse.eye_array(one[0].size) if one[2] is None else one[2] for one in tied]
+    )
+    once, place = np.unique(low, return_inverse=True)
+    merged = weights @ picked(place, once.size)
+    return once, high, scipy.sparse.csr_array(merged)
 
 
 def _refuse_others(parts: Mapping[str, Part], counts: Mapping[str, int]) -> None:
@@ -132,6 +161,8 @@ def _faces(name: str, part: Part) -> CyclicSector | None:
         return None
     try:
         low, high = (part.structure.dof_set(face) for face in part.faces)
+        if part.cyclic == MEAN:
+            return unlike_faces(part)
         if part.mesh is None and not _in_space(part.structure, low):
             return CyclicSector(part.structure, part.sectors, low, high, axis=None)
         return cyclic_sector(
@@ -147,11 +178,20 @@ def _in_space(structure: Structure, members: IntArray) -> bool:
 
 
 def partners(sector: CyclicSector) -> IntArray:
-    """Return each dof of a sector, those of the high face replaced by their partners on the low one."""
+    """Return each dof of a sector, those of the high face replaced by their partners on the low one; -1 where it follows several."""
     place = np.arange(sector.structure.n)
-    tied = sector.low != sector.high
-    place[sector.high[tied]] = sector.low[tied]
+    high, low, weights = sector.following
+    place[high] = -1
+    single = np.flatnonzero(np.diff(weights.indptr) == 1)
+    place[high[single]] = low[weights.indices[weights.indptr[single]]]
     return place
+
+
+def leaders(sector: CyclicSector, dofs: IntArray) -> IntArray:
+    """Return the dofs that some dofs of a sector move with, in rising order: themselves, or those of the low face that they follow."""
+    high, low, weights = sector.following
+    followed = weights[np.isin(high, dofs)].nonzero()[1]
+    return np.union1d(np.setdiff1d(dofs, high), low[followed])
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,14 +241,15 @@ class ReducedSector:
 
     def of_dofs(self, dofs: IntArray, place: str) -> IntArray:
         """Return the coordinates that dofs of the sector are; `place` is the key that asks for them."""
-        behind = dofs[partners(self.sector)[dofs] != dofs]
-        if behind.size and place == "output.points":
+        here = partners(self.sector)[dofs]
+        behind = dofs[here != dofs]
+        if behind.size and (place == "output.points" or np.any(here < 0)):
             raise input_error(
                 place,
                 f"{self.sector.structure.dofs.labels[int(behind[0])]} lies on the high cyclic face, which moves as the neighbour's low face",
                 "Take its partner on the low face, or a place beside the faces.",
             )
-        rows = self.ways[0][np.searchsorted(self.kept, partners(self.sector)[dofs])]
+        rows = self.ways[0][np.searchsorted(self.kept, here)]
         single = np.diff(rows.indptr) == 1
         if not single.all():
             name = self.sector.structure.dofs.labels[int(dofs[np.flatnonzero(~single)[0]])]

@@ -3,7 +3,7 @@
 import numpy as np
 import scipy.sparse
 
-from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.contact.facets import interpolation, lumped_areas
 from stickslip.contact.segment_points import segment_points
 from stickslip.contact.surface import Surface
@@ -13,7 +13,9 @@ COVERED = 1e-3  # share of side A that may stand beyond side B
 TINY = 1e-14  # weights below are rounding
 
 
-def mortar_tie(a: Surface, b: Surface, *, reach: float | None = None) -> Matrix:
+def mortar_tie(
+    a: Surface, b: Surface, *, reach: float | None = None, held: BoolArray | None = None
+) -> Matrix:
     """Return the weights by which the nodes of side A follow those of side B.
 
     The difference of both sides' displacements vanishes in the mean over side A, weighted by each of its shape functions:
@@ -26,11 +28,14 @@ def mortar_tie(a: Surface, b: Surface, *, reach: float | None = None) -> Matrix:
         The two sides; all nodes of A belong to facets, and all of A is opposite to B.
     reach
         Largest distance of partners, m; None: the radius of the largest facet.
+    held
+        (n_A,) nodes of A that do not move, where B does not either: their rows are empty, and the difference vanishes in the mean
+        weighted by the shape functions of the others; None for none.
 
     Returns
     -------
     Matrix
-        (n_A, n_B) CSR; each row adds up to one.
+        (n_A, n_B) CSR; without held nodes each row adds up to one.
 
     Raises
     ------
@@ -64,6 +69,10 @@ def mortar_tie(a: Surface, b: Surface, *, reach: float | None = None) -> Matrix:
         return scipy.sparse.csr_array(entries, shape=(len(facets), len(side.points)))
 
     on_a, on_b = shapes(a, found.facet_a, found.on_a), shapes(b, found.facet_b, found.on_b)
-    weighted = (on_a * found.weight[:, None]).T
-    weights = np.linalg.solve((weighted @ on_a).toarray(), (weighted @ on_b).toarray())
+    moves = np.arange(len(a.points)) if held is None else np.flatnonzero(~held)
+    weighted = (on_a[:, moves] * found.weight[:, None]).T
+    weights = np.zeros((len(a.points), len(b.points)))
+    weights[moves] = np.linalg.solve(
+        (weighted @ on_a[:, moves]).toarray(), (weighted @ on_b).toarray()
+    )
     return scipy.sparse.csr_array(np.where(np.abs(weights) > TINY, weights, 0.0))

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
@@ -152,6 +152,8 @@ class Part:
         Of the wheel that the part is one sector of; 1: it stands alone.
     faces
         Names of the sets of the low and the high cyclic face.
+    cyclic
+        How these faces are tied: node to node, or in the mean where their meshes do not match; then the high face follows.
     axis
         Of rotation.
     reduction
@@ -173,6 +175,7 @@ class Part:
     surfaces: Mapping[str, BodyPoints] = field(default_factory=dict)
     sectors: int = 1
     faces: tuple[str, str] = FACES
+    cyclic: Literal["node_to_node", "segment_to_segment"] = "node_to_node"
     axis: Axis = field(default_factory=Axis)
     reduction: Reducing | None = None
     damping: Damping | None = None

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 
-from stickslip.arrays import IntArray, Matrix
+from stickslip.arrays import BoolArray, IntArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
 from stickslip.model.dofs import Dofs
@@ -45,6 +45,9 @@ class CyclicSector:
         a node has its components side by side.
     axis
         Axis of rotation; None for coordinates that no rotation changes.
+    weights
+        (m_high, m_low) where the faces do not match: each dof of `high` follows those of `low` with the weights of its row, which
+        add up to one and are the same for all components of a node; None: partners follow each other.
 
     Raises
     ------
@@ -57,19 +60,21 @@ class CyclicSector:
     low: IntArray
     high: IntArray
     axis: Axis | None = field(default_factory=Axis)
+    weights: Matrix | None = None
 
     def __post_init__(self) -> None:
         check_sectors("CyclicSector", self.sectors)
         low, high = (np.asarray(side, dtype=np.int64) for side in (self.low, self.high))
         object.__setattr__(self, "low", low)
         object.__setattr__(self, "high", high)
-        if low.shape != high.shape or low.ndim != 1:
+        wanted = low.shape + low.shape if self.weights is None else self.weights.shape
+        if high.shape + low.shape != wanted or low.ndim != 1:
             raise input_error(
                 "CyclicSector: low, high",
                 f"have shapes {low.shape} and {high.shape}",
-                "Give each dof of one face and its partner on the other.",
+                "Give each dof of one face and its partner on the other, or weights (high, low).",
             )
-        both = np.concatenate([low, high[high != low]])
+        both = np.concatenate([low, high[self._tied()[0]]])
         if both.size and (both.min() < 0 or both.max() >= self.structure.n):
             raise input_error(
                 "CyclicSector: low, high",
@@ -102,7 +107,25 @@ class CyclicSector:
     @property
     def shared(self) -> IntArray:
         """Dofs that all sectors share: those of nodes on the axis, or of a hub."""
-        return np.asarray(self.low[self.low == self.high])
+        return np.asarray(self.high[~self._tied()[0]])
+
+    @property
+    def following(self) -> tuple[IntArray, IntArray, Matrix]:
+        """Dofs of the high face that follow, those of the low face that they follow, and the CSR weights (followers, followed)."""
+        high, low = self._tied()
+        weights = (
+            scipy.sparse.eye_array(high.sum(), format="csr")
+            if self.weights is None
+            else scipy.sparse.csr_array(self.weights)[high][:, low]
+        )
+        return self.high[high], self.low[low], weights
+
+    def _tied(self) -> tuple[BoolArray, BoolArray]:
+        """Return which dofs of the high and of the low face are not shared by all sectors."""
+        if self.weights is None:
+            differ = self.low != self.high
+            return differ, differ
+        return ~np.isin(self.high, self.low), ~np.isin(self.low, self.high)
 
     @property
     def tie(self) -> Matrix:
@@ -126,11 +149,10 @@ class CyclicSector:
         phase = wave(wave_number, self.sectors).phase
         n, free = self.structure.n, self.independent
         own = ones_at(free, np.arange(free.size), (n, free.size))
-        tied = self.low != self.high
-        low, high = self.low[tied], self.high[tied]
+        high, low, weights = self.following
         turn = phase * self._turn(low, 1)
         into = ones_at(high, np.arange(high.size), (n, high.size))
-        tie = own + into @ turn @ own[low]
+        tie = own + into @ (weights @ turn) @ own[low]
         return scipy.sparse.hstack([tie, self._whirl(phase)], format="csr")
 
     def turn(self, sectors: int) -> Matrix:

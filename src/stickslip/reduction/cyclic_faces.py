@@ -196,7 +196,7 @@ def _unmatched(low: Face, high: Face, sectors: int, axis: Axis, reach: float) ->
         _missing(low, high, 2 * math.pi / sectors, axis, reach)
         + _missing(high, low, -2 * math.pi / sectors, axis, reach)
         + f"sectors={sectors}, axis {axis.direction} through {axis.origin}, tolerance {reach:.3g} m",
-        "Mesh both faces alike, clamp the nodes of both or of neither, check the axis.",
+        'Mesh both faces alike or tie them in the mean, cyclic = "segment_to_segment"; clamp the nodes of both or of neither, check the axis.',
     )
 
 

@@ -125,15 +125,14 @@ def _from_wheel(sector: CyclicSector, number: int) -> Matrix:
     """Return the (n, N) matrix from the wheel's coordinates to those of a sector in its own axes."""
     structure, free, shared = sector.structure, sector.independent, sector.shared
     size = sector.sectors * free.size + shared.size
-    column = np.full(structure.n, -1)
-    column[free] = number * free.size + np.arange(free.size)
-    following = (number + 1) % sector.sectors
-    place = np.full(structure.n, -1)
-    place[free] = np.arange(free.size)
-    tied = sector.low != sector.high
-    column[sector.high[tied]] = following * free.size + place[sector.low[tied]]
-    column[shared] = sector.sectors * free.size + np.arange(shared.size)
-    glob = ones_at(np.arange(structure.n), column, (structure.n, size))
+    own = np.concatenate([free, shared])
+    column = number * free.size + np.arange(free.size)
+    column = np.concatenate([column, sector.sectors * free.size + np.arange(shared.size)])
+    glob = ones_at(own, column, (structure.n, size))
+    high, low, weights = sector.following
+    next_one = (number + 1) % sector.sectors * free.size + np.searchsorted(free, low)
+    followed = ones_at(np.arange(low.size), next_one, (low.size, size))
+    glob = glob + ones_at(high, np.arange(high.size), (structure.n, high.size)) @ weights @ followed
     return sector.turn(-number) @ glob
 
 

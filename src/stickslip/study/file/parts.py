@@ -179,6 +179,11 @@ class FileModel(PartTable):
     high_face: Name | None = Field(
         None, description="name of the node set of the cyclic face at the higher angle"
     )
+    cyclic: Literal["node_to_node", "segment_to_segment"] = Field(
+        "node_to_node",
+        description="how the cyclic faces are tied: node_to_node where their meshes match, or segment_to_segment, in the mean, where "
+        "they do not; then the high face follows the low one",
+    )
     clamped: list[Name] = Field(
         default_factory=list,
         max_length=100,

@@ -177,7 +177,14 @@ def _solid(
     gone = *clamped_sets, *(name for name in mesh.node_sets if name not in free.node_sets)
     axis = table.axis() or axis or Axis()
     return solid_part(
-        free, material, axis, sectors=sectors, faces=faces, clamped_sets=gone, **others
+        free,
+        material,
+        axis,
+        sectors=sectors,
+        faces=faces,
+        cyclic=table.cyclic,
+        clamped_sets=gone,
+        **others,
     )
 
 
@@ -203,7 +210,13 @@ def _from_matrices(key: str, table: FileModel, home: Path, others: dict[str, Any
     faces = _faces(key, table, structure.sets, sectors)
     others["warnings"] = negative_damping(structure, table.file)
     return structure_part(
-        structure, mesh=mesh, sectors=sectors, faces=faces, axis=table.axis() or Axis(), **others
+        structure,
+        mesh=mesh,
+        sectors=sectors,
+        faces=faces,
+        cyclic=table.cyclic,
+        axis=table.axis() or Axis(),
+        **others,
     )
 
 
