@@ -80,6 +80,13 @@ class CondensedStiffness:
         """Return the same structure under another load."""
         return replace(self, load=load)
 
+    def with_mass_damping(self, rate: float) -> "CondensedStiffness":
+        """Return the same structure with `rate` (1/s) times its mass added to its damping; negative: taken away."""
+        nn, nl, ll = (_mass_damped(blocks, rate) for blocks in (self.nn, self.nl, self.ll))
+        back = None if self.ln is None else _mass_damped(self.ln, rate)
+        interior = Interior(nn, nl, ll, self.diagonal, back, self.loss)
+        return replace(self, nn=nn, nl=nl, ll=ll, ln=back, spectral=interior)
+
     def condensed(self, omega: float, order: int) -> Condensed:
         """Return stiffness, load and their ω-derivatives for harmonics 0..`order` at `omega` (rad/s)."""
         # the static problem alone is no reason to decompose the interior
@@ -241,6 +248,11 @@ def _dynamic(
         stiffness += 1j * (s > 0.0) * loss
     slope: ComplexArray = np.asarray(1j * c - 2.0 * s * m)
     return stiffness, slope
+
+
+def _mass_damped(blocks: Blocks, rate: float) -> Blocks:
+    k, c, m = blocks
+    return k, c + rate * m, m
 
 
 def condense(structure: Structure, retained: IntArray, load: HarmonicLoad) -> CondensedStiffness:

@@ -152,6 +152,10 @@ class DynamicStiffness(Protocol):
         """Return the same structure under another load."""
         ...
 
+    def with_mass_damping(self, rate: float) -> Self:
+        """Return the same structure with `rate` (1/s) times its mass added to its damping; negative: taken away."""
+        ...
+
     def condensed(self, omega: float, order: int) -> Condensed:
         """Return stiffness, load and their ω-derivatives for harmonics 0..`order` at `omega` (rad/s)."""
         ...

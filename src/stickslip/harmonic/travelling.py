@@ -77,9 +77,26 @@ class Waves:
         """Return the waves of some harmonics at `omega` (rad/s); the mean has one frequency, zero."""
         return [self._mean if h == 0 else self.of_harmonic(h).at(h * omega) for h in harmonics]
 
+    def with_mass_damping(self, rate: float) -> "Waves":
+        """Return the same waves with `rate` (1/s) times their mass added to their damping; what is condensed already is kept."""
+        return _Damped(self.structures, self.near, self.far, self.feedback, plain=self, rate=rate)
+
     @cached_property
     def _mean(self) -> WaveAt:
         return self.of_harmonic(0).at(0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Damped(Waves):
+    plain: Waves | None = None
+    rate: float = 0.0
+
+    def of_harmonic(self, h: int) -> SolvedWave | ModalWave:
+        plain: Waves = self.plain  # type: ignore[assignment]  # `Waves.with_mass_damping` gives it
+        key = id(self.structures[h]), h == 0
+        if key not in self.known:
+            self.known[key] = plain.of_harmonic(h).with_mass_damping(self.rate)
+        return self.known[key]
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +136,10 @@ class TravellingStiffness:
     def with_load(self, load: HarmonicLoad) -> "TravellingStiffness":
         """Return the same waves under another load."""
         return replace(self, load=load)
+
+    def with_mass_damping(self, rate: float) -> "TravellingStiffness":
+        """Return the same waves with `rate` (1/s) times their mass added to their damping; negative: taken away."""
+        return replace(self, waves=self.waves.with_mass_damping(rate))
 
     def condensed(self, omega: float, order: int) -> Condensed:
         """Return stiffness, load and their ω-derivatives for harmonics 0..`order` at `omega` (rad/s)."""

@@ -6,7 +6,7 @@ frequency costs products (`ModalWave`; Krack et al. 2017, app. 5). All others, c
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -67,6 +67,11 @@ class SolvedWave:
     near: IntArray
     far: IntArray
     feedback: Feedback | None = None
+
+    def with_mass_damping(self, rate: float) -> "SolvedWave":
+        """Return the same wave with `rate` (1/s) times its mass added to its damping."""
+        k, c, m, loss = self.matrices
+        return replace(self, matrices=(k, c + rate * m, m, loss))
 
     def at(self, s: float) -> WaveAt:
         """Return the wave at ``s = hω`` in rad/s."""
@@ -147,6 +152,16 @@ class ModalWave:
     mass: Array
     loss: Array
     modes: Array
+
+    def with_mass_damping(self, rate: float) -> "ModalWave":
+        """Return the same wave with `rate` (1/s) times its mass added to its damping: its modes stay what they are."""
+        k, c, m, loss = self.nn
+        return replace(
+            self,
+            nn=(k, c + rate * m, m, loss),
+            ratio=self.ratio + rate,
+            damping=self.damping + rate * self.mass,
+        )
 
     def at(self, s: float) -> WaveAt:
         """Return the wave at ``s = hω`` in rad/s."""

@@ -113,6 +113,12 @@ class TunedWheel:
         """Number of coordinates."""
         return self.of_harmonic(0).n
 
+    @property
+    def has_every_wave(self) -> bool:
+        """Whether there is a structure for each wave number or the one of the other direction: what all sectors in time need."""
+        n = self.sectors
+        return all(k in self.waves or (n - k) % n in self.waves for k in range(n // 2 + 1))
+
     def grounded(self, springs: Matrix) -> "TunedWheel":
         """Return the wheel with springs, a sparse matrix (n, n) in N/m, from its coordinates to the ground."""
         waves = {k: wave.grounded(springs) for k, wave in self.waves.items()}
@@ -138,6 +144,7 @@ def tuned_wheel(  # noqa: PLR0913
     reduce: Reduce = craig_bampton,
     names: Sequence[str] = (),
     relative: bool | None = None,
+    waves: Sequence[int] = (),
 ) -> tuple[TunedWheel, Matrix]:
     """Reduce the travelling waves that an engine order excites, and write them so that the gaps are the same in all of them.
 
@@ -166,6 +173,8 @@ def tuned_wheel(  # noqa: PLR0913
         Whether the gaps are coordinates, which halves the unknowns (`in_relative_coordinates`); False: the kept dofs in the order of
         `keep` are (`nodal_coordinates`), for outputs on nodes of contacts and gaps that depend on each other; None: where gaps
         allow it.
+    waves
+        Further wave numbers that are reduced, for disturbances and for all sectors in time.
 
     Returns
     -------
@@ -182,7 +191,8 @@ def tuned_wheel(  # noqa: PLR0913
     """
     _refuse_misfits(sector, gaps)
     orders = range(harmonics + 1)
-    wanted = sorted({excited_wave(engine_order, sector.sectors, h) for h in orders})
+    excited = {excited_wave(engine_order, sector.sectors, h) for h in orders}
+    wanted = sorted(excited | {k % sector.sectors for k in waves})
     place = None if keep is None else kept_places("tuned_wheel", sector, keep)
     if place is not None:
         _refuse_lost_contacts(sector, place, *gaps)
@@ -196,8 +206,8 @@ def tuned_wheel(  # noqa: PLR0913
     first = moving[wanted[0]]
     if relative is not False:
         try:
-            waves, operator = _written(sector, wanted, moving, gap_coordinates)
-            return TunedWheel(waves, sector.sectors, engine_order, harmonics), operator.real
+            written, operator = _written(sector, wanted, moving, gap_coordinates)
+            return TunedWheel(written, sector.sectors, engine_order, harmonics), operator.real
         except InputError:
             if relative:
                 raise
@@ -207,8 +217,8 @@ def tuned_wheel(  # noqa: PLR0913
     def node_coordinates(k: int) -> tuple[Structure, Matrix]:
         return nodal.of_wave(moving[k], wave(k, sector.sectors).phase), nodal.operator
 
-    waves, operator = _written(sector, wanted, moving, node_coordinates)
-    wheel = TunedWheel(waves, sector.sectors, engine_order, harmonics, nodal.multipliers)
+    written, operator = _written(sector, wanted, moving, node_coordinates)
+    wheel = TunedWheel(written, sector.sectors, engine_order, harmonics, nodal.multipliers)
     return wheel, operator
 
 

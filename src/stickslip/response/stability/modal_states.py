@@ -24,6 +24,7 @@ class ModalStates:
     damping: FloatArray  # (n, n), over ω
     speed: FloatArray  # (n,)
     gaps: FloatArray  # (3 n_contacts, n)
+    basis: FloatArray  # (n, n)
 
     @property
     def n(self) -> int:
@@ -93,6 +94,7 @@ def modal_states(
         basis.T @ damping @ basis / omega,
         speed,
         rows @ basis,
+        basis,
     )
 
 

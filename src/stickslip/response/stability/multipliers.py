@@ -221,15 +221,7 @@ def motion_stability(
     InputError
         If a contact is rigid, harmonics vibrate as different structures, or the structure cannot be marched in time.
     """
-    if interface.rigid:
-        raise input_error(
-            "stability",
-            "a contact is rigid: its states have no multipliers that follow from forces as functions of gaps",
-            "Give the contacts a stiffness, as elastic_coulomb.",
-        )
-    whole = one_structure(structure, "stability")
-    modes = modal_states(whole, interface.gap_operator, interface.stuck_stiffness(), omega)
-    laws = [located_part(law) for law in interface.laws]
+    modes, laws = _prepared(structure, interface, omega)
     contacts = _located(interface, laws, gap_coefficients)
     if contacts is None:
         return _unknown(modes.n)
@@ -238,6 +230,51 @@ def motion_stability(
         found = floquet(monodromy(modes, contacts)).multipliers
         return _judged(contacts, found, np.zeros(found.size), modes.n)
     return _sampled(modes, contacts, interface, np.flatnonzero(~located), gap_coefficients)
+
+
+def period_matrix(
+    structure: LinearSide, interface: Interface, gap_coefficients: FloatArray, omega: float
+) -> tuple[ModalStates, FloatArray] | None:
+    """Return the derivative of all states after a period of a motion by those before, the modal ones first; None where nothing is known.
+
+    The arguments are those of `motion_stability`; where laws are known by sampled tangents, it is that of the finest samples there.
+    """
+    modes, laws = _prepared(structure, interface, omega)
+    contacts = _located(interface, laws, gap_coefficients)
+    if contacts is None:
+        return None
+    own = np.flatnonzero([not _is_located(law) for law in interface.laws])
+    if not own.size:
+        return modes, monodromy(modes, contacts)
+    times, polynomials = _samples(contacts, own, gap_coefficients, 4)
+    at = _tangents([interface.laws[c] for c in own], own, times, polynomials, modes.omega)
+    if not np.all(np.isfinite(at.jac)):
+        return None
+    return modes, sampled_monodromy(modes, contacts, times, at, interface.factors[own])
+
+
+def _prepared(
+    structure: LinearSide, interface: Interface, omega: float
+) -> tuple[ModalStates, list[PiecewiseLinear | None]]:
+    """Return the modal states, and of each law what has transitions that can be located."""
+    if interface.rigid:
+        raise input_error(
+            "stability",
+            "a contact is rigid: its states have no multipliers that follow from forces as functions of gaps",
+            "Give the contacts a stiffness, as elastic_coulomb.",
+        )
+    whole = one_structure(structure, "stability")
+    modes = modal_states(whole, interface.gap_operator, interface.stuck_stiffness(), omega)
+    return modes, [located_part(law) for law in interface.laws]
+
+
+def _samples(
+    contacts: ContactStates, own: IntArray, gap_coefficients: FloatArray, halves: int
+) -> tuple[list[FloatArray], FloatArray]:
+    """Return the samples of a period, `halves` halves of the least number, and the gaps of the contacts `own`."""
+    samples = max(SAMPLES, SAMPLES_PER_HARMONIC * ((len(gap_coefficients) - 1) // 2))
+    polynomials = gap_coefficients.reshape(len(gap_coefficients), -1, 3)[:, own]
+    return sample_times(contacts, samples, halves), polynomials
 
 
 def located_part(law: ContactLaw) -> PiecewiseLinear | None:
@@ -295,11 +332,9 @@ def _sampled(
 
     A third step between these guards the errors against two that agree by chance, as errors of first order do now and then.
     """
-    harmonics = (len(gap_coefficients) - 1) // 2
-    samples = max(SAMPLES, SAMPLES_PER_HARMONIC * harmonics)
-    polynomials = gap_coefficients.reshape(len(gap_coefficients), -1, 3)[:, own]
     laws = [interface.laws[c] for c in own]
-    times = [sample_times(contacts, samples, halves) for halves in (2, 3, 4)]
+    made = [_samples(contacts, own, gap_coefficients, halves) for halves in (2, 3, 4)]
+    times, polynomials = [each for each, _ in made], made[0][1]
     tangents = [_tangents(laws, own, each, polynomials, modes.omega) for each in times]
     if not all(np.all(np.isfinite(each.jac)) for each in tangents):
         return _unknown(modes.n)

@@ -76,11 +76,21 @@ class SectorsInTime:
         rows = []
         for h, row in enumerate(coefficients[:, : _kept(self.wheel)]):
             kept = h <= self.wheel.harmonics and _agrees(self.wheel, h)
-            rows.append(_travelling(self.wheel, h, row if kept else np.zeros_like(row)))
+            moved = row if kept else np.zeros_like(row)
+            rows.append(_travelling(self.wheel, h, moved, self.count))
         return np.array(rows)
 
+    def travelling(self, rows: ComplexArray) -> ComplexArray:
+        """Return the (H + 1, sectors · p) amplitudes of all sectors of what means the same in every wave, as gaps do (H + 1, p)."""
+        return np.array([_travelling(self.wheel, h, r, self.count) for h, r in enumerate(rows)])
 
-def all_sectors(system: System, load: HarmonicLoad) -> SectorsInTime:
+    @property
+    def count(self) -> int:
+        """Number of sectors that are here, those that stand for others alone where not `every` one was asked for."""
+        return self.structure.n // _kept(self.wheel)
+
+
+def all_sectors(system: System, load: HarmonicLoad, *, every: bool = False) -> SectorsInTime:
     """Return the wheel of all sectors of a system with a tuned wheel.
 
     Parameters
@@ -89,6 +99,9 @@ def all_sectors(system: System, load: HarmonicLoad) -> SectorsInTime:
         Its structure is a `TunedWheel` with waves up to half as many harmonics as there are different sectors.
     load
         Loads on the coordinates of its harmonics.
+    every
+        Whether all sectors of the wheel are wanted, each of which may then do something else, and not those alone that do different
+        things under the engine order. The wheel then needs all its waves (`TunedWheel.has_every_wave`).
 
     Raises
     ------
@@ -98,7 +111,8 @@ def all_sectors(system: System, load: HarmonicLoad) -> SectorsInTime:
     wheel, interface = system.structure, system.interface
     if not isinstance(wheel, TunedWheel):
         raise input_error("all_sectors", "got no tuned wheel", "Integrate its one structure.")
-    sectors, common = different_sectors(wheel)
+    alike = different_sectors(wheel)
+    sectors, common = (wheel.sectors, 1) if every else alike
     own = _kept(wheel)
     loads: dict[int, ComplexArray] = {}
     for h, amplitude in load.harmonics.items():
@@ -108,11 +122,15 @@ def all_sectors(system: System, load: HarmonicLoad) -> SectorsInTime:
                 f"harmonic {h} of the load drives a wave that turns against another one of its wave number",
                 "Leave gyroscopic terms out, or the load.",
             )
-        loads[h] = _travelling(wheel, h, amplitude[:own])
+        loads[h] = _travelling(wheel, h, amplitude[:own], sectors)
     waves = [_wave(wheel, common * k) for k in range(sectors)]
     weights = None if interface.weights is None else np.tile(interface.weights, sectors)
     gaps = _circulant([_gaps(wheel, w, interface.gap_operator) for w in waves])
-    step = pow(wheel.engine_order // common % sectors, -1, sectors) if sectors > 1 else 0
+    turns = sectors > 1 and alike == (sectors, common)
+    motion = WaveMotion(1, 0)
+    if turns:
+        step = pow(wheel.engine_order // common % sectors, -1, sectors)
+        motion = WaveMotion(sectors, step)
     static = np.tile(load.static[:own], sectors)
     structure = Structure(
         _circulant([_dense(w.mass)[:own, :own] for w in waves]),
@@ -125,9 +143,7 @@ def all_sectors(system: System, load: HarmonicLoad) -> SectorsInTime:
     )
     names = tuple(f"sector{s}.{name}" for s in range(sectors) for name in interface.names)
     contacts = Interface(names, interface.laws * sectors, gaps, weights)
-    return SectorsInTime(
-        structure, contacts, HarmonicLoad(static, loads), WaveMotion(sectors, step), wheel
-    )
+    return SectorsInTime(structure, contacts, HarmonicLoad(static, loads), motion, wheel)
 
 
 def different_sectors(wheel: TunedWheel) -> tuple[int, int]:
@@ -154,9 +170,8 @@ def _gaps(wheel: TunedWheel, wave: Structure, operator: Matrix) -> Matrix:
     return gaps[:, :own] + gaps[:, own : own + ties] @ copies
 
 
-def _travelling(wheel: TunedWheel, harmonic: int, row: Matrix) -> ComplexArray:
-    """Return a row (n,) of a harmonic of sector 0 for all sectors."""
-    sectors, _ = different_sectors(wheel)
+def _travelling(wheel: TunedWheel, harmonic: int, row: Matrix, sectors: int) -> ComplexArray:
+    """Return a row (n,) of a harmonic of sector 0 for so many sectors."""
     k = excited_wave(wheel.engine_order, wheel.sectors, harmonic)
     phases = np.exp(2j * np.pi * k * np.arange(sectors) / wheel.sectors)
     return np.asarray((phases[:, None] * row).ravel())
@@ -171,8 +186,10 @@ def _wave(wheel: TunedWheel, k: int) -> Structure:
 
 def _chosen(waves: Mapping[int, Structure], k: int, wheel: TunedWheel) -> int:
     """Return k or the wave number of the other direction, whichever belongs to the lower harmonic."""
-    for h in range(wheel.harmonics + 1):
-        found = excited_wave(wheel.engine_order, wheel.sectors, h)
+    excited = (
+        excited_wave(wheel.engine_order, wheel.sectors, h) for h in range(wheel.harmonics + 1)
+    )
+    for found in (*excited, *sorted(waves)):
         if found in waves and found in (k, (wheel.sectors - k) % wheel.sectors):
             return found
     raise input_error(

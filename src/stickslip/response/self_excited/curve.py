@@ -1,0 +1,205 @@
+"""Damping over amplitude: what a mode needs to go on with each amplitude, from where nothing slips to where friction is small."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.errors import input_error
+from stickslip.harmonic.bordered import PeriodicProblem
+from stickslip.response.branch import Followed, OneLevel, Route, branch_of, steps_through
+from stickslip.response.equilibrium import preload
+from stickslip.response.follow import follow
+from stickslip.response.parameter import Parameter
+from stickslip.response.self_excited.problem import SelfExcited, levels
+from stickslip.solve.branch import Following
+from stickslip.solve.newton_method import Newton, Solution, first_converged, newton
+from stickslip.solve.status import Status
+
+FAINT = 1e-12  # m: a gap that moves less slips nowhere
+MOST_DOUBLINGS = 80
+SLIPS = 1e-6  # change of the shape, the frequency or the damping when the amplitude is doubled, from which on it is no linear mode
+LARGEST = 0.25
+PATIENT = Newton(max_iterations=60, globalisation="levenberg_marquardt")
+
+
+@dataclass(frozen=True, eq=False)
+class AmplitudePoint:
+    """A periodic motion of given amplitude.
+
+    Parameters
+    ----------
+    amplitude
+        Of the coordinate that stands for the motion, in its first harmonic, m.
+    omega
+        rad/s.
+    level
+        Damping ratio of the motion: negative where it is fed with energy, so that its amplitude grows; or the value of the parameter
+        at which it goes on by itself.
+    order
+        Highest harmonic.
+    unknowns
+        Of the equation.
+    status
+        How the solver ended; a point that did not converge is no motion.
+    iterations
+        Newton steps.
+    """
+
+    amplitude: float
+    omega: float
+    level: float
+    order: int
+    unknowns: FloatArray
+    status: Status
+    iterations: int
+
+    @property
+    def converged(self) -> bool:
+        """Whether the point is a solution."""
+        return self.status.converged
+
+
+def slip_amplitude(problem: SelfExcited) -> float:
+    """Return an amplitude at which the first contact leaves the state that it has in the mode: within a factor of two above.
+
+    Raises
+    ------
+    InputError
+        If none does.
+    """
+    static = preload(problem.system, problem.load.static)
+    mode = problem.relative(problem.guess(static, 1.0))[1]
+    largest = float(np.max(np.abs(problem.balance.interface.gap_operator @ mode), initial=0.0))
+    amplitude = FAINT / largest if largest > 0.0 else np.inf
+    equation, before = problem.over_amplitude(), None
+    for _ in range(MOST_DOUBLINGS if np.isfinite(amplitude) else 0):
+        found = _solved(problem, equation, float(np.log(amplitude)), [])
+        if not found.status.converged:
+            return amplitude
+        if before is not None and _vibration_change(problem, before, found.x) > SLIPS:
+            return amplitude
+        before, amplitude = found.x, 2.0 * amplitude
+    raise input_error(
+        "limit_cycle",
+        f"no contact slips or opens in mode {problem.mode.number}, however large its amplitude",
+        "Nothing bounds the motion: look at the linear stability alone.",
+    )
+
+
+def damping_over_amplitude(
+    problem: SelfExcited, span: tuple[float, float], points: int, done: Sequence[Followed] = ()
+) -> Iterator[Followed]:
+    """Follow the motions of a mode over their amplitude: what damping each of them has.
+
+    Parameters
+    ----------
+    problem
+        The mode.
+    span
+        First and last amplitude, m.
+    points
+        Least number of points.
+    done
+        What an interrupted run has found.
+    """
+    yield from _followed(problem, problem.over_amplitude(), span, points, done)
+
+
+def parameter_over_amplitude(
+    problem: SelfExcited,
+    parameter: Parameter,
+    near: float,
+    cycle: FloatArray,
+    span: tuple[float, float],
+    points: int = 40,
+) -> list[AmplitudePoint]:
+    """Follow limit cycles over their amplitude: the value of a parameter at which each goes on by itself.
+
+    Parameters
+    ----------
+    problem
+        The mode.
+    parameter
+        As in `branch_in_parameter`: a field of the contact laws, or a function of the value, as one that has a factor on the aerodynamic forces.
+    near
+        Value of the parameter at the first amplitude, about.
+    cycle
+        Unknowns of a limit cycle near it.
+    span
+        First and last amplitude, m.
+    points
+        Least number of points.
+    """
+    scale = abs(near) or 1.0
+    equation = problem.over_amplitude(levels(problem, parameter, near), scale)
+    start = np.append(cycle[:-1], near / scale)
+    found = branch_of(_followed(problem, equation, span, points, (), start))
+    return [replace(of_point(problem, f), level=scale * float(f.point.x[-1])) for f in found]
+
+
+def at_amplitude(
+    problem: SelfExcited, amplitude: float, near: Sequence[FloatArray] = ()
+) -> AmplitudePoint:
+    """Return the motion of an amplitude (m) and its damping, from unknowns of motions that may be near or from the linear mode."""
+    found = _solved(problem, problem.over_amplitude(), float(np.log(amplitude)), near)
+    return _point(problem, amplitude, found)
+
+
+def of_point(problem: SelfExcited, followed: Followed) -> AmplitudePoint:
+    """Return what a point of a curve over the amplitude tells, its level as a damping ratio."""
+    return _point(problem, float(np.exp(followed.p)), followed.point.solution)
+
+
+def _point(problem: SelfExcited, amplitude: float, found: Solution) -> AmplitudePoint:
+    y = found.x
+    omega, level, order = problem.omega(y), problem.ratio(y), problem.balance.order
+    return AmplitudePoint(amplitude, omega, level, order, y, found.status, found.iterations)
+
+
+def _followed(
+    problem: SelfExcited,
+    equation: PeriodicProblem,
+    span: tuple[float, float],
+    points: int,
+    done: Sequence[Followed],
+    start: FloatArray | None = None,
+) -> Iterator[Followed]:
+    first, last = (float(np.log(a)) for a in span)
+    control = replace(steps_through(abs(last - first), points), largest=LARGEST)
+    way = Following(newton=problem.how.newton, control=control, weights=_weights(problem))
+
+    def begin(p: float, near: Sequence[FloatArray], _most: bool) -> Solution:
+        own = [] if start is None else [start]
+        return _solved(problem, equation, p, [*near, *own])
+
+    route = Route(first=first, last=last, points=points, leaves=False)
+    yield from follow(OneLevel(equation, way, begin), route, done)
+
+
+def _solved(
+    problem: SelfExcited, equation: PeriodicProblem, p: float, near: Sequence[FloatArray]
+) -> Solution:
+    """Solve at an amplitude from motions nearby, or from the linear mode about the static state."""
+    static = preload(problem.system, problem.load.static)
+    starts = [*near, problem.guess(static, float(np.exp(p)))]
+    attempts = (
+        newton(lambda y: equation.linearise(y, p), start, options)
+        for options in (problem.how.newton, replace(PATIENT, linear=problem.how.newton.linear))
+        for start in starts
+    )
+    return first_converged(attempts)
+
+
+def _weights(problem: SelfExcited) -> FloatArray:
+    """Return the share of each unknown in the length of a step: of the vibration, the frequency and the level, not of the mean."""
+    weights = np.ones(problem.balance.size + 2)
+    weights[: problem.balance.linear.n] = 0.0
+    return weights
+
+
+def _vibration_change(problem: SelfExcited, before: FloatArray, after: FloatArray) -> float:
+    mean = problem.balance.linear.n
+    change = np.abs(after[mean:] - before[mean:])
+    return float(np.max(change) / np.max(np.abs(after[mean:-2])))

@@ -1,0 +1,232 @@
+"""Self-excited vibration in time: where a motion goes from near a limit cycle, and which wave of a whole wheel wins."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.contact.interface import Interface
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.linear import LinearSide
+from stickslip.response.time.marcher import prepared
+from stickslip.response.time.settling import (
+    last_third,
+    overflowed,
+    period_harmonics,
+    remaining_change,
+)
+from stickslip.response.time.start import TransientStart
+
+KEPT = 32  # samples of a period that are kept
+LAST = 4  # periods whose phases tell the frequency
+WINDOW = 16  # periods of a window in which waves are told apart
+SMALL = 1e-2  # of the largest wave: what is below has lost
+STEADY = 1e-2  # relative change of an amplitude over the last third that counts as none
+
+Outcome = Literal["one wave", "several waves", "decays", "grows", "not settled"]
+
+
+@dataclass(frozen=True, eq=False)
+class Marched:
+    """A motion marched over many periods of a frequency.
+
+    Parameters
+    ----------
+    omega
+        That frequency, rad/s.
+    first
+        (periods, n_outputs) complex amplitudes of the first harmonic in each period, m.
+    samples
+        (periods · `KEPT`, n_outputs) displacements, m.
+    final
+        State at the end.
+    overflowed
+        Whether the motion grew beyond all numbers: the periods end before.
+    """
+
+    omega: float
+    first: ComplexArray
+    samples: FloatArray
+    final: TransientStart
+    overflowed: bool
+
+    @property
+    def amplitude(self) -> FloatArray:
+        """(n_outputs,) amplitude of the last period, m."""
+        return np.asarray(np.abs(self.first[-1]))
+
+    @property
+    def frequency(self) -> FloatArray:
+        """(n_outputs,) frequency at the end, rad/s, by the phase that the last periods gain."""
+        if len(self.first) < 2:
+            return np.full(self.first.shape[1], np.nan)
+        last = self.first[-min(len(self.first), LAST) :]
+        gained = np.angle(np.sum(np.conj(last[:-1]) * last[1:], axis=0))
+        return np.asarray(self.omega * (1.0 + gained / (2.0 * np.pi)))
+
+
+def march_periods(  # noqa: PLR0913
+    structure: LinearSide,
+    contacts: Interface,
+    load: HarmonicLoad,
+    omega: float,
+    outputs: IntArray,
+    start: TransientStart,
+    periods: int,
+    steps: int = 1024,
+    *,
+    settles: float = 0.0,
+) -> Marched:
+    """March a structure with its contacts over so many periods of a frequency that need not be its own.
+
+    Parameters
+    ----------
+    structure, contacts, load
+        One structure, or all sectors of a wheel.
+    omega
+        rad/s.
+    outputs
+        Dofs that are told of.
+    start
+        State at t = 0.
+    periods
+        Most periods.
+    steps
+        Steps in a period.
+    settles
+        What may be left of the change of the largest amplitude, relative, where the march ends before; 0: it does not.
+    """
+    steps = -(-steps // KEPT) * KEPT
+    marcher = prepared(
+        structure, contacts.gap_operator, contacts.laws, load, omega, steps, contacts.weights
+    )
+    state, record = marcher.begun(start), marcher.record()
+    rows = marcher.modes.basis[outputs].T
+    first: list[ComplexArray] = []
+    samples: list[FloatArray] = []
+    changes: list[float] = []
+    lost = False
+    for _ in range(periods):
+        began = state.x[: marcher.n].copy()
+        lost = marcher.march(state, record) < 0 or overflowed(state.x, record.motion)
+        if lost:
+            break
+        first.append(period_harmonics(began, record.motion, 1)[1] @ rows)
+        samples.append(record.motion[steps // KEPT - 1 :: steps // KEPT] @ rows)
+        size = np.abs(first[-1])
+        if len(first) > 1:
+            changes.append(abs(float(size.max() - np.abs(first[-2]).max())) / float(size.max()))
+        if settles and remaining_change(changes) < settles:
+            break
+    none = np.zeros((0, len(outputs)))
+    return Marched(
+        omega,
+        np.array(first) if first else none.astype(complex),
+        np.concatenate(samples) if samples else none,
+        marcher.end(state),
+        lost,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class WaveHistory:
+    """The waves of a motion of all sectors, over time.
+
+    Parameters
+    ----------
+    time
+        (windows,) s.
+    amplitude
+        (windows, n_s) of each wave number, m, at one place of the sectors.
+    omega
+        (windows, n_s) frequency of each, rad/s; of no meaning where the wave is small.
+    spread
+        (windows, n_s) how much the amplitude of each changes within the window, relative: a beat.
+    """
+
+    time: FloatArray
+    amplitude: FloatArray
+    omega: FloatArray
+    spread: FloatArray
+
+    @property
+    def waves(self) -> tuple[int, ...]:
+        """Wave numbers that are there at the end, the largest first."""
+        last = self._last
+        order = np.argsort(-last, kind="stable")
+        return tuple(int(k) for k in order if last[k] > SMALL * last.max(initial=0.0))
+
+    @property
+    def outcome(self) -> Outcome:
+        """What has become of the motion."""
+        total = np.sqrt(np.sum(self.amplitude**2, axis=1))
+        if len(total) < 3 or not np.all(np.isfinite(total)):
+            return "grows" if len(total) and not np.all(np.isfinite(total)) else "not settled"
+        stretch = min(last_third(len(total)), len(total) - 1)
+        if total[-1] < SMALL * total.max() and total[-1] < total[-1 - stretch]:
+            return "decays"
+        own = self.amplitude[:, list(self.waves)]
+        change = np.abs(own[-1] - own[-1 - stretch]) / total[-1]
+        if np.any(change > STEADY):
+            return "grows" if np.all(np.diff(total[-1 - stretch :]) > 0.0) else "not settled"
+        return "one wave" if len(self.waves) == 1 else "several waves"
+
+    @property
+    def sentence(self) -> str:
+        """The same in words."""
+        waves = self.waves
+        named = " and ".join(str(k) for k in waves[:4])
+        return {
+            "one wave": f"wave {named} wins",
+            "several waves": f"waves {named} coexist",
+            "decays": "the motion dies",
+            "grows": f"the motion still grows, wave {waves[0] if waves else 0} most",
+            "not settled": f"not settled yet, waves {named} are there",
+        }[self.outcome]
+
+    @property
+    def _last(self) -> FloatArray:
+        stretch = min(last_third(len(self.amplitude)), len(self.amplitude))
+        return np.asarray(np.mean(self.amplitude[-stretch:], axis=0))
+
+
+def wave_history(marched: Marched, window: int = WINDOW) -> WaveHistory:
+    """Return the waves of a motion whose outputs are the same place in all sectors, in their order.
+
+    In each window of so many periods the motion of a wave number is split by the sign of its frequency: wave k and wave -k have the same
+    shape at one time, and turn in opposite directions.
+    """
+    sectors = marched.samples.shape[1]
+    length = window * KEPT
+    count = len(marched.samples) // length
+    shape = np.fft.fft(marched.samples[: count * length], axis=1) / sectors
+    parts = shape.reshape(count, length, sectors)
+    taper = np.hanning(length + 1)[:-1, None]
+    spectrum = np.fft.fft(parts * taper, axis=1)
+    frequency = np.fft.fftfreq(length, d=1.0 / KEPT)
+    forward = np.fft.ifft(spectrum * (frequency > 0.0)[:, None], axis=1)
+    power = np.sum(np.abs(forward) ** 2, axis=1) / np.sum(taper**2)
+    turned = np.angle(np.sum(np.conj(forward[:, :-1]) * forward[:, 1:], axis=1))
+    middle = forward[:, length // 4 : -(length // 4)] / taper[length // 4 : -(length // 4)]
+    size = np.abs(middle)
+    spread = (size.max(axis=1) - size.min(axis=1)) / np.maximum(
+        size.max(axis=1), np.finfo(float).tiny
+    )
+    period = 2.0 * np.pi / marched.omega
+    return WaveHistory(
+        (np.arange(count) + 0.5) * window * period,
+        2.0 * np.sqrt(power),
+        turned * KEPT * marched.omega / (2.0 * np.pi),
+        spread,
+    )
+
+
+def mixed_start(
+    motions: Sequence[tuple[ComplexArray, float]], like: TransientStart
+) -> TransientStart:
+    """Return the sum of motions (n,) complex amplitudes and their frequencies, rad/s, at t = 0, with the states of laws of another start."""
+    moved = sum((a.real for a, _ in motions), np.zeros_like(like.displacement))
+    rate = sum(((1j * omega * a).real for a, omega in motions), np.zeros_like(like.velocity))
+    return replace(like, displacement=moved, velocity=rate)

@@ -1,0 +1,235 @@
+"""Periodic motion that nothing drives, as an equation: its frequency is unknown, and so is what keeps it going.
+
+The balance has a given amplitude ``a`` of one coordinate in its first harmonic, which is its scale, and the phase of that coordinate is
+zero, since time may begin anywhere. The unknowns beside the motion are ``ln ω`` and a *level*:
+
+- a damping of so many times the mass, which the motion needs to go on. Where it is zero the motion is a limit cycle (with positive damping
+  of the model it is negative: the extended periodic motion concept of Krack, Journal of Sound and Vibration 340 (2015) 70-86);
+- any parameter of the model: a contact parameter, or a factor on the aerodynamic forces;
+- the amplitude itself, for the model as it is: the limit cycle.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.errors import input_error
+from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
+from stickslip.harmonic.bordered import Condition, PeriodicProblem, Setting, State
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.parameters import BalanceAt
+from stickslip.response.parameter import Discretisation, Parameter, parameter_family
+from stickslip.response.self_excited.modes import StuckMode
+from stickslip.response.system import System
+from stickslip.solve.linear import Dense, factorised
+
+WANDERED = 1.0  # |ln(ω / ω_0)| at which a corrector has lost the mode
+FARTHEST = 100.0  # |ln a| beyond which there are no motions
+STILL = 1e-6  # of the largest amplitude of a mode: a coordinate that moves less is none of it
+SAMPLES_A_HARMONIC = 16
+
+
+@dataclass(frozen=True)
+class Held:
+    """A real part of the amplitude of a coordinate in the first harmonic has a given value, in the scale of the problem.
+
+    Parameters
+    ----------
+    position
+        Of the coordinate among the retained ones.
+    row
+        1: the cosine part, 2: the sine part.
+    target
+        What it is.
+    """
+
+    position: int
+    row: int
+    target: float
+
+    def value(self, state: State) -> float:
+        """Return what is zero where it holds."""
+        return float(state.x[self._place(state)] - self.target)
+
+    def gradient(self, state: State) -> FloatArray:
+        """Return its derivative by the unknowns."""
+        out = np.zeros(state.y.size)
+        out[self._place(state)] = 1.0
+        return out
+
+    def _place(self, state: State) -> int:
+        return self.row * state.setting.balance.linear.n + self.position
+
+
+@dataclass(frozen=True, eq=False)
+class SelfExcited:
+    """The periodic motions of one mode that nothing drives; `self_excited_motions` makes one.
+
+    Parameters
+    ----------
+    system, load
+        What vibrates, and its static load.
+    mode
+        Where they begin at small amplitudes.
+    how
+        Harmonics, samples, solver.
+    position
+        Of the coordinate whose amplitude is given, among the retained ones.
+    balance
+        The balance at an amplitude of 1 m.
+    """
+
+    system: System
+    load: HarmonicLoad
+    mode: StuckMode
+    how: Discretisation
+    position: int
+    balance: HarmonicBalance
+
+    def with_order(self, order: int) -> "SelfExcited":
+        """Return the same with harmonics up to `order`, which the system has to have."""
+        samples = max(self.how.samples, SAMPLES_A_HARMONIC * order)
+        how = replace(self.how, order=order, samples=samples)
+        return self_excited_motions(self.system, self.load, self.mode, self.dof, how)
+
+    @property
+    def dof(self) -> int:
+        """The coordinate whose amplitude is given."""
+        return int(self.balance.linear.retained[self.position])
+
+    def damped(self, level: float) -> HarmonicBalance:
+        """Return the balance at 1 m with a level of damping taken away: `level` times ω_0 times the mass."""
+        rate = -level * self.mode.omega
+        return replace(self.balance, linear=self.balance.linear.with_mass_damping(rate))
+
+    def over_amplitude(
+        self, family: BalanceAt | None = None, scale: float = 1.0
+    ) -> PeriodicProblem:
+        """Return the equation whose parameter is ``ln a`` and whose last unknown is a level, over `scale`; None: that of damping."""
+        members = family or self.damped
+
+        def setting(extra: FloatArray, p: float) -> Setting:
+            return self._setting(members(scale * float(extra[1])), float(extra[0]), p)
+
+        return self._bordered(setting)
+
+    def limit_cycle(self) -> PeriodicProblem:
+        """Return the equation of a limit cycle: its last unknown is ``ln a``; it has no parameter."""
+        return self._bordered(
+            lambda extra, _: self._setting(self.balance, float(extra[0]), float(extra[1]))
+        )
+
+    def unknowns(self, coefficients: ComplexArray, omega: float, last: float) -> FloatArray:
+        """Return the unknowns of a motion (H+1, n_retained) over its amplitude, its frequency and the last unknown."""
+        x = replace(self.balance, displacement_scale=1.0).unknowns(coefficients)
+        return np.append(x, [np.log(omega / self.mode.omega), last])
+
+    def relative(self, y: FloatArray) -> ComplexArray:
+        """Return the (H+1, n_retained) motion of unknowns, over its amplitude."""
+        return replace(self.balance, displacement_scale=1.0).coefficients(y[:-2])
+
+    def omega(self, y: FloatArray) -> float:
+        """Return the frequency of unknowns, rad/s."""
+        return self.mode.omega * float(np.exp(y[-2]))
+
+    def ratio(self, y: FloatArray) -> float:
+        """Return the damping ratio of a motion whose last unknown is the level of damping."""
+        return 0.5 * float(y[-1]) * self.mode.omega / self.omega(y)
+
+    def at_amplitude(self, balance: HarmonicBalance, log_amplitude: float) -> HarmonicBalance:
+        """Return a balance in the scale of an amplitude."""
+        a = float(np.exp(log_amplitude))
+        return replace(balance, displacement_scale=a, force_scale=a * self.balance.force_scale)
+
+    def guess(self, static: FloatArray, amplitude: float) -> FloatArray:
+        """Return the unknowns, over the amplitude, of the mode about a static state (n_retained of the system,)."""
+        linear = self.balance.linear
+        motion = np.zeros((self.balance.order + 1, linear.n), dtype=complex)
+        motion[0, np.searchsorted(linear.retained, self.system.retained)] = static / amplitude
+        motion[1] = self.mode.shape[linear.retained] / self.mode.shape[self.dof]
+        return self.unknowns(motion, self.mode.omega, 2.0 * self.mode.ratio)
+
+    def _setting(self, balance: HarmonicBalance, log_omega: float, log_amplitude: float) -> Setting:
+        near = abs(log_omega) < WANDERED and abs(log_amplitude) < FARTHEST
+        omega = self.mode.omega * float(np.exp(log_omega)) if near else np.nan
+        scaled = self.at_amplitude(balance, log_amplitude) if near else balance
+        return Setting(scaled, omega, np.array([omega, 0.0]))
+
+    def _bordered(self, settings: Callable[[FloatArray, float], Setting]) -> PeriodicProblem:
+        held: tuple[Condition, ...] = (
+            Held(self.position, 1, 1.0),
+            Held(self.position, 2, 0.0),
+        )
+        return PeriodicProblem(settings, held, partial(factorised, Dense()))
+
+
+def self_excited_motions(
+    system: System, load: HarmonicLoad, mode: StuckMode, dof: int, how: Discretisation
+) -> SelfExcited:
+    """Set up the motions of a mode that nothing drives.
+
+    Parameters
+    ----------
+    system
+        What vibrates and its contacts; of a wheel, with the wave number of the mode as its engine order.
+    load
+        Static forces; harmonic ones are none of a self-excited motion.
+    mode
+        One of `stuck_modes`.
+    dof
+        The coordinate whose amplitude stands for that of the motion.
+    how
+        Harmonics, samples, solver.
+
+    Raises
+    ------
+    InputError
+        If a contact is rigid, a harmonic load acts, or the coordinate is none of the mode.
+    """
+    if system.interface.rigid:
+        raise input_error(
+            "limit_cycle",
+            "a contact is rigid",
+            "Give the contacts a stiffness, as elastic_coulomb.",
+        )
+    if any(np.any(f) for f in load.harmonics.values()):
+        raise input_error(
+            "limit_cycle",
+            "a harmonic load acts: the motion would have two frequencies",
+            "Leave it out; the stability of the forced response says whether it is kept.",
+        )
+    share = abs(mode.shape[dof]) / float(np.max(np.abs(mode.shape)))
+    if share < STILL:
+        raise input_error(
+            "limit_cycle",
+            f"{system.structure.dofs.labels[dof]} hardly moves in mode {mode.number} ({share:.2g} of the largest)",
+            "Report the motion of a point that the mode moves.",
+        )
+    still = HarmonicLoad(load.static)
+    linear = system.condensed(still, how.order, np.array([dof]))
+    some = HarmonicLoad(still.static, {1: np.ones(still.static.size, dtype=complex)})
+    balance = harmonic_balance(
+        linear.with_load(some), system.interface, how.order, how.samples, how.evaluator
+    )
+    stiffness = (mode.omega / abs(mode.shape[dof])) ** 2  # of the mode, as its coordinate feels it
+    balance = replace(balance, linear=linear, displacement_scale=1.0, force_scale=stiffness)
+    position = int(np.searchsorted(linear.retained, dof))
+    return SelfExcited(system, load, mode, how, position, balance)
+
+
+def levels(problem: SelfExcited, parameter: Parameter, first: float) -> BalanceAt:
+    """Return the balances at 1 m of the values of a parameter; see `branch_in_parameter` for what that may be."""
+    own = problem.balance
+
+    def made(system: System, load: HarmonicLoad) -> HarmonicBalance:
+        return self_excited_motions(system, load, problem.mode, problem.dof, problem.how).balance
+
+    family = parameter_family(problem.system, problem.load, parameter, first, made)
+    return lambda value: replace(
+        family(value),
+        displacement_scale=own.displacement_scale,
+        force_scale=own.force_scale,
+    )

@@ -1,0 +1,115 @@
+"""Disturbances of a motion of a whole wheel, each a travelling wave: which nodal diameter grows."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.fourier import to_real
+from stickslip.response.stability.multipliers import Stability, motion_stability, period_matrix
+from stickslip.response.system import System
+from stickslip.response.time.sectors import SectorsInTime, all_sectors
+
+FELT = 1e-12  # of the largest multiplier: smaller ones are of states that are forgotten within the period
+
+
+@dataclass(frozen=True, eq=False)
+class WaveDisturbance:
+    """A disturbance of a motion of all sectors.
+
+    Parameters
+    ----------
+    multiplier
+        By which it grows in a period.
+    wave
+        Its wave number: the largest part of its shape. A disturbance of a travelling motion holds the waves that this one makes with
+        the harmonics of the motion, too.
+    share
+        Part of that wave in the shape, by squares.
+    omega
+        Frequency at which it vibrates, rad/s.
+    """
+
+    multiplier: complex
+    wave: int
+    share: float
+    omega: float
+
+    def nodal_diameter(self, sectors: int) -> int:
+        """Return the number of nodal diameters of its wave."""
+        return min(self.wave, sectors - self.wave)
+
+
+def whole_wheel(system: System) -> SectorsInTime:
+    """Return all sectors of a system with a tuned wheel, each of which may do something else."""
+    still = HarmonicLoad(np.zeros(system.structure.n))
+    return all_sectors(system, still, every=True)
+
+
+def sector_gaps(whole: SectorsInTime, gaps: ComplexArray) -> FloatArray:
+    """Return the (2H+1, 3 n_contacts n_s) real coefficients of the gaps of all sectors from those of one, (H+1, 3 n_contacts) complex, m."""
+    return to_real(whole.travelling(gaps))
+
+
+def wheel_stability(whole: SectorsInTime, gaps: FloatArray, omega: float) -> Stability:
+    """Return the stability of a motion of all sectors against every wave; see `motion_stability`."""
+    return motion_stability(whole.structure, whole.contacts, gaps, omega)
+
+
+def wave_disturbances(
+    whole: SectorsInTime, gaps: FloatArray, omega: float
+) -> list[WaveDisturbance]:
+    """Return the disturbances of a motion of all sectors, that which grows most first; none where nothing is known.
+
+    Parameters
+    ----------
+    whole
+        All sectors (`whole_wheel`).
+    gaps
+        (2H+1, 3 n_contacts n_s) of the motion (`sector_gaps`).
+    omega
+        Its frequency, rad/s.
+    """
+    found = period_matrix(whole.structure, whole.contacts, gaps, omega)
+    if found is None:
+        return []
+    modes, matrix = found
+    values, vectors = np.linalg.eig(matrix)
+    n = modes.n
+    moved = _by_wave(modes.basis @ vectors[:n], whole.count)
+    rate = _by_wave(
+        omega * (modes.basis @ (modes.speed[:, None] * vectors[n : 2 * n])), whole.count
+    )
+    order = np.argsort(-np.abs(values), kind="stable")
+    felt = order[np.abs(values[order]) > FELT * np.abs(values[order[0]])]
+    return [
+        _described(complex(values[i]), moved[:, :, i], rate[:, :, i], whole.count) for i in felt
+    ]
+
+
+def growing_wave(disturbances: Sequence[WaveDisturbance], modulus: float) -> WaveDisturbance | None:
+    """Return the disturbance whose multiplier has a modulus; None among none."""
+    if not disturbances or not np.isfinite(modulus):
+        return None
+    return min(disturbances, key=lambda d: abs(abs(d.multiplier) - modulus))
+
+
+def _by_wave(rows: ComplexArray, sectors: int) -> ComplexArray:
+    """Return (n_s, p, k) the waves of rows (n_s p, k), sector by sector."""
+    return np.asarray(np.fft.fft(rows.reshape(sectors, -1, rows.shape[1]), axis=0) / sectors)
+
+
+def _described(
+    multiplier: complex, moved: ComplexArray, rate: ComplexArray, sectors: int
+) -> WaveDisturbance:
+    """Return what a shape is: a real motion is the sum of it and its conjugate, of which that with a positive frequency is named."""
+    size = np.sum(np.abs(moved) ** 2, axis=1)
+    at, total = int(np.argmax(size)), float(np.sum(size))
+    if total == 0.0:
+        return WaveDisturbance(multiplier, 0, 0.0, 0.0)
+    omega = float(np.sum(np.conj(moved[at]) * rate[at]).imag / size[at])
+    wave = at if omega >= 0.0 else (sectors - at) % sectors
+    share = float(size[at]) / total
+    return WaveDisturbance(multiplier, wave, share, abs(omega))
