@@ -1,9 +1,15 @@
 """Public names of `stickslip.assembly`, written once."""
 
 from .assembled import Assembled as Assembled
+from .assembled import Blades as Blades
 from .assembled import ContactTable as ContactTable
 from .assembled import Frequencies as Frequencies
 from .assembled import Skin as Skin
+from .mistuning import BladeMistuning as BladeMistuning
+from .mistuning import ContactMistuning as ContactMistuning
+from .mistuning import Mistuning as Mistuning
+from .mistuning import OwnSector as OwnSector
+from .mistuning import pattern as pattern
 from .model import Model as Model
 from .placing import copy_of as copy_of
 from .placing import place_of as place_of

@@ -106,6 +106,25 @@ def _errors(full: FloatArray, reduced: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
+class Blades:
+    """What the outputs of a wheel with all its sectors are.
+
+    Parameters
+    ----------
+    sectors
+        Number of sectors; outputs and contact points go sector by sector.
+    labels
+        Outputs of each sector.
+    tuned
+        The same wheel with all sectors alike, of which one answers for all.
+    """
+
+    sectors: int
+    labels: tuple[str, ...]
+    tuned: "Assembled"
+
+
+@dataclass(frozen=True, eq=False)
 class Assembled:
     """A model reduced, its contacts paired and placed under the static load: arrays only, picklable.
 
@@ -139,6 +158,8 @@ class Assembled:
         ``nodes``, ``dofs``, ``reduced``, ``retained``.
     warnings
         What the user should know.
+    blades
+        Of a wheel whose sectors differ; None where one sector answers for all.
     """
 
     system: System
@@ -158,3 +179,4 @@ class Assembled:
     engine_order: int | None
     counts: dict[str, int]
     warnings: tuple[str, ...] = ()
+    blades: Blades | None = None

@@ -1,5 +1,6 @@
 """From a model to what solvers see: parts reduced, joined and loaded, contacts paired, all placed under the static loads."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -8,23 +9,19 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
+from stickslip.assembly.asked import asked, centrifugal_of_bodies, excitation, static_forces
 from stickslip.assembly.assembled import Assembled, ContactTable, Frequencies
 from stickslip.assembly.coordinates import Coordinates, coordinates
-from stickslip.assembly.forces import (
-    Labels,
-    engine_order,
-    error_names,
-    force_of,
-    output_labels,
-)
-from stickslip.assembly.held import held_warnings, refuse_unheld
+from stickslip.assembly.forces import force_of
+from stickslip.assembly.held import held_warnings
 from stickslip.assembly.joined import KEY, on_shapes
 from stickslip.assembly.model import Model
+from stickslip.assembly.pairs import Pairs
 from stickslip.assembly.places import picked, stacked
 from stickslip.assembly.points import in_points
 from stickslip.assembly.pulled import refuse_pulled
 from stickslip.assembly.reduced import Store, in_memory, reduced_parts
-from stickslip.assembly.rigid import held_gaps, in_gaps, refuse_mixed_gaps, refuse_rigid
+from stickslip.assembly.rigid import held_gaps, in_gaps, refuse_mixed_gaps
 from stickslip.assembly.statics import pressed_by, static_contact_force
 from stickslip.assembly.waves import reduced_sector
 from stickslip.contact.interface import Interface
@@ -73,34 +70,18 @@ class Linear:
 
 def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
     """Return a model as solvers see it; see `Model.assembled`."""
-    order = engine_order(model.loads, model.sectors > 1)
-    forces = {name: force_of(model.places, name, load) for name, load in model.loads.items()}
-    _refuse_beyond(model, harmonics)
-    labels = output_labels(model.places, model.outputs, model.loads)
-    if not labels.names:
-        raise input_error(
-            "output.points", "there is none", "Name a point whose motion is reported."
-        )
-    points = contact_labels(model)
-    names = error_names(labels, points, model.loads, model.alert_over)
-    watched = _joined(labels, points, _body_labels(model)).of(names, "alert_over")
-    if not model.pairs.names:
-        raise input_error(
-            "contact", "there is none: no coordinate would be left to solve for", "Give a contact."
-        )
-    _refuse_free(model, forces)
-    stay = np.concatenate([labels.dofs, watched])
-    kept = np.concatenate([stay, *(np.flatnonzero(f) for f in forces.values())])
-    linear = linear_side(model, order or 0, harmonics, kept, stay, store)
+    what = asked(model, harmonics)
+    order, labels = what.order, what.labels
+    linear = linear_side(model, order or 0, harmonics, what.kept, what.stay, store)
     refuse_mixed_gaps(model, linear.gaps)
     system = System(
         linear.side,
         Interface(model.pairs.names, model.pairs.laws, linear.gaps),
         linear.of_dofs(labels.dofs, "output.points"),
-        alert_dofs=linear.of_dofs(watched, "alert_over"),
-        free=_free(model, linear),
+        alert_dofs=linear.of_dofs(what.watched, "alert_over"),
+        free=free_coordinates(model, linear),
     )
-    load = _loads(model, linear, forces)
+    load = loads_on(model, linear, what.forces)
     held = system.with_retention(model.retention)
     gap, force = static_state(held, load.static)
     pressed = pressed_by(system.springs.laws, force)
@@ -112,12 +93,12 @@ def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
         system=held,
         bare=system,
         load=load,
-        contacts=_table(model),
+        contacts=contact_table(model.pairs),
         output_labels=labels.names,
         peak_output=peak,
-        error_labels=names,
+        error_labels=what.names,
         retention=model.retention,
-        excitation=_excitation(model),
+        excitation=excitation(model),
         static_gap=gap,
         static_force=force,
         frequencies=checked,
@@ -132,40 +113,6 @@ def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
         },
         warnings=(*model.warnings, *held_warnings(model, pressed), *checked.warnings()),
     )
-
-
-def _refuse_free(model: Model, forces: dict[str, Matrix]) -> None:
-    refuse_rigid(model)
-    refuse_unheld(model)
-    refuse_pulled(model, _static_forces(model, forces))
-
-
-def _refuse_beyond(model: Model, harmonics: int) -> None:
-    for name, load in model.loads.items():
-        if load.harmonic > harmonics:
-            raise input_error(
-                f"load.{name}.harmonic",
-                f"is {load.harmonic}, and harmonics up to {harmonics} are computed",
-                "Keep more harmonics.",
-            )
-
-
-def _joined(*labels: Labels) -> Labels:
-    names = tuple(name for one in labels for name in one.names)
-    return Labels(names, np.concatenate([one.dofs for one in labels]))
-
-
-def contact_labels(model: Model) -> Labels:
-    """Return names of the motion of contact points, ``point.x`` and so on, of those that are nodes."""
-    pairs, table = model.pairs, model.places.dofs
-    known = [(i, dof) for i, row in enumerate(pairs.nodes) for dof in row if dof >= 0]
-    names = tuple(f"{pairs.names[i]}.{table.component[dof]}" for i, dof in known)
-    return Labels(names, np.array([dof for _, dof in known], dtype=np.int64))
-
-
-def _body_labels(model: Model) -> Labels:
-    dofs, table = model.places.bodies(), model.places.dofs
-    return Labels(tuple(f"{table.part[d]}.{table.component[d]}" for d in dofs), dofs)
 
 
 def linear_side(
@@ -186,12 +133,8 @@ def linear_side(
     store
         As in `Model.assembled`.
     """
-    pairs, ties = model.pairs, model.ties
-    operators = [pairs.own, pairs.following, ties.weights]
-    used = [operator.nonzero()[1] for operator in operators]
+    kept, needed = physical(model, kept)
     bodies = model.places.bodies()
-    needed = np.unique(np.concatenate([kept, *used[:2], bodies]))
-    kept = np.unique(np.concatenate([needed, ties.followers, used[2]]))
     if model.neighbours is None:
         return _of_one(model, (kept, needed, np.concatenate([stay, bodies])), store)
     if model.interface_modes is not None:
@@ -222,6 +165,14 @@ def linear_side(
     return Linear(found.wheel, found.gaps, found.steady, of_dofs, load, of_wave)
 
 
+def physical(model: Model, kept: IntArray) -> tuple[IntArray, IntArray]:
+    """Return all dofs that stay physical beside some that are `kept`, and those of them that no shapes of joins replace."""
+    pairs, ties = model.pairs, model.ties
+    used = [operator.nonzero()[1] for operator in (pairs.own, pairs.following, ties.weights)]
+    needed = np.unique(np.concatenate([kept, *used[:2], model.places.bodies()]))
+    return np.unique(np.concatenate([needed, ties.followers, used[2]])), needed
+
+
 def _of_one(model: Model, dofs: tuple[IntArray, IntArray, IntArray], store: Store) -> Linear:
     """Reduce a single structure; `dofs` are those kept, those that no shapes replace, and those that stay coordinates."""
     kept, needed, stay = dofs
@@ -239,7 +190,7 @@ def _of_one(model: Model, dofs: tuple[IntArray, IntArray, IntArray], store: Stor
     steady = at.load(np.concatenate([part.steady for part in parts.values()]))
     few = on_shapes(model, structure, at, needed)
     gaps = few.columns(at.columns(model.pairs.own))
-    found = in_gaps(model, few.structure, gaps)
+    found = in_gaps(model.pairs, few.structure, gaps)
     if found.place is None:
         fixed = np.unique(at.columns(picked(stay, model.places.n)).nonzero()[1])
         found = in_points(few.structure, gaps, few.place[fixed], model.pairs.names)
@@ -264,7 +215,7 @@ def _on_kept(at: Coordinates, force: Matrix) -> Matrix:
     return at.load(untied)
 
 
-def _free(model: Model, linear: Linear) -> IntArray | None:
+def free_coordinates(model: Model, linear: Linear) -> IntArray | None:
     """Return the coordinates of rigid bodies that no join holds."""
     dofs = _free_dofs(model)
     return linear.of_dofs(dofs, "part") if dofs.size else None
@@ -274,7 +225,7 @@ def _free_dofs(model: Model) -> IntArray:
     return model.places.bodies(model.ties.weights.nonzero()[1])
 
 
-def _loads(model: Model, linear: Linear, forces: dict[str, Matrix]) -> HarmonicLoad:
+def loads_on(model: Model, linear: Linear, forces: Mapping[str, Matrix]) -> HarmonicLoad:
     """Return loads on the coordinates by their forces: static ones and harmonics; and that of steady rotation."""
     static = np.zeros(linear.side.n)
     if model.centrifugal and model.speed > 0:
@@ -288,37 +239,6 @@ def _loads(model: Model, linear: Linear, forces: dict[str, Matrix]) -> HarmonicL
         else:
             harmonics[h] = harmonics.get(h, 0) + own
     return HarmonicLoad(static, harmonics)
-
-
-def _static_forces(model: Model, forces: dict[str, Matrix]) -> dict[str, FloatArray]:
-    """Return the static forces (N,) on the dofs of all parts, by the keys that give them."""
-    static = {
-        f"load.{name}": np.real(force)
-        for name, force in forces.items()
-        if model.loads[name].harmonic == 0
-    }
-    if model.centrifugal and model.speed > 0:
-        static["rotation.speed_rpm"] = centrifugal_of_bodies(model)
-        for name, part in model.parts.items():
-            if part.solid is not None:
-                own = model.speed**2 * part.solid.centrifugal
-                static["rotation.speed_rpm"][model.places.own(name)] = own
-    return static
-
-
-def centrifugal_of_bodies(model: Model) -> FloatArray:
-    """Return the (N,) centrifugal forces (N) and moments (N m) on rigid bodies at their centres of mass."""
-    force = np.zeros(model.places.n)
-    for name, part in model.parts.items():
-        if part.body is not None:
-            force[model.places.own(name)] = part.body.centrifugal(model.speed, model.axis)
-    return force
-
-
-def _excitation(model: Model) -> float:
-    """Return the amplitude by which responses are divided, N; NaN where nothing vibrates."""
-    driven = [abs(load.newton) for load in model.loads.values() if load.harmonic > 0]
-    return max(driven, default=float("nan")) or float("nan")
 
 
 def static_state(system: System, static_load: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -336,13 +256,13 @@ def pressed_points(model: Model) -> BoolArray:
     """Return the contact points that the static loads at the model's own speed press, and those that cannot open."""
     static = {name: load for name, load in model.loads.items() if load.harmonic == 0}
     forces = {name: force_of(model.places, name, load) for name, load in static.items()}
-    refuse_pulled(model, _static_forces(model, forces))
+    refuse_pulled(model, static_forces(model, forces))
     kept = stacked(np.flatnonzero(f) for f in forces.values())
     empty = kept[:0]
     linear = linear_side(model, 0, 0, kept, empty, in_memory)
     interface = Interface(model.pairs.names, model.pairs.laws, linear.gaps)
-    system = System(linear.side, interface, empty, free=_free(model, linear))
-    load = _loads(model, linear, forces)
+    system = System(linear.side, interface, empty, free=free_coordinates(model, linear))
+    load = loads_on(model, linear, forces)
     _, force = static_state(system.with_retention(model.retention), load.static)
     return pressed_by(system.springs.laws, force)
 
@@ -385,7 +305,7 @@ def _lowest(model: Model, structure: Structure, count: int, store: Store) -> Flo
     return np.asarray(memo[content])
 
 
-def _table(model: Model) -> ContactTable:
-    pairs = model.pairs
+def contact_table(pairs: Pairs) -> ContactTable:
+    """Return what results say of contact points."""
     laws = tuple(law_name(law) for law in pairs.laws)
     return ContactTable(pairs.names, pairs.groups, laws, pairs.position, pairs.frame, pairs.area)

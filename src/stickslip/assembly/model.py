@@ -15,6 +15,7 @@ from stickslip.assembly.coordinates import Coordinates, coordinates
 from stickslip.assembly.facing import refuse_joined
 from stickslip.assembly.forces import far_outputs
 from stickslip.assembly.load import Load, Output
+from stickslip.assembly.mistuning import Mistuning
 from stickslip.assembly.pairs import Pairs, pair_contacts
 from stickslip.assembly.places import Places, picked
 from stickslip.assembly.reduced import Spin, Steady, Store, at_speed, in_memory
@@ -64,6 +65,8 @@ class Model:
         None: the nodes themselves.
     retention
         Stiffness that holds the mean position of free rigid bodies, N/m.
+    mistuning
+        How the sectors of a wheel differ; None: all are alike.
 
     Raises
     ------
@@ -84,6 +87,7 @@ class Model:
     centrifugal: bool = True
     interface_modes: int | None = None
     retention: float = 0.0
+    mistuning: Mistuning | None = None
 
     def __post_init__(self) -> None:
         if not self.parts:
@@ -337,8 +341,10 @@ class Model:
             If nothing holds a body, or the static loads find no equilibrium.
         """
         from stickslip.assembly.build import assemble
+        from stickslip.assembly.mistuned import assemble_mistuned
 
-        return assemble(self, harmonics, in_memory if store is None else store)
+        of = assemble if self.mistuning is None else assemble_mistuned
+        return of(self, harmonics, in_memory if store is None else store)
 
 
 def _beyond_sectors(loads: Mapping[str, Load], sectors: int) -> list[str]:

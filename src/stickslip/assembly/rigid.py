@@ -7,6 +7,7 @@ import scipy.sparse
 
 from stickslip.arrays import BoolArray, IntArray, Matrix
 from stickslip.assembly.model import Model
+from stickslip.assembly.pairs import Pairs
 from stickslip.contact.laws import law_name
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.errors import InputError, input_error
@@ -54,7 +55,7 @@ class InGaps:
         return found
 
 
-def in_gaps(model: Model, structure: Structure, gaps: Matrix) -> InGaps:
+def in_gaps(pairs: Pairs, structure: Structure, gaps: Matrix) -> InGaps:
     """Write a structure in the gaps of its contacts where one of them is rigid and its gaps are no coordinates.
 
     Raises
@@ -62,15 +63,15 @@ def in_gaps(model: Model, structure: Structure, gaps: Matrix) -> InGaps:
     InputError
         If gaps depend on each other.
     """
-    rigid = _rigid(model)
+    rigid = _rigid(pairs)
     if not rigid.any() or are_coordinates(gaps, rigid):
         return InGaps(structure, gaps)
     bare = replace(structure, basis=None)
     try:
-        written, operator = in_relative_coordinates(bare, gaps, model.pairs.names)
+        written, operator = in_relative_coordinates(bare, gaps, pairs.names)
     except InputError as error:
         raise input_error(
-            f"contact.{model.pairs.groups[int(np.argmax(rigid))]}.law",
+            f"contact.{pairs.groups[int(np.argmax(rigid))]}.law",
             f"is rigid_coulomb, and {error.problem}",
             "Take points that share no nodes, or give the contacts a stiffness, such as elastic_coulomb.",
         ) from None
@@ -90,7 +91,7 @@ def are_coordinates(gaps: Matrix, rigid: BoolArray) -> bool:
 
 def refuse_mixed_gaps(model: Model, gaps: Matrix) -> None:
     """Refuse rigid contacts of a wheel whose gaps (3 p, n) are no coordinates."""
-    rigid = _rigid(model)
+    rigid = _rigid(model.pairs)
     if not are_coordinates(scipy.sparse.csr_array(gaps), rigid):
         raise input_error(
             f"contact.{model.pairs.groups[int(np.argmax(rigid))]}.law",
@@ -102,11 +103,11 @@ def refuse_mixed_gaps(model: Model, gaps: Matrix) -> None:
 def held_gaps(model: Model, gaps: Matrix) -> int:
     """Return how many gaps (3 p, n) rigid contacts hold while they stick."""
     entries = np.diff(scipy.sparse.csr_array(gaps).indptr)
-    return int(np.count_nonzero(entries[np.repeat(_rigid(model), 3)]))
+    return int(np.count_nonzero(entries[np.repeat(_rigid(model.pairs), 3)]))
 
 
-def _rigid(model: Model) -> BoolArray:
-    return np.array([isinstance(law, RigidCoulomb) for law in model.pairs.laws], dtype=bool)
+def _rigid(pairs: Pairs) -> BoolArray:
+    return np.array([isinstance(law, RigidCoulomb) for law in pairs.laws], dtype=bool)
 
 
 def refuse_rigid(model: Model) -> None:

@@ -1,10 +1,11 @@
 """The sector that a model is, reduced wave by wave; waves that were reduced before are taken from memory or store."""
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy.sparse
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.model import Model
@@ -57,28 +58,81 @@ def reduced_sector(
     store
         As in `Model.assembled`.
     """
+    found = sector_waves(model, wave_numbers(model.sectors, *order), kept, store)
+    at = model.coordinates
+    pairs = replace(
+        model.pairs, own=at.columns(model.pairs.own), following=at.columns(model.pairs.following)
+    )
+    shown, bodies = (
+        at.of_dofs(np.unique(dofs), model.places.dofs, "output.points") for dofs in stay
+    )
+    return wheel_of(found.sector, found.kept, found.waves, order, pairs, (shown, bodies))
+
+
+@dataclass(frozen=True, eq=False)
+class SectorWaves:
+    """Waves of a wheel, reduced.
+
+    Parameters
+    ----------
+    sector
+        What was reduced.
+    kept
+        (k,) its dofs that the first coordinates of the waves are.
+    waves
+        Wave number -> structure without its way back, and what `reduced_wave` projected on it.
+    """
+
+    sector: CyclicSector
+    kept: IntArray
+    waves: Mapping[int, tuple[Structure, Matrix]]
+
+
+def sector_waves(
+    model: Model,
+    numbers: Sequence[int],
+    kept: IntArray,
+    store: Store,
+    rows: Matrix | None = None,
+) -> SectorWaves:
+    """Reduce waves of a sector, all to as many coordinates.
+
+    Parameters
+    ----------
+    model
+        Of a sector.
+    numbers
+        Wave numbers.
+    kept
+        Dofs of all parts that stay physical.
+    store
+        As in `Model.assembled`.
+    rows
+        (r, N) CSR operator on the dofs of all parts: the loads of its rows stand beside that of steady rotation, one a column.
+    """
     at, here = model.coordinates, model.neighbours
     assert here is not None
     structure, steady = _sector_at_speed(model)
     sector = here.sector(at.tied(structure), at)
-    pairs = replace(
-        model.pairs, own=at.columns(model.pairs.own), following=at.columns(model.pairs.following)
-    )
     reduction, damping, whole = _reduction(model)
     needed = np.unique(np.concatenate([kept, whole]))
     needed = needed[~np.isin(needed, model.ties.followers)]
     kept = leaders(sector, at.of_dofs(needed, model.places.dofs, "part"))
+    loads = at.load(steady)
+    if rows is not None:
+        columns = scipy.sparse.csr_array(at.columns(rows).T)
+        loads = scipy.sparse.hstack([scipy.sparse.csr_array(loads[:, None]), columns], format="csr")
     wheel = (
         sector.structure, sector.low, sector.high, sector.sectors, sector.axis, sector.weights,
     )  # fmt: skip
-    content = content_hash("wave", *wheel, kept, damping, steady)
+    content = content_hash("wave", *wheel, kept, damping, loads)
     memo = next(iter(model.parts.values())).memo
     mirrored = goes_both_ways(sector, sector.structure)
 
     def made(k: int, reduction: Reduction | None) -> tuple[Structure, Matrix]:
         key = f"{content} {reduction} {k}"
         if key not in memo:
-            memo[key] = _kept(sector, kept, k, (reduction, damping), at.load(steady), (key, store))
+            memo[key] = _kept(sector, kept, k, (reduction, damping), loads, (key, store))
             forget(memo, tuple, REMEMBERED)
         found: tuple[Structure, Matrix] = memo[key]
         return found
@@ -89,17 +143,13 @@ def reduced_sector(
         structure, load = made(sector.sectors - k, reduction)
         return conjugate(structure), np.conj(load)
 
-    numbers = wave_numbers(model.sectors, *order)
     waves = {k: wave(k, reduction) for k in numbers}
     most = max(structure.n for structure, _ in waves.values())
     if reduction is not None and any(structure.n < most for structure, _ in waves.values()):
         # all waves have the coordinates of the one that needs most
         alike = replace(reduction, n_modes=most - kept.size)
         waves = {k: wave(k, alike) for k in numbers}
-    shown, bodies = (
-        at.of_dofs(np.unique(dofs), model.places.dofs, "output.points") for dofs in stay
-    )
-    return wheel_of(sector, kept, waves, order, pairs, (shown, bodies))
+    return SectorWaves(sector, kept, waves)
 
 
 def _sector_at_speed(model: Model) -> tuple[Structure, FloatArray]:
@@ -174,7 +224,7 @@ def _kept(
     kept: IntArray,
     k: int,
     how: tuple[Reduction | None, Damping | None],
-    steady: FloatArray,
+    steady: Matrix,
     where: tuple[str, Store],
 ) -> tuple[Structure, Matrix]:
     def make() -> tuple[Structure, Matrix]:

@@ -264,9 +264,9 @@ def reduced_wave(
     kept: IntArray,
     k: int,
     how: tuple[Reduction | None, Damping | None],
-    steady: FloatArray,
+    steady: Matrix,
 ) -> tuple[Structure, Matrix]:
-    """Return a wave, its first coordinates the kept dofs, without its way back, and the load of steady rotation on it.
+    """Return a wave, its first coordinates the kept dofs, without its way back, and the load of steady rotation, or several, on it.
 
     It is reduced, and damped by its modes, as the two of `how` say; None: not.
     """
@@ -280,7 +280,8 @@ def reduced_wave(
         moving = _in_order(moving, np.concatenate([place, rest]))
     if damping is not None:
         moving = damping.of_modes(moving)
-    return replace(moving, basis=None), moving.project(steady)
+    load = moving.project(steady)
+    return replace(moving, basis=None), load.toarray() if scipy.sparse.issparse(load) else load
 
 
 def _in_order(structure: Structure, order: IntArray) -> Structure:

@@ -1,0 +1,182 @@
+"""What mistuning adds to the matrices of a wheel: rows by which it sees the sectors, and the change they make."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.assembly.mistuning import BladeMistuning, OwnSector
+from stickslip.assembly.model import Model
+from stickslip.assembly.places import picked, stacked
+from stickslip.assembly.reduced import at_speed, damped
+from stickslip.errors import input_error
+from stickslip.model.dofs import numbered_dofs
+from stickslip.model.fe.factorisation import factorise
+from stickslip.model.modes import normal_modes
+from stickslip.model.structure import Structure
+from stickslip.reduction.sectors import circulant, of_alike, strip
+from stickslip.units import HZ
+
+BLADE_MODES = 20  # blade-alone modes looked for where a study names none
+
+Changes = dict[str, FloatArray]  # "mass", "damping", "stiffness" -> (n_s m, n_s m)
+
+
+@dataclass(frozen=True, eq=False)
+class Deviation:
+    """A deviation of sectors.
+
+    Parameters
+    ----------
+    rows
+        (r, N) CSR on the dofs of all parts: of the sector's motion, what it acts on.
+    change
+        From the couplings (n_s, r, m) of these rows with all coordinates to what the matrices of the wheel change by.
+    """
+
+    rows: Matrix
+    change: Callable[[Matrix], Changes]
+
+
+def deviations(model: Model) -> list[Deviation]:
+    """Return all deviations of the matrices of a model's sectors.
+
+    Raises
+    ------
+    InputError
+        If a name is none, or a part that is to stand in a sector has other dofs.
+    """
+    here = model.mistuning
+    assert here is not None
+    here.require(model.sectors)
+    found = [_of_blades(model, name, one) for name, one in here.blades.items()]
+    return [*found, *(_of_own(model, name, one) for name, one in here.own.items())]
+
+
+@dataclass(frozen=True, eq=False)
+class Blade:
+    """A blade held where it meets the rest of its part.
+
+    Parameters
+    ----------
+    stiffness, mass
+        (b, b) of its own dofs.
+    rows
+        (b, N) CSR: the forces on them by the motion of the whole part, on the dofs of all parts.
+    whole
+        Whether it is the whole part, which nothing holds.
+    """
+
+    stiffness: Matrix
+    mass: Matrix
+    rows: Matrix
+    whole: bool
+
+
+def blade_of(model: Model, of: str, place: str) -> Blade:
+    """Return the blade that a name ``part`` or ``part.set`` means; `place` is the key that has it."""
+    head, _, rest = of.partition(".")
+    part = model.places.part_of(head, place)
+    structure = at_speed(head, part, model.spin(model.speed), model.steady[head])
+    first, n = model.places.offset(head), model.places.n
+    own = np.arange(structure.n)
+    if rest:
+        spot = model.places.spot(of, place)
+        dofs = spot.dofs if spot.nodes is None else spot.nodes[spot.nodes >= 0]
+        own = np.unique(dofs) - first
+    if not own.size or part.body is not None:
+        raise input_error(
+            place, f"{of!r} is nothing that deforms", "Name a blade's node set or a part."
+        )
+    rows = scipy.sparse.csr_array(structure.stiffness)[own]
+    wide = rows @ picked(first + np.arange(structure.n), n)
+    K, M = (scipy.sparse.csr_array(m)[:, own][own] for m in (structure.stiffness, structure.mass))
+    return Blade(K, M, wide, own.size == structure.n)
+
+
+def blade_alone(blade: Blade, number: int) -> tuple[FloatArray, FloatArray]:
+    """Return squares (r,) of the circular frequencies and shapes (b, r) of the lowest modes of a blade by itself, rigid ones left out."""
+    b = blade.stiffness.shape[0]
+    number = min(number, int(np.count_nonzero(blade.mass.diagonal())))
+    zero = scipy.sparse.csr_array((b, b))
+    found = normal_modes(Structure(blade.mass, zero, blade.stiffness, numbered_dofs(b)), number)
+    strained = found.squares > 0.0
+    return found.squares[strained], np.real(found.shapes[:, strained])
+
+
+def blade_alone_hz(model: Model, of: str, number: int, place: str) -> FloatArray:
+    """Return the lowest natural frequencies (r,) of a blade by itself in Hz."""
+    squares, _ = blade_alone(blade_of(model, of, place), number)
+    return np.asarray(np.sqrt(squares) / HZ)
+
+
+def _of_blades(model: Model, name: str, one: BladeMistuning) -> Deviation:
+    blade = blade_of(model, one.of, f"mistuning.{name}.of")
+    factors = one.factors
+    if factors.ndim == 2 or one.modes is not None:
+        return _of_modes(blade, factors, one.modes)
+    if blade.whole:
+        n = blade.stiffness.shape[0]
+        first = model.places.offset(one.of.partition(".")[0])
+        rows = picked(first + np.arange(n), model.places.n)
+
+        def of_part(blocks: Matrix) -> Changes:
+            return {"stiffness": of_alike(blocks, blade.stiffness, factors)}
+
+        return Deviation(rows, of_part)
+    solve = factorise(blade.stiffness)
+
+    def of_blade(blocks: Matrix) -> Changes:
+        return {"stiffness": of_alike(blocks, solve, factors)}
+
+    return Deviation(blade.rows, of_blade)
+
+
+def _of_modes(blade: Blade, factors: FloatArray, number: int | None) -> Deviation:
+    """Return the deviation that single modes of the blades carry: each has the share of the motion that is its own."""
+    squares, shapes = blade_alone(blade, factors.shape[1] if number is None else number)
+    each = np.broadcast_to(factors.reshape(len(factors), -1), (len(factors), squares.size))
+    # with K φ = ω² M φ, φᵀ [K K_r] u = ω² times the mode's share of what u is beyond the static motion by the rest
+    rows = scipy.sparse.csr_array((shapes / np.sqrt(squares)).T @ blade.rows)
+
+    def of_modes(blocks: Matrix) -> Changes:
+        shares = circulant(blocks)
+        return {"stiffness": shares.T @ (each.ravel()[:, None] * shares)}
+
+    return Deviation(rows, of_modes)
+
+
+def _of_own(model: Model, name: str, one: OwnSector) -> Deviation:
+    """Return what another part in one sector changes, seen by the motions of the tuned wheel."""
+    key = f"mistuning.{name}"
+    old = model.places.part_of(one.part, f"{key}.part")
+    _refuse_unlike(key, old.structure, one.by.structure)
+    spin, rest = model.spin(model.speed), model.steady[one.part]
+    before, after = (damped(one.part, p, at_speed(one.part, p, spin, rest)) for p in (old, one.by))
+    kinds = ("mass", "damping", "stiffness")
+    change = {
+        kind: scipy.sparse.csr_array(getattr(after, kind))
+        - scipy.sparse.csr_array(getattr(before, kind))
+        for kind in kinds
+    }
+    touched: IntArray = np.unique(stacked(abs(m).tocsr().nonzero()[1] for m in change.values()))
+    rows = picked(model.places.offset(one.part) + touched, model.places.n)
+    small = {kind: m[touched][:, touched] for kind, m in change.items()}
+
+    def of_own(blocks: Matrix) -> Changes:
+        own = strip(blocks, one.sector)
+        return {kind: own.T @ (m @ own) for kind, m in small.items() if m.nnz}
+
+    return Deviation(rows, of_own)
+
+
+def _refuse_unlike(key: str, old: Structure, new: Structure) -> None:
+    same = old.n == new.n and old.dofs.component == new.dofs.component
+    if not (same and np.array_equal(old.dofs.node, new.dofs.node)):
+        raise input_error(
+            f"{key}.by",
+            f"has {new.n} dofs, and the part in whose place it stands has {old.n}, or they are numbered otherwise",
+            "Take the same mesh, its nodes moved or of another material.",
+        )

@@ -1,0 +1,188 @@
+"""How the sectors of a wheel differ: frequencies of blades, contacts, and parts of their own."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.errors import input_error
+from stickslip.model.part import Part
+
+Distribution = Literal["normal", "uniform"]
+ContactQuantity = Literal["friction_coefficient", "stiffness", "preload", "gap"]
+LARGEST = 0.5  # relative deviation of a frequency or a stiffness; beyond, a blade is another blade
+
+
+def pattern(
+    sectors: int, distribution: Distribution, standard_deviation: float, seed: int
+) -> FloatArray:
+    """Return random deviations (n_s,) with a mean of zero in distribution; the same for the same seed.
+
+    Parameters
+    ----------
+    sectors
+        Number of sectors n_s.
+    distribution
+        ``normal``, or ``uniform`` between plus and minus √3 standard deviations.
+    standard_deviation
+        Of the distribution.
+    seed
+        Any whole number from 0 on.
+    """
+    draw = np.random.default_rng(seed)
+    if distribution == "normal":
+        return np.asarray(standard_deviation * draw.standard_normal(sectors))
+    edge = np.sqrt(3.0) * standard_deviation
+    return np.asarray(edge * (2.0 * draw.random(sectors) - 1.0))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BladeMistuning:
+    """Blades whose natural frequencies differ, their shapes as they are.
+
+    The stiffness that changes is that of the blade held where it meets the rest of its part: its static deformation by that rest
+    does not change, and all its frequencies alone change by the deviations.
+
+    Parameters
+    ----------
+    of
+        ``part`` or ``part.set``: the dofs of the blade.
+    deviations
+        (n_s,) relative deviation of each blade, sector 0 first; (n_s, r) of each of its lowest r modes alone.
+    modes
+        None: all that the blade does deforms it (nominal-mode subspace). A number: its lowest modes alone carry the deviation
+        (component-mode subspace).
+    quantity
+        What deviates: ``frequency`` or ``stiffness``.
+    """
+
+    of: str
+    deviations: FloatArray
+    modes: int | None = None
+    quantity: Literal["frequency", "stiffness"] = "frequency"
+
+    def __post_init__(self) -> None:
+        values = np.asarray(self.deviations, dtype=float)
+        object.__setattr__(self, "deviations", values)
+        if values.ndim not in (1, 2) or not values.size or not np.all(np.isfinite(values)):
+            raise input_error(
+                "BladeMistuning.deviations",
+                f"must be one number a blade, or a row of modes a blade, got shape {values.shape}",
+                "Give finite relative deviations, such as 0.01.",
+            )
+        if np.abs(values).max() > LARGEST:
+            raise input_error(
+                "BladeMistuning.deviations",
+                f"goes up to {np.abs(values).max():g}, and a blade deviates by at most {LARGEST:g}",
+                "Deviations are relative: 0.01 is one per cent. For another blade give the sector a part of its own.",
+            )
+        if values.ndim == 2 and self.modes not in (None, values.shape[1]):
+            raise input_error(
+                "BladeMistuning.modes",
+                f"is {self.modes}, and the deviations are of {values.shape[1]} modes",
+                "Leave it out.",
+            )
+
+    @property
+    def factors(self) -> FloatArray:
+        """Relative changes of the stiffness, in the shape of the deviations."""
+        if self.quantity == "stiffness":
+            return self.deviations
+        return np.asarray((1.0 + self.deviations) ** 2 - 1.0)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ContactMistuning:
+    """Contacts that differ from sector to sector.
+
+    Parameters
+    ----------
+    contact
+        Name of the model's contact; that of sector n lies in sector n, or between n and n + 1.
+    quantity
+        ``friction_coefficient``, ``stiffness`` (all of them alike) or ``preload``: of these `values` are relative deviations; ``gap``:
+        `values` are clearances in m, added to what the contact has.
+    values
+        (n_s,) of each sector.
+    """
+
+    contact: str
+    quantity: ContactQuantity
+    values: FloatArray
+
+    def __post_init__(self) -> None:
+        values = np.asarray(self.values, dtype=float)
+        object.__setattr__(self, "values", values)
+        if self.quantity not in get_args(ContactQuantity):
+            raise input_error(
+                "ContactMistuning.quantity",
+                f"is {self.quantity!r}",
+                f"Give one of {', '.join(get_args(ContactQuantity))}.",
+            )
+        if values.ndim != 1 or not np.all(np.isfinite(values)):
+            raise input_error(
+                "ContactMistuning.values",
+                f"must be one number a sector, got shape {values.shape}",
+                "Give finite numbers.",
+            )
+        if self.quantity != "gap" and values.min(initial=0.0) <= -1.0:
+            raise input_error(
+                "ContactMistuning.values",
+                f"goes down to {values.min():g}, and nothing is left at -1",
+                "Deviations are relative: -0.1 is ten per cent less.",
+            )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class OwnSector:
+    """A sector of which a part is another one: a damaged or a repaired blade.
+
+    Parameters
+    ----------
+    sector
+        Its number, from 0.
+    part
+        Name of the model's part.
+    by
+        What stands there instead: a part with the same dofs, such as the same mesh with nodes moved or of another material.
+    """
+
+    sector: int
+    part: str
+    by: Part
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Mistuning:
+    """How the sectors of a wheel differ.
+
+    Parameters
+    ----------
+    blades, contacts, own
+        By name.
+    """
+
+    blades: Mapping[str, BladeMistuning] = field(default_factory=dict)
+    contacts: Mapping[str, ContactMistuning] = field(default_factory=dict)
+    own: Mapping[str, OwnSector] = field(default_factory=dict)
+
+    def require(self, sectors: int) -> None:
+        """Refuse deviations of another number of blades than `sectors`, and sectors that are not there."""
+        values = {name: one.deviations for name, one in self.blades.items()}
+        values |= {name: one.values for name, one in self.contacts.items()}
+        for name, own in values.items():
+            if len(own) != sectors:
+                raise input_error(
+                    f"mistuning.{name}",
+                    f"has {len(own)} values, and the wheel has {sectors} sectors",
+                    "Give each sector one.",
+                )
+        for name, one in self.own.items():
+            if not 0 <= one.sector < sectors:
+                raise input_error(
+                    f"mistuning.{name}.sector",
+                    f"is {one.sector}, and the sectors are 0 to {sectors - 1}",
+                    "Sector 0 is the one that the parts describe.",
+                )

@@ -1,0 +1,218 @@
+"""Mistuned wheels: all sectors of a model, against one sector, an assembly of one's own, and the literature."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.sparse
+from test_assembly_wheel import (
+    LAW,
+    ORDER,
+    SECTORS,
+    STEEL,
+    H,
+    answered,
+    dofs_of,
+    sector_model,
+    shrouded_sector,
+    whole_wheel,
+    whole_with_gaps,
+)
+
+from stickslip.assembly import BladeMistuning, ContactMistuning, Mistuning, OwnSector, pattern
+from stickslip.contact.interface import Interface
+from stickslip.errors import InputError
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.model.axis import Axis
+from stickslip.model.damping import rayleigh_damping
+from stickslip.model.fe.rotation import rotating_solid
+from stickslip.model.fe.solid import Material
+from stickslip.model.modes import natural_frequencies
+from stickslip.model.part import solid_part
+from stickslip.reduction.relative import in_relative_coordinates
+from stickslip.response.system import System
+
+DEVIATIONS = np.array([0.03, -0.05, 0.02, 0.06, -0.04])
+FRICTION = np.array([0.0, 0.5, -0.3, 0.2, -0.4])
+
+
+def test_without_deviations_all_sectors_do_what_one_does():
+    """Slip and lift-off, two harmonics of excitation, rotation."""
+    law = replace(LAW, preload=20.0)
+    model = sector_model(shrouded_sector())
+    model = replace(model, contacts={"shroud": replace(model.contacts["shroud"], law=law)})
+    none = Mistuning(blades={"all": BladeMistuning(of="blade", deviations=np.zeros(SECTORS))})
+    wheel, tuned = replace(model, mistuning=none).assembled(H), model.assembled(H)
+    assert wheel.output_labels[4] == "tip[1].y"
+    assert np.allclose(wheel.static_force.reshape(SECTORS, -1, 3), tuned.static_force, rtol=1e-9)
+    hertz = (2140.0, 2200.0)
+    every, one = (
+        answered(wheel.system, wheel.load, hertz),
+        answered(tuned.system, tuned.load, hertz),
+    )
+    for all_of_them, mine in zip(every, one, strict=True):
+        assert mine.energy.max() > 1e-4  # slips
+        assert mine.forces[0, :, 2].max() > -20.0  # a point is open for a part of the period
+        for h in range(H + 1):
+            phase = np.exp(2j * math.pi * h * ORDER * np.arange(SECTORS) / SECTORS)
+            for name in ("gaps", "outputs"):
+                theirs = getattr(all_of_them, name)[h].reshape(SECTORS, -1)
+                own = getattr(mine, name)
+                assert (
+                    np.abs(theirs - phase[:, None] * own[h].ravel()).max()
+                    < 1e-8 * np.abs(own).max()
+                )
+
+
+def assembled_wheel(mesh, model, matrices):
+    """Return the dofs of all sectors in one table and matrices of sectors in their own axes put together: no waves, no reduction."""
+    whole, nodes = whole_wheel(mesh)
+    full = rotating_solid(whole, STEEL).structure
+    own = model.parts["blade"].structure
+    place = {
+        (int(n), c): i
+        for i, (n, c) in enumerate(zip(own.dofs.node, own.dofs.component, strict=True))
+    }
+    members = np.unique(own.dofs.node)
+    rows = np.array([[place[int(n), c] for c in "xyz"] for n in members])
+    out = scipy.sparse.csr_array((full.n, full.n))
+    for s, matrix in enumerate(matrices):
+        turn = Axis().rotation(2 * math.pi * s / SECTORS)
+        columns = dofs_of(full, nodes[s, members])
+        blocks = np.broadcast_to(turn, (len(rows), 3, 3))
+        at = (np.repeat(rows[:, :, None], 3, 2), np.repeat(columns[:, None, :], 3, 1))
+        into = scipy.sparse.csr_array(
+            (blocks.transpose(0, 2, 1).ravel(), (at[0].ravel(), at[1].ravel())),
+            shape=(own.n, full.n),
+        )
+        out = out + into.T @ matrix @ into
+    return full, nodes, scipy.sparse.csr_array(out)
+
+
+def mistuned_model():
+    model = replace(sector_model(shrouded_sector()), speed=0.0)
+    mistuning = Mistuning(
+        blades={"blade": BladeMistuning(of="blade", deviations=DEVIATIONS)},
+        contacts={
+            "worn": ContactMistuning(
+                contact="shroud", quantity="friction_coefficient", values=FRICTION
+            )
+        },
+    )
+    return replace(model, mistuning=mistuning)
+
+
+def test_a_mistuned_wheel_answers_as_its_sectors_assembled_one_by_one():
+    """Stiffness of each sector times (1 + d)², friction of each interface its own; the whole wheel is put together from the sectors."""
+    model = mistuned_model()
+    found = model.assembled(H)
+    mesh, own = model.parts["blade"].mesh, model.parts["blade"].structure
+    full, nodes, stiffness = assembled_wheel(
+        mesh, model, [(1 + d) ** 2 * own.stiffness for d in DEVIATIONS]
+    )
+    damped = rayleigh_damping(full, 0.003, (500.0, 3000.0))
+    structure = replace(damped, stiffness=stiffness)
+    _, gaps = whole_with_gaps(model)
+    laws = tuple(replace(LAW, mu=LAW.mu * (1 + f)) for f in FRICTION for _ in range(6))
+    tip = mesh.node_sets["tip"]
+    force = {h: np.zeros(full.n, dtype=complex) for h in (1, 2)}
+    static, seen = np.zeros(full.n), []
+    for s in range(SECTORS):
+        turn = Axis().rotation(2 * math.pi * s / SECTORS)
+        here = dofs_of(full, nodes[s, tip])
+        unit = np.array([0.2, 1, 0.3]) / np.linalg.norm([0.2, 1, 0.3])
+        theta = 2 * math.pi * ORDER * s / SECTORS
+        force[1][here] += turn @ unit * 1000.0 * np.exp(1j * theta)
+        force[2][here] += turn @ np.array([1.0, 0, 0]) * 300.0 * np.exp(1j * (0.4 + 2 * theta))
+        static[here] += turn @ np.array([0, 1, 1]) / math.sqrt(2) * 7.5
+        seen.append(here[0])
+    small, operator = in_relative_coordinates(structure, gaps)
+    interface = Interface(tuple(map(str, range(30))), laws, operator)
+    shown = small.basis.tocsr()[np.concatenate(seen)]
+    assert np.array_equal(shown.data, np.ones(3 * SECTORS))  # tips are coordinates of their own
+    system = System(small, interface, shown.indices)
+    hertz = (2140.0, 2142.0)
+    mine = answered(found.system, found.load, hertz)
+    theirs = answered(
+        system,
+        HarmonicLoad(small.project(static), {h: small.project(f) for h, f in force.items()}),
+        hertz,
+    )
+    for one, other in zip(mine, theirs, strict=True):
+        assert one.energy.max() > 1e-5
+        spread = np.abs(one.outputs[1].reshape(SECTORS, 3)).max(axis=1)
+        assert spread.max() > 1.2 * spread.min()  # mistuned indeed
+        assert np.abs(one.gaps - other.gaps).max() < 1e-8 * np.abs(other.gaps).max()
+        for s in range(SECTORS):
+            back = Axis().rotation(-2 * math.pi * s / SECTORS)
+            there = other.outputs[:, 3 * s : 3 * s + 3] @ back.T
+            assert (
+                np.abs(one.outputs[:, 3 * s : 3 * s + 3] - there).max()
+                < 1e-8 * np.abs(other.outputs).max()
+            )
+
+
+def test_all_modes_of_a_blade_are_the_whole_blade_and_a_common_deviation_scales_its_frequencies():
+    """Component modes become the nominal ones; both take what the blade does beyond the static motion by its root."""
+    model = replace(sector_model(shrouded_sector()), speed=0.0)
+    nodes = model.parts["blade"].mesh.node_sets
+    blade = np.unique(np.concatenate([nodes["shroud_low"], nodes["shroud_high"]]))
+    assert blade.size
+    frequencies = {}
+    for modes in (None, 3, 72):
+        one = BladeMistuning(of="blade.shroud_high", deviations=DEVIATIONS, modes=modes)
+        wheel = replace(model, mistuning=Mistuning(blades={"high": one})).assembled(2)
+        frequencies[modes] = natural_frequencies(wheel.bare.stuck_structure(), 8)
+    np.testing.assert_allclose(frequencies[72], frequencies[None], rtol=1e-10)
+    np.testing.assert_allclose(frequencies[3], frequencies[None], rtol=1e-3)
+
+
+def test_a_sector_with_a_part_of_its_own_is_that_part():
+    """Another material in sector 3 alone, all modes of the waves kept: the frequencies of the assembled wheel."""
+    model = replace(sector_model(shrouded_sector()), speed=0.0)
+    mesh = model.parts["blade"].mesh
+    other = solid_part(mesh, Material(young_modulus=1.5e11, density=8200.0), sectors=SECTORS)
+    wheel = replace(
+        model, mistuning=Mistuning(own={"repaired": OwnSector(sector=3, part="blade", by=other)})
+    )
+    old, new = model.parts["blade"].structure, other.structure
+    full, _, stiffness = assembled_wheel(
+        mesh, model, [(new if s == 3 else old).stiffness for s in range(SECTORS)]
+    )
+    _, _, mass = assembled_wheel(
+        mesh, model, [(new if s == 3 else old).mass for s in range(SECTORS)]
+    )
+    found = wheel.assembled(2).bare.structure
+    whole = replace(full, stiffness=stiffness, mass=mass)
+    np.testing.assert_allclose(
+        natural_frequencies(found, 12), natural_frequencies(whole, 12), rtol=1e-9
+    )
+
+
+def test_patterns_are_the_same_for_the_same_seed_and_have_the_spread_asked_for():
+    for distribution in ("normal", "uniform"):
+        one = pattern(20_000, distribution, 0.02, 7)
+        assert np.array_equal(one, pattern(20_000, distribution, 0.02, 7))
+        assert np.std(one) == pytest.approx(0.02, rel=0.02)
+    assert np.abs(one).max() <= math.sqrt(3) * 0.02
+    assert not np.array_equal(one, pattern(20_000, "uniform", 0.02, 8))
+
+
+def test_what_is_no_mistuning_is_refused_with_its_key():
+    model = sector_model(shrouded_sector())
+
+    def refused(place, problem, **kinds):
+        with pytest.raises(InputError) as found:
+            replace(model, mistuning=Mistuning(**kinds)).assembled(2)
+        assert found.value.place == place
+        assert problem in found.value.problem
+
+    few = BladeMistuning(of="blade", deviations=np.zeros(3))
+    refused("mistuning.a", "has 3 values, and the wheel has 5", blades={"a": few})
+    nowhere = BladeMistuning(of="blad", deviations=np.zeros(5))
+    refused("mistuning.a.of", "there is no part", blades={"a": nowhere})
+    gone = ContactMistuning(contact="rim", quantity="gap", values=np.zeros(5))
+    refused("mistuning.a.contact", "there is no such contact", contacts={"a": gone})
+    far = OwnSector(sector=5, part="blade", by=model.parts["blade"])
+    refused("mistuning.a.sector", "the sectors are 0 to 4", own={"a": far})
