@@ -419,11 +419,11 @@ def test_what_is_wrong_with_a_wheel_is_named():
     mesh = shrouded_sector()
     model = sector_model(mesh)
     plain = {name: replace(load, engine_order=None) for name, load in model.loads.items()}
-    other = {**model.loads, "more": replace(model.loads["more"], engine_order=3)}
+    other = {**model.loads, "more": replace(model.loads["more"], engine_order=0)}
     two = {**model.parts, "second": solid_part(mesh, STEEL, sectors=6)}
     for match, changes in (
         ("load.gas.engine_order: is missing", {"loads": plain}),
-        ("engine orders differ .load.gas: 2, load.more: 3", {"loads": other}),
+        ("engine order 0 beside others .load.gas: 2, load.more: 0", {"loads": other}),
         ("part.second.sectors: is 6, and the part 'blade' is one of 5", {"parts": two}),
         (
             "part.second.sectors: is 1, and",

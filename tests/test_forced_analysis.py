@@ -442,7 +442,7 @@ def refused(
     high: int | str = "auto",
     **limits: float,
 ) -> str:
-    own = settings({"high": high}, frequency_hz=[1.0, 2.0])
+    own = settings({"low": 1, "high": high}, frequency_hz=[1.0, 2.0])
     own.limits = SimpleNamespace(**{"memory_gb": 4.0, "work_s": 7200.0} | limits)
     case = Case(0, "", {}, own, lambda: asked, "", Path(), checks)
     with pytest.raises(InputError) as error:
@@ -453,7 +453,7 @@ def refused(
 def test_what_cannot_be_answered_is_refused_by_key() -> None:
     third = Load(on="blade.tip", newton=1.0, direction=(1.0, 0.0, 0.0), harmonic=3)
     assert refused(model(loads={"third": third})) == (
-        "harmonics.low: must hold harmonic 3, which load.third drives, got 1. Add it, for example low = [1, 3]."
+        "harmonics.low: must hold harmonic 3, which load.third drives, got 1. Add it, for example low = [1, 3], or leave low out."
     )
     rigid = Contact(between=("blade.tip", "ground"), law=RigidCoulomb(mu=0.3), acts="tangential")
     assert refused(model(contacts={"root": rigid}), frozenset({"verify"})) == (

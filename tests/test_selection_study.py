@@ -298,22 +298,22 @@ REFUSED = {
     ),
     "harmonics of no kind": (
         {"low": 0},
-        "harmonics.low: must be a harmonic from 1 to 41 or a list of them, got 0. 5 keeps all up to the fifth",
+        "harmonics.low: must be a harmonic from 1 to 200 or a list of them, got 0. 5 keeps all up to the fifth",
     ),
     "harmonics in words": (
         {"high": [1, "3"]},
         (
-            "harmonics.high: must be 'auto', a harmonic from 1 to 41 or a list of them, got [1, '3']. "
+            "harmonics.high: must be 'auto', a harmonic from 1 to 200 or a list of them, got [1, '3']. "
             "'auto' raises them until each point is quiet; 5 keeps all"
         ),
     ),
     "harmonics by a wrong name": (
         {"high": "automatic"},
-        "harmonics.high: must be 'auto', a harmonic from 1 to 41 or a list of them, got 'automatic'.",
+        "harmonics.high: must be 'auto', a harmonic from 1 to 200 or a list of them, got 'automatic'.",
     ),
     "auto for the first passage": (
         {"low": "auto"},
-        "harmonics.low: must be a harmonic from 1 to 41 or a list of them, got 'auto'. 5 keeps",
+        "harmonics.low: must be a harmonic from 1 to 200 or a list of them, got 'auto'. 5 keeps",
     ),
     "high without low": (
         {"low": [1, 2], "high": [1, 3, 5]},
@@ -344,7 +344,7 @@ def test_what_cannot_be_is_refused_with_a_remedy(base: Study, name: str) -> None
     [
         (
             {"low": [3]},
-            "load.shaker.harmonic: 1 is not kept by harmonics.low = [3]. Add it there.",
+            "load.shaker.harmonic: 1 is not kept by harmonics.low = [3]. Add it there, or leave that out.",
         ),
         ({"alert_over": ["tip1.x", "L1.9.x"]}, "'L1.9.x'"),
     ],

@@ -8,7 +8,6 @@ import numpy as np
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.forces import (
     Labels,
-    engine_order,
     error_names,
     force_of,
     output_labels,
@@ -27,7 +26,9 @@ class Asked:
     Parameters
     ----------
     order
-        Engine order; None for a single structure, and where nothing vibrates.
+        Engine order, of several their base; None for a single structure, and where nothing vibrates.
+    orders
+        Engine order of each harmonic that loads drive.
     forces
         (N,) of each load.
     labels
@@ -37,6 +38,7 @@ class Asked:
     """
 
     order: int | None
+    orders: Mapping[int, int]
     forces: Mapping[str, Matrix]
     labels: Labels
     names: tuple[str, ...]
@@ -61,9 +63,9 @@ def asked(model: Model, harmonics: int) -> Asked:
     InputError
         If a place is none, a load is none of the harmonics, or nothing holds a body.
     """
-    order = engine_order(model.loads, model.sectors > 1)
+    order, driven = model.engine_order, model.driven
     forces = {name: force_of(model.places, name, load) for name, load in model.loads.items()}
-    _refuse_beyond(model, harmonics)
+    _refuse_beyond(driven, harmonics)
     labels = output_labels(model.places, model.outputs, model.loads)
     if not labels.names:
         raise input_error(
@@ -79,15 +81,16 @@ def asked(model: Model, harmonics: int) -> Asked:
     refuse_rigid(model)
     refuse_unheld(model)
     refuse_pulled(model, static_forces(model, forces))
-    return Asked(order, forces, labels, names, watched)
+    orders = {h: h * order for h in sorted({*driven.values()}) if h and order is not None}
+    return Asked(order, orders, forces, labels, names, watched)
 
 
-def _refuse_beyond(model: Model, harmonics: int) -> None:
-    for name, load in model.loads.items():
-        if load.harmonic > harmonics:
+def _refuse_beyond(driven: Mapping[str, int], harmonics: int) -> None:
+    for name, harmonic in driven.items():
+        if harmonic > harmonics:
             raise input_error(
-                f"load.{name}.harmonic",
-                f"is {load.harmonic}, and harmonics up to {harmonics} are computed",
+                f"load.{name}",
+                f"acts in harmonic {harmonic}, and harmonics up to {harmonics} are computed",
                 "Keep more harmonics.",
             )
 

@@ -1,6 +1,7 @@
 """A model as solvers and results see it."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -64,7 +65,7 @@ class Skin:
 class Frequencies:
     """Natural frequencies in Hz of the full and the reduced model, contacts open (free rigid bodies left out) and stuck.
 
-    Of a wheel: those of the wave that harmonic 1 travels as.
+    Of a wheel: those of the wave that the lowest driven harmonic travels as.
     """
 
     free_full: FloatArray
@@ -153,13 +154,15 @@ class Assembled:
     skin
         None where no part has a mesh.
     sectors, engine_order
-        Of the wheel; 1 and None for a single structure.
+        Of the wheel; 1 and None for a single structure. Of several engine orders their base m_0.
     counts
         ``nodes``, ``dofs``, ``reduced``, ``retained``.
     warnings
         What the user should know.
     blades
         Of a wheel whose sectors differ; None where one sector answers for all.
+    orders
+        Engine order of each harmonic that loads drive; none for a single structure.
     """
 
     system: System
@@ -180,3 +183,4 @@ class Assembled:
     counts: dict[str, int]
     warnings: tuple[str, ...] = ()
     blades: Blades | None = None
+    orders: Mapping[int, int] = field(default_factory=dict)

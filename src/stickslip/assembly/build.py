@@ -112,6 +112,7 @@ def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
             "retained": int(held.retained.size),
         },
         warnings=(*model.warnings, *held_warnings(model, pressed), *checked.warnings()),
+        orders=what.orders,
     )
 
 
@@ -232,13 +233,18 @@ def loads_on(model: Model, linear: Linear, forces: Mapping[str, Matrix]) -> Harm
         static = static + linear.steady + np.real(linear.load(centrifugal_of_bodies(model), 0))
     harmonics: dict[int, Matrix] = {}
     for name, force in forces.items():
-        h = model.loads[name].harmonic
+        h = model.driven[name]
         own = linear.load(force, h)
         if h == 0:
             static = static + np.real(own)
         else:
             harmonics[h] = harmonics.get(h, 0) + own
     return HarmonicLoad(static, harmonics)
+
+
+def _first(model: Model) -> int:
+    """Return the lowest harmonic that a load drives; 1 where none does."""
+    return min((h for h in model.driven.values() if h), default=1)
 
 
 def static_state(system: System, static_load: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -270,8 +276,8 @@ def pressed_points(model: Model) -> BoolArray:
 def frequencies(
     model: Model, linear: Linear, springs: FloatArray, order: int | None, store: Store
 ) -> Frequencies:
-    """Compare natural frequencies of the full and the reduced model, contacts open and stuck; of a wheel, of harmonic 1."""
-    number = 0 if order is None else excited_wave(order, model.sectors)
+    """Compare natural frequencies of the full and the reduced model, contacts open and stuck; of a wheel, of the first harmonic that is driven."""
+    number = 0 if order is None else excited_wave(order, model.sectors, _first(model))
     reduced, gaps, place = linear.of_wave(number)
     bodies = _free_dofs(model)
     free = _without(reduced, place(bodies)) if bodies.size else reduced

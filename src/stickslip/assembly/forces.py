@@ -1,8 +1,10 @@
 """Loads of a model as forces on the dofs of all parts, and where motion is reported."""
 
 import cmath
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -77,13 +79,37 @@ def _unit(key: str, load: Load) -> FloatArray:
     return np.asarray(vector if abs(length - 1.0) < 1e-12 else vector / length)
 
 
-def engine_order(loads: Mapping[str, Load], wheel: bool) -> int | None:
-    """Return the engine order of the loads; None for a single structure, and where nothing vibrates.
+class Driving(Protocol):
+    """What of a load says how it travels."""
+
+    @property
+    def harmonic(self) -> int:
+        """Multiple of its own engine order; 0: static."""
+        ...
+
+    @property
+    def engine_order(self) -> int | None:
+        """As in `Load`."""
+        ...
+
+
+def engine_order(loads: Mapping[str, Driving], wheel: bool) -> tuple[int | None, dict[str, int]]:
+    """Return the base order of the loads, and the harmonic that each acts in.
+
+    Loads with one engine order have it as their base. Of several the base is the greatest common divisor m_0 of the orders
+    ``harmonic · engine_order``: a load of order m acts in harmonic m/m_0 of the frequency m_0 Ω, and travels as the wave m.
+
+    Returns
+    -------
+    order
+        None for a single structure, and where nothing vibrates.
+    harmonics
+        Of each load; 0 of static ones.
 
     Raises
     ------
     InputError
-        If a load has one and the model is no sector, or has none and it is one, or loads differ.
+        If a load has one and the model is no sector, or has none and it is one; if some loads have order 0 and others not.
     """
     found: dict[str, int] = {}
     for name, load in loads.items():
@@ -102,12 +128,18 @@ def engine_order(loads: Mapping[str, Load], wheel: bool) -> int | None:
             )
         if order is not None and load.harmonic > 0:
             found[name] = order
-    if len(set(found.values())) > 1:
+    own = {name: load.harmonic for name, load in loads.items()}
+    if len(set(found.values())) < 2:
+        return next(iter(found.values()), None), own
+    if 0 in found.values():
         listed = ", ".join(f"load.{name}: {order}" for name, order in found.items())
         raise input_error(
-            "load", f"engine orders differ ({listed})", "Study one engine order after the other."
+            "load",
+            f"has engine order 0 beside others ({listed}): what all sectors feel alike has no speed that it goes with",
+            "Study it by itself.",
         )
-    return next(iter(found.values()), None)
+    base = math.gcd(*(own[name] * order for name, order in found.items()))
+    return base, own | {name: own[name] * order // base for name, order in found.items()}
 
 
 @dataclass(frozen=True, eq=False)

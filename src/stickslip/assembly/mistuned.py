@@ -107,6 +107,7 @@ def assemble_mistuned(model: Model, harmonics: int, store: Store) -> Assembled:
             *tuned.frequencies.warnings(),
         ),
         blades=Blades(n, what.labels.names, tuned),
+        orders=what.orders,
     )
 
 

@@ -13,7 +13,7 @@ from stickslip.assembly.assembled import Assembled, Skin
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.coordinates import Coordinates, coordinates
 from stickslip.assembly.facing import refuse_joined
-from stickslip.assembly.forces import far_outputs
+from stickslip.assembly.forces import engine_order, far_outputs
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.mistuning import Mistuning
 from stickslip.assembly.pairs import Pairs, pair_contacts
@@ -154,6 +154,20 @@ class Model:
         refuse_joined(self.contacts, self.joins)
         here = self.neighbours
         return pair_contacts(self.places, self.contacts, None if here is None else here.turn)
+
+    @cached_property
+    def _orders(self) -> tuple[int | None, dict[str, int]]:
+        return engine_order(self.loads, self.sectors > 1)
+
+    @property
+    def engine_order(self) -> int | None:
+        """Engine order of the frequency: that of the loads, or the greatest common divisor of several; None for a single structure."""
+        return self._orders[0]
+
+    @property
+    def driven(self) -> dict[str, int]:
+        """The harmonic of this frequency that each load acts in, 0 of static ones."""
+        return self._orders[1]
 
     @cached_property
     def pressed(self) -> BoolArray:

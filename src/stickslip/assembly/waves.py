@@ -18,6 +18,7 @@ from stickslip.assembly.reduced import (
     steady_load,
     unpacked,
 )
+from stickslip.assembly.wave_damping import DampingOfParts
 from stickslip.assembly.wheel import (
     ReducedSector,
     leaders,
@@ -164,7 +165,7 @@ def _sector_at_speed(model: Model) -> tuple[Structure, FloatArray]:
     return join(**own), np.concatenate(steady)
 
 
-def _reduction(model: Model) -> tuple[Reduction | None, Damping | None, IntArray]:
+def _reduction(model: Model) -> tuple[Reduction | None, Damping | DampingOfParts | None, IntArray]:
     """Return how all waves are reduced and damped by their modes, and the dofs of parts that are not reduced.
 
     Raises
@@ -175,7 +176,7 @@ def _reduction(model: Model) -> tuple[Reduction | None, Damping | None, IntArray
     bodies = {name: part for name, part in model.parts.items() if part.body is None}
     ways = {name: part.reduction for name, part in bodies.items() if part.reduction is not None}
     empty = np.zeros(0, dtype=np.int64)
-    damping = _of_modes(bodies)
+    damping = _of_modes(bodies, reduced=bool(ways))
     if not ways:
         return None, damping, empty
     high = empty if model.neighbours is None else model.neighbours.high
@@ -204,17 +205,19 @@ def _one_of(ways: Mapping[str, Any]) -> Reduction:
     return Reduction(total, one.method)
 
 
-def _of_modes(parts: Mapping[str, Part]) -> Damping | None:
+def _of_modes(parts: Mapping[str, Part], *, reduced: bool) -> Damping | DampingOfParts | None:
     """Return the damping by modes of the waves of a sector; None for none."""
     found = [
         part.damping if part.damping and part.damping.is_modal else None for part in parts.values()
     ]
     for name, own in zip(parts, found, strict=True):
         if own != found[0]:
+            if not reduced:
+                return DampingOfParts(tuple(zip(parts, found, strict=True)))
             raise input_error(
                 f"part.{name}.damping",
-                "differs, and on a wheel modes are those of all parts of a sector together",
-                "Give all parts the same damping by modes, or another form.",
+                "differs, and on a wheel modes are those of all parts of a sector together, which are reduced",
+                "Give all parts the same damping by modes or another form, or reduce none.",
             )
     return found[0] if found else None
 
@@ -223,7 +226,7 @@ def _kept(
     sector: CyclicSector,
     kept: IntArray,
     k: int,
-    how: tuple[Reduction | None, Damping | None],
+    how: tuple[Reduction | None, Damping | DampingOfParts | None],
     steady: Matrix,
     where: tuple[str, Store],
 ) -> tuple[Structure, Matrix]:

@@ -12,6 +12,7 @@ from stickslip.assembly.pairs import Pairs, Turn
 from stickslip.assembly.places import Places, picked, stacked
 from stickslip.assembly.ties import MEAN, Ties
 from stickslip.assembly.unlike_faces import unlike_faces
+from stickslip.assembly.wave_damping import DampingOfParts
 from stickslip.errors import InputError, input_error
 from stickslip.model.damping import Damping
 from stickslip.model.part import Part
@@ -263,7 +264,7 @@ def reduced_wave(
     sector: CyclicSector,
     kept: IntArray,
     k: int,
-    how: tuple[Reduction | None, Damping | None],
+    how: tuple[Reduction | None, Damping | DampingOfParts | None],
     steady: Matrix,
 ) -> tuple[Structure, Matrix]:
     """Return a wave, its first coordinates the kept dofs, without its way back, and the load of steady rotation, or several, on it.

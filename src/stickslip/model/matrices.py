@@ -60,6 +60,35 @@ def lumped(
     return Structure(M, C, K, Dofs(np.arange(n), ("x",) * n, np.zeros((n, 3))), sets)
 
 
+def lumped_sector(
+    mass: Sequence[float],
+    stiffness: FloatArray,
+    damping: FloatArray,
+    names: Sequence[str],
+    behind: Sequence[str],
+) -> Structure:
+    """Return one sector of a wheel of masses, with massless copies of masses of the next sector behind its own.
+
+    Parameters
+    ----------
+    mass
+        (n,) of the sector's own masses, kg.
+    stiffness, damping
+        (n + m, n + m) of springs and dashpots, those to the copies among them.
+    names
+        Of the n masses; each becomes a set.
+    behind
+        The m masses of which there are copies: the sets ``cyclic_low`` and ``cyclic_high`` hold them and the copies.
+    """
+    own = lumped(np.array(mass), np.zeros((len(mass), len(mass))), names=names)
+    n, copies = own.n, len(behind)
+    low = np.array([own.sets[name][0] for name in behind], dtype=np.int64)
+    M = np.diag([*mass, *[0.0] * copies])
+    sets = {**own.sets, "cyclic_low": low, "cyclic_high": np.arange(n, n + copies)}
+    dofs = Dofs(np.arange(n + copies), ("x",) * (n + copies), np.zeros((n + copies, 3)))
+    return Structure(M, damping, stiffness, dofs, sets)
+
+
 def chain(n: int, mass: float, stiffness: float, damping_factor: float = 0.0) -> Structure:
     """Return a chain of `n` masses, the first one grounded by a spring, the last one free.
 

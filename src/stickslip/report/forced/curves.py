@@ -36,7 +36,7 @@ def most(response: Response, size: FloatArray) -> list[ShownCase]:
     return [c for c in response.cases if c in chosen]
 
 
-def _abscissa(response: Response) -> tuple[FloatArray, str, str]:
+def abscissa(response: Response) -> tuple[FloatArray, str, str]:
     """Return what the response is drawn over (point,), its name and its unit: frequency, or speed where that was swept."""
     if response.has("speed_rpm"):
         return response.floats("speed_rpm"), "speed", "rpm"
@@ -45,7 +45,7 @@ def _abscissa(response: Response) -> tuple[FloatArray, str, str]:
 
 def _curve(response: Response, case: ShownCase) -> go.Scatter:
     at, scale = response.points(case), response.scale
-    x, _, unit = _abscissa(response)
+    x, _, unit = abscissa(response)
     high = response.more[at]
     kept = [named(np.flatnonzero(row)) for row in response.kept[at]]
     first = "predicted_error_percent" if response.is_error else "indicator"
@@ -96,7 +96,7 @@ def _failures(response: Response) -> go.Scatter:
     values = response.response() * response.scale.factor
     good = values[response.converged & np.isfinite(values)]
     floor = float(good.min()) if good.size else 1.0
-    x, _, unit = _abscissa(response)
+    x, _, unit = abscissa(response)
     return go.Scatter(
         x=x[at], y=np.where(np.isfinite(values[at]), values[at], floor), mode="markers", name="did not converge",
         legendgroup="key", marker={"symbol": "x", "size": 9, "color": ALARM},
@@ -170,7 +170,7 @@ def frequency_response(response: Response) -> Plot | None:
     styled(figure, 540)
     buttons = _scale_buttons(logarithmic=True)
     figure.update_layout(updatemenus=buttons, showlegend=len(figure.data) > 1)
-    _, name, unit = _abscissa(response)
+    _, name, unit = abscissa(response)
     figure.update_xaxes(title_text=f"{name} ({unit})")
     ticks = log_ticks(response.accepted * scale.factor)
     figure.update_yaxes(title_text=f"{response.quantity} ({scale.unit})", type="log", **ticks)

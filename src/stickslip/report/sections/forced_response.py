@@ -8,6 +8,7 @@ from stickslip.report.forced.curves import frequency_response, low_order, optimi
 from stickslip.report.forced.errors import error_scatter, errors
 from stickslip.report.forced.harmonics import kept_harmonics
 from stickslip.report.forced.head import cards
+from stickslip.report.forced.orders import of_each_order
 from stickslip.report.forced.stability import stability
 from stickslip.report.forced.surface import surface_map
 from stickslip.report.forced.working import where_friction_works
@@ -25,6 +26,7 @@ SECTION: Section = Section(
             "Forced response",
             (
                 frequency_response,
+                of_each_order,
                 low_order,
                 kept_harmonics,
                 errors,

@@ -119,6 +119,7 @@ class ForcedResponseAnalysis:
         doubts = [*no_resonance(question), *nothing_pressed(question), *mixed_places(labels)]
         return (
             str(estimate(model, question.sweep)),
+            *question.orders_lines,
             *(f"harmonics: {line}" for line in chooser.lines(passages)),
             cost_line(question),
             *inside(question),

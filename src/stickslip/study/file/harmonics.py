@@ -1,6 +1,6 @@
 """The table [harmonics] of a study file: which harmonics are kept, and what chooses them at each frequency."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import fields
 from typing import Annotated, Any, Literal, Self
 
@@ -15,7 +15,7 @@ from stickslip.harmonic.support import harmonics_of
 from stickslip.response.forced.sweep import PUBLISHED, RUNGS, Passages, Sweep
 from stickslip.study.file.section import Positive, Section, custom_error, refuse_all, shown
 
-HIGHEST = RUNGS[-1]  # harmonic that a study may keep
+HIGHEST = 200  # harmonic that a study may keep
 SELECTIONS = tuple(STRATEGIES)
 DEFAULT_SELECTION = str({f.name: f.default for f in fields(Sweep)}["selection"])
 SAMPLES_A_HARMONIC = 8  # of a period, at least
@@ -31,7 +31,8 @@ class Harmonics(Section):
 
     low: Kept = Field(
         1,
-        description=f"harmonics of the first passage: the highest of all, 1 to {HIGHEST}, or a list such as [1, 3]",
+        description=f"harmonics of the first passage: the highest of all, 1 to {HIGHEST}, or a list such as [1, 3]; left out: those that "
+        "loads drive, which is 1 but for loads with a harmonic or several engine orders",
     )
     high: Literal["auto"] | Kept = Field(
         "auto",
@@ -118,6 +119,13 @@ class Harmonics(Section):
         """Harmonics of the first passage, from 0."""
         return harmonics_of(self.low)
 
+    def beginning(self, driven: Iterable[int]) -> Support:
+        """Return the harmonics of the first passage, from 0: where `low` is left out those that loads drive."""
+        own = {h for h in driven if h > 0}
+        return (
+            self.low_harmonics if "low" in self.model_fields_set or not own else harmonics_of(own)
+        )
+
     @property
     def high_harmonics(self) -> Support:
         """Harmonics of the reference, from 0; with ``auto`` those of the published one, or of the first passage where it has more."""
@@ -161,6 +169,8 @@ def _of_supports(table: Harmonics) -> Iterator[PydanticCustomError]:
     low, high = table.low_harmonics, table.high_harmonics
     if table.high == "auto":
         pass  # holds all up to its highest
+    elif "low" not in table.model_fields_set and isinstance(table.high, list):
+        pass  # the loads say what it has to hold
     elif isinstance(table.low, int) and isinstance(table.high, int) and table.high < table.low:
         yield custom_error(
             f"must not be below low = {table.low}, got {table.high}",

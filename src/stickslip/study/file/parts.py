@@ -11,6 +11,7 @@ from pydantic import (
     model_validator,
 )
 
+from stickslip.assembly.contact import NEXT
 from stickslip.errors import did_you_mean
 from stickslip.model.axis import Axis
 from stickslip.model.fe.beam import Beam, Bending
@@ -101,7 +102,7 @@ Link = Annotated[list[Any], BeforeValidator(_link)]
 
 
 class Lumped(PartTable):
-    """Masses that move along one direction, springs and dashpots between them and to the ground."""
+    """Masses that move along one direction, springs and dashpots between them, to the ground and to the next sector."""
 
     shape: Literal["lumped"] = Field(description='shape = "lumped"')
     masses_kg: list[Positive] = Field(
@@ -113,12 +114,19 @@ class Lumped(PartTable):
     springs_n_per_m: list[Link] = Field(
         default_factory=list,
         max_length=100_000,
-        description='springs [end, end, stiffness in N/m]; ends are "ground", names of masses or their numbers from 1',
+        description='springs [end, end, stiffness in N/m]; ends are "ground", names of masses or their numbers from 1, and on a wheel '
+        'those of the next sector, such as "next.m1"',
     )
     dashpots_n_s_per_m: list[Link] = Field(
         default_factory=list,
         max_length=100_000,
         description="dashpots [end, end, coefficient in N s/m]; ends as of springs",
+    )
+    sectors: int = Field(
+        1,
+        ge=1,
+        le=1000,
+        description="number of equal sectors that make the wheel; 1 where it stands alone",
     )
 
     @property
@@ -142,13 +150,13 @@ class Lumped(PartTable):
         return self
 
     def _check_end(self, end: str | int, key: str) -> None:
-        if end == "ground" or end in self.labels:
+        own = end.removeprefix(NEXT) if isinstance(end, str) and self.sectors > 1 else end
+        if end == "ground" or own in self.labels:
             return
         if isinstance(end, int) and 1 <= end <= len(self.masses_kg):
             return
-        raise custom_error(
-            f"there is no mass {end!r}", did_you_mean(str(end), [*self.labels, "ground"]), key
-        )
+        known = [*self.labels, "ground", *(NEXT + m for m in self.labels if self.sectors > 1)]
+        raise custom_error(f"there is no mass {end!r}", did_you_mean(str(end), known), key)
 
 
 class FileModel(PartTable):

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from stickslip.assembly.contact import GROUND, NEXT
+from stickslip.assembly.forces import engine_order
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.dofs import is_numbered
 from stickslip.study.file.bodies import (
@@ -62,7 +63,7 @@ def sectors_of(tables: Tables) -> int | None:
     found: list[int | None] = [1]
     for table in tables.part.values():
         known: Any = table
-        if isinstance(known, Sector):
+        if isinstance(known, Sector | Lumped):
             found.append(known.sectors)  # type: ignore[attr-defined]
         elif isinstance(known, FileModel):
             found.append(known.sectors)
@@ -225,7 +226,6 @@ _NAMES: dict[type[Section], Callable[[Any], tuple[str, ...]]] = {
 
 
 def _loads(tables: Tables) -> Iterator[InputError]:
-    orders = set()
     for name, table in tables.load.items():
         place = f"load.{name}"
         yield from _refused(tables, f"{place}.on", table.on, ("set",))
@@ -241,25 +241,43 @@ def _loads(tables: Tables) -> Iterator[InputError]:
                     if known
                     else "Give a load force_n of its own.",
                 )
-        if table.engine_order is not None:
-            orders.add(table.engine_order)
-            if sectors_of(tables) == 1:
-                yield input_error(
-                    f"{place}.engine_order",
-                    "is of a wheel, but no part is a sector of one",
-                    "Leave it out, or give the part its number of sectors.",
-                )
-        low = tables.harmonics.low_harmonics
-        if table.harmonic not in low:
+        if table.engine_order is not None and sectors_of(tables) == 1:
             yield input_error(
-                f"{place}.harmonic",
-                f"{table.harmonic} is not kept by harmonics.low = {tables.harmonics.low}",
-                "Add it there.",
+                f"{place}.engine_order",
+                "is of a wheel, but no part is a sector of one",
+                "Leave it out, or give the part its number of sectors.",
             )
-    if len(orders) > 1:
-        yield input_error(
-            "load", f"has the engine orders {sorted(orders)}", "Give all loads the same one."
-        )
+    yield from _driven(tables)
+
+
+def _driven(tables: Tables) -> Iterator[InputError]:
+    """Yield the complaints about harmonics that loads act in and the response does not keep."""
+    if any(table.harmonic and table.engine_order is None for table in tables.load.values()):
+        own = {
+            name: table.harmonic for name, table in tables.load.items()
+        }  # a wheel's are refused elsewhere
+    else:
+        try:
+            _, own = engine_order(tables.load, wheel=True)
+        except InputError as error:
+            yield error
+            return
+    table = tables.harmonics
+    low = table.beginning(own.values())
+    high = low if table.high == "auto" else table.high_harmonics
+    for key, kept in (("low", low), ("high", high)):
+        lacking = {name: h for name, h in own.items() if h not in kept}
+        for name, h in lacking.items():
+            given = tables.load[name]
+            asked = (given.engine_order or 0) * given.harmonic
+            why = f", {asked // h} that common to all loads" if h != given.harmonic else ""
+            yield input_error(
+                f"load.{name}.harmonic",
+                f"{h}{f' (engine order {asked}{why})' if why else ''} is not kept by harmonics.{key} = {getattr(table, key)}",
+                "Add it there." if key == "high" else "Add it there, or leave that out.",
+            )
+        if lacking:
+            return
 
 
 def _outputs(tables: Tables) -> Iterator[InputError]:

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.assembly.contact import NEXT
 from stickslip.assembly.placing import copy_of, place_of, placed_body
 from stickslip.errors import input_error
 from stickslip.model.axis import Axis
 from stickslip.model.fe.beam import Beam, beam
 from stickslip.model.fe.solid import Material
-from stickslip.model.matrices import lumped
+from stickslip.model.matrices import lumped, lumped_sector
 from stickslip.model.mesh.blade_mesh import mesh_blade_pair
 from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector
@@ -154,16 +155,19 @@ class Workshop:
 
     def lumped(self, name: str, table: Lumped) -> Part:
         """Make a structure of masses, springs and dashpots."""
-        n = len(table.masses_kg)
+        behind = _behind(table)
+        labels = [*table.labels, *(NEXT + name for name in behind)]
         stiffness, damping = (
-            _links(links, table.labels, n)
-            for links in (table.springs_n_per_m, table.dashpots_n_s_per_m)
+            _links(links, labels) for links in (table.springs_n_per_m, table.dashpots_n_s_per_m)
         )
-        structure = lumped(np.array(table.masses_kg), stiffness, damping, table.labels)
+        if behind:
+            structure = lumped_sector(table.masses_kg, stiffness, damping, table.labels, behind)
+        else:
+            structure = lumped(np.array(table.masses_kg), stiffness, damping, table.labels)
         others = self.others(table, reduced=False)
         if table.dashpots_n_s_per_m and table.damping is None:  # has its own
             others.pop("damping", None)
-        return structure_part(structure, **others)
+        return structure_part(structure, sectors=table.sectors, **others)
 
     def rigid(self, name: str, table: Any) -> Part:
         """Make a rigid body with its surfaces."""
@@ -303,11 +307,20 @@ def digest_of(path: Path) -> str:
     return found.hexdigest()
 
 
-def _links(links: list[list[Any]], labels: list[str], n: int) -> FloatArray:
-    """Return the (n, n) matrix of springs or dashpots."""
-    matrix = np.zeros((n, n))
+def _behind(table: Lumped) -> list[str]:
+    """Return the masses of the next sector that springs and dashpots lead to."""
+    links = [*table.springs_n_per_m, *table.dashpots_n_s_per_m]
+    ends = {
+        end.removeprefix(NEXT) for link in links for end in link[:2] if str(end).startswith(NEXT)
+    }
+    return [name for name in table.labels if name in ends]
+
+
+def _links(links: list[list[Any]], labels: list[str]) -> FloatArray:
+    """Return the matrix of springs or dashpots between the masses of the labels."""
+    matrix = np.zeros((len(labels), len(labels)))
     for first, second, value in links:
-        column = np.zeros(n)
+        column = np.zeros(len(labels))
         for end, sign in ((first, 1.0), (second, -1.0)):
             if end != "ground":
                 column[labels.index(end) if isinstance(end, str) else end - 1] += sign

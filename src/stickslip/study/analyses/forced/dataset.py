@@ -12,7 +12,7 @@ from stickslip.study.analyses.forced.values import Values
 from stickslip.study.analyses.forced.verdicts import with_levels
 from stickslip.study.analyses.verdict import said
 
-LABELLED = ("output", "retained", "contact")  # dimensions whose entries have names
+LABELLED = ("output", "retained", "contact", "driven")  # dimensions whose entries have names
 # dimensions along which cases follow each other, the variable that says whose they are, and one that tells how many there are
 ROWS = {
     "point": ("point_case", "frequency_hz"),

@@ -60,6 +60,11 @@ def inside(question: Question) -> list[str]:
     lowest, highest = (omega / HZ for omega in question.sweep.omega_range)
     known, normal = question.model.frequencies, -question.model.static_force[:, 2]
     told = [f"sweep: {lowest:.2f} to {highest:.2f} Hz"]
+    times, highest = question.driven[0], question.driven[0] * highest
+    if times > 1:
+        told.append(
+            f"{question.driven_names[0]}, whose frequencies follow, acts at {times} times these frequencies"
+        )
     for state, hertz in (("open", known.free_reduced), ("stuck", known.stuck_reduced)):
         rigid = int(np.count_nonzero(hertz < RIGID))
         near = [f"{f:.2f}" for f in hertz[rigid:] if f <= highest][-LISTED:]
@@ -90,7 +95,9 @@ def nothing_pressed(question: Question) -> tuple[Verdict, ...]:
 
 def no_resonance(question: Question) -> tuple[Verdict, ...]:
     """Doubt where no natural frequency, contacts open or stuck, lies in the range of the sweep."""
-    lowest, highest = (omega / HZ for omega in question.sweep.omega_range)
+    if len(question.driven) > 1:  # known are the frequencies of one harmonic
+        return ()
+    lowest, highest = (question.driven[0] * omega / HZ for omega in question.sweep.omega_range)
     known = question.model.frequencies
     every = np.concatenate([known.free_reduced, known.stuck_reduced])
     if not every.size or np.any((every >= lowest) & (every <= highest)):

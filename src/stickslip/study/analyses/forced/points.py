@@ -60,6 +60,12 @@ class Accepted:
         """Return the (n_outputs,) amplitudes, m: norms over the driven harmonics; NaN where the point did not converge."""
         return _amplitudes(self.fields, n_outputs, self.driven)
 
+    def driven_amplitudes(self, n_outputs: int) -> FloatArray:
+        """Return the (driven, n_outputs) amplitudes of each driven harmonic, m; NaN where the point did not converge."""
+        if self.fields is None:
+            return np.full((len(self.driven), n_outputs), np.nan)
+        return np.asarray(np.abs(self.fields.outputs[list(self.driven), :n_outputs]))
+
     def first_amplitudes(self, n_outputs: int, harmonics: Harmonics) -> FloatArray:
         """Return the same of the first solution, NaN where that had other harmonics than these."""
         known = self.low is not None and self.low.support == harmonics

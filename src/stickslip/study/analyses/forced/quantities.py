@@ -80,6 +80,9 @@ _OF = {
         "amplitude": ("m", "amplitude of the harmonic that the load drives (attribute driven_harmonics), the norm over several"),
         "amplitude_low": ("m", "the same with the harmonics of the first passage"),
     },
+    "point driven output": {
+        "driven_amplitude": ("m", "amplitude of each harmonic that the load drives, which on a wheel is an engine order"),
+    },
     "point harmonic output part": {
         "output_displacement": ("m", "displacement of the outputs"),
     },

@@ -86,6 +86,28 @@ class Question:
         return tuple(h for h in sorted(forces) if np.any(forces[h])) or (1,)
 
     @property
+    def driven_names(self) -> tuple[str, ...]:
+        """What these harmonics are called: engine orders on a wheel."""
+        orders = self.model.orders
+        return tuple(
+            f"engine order {orders[h]}" if h in orders else f"harmonic {h}" for h in self.driven
+        )
+
+    @property
+    def orders_lines(self) -> tuple[str, ...]:
+        """What the frequency is where several engine orders act at once, in words."""
+        base, orders = self.model.engine_order, self.model.orders
+        if len(orders) < 2 or not base:
+            return ()
+        waves = [f"{m} in harmonic {h} as wave {m % self.model.sectors}" for h, m in orders.items()]
+        range_of = (
+            "speeds are those of the wheel"
+            if self.over_speed
+            else f"{self.key} is {base} times the speed"
+        )
+        return (f"engine orders: {', '.join(waves)}; {range_of}",)
+
+    @property
     def chooser(self) -> Chooser:
         """How harmonics are chosen."""
         return chooser_of(self.sweep, self.model.error_labels, self.driven)
@@ -116,7 +138,9 @@ def question_of(case: Case, model: Model) -> Question:
         exceeds the study's limits.
     """
     settings = case.settings
-    sweep = within_limits(model, sweep_of(settings, _engine_order(model)), settings.limits)
+    sweep = within_limits(
+        model, sweep_of(settings, model.engine_order, model.driven.values()), settings.limits
+    )
     _require_driven(model, sweep)
     if IN_TIME in case.checks:
         _require_integrable(model)
@@ -170,19 +194,13 @@ def _driving(loads: Mapping[str, Any]) -> str:
     return f"load.{name}.{'ratio' if table.ratio_of else 'force_n'}"
 
 
-def _engine_order(model: Model) -> int | None:
-    """Return the engine order of the loads; None: they have none, or several."""
-    orders = {load.engine_order for load in model.loads.values() if load.engine_order}
-    return orders.pop() if len(orders) == 1 else None
-
-
 def _require_driven(model: Model, sweep: Sweep) -> None:
-    for name, load in model.loads.items():
-        if load.harmonic not in sweep.low_harmonics:
+    for name, harmonic in model.driven.items():
+        if harmonic not in sweep.low_harmonics:
             raise input_error(
                 "harmonics.low",
-                f"must hold harmonic {load.harmonic}, which load.{name} drives, got {named(sweep.low_harmonics)}",
-                f"Add it, for example low = {sorted({*sweep.low_harmonics[1:], load.harmonic})}.",
+                f"must hold harmonic {harmonic}, which load.{name} drives, got {named(sweep.low_harmonics)}",
+                f"Add it, for example low = {sorted({*sweep.low_harmonics[1:], harmonic})}, or leave low out.",
             )
 
 

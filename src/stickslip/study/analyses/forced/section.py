@@ -1,5 +1,6 @@
 """The table [forced_response] of a study file, and the sweep that it becomes."""
 
+from collections.abc import Iterable
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
@@ -7,11 +8,13 @@ from pydantic import Field, model_validator
 
 from stickslip.errors import input_error
 from stickslip.response.forced.response import Sweep
+from stickslip.response.forced.sweep import RUNGS
 from stickslip.study.file.section import Positive, Section, custom_error, rising_pair
 from stickslip.units import HZ, RPM
 
 Range = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 RANGES = ("frequency_hz", "frequencies_hz", "speed_rpm")
+MULTIPLE = 3  # of the highest harmonic that loads drive, which friction answers with
 ALONE = 1e-3  # of a frequency that stands alone: half the width of its range
 
 
@@ -94,7 +97,7 @@ class ForcedResponse(Section):
         return self
 
 
-def sweep_of(settings: Any, engine_order: int | None) -> Sweep:
+def sweep_of(settings: Any, engine_order: int | None, driven: Iterable[int] = (1,)) -> Sweep:
     """Return the sweep that a study's tables ask for.
 
     Parameters
@@ -102,7 +105,9 @@ def sweep_of(settings: Any, engine_order: int | None) -> Sweep:
     settings
         With the tables ``forced_response``, ``harmonics`` and ``solver``.
     engine_order
-        Of the loads, for a response over speed; None: they have none.
+        Of the frequency, for a response over speed; None: the loads have none.
+    driven
+        Harmonics that loads act in.
 
     Raises
     ------
@@ -111,14 +116,16 @@ def sweep_of(settings: Any, engine_order: int | None) -> Sweep:
     """
     table, h = settings.forced_response, settings.harmonics
     lowest, highest = _range(table, engine_order)
+    low = h.beginning(driven)
     return Sweep(
         omega_range=(lowest, highest),
         at=tuple(HZ * f for f in table.frequencies_hz or ()),
         direction=table.direction,
-        low=h.low_harmonics,
+        low=low,
         high="auto" if h.high == "auto" else h.high_harmonics,
         samples=h.samples,
         evaluator=settings.solver.evaluator,
+        cap=max(RUNGS[-1], MULTIPLE * low[-1]),
         threshold=h.alert_threshold_percent / 100,
         selection=h.chooser,
         passages=h.passages,

@@ -41,6 +41,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     rows = tuple(_row(data.isel(case=i), label) for i, label in enumerate(labels))
     found = [
         TextTable("Forced response" + f", {name}" * (name != FIRST), head, rows),
+        _of_orders(data, labels),
         _lines(TITLE, range_lines(data)),
         _lines(_choice_title(data), choices(data)),
         _lines("Against twice as many harmonics", _sentences(data, "reference_sentence", labels)),
@@ -53,6 +54,9 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
 def amplitude_name(data: xr.Dataset) -> str:
     """Return of which harmonics amplitudes are: those that the load drives."""
     driven = [int(h) for h in np.atleast_1d(data.attrs.get("driven_harmonics", [1]))]
+    orders = several_orders(data)
+    if orders:
+        return f"norm of engine orders {', '.join(map(str, orders))}"
     if driven == [1]:
         return FIRST
     return (
@@ -60,6 +64,37 @@ def amplitude_name(data: xr.Dataset) -> str:
         if len(driven) == 1
         else f"norm of harmonics {', '.join(map(str, driven))}"
     )
+
+
+def several_orders(data: xr.Dataset) -> list[int]:
+    """Return the engine orders that act at once; none where there is one."""
+    return [int(m) for m in np.atleast_1d(data.attrs.get("driven_engine_orders", []))]
+
+
+def orders_sentence(data: xr.Dataset) -> str:
+    """Say what the frequency is where several engine orders act at once."""
+    base = int(data.attrs["engine_order"])
+    acts = [f"engine order {m} at {m // base} times that" for m in several_orders(data)]
+    return f"Frequencies are those of engine order {base}, the common divisor: {', '.join(acts)}."
+
+
+def _of_orders(data: xr.Dataset, labels: list[str]) -> TextTable:
+    """Return the peak of each engine order where several act at once."""
+    head = ("case", "engine order", *HEAD, "its own Hz")
+    rows = []
+    for i, label in enumerate(labels):
+        own = data.isel(point=np.flatnonzero(data["point_case"].values == i), output=0)
+        for k, m in enumerate(several_orders(data)):
+            size = own["driven_amplitude"].values[:, k]
+            if np.isfinite(size).any():
+                at = int(np.nanargmax(size))
+                hertz = float(own["frequency_hz"][at])
+                times = m / int(data.attrs["engine_order"])
+                rows.append(
+                    (label, str(m), f"{1e3 * size[at]:.5g}", f"{hertz:.3f}", f"{times * hertz:.3f}")
+                )
+    lines = (orders_sentence(data),) if rows else ()
+    return TextTable("Largest amplitude of each engine order", head, tuple(rows), lines)
 
 
 def _choice_title(data: xr.Dataset) -> str:

@@ -28,6 +28,7 @@ def of_model(question: Question) -> Values:
         "output": model.output_labels,
         "retained": model.system.retained_labels,
         "contact": model.contacts.names,
+        "driven": question.driven_names,
         "frequency_full_hz": model.frequencies.free_full,
         "frequency_reduced_hz": model.frequencies.free_reduced,
         "frequency_stuck_full_hz": model.frequencies.stuck_full,
@@ -49,7 +50,9 @@ def of_model(question: Question) -> Values:
 def _attributes(question: Question) -> Values:
     """Return the attributes of the dataset: texts, numbers and lists of numbers."""
     model, sweep = question.model, question.sweep
-    order = {} if model.engine_order is None else {"engine_order": model.engine_order}
+    order: Values = {} if model.engine_order is None else {"engine_order": model.engine_order}
+    if len(model.orders) > 1:
+        order["driven_engine_orders"] = [model.orders[h] for h in question.driven]
     own = {
         "samples": sweep.samples,
         "evaluator": sweep.evaluator,
@@ -180,6 +183,7 @@ def _of_fields(question: Question, response: Response) -> Values:
         "harmonic_kept": _kept([a.point for a in every], high),
         "amplitude": _stacked([a.amplitudes(n_outputs) for a in every], n_outputs),
         "amplitude_low": _stacked([a.first_amplitudes(n_outputs, low) for a in every], n_outputs),
+        "driven_amplitude": _stacked([a.driven_amplitudes(n_outputs) for a in every], len(question.driven), n_outputs),
         "output_displacement": block("outputs", n_outputs),
         "retained_displacement": _parts(retained, (high + 1, n_retained)),
         "gap": block("gaps", n_contacts, 3),

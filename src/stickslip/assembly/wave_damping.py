@@ -1,0 +1,66 @@
+"""Damping of a wave by the modes of its parts, where each has its own."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import Matrix
+from stickslip.errors import input_error
+from stickslip.model.damping import Damping
+from stickslip.model.structure import Structure
+
+JOINED = 1e-12  # of the largest entry: what leads from part to part
+
+
+@dataclass(frozen=True)
+class DampingOfParts:
+    """Damping by modes of parts that nothing but contacts leads between.
+
+    Parameters
+    ----------
+    parts
+        Name and damping of each part; None: the part has no damping by modes.
+    """
+
+    parts: tuple[tuple[str, Damping | None], ...]
+
+    def of_modes(self, moving: Structure) -> Structure:
+        """Return a wave of all parts whose modes are damped as each part says.
+
+        Raises
+        ------
+        InputError
+            If something else than contacts leads from part to part.
+        """
+        owner = np.array(moving.dofs.part)
+        damping = _dense(moving.damping).astype(complex if moving.is_complex else float)
+        for name, own in self.parts:
+            if own is None:
+                continue
+            rows = np.flatnonzero(owner == name)
+            others = np.flatnonzero(owner != name)
+            _refuse_joined(name, moving, np.ix_(rows, others))
+            square = np.ix_(rows, rows)
+            mass, skew, stiffness = (
+                _dense(m)[square] for m in (moving.mass, moving.damping, moving.stiffness)
+            )
+            alone = Structure(mass, skew, stiffness, moving.dofs.take(rows))
+            damping[square] = _dense(own.of_modes(alone).damping)
+        sparse = scipy.sparse.issparse(moving.stiffness)
+        return replace(moving, damping=scipy.sparse.csr_array(damping) if sparse else damping)
+
+
+def _refuse_joined(name: str, moving: Structure, across: tuple[Matrix, ...]) -> None:
+    for matrix in (moving.mass, moving.stiffness):
+        dense = _dense(matrix)
+        if np.abs(dense[across]).max(initial=0.0) > JOINED * np.abs(dense).max(initial=0.0):
+            raise input_error(
+                f"part.{name}.damping",
+                "differs from that of a part it is joined to, and modes are those of both together",
+                "Give them the same damping by modes, or another form.",
+            )
+
+
+def _dense(matrix: Matrix) -> Matrix:
+    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
