@@ -23,13 +23,17 @@ from test_assembly_wheel import (
 from stickslip.assembly import BladeMistuning, ContactMistuning, Mistuning, OwnSector, pattern
 from stickslip.contact.interface import Interface
 from stickslip.errors import InputError
+from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.mistuned import MistunedStiffness
+from stickslip.harmonic.travelling import condense_side
 from stickslip.model.axis import Axis
 from stickslip.model.damping import rayleigh_damping
 from stickslip.model.fe.rotation import rotating_solid
 from stickslip.model.fe.solid import Material
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.part import solid_part
+from stickslip.reduction.mistuned import MistunedWheel
 from stickslip.reduction.relative import in_relative_coordinates
 from stickslip.response.system import System
 
@@ -37,12 +41,14 @@ DEVIATIONS = np.array([0.03, -0.05, 0.02, 0.06, -0.04])
 FRICTION = np.array([0.0, 0.5, -0.3, 0.2, -0.4])
 
 
-def test_without_deviations_all_sectors_do_what_one_does():
+@pytest.mark.parametrize("modes", [None, 4])
+def test_without_deviations_all_sectors_do_what_one_does(modes):
     """Slip and lift-off, two harmonics of excitation, rotation."""
     law = replace(LAW, preload=20.0)
     model = sector_model(shrouded_sector())
     model = replace(model, contacts={"shroud": replace(model.contacts["shroud"], law=law)})
-    none = Mistuning(blades={"all": BladeMistuning(of="blade", deviations=np.zeros(SECTORS))})
+    even = BladeMistuning(of="blade", deviations=np.zeros(SECTORS), modes=modes)
+    none = Mistuning(blades={"all": even})
     wheel, tuned = replace(model, mistuning=none).assembled(H), model.assembled(H)
     assert wheel.output_labels[4] == "tip[1].y"
     assert np.allclose(wheel.static_force.reshape(SECTORS, -1, 3), tuned.static_force, rtol=1e-9)
@@ -216,3 +222,56 @@ def test_what_is_no_mistuning_is_refused_with_its_key():
     refused("mistuning.a.contact", "there is no such contact", contacts={"a": gone})
     far = OwnSector(sector=5, part="blade", by=model.parts["blade"])
     refused("mistuning.a.sector", "the sectors are 0 to 4", own={"a": far})
+
+
+def test_a_wheel_condensed_wave_by_wave_is_the_wheel_condensed_as_a_whole():
+    """Stiffness, loads, their derivatives, recovery, rows of outputs and energy, with springs on contact coordinates."""
+    model = sector_model(shrouded_sector())
+    one = BladeMistuning(of="blade.shroud_high", deviations=DEVIATIONS, modes=2)
+    found = replace(model, mistuning=Mistuning(blades={"high": one})).assembled(H)
+    wheel, retained = found.bare.structure, found.bare.retained
+    assert isinstance(wheel, MistunedWheel)
+    springs = np.zeros(wheel.n)
+    springs[retained] = 3e5 * np.arange(1, retained.size + 1) / retained.size
+    wheel = wheel.grounded(scipy.sparse.diags_array(springs).tocsr())
+    fast = condense_side(wheel, retained, found.load, H)
+    assert isinstance(fast, MistunedStiffness)
+    for rate in (0.0, 25.0):
+        fast = fast.with_mass_damping(rate)
+        structure = wheel.structure
+        slow = condense(
+            replace(structure, damping=structure.damping + rate * structure.mass),
+            retained,
+            found.load,
+        )
+        omega, rng = 2 * math.pi * 2150, np.random.default_rng(1)
+        mine, theirs = fast.condensed(omega, H), slow.condensed(omega, H)
+        for name in ("stiffness", "derivative", "load", "load_derivative"):
+            a, b = getattr(mine, name), getattr(theirs, name)
+            for h in range(H + 1):
+                assert np.abs(a[h] - b[h]).max() <= 1e-9 * max(
+                    np.abs(b[h]).max(), 1e-9 * np.abs(b).max()
+                )
+        q = rng.standard_normal((H + 1, retained.size)) + 1j * rng.standard_normal(
+            (H + 1, retained.size)
+        )
+        q[0] = q[0].real
+        one_way, other = fast.products(omega, (0, 1, 2, 3)), slow.products(omega, (0, 1, 2, 3))
+        rows = rng.standard_normal((7, retained.size))
+        pairs = [
+            (fast.recover(omega, q), slow.recover(omega, q)),
+            (fast.recover_change(omega, q), slow.recover_change(omega, q)),
+            (fast.strain_energy(omega, q), slow.strain_energy(omega, q)),
+            (
+                fast.output_rows(omega, 2, found.bare.outputs),
+                slow.output_rows(omega, 2, found.bare.outputs),
+            ),
+            (one_way.product(rows), other.product(rows)),
+            (one_way.transposed_product(rows), other.transposed_product(rows)),
+            (one_way.product_and_slope(rows)[1], other.product_and_slope(rows)[1]),
+            (one_way.block(3), other.block(3)),
+            (one_way.load, other.load),
+            (one_way.load_slope, other.load_slope),
+        ]
+        for a, b in pairs:
+            assert np.abs(a - b).max() < 1e-9 * np.abs(b).max()

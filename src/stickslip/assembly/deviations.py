@@ -16,11 +16,12 @@ from stickslip.model.dofs import numbered_dofs
 from stickslip.model.fe.factorisation import factorise
 from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
-from stickslip.reduction.sectors import circulant, of_alike, strip
+from stickslip.reduction.sectors import of_alike, strip
 from stickslip.units import HZ
 
 BLADE_MODES = 20  # blade-alone modes looked for where a study names none
 
+FEW_ROWS = 30  # shares of a sector's motion: above, all coordinates of the wheel are no more
 Changes = dict[str, FloatArray]  # "mass", "damping", "stiffness" -> (n_s m, n_s m)
 
 
@@ -31,13 +32,16 @@ class Deviation:
     Parameters
     ----------
     rows
-        (r, N) CSR on the dofs of all parts: of the sector's motion, what it acts on.
+        (r, N) CSR on the dofs of all parts: shares of a sector's motion that it acts on.
+    factors
+        (n_s, r) stiffness that each share has beyond the tuned one; None where shares are many and `change` tells it all.
     change
         From the couplings (n_s, r, m) of these rows with all coordinates to what the matrices of the wheel change by.
     """
 
     rows: Matrix
-    change: Callable[[Matrix], Changes]
+    factors: FloatArray | None = None
+    change: Callable[[Matrix], Changes] | None = None
 
 
 def deviations(model: Model) -> list[Deviation]:
@@ -117,21 +121,20 @@ def _of_blades(model: Model, name: str, one: BladeMistuning) -> Deviation:
     factors = one.factors
     if factors.ndim == 2 or one.modes is not None:
         return _of_modes(blade, factors, one.modes)
-    if blade.whole:
-        n = blade.stiffness.shape[0]
-        first = model.places.offset(one.of.partition(".")[0])
-        rows = picked(first + np.arange(n), model.places.n)
-
-        def of_part(blocks: Matrix) -> Changes:
-            return {"stiffness": of_alike(blocks, blade.stiffness, factors)}
-
-        return Deviation(rows, of_part)
-    solve = factorise(blade.stiffness)
+    b = blade.stiffness.shape[0]
+    first = model.places.offset(one.of.partition(".")[0])
+    rows = picked(first + np.arange(b), model.places.n) if blade.whole else blade.rows
+    if b <= FEW_ROWS:
+        # K = V diag(w) Vᵀ; of a blade that is held, [K K_r]ᵀ K⁻¹ [K K_r]
+        values, vectors = np.linalg.eigh(blade.stiffness.toarray())
+        weights = values if blade.whole else 1.0 / values
+        return Deviation(scipy.sparse.csr_array(vectors.T @ rows), factors[:, None] * weights)
+    kernel = blade.stiffness if blade.whole else factorise(blade.stiffness)
 
     def of_blade(blocks: Matrix) -> Changes:
-        return {"stiffness": of_alike(blocks, solve, factors)}
+        return {"stiffness": of_alike(blocks, kernel, factors)}
 
-    return Deviation(blade.rows, of_blade)
+    return Deviation(rows, change=of_blade)
 
 
 def _of_modes(blade: Blade, factors: FloatArray, number: int | None) -> Deviation:
@@ -140,12 +143,7 @@ def _of_modes(blade: Blade, factors: FloatArray, number: int | None) -> Deviatio
     each = np.broadcast_to(factors.reshape(len(factors), -1), (len(factors), squares.size))
     # with K φ = ω² M φ, φᵀ [K K_r] u = ω² times the mode's share of what u is beyond the static motion by the rest
     rows = scipy.sparse.csr_array((shapes / np.sqrt(squares)).T @ blade.rows)
-
-    def of_modes(blocks: Matrix) -> Changes:
-        shares = circulant(blocks)
-        return {"stiffness": shares.T @ (each.ravel()[:, None] * shares)}
-
-    return Deviation(rows, of_modes)
+    return Deviation(rows, each)
 
 
 def _of_own(model: Model, name: str, one: OwnSector) -> Deviation:
@@ -169,7 +167,7 @@ def _of_own(model: Model, name: str, one: OwnSector) -> Deviation:
         own = strip(blocks, one.sector)
         return {kind: own.T @ (m @ own) for kind, m in small.items() if m.nnz}
 
-    return Deviation(rows, of_own)
+    return Deviation(rows, change=of_own)
 
 
 def _refuse_unlike(key: str, old: Structure, new: Structure) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse
 
-from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.arrays import IntArray, Matrix
 from stickslip.assembly.asked import Asked, asked, excitation
 from stickslip.assembly.assembled import Assembled, Blades
 from stickslip.assembly.build import (
@@ -25,24 +25,25 @@ from stickslip.assembly.mistuning import ContactMistuning
 from stickslip.assembly.model import Model
 from stickslip.assembly.pairs import Pairs
 from stickslip.assembly.places import picked
-from stickslip.assembly.points import in_points
 from stickslip.assembly.reduced import Store
-from stickslip.assembly.rigid import InGaps, in_gaps
+from stickslip.assembly.rigid import refuse_mixed_gaps
 from stickslip.assembly.shares import at_rest
 from stickslip.assembly.statics import pressed_by
 from stickslip.assembly.waves import SectorWaves, sector_waves
-from stickslip.assembly.wheel import partners
+from stickslip.assembly.wheel import ReducedSector, wheel_of
 from stickslip.contact.interface import Interface
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws import law_name
 from stickslip.errors import input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
-from stickslip.reduction.sectors import circulant, couplings, repeated, travelling
+from stickslip.reduction.cyclic import CyclicSector
+from stickslip.reduction.mistuned import MistunedWheel, mistuned_wheel
+from stickslip.reduction.sectors import couplings, repeated, travelling
+from stickslip.reduction.tuned import TunedWheel
 from stickslip.reduction.waves import excited_wave, wave
 from stickslip.response.system import System
 
-KINDS = ("mass", "damping", "stiffness")
 RELATIVE = {
     "friction_coefficient": ("mu",),
     "preload": ("preload",),
@@ -64,11 +65,12 @@ def assemble_mistuned(model: Model, harmonics: int, store: Store) -> Assembled:
     what = asked(alike, harmonics)
     wheel = all_sectors(model, what, store)
     n, order = model.sectors, what.order
+    refuse_mixed_gaps(alike, wheel.gaps[: 3 * len(alike.pairs.names)])
     pairs = pairs_of_all(model)
     linear = wheel.linear(order or 0)
     bodies = model.places.bodies(model.ties.weights.nonzero()[1])
     system = System(
-        wheel.structure,
+        wheel.side,
         Interface(pairs.names, pairs.laws, wheel.gaps),
         wheel.of_dofs(what.labels.dofs, "output.points"),
         alert_dofs=wheel.of_dofs(what.watched, "alert_over"),
@@ -98,7 +100,7 @@ def assemble_mistuned(model: Model, harmonics: int, store: Store) -> Assembled:
         counts={
             "nodes": model.facts.nodes,
             "dofs": model.places.n,
-            "reduced": wheel.structure.n,
+            "reduced": wheel.side.n,
             "retained": int(held.retained.size),
         },
         warnings=(
@@ -140,57 +142,42 @@ class AllSectors:
     ----------
     model
         Of one of them.
-    waves
-        Of the tuned wheel.
-    size
-        Coordinates of each sector before contacts changed them: kept dofs in its own axes, then modes.
-    found
-        The wheel, in gaps or contact points where that leaves fewer coordinates.
+    sector
+        The tuned wheel by all its waves; coordinates of the others mean what those of sector 0 do.
+    side
+        The wheel.
+    gaps
+        (3 p n_s, n) CSR, sector by sector.
     """
 
     model: Model
-    waves: SectorWaves
-    size: int
-    found: InGaps
+    sector: ReducedSector
+    side: MistunedWheel | Structure
+    gaps: Matrix
 
     @property
-    def structure(self) -> Structure:
-        """The wheel."""
-        return self.found.structure
-
-    @property
-    def gaps(self) -> Matrix:
-        """(3 p n_s, n) CSR, sector by sector."""
-        return self.found.gaps
+    def size(self) -> int:
+        """Number of coordinates of a sector."""
+        return self.side.n // self.model.sectors
 
     def of_dofs(self, dofs: IntArray, place: str) -> IntArray:
         """Return the coordinates of dofs of the parts in all sectors, sector by sector; `place` is the key that asks."""
-        own = places_of(self.model, self.waves, dofs, place)
-        every = (np.arange(self.model.sectors)[:, None] * self.size + own).ravel()
-        return self.found.of(every, place)
-
-    def load(self, force: Matrix, wave_number: int) -> Matrix:
-        """Return the load of all sectors of one (N,) on kept dofs of the parts, which travels as a wave."""
-        sector, kept = self.waves.sector, self.waves.kept
-        angle = wave(wave_number, sector.sectors).phase_angle
-        on_wave = sector.wave_tie(wave_number).conj().T @ self.model.coordinates.load(force)
-        own = np.zeros(self.size, dtype=on_wave.dtype)
-        own[: kept.size] = on_wave[np.searchsorted(sector.independent, kept)]
-        return self.found.load(travelling(own, angle, sector.sectors))
-
-    def steady(self) -> FloatArray:
-        """Return the load of steady rotation."""
-        load = self.waves.waves[0][1]
-        own = np.real(load if load.ndim == 1 else load[:, 0])
-        return np.asarray(self.found.load(np.tile(own, self.model.sectors)))
+        at = self.model.coordinates
+        own = self.sector.of_dofs(at.of_dofs(dofs, self.model.places.dofs, place), place)
+        return np.asarray((np.arange(self.model.sectors)[:, None] * self.size + own).ravel())
 
     def linear(self, order: int) -> Linear:
         """Return the wheel as the linear side of a model under an engine order."""
+        n = self.model.sectors
 
         def load(force: Matrix, harmonic: int) -> Matrix:
-            return self.load(force, excited_wave(order, self.model.sectors, harmonic))
+            k = excited_wave(order, n, harmonic)
+            own = self.sector.load(self.model.coordinates.load(force), k)
+            return travelling(own, wave(k, n).phase_angle, n)
 
-        return Linear(self.structure, self.gaps, self.steady(), self.of_dofs, load, None)
+        steady = self.sector.steady
+        own = steady if steady.ndim == 1 else steady[:, 0]
+        return Linear(self.side, self.gaps, np.tile(own, n), self.of_dofs, load, None)
 
 
 def all_sectors(model: Model, what: Asked, store: Store) -> AllSectors:
@@ -199,68 +186,69 @@ def all_sectors(model: Model, what: Asked, store: Store) -> AllSectors:
     changes = deviations(model)
     rows = scipy.sparse.vstack([c.rows for c in changes], format="csr") if changes else None
     waves = sector_waves(model, range(model.sectors), kept, store, rows)
-    every = [waves.waves[k] for k in range(model.sectors)]
-    size = every[0][0].n
-    matrices = {kind: circulant(couplings([getattr(s, kind) for s, _ in every])) for kind in KINDS}
-    loss = None
-    if every[0][0].loss is not None:
-        loss = circulant(couplings([s.loss for s, _ in every]))
-    first = 1
-    for change in changes:
-        count = change.rows.shape[0]
-        seen = couplings([load[:, first : first + count].conj().T for _, load in every])
-        for kind, added in change.change(seen).items():
-            matrices[kind] = matrices[kind] + added
-        first += count
-    dofs = _dofs(waves, every[0][0].dofs)
-    structure = Structure(
-        matrices["mass"], matrices["damping"], matrices["stiffness"], dofs, loss=loss
+    sector, gaps = _in_sectors(model, waves, what)
+    structures = [sector.wheel.waves[k] for k in range(model.sectors)]
+    seen = []
+    for k in range(model.sectors):
+        loads = waves.waves[k][1]
+        shares = loads[:, 1:].conj().T if loads.ndim > 1 else np.zeros((0, loads.size))
+        seen.append(shares @ sector.ways[k])
+    few = [change.factors is not None for change in changes]
+    counts = [change.rows.shape[0] for change in changes]
+    factors = [c.factors for c in changes if c.factors is not None]
+    mine = np.repeat(few, counts).astype(bool)
+    wheel = mistuned_wheel(
+        structures,
+        [shares[mine] for shares in seen],
+        np.hstack([np.zeros((model.sectors, 0)), *factors]),
+        _dofs(waves.sector, structures[0].dofs),
     )
-    gaps = gaps_of_all(model, waves, size)
-    pairs = pairs_of_all(model)
-    found = in_gaps(pairs, structure, gaps)
-    if found.place is None:
-        bodies = model.places.bodies()
-        own = places_of(
-            model, waves, np.unique(np.concatenate([what.stay, bodies])), "output.points"
-        )
-        fixed = (np.arange(model.sectors)[:, None] * size + own).ravel()
-        found = in_points(structure, gaps, fixed, pairs.names)
-    return AllSectors(model, waves, size, found)
+    if all(few):
+        return AllSectors(model, sector, wheel, gaps)
+    structure = wheel.structure
+    for first, count, change in zip(np.cumsum([0, *counts]), counts, changes, strict=False):
+        if change.change is not None:
+            blocks = couplings([shares[first : first + count] for shares in seen])
+            for kind, added in change.change(blocks).items():
+                structure = replace(structure, **{kind: getattr(structure, kind) + added})
+    return AllSectors(model, sector, structure, gaps)
 
 
-def places_of(model: Model, waves: SectorWaves, dofs: IntArray, place: str) -> IntArray:
-    """Return where dofs of the parts stand among the coordinates of their sector."""
-    sector, at = waves.sector, model.coordinates
-    own = at.of_dofs(dofs, model.places.dofs, place)
-    behind = own[partners(sector)[own] != own]
-    if behind.size and place == "output.points":
-        raise input_error(
-            place,
-            f"{sector.structure.dofs.labels[int(behind[0])]} lies on the high cyclic face, which moves as the neighbour's low face",
-            "Take its partner on the low face, or a place beside the faces.",
-        )
-    return np.searchsorted(waves.kept, partners(sector)[own])
+def _in_sectors(model: Model, waves: SectorWaves, what: Asked) -> tuple[ReducedSector, Matrix]:
+    """Return all waves on coordinates that contacts know, and the gaps of all sectors: gaps where waves can be written in them."""
+    at, n = model.coordinates, model.sectors
+    pairs = replace(
+        model.pairs, own=at.columns(model.pairs.own), following=at.columns(model.pairs.following)
+    )
+    bodies = model.places.bodies()
+    shown, held = (
+        at.of_dofs(np.unique(d), model.places.dofs, "output.points") for d in (what.stay, bodies)
+    )
+    found = wheel_of(waves.sector, waves.kept, waves.waves, (0, 0), pairs, (shown, held))
+    if not found.wheel.multipliers.size:
+        return found, repeated([found.gaps], n)
+    # contacts know a dof as this sector's and as a neighbour's: sectors of a whole wheel need no copies
+    own = {k: structure for k, (structure, _) in waves.waves.items()}
+    size = own[0].n
+    same = scipy.sparse.eye_array(size, format="csr")
+    plain = TunedWheel(own, n, 0, 0)
+    steady = np.real(waves.waves[0][1])
+    sector = ReducedSector(
+        waves.sector, waves.kept, dict.fromkeys(own, same), waves.waves, plain, found.gaps, steady
+    )
+    return sector, _shifted_gaps(waves, pairs, size)
 
 
-def gaps_of_all(model: Model, waves: SectorWaves, size: int) -> Matrix:
-    """Return the (3 p n_s, n_s size) CSR operator from the coordinates of all sectors to their gaps."""
-    sector, at = waves.sector, model.coordinates
-    own, following = (at.columns(m) for m in (model.pairs.own, model.pairs.following))
-    touched = np.union1d(own.nonzero()[1], following.nonzero()[1])
-    shared = np.intersect1d(touched, sector.shared)
-    if shared.size:
-        raise input_error(
-            "contact",
-            f"touches {sector.structure.dofs.labels[shared[0]]} on the axis, which all sectors share",
-            "Leave that node out.",
-        )
+def _shifted_gaps(waves: SectorWaves, pairs: Pairs, size: int) -> Matrix:
+    """Return the gaps of all sectors from their coordinates: of each contact from this sector, the next one and the one after it."""
+    sector = waves.sector
     place = np.searchsorted(sector.independent, waves.kept)
     tie = sector.tie[:, : sector.independent.size][:, place]
     high = np.zeros(sector.structure.n)
     high[sector.high] = 1.0
     tied, free = (scipy.sparse.diags_array(d) @ tie for d in (high, 1.0 - high))
     wide = picked(np.arange(place.size), size)
+    own, following = pairs.own, pairs.following
     known = [own @ free, own @ tied + following @ free, following @ tied]
     return repeated([m @ wide for m in known], sector.sectors)
 
@@ -334,12 +322,13 @@ def changed(law: ContactLaw, key: str, one: ContactMistuning, value: float) -> C
     return found
 
 
-def _dofs(waves: SectorWaves, own: Dofs) -> Dofs:
+def _dofs(sector: CyclicSector, own: Dofs) -> Dofs:
     """Return the table of all sectors: ``part[n]``, positions turned."""
-    n, k, axis = waves.sector.sectors, waves.kept.size, waves.sector.axis
+    n, axis = sector.sectors, sector.axis
     position = np.tile(own.position, (n, 1, 1))
+    placed = np.flatnonzero(np.isfinite(own.position).all(axis=1))
     for i in range(1, n):
         if axis is not None:
-            position[i, :k] = axis.turned(own.position[:k], i * waves.sector.pitch)
+            position[i, placed] = axis.turned(own.position[placed], i * sector.pitch)
     parts = tuple(f"{part}[{i}]" for i in range(n) for part in own.part)
     return Dofs(np.tile(own.node, n), own.component * n, position.reshape(-1, 3), parts)

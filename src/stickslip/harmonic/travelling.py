@@ -20,6 +20,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.harmonic.linear import DynamicStiffness, LinearSide
 from stickslip.harmonic.matrices import checked_matrix, is_real_symmetric
+from stickslip.harmonic.mistuned import by_sectors, condense_mistuned
 from stickslip.harmonic.spectral import Blocks
 from stickslip.harmonic.support import Harmonics
 from stickslip.harmonic.wave_condensation import (
@@ -31,6 +32,7 @@ from stickslip.harmonic.wave_condensation import (
 )
 from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback
+from stickslip.reduction.mistuned import MistunedWheel
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,8 +275,12 @@ def condense_side(
     """Prepare the exact condensation of what vibrates, for harmonics up to `order`.
 
     By `condense`, whose frequencies cost few products, where all harmonics vibrate as one real symmetric structure; by
-    `condense_waves` otherwise.
+    `condense_mistuned` where that is a wheel of sectors; by `condense_waves` otherwise.
     """
+    if isinstance(side, MistunedWheel):
+        if by_sectors(side, retained):
+            return condense_mistuned(side, retained, load)
+        return condense(side.structure, retained, load)
     structures = tuple(side.of_harmonic(h) for h in range(order + 1))
     feedback = tuple(side.feedback_of(h) for h in range(order + 1))
     one, still = structures[0], all(force is None for force in feedback)
