@@ -124,7 +124,7 @@ def _of_drift(question: Question, response: Response) -> Iterator[Verdict]:
             )
             remedy = (
                 "Give [retention] a small stiffness_n_per_m (1e-6 of the contact stiffness); the result then says how far it "
-                "moves the peak."
+                "moves the peak. A part that is no rigid body needs a weak spring to the ground."
             )
             yield Verdict("doubtful", why=why, remedy=remedy)
             return
