@@ -17,9 +17,9 @@ from stickslip.solve.branch import Following
 from stickslip.solve.newton_method import Newton, Solution, first_converged, newton
 from stickslip.solve.status import Status
 
-FAINT = 1e-12  # m: a gap that moves less slips nowhere
+FAINT = 1e-11  # m: a gap that moves less slips nowhere
 MOST_DOUBLINGS = 80
-SLIPS = 1e-6  # change of the shape, the frequency or the damping when the amplitude is doubled, from which on it is no linear mode
+SLIPS = 1e-6  # of the elastic force of the mode: what a contact adds that leaves its state
 LARGEST = 0.25
 PATIENT = Newton(max_iterations=60, globalisation="levenberg_marquardt")
 
@@ -73,14 +73,20 @@ def slip_amplitude(problem: SelfExcited) -> float:
     mode = problem.relative(problem.guess(static, 1.0))[1]
     largest = float(np.max(np.abs(problem.balance.interface.gap_operator @ mode), initial=0.0))
     amplitude = FAINT / largest if largest > 0.0 else np.inf
-    equation, before = problem.over_amplitude(), None
-    for _ in range(MOST_DOUBLINGS if np.isfinite(amplitude) else 0):
-        found = _solved(problem, equation, float(np.log(amplitude)), [])
-        if not found.status.converged:
+    equation, mean = problem.over_amplitude(), problem.balance.linear.n
+    faint = min(amplitude, 1.0)
+    small = _solved(problem, equation, float(np.log(faint)), [])
+    sticks = small.status.converged and np.isfinite(amplitude)
+    for _ in range(MOST_DOUBLINGS if sticks else 0):
+        # as long as all contacts stick the motion grows in proportion about the same mean
+        grown = small.x.copy()
+        grown[:mean] *= faint / amplitude
+        left = equation.residual(grown, float(np.log(amplitude)))
+        if np.max(np.abs(left)) > SLIPS:
             return amplitude
-        if before is not None and _vibration_change(problem, before, found.x) > SLIPS:
-            return amplitude
-        before, amplitude = found.x, 2.0 * amplitude
+        amplitude *= 2.0
+    if not sticks and np.isfinite(amplitude):
+        return amplitude
     raise input_error(
         "limit_cycle",
         f"no contact slips or opens in mode {problem.mode.number}, however large its amplitude",
@@ -197,9 +203,3 @@ def _weights(problem: SelfExcited) -> FloatArray:
     weights = np.ones(problem.balance.size + 2)
     weights[: problem.balance.linear.n] = 0.0
     return weights
-
-
-def _vibration_change(problem: SelfExcited, before: FloatArray, after: FloatArray) -> float:
-    mean = problem.balance.linear.n
-    change = np.abs(after[mean:] - before[mean:])
-    return float(np.max(change) / np.max(np.abs(after[mean:-2])))
