@@ -1,6 +1,6 @@
 """From a model to what solvers see: parts reduced, joined and loaded, contacts paired, all placed under the static loads."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -68,11 +68,20 @@ class Linear:
     of_wave: Any
 
 
-def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
+def assemble(
+    model: Model,
+    harmonics: int,
+    store: Store,
+    wave_number: int | None = None,
+    *,
+    every_wave: bool = False,
+) -> Assembled:
     """Return a model as solvers see it; see `Model.assembled`."""
     what = asked(model, harmonics)
-    order, labels = what.order, what.labels
-    linear = linear_side(model, order or 0, harmonics, what.kept, what.stay, store)
+    labels = what.labels
+    order = what.order if wave_number is None else wave_number
+    more = range(model.sectors) if every_wave else ()
+    linear = linear_side(model, order or 0, harmonics, what.kept, what.stay, store, more)
     refuse_mixed_gaps(model, linear.gaps)
     system = System(
         linear.side,
@@ -117,7 +126,13 @@ def assemble(model: Model, harmonics: int, store: Store) -> Assembled:
 
 
 def linear_side(
-    model: Model, order: int, harmonics: int, kept: IntArray, stay: IntArray, store: Store
+    model: Model,
+    order: int,
+    harmonics: int,
+    kept: IntArray,
+    stay: IntArray,
+    store: Store,
+    more: Sequence[int] = (),
 ) -> Linear:
     """Reduce a model.
 
@@ -133,6 +148,8 @@ def linear_side(
         Outputs, which have to be coordinates of their own.
     store
         As in `Model.assembled`.
+    more
+        Wave numbers that are reduced beside those of the harmonics.
     """
     kept, needed = physical(model, kept)
     bodies = model.places.bodies()
@@ -142,7 +159,7 @@ def linear_side(
         raise input_error(
             KEY, "is for single structures: waves hold no joined nodes", "Leave it out on a wheel."
         )
-    found = reduced_sector(model, (order, harmonics), kept, (stay, bodies), store)
+    found = reduced_sector(model, (order, harmonics), kept, (stay, bodies), store, more)
     at = model.coordinates
 
     def of_dofs(dofs: IntArray, place: str) -> IntArray:

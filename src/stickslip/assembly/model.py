@@ -337,7 +337,22 @@ class Model:
         """Return what the centrifugal load does to the solids at a speed in rad/s; None at rest, and where no speed changes anything."""
         return static_state(self.parts, self.static_displacement(speed), speed)
 
-    def assembled(self, harmonics: int, store: Store | None = None) -> Assembled:
+    @cached_property
+    def undriven(self) -> "Model":
+        """The same without harmonic loads, its motion reported at the same places."""
+        driven = {name: load for name, load in self.loads.items() if load.harmonic > 0}
+        still = {name: load for name, load in self.loads.items() if name not in driven}
+        places = tuple(Output(name=name, on=load.on) for name, load in driven.items())
+        return replace(self, loads=still, outputs=self.outputs or places)
+
+    def assembled(
+        self,
+        harmonics: int,
+        store: Store | None = None,
+        *,
+        wave_number: int | None = None,
+        every_wave: bool = False,
+    ) -> Assembled:
         """Reduce the parts, join them, pair the contacts, and place all under the static loads.
 
         Parameters
@@ -346,6 +361,10 @@ class Model:
             Highest harmonic of the response.
         store
             Takes a text that all depends on and a function that makes named arrays; returns these, perhaps from an earlier run.
+        wave_number
+            Of a wheel: that in which a motion travels that nothing drives; harmonic loads are then left out. None: the loads say.
+        every_wave
+            Whether all waves of a wheel are reduced, as its stability against every one of them needs.
 
         Raises
         ------
@@ -357,8 +376,11 @@ class Model:
         from stickslip.assembly.build import assemble
         from stickslip.assembly.mistuned import assemble_mistuned
 
-        of = assemble if self.mistuning is None else assemble_mistuned
-        return of(self, harmonics, in_memory if store is None else store)
+        keep = in_memory if store is None else store
+        model = self if wave_number is None else self.undriven
+        if self.mistuning is not None:
+            return assemble_mistuned(model, harmonics, keep)
+        return assemble(model, harmonics, keep, wave_number, every_wave=every_wave)
 
 
 def _beyond_sectors(loads: Mapping[str, Load], sectors: int) -> list[str]:

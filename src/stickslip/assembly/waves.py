@@ -45,6 +45,7 @@ def reduced_sector(
     kept: IntArray,
     stay: tuple[IntArray, IntArray],
     store: Store,
+    more: Sequence[int] = (),
 ) -> ReducedSector:
     """Reduce the waves that an engine order excites.
 
@@ -58,8 +59,11 @@ def reduced_sector(
         Dofs of all parts that stay physical, and those that have to be coordinates of their own: outputs, rigid bodies.
     store
         As in `Model.assembled`.
+    more
+        Further wave numbers.
     """
-    found = sector_waves(model, wave_numbers(model.sectors, *order), kept, store)
+    numbers = sorted({*wave_numbers(model.sectors, *order), *more})
+    found = sector_waves(model, numbers, kept, store)
     at = model.coordinates
     pairs = replace(
         model.pairs, own=at.columns(model.pairs.own), following=at.columns(model.pairs.following)
