@@ -33,6 +33,9 @@ from stickslip.harmonic.wave_condensation import (
 from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback
 from stickslip.reduction.mistuned import MistunedWheel
+from stickslip.reduction.tuned import TunedWheel
+
+ANY = 100  # harmonics for which a wheel with every wave is there
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,6 +284,8 @@ def condense_side(
         if by_sectors(side, retained):
             return condense_mistuned(side, retained, load)
         return condense(side.structure, retained, load)
+    if isinstance(side, TunedWheel) and side.has_every_wave:
+        order = max(order, ANY)  # a wave is condensed when a harmonic first asks for it
     structures = tuple(side.of_harmonic(h) for h in range(order + 1))
     feedback = tuple(side.feedback_of(h) for h in range(order + 1))
     one, still = structures[0], all(force is None for force in feedback)

@@ -78,9 +78,9 @@ class TunedWheel:
         Raises
         ------
         InputError
-            If the wheel was made for fewer harmonics.
+            If the wheel was made for fewer harmonics and has not every wave.
         """
-        if not 0 <= harmonic <= self.harmonics:
+        if harmonic < 0 or (harmonic > self.harmonics and not self.has_every_wave):
             raise input_error(
                 "TunedWheel",
                 f"was made for harmonics up to {self.harmonics}, asked for {harmonic}",
@@ -115,9 +115,8 @@ class TunedWheel:
 
     @property
     def has_every_wave(self) -> bool:
-        """Whether there is a structure for each wave number or the one of the other direction: what all sectors in time need."""
-        n = self.sectors
-        return all(k in self.waves or (n - k) % n in self.waves for k in range(n // 2 + 1))
+        """Whether there is a structure for each wave number: what all sectors in time need, each of which may do something else."""
+        return all(k in self.waves for k in range(self.sectors))
 
     def grounded(self, springs: Matrix) -> "TunedWheel":
         """Return the wheel with springs, a sparse matrix (n, n) in N/m, from its coordinates to the ground."""

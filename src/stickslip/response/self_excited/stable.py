@@ -4,8 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stickslip.arrays import FloatArray
-from stickslip.harmonic.fourier import to_real
+from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.self_excited.cycles import LimitCycle, solve_cycle
 from stickslip.response.self_excited.problem import SelfExcited
@@ -13,12 +12,10 @@ from stickslip.response.stability.multipliers import Stability, motion_stability
 from stickslip.response.stability.waves import (
     WaveDisturbance,
     growing_wave,
-    sector_gaps,
     wave_disturbances,
-    whole_wheel,
 )
 from stickslip.response.time.floquet import Floquet
-from stickslip.response.time.sectors import SectorsInTime
+from stickslip.response.time.sectors import all_in_time
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,49 +47,38 @@ def cycle_stability(problem: SelfExcited, cycle: LimitCycle) -> CycleStability:
     InputError
         If the structure cannot be marched in time, or a wheel has not all its waves.
     """
-    whole = (
-        whole_wheel(problem.system) if isinstance(problem.system.structure, TunedWheel) else None
-    )
-    found, along = _of(problem, cycle.unknowns, whole)
+    found, along = _of(problem, cycle.unknowns)
     errors = np.full(found.errors.size, np.inf)
     fewer = _with_fewer(problem, cycle)
     if fewer is not None:
-        other, _ = _of(*fewer, whole)
+        other, _ = _of(*fewer)
         size = min(found.errors.size, other.errors.size)
         errors[:size] = _changes(found.floquet, other.floquet)[:size]
         errors[size:] = 0.0
     errors = np.maximum(errors + found.errors, abs(along - 1.0))
     found = replace(found, errors=errors)
-    if whole is None:
+    if not isinstance(problem.system.structure, TunedWheel):
         return CycleStability(found, along, None)
-    gaps = _gaps(problem, cycle.unknowns, whole)
-    every = wave_disturbances(whole, gaps, problem.omega(cycle.unknowns))
-    others = [d for d in every if abs(d.multiplier - along) > 0.0]
+    every = wave_disturbances(problem.system, _gaps(problem, cycle.unknowns), cycle.omega)
+    others = sorted(every, key=lambda d: abs(d.multiplier - along))[1:]
     return CycleStability(found, along, growing_wave(others, found.multiplier))
 
 
-def _of(
-    problem: SelfExcited, unknowns: FloatArray, whole: SectorsInTime | None
-) -> tuple[Stability, complex]:
+def _of(problem: SelfExcited, unknowns: FloatArray) -> tuple[Stability, complex]:
     """Return the stability without the disturbance along the motion, and the multiplier of this."""
-    omega, gaps = problem.omega(unknowns), _gaps(problem, unknowns, whole)
-    structure, contacts = problem.system.structure, problem.system.interface
-    if whole is not None:
-        structure, contacts = whole.structure, whole.contacts
-    found = motion_stability(structure, contacts, gaps, omega)
+    own = all_in_time(problem.system, _gaps(problem, unknowns))
+    found = motion_stability(*own, problem.omega(unknowns))
     values = found.floquet.multipliers
     if found.unknown or not values.size:
         return found, complex(np.nan)
-    own = int(np.argmin(np.abs(values - 1.0)))
-    rest = Floquet(np.delete(values, own))
-    return replace(found, floquet=rest, errors=np.delete(found.errors, own)), complex(values[own])
+    at = int(np.argmin(np.abs(values - 1.0)))
+    rest = Floquet(np.delete(values, at))
+    return replace(found, floquet=rest, errors=np.delete(found.errors, at)), complex(values[at])
 
 
-def _gaps(problem: SelfExcited, unknowns: FloatArray, whole: SectorsInTime | None) -> FloatArray:
-    amplitude = float(np.exp(unknowns[-1]))
-    motion = amplitude * problem.relative(unknowns)
-    gaps = motion @ problem.balance.interface.gap_operator.T
-    return to_real(gaps) if whole is None else sector_gaps(whole, gaps)
+def _gaps(problem: SelfExcited, unknowns: FloatArray) -> ComplexArray:
+    motion = float(np.exp(unknowns[-1])) * problem.relative(unknowns)
+    return np.asarray(motion @ problem.balance.interface.gap_operator.T)
 
 
 def _with_fewer(problem: SelfExcited, cycle: LimitCycle) -> tuple[SelfExcited, FloatArray] | None:

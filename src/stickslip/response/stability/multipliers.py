@@ -14,7 +14,6 @@ from stickslip.contact.law import ContactLaw, PiecewiseLinear
 from stickslip.contact.laws.coupled_coulomb import CoupledCoulomb
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import input_error
-from stickslip.harmonic.fourier import to_real
 from stickslip.harmonic.linear import LinearSide, one_structure
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.stability.contact_states import ContactStates, contact_states
@@ -28,6 +27,7 @@ from stickslip.response.stability.sampled_tangents import (
     sampled_tangents,
 )
 from stickslip.response.time.floquet import UNIT_TOLERANCE, Floquet, floquet
+from stickslip.response.time.sectors import all_in_time
 
 SAMPLES = 256  # of a period, where laws are known by their tangents; and twice as many
 SAMPLES_PER_HARMONIC = 16
@@ -164,7 +164,7 @@ def stability(problem: ForcedProblem, point: ForcedPoint) -> Stability:
     Raises
     ------
     InputError
-        If the point did not converge, a contact is rigid, or what vibrates is one sector of a tuned wheel.
+        If the point did not converge, a contact is rigid, or what vibrates is one sector of a tuned wheel without all its waves.
     """
     if not point.converged:
         raise input_error(
@@ -182,9 +182,9 @@ def stability(problem: ForcedProblem, point: ForcedPoint) -> Stability:
 
 
 def _of_point(problem: ForcedProblem, point: ForcedPoint) -> Stability:
-    """Return the stability of the motion of a point as it was solved."""
-    gaps = to_real(point.coefficients @ problem.low.interface.gap_operator.T)
-    return motion_stability(problem.system.structure, problem.system.interface, gaps, point.omega)
+    """Return the stability of the motion of a point as it was solved; of a wheel that of all its sectors, each moving on its own."""
+    gaps = point.coefficients @ problem.low.interface.gap_operator.T
+    return motion_stability(*all_in_time(problem.system, gaps), point.omega)
 
 
 def _with_change(solved: Stability, better: Stability, times: float) -> Stability:

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray, FloatArray
-from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.fourier import to_real
-from stickslip.response.stability.multipliers import Stability, motion_stability, period_matrix
+from stickslip.arrays import ComplexArray
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
+from stickslip.response.stability.multipliers import period_matrix
 from stickslip.response.system import System
-from stickslip.response.time.sectors import SectorsInTime, all_sectors
+from stickslip.response.time.sectors import all_in_time
 
 FELT = 1e-12  # of the largest multiplier: smaller ones are of states that are forgotten within the period
 
@@ -42,51 +41,37 @@ class WaveDisturbance:
         return min(self.wave, sectors - self.wave)
 
 
-def whole_wheel(system: System) -> SectorsInTime:
-    """Return all sectors of a system with a tuned wheel, each of which may do something else."""
-    still = HarmonicLoad(np.zeros(system.structure.n))
-    return all_sectors(system, still, every=True)
+def point_disturbances(problem: ForcedProblem, point: ForcedPoint) -> list[WaveDisturbance]:
+    """Return the disturbances of a forced motion of a wheel as it was solved; see `wave_disturbances`."""
+    gaps = point.coefficients @ problem.low.interface.gap_operator.T
+    return wave_disturbances(problem.system, gaps, point.omega)
 
 
-def sector_gaps(whole: SectorsInTime, gaps: ComplexArray) -> FloatArray:
-    """Return the (2H+1, 3 n_contacts n_s) real coefficients of the gaps of all sectors from those of one, (H+1, 3 n_contacts) complex, m."""
-    return to_real(whole.travelling(gaps))
-
-
-def wheel_stability(whole: SectorsInTime, gaps: FloatArray, omega: float) -> Stability:
-    """Return the stability of a motion of all sectors against every wave; see `motion_stability`."""
-    return motion_stability(whole.structure, whole.contacts, gaps, omega)
-
-
-def wave_disturbances(
-    whole: SectorsInTime, gaps: FloatArray, omega: float
-) -> list[WaveDisturbance]:
+def wave_disturbances(system: System, gaps: ComplexArray, omega: float) -> list[WaveDisturbance]:
     """Return the disturbances of a motion of all sectors, that which grows most first; none where nothing is known.
 
     Parameters
     ----------
-    whole
-        All sectors (`whole_wheel`).
+    system
+        With a tuned wheel that has every wave.
     gaps
-        (2H+1, 3 n_contacts n_s) of the motion (`sector_gaps`).
+        (H+1, 3 n_contacts) complex coefficients of the gaps of one sector, m.
     omega
-        Its frequency, rad/s.
+        Frequency of the motion, rad/s.
     """
-    found = period_matrix(whole.structure, whole.contacts, gaps, omega)
+    structure, contacts, real = all_in_time(system, gaps)
+    found = period_matrix(structure, contacts, real, omega)
     if found is None:
         return []
+    sectors = contacts.n_contacts // system.interface.n_contacts
     modes, matrix = found
     values, vectors = np.linalg.eig(matrix)
     n = modes.n
-    moved = _by_wave(modes.basis @ vectors[:n], whole.count)
-    rate = _by_wave(
-        omega * (modes.basis @ (modes.speed[:, None] * vectors[n : 2 * n])), whole.count
-    )
+    moved = _by_wave(modes.basis @ vectors[:n], sectors)
+    rate = _by_wave(omega * (modes.basis @ (modes.speed[:, None] * vectors[n : 2 * n])), sectors)
     order = np.argsort(-np.abs(values), kind="stable")
     felt = order[np.abs(values[order]) > FELT * np.abs(values[order[0]])]
-    return [
-        _described(complex(values[i]), moved[:, :, i], rate[:, :, i], whole.count) for i in felt
-    ]
+    return [_described(complex(values[i]), moved[:, :, i], rate[:, :, i], sectors) for i in felt]
 
 
 def growing_wave(disturbances: Sequence[WaveDisturbance], modulus: float) -> WaveDisturbance | None:

@@ -17,6 +17,8 @@ from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.fourier import to_real
+from stickslip.harmonic.linear import one_structure
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.tuned import TunedWheel
@@ -144,6 +146,28 @@ def all_sectors(system: System, load: HarmonicLoad, *, every: bool = False) -> S
     names = tuple(f"sector{s}.{name}" for s in range(sectors) for name in interface.names)
     contacts = Interface(names, interface.laws * sectors, gaps, weights)
     return SectorsInTime(structure, contacts, HarmonicLoad(static, loads), motion, wheel)
+
+
+def whole_wheel(system: System) -> SectorsInTime:
+    """Return all sectors of a system with a tuned wheel that has every wave, each of which may do something else; nothing drives them."""
+    still = HarmonicLoad(np.zeros(system.structure.n))
+    return all_sectors(system, still, every=True)
+
+
+def all_in_time(system: System, gaps: ComplexArray) -> tuple[Structure, Interface, FloatArray]:
+    """Return what is marched in time and the real coefficients of its gaps, from those (H+1, 3 n_contacts) of a system.
+
+    Parameters
+    ----------
+    system
+        Of a wheel with every wave (`TunedWheel.has_every_wave`) all sectors are marched.
+    gaps
+        Complex, m.
+    """
+    if isinstance(system.structure, TunedWheel):
+        whole = whole_wheel(system)
+        return whole.structure, whole.contacts, to_real(whole.travelling(gaps))
+    return one_structure(system.structure, "stability"), system.interface, to_real(gaps)
 
 
 def different_sectors(wheel: TunedWheel) -> tuple[int, int]:

@@ -1,0 +1,143 @@
+"""Waves of a wheel that a fluid feeds and a friction ring bounds: limit cycles, stability against every wave, and who wins in time."""
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from flutter_wheel import MODE, MOVED, ONE_UNSTABLE, SECTORS, TWO_UNSTABLE, flutter_wheel
+
+import stickslip as ss
+from stickslip.errors import InputError
+from stickslip.reduction.aerodynamics import InfluenceCoefficients
+from stickslip.response.branch import branch_of
+from stickslip.response.parameter import Discretisation
+from stickslip.response.self_excited.curve import (
+    damping_over_amplitude,
+    of_point,
+    slip_amplitude,
+)
+from stickslip.response.self_excited.cycles import LimitCycle, limit_cycles
+from stickslip.response.self_excited.in_time import Marched, march_periods, wave_history
+from stickslip.response.self_excited.modes import stuck_modes
+from stickslip.response.self_excited.problem import SelfExcited, self_excited_motions
+from stickslip.response.self_excited.stable import cycle_stability
+from stickslip.response.stability import stability
+from stickslip.response.stability.waves import growing_wave, point_disturbances
+from stickslip.response.time.sectors import all_sectors, whole_wheel
+from stickslip.response.time.start import start_from_harmonics
+
+TIPS = MOVED + 4 * np.arange(SECTORS)
+
+
+@cache
+def cycles_of(two: bool) -> tuple[SelfExcited, list[LimitCycle]]:
+    """The limit cycles of wave 2, in a fluid that feeds it alone, or wave 1 too."""
+    system, load = flutter_wheel(2, 11, TWO_UNSTABLE if two else ONE_UNSTABLE)
+    mode = stuck_modes(system, MODE)[-1]
+    assert mode.unstable
+    problem = self_excited_motions(system, load, mode, MOVED, Discretisation(order=11, samples=256))
+    slips = slip_amplitude(problem)
+    found = branch_of(damping_over_amplitude(problem, (0.6 * slips, 15.0 * slips), 10))
+    return problem, limit_cycles(problem, [of_point(problem, f) for f in found])
+
+
+def marched(whole, motion: np.ndarray, omega: float, periods: int, kick: float) -> Marched:
+    """March all sectors from a motion, speeds disturbed in another share for each coordinate."""
+    start = start_from_harmonics(
+        whole.spread(motion), omega, whole.contacts.gap_operator, whole.contacts.laws
+    )
+    shares = 1.0 + kick * np.cos(2.4 * np.arange(whole.structure.n))
+    start = replace(start, velocity=start.velocity * shares)
+    return march_periods(whole.structure, whole.contacts, whole.load, omega, TIPS, start, periods, 256)  # fmt: skip
+
+
+def test_modes_of_all_waves_have_the_damping_that_the_fluid_gives_them() -> None:
+    ratios = [
+        stuck_modes(flutter_wheel(k, 1, ONE_UNSTABLE)[0], MODE)[-1].ratio for k in range(SECTORS)
+    ]
+    assert [k for k, ratio in enumerate(ratios) if ratio < 0] == [2]
+    still = [
+        stuck_modes(flutter_wheel(k, 1, TWO_UNSTABLE)[0], MODE)[-1].ratio for k in range(SECTORS)
+    ]
+    assert [k for k, ratio in enumerate(still) if ratio < 0] == [1, 2]
+
+
+def test_the_smaller_cycle_of_the_only_unstable_wave_is_that_of_all_sectors_in_time() -> None:
+    problem, cycles = cycles_of(False)
+    small, large = cycles
+    found = cycle_stability(problem, small)
+    assert found.stability.verdict == "stable"
+    assert abs(found.along - 1.0) < 1e-4
+    grown = cycle_stability(problem, large)
+    assert grown.stability.verdict == "unstable"
+    assert grown.wave is not None
+    assert grown.wave.wave == 2  # its own: friction cannot hold it any more
+    full = problem.balance.linear.recover(small.omega, small.coefficients)
+    after = marched(whole_wheel(problem.system), full, small.omega, 700, 1e-3)
+    assert after.amplitude == pytest.approx(np.full(SECTORS, small.amplitude), rel=1e-4)
+    assert after.frequency == pytest.approx(np.full(SECTORS, small.omega), rel=1e-4)
+    history = wave_history(after)
+    assert history.outcome == "one wave"
+    assert history.waves == (2,)
+
+
+def test_another_unstable_wave_is_named_and_leaves_the_cycle_in_time() -> None:
+    problem, cycles = cycles_of(True)
+    found = cycle_stability(problem, cycles[0])
+    assert found.stability.verdict == "unstable"
+    assert found.wave is not None
+    assert found.wave.wave == 1
+    assert found.wave.omega == pytest.approx(2 * math.pi * 620, rel=5e-3)
+    full = problem.balance.linear.recover(cycles[0].omega, cycles[0].coefficients)
+    periods = 320
+    after = marched(whole_wheel(problem.system), full, cycles[0].omega, periods, 1e-5)
+    history = wave_history(after)
+    # wave 1 grows by as much as its multiplier says, as long as it is small
+    gained = (history.amplitude[-1, 1] / history.amplitude[9, 1]) ** (1.0 / (periods - 10 * 16))
+    assert gained == pytest.approx(found.stability.multiplier, abs=4e-4)
+    assert history.amplitude[-1, 1] < 0.02 * history.amplitude[-1, 2]
+
+
+def forced(force: float, fluid: InfluenceCoefficients = ONE_UNSTABLE):
+    """A forced motion of wave 1, near its resonance."""
+    system, load = flutter_wheel(1, 9, fluid, force)
+    omega = 2 * math.pi * 619.5
+    sweep = ss.Sweep(omega_range=(omega, 1.0001 * omega), low=9, high=9, selection="always_low", frequencies=2, peak_points=0)  # fmt: skip
+    problem = ss.response.forced_problem(system, load, sweep)
+    point = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))[0]
+    assert point.converged
+    return problem, point, load
+
+
+def test_a_forced_motion_is_left_by_an_unstable_wave_unless_it_slips_enough() -> None:
+    """Where the forced wave 1 sticks, wave 2 grows out of it; where it slips, its friction damps wave 2 and keeps the tuned motion."""
+    for force, word in ((0.3, "unstable"), (2.0, "stable")):
+        problem, point, load = forced(force)
+        found = stability(problem, point)
+        assert found.verdict == word
+        whole = all_sectors(problem.system, load, every=True)
+        full = problem.low.linear.recover(point.omega, point.coefficients)
+        history = wave_history(marched(whole, full, point.omega, 480, 1e-3))
+        others = history.amplitude.copy()
+        others[:, 1] = 0.0
+        if word == "stable":
+            assert found.transitions > 0
+            assert history.waves == (1,)
+            assert others[-1].max() < 0.3 * others[0].max()
+        else:
+            decisive = growing_wave(point_disturbances(problem, point), found.multiplier)
+            assert decisive is not None
+            assert decisive.wave == 2
+            assert decisive.nodal_diameter(SECTORS) == 2
+            gained = (others[-1, 2] / others[10, 2]) ** (1.0 / (16 * (len(others) - 11)))
+            assert gained == pytest.approx(found.multiplier, abs=1e-3)
+
+
+def test_of_a_wheel_without_all_its_waves_nothing_is_said() -> None:
+    problem, point, _ = forced(0.3)
+    wheel = problem.system.structure
+    few = replace(wheel, waves={k: s for k, s in wheel.waves.items() if k % 2 == 0})
+    with pytest.raises(InputError, match="has no wave"):
+        stability(replace(problem, system=replace(problem.system, structure=replace(few, engine_order=2))), point)  # fmt: skip
