@@ -37,6 +37,7 @@ from stickslip.response.equilibrium import preload
 from stickslip.response.system import System
 
 MODES = 10  # natural frequencies compared
+UNKNOWN = Frequencies(*(np.zeros(0),) * 4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +76,9 @@ def assemble(
     wave_number: int | None = None,
     *,
     every_wave: bool = False,
+    checked: bool = True,
 ) -> Assembled:
-    """Return a model as solvers see it; see `Model.assembled`."""
+    """Return a model as solvers see it; see `Model.assembled`. Frequencies of the full model are left out if it is not to be `checked`."""
     what = asked(model, harmonics)
     labels = what.labels
     order = what.order if wave_number is None else wave_number
@@ -94,7 +96,8 @@ def assemble(
     held = system.with_retention(model.retention)
     gap, force = static_state(held, load.static)
     pressed = pressed_by(system.springs.laws, force)
-    checked = frequencies(model, linear, system.springs.stuck_stiffness(), order, store)
+    stiffness = system.springs.stuck_stiffness()
+    compared = frequencies(model, linear, stiffness, order, store) if checked else UNKNOWN
     if model.peak_output:
         labels.of((model.peak_output,), "output.peak")
     peak = labels.names.index(model.peak_output) if model.peak_output else 0
@@ -110,7 +113,7 @@ def assemble(
         excitation=excitation(model),
         static_gap=gap,
         static_force=force,
-        frequencies=checked,
+        frequencies=compared,
         skin=model.skin,
         sectors=model.sectors,
         engine_order=order,
@@ -120,7 +123,7 @@ def assemble(
             "reduced": linear.side.n,
             "retained": int(held.retained.size),
         },
-        warnings=(*model.warnings, *held_warnings(model, pressed), *checked.warnings()),
+        warnings=(*model.warnings, *held_warnings(model, pressed), *compared.warnings()),
         orders=what.orders,
     )
 

@@ -67,6 +67,9 @@ class Model:
         Stiffness that holds the mean position of free rigid bodies, N/m.
     mistuning
         How the sectors of a wheel differ; None: all are alike.
+    modes_like
+        Speed in rad/s to whose modes the modal coordinates of reductions are turned, so that reduced matrices change smoothly with the
+        speed; None: they are the modes at `speed`.
 
     Raises
     ------
@@ -88,6 +91,7 @@ class Model:
     interface_modes: int | None = None
     retention: float = 0.0
     mistuning: Mistuning | None = None
+    modes_like: float | None = None
 
     def __post_init__(self) -> None:
         if not self.parts:
@@ -197,7 +201,7 @@ class Model:
 
     def spin(self, speed: float) -> Spin:
         """Return how it turns at a speed in rad/s."""
-        return Spin(float(speed), self.tangent, self.coriolis, self.axis)
+        return Spin(float(speed), self.tangent, self.coriolis, self.axis, self.modes_like)
 
     def full(self, speed: float) -> Structure:
         """Return all parts side by side at a speed in rad/s, before joins and cyclic faces tie them."""

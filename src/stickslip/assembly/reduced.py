@@ -14,7 +14,7 @@ from stickslip.model.axis import Axis
 from stickslip.model.dofs import Dofs
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
-from stickslip.reduction.basis import surviving_sets, with_modal_dofs
+from stickslip.reduction.basis import surviving_sets, turned_modes, with_modal_dofs
 from stickslip.reduction.cache import content_hash
 
 Store = Callable[[str, Callable[[], Mapping[str, Any]]], Mapping[str, Any]]
@@ -33,12 +33,22 @@ class Spin:
         As in `RotatingSolid.at_speed`.
     axis
         That rigid bodies turn about; solids have their own.
+    like
+        Speed in rad/s whose modal coordinates those of reductions are to be near to, see `Model.modes_like`; None: any.
     """
 
     speed: float = 0.0
     tangent: Literal["consistent", "textbook"] = "consistent"
     coriolis: bool = False
     axis: Axis = Axis()  # noqa: RUF009  # frozen
+    like: float | None = None
+
+    @property
+    def reference(self) -> "Spin | None":
+        """How it turns where its modal coordinates are the modes; None: here."""
+        if self.like is None or self.like == self.speed:
+            return None
+        return replace(self, speed=self.like, like=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,6 +240,9 @@ def _reduce(name: str, part: Part, kept: IntArray, spin: Spin, rest: Steady) -> 
         small = part.reduction.of(full, kept)
         if part.damping is not None:
             small = part.damping.of_modes(small)
+        if spin.reference is not None and part.solid is not None:
+            known = part.reduction.of(at_speed(name, part, spin.reference, rest), kept)
+            small = turned_modes(small, known, full.mass, kept.size)
     except InputError as error:
         raise error.inside(f"part.{name}") from None
     except SingularError as error:

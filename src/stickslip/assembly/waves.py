@@ -1,7 +1,8 @@
 """The sector that a model is, reduced wave by wave; waves that were reduced before are taken from memory or store."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import scipy.sparse
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.model import Model
 from stickslip.assembly.reduced import (
+    Spin,
     Store,
     at_speed,
     damped,
@@ -24,6 +26,7 @@ from stickslip.assembly.wheel import (
     leaders,
     reduced_wave,
     wave_numbers,
+    wave_with_way_back,
     wheel_of,
 )
 from stickslip.errors import InputError, input_error
@@ -117,7 +120,8 @@ def sector_waves(
     """
     at, here = model.coordinates, model.neighbours
     assert here is not None
-    structure, steady = _sector_at_speed(model)
+    spin = model.spin(model.speed)
+    structure, steady = _sector_at_speed(model, spin)
     sector = here.sector(at.tied(structure), at)
     reduction, damping, whole = _reduction(model)
     needed = np.unique(np.concatenate([kept, whole]))
@@ -130,14 +134,29 @@ def sector_waves(
     wheel = (
         sector.structure, sector.low, sector.high, sector.sectors, sector.axis, sector.weights,
     )  # fmt: skip
-    content = content_hash("wave", *wheel, kept, damping, loads)
+    like = None if reduction is None else spin.reference
+    own = "" if like is None else content_hash(*wheel[1:], kept, like.speed, like.coriolis)
+    content = content_hash("wave", *wheel, kept, damping, loads, own)
     memo = next(iter(model.parts.values())).memo
     mirrored = goes_both_ways(sector, sector.structure)
+
+    def reference(
+        k: int, how: tuple[Reduction | None, Damping | DampingOfParts | None]
+    ) -> Structure:
+        assert like is not None
+        key = f"modes like {own} {how} {k}"
+        if key not in memo:
+            there = here.sector(at.tied(_sector_at_speed(model, like)[0]), at)
+            memo[key] = wave_with_way_back(there, kept, k, how)
+        found: Structure = memo[key]
+        return found
 
     def made(k: int, reduction: Reduction | None) -> tuple[Structure, Matrix]:
         key = f"{content} {reduction} {k}"
         if key not in memo:
-            memo[key] = _kept(sector, kept, k, (reduction, damping), loads, (key, store))
+            how = reduction, damping
+            known = None if like is None else partial(reference, k, how)
+            memo[key] = _kept(sector, kept, k, how, loads, (key, store), known)
             forget(memo, tuple, REMEMBERED)
         found: tuple[Structure, Matrix] = memo[key]
         return found
@@ -157,9 +176,9 @@ def sector_waves(
     return SectorWaves(sector, kept, waves)
 
 
-def _sector_at_speed(model: Model) -> tuple[Structure, FloatArray]:
-    """Return all parts side by side at the model's speed, damped, and the load of steady rotation on them."""
-    spin, rest = model.spin(model.speed), model.steady
+def _sector_at_speed(model: Model, spin: Spin) -> tuple[Structure, FloatArray]:
+    """Return all parts side by side at a speed, damped, and the load of steady rotation on them."""
+    rest = model.steady
     own: dict[str, Structure] = {}
     steady = []
     for name, part in model.parts.items():
@@ -233,10 +252,11 @@ def _kept(
     how: tuple[Reduction | None, Damping | DampingOfParts | None],
     steady: Matrix,
     where: tuple[str, Store],
+    known: Callable[[], Structure] | None = None,
 ) -> tuple[Structure, Matrix]:
     def make() -> tuple[Structure, Matrix]:
         try:
-            return reduced_wave(sector, kept, k, how, steady)
+            return reduced_wave(sector, kept, k, how, steady, None if known is None else known())
         except InputError as error:
             raise error.inside(f"wave {k}") from None
 

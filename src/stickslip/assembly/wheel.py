@@ -17,7 +17,7 @@ from stickslip.errors import InputError, input_error
 from stickslip.model.damping import Damping
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
-from stickslip.reduction.basis import in_coordinates
+from stickslip.reduction.basis import in_coordinates, turned_modes
 from stickslip.reduction.choice import Reduction
 from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
 from stickslip.reduction.nodal import nodal_coordinates
@@ -266,11 +266,27 @@ def reduced_wave(
     k: int,
     how: tuple[Reduction | None, Damping | DampingOfParts | None],
     steady: Matrix,
+    known: Structure | None = None,
 ) -> tuple[Structure, Matrix]:
     """Return a wave, its first coordinates the kept dofs, without its way back, and the load of steady rotation, or several, on it.
 
-    It is reduced, and damped by its modes, as the two of `how` say; None: not.
+    It is reduced, and damped by its modes, as the two of `how` say; None: not. Modal coordinates are turned to those of the same wave
+    in another state, where that is `known` with its way back.
     """
+    moving = wave_with_way_back(sector, kept, k, how)
+    if known is not None:
+        moving = turned_modes(moving, known, sector.structure.mass, kept.size)
+    load = moving.project(steady)
+    return replace(moving, basis=None), load.toarray() if scipy.sparse.issparse(load) else load
+
+
+def wave_with_way_back(
+    sector: CyclicSector,
+    kept: IntArray,
+    k: int,
+    how: tuple[Reduction | None, Damping | DampingOfParts | None],
+) -> Structure:
+    """Return a wave as `reduced_wave` does, with its way back to the sector."""
     reduction, damping = how
     place = np.searchsorted(sector.independent, kept)
     moving = travelling_wave(sector, k)
@@ -279,10 +295,7 @@ def reduced_wave(
     else:
         rest = np.setdiff1d(np.arange(moving.n), place)
         moving = _in_order(moving, np.concatenate([place, rest]))
-    if damping is not None:
-        moving = damping.of_modes(moving)
-    load = moving.project(steady)
-    return replace(moving, basis=None), load.toarray() if scipy.sparse.issparse(load) else load
+    return moving if damping is None else damping.of_modes(moving)
 
 
 def _in_order(structure: Structure, order: IntArray) -> Structure:

@@ -76,6 +76,14 @@ class CondensedStiffness:
         """Number of retained coordinates."""
         return int(self.retained.size)
 
+    @property
+    def most(self) -> None:
+        """Highest harmonic for which there are matrices: any."""
+
+    def load_at(self, _omega: float) -> HarmonicLoad:
+        """Return the load at a frequency, N: the same at all."""
+        return self.load
+
     def with_load(self, load: HarmonicLoad) -> "CondensedStiffness":
         """Return the same structure under another load."""
         return replace(self, load=load)

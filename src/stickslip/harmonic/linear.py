@@ -121,7 +121,7 @@ class DynamicStiffness(Protocol):
     """A structure and its load, condensed to the retained coordinates.
 
     `CondensedStiffness` is that of one structure; `TravellingStiffness` that of a tuned wheel, whose harmonics have wave
-    numbers of their own.
+    numbers of their own; `TurningStiffness` either of them along an engine-order line, at the speed of each frequency.
     """
 
     def __hash__(self) -> int:
@@ -146,6 +146,15 @@ class DynamicStiffness(Protocol):
     @property
     def load(self) -> HarmonicLoad:
         """Load on all dofs, N."""
+        ...
+
+    @property
+    def most(self) -> int | None:
+        """Highest harmonic for which there are matrices; None: any."""
+        ...
+
+    def load_at(self, omega: float) -> HarmonicLoad:
+        """Return the load at a frequency, N; the same at all unless it follows the speed."""
         ...
 
     def with_load(self, load: HarmonicLoad) -> Self:

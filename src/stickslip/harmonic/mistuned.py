@@ -70,6 +70,14 @@ class MistunedStiffness:
         s, own = self.wheel.structure, np.ix_(self.retained, self.retained)
         return s.stiffness[own], s.damping[own], s.mass[own]
 
+    @property
+    def most(self) -> None:
+        """Highest harmonic for which there are matrices: any."""
+
+    def load_at(self, _omega: float) -> HarmonicLoad:
+        """Return the load at a frequency, N: the same at all."""
+        return self.load
+
     def with_load(self, load: HarmonicLoad) -> "MistunedStiffness":
         """Return the same wheel under another load."""
         return replace(self, load=load)

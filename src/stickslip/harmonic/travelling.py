@@ -138,6 +138,15 @@ class TravellingStiffness:
         k, c, m = (checked_matrix(one, name)[own] for name in ("stiffness", "damping", "mass"))
         return np.abs(k), np.abs(c), np.abs(m)
 
+    @property
+    def most(self) -> int:
+        """Highest harmonic for which there is a wave."""
+        return len(self.waves.structures) - 1
+
+    def load_at(self, _omega: float) -> HarmonicLoad:
+        """Return the load at a frequency, N: the same at all."""
+        return self.load
+
     def with_load(self, load: HarmonicLoad) -> "TravellingStiffness":
         """Return the same waves under another load."""
         return replace(self, load=load)

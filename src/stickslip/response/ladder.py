@@ -78,14 +78,14 @@ def plain_sweep(
 
 
 def _ways(system: System, balance: AnyBalance, omega: float) -> Iterator[Homotopy]:
-    yield from homotopies(balance, omega, _at_rest(system, balance)[0].real)
+    yield from homotopies(balance, omega, _at_rest(system, balance, omega)[0].real)
 
 
-def _at_rest(system: System, balance: AnyBalance) -> ComplexArray:
+def _at_rest(system: System, balance: AnyBalance, omega: float) -> ComplexArray:
     """Return the (1, n_retained) static equilibrium, m; zero at coordinates that are retained beside those of the system."""
     rest = np.zeros((1, balance.linear.n), dtype=complex)
     own = np.searchsorted(balance.linear.retained, system.retained)
-    rest[0, own] = preload(system, balance.linear.load.static)
+    rest[0, own] = preload(system.at(omega), balance.linear.load_at(omega).static)
     return rest
 
 
@@ -99,7 +99,7 @@ def _starts(
     """Yield scaled unknowns to start Newton from."""
     yield from near
     guess = balance.coefficients(bonded_start(balance, omega, system))
-    guess[:1] = _at_rest(system, balance)
+    guess[:1] = _at_rest(system, balance, omega)
     yield balance.unknowns(guess)
     driven = max(balance.linear.load.harmonics, default=balance.order)
     few = balance.with_harmonics(tuple(h for h in balance.harmonics if h <= max(driven, 1)))

@@ -12,8 +12,10 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import DynamicStiffness, LinearSide, one_structure
 from stickslip.harmonic.rigid_contacts import STIFF
 from stickslip.harmonic.travelling import condense_side
+from stickslip.harmonic.turning import condense_line
 from stickslip.model.modes import with_springs
 from stickslip.model.structure import Structure
+from stickslip.reduction.speed_line import SpeedLine
 
 NO_DOFS: IntArray = np.zeros(0, dtype=np.int64)
 
@@ -77,11 +79,23 @@ class System:
         labels = self.structure.dofs.labels
         return tuple(labels[i] for i in self.retained)
 
+    def at(self, omega: float) -> "System":
+        """Return the system as it is at a frequency in rad/s; another one only along an engine-order line, at the speed of the frequency."""
+        side = self.structure
+        return (
+            replace(self, structure=side.at(side.speed(omega)))
+            if isinstance(side, SpeedLine)
+            else self
+        )
+
     def condensed(
         self, load: HarmonicLoad, order: int, more: IntArray = NO_DOFS
     ) -> DynamicStiffness:
         """Return what vibrates and a load on it, condensed to the retained dofs and `more`, for harmonics up to `order`."""
-        return condense_side(self.structure, np.union1d(self.retained, more), load, order)
+        side, retained = self.structure, np.union1d(self.retained, more)
+        if isinstance(side, SpeedLine):
+            return condense_line(side, retained, load, order)
+        return condense_side(side, retained, load, order)
 
     @property
     def plain_structure(self) -> Structure:

@@ -29,7 +29,6 @@ from stickslip.harmonic.selection.alert import jacobian_alert
 from stickslip.harmonic.selection.strategy import Step, Verdict
 from stickslip.harmonic.structured import StructuredJacobian
 from stickslip.harmonic.support import harmonics_of, is_full, rows_of
-from stickslip.harmonic.travelling import TravellingStiffness
 
 SAMPLES_A_HARMONIC = 8
 DOUBT = 2.0  # times the chord step that the true change may go beyond the prediction
@@ -175,8 +174,8 @@ def _error(step: Step, balance: HarmonicBalance, change: FloatArray) -> float:
 def doubled(reference: HarmonicBalance) -> HarmonicBalance:
     """Return the same problem with all harmonics up to twice the highest, or as many as there are waves of a tuned wheel."""
     order = 2 * reference.order
-    if isinstance(reference.linear, TravellingStiffness):
-        order = min(order, len(reference.linear.waves.structures) - 1)
+    most = reference.linear.most
+    order = order if most is None else min(order, most)
     samples = max(reference.samples, SAMPLES_A_HARMONIC * order)
     return replace(reference, samples=samples).with_harmonics(harmonics_of(order))
 

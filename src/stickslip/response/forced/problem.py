@@ -21,6 +21,7 @@ from stickslip.harmonic.selection.strategy import (
     always_kept,
 )
 from stickslip.harmonic.support import ByDof, Harmonics, is_full, kept_by_dof, supports_of
+from stickslip.reduction.speed_line import SpeedLine
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.branch import following_vibration
 from stickslip.response.forced.sweep import Sweep
@@ -266,7 +267,11 @@ class ForcedProblem:
 def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedProblem:
     """Set up the forced response of `system` under `load`; a tuned wheel made for fewer harmonics than ``auto`` may take lowers its cap."""
     _refuse_ill_posed(system)
-    if sweep.auto and isinstance(system.structure, TunedWheel):
+    if (
+        sweep.auto
+        and isinstance(system.structure, TunedWheel | SpeedLine)
+        and system.structure.harmonics
+    ):
         sweep = replace(sweep, cap=max(min(sweep.cap, system.structure.harmonics), 1))
     first, reference = sweep.first_harmonics, sweep.high_harmonics
     for h, force in load.harmonics.items():

@@ -65,7 +65,8 @@ def forced_response(
     elif sweep.single:
         passage = single_passage(problem, before)
     else:
-        static = cache(lambda: preload(system, load.static))
+        first = sweep.ends[0]
+        static = cache(lambda: preload(system.at(first), problem.low.linear.load_at(first).static))
         passage = double_passage(problem, before, static)
     for point in passage:
         solved.append(point)

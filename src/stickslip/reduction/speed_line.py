@@ -1,0 +1,179 @@
+"""What vibrates along an engine-order line: its matrices and static load are those of the speed that belongs to each frequency.
+
+Matrices of a few speeds on the same coordinates, and polynomials in the square of the speed through them, times the speed for Coriolis
+forces. Those of solids are such polynomials themselves, of second degree, their load of third; what modes of a reduction add converges
+as fast as they change.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.errors import input_error
+from stickslip.model.dofs import Dofs
+from stickslip.model.structure import Structure
+from stickslip.reduction.tuned import TunedWheel
+
+AtRest = Structure | TunedWheel
+REMEMBERED = 8  # speeds whose matrices are kept
+
+
+def speed_nodes(lowest: float, highest: float, intervals: int) -> FloatArray:
+    """Return speeds whose squares are Chebyshev points, both ends among them, in growing order; those of half as many intervals are every second one."""
+    angles = np.pi * np.arange(intervals + 1) / intervals
+    middle, half = (highest**2 + lowest**2) / 2, (highest**2 - lowest**2) / 2
+    nodes = np.sqrt(middle - half * np.cos(angles))
+    nodes[[0, -1]] = lowest, highest
+    return np.asarray(nodes)
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedLine:
+    """What vibrates at ``ω = m Ω``, as one linear side whose matrices follow the frequency.
+
+    Parameters
+    ----------
+    engine_order
+        m, from 1.
+    speeds
+        (k,) as `speed_nodes` gives them, rad/s.
+    sides
+        What vibrates at each of them, on the same coordinates: one structure each, or a tuned wheel each.
+    loads
+        Harmonic -> (k, n) load at each of them, N; 0: the static one.
+
+    Raises
+    ------
+    InputError
+        If numbers of speeds or coordinates differ, or a wheel has aerodynamic forces.
+    """
+
+    engine_order: int
+    speeds: FloatArray
+    sides: tuple[AtRest, ...]
+    loads: dict[int, ComplexArray]
+    known: dict[float, AtRest] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        sizes = {side.n for side in self.sides}
+        fits = len(self.sides) == len(self.speeds) and len(sizes) == 1
+        if not fits or any(len(load) != len(self.speeds) for load in self.loads.values()):
+            raise input_error(
+                "SpeedLine",
+                f"has {len(self.speeds)} speeds, {len(self.sides)} sides of {sorted(sizes)} coordinates",
+                "Give a side and a load a speed, all on the same coordinates.",
+            )
+        if any(side.feedback for side in self.sides if isinstance(side, TunedWheel)):
+            raise input_error(
+                "run_up",
+                "the model has aerodynamic forces, which are not followed over speed",
+                "Leave [aero] out, or compute forced responses at single speeds.",
+            )
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave what can be computed again behind."""
+        return self.__dict__ | {"known": {}}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        """Take what was kept."""
+        self.__dict__.update(state)
+
+    @property
+    def top(self) -> AtRest:
+        """What vibrates at the highest speed, which stands for all where matrices are asked for without a frequency."""
+        return self.sides[-1]
+
+    @property
+    def n(self) -> int:
+        """Number of coordinates."""
+        return self.top.n
+
+    @property
+    def dofs(self) -> Dofs:
+        """Table of the coordinates."""
+        return self.top.dofs
+
+    @property
+    def multipliers(self) -> IntArray:
+        """Coordinates that are forces of constraints."""
+        return self.top.multipliers
+
+    @property
+    def harmonics(self) -> int | None:
+        """Highest harmonic for which there are matrices; None: any."""
+        return self.top.harmonics if isinstance(self.top, TunedWheel) else None
+
+    def of_harmonic(self, harmonic: int) -> Structure:
+        """Return the structure of a harmonic at the highest speed."""
+        return self.top.of_harmonic(harmonic)
+
+    def feedback_of(self, _harmonic: int) -> None:
+        """Return the aerodynamic force on a harmonic: none."""
+
+    def grounded(self, springs: Matrix) -> "SpeedLine":
+        """Return the same with springs, a sparse matrix (n, n) in N/m, from its coordinates to the ground."""
+        sides = tuple(side.grounded(springs) for side in self.sides)
+        return replace(self, sides=sides, known={})
+
+    def speed(self, omega: float) -> float:
+        """Return the speed at which the engine order has a frequency, both in rad/s."""
+        return omega / self.engine_order
+
+    def at(self, speed: float) -> AtRest:
+        """Return what vibrates at a speed in rad/s."""
+        found = self.known.get(speed)
+        if found is None:
+            while len(self.known) >= REMEMBERED:
+                del self.known[next(iter(self.known))]
+            found = self.known[speed] = self._between(self.weights(speed), speed / self.speeds)
+        return found
+
+    def load(self, harmonic: int, speed: float) -> ComplexArray:
+        """Return the (n,) load of a harmonic at a speed in rad/s, N."""
+        return np.asarray(self.weights(speed) @ self.loads[harmonic])
+
+    def weights(self, speed: float) -> FloatArray:
+        """Return the (k,) values at a speed of the polynomials that are one at one of the speeds and zero at the others."""
+        distance = speed**2 - self.speeds**2
+        if np.any(distance == 0.0):
+            return np.asarray(distance == 0.0, dtype=float)
+        sign = np.where(np.arange(len(distance)) % 2, -1.0, 1.0)
+        sign[[0, -1]] /= 2
+        share = sign / distance
+        return np.asarray(share / share.sum())
+
+    def _between(self, weights: FloatArray, ratio: FloatArray) -> AtRest:
+        top = self.top
+        if isinstance(top, Structure):
+            return _mixed([s for s in self.sides if isinstance(s, Structure)], weights, ratio)
+        wheels = [side for side in self.sides if isinstance(side, TunedWheel)]
+        waves = {k: _mixed([w.waves[k] for w in wheels], weights, ratio) for k in top.waves}
+        return replace(top, waves=waves)
+
+
+def _mixed(structures: list[Structure], weights: FloatArray, ratio: FloatArray) -> Structure:
+    """Return the weighted sum of matrices; the skew part of the damping is proportional to the speed, whose `ratio` to each is given."""
+    picked = np.flatnonzero(weights == 1.0)
+    if picked.size:
+        return structures[int(picked[0])]
+    first = structures[-1]
+    loss = None if first.loss is None else _summed([s.loss for s in structures], weights)
+    damping = [s.damping for s in structures]
+    skew = [(d - d.conj().T) / 2 for d in damping]
+    even = [d - g for d, g in zip(damping, skew, strict=True)]
+    return Structure(
+        _summed([s.mass for s in structures], weights),
+        _summed(even, weights) + _summed(skew, weights * ratio),
+        _summed([s.stiffness for s in structures], weights),
+        first.dofs,
+        first.sets,
+        None,
+        loss,
+    )
+
+
+def _summed(matrices: list[Matrix], weights: FloatArray) -> Matrix:
+    total = sum(w * m for w, m in zip(weights, matrices, strict=True))
+    return scipy.sparse.csr_array(total) if scipy.sparse.issparse(total) else np.asarray(total)
