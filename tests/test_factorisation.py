@@ -68,6 +68,27 @@ def test_solutions_of_every_backend(backend, shift, draw):
 
 
 @pytest.mark.parametrize("kind", [float, complex])
+def test_positive_matrices_front_by_front(kind, monkeypatch):
+    """Large ones go there without the optional package; an indefinite one comes back to SuperLU."""
+    draw = {float: laplacian, complex: hermitian}[kind]
+    matrix = draw((23, 22), 0.3)
+    found = factorise(matrix, backend="multifrontal")
+    assert found.negative == 0
+    check(found, matrix)
+    with pytest.raises(SingularError, match="not positive definite"):
+        factorise(draw((23, 22), -0.3), backend="multifrontal")
+    monkeypatch.setattr(factorisation, "LARGE", 100)
+    monkeypatch.setattr(factorisation, "HUGE", 500)
+    monkeypatch.setattr(factorisation, "find_spec", lambda name: None)
+    assert factorise(matrix).backend == "multifrontal"
+    assert factorise(draw((21, 22), 0.3)).backend == "superlu"
+    below = draw((23, 22), -0.3)
+    below.setdiag(below.diagonal() + 0.0)
+    assert np.all(below.diagonal().real > 0)
+    check(factorise(below), below)
+
+
+@pytest.mark.parametrize("kind", [float, complex])
 def test_general_matrices_go_to_superlu(kind, monkeypatch):
     monkeypatch.setattr(factorisation, "LARGE", 100)
     skew = scipy.sparse.csr_array(np.eye(506, k=3) - np.eye(506, k=-3))

@@ -11,12 +11,17 @@ import scipy.linalg
 from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.errors import input_error
 from stickslip.model.fe.factorisation import DENSE, factorise
-from stickslip.model.modes import connected_parts, lowest_modes, normal_modes
+from stickslip.model.modes import (
+    Factors,
+    connected_parts,
+    lowest_modes,
+    normal_modes,
+    usual_shift,
+)
 from stickslip.model.structure import Structure
 from stickslip.units import HZ
 
 SPARE = 10  # modes beyond twice as many as are asked for
-SHIFT = 1e-8  # share of the mean of K/M: the factorised matrix is regular where a body is free
 RIGID = 1e-12  # of the largest square of a basis: a negative one nearer to zero is that of a rigid motion
 STILL = 1e-9  # of the fastest rate: a smaller frequency is that of a motion that creeps, whatever its rounding
 KNOWN = 1e-8  # share of an answer that lies outside the modes, below which it is rounding
@@ -43,7 +48,12 @@ class GyroscopicModes:
 
 
 def gyroscopic_modes(
-    structure: Structure, n_modes: int, *, n_basis: int | None = None
+    structure: Structure,
+    n_modes: int,
+    *,
+    n_basis: int | None = None,
+    shift: float | None = None,
+    factors: Factors | None = None,
 ) -> GyroscopicModes:
     """Return the lowest modes of a structure whose damping matrix holds Coriolis terms.
 
@@ -57,6 +67,8 @@ def gyroscopic_modes(
     n_basis
         Modes at rest that span the basis, twice `n_modes` and ten more if not given. Modes alone converge slowly, so that the static
         answers to their Coriolis forces are added. Structures of a few hundred dofs are solved whole.
+    shift, factors
+        As in `normal_modes`.
 
     Raises
     ------
@@ -76,7 +88,7 @@ def gyroscopic_modes(
         modes = normal_modes(structure, movable)
         squares, shapes = modes.squares, modes.shapes
     else:
-        squares, shapes = _enriched(structure, G, n_basis)
+        squares, shapes = _enriched(structure, G, n_basis, shift, factors)
     rates, amplitudes = _eigenpairs(squares, shapes.conj().T @ (G @ shapes))
     first = np.lexsort((-rates.real, _without_rounding(rates)))[:n_modes]
     return GyroscopicModes(rates.imag[first] / HZ, shapes @ amplitudes[:, first], rates.real[first])
@@ -109,13 +121,19 @@ def _without_rounding(rates: ComplexArray) -> FloatArray:
     return np.where(np.abs(omega) <= STILL * np.max(np.abs(rates), initial=0.0), 0.0, omega)
 
 
-def _enriched(structure: Structure, coriolis: Matrix, n_basis: int) -> tuple[FloatArray, Matrix]:
+def _enriched(
+    structure: Structure,
+    coriolis: Matrix,
+    n_basis: int,
+    shift: float | None,
+    factors: Factors | None,
+) -> tuple[FloatArray, Matrix]:
     """Return squares and shapes of the structure on its lowest modes and the static answers to their Coriolis forces."""
     K, M = structure.stiffness, structure.mass
-    shift = SHIFT * abs(K.diagonal()).sum() / abs(M.diagonal()).sum()
-    solve = factorise(K + shift * M)
+    start = usual_shift(structure) if shift is None else shift
+    solve = (factors or factorise)(K - start * M)
     if len(connected_parts(K, M)) == 1:  # one factorisation for both
-        modes = lowest_modes(K, M, n_basis, solve, -shift)[1]
+        modes = lowest_modes(K, M, n_basis, solve, start)[1]
     else:
         modes = normal_modes(structure, n_basis).shapes
     answers = solve(np.asarray(coriolis @ modes))

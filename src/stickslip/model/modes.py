@@ -37,6 +37,9 @@ INDEFINITE = (
 SHIFT = 1e-8  # below zero, as a fraction of the mean K_ii / M_ii: regular where a body is free
 
 
+Factors = Callable[[Matrix], Factorisation]
+
+
 @dataclass(frozen=True, eq=False)
 class Modes:
     """Undamped modes, lowest first.
@@ -64,7 +67,12 @@ class Modes:
 
 
 def normal_modes(
-    structure: Structure, n: int, *, shift: float | None = None, say: Say = silent
+    structure: Structure,
+    n: int,
+    *,
+    shift: float | None = None,
+    say: Say = silent,
+    factors: Factors | None = None,
 ) -> Modes:
     """Return the `n` lowest undamped modes.
 
@@ -81,6 +89,8 @@ def normal_modes(
         it (diverging motions) are looked for with a lower one.
     say
         Called with a sentence before each long step.
+    factors
+        Factorises ``K − shift M`` of the whole structure, as `WaveFamily` does with what waves share; None: `factorise`.
 
     Raises
     ------
@@ -108,7 +118,8 @@ def normal_modes(
         start, solve = -SHIFT * mean if shift is None else shift, None
         factorised = partial(_factorised, dofs=structure.dofs.take(part), say=say)
         if not _small(K, count):
-            solve = factorised(K - start * M)
+            known = factors if len(part) == structure.n else None
+            solve = factorised(K - start * M) if known is None else known(K - start * M)
         say(f"{count} modes of {len(part)} dofs")
         values, vectors = lowest_modes(K, M, count, solve, start)
         if solve is not None:
@@ -287,6 +298,11 @@ def _check_count(place: str, structure: Structure, n: int) -> None:
             f"{n} asked of a structure with {structure.n} dofs, of which {heavy} have mass",
             "Ask for at most as many as have mass.",
         )
+
+
+def usual_shift(structure: Structure) -> float:
+    """Return the shift that `normal_modes` takes by default, in rad²/s²."""
+    return -SHIFT * _mean_square(structure)
 
 
 def _mean_square(structure: Structure) -> float:

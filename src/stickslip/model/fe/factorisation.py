@@ -11,14 +11,16 @@ import scipy.sparse.linalg
 
 from stickslip.arrays import Matrix
 from stickslip.errors import SingularError, input_error, missing_package
+from stickslip.model.fe.multifrontal import multifrontal
 
 DENSE = 400  # below this many rows dense algebra is faster than sparse
 LARGE = 3000  # below this many rows SuperLU is as fast as the optional package
+HUGE = 20_000  # below this many rows SuperLU is as fast as the multifrontal method
 SINGULAR = 1e13  # a condition number above which nothing of a solution is known
 SYMMETRIC = 1e-10  # a matrix counts as Hermitian where it differs by less, over its largest entry
 PIVOTS = 0.01  # SuperLU leaves the diagonal for a pivot more than a hundred times as large
 COUNTED = 50_000_000  # entries of factors that are copied to see the signs of the pivots: 0.6 GB
-BACKENDS = ("auto", "dense", "superlu", "feral")
+BACKENDS = ("auto", "dense", "multifrontal", "superlu", "feral")
 
 Solve = Callable[[Matrix], Matrix]
 Say = Callable[[str], None]
@@ -33,7 +35,7 @@ class Factorisation:
     solve
         Takes (n,) or (n, k), real or complex, and returns the same shape.
     backend
-        What factorised it: ``dense``, ``superlu`` or ``feral``.
+        What factorised it: ``dense``, ``multifrontal``, ``superlu`` or ``feral``.
     count
         Returns the number of negative eigenvalues; None where the factors do not tell.
     """
@@ -64,17 +66,17 @@ def factorise(matrix: Matrix, *, backend: str = "auto", say: Say = silent) -> Fa
     matrix
         (n, n), dense or sparse, real or complex: symmetric, Hermitian or general.
     backend
-        ``dense``; ``superlu`` (SciPy's); ``feral`` (optional, for real symmetric and complex
-        Hermitian matrices); ``auto`` takes the fastest of those that are installed and apply.
+        ``dense``; ``multifrontal`` (real symmetric and complex Hermitian, positive definite); ``superlu`` (SciPy's); ``feral``
+        (optional, for real symmetric and complex Hermitian matrices); ``auto`` takes the fastest of those that are installed and apply.
     say
         Called with a sentence before a long factorisation.
 
     Raises
     ------
     SingularError
-        If a pivot vanishes, or if the condition number exceeds `SINGULAR`.
+        If a pivot vanishes (``multifrontal``: is not positive), or if the condition number exceeds `SINGULAR`.
     InputError
-        If `backend` is unknown, or is ``feral`` and the matrix is neither symmetric nor Hermitian.
+        If `backend` is unknown, or is ``feral`` or ``multifrontal`` and the matrix is neither symmetric nor Hermitian.
     StickslipError
         If `backend` is ``feral`` and the package is not installed.
     """
@@ -83,8 +85,14 @@ def factorise(matrix: Matrix, *, backend: str = "auto", say: Say = silent) -> Fa
         found = _dense(matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix))
     else:
         say(f"factorising {matrix.shape[0]} equations ({chosen})")
-        found = (_feral if chosen == "feral" else _superlu)(scipy.sparse.csc_array(matrix))
-    _refuse_singular(matrix, found)
+        try:
+            found = SPARSE[chosen](scipy.sparse.csc_array(matrix))
+        except SingularError:
+            if chosen != "multifrontal" or backend != "auto":
+                raise
+            say("the matrix is not positive definite: factorising again (superlu)")
+            found = _superlu(scipy.sparse.csc_array(matrix))
+    refuse_singular(matrix, found)
     return found
 
 
@@ -94,19 +102,22 @@ def _chosen(matrix: Matrix, backend: str) -> str:
         raise input_error(
             "factorise: backend", f"got {backend!r}", f"Use one of {', '.join(BACKENDS)}."
         )
-    if backend == "feral" and not _hermitian(matrix):
+    if backend in ("feral", "multifrontal") and not _hermitian(matrix):
         raise input_error(
             "factorise: backend",
-            "feral factorises real symmetric and complex Hermitian matrices, which this is not",
+            f"{backend} factorises real symmetric and complex Hermitian matrices, which this is not",
             "Use superlu.",
         )
     if backend != "auto":
         return backend
     if matrix.shape[0] <= DENSE or not scipy.sparse.issparse(matrix):
         return "dense"
-    if matrix.shape[0] > LARGE and _has_feral() and _hermitian(matrix):
+    if matrix.shape[0] <= LARGE or not _hermitian(matrix):
+        return "superlu"
+    if _has_feral():
         return "feral"
-    return "superlu"
+    positive = matrix.shape[0] > HUGE and np.all(matrix.diagonal().real > 0)
+    return "multifrontal" if positive else "superlu"
 
 
 def _has_feral() -> bool:
@@ -147,6 +158,8 @@ def negative_eigenvalues(matrix: Matrix, *, say: Say = silent) -> int | None:
         None where a pivot vanishes, or the factors are too large to be looked through.
     """
     chosen = _chosen(matrix, "auto")
+    if chosen == "multifrontal":
+        chosen = "superlu"
     if chosen == "dense":
         whole = matrix.toarray() if scipy.sparse.issparse(matrix) else np.asarray(matrix)
         whole = (whole + whole.conj().T) / 2  # a diagonal real to the last digit
@@ -188,6 +201,11 @@ def _superlu(matrix: Matrix, threshold: float = PIVOTS) -> Factorisation:
     return Factorisation(
         lambda b: np.asarray(lu.solve(np.asarray(b, dtype=complex))), "superlu", count
     )
+
+
+def _multifrontal(matrix: Matrix) -> Factorisation:
+    """Factorise a Hermitian positive definite matrix."""
+    return Factorisation(multifrontal(matrix.tocsr()).solve, "multifrontal", lambda: 0)
 
 
 def _feral(matrix: Matrix) -> Factorisation:
@@ -245,7 +263,7 @@ def _of_complex(solve: Solve) -> Solve:
     return both
 
 
-def _refuse_singular(matrix: Matrix, solve: Solve) -> None:
+def refuse_singular(matrix: Matrix, solve: Solve) -> None:
     """Raise where two steps of inverse iteration find a condition number above `SINGULAR`.
 
     Rows are scaled by their sums, so that units do not count.
@@ -262,3 +280,6 @@ def _refuse_singular(matrix: Matrix, solve: Solve) -> None:
                 f"factorise: the matrix of {len(size)} equations is singular to working precision "
                 f"(condition number above {growth:.1g})"
             )
+
+
+SPARSE = {"multifrontal": _multifrontal, "superlu": _superlu, "feral": _feral}

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -9,8 +10,8 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.model.gyroscopic import gyroscopic_modes
 from stickslip.model.modes import normal_modes
-from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector, travelling_wave
+from stickslip.reduction.wave_family import WaveFamily
 from stickslip.units import HZ
 
 
@@ -105,12 +106,13 @@ def nodal_diameter_map(
             f"A wheel of {sector.sectors} sectors has no others.",
         )
     backward, forward, kept = [], [], []
+    family = WaveFamily(partial(travelling_wave, sector), sector.sectors, tuple(diameters.tolist()))
     for diameter in diameters.tolist():
-        hertz, vectors = _wave_modes(travelling_wave(sector, diameter), n_modes, coriolis)
+        hertz, vectors = _wave_modes(family, diameter, n_modes, coriolis)
         backward.append(hertz)
         kept.append(vectors)
         if coriolis and 0 < 2 * diameter < sector.sectors:
-            hertz, _ = _wave_modes(travelling_wave(sector, -diameter), n_modes, True)
+            hertz, _ = _wave_modes(family, -diameter, n_modes, True)
         forward.append(hertz)
     return NodalDiameterMap(
         sector.sectors,
@@ -122,10 +124,12 @@ def nodal_diameter_map(
 
 
 def _wave_modes(
-    structure: Structure, n_modes: int, coriolis: bool
+    family: WaveFamily, wave_number: int, n_modes: int, coriolis: bool
 ) -> tuple[FloatArray, FloatArray | ComplexArray]:
+    structure = family.at(wave_number)
+    shift, factors = family.shifted(wave_number, structure)
     if coriolis:
-        turning = gyroscopic_modes(structure, n_modes)
+        turning = gyroscopic_modes(structure, n_modes, shift=shift, factors=factors)
         return turning.frequencies_hz, turning.shapes
-    modes = normal_modes(structure, n_modes)
+    modes = normal_modes(structure, n_modes, shift=shift, factors=factors)
     return modes.frequencies_hz, modes.shapes

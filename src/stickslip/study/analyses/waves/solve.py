@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property, partial
 from time import perf_counter
 from typing import TypeVar
 
@@ -14,6 +15,7 @@ from stickslip.model.gyroscopic import gyroscopic_modes
 from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
 from stickslip.reduction.speed_basis import speed_basis
+from stickslip.reduction.wave_family import WaveFamily
 from stickslip.response.rotating.campbell import campbell
 from stickslip.study.analyses.analysis import Notes
 from stickslip.study.analyses.waves.about import ABOUT, about, skin_note
@@ -64,6 +66,11 @@ class Question:
         """Return the structure at a speed in rad/s as a wave."""
         return self.model.at(speed, wave_number, self.contacts)
 
+    @cached_property
+    def family(self) -> WaveFamily:
+        """The waves at the first speed, which share what is alike in them."""
+        return WaveFamily(partial(self.at, self.speeds[0]), self.wheel.sectors, self.numbers)
+
 
 def each_wave(
     solve: Callable[[Question, int], W], asked: Question, done: Sequence[W], notes: Notes
@@ -99,11 +106,12 @@ def solve_wave(asked: Question, wave_number: int) -> WaveModes:
     """
     began = perf_counter()
     structure = asked.at(asked.speeds[0], wave_number)
+    shift, factors = asked.family.shifted(wave_number, structure)
     if asked.wheel.parted:
-        turning = gyroscopic_modes(structure, asked.n_modes)
+        turning = gyroscopic_modes(structure, asked.n_modes, shift=shift, factors=factors)
         hertz, vectors = turning.frequencies_hz, turning.shapes
     else:
-        modes = normal_modes(structure, asked.n_modes)
+        modes = normal_modes(structure, asked.n_modes, shift=shift, factors=factors)
         hertz, vectors = modes.frequencies_hz, np.asarray(modes.shapes, dtype=complex)
     moved = np.zeros((asked.n_modes, 0, 3), dtype=complex)
     if asked.shapes:
