@@ -17,8 +17,9 @@ PARTS_OF_THE_PAGE = {
     "parts": ("part",),
     "contacts": ("contact", "join"),
     "loads": ("load", "rotation"),
+    "aero": ("aero",),
     "output": ("output", "measured"),
-    "analyses": ("forced_response", "modes", "campbell", "safe"),
+    "analyses": ("forced_response", "modes", "campbell", "flutter", "safe"),
     "settings": ("harmonics", "solver", "retention", "limits"),
 }
 RESULTS = Path(__file__).parent.parent / "evidence" / "validation" / "out" / "results.json"

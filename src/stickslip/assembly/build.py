@@ -11,7 +11,8 @@ import scipy.sparse
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.asked import asked, centrifugal_of_bodies, excitation, static_forces
 from stickslip.assembly.assembled import Assembled, ContactTable, Frequencies
-from stickslip.assembly.coordinates import Coordinates, coordinates
+from stickslip.assembly.coordinates import coordinates
+from stickslip.assembly.flow import about_static_state, fluid_of
 from stickslip.assembly.forces import force_of
 from stickslip.assembly.held import held_warnings
 from stickslip.assembly.joined import KEY, on_shapes
@@ -92,8 +93,8 @@ def assemble(
         alert_dofs=linear.of_dofs(what.watched, "alert_over"),
         free=free_coordinates(model, linear),
     )
-    load = loads_on(model, linear, what.forces)
     held = system.with_retention(model.retention)
+    load = about_static_state(held, loads_on(model, linear, what.forces), fluid_of(linear.side))
     gap, force = static_state(held, load.static)
     pressed = pressed_by(system.springs.laws, force)
     stiffness = system.springs.stuck_stiffness()
@@ -221,19 +222,12 @@ def _of_one(model: Model, dofs: tuple[IntArray, IntArray, IntArray], store: Stor
         return found.of(few.place[at.of_dofs(dofs, model.places.dofs, place)], place)
 
     def load(force: Matrix, _harmonic: int) -> Matrix:
-        return found.load(few.load(_on_kept(at, force)))
+        return found.load(few.load(at.load_of_dofs(force)))
 
     def of_wave(_number: int) -> tuple[Structure, Matrix, Any]:
         return structure, gaps, lambda dofs: of_dofs(dofs, "part")
 
     return Linear(structure, gaps, found.load(few.load(steady)), of_dofs, load, of_wave)
-
-
-def _on_kept(at: Coordinates, force: Matrix) -> Matrix:
-    untied = np.zeros(at.ids.size, dtype=force.dtype)
-    known = at.ids >= 0
-    untied[known] = force[at.ids[known]]
-    return at.load(untied)
 
 
 def free_coordinates(model: Model, linear: Linear) -> IntArray | None:
@@ -280,6 +274,7 @@ def static_state(system: System, static_load: FloatArray) -> tuple[FloatArray, F
 
 def pressed_points(model: Model) -> BoolArray:
     """Return the contact points that the static loads at the model's own speed press, and those that cannot open."""
+    model = model.without_aerodynamics()
     static = {name: load for name, load in model.loads.items() if load.harmonic == 0}
     forces = {name: force_of(model.places, name, load) for name, load in static.items()}
     refuse_pulled(model, static_forces(model, forces))

@@ -60,6 +60,13 @@ class Coordinates:
         """Return a load (n0,) on the untied coordinates as one on those that stay."""
         return untied if self.tie is None else np.asarray(self.tie.T @ untied)
 
+    def load_of_dofs(self, force: Matrix) -> Matrix:
+        """Return a force (N,) on the dofs of all parts as one on the coordinates that stay; of what they do not hold nothing is left."""
+        untied = np.zeros(self.ids.size, dtype=force.dtype)
+        known = self.ids >= 0
+        untied[known] = force[self.ids[known]]
+        return self.load(untied)
+
     def of_dofs(self, dofs: IntArray, table: Dofs, place: str) -> IntArray:
         """Return the coordinates that dofs of the parts are.
 

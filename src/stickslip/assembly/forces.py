@@ -18,14 +18,18 @@ ALONG = 1e-6  # share of a direction below which it has no such component
 
 
 def force_of(places: Places, name: str, load: Load) -> Matrix:
-    """Return the (N,) force of a load, complex where it has a phase.
+    """Return the (N,) force of a load, complex where it has a phase; see `force_at`."""
+    return force_at(places, f"load.{name}", load)
+
+
+def force_at(places: Places, key: str, load: Load) -> Matrix:
+    """Return the (N,) force of a load that a study gives at `key`.
 
     Raises
     ------
     InputError
         If the place is not there or cannot move, or the direction is missing.
     """
-    key = f"load.{name}"
     spot = places.spot(load.on, f"{key}.on")
     amplitude = load.newton * (cmath.exp(1j * load.phase) if load.phase else 1.0)
     force = np.zeros(places.n, dtype=type(amplitude))
@@ -273,3 +277,13 @@ def _axis_of_excitation(loads: Mapping[str, Load]) -> str | None:
     if largest.direction is None:
         return largest.on.rpartition(".")[2]
     return AXES[int(np.argmax(np.abs(largest.direction)))]
+
+
+def beyond_sectors(loads: Mapping[str, Load], sectors: int) -> list[str]:
+    """Say of engine orders not below the number of sectors that the sectors cannot tell them from lower ones."""
+    return [
+        f"load.{name}.engine_order is {load.engine_order}, and {sectors} sectors see it as {load.engine_order % sectors}: a force "
+        "that changes so much within a sector is taken as the same all over its place."
+        for name, load in loads.items()
+        if sectors > 1 and load.engine_order is not None and load.engine_order >= sectors
+    ]

@@ -20,6 +20,7 @@ from stickslip.assembly.build import (
 )
 from stickslip.assembly.contact import Contact
 from stickslip.assembly.deviations import deviations
+from stickslip.assembly.flow import about_static_state
 from stickslip.assembly.held import held_warnings
 from stickslip.assembly.mistuning import ContactMistuning
 from stickslip.assembly.model import Model
@@ -39,7 +40,7 @@ from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.mistuned import MistunedWheel, mistuned_wheel
-from stickslip.reduction.sectors import couplings, repeated, travelling
+from stickslip.reduction.sectors import circulant, couplings, repeated, travelling
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.reduction.waves import excited_wave, wave
 from stickslip.response.system import System
@@ -76,8 +77,8 @@ def assemble_mistuned(model: Model, harmonics: int, store: Store) -> Assembled:
         alert_dofs=wheel.of_dofs(what.watched, "alert_over"),
         free=wheel.of_dofs(bodies, "part") if bodies.size else None,
     )
-    load = loads_on(alike, linear, what.forces)
     held = system.with_retention(model.retention)
+    load = about_static_state(held, loads_on(alike, linear, what.forces), wheel.fluid)
     gap, force = static_state(held, load.static)
     pressed = pressed_by(system.springs.laws, force)
     names = of_all(what.labels.names, n)
@@ -148,12 +149,15 @@ class AllSectors:
         The wheel.
     gaps
         (3 p n_s, n) CSR, sector by sector.
+    fluid
+        (n, n) stiffness that the frozen aerodynamic force takes from the wheel; None for none.
     """
 
     model: Model
     sector: ReducedSector
     side: MistunedWheel | Structure
     gaps: Matrix
+    fluid: Matrix | None = None
 
     @property
     def size(self) -> int:
@@ -203,15 +207,19 @@ def all_sectors(model: Model, what: Asked, store: Store) -> AllSectors:
         np.hstack([np.zeros((model.sectors, 0)), *factors]),
         _dofs(waves.sector, structures[0].dofs),
     )
+    forces = sector.wheel.feedback
+    fluid = None
+    if forces:
+        fluid = circulant(couplings([forces[k].stiffness() for k in range(model.sectors)]))
     if all(few):
-        return AllSectors(model, sector, wheel, gaps)
+        return AllSectors(model, sector, wheel, gaps, fluid)
     structure = wheel.structure
     for first, count, change in zip(np.cumsum([0, *counts]), counts, changes, strict=False):
         if change.change is not None:
             blocks = couplings([shares[first : first + count] for shares in seen])
             for kind, added in change.change(blocks).items():
                 structure = replace(structure, **{kind: getattr(structure, kind) + added})
-    return AllSectors(model, sector, structure, gaps)
+    return AllSectors(model, sector, structure, gaps, fluid)
 
 
 def _in_sectors(model: Model, waves: SectorWaves, what: Asked) -> tuple[ReducedSector, Matrix]:
@@ -226,7 +234,7 @@ def _in_sectors(model: Model, waves: SectorWaves, what: Asked) -> tuple[ReducedS
     )
     found = wheel_of(waves.sector, waves.kept, waves.waves, (0, 0), pairs, (shown, held))
     if not found.wheel.multipliers.size:
-        return found, repeated([found.gaps], n)
+        return waves.with_forces(found), repeated([found.gaps], n)
     # contacts know a dof as this sector's and as a neighbour's: sectors of a whole wheel need no copies
     own = {k: structure for k, (structure, _) in waves.waves.items()}
     size = own[0].n
@@ -236,7 +244,7 @@ def _in_sectors(model: Model, waves: SectorWaves, what: Asked) -> tuple[ReducedS
     sector = ReducedSector(
         waves.sector, waves.kept, dict.fromkeys(own, same), waves.waves, plain, found.gaps, steady
     )
-    return sector, _shifted_gaps(waves, pairs, size)
+    return waves.with_forces(sector), _shifted_gaps(waves, pairs, size)
 
 
 def _shifted_gaps(waves: SectorWaves, pairs: Pairs, size: int) -> Matrix:

@@ -6,19 +6,20 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-import scipy.sparse
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
+from stickslip.assembly.aerodynamics import Aerodynamics
 from stickslip.assembly.assembled import Assembled, Skin
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.coordinates import Coordinates, coordinates
 from stickslip.assembly.facing import refuse_joined
-from stickslip.assembly.forces import engine_order, far_outputs
+from stickslip.assembly.forces import beyond_sectors, engine_order, far_outputs
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.mistuning import Mistuning
 from stickslip.assembly.pairs import Pairs, pair_contacts
 from stickslip.assembly.places import Places, picked
-from stickslip.assembly.reduced import Spin, Steady, Store, at_speed, in_memory
+from stickslip.assembly.reduced import Spin, Steady, Store, at_speed, damped, in_memory
+from stickslip.assembly.shared_rotation import joined_displacements
 from stickslip.assembly.skin import on_skin, skin_of
 from stickslip.assembly.statics import StaticState, static_state
 from stickslip.assembly.ties import Ties, tie_joins
@@ -28,7 +29,6 @@ from stickslip.errors import input_error
 from stickslip.harmonic.rigid_contacts import STIFF
 from stickslip.model.axis import Axis
 from stickslip.model.facts import Facts, facts_of_parts, unlike_units
-from stickslip.model.fe.factorisation import factorise
 from stickslip.model.modes import with_springs
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure, join
@@ -70,6 +70,8 @@ class Model:
     modes_like
         Speed in rad/s to whose modes the modal coordinates of reductions are turned, so that reduced matrices change smoothly with the
         speed; None: they are the modes at `speed`.
+    aerodynamics
+        Of a sector of a wheel: what blades feel of their neighbours' motion through the fluid; None for nothing. `at` leaves it out.
 
     Raises
     ------
@@ -92,10 +94,17 @@ class Model:
     retention: float = 0.0
     mistuning: Mistuning | None = None
     modes_like: float | None = None
+    aerodynamics: Aerodynamics | None = None
 
     def __post_init__(self) -> None:
         if not self.parts:
             raise input_error("part", "there is none", "Give a model at least one part.")
+        if self.aerodynamics is not None and self.sectors == 1:
+            raise input_error(
+                "aero",
+                "is given, and the model is no sector of a wheel",
+                "Give a part its number of sectors, or leave the table out.",
+            )
 
     def __repr__(self) -> str:
         """Return what it is in a line."""
@@ -180,6 +189,10 @@ class Model:
 
         return pressed_points(self)
 
+    def without_aerodynamics(self) -> "Model":
+        """Return the model in still fluid, itself where it has no coefficients."""
+        return self if self.aerodynamics is None else replace(self, aerodynamics=None)
+
     @property
     def facts(self) -> Facts:
         """Mass, size and counts; of one sector."""
@@ -192,7 +205,7 @@ class Model:
         of_wheel = () if self.neighbours is None else self.neighbours.warnings
         of_units = unlike_units(self.parts)
         of_outputs = far_outputs(self.places, self.outputs)
-        orders = _beyond_sectors(self.loads, self.sectors)
+        orders = beyond_sectors(self.loads, self.sectors)
         return tuple(
             dict.fromkeys(
                 [*of_parts, *of_units, *of_outputs, *of_wheel, *orders, *self.pairs.warnings]
@@ -203,46 +216,36 @@ class Model:
         """Return how it turns at a speed in rad/s."""
         return Spin(float(speed), self.tangent, self.coriolis, self.axis, self.modes_like)
 
-    def full(self, speed: float) -> Structure:
-        """Return all parts side by side at a speed in rad/s, before joins and cyclic faces tie them."""
+    def full(self, speed: float, *, with_damping: bool = False) -> Structure:
+        """Return all parts side by side at a speed in rad/s, before joins and cyclic faces tie them; `with_damping` as in `at`."""
         spin, rest = self.spin(speed), self.steady
-        return join(
-            **{name: at_speed(name, part, spin, rest[name]) for name, part in self.parts.items()}
-        )
+        own = {name: at_speed(name, part, spin, rest[name]) for name, part in self.parts.items()}
+        if with_damping:
+            own = {name: damped(name, self.parts[name], part) for name, part in own.items()}
+        return join(**own)
 
     @cached_property
     def steady(self) -> dict[str, Steady]:
         """What the displacements of steady rotation obey: cyclic faces, and joins, by which parts share in it."""
         if self.joins and self._has_mesh:
-            return self._joined_displacements()
+            loose = self._loose(np.zeros(len(self.pairs.names), dtype=bool))
+            return joined_displacements(self.places, self.coordinates, self.neighbours, loose)
         ties = {} if self.neighbours is None else self.neighbours.ties
         return {name: Steady(ties.get(name)) for name in self.parts}
-
-    def _joined_displacements(self) -> dict[str, Steady]:
-        """Solve the linear statics of all joined parts at rest under the centrifugal load at 1 rad/s."""
-        at, parts = self.coordinates, self.parts
-        rest = at.tied(join(**{name: part.structure for name, part in parts.items()}))
-        tie = picked(np.arange(at.ids.size), at.ids.size) if at.tie is None else at.tie
-        if self.neighbours is not None:
-            tie = tie @ self.neighbours.sector(rest, at).wave_tie(0)
-        loose = self._loose(np.zeros(len(self.pairs.names), dtype=bool))
-        moves = np.setdiff1d(np.arange(tie.shape[1]), tie[loose].nonzero()[1])
-        tie = scipy.sparse.csr_array(tie[:, moves])
-        stiffness = scipy.sparse.block_diag([part.structure.stiffness for part in parts.values()])
-        load = [
-            np.zeros(p.structure.n) if p.solid is None else p.solid.centrifugal
-            for p in parts.values()
-        ]
-        solve = factorise(scipy.sparse.csr_array(tie.T @ stiffness @ tie))
-        moved = tie @ solve(tie.T @ np.concatenate(load))
-        return {name: Steady(unit=np.asarray(moved[self.places.own(name)])) for name in parts}
 
     @cached_property
     def coordinates(self) -> Coordinates:
         """Coordinates of `full` that the joins leave."""
         return coordinates(np.arange(self.places.n), self.ties)
 
-    def at(self, speed: float, wave_number: int = 0, contacts: ContactsAs = "static") -> Structure:
+    def at(
+        self,
+        speed: float,
+        wave_number: int = 0,
+        contacts: ContactsAs = "static",
+        *,
+        with_damping: bool = False,
+    ) -> Structure:
         """Return the full structure for small vibrations at a speed, as the travelling wave of a wave number where it is a sector.
 
         Parameters
@@ -254,6 +257,8 @@ class Model:
         contacts
             What contacts do: ``open``: nothing; ``stuck``: all are springs; ``static``: those are that the static state at the
             model's own speed presses. Rigid bodies that nothing holds then are left out.
+        with_damping
+            Whether the parts are damped as far as this follows from their matrices; ratios of modes are left out.
 
         Returns
         -------
@@ -261,7 +266,7 @@ class Model:
             Sparse where a part is; `basis` leads to the dofs of all parts, in the order of `places`.
         """
         at = self.coordinates
-        structure, tie = at.tied(self.full(speed)), at.tie
+        structure, tie = at.tied(self.full(speed, with_damping=with_damping)), at.tie
         operators = [at.columns(self.pairs.own), at.columns(self.pairs.following)]
         phase: complex | float = 1.0
         if self.neighbours is not None:
@@ -385,13 +390,3 @@ class Model:
         if self.mistuning is not None:
             return assemble_mistuned(model, harmonics, keep)
         return assemble(model, harmonics, keep, wave_number, every_wave=every_wave)
-
-
-def _beyond_sectors(loads: Mapping[str, Load], sectors: int) -> list[str]:
-    """Say of engine orders not below the number of sectors that the sectors cannot tell them from lower ones."""
-    return [
-        f"load.{name}.engine_order is {load.engine_order}, and {sectors} sectors see it as {load.engine_order % sectors}: a force "
-        "that changes so much within a sector is taken as the same all over its place."
-        for name, load in loads.items()
-        if sectors > 1 and load.engine_order is not None and load.engine_order >= sectors
-    ]

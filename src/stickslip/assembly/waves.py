@@ -1,7 +1,7 @@
 """The sector that a model is, reduced wave by wave; waves that were reduced before are taken from memory or store."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -9,6 +9,8 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.assembly.coordinates import Coordinates
+from stickslip.assembly.flow import Flow, flow_around
 from stickslip.assembly.model import Model
 from stickslip.assembly.reduced import (
     Spin,
@@ -33,6 +35,7 @@ from stickslip.errors import InputError, input_error
 from stickslip.model.damping import Damping
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure, join
+from stickslip.reduction.aerodynamics import Feedback
 from stickslip.reduction.cache import content_hash
 from stickslip.reduction.choice import Reduction
 from stickslip.reduction.cyclic import CyclicSector
@@ -50,7 +53,7 @@ def reduced_sector(
     store: Store,
     more: Sequence[int] = (),
 ) -> ReducedSector:
-    """Reduce the waves that an engine order excites.
+    """Reduce the waves that an engine order excites, and put the aerodynamic force on them.
 
     Parameters
     ----------
@@ -74,7 +77,8 @@ def reduced_sector(
     shown, bodies = (
         at.of_dofs(np.unique(dofs), model.places.dofs, "output.points") for dofs in stay
     )
-    return wheel_of(found.sector, found.kept, found.waves, order, pairs, (shown, bodies))
+    wheel = wheel_of(found.sector, found.kept, found.waves, order, pairs, (shown, bodies))
+    return found.with_forces(wheel)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,11 +93,21 @@ class SectorWaves:
         (k,) its dofs that the first coordinates of the waves are.
     waves
         Wave number -> structure without its way back, and what `reduced_wave` projected on it.
+    forces
+        Wave number -> aerodynamic force on it, which the structures do not hold; empty: none.
     """
 
     sector: CyclicSector
     kept: IntArray
     waves: Mapping[int, tuple[Structure, Matrix]]
+    forces: Mapping[int, Feedback] = field(default_factory=dict)
+
+    def with_forces(self, found: ReducedSector) -> ReducedSector:
+        """Return the waves in other coordinates with the aerodynamic forces on them."""
+        if not self.forces:
+            return found
+        forces = {k: own.in_coordinates(found.ways[k]) for k, own in self.forces.items()}
+        return replace(found, wheel=found.wheel.with_aerodynamics(forces))
 
 
 def sector_waves(
@@ -118,7 +132,7 @@ def sector_waves(
     rows
         (r, N) CSR operator on the dofs of all parts: the loads of its rows stand beside that of steady rotation, one a column.
     """
-    at, here = model.coordinates, model.neighbours
+    at, here, flow = model.coordinates, model.neighbours, flow_around(model, store)
     assert here is not None
     spin = model.spin(model.speed)
     structure, steady = _sector_at_speed(model, spin)
@@ -152,11 +166,12 @@ def sector_waves(
         return found
 
     def made(k: int, reduction: Reduction | None) -> tuple[Structure, Matrix]:
-        key = f"{content} {reduction} {k}"
+        columns, more = _columns(at, loads, flow, k)
+        key = f"{content} {reduction} {k}{more}"
         if key not in memo:
             how = reduction, damping
             known = None if like is None else partial(reference, k, how)
-            memo[key] = _kept(sector, kept, k, how, loads, (key, store), known)
+            memo[key] = _kept(sector, kept, k, how, columns, (key, store), known)
             forget(memo, tuple, REMEMBERED)
         found: tuple[Structure, Matrix] = memo[key]
         return found
@@ -173,7 +188,38 @@ def sector_waves(
         # all waves have the coordinates of the one that needs most
         alike = replace(reduction, n_modes=most - kept.size)
         waves = {k: wave(k, alike) for k in numbers}
-    return SectorWaves(sector, kept, waves)
+    return SectorWaves(sector, kept, *_parted(waves, flow, alone=loads.ndim == 1))
+
+
+def _columns(at: Coordinates, loads: Matrix, flow: Flow | None, k: int) -> tuple[Matrix, str]:
+    """Return loads with the patterns of the aerodynamic force on a wave behind them, and what tells these apart."""
+    if flow is None:
+        return loads, ""
+    patterns = at.load(flow.patterns(k))
+    if loads.ndim == 1:
+        columns = np.column_stack([loads, patterns])
+    else:
+        columns = scipy.sparse.hstack([loads, scipy.sparse.csr_array(patterns)], format="csr")
+    return columns, content_hash(patterns)
+
+
+def _parted(
+    waves: Mapping[int, tuple[Structure, Matrix]], flow: Flow | None, *, alone: bool
+) -> tuple[Mapping[int, tuple[Structure, Matrix]], dict[int, Feedback]]:
+    """Return waves with their loads, of one load `alone` a row, and the aerodynamic forces that stood behind these."""
+    if flow is None:
+        return waves, {}
+    last = flow.influence.patterns
+    forces = {k: flow.on(k, _dense(columns[:, -last:])) for k, (_, columns) in waves.items()}
+    rest = {
+        k: (own, columns[:, 0] if alone else columns[:, :-last])
+        for k, (own, columns) in waves.items()
+    }
+    return rest, forces
+
+
+def _dense(matrix: Matrix) -> Matrix:
+    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
 
 
 def _sector_at_speed(model: Model, spin: Spin) -> tuple[Structure, FloatArray]:
@@ -199,7 +245,7 @@ def _reduction(model: Model) -> tuple[Reduction | None, Damping | DampingOfParts
     bodies = {name: part for name, part in model.parts.items() if part.body is None}
     ways = {name: part.reduction for name, part in bodies.items() if part.reduction is not None}
     empty = np.zeros(0, dtype=np.int64)
-    damping = _of_modes(bodies, reduced=bool(ways))
+    damping = damping_by_modes(bodies, reduced=bool(ways))
     if not ways:
         return None, damping, empty
     high = empty if model.neighbours is None else model.neighbours.high
@@ -228,7 +274,9 @@ def _one_of(ways: Mapping[str, Any]) -> Reduction:
     return Reduction(total, one.method)
 
 
-def _of_modes(parts: Mapping[str, Part], *, reduced: bool) -> Damping | DampingOfParts | None:
+def damping_by_modes(
+    parts: Mapping[str, Part], *, reduced: bool
+) -> Damping | DampingOfParts | None:
     """Return the damping by modes of the waves of a sector; None for none."""
     found = [
         part.damping if part.damping and part.damping.is_modal else None for part in parts.values()

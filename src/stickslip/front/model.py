@@ -78,6 +78,10 @@ class Model(Assembly):
         """Follow frequencies over speed; keys such as ``speeds_rpm=(0, 9000), engine_orders=[4, 20]``."""
         return self._answer("campbell", keys, folder)
 
+    def flutter(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+        """Find the aerodynamic damping of every wave; keys such as ``number=2, contacts="open"``. The model needs `aerodynamics`."""
+        return self._answer("flutter", keys, folder)
+
     def safe(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
         """Say which modes engine orders can excite; keys such as ``engine_orders=range(1, 13), margin_percent=5.0``."""
         return self._answer("safe", keys, folder)

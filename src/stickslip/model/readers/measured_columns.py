@@ -32,12 +32,19 @@ class MeasuredColumns:
         Number of each row's line in the file.
     rows
         Cells of each row.
+    word
+        What a row is called in messages.
     """
 
     path: Path
     names: tuple[str, ...]
     lines: tuple[int, ...]
     rows: tuple[tuple[str, ...], ...]
+    word: str = "line"
+
+    def place(self, row: int, name: str = "") -> str:
+        """Return the place of a row, or of a cell of it, for messages."""
+        return f"{self.path}: {self.word} {self.lines[row]}" + (f": {name}" if name else "")
 
     def numbers(self, name: str, *, gaps: bool = False) -> FloatArray:
         """Return a column as finite numbers; with `gaps` an empty cell is NaN.
@@ -90,9 +97,7 @@ class MeasuredColumns:
     def wrong(self, row: int, name: str, problem: str, remedy: str) -> InputError:
         """Return the complaint about the cell of a row in the column `name`."""
         got = self.rows[row][self.names.index(name)][:SHOWN]
-        return input_error(
-            f"{self.path}: line {self.lines[row]}: {name}", f"{problem}, got {got!r}", remedy
-        )
+        return input_error(self.place(row, name), f"{problem}, got {got!r}", remedy)
 
     def _number(self, line: int, name: str, text: str, *, gaps: bool) -> float:
         if gaps and not text:
@@ -105,7 +110,7 @@ class MeasuredColumns:
             return value
         remedy = "Leave the cell empty where nothing was measured." if gaps else "Mend the line."
         raise input_error(
-            f"{self.path}: line {line}: {name}", f"is no finite number, got {text[:SHOWN]!r}", remedy
+            f"{self.path}: {self.word} {line}: {name}", f"is no finite number, got {text[:SHOWN]!r}", remedy
         )  # fmt: skip
 
 

@@ -58,6 +58,20 @@ def frequencies(view: Waves) -> str:
     return "<h3>Natural frequencies</h3>" + html_table(head, rows)
 
 
+def in_flow(view: Waves) -> str | None:
+    """Return frequencies and damping ratios with aerodynamic forces, a row a wave."""
+    if not view.has("damped_hz", "damping"):
+        return None
+    hz, damping = view.floats("damped_hz"), 100 * view.floats("damping")
+    head = ["wave", *(f"mode {m + 1}" for m in range(hz.shape[1]))]
+    rows = [
+        [escape(f"{name}, {kind}"), *(f"{number(f, 7)} Hz, {number(d, 4)} %" for f, d in zip(*own, strict=True))]
+        for name, kind, own in zip(view.waves, view.kinds, zip(hz, damping, strict=True), strict=True)
+    ]  # fmt: skip
+    text = "<p>Eigenvalues with aerodynamic forces and the structure's damping: frequency and damping ratio.</p>"
+    return "<h3>In the flow</h3>" + text + html_table(head, rows)
+
+
 def comparison(view: Waves) -> str | None:
     """Return the relative differences from the reference, a row a wave."""
     if not view.has("difference"):
@@ -101,5 +115,5 @@ def _cards(view: Waves) -> list[Card]:
 
 
 _TITLE = "Natural frequencies and mode shapes"
-_BLOCK = Block("modes", _TITLE, (diameter_map, mode_shapes, frequencies, comparison))
+_BLOCK = Block("modes", _TITLE, (diameter_map, mode_shapes, frequencies, in_flow, comparison))
 SECTION: Section = Section("modes", NEEDED, Waves, (_BLOCK,), by_case=True, cards=_cards)

@@ -4,5 +4,6 @@ ANALYSES = {
     "forced_response": "stickslip.study.analyses.forced_response:FORCED_RESPONSE",
     "modes": "stickslip.study.analyses.modes:MODES",
     "campbell": "stickslip.study.analyses.campbell:CAMPBELL",
+    "flutter": "stickslip.study.analyses.flutter:FLUTTER",
     "safe": "stickslip.study.analyses.safe:SAFE",
 }

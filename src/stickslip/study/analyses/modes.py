@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
+from stickslip.response.rotating.flutter import damping_ratio
 from stickslip.study.analyses.analysis import Case, Solved
 from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.analyses.waves.analysis import WaveAnalysis
@@ -22,7 +23,7 @@ from stickslip.study.analyses.waves.tables import Diameter, WaveTable
 from stickslip.study.analyses.waves.texts import modes_tables
 from stickslip.study.file.section import FilePath, custom_error, once
 from stickslip.study.keep.netcdf import variable
-from stickslip.units import RPM
+from stickslip.units import HZ, RPM
 
 
 class ModesTable(WaveTable):
@@ -74,7 +75,19 @@ def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
         "frequency_hz": variable("wave mode", hertz, "Hz", "natural frequency"),
         "growth": growth(waves),
     }
-    return found | _compared(solved, hertz) | _shapes(waves), []
+    return found | _in_flow(waves) | _compared(solved, hertz) | _shapes(waves), []
+
+
+def _in_flow(waves: Sequence[WaveModes]) -> Variables:
+    """Return damping and frequency of the eigenvalues with aerodynamic forces; nothing where there are none."""
+    values = np.array([w.in_flow for w in waves])
+    if not values.size:
+        return {}
+    about = "of the eigenvalue with aerodynamic forces and the structure's damping"
+    return {
+        "damping": variable("wave mode", damping_ratio(values), "1", f"damping ratio {about}"),
+        "damped_hz": variable("wave mode", values.imag / HZ, "Hz", f"frequency {about}"),
+    }
 
 
 def _compared(solved: Solved, hertz: FloatArray) -> Variables:
@@ -114,7 +127,8 @@ class Modes(WaveAnalysis):
     def inputs(self, case: Case, model: Model) -> Question:
         """Return what is solved."""
         asked: ModesTable = self.asked(case)
-        wheel = Wheel(model.sectors, model.coriolis and model.rotates and model.speed > 0)
+        turning = model.coriolis and model.rotates and model.speed > 0
+        wheel = Wheel(model.sectors, turning or model.aerodynamics is not None)
         wheel.require(asked.nodal_diameters, "modes.nodal_diameters")
         _refuse_too_many(model, asked.number)
         numbers = wheel.numbers(asked.nodal_diameters)

@@ -13,7 +13,7 @@ Speed = Annotated[float, Field(ge=0, le=1e7)]  # rpm
 HIGHEST_ORDER = 1000
 
 
-def _direction(given: Any) -> Any:
+def unit_direction(given: Any) -> Any:
     """Return the unit vector of a direction: an axis, with a sign or without, or a vector."""
     if given is None:
         return None
@@ -47,7 +47,7 @@ class LoadTable(Section):
     ratio: Annotated[float, Field(gt=0, le=1e9)] | None = Field(
         None, description="the force of ratio_of over that of this load, greater than zero"
     )
-    direction: Annotated[Triple | None, BeforeValidator(_direction)] = Field(
+    direction: Annotated[Triple | None, BeforeValidator(unit_direction)] = Field(
         None, description='"x", "y", "z", "-x" ... or a vector [x, y, z]; left out for single dofs'
     )
     harmonic: int = Field(

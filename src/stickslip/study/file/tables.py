@@ -9,6 +9,7 @@ from pydantic import Field, create_model
 from stickslip.contact.compiled import Evaluator
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.analysis import named
+from stickslip.study.file.aero import AeroTable
 from stickslip.study.file.contacts import ContactTable, JoinTable
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.file.loads import Limits, LoadTable, Output, Retention, Rotation
@@ -19,7 +20,18 @@ from stickslip.study.file.section import Name, Section
 
 VERSION = 2
 OF_THE_MODEL = frozenset(
-    {"part", "material", "damping", "reduction", "contact", "join", "load", "rotation", "retention"}
+    {
+        "part",
+        "material",
+        "damping",
+        "reduction",
+        "contact",
+        "join",
+        "load",
+        "rotation",
+        "retention",
+        "aero",
+    }
 )
 
 
@@ -60,6 +72,9 @@ class Tables(Section):
     )
     load: dict[Name, LoadTable] = Field(default_factory=dict, description="the tables [load.NAME]")
     rotation: Rotation = Field(default_factory=Rotation, description="the table [rotation]")
+    aero: AeroTable | None = Field(
+        None, description="the table [aero], of aerodynamic influence coefficients"
+    )
     output: Output = (
         Field(  # validated even if left out: its folder may be a link that leads elsewhere
             {},

@@ -25,6 +25,7 @@ from stickslip.study.file.parts import (
 )
 from stickslip.study.file.section import Section
 from stickslip.study.file.tables import Tables
+from stickslip.study.models.aero import aero_refusals
 from stickslip.study.models.areas import without_areas
 from stickslip.study.models.cost import too_large
 from stickslip.study.models.files import MESHES
@@ -56,6 +57,7 @@ def refusals(tables: Tables, home: Path) -> Iterator[InputError]:
         yield from _loads(tables)
         yield from _outputs(tables)
         yield from _questions(tables)
+        yield from aero_refusals(tables, home, sectors_of(tables))
 
 
 def sectors_of(tables: Tables) -> int | None:

@@ -5,12 +5,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from stickslip.assembly.aerodynamics import Aerodynamics
 from stickslip.assembly.contact import GROUND, NEXT, Contact, Join
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.model import Model
 from stickslip.model.part import Part
 from stickslip.study.file.loads import LoadTable
 from stickslip.study.file.tables import Tables
+from stickslip.study.models.aero import aerodynamics_of
 from stickslip.study.models.files import alike
 from stickslip.study.models.parts import Memo, Workshop
 from stickslip.units import DEG, RPM
@@ -59,7 +61,17 @@ def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
         centrifugal=rotation.centrifugal,
         interface_modes=None if tables.reduction is None else tables.reduction.interface_modes,
         retention=tables.retention.stiffness_n_per_m,
+        aerodynamics=_aerodynamics(tables, parts, home),
     )
+
+
+def _aerodynamics(tables: Tables, parts: Mapping[str, Part], home: Path) -> Aerodynamics | None:
+    if tables.aero is None:
+        return None
+    points = {name: _own_name(parts, point.on) for name, point in tables.aero.points.items()}
+    clamped = None if tables.aero.clamped is None else _own_name(parts, tables.aero.clamped)
+    sectors = max(part.sectors for part in parts.values())
+    return aerodynamics_of(tables.aero, home, sectors, points, clamped or "")
 
 
 def newton(tables: Tables, table: LoadTable) -> float:

@@ -17,7 +17,7 @@ from stickslip.study.file.vary import with_values
 from stickslip.study.models.checks import refusals
 from stickslip.study.models.measured import MeasuredPeaks, measured_peaks
 from stickslip.study.models.model import model_of, newton
-from stickslip.study.models.parts import Memo, digest
+from stickslip.study.models.parts import Memo, digest, digest_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +134,8 @@ def model_digests(tables: Tables, home: Path) -> tuple[str, str]:
         for name, load in tables.load.items()
     }
     static = {name: loads[name] for name, load in tables.load.items() if load.harmonic == 0}
+    if tables.aero is not None:
+        parts.append(digest_of(home / tables.aero.file))
     output = tables.output.model_dump(mode="json", exclude={"folder"})
     driven = [own, parts, loads, output, tables.harmonics.alert_over]
     return _hash(driven), _hash([own, parts, static])

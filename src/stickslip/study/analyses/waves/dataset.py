@@ -18,11 +18,11 @@ from stickslip.study.analyses.verdict import (
 )
 from stickslip.study.analyses.waves.about import ABOUT, told
 from stickslip.study.analyses.waves.numbers import wave_name
-from stickslip.study.analyses.waves.results import WaveBranches, WaveModes
+from stickslip.study.analyses.waves.results import WaveBranches, WaveFlutter, WaveModes
 from stickslip.study.keep.netcdf import stacked, variable
 
 Variables = dict[str, xr.Variable]
-Waves = Sequence[WaveModes] | Sequence[WaveBranches]
+Waves = Sequence[WaveModes] | Sequence[WaveBranches] | Sequence[WaveFlutter]
 LABELS = {"xyz": ["x", "y", "z"], "part": ["re", "im"]}
 
 

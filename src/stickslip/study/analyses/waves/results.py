@@ -1,8 +1,16 @@
 """Records of the analyses by waves: plain arrays, wave by wave."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.response.rotating.flutter import FlutterOfWave
+from stickslip.units import HZ
+
+
+def _none() -> ComplexArray:
+    return np.zeros(0, dtype=complex)
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +29,8 @@ class WaveModes:
         (m,) derivatives of ω² by Ω² at the speed; zeros for a model that no speed changes.
     seconds
         Time of the computation.
+    in_flow
+        (m,) eigenvalues with aerodynamic forces and the structure's damping, 1/s; none where the model has no such forces.
     """
 
     wave_number: int
@@ -28,6 +38,7 @@ class WaveModes:
     shapes: ComplexArray
     growth: FloatArray
     seconds: float
+    in_flow: ComplexArray = field(default_factory=_none)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,3 +69,38 @@ class WaveBranches:
     crossings_hz: FloatArray
     error: float
     seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class WaveFlutter:
+    """A wave in the flow; as `FlutterOfWave`, with its number.
+
+    Parameters
+    ----------
+    wave_number
+        Of the wave.
+    frequencies_hz
+        (n,) in still fluid.
+    amplitudes
+        (n, m) of the patterns in each mode.
+    by_energy
+        (n,) aerodynamic damping ratio by the energy method.
+    in_flow, damped
+        (n,) eigenvalues with the fluid alone, and with the structure's damping, 1/s.
+    seconds
+        Time of the computation.
+    """
+
+    wave_number: int
+    frequencies_hz: FloatArray
+    amplitudes: ComplexArray
+    by_energy: FloatArray
+    in_flow: ComplexArray
+    damped: ComplexArray
+    seconds: float
+
+    @property
+    def solved(self) -> FlutterOfWave:
+        """The same without its number."""
+        omega = HZ * self.frequencies_hz
+        return FlutterOfWave(omega, self.amplitudes, self.by_energy, self.in_flow, self.damped)

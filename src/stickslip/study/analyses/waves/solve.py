@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from time import perf_counter
 from typing import TypeVar
@@ -19,11 +19,12 @@ from stickslip.reduction.wave_family import WaveFamily
 from stickslip.response.rotating.campbell import campbell
 from stickslip.study.analyses.analysis import Notes
 from stickslip.study.analyses.waves.about import ABOUT, about, skin_note
+from stickslip.study.analyses.waves.in_flow import wave_in_flow
 from stickslip.study.analyses.waves.numbers import Wheel
-from stickslip.study.analyses.waves.results import WaveBranches, WaveModes
+from stickslip.study.analyses.waves.results import WaveBranches, WaveFlutter, WaveModes
 from stickslip.study.keep.progress import advance
 
-W = TypeVar("W", WaveModes, WaveBranches)
+W = TypeVar("W", WaveModes, WaveBranches, WaveFlutter)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +63,11 @@ class Question:
     shapes: bool = False
     engine_orders: tuple[int, ...] = ()
 
+    @property
+    def turning(self) -> bool:
+        """Whether Coriolis forces act at the first speed; forces of a flow part the directions of waves as well."""
+        return self.model.coriolis and self.model.rotates and self.speeds[0] > 0
+
     def at(self, speed: float, wave_number: int) -> Structure:
         """Return the structure at a speed in rad/s as a wave."""
         return self.model.at(speed, wave_number, self.contacts)
@@ -88,7 +94,7 @@ def each_wave(
             advance((i + 1) / len(asked.numbers), _progress(found))
 
 
-def _progress(wave: WaveModes | WaveBranches) -> str:
+def _progress(wave: WaveModes | WaveBranches | WaveFlutter) -> str:
     low, high = wave.frequencies_hz.min(), wave.frequencies_hz.max()
     basis = f", basis good to {wave.error:.0e}" if isinstance(wave, WaveBranches) else ""
     return (
@@ -107,7 +113,7 @@ def solve_wave(asked: Question, wave_number: int) -> WaveModes:
     began = perf_counter()
     structure = asked.at(asked.speeds[0], wave_number)
     shift, factors = asked.family.shifted(wave_number, structure)
-    if asked.wheel.parted:
+    if asked.turning:
         turning = gyroscopic_modes(structure, asked.n_modes, shift=shift, factors=factors)
         hertz, vectors = turning.frequencies_hz, turning.shapes
     else:
@@ -117,7 +123,9 @@ def solve_wave(asked: Question, wave_number: int) -> WaveModes:
     if asked.shapes:
         moved = _unit(asked.model.on_skin(np.asarray(structure.expand(vectors), dtype=complex)))
     growth = _growth(asked, wave_number, hertz, vectors)
-    return WaveModes(wave_number, hertz, moved, growth, perf_counter() - began)
+    flow = wave_in_flow(asked.model, asked.contacts, asked.speeds[0], wave_number, asked.n_modes)
+    found = WaveModes(wave_number, hertz, moved, growth, perf_counter() - began)
+    return found if flow is None else replace(found, in_flow=flow.damped)
 
 
 def _growth(asked: Question, wave_number: int, hertz: FloatArray, vectors: Matrix) -> FloatArray:
@@ -133,7 +141,7 @@ def _growth(asked: Question, wave_number: int, hertz: FloatArray, vectors: Matri
     # the stiffness has degree two in Ω², so that the central difference is exact
     by_x = form((high.stiffness - low.stiffness) / x)
     mass, omega = form(here.mass), 2 * np.pi * hertz
-    if not asked.wheel.parted:
+    if not asked.turning:
         return np.asarray((by_x / mass).real)
     # Coriolis terms grow with Ω; what is left of the damping dissipates, and does not count here
     turning = 1j * (form(here.damping) - form(here.damping.conj().T)) / 2

@@ -38,6 +38,8 @@ def modes_tables(case: xr.Dataset) -> list[TextTable]:
         (*name, *(f"{f:.7g}" for f in own)) for name, own in zip(names, hertz, strict=True)
     )
     tables = [TextTable(f"Natural frequencies in Hz {_at(case.attrs['speed_rpm'])}", head, rows)]
+    if "damped_hz" in case and np.isfinite(case["damped_hz"]).any():
+        tables.append(_damped_table(case, names))
     if "difference" in case and np.isfinite(case["difference"]).any():
         off = case["difference"].values
         worst = np.unravel_index(np.nanargmax(np.abs(off)), off.shape)
@@ -52,6 +54,54 @@ def modes_tables(case: xr.Dataset) -> list[TextTable]:
         )
         tables.append(TextTable(title, head, rows))
     return tables
+
+
+def flutter_tables(case: xr.Dataset) -> list[TextTable]:
+    """Return the damping of each wave, and which is the least stable one."""
+    labels, total = _labels(case), case["damping"].values
+    i, m = int(case.attrs["least_wave"]), int(case.attrs["least_mode"])
+    required = float(case.attrs["required_damping"])
+    columns = ("frequency_hz", "damping_by_energy", "damping_by_eigenvalue", "damping")
+    rows = tuple(
+        _flutter_row(labels[w], float(case["phase_angle_deg"][w]), n, [float(case[c][w, n]) for c in columns], required)
+        for n in range(total.shape[1])
+        for w in np.argsort(case["phase_angle_deg"].values, kind="stable")
+    )  # fmt: skip
+    head = (
+        "wave",
+        "phase angle deg",
+        "mode",
+        "Hz",
+        "by energy %",
+        "by eigenvalue %",
+        "with structure %",
+        "",
+    )
+    title = (
+        f"Flutter margins {_at(case.attrs['speed_rpm'])}: the least stable is {labels[i]}, mode {m + 1}, with "
+        f"{100 * (total[i, m] - required):.4g} %"
+    )
+    return [TextTable(title, head, rows)]
+
+
+def _flutter_row(
+    name: str, angle: float, mode: int, numbers: Sequence[float], required: float
+) -> tuple[str, ...]:
+    hertz, *damping = numbers
+    told = "UNSTABLE" if damping[-1] < 0 else "below required" if damping[-1] < required else ""
+    shares = (f"{100 * d:.4g}" for d in damping)
+    return (name, f"{angle:.1f}", f"{mode + 1}", f"{hertz:.6g}", *shares, told)
+
+
+def _damped_table(case: xr.Dataset, names: Sequence[tuple[str, str]]) -> TextTable:
+    """Return frequency and damping of the eigenvalues with aerodynamic forces."""
+    hertz, damping = case["damped_hz"].values, case["damping"].values
+    rows = tuple(
+        (*name, *(f"{f:.7g} ({100 * d:.4g} %)" for f, d in zip(*own, strict=True)))
+        for name, own in zip(names, zip(hertz, damping, strict=True), strict=True)
+    )
+    head = ("wave", "kind", *(f"{m + 1}" for m in range(hertz.shape[1])))
+    return TextTable("Damped frequencies in Hz and damping ratios in the flow", head, rows)
 
 
 def campbell_tables(case: xr.Dataset) -> list[TextTable]:

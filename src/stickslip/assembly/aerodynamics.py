@@ -1,0 +1,78 @@
+"""Aerodynamic coefficients of a model and what they belong to: modes, or points."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from stickslip.errors import input_error
+from stickslip.reduction.aerodynamics import InfluenceCoefficients
+
+Direction = tuple[float, float, float] | None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Aerodynamics:
+    """Influence coefficients of a wheel and what they belong to: modes, or points.
+
+    Parameters
+    ----------
+    influence
+        The coefficients, of the modes or points in their order.
+    reference
+        ω_r in rad/s: at this frequency the force is exact where matrices stand for it.
+    modes
+        Numbers of the modes, from 1.
+    shapes
+        ``wave``: each wave has its own modes; ``blade_alone``: those of a part with the nodes `clamped` and its cyclic faces held, in all
+        waves; ``nodal_diameter``: those of one nodal diameter, in all waves.
+    nodal_diameter
+        Whose modes the shapes are; of no meaning for other `shapes`.
+    clamped
+        Place that holds the blade where its shapes are those of it alone, ``blade.root``.
+    largest_displacement
+        That the modes were scaled to, in m: coefficients are in J then; None: to unit mass, coefficients in 1/s².
+    over
+        Part on which the largest displacement is looked for; empty: everywhere.
+    contacts
+        What contacts do where the modes are those of waves, as in `Model.at`.
+    points
+        Name -> place and direction, as in `Load`, where the coefficients belong to points; empty: to modes.
+
+    Raises
+    ------
+    InputError
+        If numbers of modes or points do not fit the coefficients.
+    """
+
+    influence: InfluenceCoefficients
+    reference: float
+    modes: tuple[int, ...] = (1,)
+    shapes: Literal["wave", "blade_alone", "nodal_diameter"] = "wave"
+    nodal_diameter: int = 0
+    clamped: str = ""
+    largest_displacement: float | None = None
+    over: str = ""
+    contacts: Literal["static", "stuck", "open"] = "static"
+    points: Mapping[str, tuple[str, Direction]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        named = len(self.points) or len(self.modes)
+        if named != self.influence.patterns:
+            raise input_error(
+                "Aerodynamics",
+                f"has coefficients between {self.influence.patterns} and names {named} modes or points",
+                "Give as many.",
+            )
+        if not 0 < self.reference < math.inf:
+            raise input_error("Aerodynamics.reference", f"is {self.reference}", "Give rad/s.")
+        size = self.largest_displacement
+        if size is not None and not 0 < size < math.inf:
+            raise input_error("Aerodynamics.largest_displacement", f"is {size}", "Give metres.")
+        if min(self.modes) < 1:
+            raise input_error("Aerodynamics.modes", f"are {self.modes}", "The lowest is 1.")
+
+    @property
+    def of_points(self) -> bool:
+        """Whether the coefficients belong to points."""
+        return bool(self.points)

@@ -1,0 +1,42 @@
+"""Displacements of steady rotation that joined parts share."""
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import IntArray
+from stickslip.assembly.coordinates import Coordinates
+from stickslip.assembly.places import Places, picked
+from stickslip.assembly.reduced import Steady
+from stickslip.assembly.wheel import Neighbours
+from stickslip.model.fe.factorisation import factorise
+from stickslip.model.structure import join
+
+
+def joined_displacements(
+    places: Places, at: Coordinates, here: Neighbours | None, loose: IntArray
+) -> dict[str, Steady]:
+    """Solve the linear statics of all joined parts at rest under the centrifugal load at 1 rad/s.
+
+    Parameters
+    ----------
+    places, at
+        The parts, and the coordinates that their joins leave.
+    here
+        How they meet their neighbours on a wheel; None for a single structure.
+    loose
+        Dofs that nothing holds, which stay where they are.
+    """
+    parts = places.parts
+    rest = at.tied(join(**{name: part.structure for name, part in parts.items()}))
+    tie = picked(np.arange(at.ids.size), at.ids.size) if at.tie is None else at.tie
+    if here is not None:
+        tie = tie @ here.sector(rest, at).wave_tie(0)
+    moves = np.setdiff1d(np.arange(tie.shape[1]), tie[loose].nonzero()[1])
+    tie = scipy.sparse.csr_array(tie[:, moves])
+    stiffness = scipy.sparse.block_diag([part.structure.stiffness for part in parts.values()])
+    load = [
+        np.zeros(p.structure.n) if p.solid is None else p.solid.centrifugal for p in parts.values()
+    ]
+    solve = factorise(scipy.sparse.csr_array(tie.T @ stiffness @ tie))
+    moved = tie @ solve(tie.T @ np.concatenate(load))
+    return {name: Steady(unit=np.asarray(moved[places.own(name)])) for name in parts}

@@ -1,0 +1,230 @@
+"""Flutter of one wave: aerodynamic damping by the energy method and by eigenvalues, beside each other.
+
+The wave is written in its lowest undamped modes. The energy method takes each mode as it is in still fluid and the work of the fluid on
+it in a period; the eigenvalues are those of the modes together, with coefficients at the frequency of the motion itself.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, Matrix
+from stickslip.errors import input_error
+from stickslip.model.modes import normal_modes
+from stickslip.model.structure import Structure
+from stickslip.reduction.aerodynamics import Feedback, InfluenceCoefficients
+
+SPARE = 6  # modes beyond those asked for, with which the fluid may couple them
+TAKES_PART = 1e-9  # of the largest amplitude of a pattern: below, a mode does not feel the fluid
+ITERATIONS = 60
+SETTLED = 1e-12  # relative change of an eigenvalue
+
+
+@dataclass(frozen=True, eq=False)
+class FlutterOfWave:
+    """Modes of a wave in the flow, lowest frequency in still fluid first.
+
+    Parameters
+    ----------
+    frequencies
+        (n,) in still fluid, rad/s.
+    amplitudes
+        (n, m) of the patterns in each mode of unit mass: ``Pᴴ φ``.
+    by_energy
+        (n,) aerodynamic damping ratio ``ζ = −W/(4πE)``.
+    in_flow
+        (n,) eigenvalues with the fluid and without the structure's own damping, 1/s.
+    damped
+        (n,) eigenvalues with both, 1/s.
+    """
+
+    frequencies: FloatArray
+    amplitudes: ComplexArray
+    by_energy: FloatArray
+    in_flow: ComplexArray
+    damped: ComplexArray
+
+    @property
+    def by_eigenvalue(self) -> FloatArray:
+        """(n,) aerodynamic damping ratio ``−Re λ / |λ|``."""
+        return damping_ratio(self.in_flow)
+
+    @property
+    def total(self) -> FloatArray:
+        """(n,) damping ratio with that of the structure."""
+        return damping_ratio(self.damped)
+
+
+def damping_ratio(eigenvalues: ComplexArray) -> FloatArray:
+    """Return ``−Re λ / |λ|`` of eigenvalues (n,); negative where a motion grows."""
+    return np.asarray(-eigenvalues.real / np.abs(eigenvalues))
+
+
+def flutter_of_wave(
+    structure: Structure,
+    feedback: Feedback,
+    n_modes: int,
+    *,
+    ratios: float | Sequence[float] = 0.0,
+) -> FlutterOfWave:
+    """Return the damping of the lowest modes of a wave in a flow.
+
+    Parameters
+    ----------
+    structure
+        The wave without the fluid: its damping, Coriolis terms (the skew part) and structural damping count.
+    feedback
+        The aerodynamic force, in coordinates of the wave.
+    n_modes
+        Number of modes.
+    ratios
+        Damping ratios of the modes, lowest first, beside the structure's matrices; one number: of all.
+
+    Raises
+    ------
+    InputError
+        If the wave has fewer modes, a mode does not vibrate, or its frequency is outside of the coefficients' table.
+
+    Notes
+    -----
+    ``W = π Im(Qᴴ G Q)`` and ``E = ½ ω² Qᴴ M Q``. The eigenvalue differs from it by terms of second order in the coefficients: it falls
+    four-fold where they are halved. Structural damping is that of frequencies above zero.
+    """
+    heavy = int(np.count_nonzero(structure.mass.diagonal()))
+    count = min(heavy, 2 * n_modes + SPARE)
+    modes = normal_modes(structure, max(count, n_modes))
+    shapes = np.asarray(modes.shapes)
+    if np.any(modes.squares[:n_modes] <= 0):
+        raise input_error(
+            "flutter",
+            f"{int(np.count_nonzero(modes.squares[:n_modes] <= 0))} of {n_modes} modes do not vibrate",
+            "Clamp the structure, let contacts stick, or give a speed at which it is stable.",
+        )
+    still = np.diag(modes.squares).astype(complex)
+    damping = shapes.conj().T @ (structure.damping @ shapes)
+    turning = (damping - damping.conj().T) / 2
+    given = np.atleast_1d(np.asarray(ratios, dtype=float))
+    zeta = (
+        np.full(modes.squares.size, given[0]) if given.size == 1 else np.zeros(modes.squares.size)
+    )
+    if given.size > 1:
+        zeta[: given.size] = given[: modes.squares.size]
+    own = damping + np.diag(2 * zeta * np.sqrt(np.maximum(modes.squares, 0.0)))
+    lossy = still
+    if structure.loss is not None:
+        lossy = still + 1j * (shapes.conj().T @ (structure.loss @ shapes))
+    P = shapes.conj().T @ feedback.patterns
+    felt = np.abs(P) > TAKES_PART * np.abs(P).max(axis=0, initial=0.0)
+    P = np.where(felt, P, 0.0)
+    found = [_mode(i, still, lossy, turning, own, P, feedback) for i in range(n_modes)]
+    frequencies, amplitudes, energy, flow, damped = zip(*found, strict=True)
+    return FlutterOfWave(
+        np.array(frequencies), np.array(amplitudes), np.array(energy), np.array(flow), np.array(damped)
+    )  # fmt: skip
+
+
+def _mode(
+    i: int,
+    still: ComplexArray,
+    lossy: ComplexArray,
+    turning: ComplexArray,
+    damping: ComplexArray,
+    P: Matrix,
+    feedback: Feedback,
+) -> tuple[float, ComplexArray, float, complex, complex]:
+    none = np.zeros_like(still)
+    start = 1j * np.sqrt(still[i, i].real), np.eye(len(still))[i].astype(complex)
+    value, vector = _nearest(still, turning, none, start)
+    omega = value.imag
+    amplitude = P.conj().T @ vector
+    if not np.any(amplitude):
+        damped = _nearest(lossy, damping, none, (value, vector))[0]
+        return omega, amplitude, 0.0, 1j * omega, damped
+    force = feedback.force(omega)
+    energy = -float((amplitude.conj() @ force @ amplitude).imag) / (2 * omega**2)
+    pair = value, vector
+    in_flow = _followed(still, turning, P, feedback, pair)
+    both = _followed(lossy, damping, P, feedback, in_flow)
+    return omega, amplitude, energy, in_flow[0], both[0]
+
+
+def _followed(
+    stiffness: ComplexArray,
+    damping: ComplexArray,
+    P: Matrix,
+    feedback: Feedback,
+    start: tuple[complex, ComplexArray],
+) -> tuple[complex, ComplexArray]:
+    """Return the eigenvalue whose coefficients are those of its own frequency."""
+    pair = start
+    for _ in range(ITERATIONS):
+        force = P @ feedback.force(pair[0].imag) @ P.conj().T
+        found = _nearest(stiffness, damping, force, pair)
+        if abs(found[0] - pair[0]) <= SETTLED * abs(found[0]):
+            return found
+        pair = found
+    return pair
+
+
+def _nearest(
+    stiffness: ComplexArray,
+    damping: ComplexArray,
+    force: ComplexArray,
+    near: tuple[complex, ComplexArray],
+) -> tuple[complex, ComplexArray]:
+    """Return the eigenvalue, frequency above zero, whose shape of unit mass is most like another one."""
+    n = len(stiffness)
+    zero, one = np.zeros((n, n)), np.eye(n)
+    values, vectors = np.linalg.eig(np.block([[zero, one], [force - stiffness, -damping]]))
+    shapes = vectors[:n] / np.linalg.norm(vectors[:n], axis=0)
+    like = np.abs(near[1].conj() @ shapes)
+    like[values.imag <= 0] = -1.0
+    best = int(like.argmax())
+    return complex(values[best]), shapes[:, best]
+
+
+def least_stable_curve(
+    influence: InfluenceCoefficients,
+    angles: FloatArray,
+    waves: Sequence[FlutterOfWave],
+    phase_angles: FloatArray,
+) -> FloatArray:
+    """Return the aerodynamic damping ratio (n, a) of each mode over any inter-blade phase angle, by the energy method.
+
+    Parameters
+    ----------
+    influence
+        Coefficients of one speed.
+    angles
+        (a,) in rad.
+    waves
+        Of phase angles that the wheel has.
+    phase_angles
+        (w,) theirs, in rad.
+
+    Notes
+    -----
+    Frequency and amplitudes of a mode between two waves are interpolated linearly in the angle; the coefficients are exact.
+    """
+    turn = 2 * np.pi
+    order = np.argsort(np.mod(phase_angles, turn))
+    known = np.mod(phase_angles, turn)[order]
+    wrapped = np.concatenate([known[-1:] - turn, known, known[:1] + turn])
+    own = [waves[i] for i in order]
+    own = [own[-1], *own, own[0]]
+    omegas = np.array([w.frequencies for w in own])
+    work = np.array([np.einsum("ni,nj->nij", w.amplitudes, w.amplitudes.conj()) for w in own])
+    out = np.empty((omegas.shape[1], angles.size))
+    for a, angle in enumerate(np.mod(angles, turn)):
+        right = int(np.clip(np.searchsorted(wrapped, angle), 1, wrapped.size - 1))
+        share = (angle - wrapped[right - 1]) / (wrapped[right] - wrapped[right - 1])
+        omega = (1 - share) * omegas[right - 1] + share * omegas[right]
+        outer = (1 - share) * work[right - 1] + share * work[right]
+        for n in range(omega.size):
+            if np.any(outer[n]):
+                G = influence.of_wave(float(angle), float(omega[n]))
+                out[n, a] = -np.sum(G * outer[n].T).imag / (2 * omega[n] ** 2)
+            else:
+                out[n, a] = 0.0
+    return out

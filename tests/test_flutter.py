@@ -1,0 +1,342 @@
+"""Flutter from a study file and from Python, against a whole wheel with a fluid of its own."""
+
+import re
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import lumped_fluid as fluid
+import numpy as np
+import pytest
+import scipy.linalg
+
+import stickslip as ss
+from stickslip.assembly.aerodynamics import Aerodynamics
+from stickslip.assembly.flow import flow_around, largest_displacements
+from stickslip.assembly.mistuning import Mistuning
+from stickslip.model.dofs import nodal_dofs
+from stickslip.model.part import Part
+from stickslip.model.structure_file import save_structure
+from stickslip.reduction import InfluenceCoefficients
+from stickslip.response.rotating.flutter import flutter_of_wave
+from stickslip.study.models.study import read_study
+
+N = fluid.BLADES
+HERTZ = np.linspace(0.05, 0.45, 33)
+
+STUDY = """
+schema_version = 2
+[part.sector]
+file = "sector.npz"
+units = "SI"
+plausible = false
+sectors = 6
+low_face = "cyclic_low"
+high_face = "cyclic_high"
+[aero]
+file = "{file}"
+reference_hz = 0.35
+points = {{ blade = "sector.blade" }}
+[flutter]
+number = 2
+"""
+
+
+def sector():
+    """The judge's disk as a sector: disk, blade, and the neighbour's disk without its mass."""
+    ground, ring, blade = fluid.SPRINGS
+    K = np.diag([ground + ring + blade, blade, ring])
+    K[0, 1] = K[1, 0] = -blade
+    K[0, 2] = K[2, 0] = -ring
+    M = np.diag([*fluid.MASSES, 0.0])
+    sets = {name: np.array([i]) for i, name in enumerate(("cyclic_low", "blade", "cyclic_high"))}
+    dofs = ss.model.lumped(np.ones(3), np.eye(3)).dofs
+    return ss.Structure(M, fluid.LOSS * K, K, dofs, sets)
+
+
+def recorded_rows():
+    """What a user records who moves blade 0 at some frequencies: the force on every blade."""
+    rows = ["recorded_on,frequency_hz,real_n_per_m,imag_n_per_m"]
+    for hertz in HERTZ:
+        for blade, force in enumerate(fluid.recorded(2 * np.pi * hertz)):
+            on = blade if 2 * blade <= N else blade - N
+            rows.append(f"{on},{hertz:.17g},{force.real:.17g},{force.imag:.17g}")
+    return rows
+
+
+def influence(strength=fluid.STRENGTH):
+    j = -np.arange(N)
+    force = [fluid.recorded(2 * np.pi * hertz, strength) for hertz in HERTZ]
+    values = np.array(force).reshape(1, HERTZ.size, N, 1, 1)
+    return InfluenceCoefficients(j, values, 2 * np.pi * HERTZ)
+
+
+def model(aero, **more):
+    return ss.Model(
+        parts={"sector": Part(structure=sector(), sectors=N)}, aerodynamics=aero, **more
+    )
+
+
+def of_blade(coefficients, reference=2.2):
+    points = {"blade": ("sector.blade", None)}
+    return Aerodynamics(influence=coefficients, reference=reference, points=points)
+
+
+@pytest.mark.parametrize("kind", ["csv", "toml"])
+def test_coefficients_recorded_with_one_moved_blade_give_the_eigenvalues_of_the_whole_wheel(
+    kind: str, tmp_path: Path
+) -> None:
+    save_structure(sector(), tmp_path / "sector.npz")
+    (tmp_path / "study.toml").write_text(STUDY.format(file=f"aero.{kind}"))
+    rows = recorded_rows()
+    if kind == "toml":
+        columns = zip(*(row.split(",") for row in rows), strict=True)
+        rows = [f"{name} = [{', '.join(cells)}]" for name, *cells in columns]
+    (tmp_path / f"aero.{kind}").write_text("\n".join(rows))
+    result = ss.Study.from_file(tmp_path / "study.toml").run()
+    data = result.data["flutter"].isel(case=0)
+    assert data["wave_number"].values.tolist() == list(range(N))
+    for w, k in enumerate(data["wave_number"].values):
+        exact = fluid.modes_of_wave(int(k))
+        exact = exact[exact.real > -0.1]  # without those of the fluid
+        values = [(-v.real / abs(v), v.imag / (2 * np.pi)) for v in exact]
+        for m, (damping, hertz) in enumerate(values[-2:] if len(values) > 1 else values):
+            mode = m if len(values) > 1 else 1
+            # coefficients of iω at λ, whose real part is up to 5e-3 of it
+            assert float(data["damping"][w, mode]) == pytest.approx(damping, rel=0.01)
+            assert float(data["frequency_in_flow_hz"][w, mode]) == pytest.approx(hertz, rel=1e-4)
+    # the curve goes through the waves
+    for w, angle in enumerate(data["phase_angle_deg"].values):
+        on_curve = [np.interp(angle, data["curve_angle_deg"], row) for row in data["curve_damping"]]
+        np.testing.assert_allclose(on_curve, data["damping_by_energy"][w], rtol=1e-9)
+    assert "the least stable is" in result.summaries["flutter"][0].title
+
+
+def test_the_least_stable_wave_is_told_and_an_unstable_one_is_a_note() -> None:
+    shaken = replace(influence(), values=-influence().values)
+    result = model(of_blade(shaken)).flutter(number=1)
+    told = [str(v) for v in result.verdicts]
+    assert any("NOTE" in t and "grows: damping" in t and "flutters" in t for t in told)
+    data = result.data["flutter"].isel(case=0)
+    w, m = int(data["least_wave"]), int(data["least_mode"])
+    assert float(data["damping"][w, m]) == float(data["damping"].min()) < 0
+    assert f"mode {m + 1} grows" in " ".join(told)
+    calm = model(of_blade(influence())).flutter(number=1, required_percent=1.0)
+    assert any("less damping than the 1 % required" in str(v) for v in calm.verdicts)
+
+
+@pytest.mark.parametrize("wave", [1, 4])
+def test_energy_method_and_eigenvalue_part_four_times_less_when_coefficients_are_halved(
+    wave: int,
+) -> None:
+    """Two modes that the fluid couples, so that the shapes change as well."""
+    rng = np.random.default_rng(8)
+    values = rng.standard_normal((1, 1, 3, 2, 2)) + 1j * rng.standard_normal((1, 1, 3, 2, 2))
+    off = []
+    for share in (0.04, 0.02, 0.01):
+        points = {"blade": ("sector.blade", None), "disk": ("sector.cyclic_low", None)}
+        own = InfluenceCoefficients(np.array([-1, 0, 1]), share * values)
+        aero = Aerodynamics(influence=own, reference=2.0, points=points)
+        there = model(aero)
+        moving = there.at(0.0, wave, "open")
+        found = flutter_of_wave(moving, flow_around(there).on_structure(wave, moving), 2)
+        off.append(found.by_eigenvalue - found.by_energy)
+    for before, after in pairwise(off):
+        assert np.all(np.abs(after) > 1e-7)
+        np.testing.assert_allclose(before / after, 4.0, rtol=0.15)
+    assert np.abs(off[0] / off[1] - 4).max() > np.abs(off[1] / off[2] - 4).max()
+
+
+@pytest.mark.parametrize("number", range(N))
+def test_free_decay_in_time_has_the_rate_and_the_direction_of_each_wave(number: int) -> None:
+    """The whole wheel is let go in the shape of a wave; sector n + 1 leads sector n by θ, and it decays as the energy method says."""
+    there = model(of_blade(influence()))
+    moving = there.at(0.0, number, "open", with_damping=True)
+    feedback = flow_around(there).on_structure(number, moving)
+    wave = flutter_of_wave(moving, feedback, 2)
+    bare = flutter_of_wave(moving, replace(feedback, patterns=0 * feedback.patterns), 2)
+    omega, structural = wave.frequencies[1], bare.total[1]
+    shape = mode(moving)
+    phases = np.exp(2j * np.pi * number * np.arange(N) / N)
+    u = np.outer(phases, shape).ravel()
+    A = fluid.coupled()
+    start = np.concatenate([u.real, (1j * omega * u).real, np.zeros(N)])
+    periods = 40
+    step = scipy.linalg.expm(A * 2 * np.pi / omega / 64)
+    states = [start]
+    for _ in range(64 * periods):
+        states.append(step @ states[-1])
+    blades = np.array(states)[:, 1 : 2 * N : 2]
+    # the analytic signal of each blade, over the last ten periods and ten earlier ones
+    turn = np.exp(-2j * np.pi * np.arange(640) / 64)
+    early, late = (2 / 640 * turn @ blades[i : i + 640] for i in (640, 64 * periods - 640))
+    lead = np.angle(late[1:] / late[:-1])
+    np.testing.assert_allclose(np.exp(1j * lead), np.exp(2j * np.pi * number / N), atol=0.1)
+    elapsed = (64 * periods - 1280) / 64 * 2 * np.pi / omega
+    rate = np.log(np.abs(late / early)).mean() / elapsed
+    predicted = -omega * (wave.by_energy[1] + structural)
+    assert rate == pytest.approx(predicted, rel=0.03)
+
+
+def mode(moving):
+    """Return the second mode of a wave of the judge's disk."""
+    K, M = (np.asarray(m)[:2, :2] for m in (moving.stiffness, moving.mass))
+    return scipy.linalg.eigh(K, M)[1][:, 1]
+
+
+def wrong(tmp_path: Path, rows: list[str], change: tuple[str, str] = ("", "")) -> str:
+    """Return what a study says of a file of coefficients."""
+    save_structure(sector(), tmp_path / "sector.npz")
+    text = (
+        STUDY.format(file="aero.csv").replace(*change)
+        if change[0]
+        else STUDY.format(file="aero.csv")
+    )
+    (tmp_path / "study.toml").write_text(text)
+    (tmp_path / "aero.csv").write_text("\n".join(rows))
+    with pytest.raises(ss.InputError) as told:
+        read_study(tmp_path / "study.toml").model()
+    return str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "words"),
+    [
+        ("neighbour,real_per_s2,imag_n_per_m", "0,1,2", "real_per_s2.*points are in N/m.*real_n_per_m"),
+        ("neighbur,real_n_per_m,imag_n_per_m", "0,1,2", "neighbur.*not known.*neighbour"),
+        ("note,real_n_per_m,imag_n_per_m", "0,1,2", "whose motion.*neighbour, recorded_on"),
+        ("neighbour,real_n_per_m,phase_deg", "0,1,2", "real_n_per_m and phase_deg of the values"),
+        ("neighbour,real_n_per_m,imag_n_per_m", "0.5,1,2", "line 2: neighbour: is no whole number, got '0.5'"),
+        ("neighbour,real_n_per_m,imag_n_per_m", "0,one,2", "line 2: real_n_per_m.*'one'"),
+        ("neighbour,real_n_per_m,imag_n_per_m", "7,1,2", "goes to 7, and the wheel has 6"),
+        ("neighbour,real_n_per_m,imag_n_per_m", "0,1,2\n0,1,3", "line 3: says the same.*line 2"),
+        ("neighbour,frequency_hz,real_n_per_m,imag_n_per_m", "0,1,1,2\n1,1,1,3\n0,2,1,2", "lacks.*neighbour 1, 2 Hz"),
+        ("phase_angle_deg,real_n_per_m,imag_n_per_m", "0,1,2\n50,1,2", "not spread evenly"),
+        ("neighbour,force_point,motion_point,real_n_per_m,imag_n_per_m", "0,blade,tip,1,2", "motion_point: is no point"),
+        ("neighbour,force_point,real_n_per_m,imag_n_per_m", "0,blade,1,2", "force_point and motion_point"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_in_the_file_is_told_with_its_place(
+    head: str, row: str, words: str, tmp_path: Path
+) -> None:
+    told = wrong(tmp_path, [head, *row.split("\n")])
+    assert re.search(words, told.replace("\n", " ")), told
+    assert "aero.csv" in told
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("sectors = 6", "sectors = 1"), "no sector of a wheel"),
+        (('[aero]', '[aero]\nclamped = "sector.blade"'), "clamped: is given for shapes"),
+        (('[aero]', '[aero]\nlargest_displacement_m = 1.0'), "belongs to modes"),
+        (("aero.csv", "other.csv"), "aero.file: there is no file"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_in_the_table_is_told(
+    change: tuple[str, str], words: str, tmp_path: Path
+) -> None:
+    assert words in wrong(tmp_path, recorded_rows(), change)
+
+
+def test_flutter_without_coefficients_and_outside_of_their_table_is_refused() -> None:
+    with pytest.raises(ss.InputError, match="needs aerodynamic coefficients"):
+        model(None).flutter()
+    narrow = influence()
+    narrow = InfluenceCoefficients(narrow.distances, narrow.values[:, :3], narrow.frequencies[:3])
+    with pytest.raises(ss.InputError, match=r"0\.05 to 0\.075 Hz, asked for 0\.106249 Hz"):
+        model(of_blade(narrow)).flutter(number=1)
+
+
+def test_modes_of_unit_mass_and_of_a_largest_displacement_are_the_same_force() -> None:
+    """G of mode 2 on all three forms of the same coefficients; between two modes their phases count."""
+    own = np.array([[[-3e-4 - 2e-3j]], [[1e-3 - 4e-3j]], [[5e-4 + 1e-3j]]])[None, None]
+    j = np.array([-1, 0, 1])
+    unit = Aerodynamics(influence=InfluenceCoefficients(j, own), reference=2.0, modes=(2,))
+    there = model(unit)
+    moving = there.at(0.0, 1, "open")
+    plain = flutter_of_wave(moving, flow_around(there).on_structure(1, moving), 2)
+    assert plain.by_energy[0] == pytest.approx(0.0, abs=1e-15)
+    theta = 2 * np.pi / N
+    G = sum(own[0, 0, i, 0, 0] * np.exp(1j * theta * step) for i, step in enumerate(j))
+    assert plain.by_energy[1] == pytest.approx(-G.imag / (2 * plain.frequencies[1] ** 2), rel=1e-12)
+    largest = np.abs(mode(moving)).max()
+    scaled = Aerodynamics(
+        influence=InfluenceCoefficients(j, own * (0.002 / largest) ** 2),
+        reference=2.0,
+        modes=(2,),
+        largest_displacement=0.002,
+    )
+    there = model(scaled)
+    again = flutter_of_wave(moving, flow_around(there).on_structure(1, moving), 2)
+    np.testing.assert_allclose(again.by_energy, plain.by_energy, rtol=1e-12, atol=1e-18)
+    # the blade alone: one mass on its spring, in all waves
+    alone = replace(unit, shapes="blade_alone", clamped="sector.cyclic_low", modes=(1,))
+    pattern = flow_around(model(alone)).patterns(3)
+    np.testing.assert_allclose(pattern[:, 0], [0.0, np.sqrt(fluid.MASSES[1]), 0.0])
+
+
+def test_largest_displacements_are_those_of_nodes() -> None:
+    dofs = nodal_dofs(np.zeros((2, 3)), np.arange(2))
+    shapes = np.array([[3.0, 0], [4j, 0], [0, 0], [1, 0], [1, 0], [1, 2.0]])
+    np.testing.assert_allclose(largest_displacements(dofs, shapes), [5.0, 2.0])
+
+
+LAW = ss.UnilateralSpring(k_n=0.4, preload=0.3)
+
+
+def driven(aero, order=4):
+    """Blades driven by an engine order, whose disk stands on a spring that stays closed, under a static pull."""
+    contact = ss.Contact(between=("sector.cyclic_low", "ground"), law=LAW, acts="normal")
+    loads = {
+        "gas": ss.Load(on="sector.blade", newton=0.02, engine_order=order),
+        "pull": ss.Load(on="sector.blade", newton=0.05, harmonic=0, engine_order=0),
+    }
+    outputs = (ss.Output(name="tip", on="sector.blade"),)
+    return model(aero, contacts={"stand": contact}, loads=loads, outputs=outputs)
+
+
+@pytest.mark.parametrize("order", [2, 4])
+def test_forced_response_is_that_of_the_whole_wheel_with_its_fluid(order: int) -> None:
+    """Engine orders 2 and 4 drive the two directions of a nodal diameter; the coefficients are those of each frequency."""
+    there = driven(of_blade(influence()), order)
+    hertz = [0.3, 0.35, 0.36]
+    result = there.forced_response(
+        frequencies_hz=hertz, low=1, high=1, selection="always_low", peak_points=0, stability="off"
+    )
+    data = result.data["forced_response"]
+    found = np.sort(np.unique(data["frequency_hz"].values))
+    np.testing.assert_allclose(found[:3], hertz)
+    n = 2 * N
+    A = fluid.coupled()
+    A[n + 2 * np.arange(N), 2 * np.arange(N)] -= LAW.k_n / fluid.MASSES[0]
+    phases = np.exp(2j * np.pi * order * np.arange(N) / N)
+    for i, own in enumerate(hertz):
+        push = np.zeros(5 * N, dtype=complex)
+        push[n + 2 * np.arange(N) + fluid.BLADE] = 0.02 * phases / fluid.MASSES[1]
+        u = np.linalg.solve(2j * np.pi * own * np.eye(5 * N) - A, push)
+        row = int(np.argmin(np.abs(data["frequency_hz"].values - own)))
+        amplitude = float(np.ravel(data["amplitude"].values[row])[0])
+        assert amplitude == pytest.approx(abs(u[fluid.BLADE]), rel=1e-5), i
+
+
+def test_the_static_state_is_that_without_the_fluid() -> None:
+    wet, dry = (driven(aero).assembled(1) for aero in (of_blade(influence()), None))
+    np.testing.assert_allclose(wet.static_gap, dry.static_gap, rtol=1e-9)
+    np.testing.assert_allclose(wet.static_force, dry.static_force, rtol=1e-9)
+    assert np.abs(wet.load.static - dry.load.static).max() > 1e-5
+
+
+def test_a_mistuned_wheel_without_deviations_does_what_one_sector_does_in_the_flow() -> None:
+    """Coefficients of one frequency, so that both have the frozen form; every sector a phase angle ahead, also in statics."""
+    own = influence()
+    own = InfluenceCoefficients(own.distances, own.values[:, 22:23])
+    there = driven(of_blade(own), 4)
+    whole = replace(there, mistuning=Mistuning())
+    keys = {"frequencies_hz": [0.35, 0.36], "low": 1, "high": 1, "selection": "always_low", "peak_points": 0, "stability": "off"}  # fmt: skip
+    one, every = (m.forced_response(**keys).data["forced_response"] for m in (there, whole))
+    tuned, sectors = one["amplitude"].values, every["amplitude"].values
+    assert sectors.shape[1] >= N
+    np.testing.assert_allclose(sectors[:, :N], np.repeat(tuned[:, :1], N, axis=1), rtol=1e-8)
+    dry, wet = (m.assembled(1) for m in (replace(whole, aerodynamics=None), whole))
+    np.testing.assert_allclose(wet.static_gap, dry.static_gap, rtol=1e-8)
