@@ -210,12 +210,13 @@ class At:
         A = receptance[behind, share[:, None], share]
         return np.asarray(np.linalg.solve(np.eye(delta.size) + delta[:, None] * A, np.diag(delta)))
 
-    def _deviate(self, shares: ComplexArray) -> ComplexArray:
+    def _deviate(self, shares: ComplexArray, reaction: ComplexArray | None = None) -> ComplexArray:
         """Return the forces on the shares by wave number, (n_s, r, k), from the shares (n_s, r, k) without them."""
         sector, share = self.linear.wheel.active
         y = np.fft.ifft(shares, axis=0, norm="ortho")
         z = np.zeros_like(y)
-        z[sector, share] = self._reaction @ y[sector, share]
+        by = self._reaction if reaction is None else reaction
+        z[sector, share] = by @ y[sector, share]
         return np.asarray(np.fft.fft(z, axis=0, norm="ortho"))
 
     def times(self, q: ComplexArray) -> ComplexArray:
@@ -226,6 +227,16 @@ class At:
             out += self._felt @ self._deviate(self._seen @ waves)
         found = self._to_sectors(out, q)
         return found if self._springs is None else np.asarray(found + self._springs @ q)
+
+    def adjoint_times(self, q: ComplexArray) -> ComplexArray:
+        """Return the conjugate transpose of the stiffness times `q` (n,)."""
+        waves = self._to_waves(q)
+        out = self._tuned.conj().transpose(0, 2, 1) @ waves
+        if self.linear.wheel.active[0].size:
+            felt, seen = (part.conj().transpose(0, 2, 1) for part in (self._felt, self._seen))
+            out += seen @ self._deviate(felt @ waves, self._reaction.conj().T)
+        found = self._to_sectors(out, q)
+        return found if self._springs is None else np.asarray(found + self._springs.T @ q)
 
     @property
     def stiffness(self) -> ComplexArray:
@@ -346,7 +357,7 @@ class CondensedSectors:
     def transposed_product(self, rows: FloatArray) -> FloatArray:
         """Return the rows of the product with the transpose of the real form of Z, which is that of the conjugate transpose."""
         pairs = zip(self._at, to_complex(rows), strict=True)
-        return to_real(np.array([(q.conj() @ one.stiffness).conj() for one, q in pairs]))
+        return to_real(np.array([one.adjoint_times(q) for one, q in pairs]))
 
     def product_and_slope(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return ``Z q`` and ``∂Z/∂ω q``."""
