@@ -18,6 +18,7 @@ PARTS_OF_THE_PAGE = {
     "contacts": ("contact", "join"),
     "loads": ("load", "rotation"),
     "aero": ("aero",),
+    "mistuning": ("mistuning",),
     "output": ("output", "measured"),
     "analyses": ("forced_response", "modes", "campbell", "flutter", "safe"),
     "settings": ("harmonics", "solver", "retention", "limits"),

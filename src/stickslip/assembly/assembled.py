@@ -106,6 +106,9 @@ def _errors(full: FloatArray, reduced: FloatArray) -> FloatArray:
     return np.where(moves, reduced / np.where(moves, full, 1.0) - 1.0, 0.0)
 
 
+FIRST = np.zeros(1, dtype=np.int64)
+
+
 @dataclass(frozen=True, eq=False)
 class Blades:
     """What the outputs of a wheel with all its sectors are.
@@ -118,11 +121,19 @@ class Blades:
         Outputs of each sector.
     tuned
         The same wheel with all sectors alike, of which one answers for all.
+    deviations
+        (n_s,) what each sector deviates by, relative, of gaps in m; by name.
     """
 
     sectors: int
     labels: tuple[str, ...]
     tuned: "Assembled"
+    deviations: Mapping[str, FloatArray]
+
+    def same_in_all(self, output: int) -> IntArray:
+        """Return the positions of an output of one sector in all sectors."""
+        own = len(self.labels)
+        return np.asarray(output % own + own * np.arange(self.sectors))
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,3 +195,9 @@ class Assembled:
     warnings: tuple[str, ...] = ()
     blades: Blades | None = None
     orders: Mapping[int, int] = field(default_factory=dict)
+
+    @property
+    def peak_of(self) -> IntArray:
+        """Positions of the outputs of which the largest amplitude counts."""
+        own = self.system.peak_of
+        return FIRST + self.peak_output if own is None else own

@@ -76,6 +76,7 @@ def assemble_mistuned(model: Model, harmonics: int, store: Store) -> Assembled:
         wheel.of_dofs(what.labels.dofs, "output.points"),
         alert_dofs=wheel.of_dofs(what.watched, "alert_over"),
         free=wheel.of_dofs(bodies, "part") if bodies.size else None,
+        peak_of=_peak(what, model, of_all(what.labels.names, n)),
     )
     held = system.with_retention(model.retention)
     load = about_static_state(held, loads_on(alike, linear, what.forces), wheel.fluid)
@@ -88,7 +89,7 @@ def assemble_mistuned(model: Model, harmonics: int, store: Store) -> Assembled:
         load=load,
         contacts=contact_table(pairs),
         output_labels=names,
-        peak_output=_peak(what, model, names),
+        peak_output=0,
         error_labels=of_all(what.names, n),
         retention=model.retention,
         excitation=excitation(model),
@@ -109,7 +110,7 @@ def assemble_mistuned(model: Model, harmonics: int, store: Store) -> Assembled:
             *held_warnings(alike, np.all(pressed.reshape(n, -1), axis=0).reshape(-1)),
             *tuned.frequencies.warnings(),
         ),
-        blades=Blades(n, what.labels.names, tuned),
+        blades=Blades(n, what.labels.names, tuned, model.mistuning.patterns),
         orders=what.orders,
     )
 
@@ -124,15 +125,16 @@ def _of_sector(name: str, sector: int) -> str:
     return f"{head}[{sector}].{last}" if dot else f"{name}[{sector}]"
 
 
-def _peak(what: Asked, model: Model, names: tuple[str, ...]) -> int:
-    """Return the output whose peak is resolved: that named, of sector 0 where no sector is."""
+def _peak(what: Asked, model: Model, names: tuple[str, ...]) -> IntArray:
+    """Return the outputs of which the largest counts: the one named, of all sectors where no sector is."""
     wanted = model.peak_output
-    if not wanted:
-        return 0
     if wanted in names:
-        return names.index(wanted)
-    what.labels.of((wanted,), "output.peak")
-    return what.labels.names.index(wanted)
+        return np.array([names.index(wanted)])
+    own = what.labels.names
+    if wanted:
+        what.labels.of((wanted,), "output.peak")
+    first = own.index(wanted) if wanted else 0
+    return np.asarray(first + len(own) * np.arange(model.sectors))
 
 
 @dataclass(frozen=True, eq=False)

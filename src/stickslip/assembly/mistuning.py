@@ -168,6 +168,18 @@ class Mistuning:
     contacts: Mapping[str, ContactMistuning] = field(default_factory=dict)
     own: Mapping[str, OwnSector] = field(default_factory=dict)
 
+    @property
+    def patterns(self) -> dict[str, FloatArray]:
+        """(n_s,) what each sector deviates by, by name; of blades with deviations of several modes one a mode."""
+        found: dict[str, FloatArray] = {}
+        for name, one in self.blades.items():
+            if one.deviations.ndim == 1:
+                found[name] = one.deviations
+            else:
+                each = enumerate(one.deviations.T)
+                found |= {f"{name}, mode {i + 1}": own for i, own in each}
+        return found | {name: one.values for name, one in self.contacts.items()}
+
     def require(self, sectors: int) -> None:
         """Refuse deviations of another number of blades than `sectors`, and sectors that are not there."""
         values = {name: one.deviations for name, one in self.blades.items()}

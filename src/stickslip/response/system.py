@@ -36,6 +36,8 @@ class System:
         Dofs over which the predicted error of the harmonics is taken: outputs, contact dofs, chosen directions; None: the outputs.
     free
         Dofs of rigid bodies that only contacts hold; they are retained whether or not a contact touches them.
+    peak_of
+        Positions among the outputs of which the largest amplitude is that of the response, as that of all blades; None: the first one.
     """
 
     structure: LinearSide
@@ -43,6 +45,7 @@ class System:
     outputs: IntArray
     alert_dofs: IntArray | None = None
     free: IntArray | None = None
+    peak_of: IntArray | None = None
 
     def __post_init__(self) -> None:
         if self.interface.gap_operator.shape[1] != self.structure.n:

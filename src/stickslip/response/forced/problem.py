@@ -254,14 +254,22 @@ class ForcedProblem:
         forces = self.low.linear.load.harmonics
         return tuple(h for h in sorted(forces) if np.any(forces[h])) or (1,)
 
-    def amplitude(self, point: ForcedPoint, output: int = 0) -> float:
+    def amplitude(self, point: ForcedPoint, output: int | None = None) -> float:
         """Return the amplitude of output number `output` at a point, m; see `amplitude_of`."""
         return self.amplitude_of(point.omega, point.coefficients, output)
 
-    def amplitude_of(self, omega: float, coefficients: ComplexArray, output: int = 0) -> float:
-        """Return the amplitude of output number `output` over the harmonics that the load drives, m: of several the root of their squares."""
-        motion = self.low.linear.recover(omega, coefficients)
-        return float(np.linalg.norm(motion[list(self.driven), self.system.outputs[output]]))
+    def amplitude_of(
+        self, omega: float, coefficients: ComplexArray, output: int | None = None
+    ) -> float:
+        """Return the amplitude of output number `output` over the harmonics that the load drives, m: of several the root of their squares.
+
+        None: the largest one of those that the system's peak is of.
+        """
+        motion, system = self.low.linear.recover(omega, coefficients), self.system
+        first = np.zeros(1, dtype=np.int64) if system.peak_of is None else system.peak_of
+        chosen = first if output is None else np.array([output])
+        rows = motion[list(self.driven)][:, system.outputs[chosen]]
+        return float(np.linalg.norm(rows, axis=0).max())
 
 
 def forced_problem(system: System, load: HarmonicLoad, sweep: Sweep) -> ForcedProblem:

@@ -15,6 +15,7 @@ from stickslip.harmonic.support import named
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.response import ForcedPoint, Sweep, forced_response
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
+from stickslip.study.analyses.forced.blades import of_blades
 from stickslip.study.analyses.forced.comparison import Check
 from stickslip.study.analyses.forced.dataset import put_together
 from stickslip.study.analyses.forced.estimate import estimate
@@ -61,7 +62,8 @@ from stickslip.units import HZ
 
 NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
 COMPILED = 5.0  # seconds of the first evaluation: below, it was found compiled
-NOTES = ("model", "response", STABLE, IN_TIME, HARMONICS)  # what makes up the dataset
+BLADES = "blades"  # of a wheel whose sectors differ
+NOTES = ("model", "response", BLADES, STABLE, IN_TIME, HARMONICS)  # what makes up the dataset
 
 
 class ForcedResponseAnalysis:
@@ -98,6 +100,8 @@ class ForcedResponseAnalysis:
         notes.put("finished", {"points": len(points)})
         response = collect(inputs.problem, points, inputs.model.peak_output)
         _put_down(inputs, response, notes)
+        if inputs.model.blades is not None and notes.get(BLADES) is None:
+            notes.put(BLADES, of_blades(inputs, response))
         _judge(inputs, response, notes)
         if HARMONICS in inputs.checks:
             _check_harmonics(inputs, response, notes)
@@ -159,7 +163,7 @@ def _put_down(question: Question, response: Response, notes: Notes) -> None:
     if notes.get("response") is not None:
         return
     shift = peak_shift(question, response)
-    notes.put("model", of_model(question))
+    notes.put("model", of_model(question, response.output))
     told = {"known_verdicts": to_json(known(question, response, shift))}
     notes.put("response", of_response(question, response, shift) | told)
     LOG.info(

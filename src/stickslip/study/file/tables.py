@@ -15,6 +15,7 @@ from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.file.loads import Limits, LoadTable, Output, Retention, Rotation
 from stickslip.study.file.material import DampingTable, MaterialTable, StudyReduction
 from stickslip.study.file.measured import Measured
+from stickslip.study.file.mistuning import MistuningTable
 from stickslip.study.file.parts import AnyPart
 from stickslip.study.file.section import Name, Section
 
@@ -31,6 +32,7 @@ OF_THE_MODEL = frozenset(
         "rotation",
         "retention",
         "aero",
+        "mistuning",
     }
 )
 
@@ -74,6 +76,10 @@ class Tables(Section):
     rotation: Rotation = Field(default_factory=Rotation, description="the table [rotation]")
     aero: AeroTable | None = Field(
         None, description="the table [aero], of aerodynamic influence coefficients"
+    )
+    mistuning: dict[Name, MistuningTable] = Field(
+        default_factory=dict,
+        description="the tables [mistuning.NAME], of what differs from sector to sector",
     )
     output: Output = (
         Field(  # validated even if left out: its folder may be a link that leads elsewhere

@@ -1,5 +1,6 @@
 """What can be refused without a mesh: names that are not there, files that are not there, questions without what they need."""
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -29,11 +30,13 @@ from stickslip.study.models.aero import aero_refusals
 from stickslip.study.models.areas import without_areas
 from stickslip.study.models.cost import too_large
 from stickslip.study.models.files import MESHES
+from stickslip.study.models.mistuning import mistuning_refusals
 
 BLADES = ("root", "force", "tip1", "edge1", "tip2")
 SECTOR = ("root", "cyclic_low", "cyclic_high", "tip")
 SIDES = ("flat", "curved")
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
+OF_SECTOR = re.compile(r"\[\d+\](?=\.)")  # of one blade of a mistuned wheel
 
 
 def refusals(tables: Tables, home: Path) -> Iterator[InputError]:
@@ -58,6 +61,7 @@ def refusals(tables: Tables, home: Path) -> Iterator[InputError]:
         yield from _outputs(tables)
         yield from _questions(tables)
         yield from aero_refusals(tables, home, sectors_of(tables))
+        yield from mistuning_refusals(tables, home, sectors_of(tables))
 
 
 def sectors_of(tables: Tables) -> int | None:
@@ -287,7 +291,7 @@ def _outputs(tables: Tables) -> Iterator[InputError]:
         yield from _refused(tables, f"output.points.{name}", point.on, ("set", "dof"))
     peak = tables.output.peak
     if peak:
-        head, _, direction = peak.partition(".")
+        head, _, direction = OF_SECTOR.sub("", peak).partition(".")
         of = {name: _directions(tables, point) for name, point in tables.output.points.items()}
         words = of.get(head, ())
         may_have = len(words) > 1 and (direction in COMPONENTS or is_numbered(direction))

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from stickslip.study.file.loads import LoadTable
 from stickslip.study.file.tables import Tables
 from stickslip.study.models.aero import aerodynamics_of
 from stickslip.study.models.files import alike
+from stickslip.study.models.mistuning import mistuning_of, spare_parts
 from stickslip.study.models.parts import Memo, Workshop
 from stickslip.units import DEG, RPM
 
@@ -38,9 +40,11 @@ def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
     InputError
         Naming the key, if files cannot be read or something does not fit.
     """
-    parts = Workshop(tables, home, memo).parts()
+    every = Workshop(tables, home, memo).parts()
+    spare = spare_parts(tables)
+    parts = {name: part for name, part in every.items() if name not in spare}
     rotation = tables.rotation
-    return Model(
+    alike = Model(
         parts=parts,
         contacts={name: _contact(parts, table) for name, table in tables.contact.items()},
         joins={
@@ -63,6 +67,12 @@ def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
         retention=tables.retention.stiffness_n_per_m,
         aerodynamics=_aerodynamics(tables, parts, home),
     )
+
+    def own_name(name: str) -> str:
+        return _own_name(parts, name)
+
+    mistuning = mistuning_of(tables, home, alike, every, own_name)
+    return alike if mistuning is None else replace(alike, mistuning=mistuning)
 
 
 def _aerodynamics(tables: Tables, parts: Mapping[str, Part], home: Path) -> Aerodynamics | None:

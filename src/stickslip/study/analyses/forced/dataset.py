@@ -12,7 +12,13 @@ from stickslip.study.analyses.forced.values import Values
 from stickslip.study.analyses.forced.verdicts import with_levels
 from stickslip.study.analyses.verdict import said
 
-LABELLED = ("output", "retained", "contact", "driven")  # dimensions whose entries have names
+LABELLED = (
+    "output",
+    "retained",
+    "contact",
+    "driven",
+    "mistuned",
+)  # dimensions whose entries have names
 # dimensions along which cases follow each other, the variable that says whose they are, and one that tells how many there are
 ROWS = {
     "point": ("point_case", "frequency_hz"),
@@ -20,8 +26,9 @@ ROWS = {
     "alert_point": ("alert_case", "alert_frequency_hz"),
     "check": ("verify_case", "verify_frequency_hz"),
     "examined": ("stability_case", "stability_frequency_hz"),
+    "tuned_point": ("tuned_case", "tuned_frequency_hz"),
 }
-SOME = ("check", "examined")  # dimensions of what some cases may lack
+SOME = ("check", "examined", "tuned_point")  # dimensions of what some cases may lack
 COUNTED = (
     "harmonic",
     "sample",
@@ -57,7 +64,7 @@ def put_together(cases: Sequence[Values], labels: Sequence[str]) -> xr.Dataset:
     empty = [name for name, variable in found.items() if not _told(name, variable)]
     ordered = {name: variable for name, variable in found.items() if name not in empty}
     used = {d for v in ordered.values() for d in v.dims}
-    coordinates: dict[str, Any] = {name: each[0][name].values for name in LABELLED}
+    coordinates: dict[str, Any] = {n: each[0][n].values for n in LABELLED if n in each[0].coords}
     coordinates |= {name: values for name, values in AXES.items() if name in used}
     data = xr.Dataset(ordered, coords=coordinates, attrs=_attributes(cases, labels))
     data = data.assign(with_levels(data, labels))
@@ -104,7 +111,8 @@ def _of_case(index: int, values: Values, before: int) -> xr.Dataset:
         for name, quantity in QUANTITIES.items()
         if name in values
     }
-    made = xr.Dataset(data, coords={name: [str(x) for x in values[name]] for name in LABELLED})
+    named = {name: [str(x) for x in values[name]] for name in LABELLED if name in values}
+    made = xr.Dataset(data, coords=named)
     return made.assign_coords({d: np.arange(made.sizes[d]) for d in COUNTED if d in made.sizes})
 
 
@@ -117,7 +125,8 @@ def _shaped(value: Any, dims: Sequence[str]) -> Any:
 def _aligned(each: Sequence[xr.Dataset]) -> list[xr.Dataset]:
     """Return datasets of cases with the same labels and lengths."""
     counts = {d: np.arange(max(e.sizes.get(d, 0) for e in each)) for d in COUNTED}
-    labels = {d: list(dict.fromkeys(x for e in each for x in e[d].values)) for d in LABELLED}
+    labelled = [d for d in LABELLED if any(d in e.coords for e in each)]
+    labels = {d: list(dict.fromkeys(x for e in each for x in e[d].values)) for d in labelled}
     return [_filled(e, {d: n for d, n in counts.items() if d in e.sizes} | labels) for e in each]
 
 

@@ -165,7 +165,7 @@ def collect(problem: ForcedProblem, points: Sequence[ForcedPoint], output: int) 
     points
         All points in the order of solution.
     output
-        Position of the output whose peak counts.
+        Position of the output whose peak counts; of the largest of several, where the system says so.
     """
     audits = _audits(points)
     accepted = []
@@ -174,6 +174,10 @@ def collect(problem: ForcedProblem, points: Sequence[ForcedPoint], output: int) 
         audit = _audit_error(problem, point, audits.get(point.omega, []))
         made = _accept(problem, point, low)
         accepted.append(replace(made, driven=problem.driven, own_error=own, audit_error=audit))
+    of = problem.system.peak_of
+    if of is not None and any(a.fields for a in accepted):
+        sizes = np.array([a.amplitudes(problem.system.outputs.size)[of] for a in accepted])
+        output = int(of[np.argmax(np.nanmax(sizes, axis=0))])
     amplitude = np.array([a.amplitudes(output + 1)[output] for a in accepted])
     peak = int(np.nanargmax(amplitude)) if np.any(np.isfinite(amplitude)) else -1
     return Response(tuple(points), tuple(accepted), peak, output, problem.sweep.first_harmonics)

@@ -53,6 +53,12 @@ _OF = {
         "reference_sentence": ("1", "what the check says, in words"),
         "known_verdicts": ("1", "what only the model knew, verdicts as JSON"),
         "case_verdict": ("1", "whether the peak is to be trusted"),
+        "largest_blade": ("1", "sector of the blade with the largest amplitude"),
+        "tuned_peak_amplitude": ("m", "largest amplitude of the wheel with all sectors alike"),
+        "tuned_peak_hz": ("Hz", "frequency of that peak"),
+        "amplification": ("1", "largest amplitude of any blade over that of the wheel with all sectors alike"),
+        "whitehead": ("1", "(1 + √n)/2, a bound of the amplification for one family of modes, equal damping of all waves and no friction only"),
+        "localisation": ("1", "localisation factor at the peak: 0 where all blades move alike, 1 where one moves alone"),
     },
     "point": {
         "frequency_hz": ("Hz", "excitation frequency, in the order of the branch: it goes back where the branch folds, and up to a tenth of the range beyond lowest_hz and highest_hz; points added to resolve the peak stand last, as near to each other as its search came"),
@@ -116,6 +122,24 @@ _OF = {
         "attempt_status": ("1", "how it ended"),
         "attempt_newton_iterations": ("1", "Newton iterations"),
         "attempt_seconds": ("s", "time it took"),
+    },
+    "case blade": {
+        "blade_peak_amplitude": ("m", "largest amplitude of each blade at any frequency"),
+        "blade_peak_hz": ("Hz", "frequency of that"),
+    },
+    "case blade part": {
+        "blade_motion": ("m", "motion of the blades at the peak, the lowest harmonic that is driven"),
+    },
+    "case wave": {
+        "wave_amplitude": ("m", "amplitude of each wave number in the motion of the blades at the peak"),
+    },
+    "case blade mistuned": {
+        "deviation": ("1", "deviation of each sector, relative; of gaps in m"),
+    },
+    "tuned_point": {
+        "tuned_case": ("1", "case of a point of the wheel with all sectors alike"),
+        "tuned_frequency_hz": ("Hz", "its frequency"),
+        "tuned_amplitude": ("m", "its amplitude"),
     },
     "attempt harmonic": {
         "attempt_kept": ("1", "1 if the solution keeps the harmonic"),

@@ -230,6 +230,12 @@ def _require_sectors(model: Model, assembled: Assembled) -> None:
     """Refuse a wheel whose sectors are too many coordinates to be integrated."""
     side = assembled.system.structure
     if not isinstance(side, TunedWheel):
+        if assembled.blades is not None and side.n > MOST_IN_TIME:
+            raise input_error(
+                "mistuning",
+                f"--verify integrates all sectors, {side.n} coordinates, more than {MOST_IN_TIME}",
+                "Keep fewer modes, or verify a wheel of fewer sectors.",
+            )
         return
     place = f"part.{next(name for name, part in model.parts.items() if part.sectors > 1)}.sectors"
     size = different_sectors(side)[0] * side.n

@@ -21,8 +21,8 @@ from stickslip.units import HZ, RPM
 Values = dict[str, Any]
 
 
-def of_model(question: Question) -> Values:
-    """Return what is known of the model alone: labels, contacts, static state, natural frequencies, skin."""
+def of_model(question: Question, output: int) -> Values:
+    """Return what is known of the model, and the `output` whose peak counts: labels, contacts, static state, natural frequencies, skin."""
     model, skin = question.model, question.model.skin
     found = {
         "output": model.output_labels,
@@ -40,14 +40,14 @@ def of_model(question: Question) -> Values:
         "contact_position": model.contacts.position,
         "contact_frame": model.contacts.frame,
         "contact_area": model.contacts.area,
-        "attributes": json.dumps(_attributes(question)),
+        "attributes": json.dumps(_attributes(question, output)),
     }
     if skin is None:
         return found
     return found | {"surface_point": skin.points, "surface_triangle": skin.triangles}
 
 
-def _attributes(question: Question) -> Values:
+def _attributes(question: Question, output: int) -> Values:
     """Return the attributes of the dataset: texts, numbers and lists of numbers."""
     model, sweep = question.model, question.sweep
     order: Values = {} if model.engine_order is None else {"engine_order": model.engine_order}
@@ -56,7 +56,7 @@ def _attributes(question: Question) -> Values:
     own = {
         "samples": sweep.samples,
         "evaluator": sweep.evaluator,
-        "report_output": model.output_labels[0],
+        "report_output": model.output_labels[output],
         "sectors": model.sectors,
         "driven_harmonics": list(question.driven),
         "direction": sweep.direction,

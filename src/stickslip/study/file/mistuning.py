@@ -1,0 +1,132 @@
+"""The tables [mistuning.NAME]: blades, contacts and sectors that differ."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from stickslip.study.file.section import FilePath, Name, Positive, Section, custom_error
+
+MODES = 6  # blade-alone modes that carry a deviation where the study does not say
+Deviation = Annotated[float, Field(ge=-0.5, le=0.5)]
+KINDS = ("of", "contact", "part")
+
+
+class MistuningTable(Section):
+    """What differs from sector to sector: blades (`of`), a contact (`contact`), or the part of one sector (`part`)."""
+
+    of: Name | None = Field(
+        None, description='blades that differ: a part, or a node set of one such as "blade.airfoil"'
+    )
+    contact: Name | None = Field(None, description="name of the contact that differs")
+    part: Name | None = Field(None, description="part that is another one in a single sector")
+    sector: int | None = Field(
+        None, ge=0, le=10_000, description="of part: number of that sector, from 0"
+    )
+    by: Name | None = Field(
+        None,
+        description="of part: the part [part.NAME] that stands there instead, with the same nodes; it is nowhere else",
+    )
+    quantity: Literal["frequency", "stiffness", "friction_coefficient", "preload", "gap"] | None = (
+        Field(
+            None,
+            description="what differs: of blades frequency (the default) or stiffness; of contacts friction_coefficient, stiffness, "
+            "preload or gap",
+        )
+    )
+    deviations: list[Deviation] | None = Field(
+        None,
+        min_length=1,
+        max_length=10_000,
+        description="relative deviation of each sector from the first one on, -0.5 to 0.5; a shorter list is repeated",
+    )
+    gaps_m: list[float] | None = Field(
+        None,
+        min_length=1,
+        max_length=10_000,
+        description='of quantity = "gap": clearance in m that each sector has more; a shorter list is repeated',
+    )
+    distribution: Literal["normal", "uniform"] | None = Field(
+        None, description="of random deviations: normal or uniform"
+    )
+    standard_deviation: Annotated[float, Field(gt=0, le=0.2)] | None = Field(
+        None, description="of random deviations, relative, above 0 to 0.2"
+    )
+    standard_deviation_m: Positive | None = Field(
+        None, description="of random gaps in m, greater than zero"
+    )
+    seed: int = Field(
+        1, ge=0, le=2**31, description="of random deviations: the same seed gives the same"
+    )
+    file: FilePath | None = Field(
+        None,
+        description="CSV file of measured blade-alone frequencies, relative to the study; columns blade (from 0), mode (from 1), "
+        "frequency_hz",
+    )
+    relative_to: Literal["mean", "model"] = Field(
+        "mean",
+        description="of a file: deviations are taken from the mean of each mode over the blades, or from the frequencies of the model's "
+        "blade by itself",
+    )
+    modes: Annotated[int, Field(ge=1, le=200)] | Literal["all"] = Field(
+        MODES,
+        description="of blades: number of blade-alone modes that carry the deviation, or all (whatever the blade does; long for wheels "
+        "of many blades)",
+    )
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        kinds = [kind for kind in KINDS if getattr(self, kind) is not None]
+        if len(kinds) != 1:
+            found = " and ".join(kinds) or "neither"
+            raise custom_error(
+                f"needs one of of, contact and part, got {found}",
+                'Say what differs: of = "blade.airfoil", contact = "shroud", or part = "blade".',
+            )
+        if self.part is not None:
+            self._of_part()
+            return self
+        wanted = ("frequency", "stiffness") if self.of else None
+        known = wanted or ("friction_coefficient", "stiffness", "preload", "gap")
+        if (self.quantity is None and not self.of) or (
+            self.quantity is not None and self.quantity not in known
+        ):
+            raise custom_error(
+                "is missing" if self.quantity is None else f"is {self.quantity}",
+                f"Give one of {', '.join(known)}.",
+                "quantity",
+            )
+        self._pattern()
+        return self
+
+    def _of_part(self) -> None:
+        for key in ("sector", "by"):
+            if getattr(self, key) is None:
+                raise custom_error(
+                    "is missing beside part", "Say which sector, and what stands there.", key
+                )
+        for key in ("quantity", "deviations", "gaps_m", "distribution", "file"):
+            if getattr(self, key) is not None:
+                raise custom_error("is given beside part", "A part of its own has no pattern.", key)
+
+    def _pattern(self) -> None:
+        ways = ("deviations", "gaps_m", "distribution", "file")
+        given = [key for key in ways if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise custom_error(
+                f"needs one of {', '.join(ways)}, got {' and '.join(given) or 'neither'}",
+                'For example distribution = "normal" with standard_deviation = 0.01.',
+            )
+        gap = self.quantity == "gap"
+        spread = "standard_deviation_m" if gap else "standard_deviation"
+        if (given[0] == "deviations" and gap) or (given[0] == "gaps_m" and not gap):
+            raise custom_error(
+                f"does not go with quantity = {self.quantity!r}",
+                "Gaps are gaps_m, everything else deviations.",
+                given[0],
+            )
+        if self.distribution is not None and getattr(self, spread) is None:
+            raise custom_error(
+                "is missing beside distribution", "Say how much it scatters.", spread
+            )
+        if self.file is not None and (self.of is None or self.quantity == "stiffness"):
+            raise custom_error("is of blades' frequencies", "Give a list of deviations.", "file")
