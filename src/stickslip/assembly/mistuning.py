@@ -178,7 +178,10 @@ class Mistuning:
             else:
                 each = enumerate(one.deviations.T)
                 found |= {f"{name}, mode {i + 1}": own for i, own in each}
-        return found | {name: one.values for name, one in self.contacts.items()}
+        gap = ", gap in m"
+        return found | {
+            name + gap * (one.quantity == "gap"): one.values for name, one in self.contacts.items()
+        }
 
     def require(self, sectors: int) -> None:
         """Refuse deviations of another number of blades than `sectors`, and sectors that are not there."""

@@ -11,6 +11,7 @@ from stickslip.report.forced.head import cards
 from stickslip.report.forced.orders import of_each_order
 from stickslip.report.forced.stability import stability
 from stickslip.report.forced.surface import surface_map
+from stickslip.report.forced.wheel import blades, peaks_of_blades, statistics, wheel_at_peak
 from stickslip.report.forced.working import where_friction_works
 from stickslip.report.response import NEEDED, Response
 from stickslip.report.section import Block, Section
@@ -35,6 +36,7 @@ SECTION: Section = Section(
                 where_friction_works,
             ),
         ),
+        Block("wheel", "Blades of the wheel", (blades, peaks_of_blades, wheel_at_peak, statistics)),
         Block(
             "contact",
             "Contacts at the peak",

@@ -4,27 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.arrays import ComplexArray, IntArray
 from stickslip.response.forced.response import forced_problem, forced_response
+from stickslip.study.analyses.forced.bounds import BOUND, localisation, whitehead
 from stickslip.study.analyses.forced.points import Response, collect
 from stickslip.study.analyses.forced.question import Question
 from stickslip.study.analyses.forced.values import Values
 from stickslip.study.keep.progress import LOG
 from stickslip.units import HZ
-
-
-def whitehead(blades: int) -> float:
-    """Return Whitehead's (1 + √n)/2, the largest amplification of one family of modes of equal damping in all waves, without friction."""
-    return 0.5 * (1.0 + float(np.sqrt(blades)))
-
-
-def localisation(amplitudes: FloatArray) -> float:
-    """Return the localisation factor of amplitudes (n,): 0 where all are alike, 1 where one blade alone moves."""
-    largest = float(np.max(amplitudes))
-    others = np.delete(amplitudes, int(np.argmax(amplitudes)))
-    if not largest or not others.size:
-        return 0.0
-    return float(1.0 - np.sqrt(np.mean(others**2)) / largest)
 
 
 def tuned_response(question: Question) -> Response:
@@ -78,10 +65,7 @@ def of_blades(question: Question, response: Response) -> Values:
 def sentence(blades: int, factor: float, largest: int) -> str:
     """Say what the amplification is, and what it may be compared with."""
     bound = whitehead(blades)
-    return (
-        f"largest blade {largest}, amplification {factor:.4g} over the tuned wheel; (1 + √{blades})/2 = {bound:.3g} (Whitehead) bounds it "
-        "for one family of modes, equal damping of all waves and no friction only"
-    )
+    return f"largest blade {largest}, amplification {factor:.4g} over the wheel with all sectors alike; {BOUND} is {bound:.3g}"
 
 
 def _motion(response: Response, where: IntArray) -> ComplexArray:

@@ -5,6 +5,7 @@ import xarray as xr
 
 from stickslip.harmonic.support import named
 from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.analyses.forced.bounds import BOUND
 from stickslip.study.analyses.forced.working_words import TITLE, range_lines
 from stickslip.study.analyses.verdict import LEVELS, said
 
@@ -42,6 +43,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     found = [
         TextTable("Forced response" + f", {name}" * (name != FIRST), head, rows),
         _of_orders(data, labels),
+        _of_blades(data, labels),
         _lines(TITLE, range_lines(data)),
         _lines(_choice_title(data), choices(data)),
         _lines("Against twice as many harmonics", _sentences(data, "reference_sentence", labels)),
@@ -95,6 +97,27 @@ def _of_orders(data: xr.Dataset, labels: list[str]) -> TextTable:
                 )
     lines = (orders_sentence(data),) if rows else ()
     return TextTable("Largest amplitude of each engine order", head, tuple(rows), lines)
+
+
+def _of_blades(data: xr.Dataset, labels: list[str]) -> TextTable:
+    """Return amplification and largest blade where the sectors of a wheel differ."""
+    title = "Blades of the wheel"
+    if "amplification" not in data:
+        return TextTable(title, (), ())
+    head = ("case", "largest blade", "amplification", "tuned mm", "at Hz", "localisation")
+    rows = tuple(
+        (
+            label,
+            str(int(case["largest_blade"])),
+            f"{float(case['amplification']):.4f}",
+            f"{1e3 * float(case['tuned_peak_amplitude']):.5g}",
+            f"{float(case['tuned_peak_hz']):.3f}",
+            f"{float(case['localisation']):.3f}",
+        )
+        for label, case in zip(labels, (data.isel(case=i) for i in range(len(labels))), strict=True)
+    )
+    bound = f"{BOUND} is {float(data['whitehead'][0]):.3g}."
+    return TextTable(title, head, rows, (bound,))
 
 
 def _choice_title(data: xr.Dataset) -> str:

@@ -1,0 +1,21 @@
+"""What amplification and localisation of a mistuned wheel are measured by."""
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+
+BOUND = "Whitehead's (1 + √n)/2, a bound for one family of modes, equal damping of all waves and no friction only,"
+
+
+def whitehead(blades: int) -> float:
+    """Return Whitehead's (1 + √n)/2, the largest amplification of one family of modes of equal damping in all waves, without friction."""
+    return 0.5 * (1.0 + float(np.sqrt(blades)))
+
+
+def localisation(amplitudes: FloatArray) -> float:
+    """Return the localisation factor of amplitudes (n,): 0 where all are alike, 1 where one blade alone moves."""
+    largest = float(np.max(amplitudes))
+    others = np.delete(amplitudes, int(np.argmax(amplitudes)))
+    if not largest or not others.size:
+        return 0.0
+    return float(1.0 - np.sqrt(np.mean(others**2)) / largest)
