@@ -538,7 +538,8 @@ def test_bad_input_names_file_and_remedy(tmp_path: Path) -> None:
         tree_of(forced_response=synthetic_result().drop_vars("status")), tmp_path / "other.nc"
     )
     with pytest.raises(
-        InputError, match=r"other\.nc: holds none of forced_response, modes, campbell, flutter, safe"
+        InputError,
+        match=r"other\.nc: holds none of forced_response, modes, campbell, flutter, safe",
     ):
         report_file(other)
     good = write_result(

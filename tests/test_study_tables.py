@@ -286,7 +286,7 @@ WRONG = [
     ({"load.shaker.direction": '"q"'}, "load.shaker.direction: is no direction, got 'q'."),
     ({"load.shaker.harmonic": "0"}, "forced_response: has no harmonic load to respond to."),
     ({"load.shaker.harmonic": "2", "harmonics.low": "1"}, "load.shaker.harmonic: 2 is not kept by harmonics.low = 1."),
-    ({"load.shaker.force_n": "3.0"}, "load.shaker.force_n: needs one of force_n and ratio_of, got both."),
+    ({"load.shaker.force_n": "3.0"}, "load.shaker.force_n: needs one of force_n, ratio_of and pressure, got force_n and ratio_of."),
     ({"part.blades.pitch_m": "-1.0"}, "part.blades.pitch_m: must be greater than 0, got -1.0. Give distance of the two blades along x in m"),
     ({"part.blades.shape": '"prism_blade"'}, "part.blades.shape: is not known, got 'prism_blade'. Did you mean 'prism_blades'?"),
     ({"part.blades.pich_m": "0.05"}, "part.blades.pich_m: unknown key 'pich_m'. Did you mean 'pitch_m'?"),

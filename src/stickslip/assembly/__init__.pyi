@@ -1,5 +1,6 @@
 """Public names of `stickslip.assembly`, written once."""
 
+from .aerodynamics import Aerodynamics as Aerodynamics
 from .assembled import Assembled as Assembled
 from .assembled import Blades as Blades
 from .assembled import ContactTable as ContactTable
@@ -13,3 +14,4 @@ from .mistuning import pattern as pattern
 from .model import Model as Model
 from .placing import copy_of as copy_of
 from .placing import place_of as place_of
+from .pressure import PressureField as PressureField

@@ -8,6 +8,7 @@ import numpy as np
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.forces import (
     Labels,
+    amplitude,
     error_names,
     force_of,
     output_labels,
@@ -33,6 +34,8 @@ class Asked:
         (N,) of each load.
     labels
         What is reported.
+    spread
+        Loads of which no dof has to stay (`Model.spread`).
     names, watched
         Labels over which the error of missing harmonics is taken, and their dofs.
     """
@@ -43,6 +46,7 @@ class Asked:
     labels: Labels
     names: tuple[str, ...]
     watched: IntArray
+    spread: tuple[str, ...] = ()
 
     @property
     def stay(self) -> IntArray:
@@ -52,7 +56,8 @@ class Asked:
     @property
     def kept(self) -> IntArray:
         """Dofs that stay physical beside those of contacts and joins."""
-        return np.concatenate([self.stay, *(np.flatnonzero(f) for f in self.forces.values())])
+        near = [np.flatnonzero(f) for name, f in self.forces.items() if name not in self.spread]
+        return np.concatenate([self.stay, *near])
 
 
 def asked(model: Model, harmonics: int) -> Asked:
@@ -82,7 +87,7 @@ def asked(model: Model, harmonics: int) -> Asked:
     refuse_unheld(model)
     refuse_pulled(model, static_forces(model, forces))
     orders = {h: h * order for h in sorted({*driven.values()}) if h and order is not None}
-    return Asked(order, orders, forces, labels, names, watched)
+    return Asked(order, orders, forces, labels, names, watched, model.spread)
 
 
 def _refuse_beyond(driven: Mapping[str, int], harmonics: int) -> None:
@@ -140,5 +145,9 @@ def centrifugal_of_bodies(model: Model) -> FloatArray:
 
 def excitation(model: Model) -> float:
     """Return the amplitude by which responses are divided, N; NaN where nothing vibrates."""
-    driven = [abs(load.newton) for load in model.loads.values() if load.harmonic > 0]
+    driven = [
+        amplitude(model.places, name, load)
+        for name, load in model.loads.items()
+        if load.harmonic > 0
+    ]
     return max(driven, default=float("nan")) or float("nan")

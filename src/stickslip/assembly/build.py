@@ -60,6 +60,8 @@ class Linear:
     of_wave
         From a wave number to a structure whose modes are those of the reduced model, its gaps, and its coordinates of dofs of all
         parts.
+    field
+        From the name of a load of `Model.spread` and a harmonic to the load on the coordinates; None where there is none.
     """
 
     side: LinearSide
@@ -68,6 +70,7 @@ class Linear:
     of_dofs: Any
     load: Any
     of_wave: Any
+    field: Any = None
 
 
 def assemble(
@@ -184,7 +187,11 @@ def linear_side(
 
         return found.waves[number][0], gaps, place
 
-    return Linear(found.wheel, found.gaps, found.steady, of_dofs, load, of_wave)
+    def field(name: str, harmonic: int) -> Matrix:
+        number = excited_wave(order, model.sectors, harmonic)
+        return found.field(model.spread.index(name), number)
+
+    return Linear(found.wheel, found.gaps, found.steady, of_dofs, load, of_wave, field)
 
 
 def physical(model: Model, kept: IntArray) -> tuple[IntArray, IntArray]:
@@ -248,7 +255,7 @@ def loads_on(model: Model, linear: Linear, forces: Mapping[str, Matrix]) -> Harm
     harmonics: dict[int, Matrix] = {}
     for name, force in forces.items():
         h = model.driven[name]
-        own = linear.load(force, h)
+        own = linear.field(name, h) if name in model.spread else linear.load(force, h)
         if h == 0:
             static = static + np.real(own)
         else:
@@ -278,7 +285,7 @@ def pressed_points(model: Model) -> BoolArray:
     static = {name: load for name, load in model.loads.items() if load.harmonic == 0}
     forces = {name: force_of(model.places, name, load) for name, load in static.items()}
     refuse_pulled(model, static_forces(model, forces))
-    kept = stacked(np.flatnonzero(f) for f in forces.values())
+    kept = stacked(np.flatnonzero(f) for name, f in forces.items() if name not in model.spread)
     empty = kept[:0]
     linear = linear_side(model, 0, 0, kept, empty, in_memory)
     interface = Interface(model.pairs.names, model.pairs.laws, linear.gaps)

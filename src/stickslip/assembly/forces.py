@@ -22,6 +22,14 @@ def force_of(places: Places, name: str, load: Load) -> Matrix:
     return force_at(places, f"load.{name}", load)
 
 
+def amplitude(places: Places, name: str, load: Load) -> float:
+    """Return the magnitude of a whole load, N."""
+    if load.field is None:
+        return abs(load.newton)
+    key = f"load.{name}.on"
+    return abs(load.newton) * load.field.on(places.spot(load.on, key), key).newton
+
+
 def force_at(places: Places, key: str, load: Load) -> Matrix:
     """Return the (N,) force of a load that a study gives at `key`.
 
@@ -32,6 +40,9 @@ def force_at(places: Places, key: str, load: Load) -> Matrix:
     """
     spot = places.spot(load.on, f"{key}.on")
     amplitude = load.newton * (cmath.exp(1j * load.phase) if load.phase else 1.0)
+    if load.field is not None:
+        spread = load.field.on(spot, f"{key}.on").force
+        return amplitude * (spread if load.harmonic else spread.real)
     force = np.zeros(places.n, dtype=type(amplitude))
     if spot.surface is None:
         _refuse_direction(places, key, load, spot)

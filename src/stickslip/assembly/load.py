@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stickslip.assembly.pressure import PressureField
 from stickslip.errors import input_error
 
 
@@ -26,6 +27,8 @@ class Load:
         In rad.
     engine_order
         m of a wheel's excitation: harmonic h travels as the wave ``h m``, 0: all sectors alike; None for a single structure.
+    field
+        Pressure on the facets of a surface in place of a force: `newton` is then its share, 1 for all of it; None: a force.
 
     Raises
     ------
@@ -39,6 +42,7 @@ class Load:
     harmonic: int = 1
     phase: float = 0.0
     engine_order: int | None = None
+    field: PressureField | None = None
 
     def __post_init__(self) -> None:
         for name, least in (("harmonic", 0), ("engine_order", 0)):

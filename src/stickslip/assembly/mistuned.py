@@ -183,7 +183,14 @@ class AllSectors:
 
         steady = self.sector.steady
         own = steady if steady.ndim == 1 else steady[:, 0]
-        return Linear(self.side, self.gaps, np.tile(own, n), self.of_dofs, load, None)
+
+        def field(name: str, harmonic: int) -> Matrix:
+            k = excited_wave(order, n, harmonic)
+            return travelling(
+                self.sector.field(self.model.spread.index(name), k), wave(k, n).phase_angle, n
+            )
+
+        return Linear(self.side, self.gaps, np.tile(own, n), self.of_dofs, load, None, field)
 
 
 def all_sectors(model: Model, what: Asked, store: Store) -> AllSectors:

@@ -189,6 +189,12 @@ class Model:
 
         return pressed_points(self)
 
+    @property
+    def spread(self) -> tuple[str, ...]:
+        """Names of the loads that act on so many nodes that waves know them by projection alone: pressure fields on a wheel."""
+        fields = [name for name, load in self.loads.items() if load.field is not None]
+        return tuple(fields) if self.sectors > 1 else ()
+
     def without_aerodynamics(self) -> "Model":
         """Return the model in still fluid, itself where it has no coefficients."""
         return self if self.aerodynamics is None else replace(self, aerodynamics=None)

@@ -11,6 +11,7 @@ import scipy.sparse
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.coordinates import Coordinates
 from stickslip.assembly.flow import Flow, flow_around
+from stickslip.assembly.forces import force_of
 from stickslip.assembly.model import Model
 from stickslip.assembly.reduced import (
     Spin,
@@ -95,15 +96,20 @@ class SectorWaves:
         Wave number -> structure without its way back, and what `reduced_wave` projected on it.
     forces
         Wave number -> aerodynamic force on it, which the structures do not hold; empty: none.
+    fields
+        Wave number -> (n, l) loads of `Model.spread`.
     """
 
     sector: CyclicSector
     kept: IntArray
     waves: Mapping[int, tuple[Structure, Matrix]]
     forces: Mapping[int, Feedback] = field(default_factory=dict)
+    fields: Mapping[int, Matrix] = field(default_factory=dict)
 
     def with_forces(self, found: ReducedSector) -> ReducedSector:
-        """Return the waves in other coordinates with the aerodynamic forces on them."""
+        """Return the waves in other coordinates with the aerodynamic forces and the pressure fields on them."""
+        spread = {k: found.ways[k].conj().T @ own for k, own in self.fields.items()}
+        found = replace(found, fields=spread)
         if not self.forces:
             return found
         forces = {k: own.in_coordinates(found.ways[k]) for k, own in self.forces.items()}
@@ -151,7 +157,7 @@ def sector_waves(
     like = None if reduction is None else spin.reference
     own = "" if like is None else content_hash(*wheel[1:], kept, like.speed, like.coriolis)
     content = content_hash("wave", *wheel, kept, damping, loads, own)
-    memo = next(iter(model.parts.values())).memo
+    memo, spread = next(iter(model.parts.values())).memo, _spread(model)
     mirrored = goes_both_ways(sector, sector.structure)
 
     def reference(
@@ -166,7 +172,7 @@ def sector_waves(
         return found
 
     def made(k: int, reduction: Reduction | None) -> tuple[Structure, Matrix]:
-        columns, more = _columns(at, loads, flow, k)
+        columns, more = _columns(at, loads, flow, spread, k)
         key = f"{content} {reduction} {k}{more}"
         if key not in memo:
             how = reduction, damping
@@ -188,14 +194,23 @@ def sector_waves(
         # all waves have the coordinates of the one that needs most
         alike = replace(reduction, n_modes=most - kept.size)
         waves = {k: wave(k, alike) for k in numbers}
-    return SectorWaves(sector, kept, *_parted(waves, flow, alone=loads.ndim == 1))
+    return SectorWaves(sector, kept, *_parted(waves, flow, spread.shape[1], alone=loads.ndim == 1))
 
 
-def _columns(at: Coordinates, loads: Matrix, flow: Flow | None, k: int) -> tuple[Matrix, str]:
-    """Return loads with the patterns of the aerodynamic force on a wave behind them, and what tells these apart."""
-    if flow is None:
+def _spread(model: Model) -> FloatArray:
+    """Return the real parts of the loads of `Model.spread` on the dofs of all parts, then the imaginary ones, (N, 2 l)."""
+    own = [force_of(model.places, name, model.loads[name]) for name in model.spread]
+    forces = np.array(own).reshape(len(own), model.places.n).T
+    return np.hstack([forces.real, forces.imag])
+
+
+def _columns(
+    at: Coordinates, loads: Matrix, flow: Flow | None, spread: FloatArray, k: int
+) -> tuple[Matrix, str]:
+    """Return loads with the patterns of the aerodynamic force on a wave and the spread loads behind them, and what tells these apart."""
+    if flow is None and not spread.size:
         return loads, ""
-    patterns = at.load(flow.patterns(k))
+    patterns = at.load(spread if flow is None else np.hstack([flow.patterns(k), spread]))
     if loads.ndim == 1:
         columns = np.column_stack([loads, patterns])
     else:
@@ -204,18 +219,22 @@ def _columns(at: Coordinates, loads: Matrix, flow: Flow | None, k: int) -> tuple
 
 
 def _parted(
-    waves: Mapping[int, tuple[Structure, Matrix]], flow: Flow | None, *, alone: bool
-) -> tuple[Mapping[int, tuple[Structure, Matrix]], dict[int, Feedback]]:
-    """Return waves with their loads, of one load `alone` a row, and the aerodynamic forces that stood behind these."""
-    if flow is None:
-        return waves, {}
-    last = flow.influence.patterns
-    forces = {k: flow.on(k, _dense(columns[:, -last:])) for k, (_, columns) in waves.items()}
-    rest = {
-        k: (own, columns[:, 0] if alone else columns[:, :-last])
-        for k, (own, columns) in waves.items()
-    }
-    return rest, forces
+    waves: Mapping[int, tuple[Structure, Matrix]], flow: Flow | None, spread: int, *, alone: bool
+) -> tuple[Mapping[int, tuple[Structure, Matrix]], dict[int, Feedback], dict[int, Matrix]]:
+    """Return waves with their loads, of one load `alone` a row, and the aerodynamic forces and spread loads that stood behind these."""
+    felt = 0 if flow is None else flow.influence.patterns
+    if not felt + spread:
+        return waves, {}, {}
+    rest, forces, fields = {}, {}, {}
+    for k, (own, columns) in waves.items():
+        first = columns.shape[1] - felt - spread
+        rest[k] = own, columns[:, 0] if alone else columns[:, :first]
+        behind = _dense(columns[:, first:])
+        if flow is not None:
+            forces[k] = flow.on(k, behind[:, :felt])
+        real, imaginary = np.hsplit(behind[:, felt:], 2)
+        fields[k] = real + 1j * imaginary
+    return rest, forces, fields
 
 
 def _dense(matrix: Matrix) -> Matrix:

@@ -1,7 +1,7 @@
 """A model that is a sector of a wheel: how its parts meet their neighbours, and its waves reduced."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse
@@ -215,6 +215,8 @@ class ReducedSector:
         (3 p, n) CSR.
     steady
         (n,) load of steady rotation.
+    fields
+        Wave number -> (n, l) loads of `Model.spread` on its coordinates; empty: there are none.
     """
 
     sector: CyclicSector
@@ -224,6 +226,11 @@ class ReducedSector:
     wheel: TunedWheel
     gaps: Matrix
     steady: FloatArray
+    fields: Mapping[int, Matrix] = field(default_factory=dict)
+
+    def field(self, index: int, wave_number: int) -> Matrix:
+        """Return the (n,) load on the coordinates of a wave of one that was projected with it."""
+        return np.asarray(self.fields[wave_number % self.sector.sectors][:, index])
 
     def load(self, force: Matrix, wave_number: int) -> Matrix:
         """Return the (n,) load on the coordinates of a wave of a load (n_sector,) on kept dofs."""

@@ -22,6 +22,8 @@ from .rotating.campbell import Campbell as Campbell
 from .rotating.campbell import Crossing as Crossing
 from .rotating.campbell import campbell as campbell
 from .rotating.cyclic_campbell import cyclic_campbell as cyclic_campbell
+from .rotating.flutter import FlutterOfWave as FlutterOfWave
+from .rotating.flutter import flutter_of_wave as flutter_of_wave
 from .rotating.nodal_diameters import NodalDiameterMap as NodalDiameterMap
 from .rotating.nodal_diameters import nodal_diameter_map as nodal_diameter_map
 from .rotating.safe import Interference as Interference

@@ -29,6 +29,7 @@ from stickslip.study.analyses.forced.known import (
 )
 from stickslip.study.analyses.forced.more_harmonics import check_harmonics
 from stickslip.study.analyses.forced.points import Accepted, Response, collect
+from stickslip.study.analyses.forced.pressures import pressure_lines
 from stickslip.study.analyses.forced.question import (
     HARMONICS,
     IN_TIME,
@@ -83,6 +84,8 @@ class ForcedResponseAnalysis:
 
     def inputs(self, case: Case, model: Model) -> Question:
         """Return the assembled model and the sweep; refuse what cannot be computed."""
+        for line in _of_pressures(case, model):
+            LOG.info(line)
         return question_of(case, model)
 
     def solve(
@@ -116,12 +119,13 @@ class ForcedResponseAnalysis:
 
     def check(self, case: Case, model: Model) -> tuple[str, ...]:
         """Return the estimated cost, where resonances are to be expected, and how harmonics will be chosen."""
-        question = self.inputs(case, model)
+        question = question_of(case, model)
         chooser, passages = question.chooser, case.settings.harmonics.passages
         labels = question.model.error_labels
         of_model = [text for text in question.model.warnings if text not in model.warnings]
         doubts = [*no_resonance(question), *nothing_pressed(question), *mixed_places(labels)]
         return (
+            *_of_pressures(case, model),
             str(estimate(model, question.sweep)),
             *question.orders_lines,
             *(f"harmonics: {line}" for line in chooser.lines(passages)),
@@ -140,6 +144,12 @@ class ForcedResponseAnalysis:
     def summary(self, data: xr.Dataset) -> tuple[TextTable, ...]:
         """Return what the terminal prints."""
         return tables(data)
+
+
+def _of_pressures(case: Case, model: Model) -> tuple[str, ...]:
+    """Return what is told of pressure fields; a model without a study has no table of its loads."""
+    given = getattr(case.settings, "load", {})
+    return pressure_lines(model, {name: table.modal_forces for name, table in given.items()})
 
 
 FORCED_RESPONSE = ForcedResponseAnalysis()

@@ -6,7 +6,15 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from stickslip.study.file.bodies import AXES, Triple
-from stickslip.study.file.section import Name, Positive, Section, custom_error, once, shown
+from stickslip.study.file.section import (
+    FilePath,
+    Name,
+    Positive,
+    Section,
+    custom_error,
+    once,
+    shown,
+)
 
 Component = Literal["x", "y", "z", "rx", "ry", "rz"]
 Speed = Annotated[float, Field(ge=0, le=1e7)]  # rpm
@@ -39,7 +47,22 @@ class LoadTable(Section):
         'among its nodes), a node ("blade.node12") or a dof ("chain.m1")'
     )
     force_n: float | None = Field(
-        None, description="the whole force, or its amplitude, in N; or give ratio_of and ratio"
+        None,
+        description="the whole force, or its amplitude, in N; or give ratio_of and ratio, or pressure",
+    )
+    pressure: FilePath | None = Field(
+        None,
+        description="file of a pressure field that acts on the faces of the node set, relative to the study: CSV (columns x_m, y_m, z_m, "
+        "real_pa, imag_pa) or a surface of VTK (.vtk, .vtu)",
+    )
+    length_unit: Literal["m", "mm"] = Field(
+        "m", description="unit of the places in a VTK file of pressures: m or mm"
+    )
+    modal_forces: int = Field(
+        3,
+        ge=0,
+        le=50,
+        description="number of modes whose modal force by the pressure is told, 0 to 50",
     )
     ratio_of: Name | None = Field(
         None, description='another load, such as "load.pull", of which this one is a fraction'
@@ -65,11 +88,19 @@ class LoadTable(Section):
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
-        if (self.force_n is None) == (self.ratio_of is None):
-            found = "neither" if self.force_n is None else "both"
+        given = [k for k in ("force_n", "ratio_of", "pressure") if getattr(self, k) is not None]
+        if len(given) != 1:
+            found = " and ".join(given) or "none of them"
             raise custom_error(
-                f"needs one of force_n and ratio_of, got {found}", "Give exactly one.", "force_n"
+                f"needs one of force_n, ratio_of and pressure, got {found}", "Give exactly one.", "force_n"
+            )  # fmt: skip
+        if self.pressure is not None and self.direction is not None:
+            raise custom_error(
+                "is given for a pressure, which acts along normals", "Leave it out.", "direction"
             )
+        strange = sorted({"length_unit", "modal_forces"} & self.model_fields_set)
+        if self.pressure is None and strange:
+            raise custom_error("belongs to a pressure", "Leave it out.", strange[0])
         if (self.ratio_of is None) != (self.ratio is None):
             raise custom_error(
                 "goes together with the other of ratio_of and ratio",

@@ -26,10 +26,10 @@ from stickslip.study.file.parts import (
 )
 from stickslip.study.file.section import Section
 from stickslip.study.file.tables import Tables
-from stickslip.study.models.aero import aero_refusals
 from stickslip.study.models.areas import without_areas
 from stickslip.study.models.cost import too_large
 from stickslip.study.models.files import MESHES
+from stickslip.study.models.fluid import fluid_refusals
 from stickslip.study.models.mistuning import mistuning_refusals
 
 BLADES = ("root", "force", "tip1", "edge1", "tip2")
@@ -60,7 +60,7 @@ def refusals(tables: Tables, home: Path) -> Iterator[InputError]:
         yield from _loads(tables)
         yield from _outputs(tables)
         yield from _questions(tables)
-        yield from aero_refusals(tables, home, sectors_of(tables))
+        yield from fluid_refusals(tables, home, sectors_of(tables))
         yield from mistuning_refusals(tables, home, sectors_of(tables))
 
 

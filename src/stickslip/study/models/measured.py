@@ -301,5 +301,9 @@ def _force(file: StudyFile, values: Mapping[str, Any]) -> float:
     """Return the largest harmonic force of the study with these values of the varied keys, N."""
     raw = with_values(file.raw, values)
     tables = study_tables().model_validate(raw, context={"study": file.path})
-    forces = [abs(newton(tables, load)) for load in tables.load.values() if load.harmonic]
+    forces = [
+        abs(newton(tables, load))
+        for load in tables.load.values()
+        if load.harmonic and load.pressure is None
+    ]
     return max(forces, default=math.nan)

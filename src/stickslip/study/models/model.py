@@ -17,6 +17,7 @@ from stickslip.study.models.aero import aerodynamics_of
 from stickslip.study.models.files import alike
 from stickslip.study.models.mistuning import mistuning_of, spare_parts
 from stickslip.study.models.parts import Memo, Workshop
+from stickslip.study.models.pressure import read_pressure
 from stickslip.units import DEG, RPM
 
 DOF = re.compile(r"node\d+(\.r?[xyz])?|r?[xyz]|dof\d+")
@@ -55,7 +56,7 @@ def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
             )
             for name, table in tables.join.items()
         },
-        loads={name: _load(tables, parts, table) for name, table in tables.load.items()},
+        loads={name: _load(tables, parts, table, home) for name, table in tables.load.items()},
         outputs=_outputs(tables, parts),
         peak_output=tables.output.peak,
         alert_over=_alert_over(tables),
@@ -88,6 +89,8 @@ def newton(tables: Tables, table: LoadTable) -> float:
     """Return the force of a load, N: its own, or that of another one over the ratio."""
     if table.force_n is not None:
         return table.force_n
+    if table.pressure is not None:  # the share of the field
+        return 1.0
     other = tables.load[str(table.ratio_of).removeprefix("load.")]
     assert table.ratio is not None
     return newton(tables, other) / table.ratio
@@ -128,8 +131,12 @@ def _own_name(parts: Mapping[str, Part], name: str) -> str:
     return f"{ahead}{head}{dot}{alike(rest, parts[head].names) or as_dof}"
 
 
-def _load(tables: Tables, parts: Mapping[str, Part], table: LoadTable) -> Load:
+def _load(tables: Tables, parts: Mapping[str, Part], table: LoadTable, home: Path) -> Load:
     x, y, z = table.direction or (0.0, 0.0, 0.0)
+    field = None
+    if table.pressure is not None:
+        still = table.harmonic == 0
+        field = read_pressure(home / table.pressure, table.length_unit, static=still)
     return Load(
         on=_own_name(parts, table.on),
         newton=newton(tables, table),
@@ -137,6 +144,7 @@ def _load(tables: Tables, parts: Mapping[str, Part], table: LoadTable) -> Load:
         harmonic=table.harmonic,
         phase=table.phase_deg * DEG,
         engine_order=table.engine_order,
+        field=field,
     )
 
 

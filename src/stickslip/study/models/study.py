@@ -133,11 +133,18 @@ def model_digests(tables: Tables, home: Path) -> tuple[str, str]:
         name: [load.model_dump(mode="json"), newton(tables, load)]
         for name, load in tables.load.items()
     }
-    static = {name: loads[name] for name, load in tables.load.items() if load.harmonic == 0}
     if tables.aero is not None:
         parts.append(digest_of(home / tables.aero.file))
     files = [one.file for one in tables.mistuning.values() if one.file is not None]
     parts += [digest_of(home / file) for file in files]
+    fields = {
+        name: digest_of(home / load.pressure)
+        for name, load in tables.load.items()
+        if load.pressure is not None
+    }
+    for name, content in fields.items():
+        loads[name].append(content)
+    static = {name: loads[name] for name, load in tables.load.items() if load.harmonic == 0}
     output = tables.output.model_dump(mode="json", exclude={"folder"})
     driven = [own, parts, loads, output, tables.harmonics.alert_over]
     return _hash(driven), _hash([own, parts, static])

@@ -1,0 +1,252 @@
+"""Pressure fields on facets: force, moment and virtual work against closed forms, and the wheel that they drive."""
+
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+from small_v2 import SECTOR
+from test_assembly_wheel import ORDER, SECTORS, H, sector_model, shrouded_sector
+
+import stickslip as ss
+from stickslip.assembly.places import Spot
+from stickslip.assembly.pressure import PressureField
+from stickslip.contact.surface import nodal_surface
+from stickslip.reduction.waves import wave
+from stickslip.study.models.pressure import read_pressure
+
+WIDE, HIGH = 0.05, 0.03
+
+
+def plate(cells=(4, 3), triangles=False):
+    """A rectangle in the plane z = 0.01, outward along +z, and the operator of its free nodes."""
+    x, y = np.meshgrid(
+        np.linspace(0, WIDE, cells[0] + 1), np.linspace(0, HIGH, cells[1] + 1), indexing="ij"
+    )
+    points = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 0.01)])
+    number = np.arange(x.size).reshape(x.shape)
+    corners = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
+    quads = np.column_stack([c.ravel() for c in corners])
+    facets = np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]) if triangles else quads
+    dofs = np.arange(3 * len(points)).reshape(-1, 3)
+    return Spot(
+        "plate",
+        "part",
+        nodal_surface(points, dofs, 3 * len(points), facets),
+        np.zeros(0, dtype=int),
+    )
+
+
+def points_on(n, away=0.0):
+    """Points of a field, cell middles of a finer grid, and their areas."""
+    x, y = ((np.arange(k) + 0.5) / k for k in (n, n))
+    grid = np.stack(np.meshgrid(WIDE * x, HIGH * y, indexing="ij"), axis=-1).reshape(-1, 2)
+    area = np.tile([0.0, 0.0, WIDE * HIGH / n**2], (n * n, 1))
+    return np.column_stack([grid, np.full(n * n, 0.01 + away)]), area
+
+
+@pytest.mark.parametrize("triangles", [False, True])
+@pytest.mark.parametrize("known_areas", [False, True])
+def test_uniform_pressure_on_a_plane_face(triangles: bool, known_areas: bool) -> None:
+    points, area = points_on(7)
+    area = (
+        -area if known_areas else None
+    )  # the direction of an area does not count: the facet's does
+    field = PressureField(points, np.full(len(points), 2000.0 + 500j), area)
+    put = field.on(plate(triangles=triangles), "load.gas.on")
+    force = -(2000 + 500j) * WIDE * HIGH
+    moment = np.cross([WIDE / 2, HIGH / 2, 0.01], [0, 0, force])
+    for sums in (put.before, put.after):
+        np.testing.assert_allclose(sums[0], [0, 0, force], atol=1e-12)
+        np.testing.assert_allclose(sums[1], moment, atol=1e-13)
+    assert put.newton == pytest.approx(abs(force))
+
+
+def test_harmonic_pattern_against_its_integral() -> None:
+    """p = e^{iκx}: force and moment in closed form; a mesh of other points and none of its own areas."""
+    kappa = 80.0
+    points, area = points_on(40)
+    spot = plate((20, 6))
+    pressure = np.exp(1j * kappa * points[:, 0])
+    turn = np.exp(1j * kappa * WIDE)
+    force = -HIGH * (turn - 1) / (1j * kappa)
+    along = HIGH * (turn * (1 - 1j * kappa * WIDE) - 1) / kappa**2  # ∫ x p dA
+    for known, accuracy in ((None, 1e-3), (area, 2e-4)):
+        put = PressureField(points, pressure, known).on(spot, "load.gas.on")
+        assert abs(put.after[0, 2] - force) < accuracy * WIDE * HIGH
+        assert abs(put.after[1, 1] - along) < accuracy * WIDE**2 * HIGH
+        # force and moment of the field are those of the nodes
+        np.testing.assert_allclose(put.after, put.before, atol=1e-14)
+        # the work on a bending shape, which no resultant tells
+        w = spot.surface.points[:, 0] ** 2
+        work = put.force.reshape(-1, 3)[:, 2] @ w
+        x = (np.arange(4000) + 0.5) / 4000 * WIDE
+        exact = -HIGH * WIDE * np.mean(np.exp(1j * kappa * x) * x**2)
+        assert abs(work - exact) < 3e-3 * WIDE**3 * HIGH
+
+
+def test_a_field_that_stands_off_keeps_its_force_and_says_how_far_it_is() -> None:
+    points, area = points_on(9, away=4e-4)
+    put = PressureField(points, points[:, 0] * 1e5, area).on(plate(), "load.gas.on")
+    assert put.offset == pytest.approx(4e-4)
+    np.testing.assert_allclose(put.after[0], put.before[0], atol=1e-12)
+    # normal forces: the offset along the normal moves no moment
+    np.testing.assert_allclose(put.after[1], put.before[1], atol=1e-12)
+    with pytest.raises(ss.InputError, match=r"away from 'plate'.*Check the unit"):
+        PressureField(1e3 * points, points[:, 0]).on(plate(), "load.gas.on")
+    bare = replace(plate(), surface=None)
+    with pytest.raises(ss.InputError, match="has no facets"):
+        PressureField(points, points[:, 0]).on(bare, "load.gas.on")
+
+
+def flank_field(mesh):
+    """A field on the flank of the blade: its nodes, the real and the imaginary part of their own pattern."""
+    nodes = mesh.node_sets["flank_low"]
+    points = mesh.points[nodes]
+    pressure = 4e6 * (1 + 8 * (points[:, 0] - 0.15)) * np.exp(40j * points[:, 2])
+    return PressureField(points, pressure)
+
+
+def test_a_pressure_drives_a_wheel_as_its_nodal_forces_do() -> None:
+    """Projected on waves, or its nodes kept: the same load on the coordinates, and the same answer of the whole wheel."""
+    mesh = shrouded_sector()
+    model = sector_model(mesh)
+    gas = ss.Load(
+        on="blade.flank_low", newton=1.0, phase=0.3, engine_order=ORDER, field=flank_field(mesh)
+    )
+    more = ss.Load(
+        on="blade.flank_low", newton=0.5, harmonic=2, engine_order=ORDER, field=flank_field(mesh)
+    )
+    model = replace(model, loads={"lean": model.loads["lean"], "gas": gas, "more": more})
+    assert model.spread == ("gas", "more")
+    found = model.assembled(H)
+    whole = replace(model, mistuning=ss.assembly.Mistuning()).assembled(H)
+    put = gas.field.on(model.places.spot("blade.flank_low", "x"), "x")
+    for h, share in ((1, np.exp(0.3j)), (2, 0.5)):
+        side = found.system.structure
+        k = h * ORDER % SECTORS
+        # by the full wave: the work of the force on any static answer of the reduced one
+        moving = model.at(model.speed, k, "open")
+        full = moving.project(share * put.force)
+        reduced = found.load.harmonics[h]
+        own = side.of_harmonic(h)
+        stiff = moving.stiffness.toarray()
+        exact = full.conj() @ np.linalg.solve(stiff, full)
+        here = reduced.conj() @ np.linalg.solve(own.stiffness.toarray(), reduced)
+        assert abs(here - exact) < 1e-8 * abs(exact)
+    n = whole.load.static.size // SECTORS
+    angle = wave(ORDER, SECTORS).phase_angle
+    for s in range(SECTORS):
+        mine = whole.load.harmonics[1][s * n : (s + 1) * n]
+        np.testing.assert_allclose(
+            mine, np.exp(1j * s * angle) * whole.load.harmonics[1][:n], rtol=1e-9
+        )
+
+
+def write_fields(folder: Path, mesh_points, quads, pressure):
+    """The same field as VTK surface and as CSV of its nodes, in mm."""
+    data = {"real_pa": pressure.real, "imag_pa": pressure.imag}
+    meshio.write(
+        folder / "field.vtu", meshio.Mesh(1e3 * mesh_points, [("quad", quads)], point_data=data)
+    )
+    rows = ["x_mm,y_mm,z_mm,amplitude_kpa,phase_deg"]
+    for (x, y, z), p in zip(1e3 * mesh_points, pressure, strict=True):
+        rows.append(
+            f"{x:.15g},{y:.15g},{z:.15g},{abs(p) / 1e3:.15g},{math.degrees(np.angle(p)):.15g}"
+        )
+    (folder / "field.csv").write_text("\n".join(rows))
+
+
+def test_csv_and_vtk_hold_the_same_field(tmp_path: Path) -> None:
+    spot = plate((20, 8))
+    pressure = 1e3 * np.exp(60j * spot.surface.points[:, 0])
+    write_fields(tmp_path, spot.surface.points, spot.surface.facets, pressure)
+    of_vtk = read_pressure(tmp_path / "field.vtu", "mm", static=False)
+    of_csv = read_pressure(tmp_path / "field.csv", "m", static=False)
+    one, other = (f.on(spot, "x") for f in (of_vtk, of_csv))
+    np.testing.assert_allclose(of_vtk.area.sum(axis=0), [0, 0, WIDE * HIGH], atol=1e-15)
+    # planes through eight points smooth a wave of 42 points a period by 1.6e-3
+    np.testing.assert_allclose(one.after, other.after, atol=2e-3 * np.abs(one.after).max())
+    np.testing.assert_allclose(one.force, other.force, atol=5e-3 * np.abs(one.force).max())
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ("x_m,y_m,z_m,pressure_pa\n0,0,0,1", "A harmonic load has real_pa and imag_pa"),
+        ("x_m,y_m,real_pa,imag_pa\n0,0,0,1", "no column z_m or z_mm"),
+        ("x_m,y_m,z_m,real_pa,imag_pa,area_m2\n0,0,0,1,1,1", "area_m2 alone"),
+        ("x_m,y_m,z_m,real_pa,imag_pa\n0,0,zero,1,1", "line 2: z_m: is no finite number"),
+        ("x_m,y_m,z_m,real_pa,imag_pas\n0,0,0,1,1", "imag_pas.*imag_pa"),
+        ("x_m,y_m,z_m,real_pa,imag_pa,area_m2,normal_x,normal_y,normal_z\n0,0,0,1,1,1,1,1,0", "length 1"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_in_a_field_is_told(rows: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / "field.csv").write_text(rows)
+    with pytest.raises(ss.InputError, match=words):
+        read_pressure(tmp_path / "field.csv", "m", static=False)
+    (tmp_path / "field.vtu").write_text("no vtk")
+    with pytest.raises(ss.InputError, match="cannot be read as VTK"):
+        read_pressure(tmp_path / "field.vtu", "m", static=False)
+
+
+STUDY = (
+    "schema_version = 2\n[material]\nyoung_modulus_pa = 2.1e11\npoisson_ratio = 0.3\ndensity_kg_per_m3 = 7850.0\n"
+    + SECTOR
+    + """
+[reduction]
+fixed_interface_modes = 6
+[contact.shroud]
+between = ["blade.shroud_high", "next.blade.shroud_low"]
+law = "elastic_coulomb"
+normal_stiffness_n_per_m = 6e5
+tangential_stiffness_n_per_m = 3e5
+axial_stiffness_n_per_m = 3e5
+friction_coefficient = 0.3
+[load.gas]
+on = "blade.tip"
+pressure = "gas.csv"
+engine_order = 3
+modal_forces = 2
+[output]
+points = { tip = "blade.tip" }
+[forced_response]
+frequency_hz = [300.0, 310.0]
+"""
+)
+
+
+def test_a_study_tells_force_and_modal_forces_of_its_pressure(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    from stickslip.study.check import check_study
+    from stickslip.study.models.study import read_study
+
+    (tmp_path / "study.toml").write_text(STUDY)
+    (tmp_path / "gas.csv").write_text(
+        "x_m,y_m,z_m,real_pa,imag_pa\n0,0,0,1,1\n0,1,0,1,1\n1,0,0,1,1"
+    )
+    study = read_study(tmp_path / "study.toml")
+    places = study.model().places.spot("blade.tip", "x").surface.points
+    rows = "\n".join(f"{x},{y},{z},0,1000" for x, y, z in places)
+    (tmp_path / "gas.csv").write_text(f"x_m,y_m,z_m,real_pa,imag_pa\n{rows}")
+    study = read_study(tmp_path / "study.toml")
+    with caplog.at_level("INFO"):
+        check_study(study)
+    told = re.search(
+        r"load\.gas: modal forces .* on (ND \d \w+), .*: ([\d.]+) Hz: ([\d.e-]+) at (-?[\d.]+) deg",
+        caplog.text,
+    )
+    assert told is not None, caplog.text
+    assert told[1] == "ND 3 backward"
+    assert "pressure on blade.tip: force (" in caplog.text
+    model = study.model()
+    moving = model.at(model.speed, 3)
+    modes = ss.model.normal_modes(moving, 1)
+    shape = np.asarray(moving.expand(modes.shapes))[:, 0]
+    assert float(told[2]) == pytest.approx(modes.frequencies_hz[0], rel=1e-5)
+    force = model.loads["gas"].field.on(model.places.spot("blade.tip", "x"), "x").force
+    assert float(told[3]) == pytest.approx(abs(shape.conj() @ force), rel=1e-3)
