@@ -6,6 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.report.diameters import diameter_axes, mode_lines
+from stickslip.report.mistuned_modes import modes_of_wheel
 from stickslip.report.plot import INK, Plot, ring, styled
 from stickslip.report.quantities import NONE, counted, number, percent
 from stickslip.report.section import Block, Card, Section
@@ -115,5 +116,7 @@ def _cards(view: Waves) -> list[Card]:
 
 
 _TITLE = "Natural frequencies and mode shapes"
-_BLOCK = Block("modes", _TITLE, (diameter_map, mode_shapes, frequencies, in_flow, comparison))
+_BLOCK = Block(
+    "modes", _TITLE, (diameter_map, mode_shapes, frequencies, modes_of_wheel, in_flow, comparison)
+)
 SECTION: Section = Section("modes", NEEDED, Waves, (_BLOCK,), by_case=True, cards=_cards)

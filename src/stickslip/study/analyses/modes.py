@@ -1,6 +1,6 @@
 """Natural frequencies and mode shapes: of each nodal diameter of a wheel, or of a structure as a whole."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Self
 
@@ -11,11 +11,13 @@ from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 from stickslip.response.rotating.flutter import damping_ratio
-from stickslip.study.analyses.analysis import Case, Solved
+from stickslip.study.analyses.analysis import Case, Notes, Solved
 from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.analyses.waves.analysis import WaveAnalysis
 from stickslip.study.analyses.waves.dataset import Variables, frequencies, growth
 from stickslip.study.analyses.waves.numbers import Wheel
+from stickslip.study.analyses.waves.of_wheel import NOTE, variables
+from stickslip.study.analyses.waves.of_wheel import solved as solved_wheel
 from stickslip.study.analyses.waves.reference import Reference, read_reference
 from stickslip.study.analyses.waves.results import WaveModes
 from stickslip.study.analyses.waves.solve import Question, solve_wave
@@ -75,7 +77,8 @@ def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
         "frequency_hz": variable("wave mode", hertz, "Hz", "natural frequency"),
         "growth": growth(waves),
     }
-    return found | _in_flow(waves) | _compared(solved, hertz) | _shapes(waves), []
+    of_wheel = variables(solved.notes.get(NOTE))
+    return found | _in_flow(waves) | _compared(solved, hertz) | _shapes(waves) | of_wheel, []
 
 
 def _in_flow(waves: Sequence[WaveModes]) -> Variables:
@@ -145,6 +148,14 @@ class Modes(WaveAnalysis):
             rpm=float(f"{model.speed / RPM:.12g}"),
             shapes=asked.shapes and model.skin is not None,
         )
+
+    def solve(
+        self, inputs: Question, done: Sequence[WaveModes], notes: Notes
+    ) -> Iterator[WaveModes]:
+        """Yield what is found of each wave, and put down the modes of a wheel whose sectors differ."""
+        yield from super().solve(inputs, done, notes)
+        if inputs.model.mistuning is not None and notes.get(NOTE) is None:
+            notes.put(NOTE, solved_wheel(inputs))
 
 
 def _refuse_too_many(model: Model, number: int) -> None:

@@ -7,6 +7,7 @@ import xarray as xr
 
 from stickslip.study.analyses.analysis import TextTable
 from stickslip.study.analyses.waves.numbers import label, wave_name
+from stickslip.study.analyses.waves.of_wheel import table as of_wheel
 from stickslip.study.keep.netcdf import alike, one_case
 
 MOST_PAIRS = 30  # of an interference table on the screen
@@ -40,6 +41,7 @@ def modes_tables(case: xr.Dataset) -> list[TextTable]:
     tables = [TextTable(f"Natural frequencies in Hz {_at(case.attrs['speed_rpm'])}", head, rows)]
     if "damped_hz" in case and np.isfinite(case["damped_hz"]).any():
         tables.append(_damped_table(case, names))
+    tables += of_wheel(case)
     if "difference" in case and np.isfinite(case["difference"]).any():
         off = case["difference"].values
         worst = np.unravel_index(np.nanargmax(np.abs(off)), off.shape)

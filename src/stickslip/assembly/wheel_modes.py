@@ -1,0 +1,97 @@
+"""Modes of a wheel whose sectors differ, its contacts open, stuck or as the static loads leave them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import BoolArray, FloatArray
+from stickslip.assembly.asked import Asked
+from stickslip.assembly.forces import output_labels
+from stickslip.assembly.mistuned import AllSectors, all_sectors, pairs_of_all
+from stickslip.assembly.model import ContactsAs, Model
+from stickslip.assembly.reduced import Store, in_memory
+from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
+from stickslip.harmonic.rigid_contacts import STIFF
+from stickslip.model.modes import normal_modes, with_springs
+from stickslip.model.structure import Structure
+
+NO_PLACES = np.zeros(0, dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class WheelModes:
+    """Modes of all sectors together, lowest first; rigid ones are left out.
+
+    Parameters
+    ----------
+    frequencies_hz
+        (r,).
+    sector_share, wave_share
+        (r, n_s) share of the kinetic energy in each sector, and in each wave number.
+    """
+
+    frequencies_hz: FloatArray
+    sector_share: FloatArray
+    wave_share: FloatArray
+
+
+def wheel_modes(
+    model: Model, number: int, contacts: ContactsAs = "static", store: Store = in_memory
+) -> WheelModes:
+    """Return the lowest modes of a mistuned wheel.
+
+    Parameters
+    ----------
+    model
+        With mistuning.
+    number
+        How many; the reduced wheel's at most.
+    contacts
+        As in `Model.at`.
+    store
+        As in `Model.assembled`.
+    """
+    labels = output_labels(model.places, model.outputs, model.loads)
+    none = Asked(None, {}, {}, labels, (), NO_PLACES)
+    wheel = all_sectors(model, none, store)
+    structure = wheel.side.of_harmonic(0)
+    stiffness = _springs(model, structure, _held(model, contacts))
+    if stiffness.any():
+        structure = with_springs(structure, wheel.gaps, stiffness)
+    massive = int(np.count_nonzero(structure.mass.diagonal()))
+    found = normal_modes(structure, min(number, massive))
+    strained = found.squares != 0
+    return _shares(model, wheel, found.frequencies_hz[strained], np.real(found.shapes[:, strained]))
+
+
+def _held(model: Model, contacts: ContactsAs) -> BoolArray:
+    p = len(model.pairs.names)
+    if contacts == "static" and p:
+        return np.tile(model.pressed, model.sectors)
+    return np.full(p * model.sectors, contacts == "stuck")
+
+
+def _springs(model: Model, structure: Structure, holds: BoolArray) -> FloatArray:
+    """Return the (3 p n_s,) stiffnesses of contacts that hold, each sector's own."""
+    stiff = STIFF * float(np.abs(structure.stiffness.diagonal()).max())
+    laws = [
+        law.softened(stiff) if isinstance(law, RigidCoulomb) else law
+        for law in pairs_of_all(model).laws
+    ]
+    rows = [
+        law.stuck_stiffness() if hold else np.zeros(3)
+        for law, hold in zip(laws, holds, strict=True)
+    ]
+    return np.array(rows, dtype=float).reshape(-1)
+
+
+def _shares(model: Model, wheel: AllSectors, hertz: FloatArray, shapes: FloatArray) -> WheelModes:
+    n = model.sectors
+    moved = wheel.side.of_harmonic(0).mass @ shapes
+    each = (shapes * moved).reshape(n, -1, hertz.size).sum(axis=1)
+    waves, driven = (
+        np.fft.fft(rows.reshape(n, -1, hertz.size), axis=0, norm="ortho")
+        for rows in (shapes, moved)
+    )
+    by_wave = np.real(waves.conj() * driven).sum(axis=1)
+    return WheelModes(hertz, (each / each.sum(axis=0)).T, (by_wave / by_wave.sum(axis=0)).T)
