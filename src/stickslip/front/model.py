@@ -24,7 +24,10 @@ from stickslip.study.keep.threads import one_loaded_blas_thread
 from stickslip.study.run import answer
 from stickslip.units import RPM
 
-_SHARED = ("harmonics", "solver", "limits")  # tables that analyses share
+_SHARED = {  # tables that analyses take beside their own
+    "forced_response": ("harmonics", "solver", "limits"),
+    "limit_cycle": ("solver",),
+}
 _OF_THE_MODEL = ("alert_over",)  # keys of them that a model has itself
 
 
@@ -86,6 +89,28 @@ class Model(Assembly):
         """Say which modes engine orders can excite; keys such as ``engine_orders=range(1, 13), margin_percent=5.0``."""
         return self._answer("safe", keys, folder)
 
+    def limit_cycle(
+        self, *, verify: bool = False, folder: str | Path | None = None, **keys: Any
+    ) -> Result:
+        """Find motions that nothing drives; keys such as ``wave_numbers=[3], points=40, in_time=True``.
+
+        Parameters
+        ----------
+        verify
+            Compare with time integration, as the key ``in_time`` does.
+        folder
+            Where to write ``result.nc``; left out: the result stays in memory.
+        keys
+            Of the table [limit_cycle].
+
+        Raises
+        ------
+        InputError
+            If a key is none, or the model does not allow the answer.
+        """
+        checks = frozenset({"verify"} if verify else ())
+        return self._answer("limit_cycle", keys, folder, checks)
+
     def _answer(
         self,
         name: str,
@@ -137,8 +162,8 @@ def _contact(contact: Contact) -> str:
 def _tables(name: str, keys: Mapping[str, Any]) -> dict[str, Section]:
     """Sort keys into the tables of an analysis and validate them."""
     sections: dict[str, type[Section]] = {name: named(name).table}
-    if name == "forced_response":
-        sections |= {table: Tables.model_fields[table].annotation for table in _SHARED}  # type: ignore[misc]
+    shared = _SHARED.get(name, ())
+    sections |= {table: Tables.model_fields[table].annotation for table in shared}  # type: ignore[misc]
     home = {key: table for table, own in sections.items() for key in own.model_fields}
     values: dict[str, dict[str, Any]] = {table: {} for table in sections}
     for key, value in keys.items():

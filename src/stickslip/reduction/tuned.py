@@ -118,6 +118,10 @@ class TunedWheel:
         """Whether there is a structure for each wave number: what all sectors in time need, each of which may do something else."""
         return all(k in self.waves for k in range(self.sectors))
 
+    def travelling_as(self, wave_number: int) -> "TunedWheel":
+        """Return the same wheel, which has every wave, under another engine order."""
+        return replace(self, engine_order=wave_number)
+
     def grounded(self, springs: Matrix) -> "TunedWheel":
         """Return the wheel with springs, a sparse matrix (n, n) in N/m, from its coordinates to the ground."""
         waves = {k: wave.grounded(springs) for k, wave in self.waves.items()}

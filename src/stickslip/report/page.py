@@ -26,13 +26,21 @@ from stickslip.report.plot import Plot
 from stickslip.report.quantities import NONE, fixed, quantity
 from stickslip.report.result import analysis, open_result, versions
 from stickslip.report.section import Card, Part, Section, Shown
-from stickslip.report.sections import campbell, flutter, forced_response, modes, safe
+from stickslip.report.sections import (
+    campbell,
+    flutter,
+    forced_response,
+    limit_cycle,
+    modes,
+    safe,
+)
 from stickslip.report.tables import html_table
 from stickslip.study.analyses.verdict import conclusion, not_trusted, of_tree
 from stickslip.study.keep.netcdf import alike, one_case
 
 SECTIONS: tuple[Section, ...] = (
     forced_response.SECTION,
+    limit_cycle.SECTION,
     modes.SECTION,
     campbell.SECTION,
     flutter.SECTION,

@@ -20,6 +20,7 @@ from stickslip.solve.status import Status
 FAINT = 1e-11  # m: a gap that moves less slips nowhere
 MOST_DOUBLINGS = 80
 SLIPS = 1e-6  # of the elastic force of the mode: what a contact adds that leaves its state
+ONSET = 1.01  # to which the amplitude is found at which slip begins
 LARGEST = 0.25
 PATIENT = Newton(max_iterations=60, globalisation="levenberg_marquardt")
 
@@ -62,7 +63,7 @@ class AmplitudePoint:
 
 
 def slip_amplitude(problem: SelfExcited) -> float:
-    """Return an amplitude at which the first contact leaves the state that it has in the mode: within a factor of two above.
+    """Return the amplitude, m, at which the first contact leaves the state that it has in the mode, to a percent.
 
     Raises
     ------
@@ -77,12 +78,20 @@ def slip_amplitude(problem: SelfExcited) -> float:
     faint = min(amplitude, 1.0)
     small = _solved(problem, equation, float(np.log(faint)), [])
     sticks = small.status.converged and np.isfinite(amplitude)
-    for _ in range(MOST_DOUBLINGS if sticks else 0):
+
+    def slips(amplitude: float) -> bool:
         # as long as all contacts stick the motion grows in proportion about the same mean
         grown = small.x.copy()
         grown[:mean] *= faint / amplitude
         left = equation.residual(grown, float(np.log(amplitude)))
-        if np.max(np.abs(left)) > SLIPS:
+        return bool(np.max(np.abs(left)) > SLIPS)
+
+    for _ in range(MOST_DOUBLINGS if sticks else 0):
+        if slips(amplitude):
+            below = 0.5 * amplitude
+            while amplitude > ONSET * below:
+                middle = float(np.sqrt(below * amplitude))
+                below, amplitude = (below, middle) if slips(middle) else (middle, amplitude)
             return amplitude
         amplitude *= 2.0
     if not sticks and np.isfinite(amplitude):

@@ -170,8 +170,8 @@ def _between(
 
 def _refined(problem: SelfExcited, cycle: LimitCycle, most: int, tolerance: float) -> LimitCycle:
     """Raise the harmonics until the amplitude stays."""
-    while MORE * cycle.order + 1 <= most:
-        more = problem.with_order(MORE * cycle.order + 1)
+    while cycle.order < most:
+        more = problem.with_order(min(MORE * cycle.order + 1, most))
         start = more.unknowns(cycle.coefficients / cycle.amplitude, cycle.omega, 0.0)[:-2]
         found = solve_cycle(more, start, cycle.amplitude, cycle.omega)
         if found is None:

@@ -2,6 +2,7 @@
 
 ANALYSES = {
     "forced_response": "stickslip.study.analyses.forced_response:FORCED_RESPONSE",
+    "limit_cycle": "stickslip.study.analyses.limit_cycle:LIMIT_CYCLE",
     "modes": "stickslip.study.analyses.modes:MODES",
     "campbell": "stickslip.study.analyses.campbell:CAMPBELL",
     "flutter": "stickslip.study.analyses.flutter:FLUTTER",

@@ -22,6 +22,7 @@ from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.forced.chooser import Chooser, chooser_of
 from stickslip.study.analyses.forced.estimate import check_limits, estimate, within_limits
+from stickslip.study.analyses.forced.examination import examines_every_wave
 from stickslip.study.analyses.forced.section import sweep_of
 from stickslip.study.analyses.verdict import said
 from stickslip.units import RPM
@@ -151,6 +152,8 @@ def question_of(case: Case, model: Model) -> Question:
     if IN_TIME in case.checks:
         harmonics = max(harmonics, model.sectors // 2)  # those that all waves of a wheel need
     assembled = model.assembled(harmonics, case.store)
+    if settings.forced_response.stability != "off" and examines_every_wave(assembled.system):
+        assembled = model.assembled(harmonics, case.store, every_wave=True)
     if IN_TIME in case.checks:
         _require_sectors(model, assembled)
     if (share := settings.forced_response.static_friction_share) is not None:

@@ -7,9 +7,16 @@ import numpy as np
 
 from stickslip.errors import InputError, StickslipError
 from stickslip.reduction.tuned import TunedWheel
-from stickslip.response.stability import stability
+from stickslip.response.stability import Stability, stability
+from stickslip.response.stability.waves import growing_wave, point_disturbances
 from stickslip.study.analyses.forced.comparison import Check
 from stickslip.study.analyses.forced.curve import branch_length
+from stickslip.study.analyses.forced.examination import (
+    FLOPS,
+    MOST_WHEEL,
+    MOST_WORK,
+    examination_work,
+)
 from stickslip.study.analyses.forced.in_time import seconds_in_time
 from stickslip.study.analyses.forced.jumps import jumps, stored_energy
 from stickslip.study.analyses.forced.points import Accepted, Response
@@ -18,10 +25,6 @@ from stickslip.units import HZ
 
 Word = Literal["stable", "unstable", "undecided", "not examined"]
 DOUBTFUL = 4  # points beside the peak, the nearest to it
-INTERVALS = 12  # between transitions, for each contact: 2 to 18 at the peaks of the two blades
-PRODUCTS = 20  # of matrices for each of these
-FLOPS = 2e10  # a second, of such products on one core
-MOST_WORK = 60 * FLOPS  # of one examination
 MOST_IN_TIME = 20.0  # seconds estimated of an integration that nobody asked for
 FAR = 50.0  # percent off: what a motion in time is that has left a balance of which no better one is known
 ONE_SECTOR = (
@@ -102,11 +105,25 @@ def examine(question: Question, accepted: Accepted) -> Examined:
         return Examined(omega, "not examined", np.nan, np.nan, why)
     try:
         found = stability(question.problem, accepted.point)
+        wave = _of_wave(question, accepted, found)
     except InputError as error:
         return Examined(omega, "not examined", np.nan, np.nan, error.problem)
     except (StickslipError, FloatingPointError, np.linalg.LinAlgError) as error:
         return Examined(omega, "not examined", np.nan, np.nan, f"no multipliers ({error})")
-    return Examined(omega, found.verdict, found.multiplier, found.multiplier_error, found.reason)
+    said = f"{found.reason}{wave}"
+    return Examined(omega, found.verdict, found.multiplier, found.multiplier_error, said)
+
+
+def _of_wave(question: Question, accepted: Accepted, found: Stability) -> str:
+    """Return which wave of a wheel the multiplier that decides belongs to; empty where disturbances die."""
+    wheel = question.model.system.structure
+    if not isinstance(wheel, TunedWheel) or found.verdict == "stable":
+        return ""
+    wave = growing_wave(point_disturbances(question.problem, accepted.point), found.multiplier)
+    if wave is None:
+        return ""
+    diameters = wave.nodal_diameter(wheel.sectors)
+    return f", in wave {wave.wave} ({diameters} nodal diameters) near {wave.omega / HZ:.5g} Hz"
 
 
 def with_motion(examined: Examined, check: Check | None) -> Examined:
@@ -135,17 +152,29 @@ def to_integrate(question: Question, response: Response, examined: list[Examined
 def unexaminable(question: Question) -> str:
     """Return why no point of a case has multipliers that could be had; empty where nothing is known against it."""
     system = question.model.system
-    if isinstance(system.structure, TunedWheel):
-        return ONE_SECTOR
     if system.interface.rigid:
         return "a contact is rigid: its force is no function of the gap"
-    if _work(question) > MOST_WORK:
+    work, wheel = examination_work(system), system.structure
+    if isinstance(wheel, TunedWheel):
+        return _unexaminable_wheel(wheel, work)
+    if work > MOST_WORK:
         return (
             f"{system.structure.n} coordinates with {system.interface.n_contacts} contacts would take about "
-            f"{_work(question) / FLOPS:.0f} s a point, more than {MOST_WORK / FLOPS:.0f} s: each interval between two transitions costs "
+            f"{work / FLOPS:.0f} s a point, more than {MOST_WORK / FLOPS:.0f} s: each interval between two transitions costs "
             "the exponential of a matrix of twice as many rows"
         )
     return ""
+
+
+def _unexaminable_wheel(wheel: TunedWheel, work: float) -> str:
+    if wheel.has_every_wave:
+        return ""
+    if work > MOST_WHEEL:
+        return (
+            f"against every wave all {wheel.sectors} sectors count, {wheel.sectors * wheel.n} coordinates, which would take about "
+            f"{work / FLOPS:.0f} s a point, more than {MOST_WHEEL / FLOPS:.0f} s"
+        )
+    return ONE_SECTOR
 
 
 def cost_line(question: Question) -> str:
@@ -166,14 +195,7 @@ def cost_line(question: Question) -> str:
         if seconds < MOST_IN_TIME
         else f"it stays undecided without --verify (about {seconds:.0f} s)"
     )
-    return f"stability: {points} of a case, about {_work(question) / FLOPS:.1g} s each; where the peak is undecided, {motion}"
-
-
-def _work(question: Question) -> float:
-    """Return the operations of one examination, which looks at two motions."""
-    system = question.model.system
-    rows = 2 * system.structure.n
-    return 2.0 * INTERVALS * system.interface.n_contacts * PRODUCTS * 2.0 * rows**3
+    return f"stability: {points} of a case, about {examination_work(question.model.system) / FLOPS:.1g} s each; where the peak is undecided, {motion}"
 
 
 def _off(question: Question, accepted: Accepted) -> bool:

@@ -1,0 +1,250 @@
+"""Limit cycles: damping and frequency over the amplitude, what is stable, and which wave wins in time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+import plotly.graph_objects as go
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.report.node import Node
+from stickslip.report.plot import ALARM, INK, Plot, colour, log_ticks, styled
+from stickslip.report.quantities import NONE, counted, joined, number, quantity, scale_for
+from stickslip.report.section import Block, Card, Section
+from stickslip.report.tables import shortened
+
+_SYMBOLS = {"stable": "circle", "unstable": "x", "undecided": "diamond-open", "not examined": "circle-open"}  # fmt: skip
+_READING = (
+    "Damping ratio of the motion of each amplitude: below zero it grows, above it decays, and where the curve crosses the line it "
+    "goes on by itself. Crossings upward attract motions of the same wave, crossings downward repel them: beyond these friction "
+    "cannot bound the motion."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Cycles(Node):
+    """One case.
+
+    Parameters
+    ----------
+    key
+        Added to the names of its figures: empty for the first case.
+    """
+
+    key: str = ""
+
+    @property
+    def names(self) -> list[str]:
+        """Of the modes that were followed."""
+        waves, modes = self.integers("wave_number"), self.integers("mode")
+        return [
+            f"mode {m}" if k < 0 else f"wave {k}, mode {m}"
+            for k, m in zip(waves, modes, strict=True)
+        ]
+
+    @property
+    def cycles(self) -> int:
+        """Number of limit cycles."""
+        return int(self.data.sizes.get("cycle", 0)) if self.has("cycle_amplitude") else 0
+
+    def of_branch(self, i: int, name: str) -> FloatArray:
+        """Return a variable along the amplitudes of a mode, in their order."""
+        amplitude = self.values("amplitude", "branch", "point")[i]
+        order = np.argsort(amplitude[np.isfinite(amplitude)], kind="stable")
+        own = self.values(name, "branch", "point")[i][np.isfinite(amplitude)]
+        return np.asarray(own[order])
+
+
+def damping(view: Cycles) -> Plot | None:
+    """Show the damping that each amplitude has; limit cycles are its zeros."""
+    if not view.has("amplitude"):
+        return None
+    figure = _over_amplitude(view, "damping_ratio", 100.0)
+    for i, name in enumerate(view.names):
+        figure.data[i].name = name
+    figure.add_hline(y=0.0, line={"color": INK, "width": 1})
+    _mark(view, figure, np.zeros(view.cycles))
+    figure.update_yaxes(title_text="damping ratio of the motion (%)")
+    return Plot(f"limit_cycles{view.key}", "Damping over the amplitude", _caption(view), figure)
+
+
+def frequencies(view: Cycles) -> Plot | None:
+    """Show the frequency of the motions."""
+    if not view.has("amplitude"):
+        return None
+    figure = _over_amplitude(view, "frequency_hz", 1.0)
+    if view.cycles:
+        _mark(view, figure, view.floats("cycle_frequency_hz"))
+    figure.update_yaxes(title_text="frequency (Hz)")
+    caption = (
+        "Friction that slips takes stiffness away: the frequency falls from that of the mode with all contacts stuck towards that without "
+        "friction. Limit cycles are marked as above."
+    )
+    return Plot(f"limit_cycle_frequency{view.key}", "Frequency over the amplitude", caption, figure)
+
+
+def waves_in_time(view: Cycles) -> Plot | None:
+    """Show what becomes of all unstable waves together."""
+    if not view.has("wave_amplitude"):
+        return None
+    figure = go.Figure()
+    time, amplitude = view.floats("time"), view.values("wave_amplitude", "window", "wave")
+    scale = scale_for(amplitude, "m")
+    largest = amplitude.max(axis=0)
+    shown = [k for k in range(amplitude.shape[1]) if largest[k] > 1e-3 * largest.max()]
+    for i, k in enumerate(shown):
+        figure.add_trace(
+            go.Scatter(
+                x=time, y=scale.factor * amplitude[:, k], mode="lines", name=f"wave {k}",
+                line={"color": colour(i), "width": 1.8},
+                hovertemplate=f"wave {k}: %{{y:.4g}} {scale.unit} at %{{x:.4g}} s<extra></extra>",
+            )
+        )  # fmt: skip
+    styled(figure, 420)
+    figure.update_xaxes(title_text="time (s)")
+    figure.update_yaxes(title_text=f"amplitude of each wave ({scale.unit})", rangemode="tozero")
+    caption = (
+        f"All sectors in time from a mixed start, 30 % of the limit cycle of each unstable wave: <b>{escape(view.text('outcome'))}</b>. Waves are told "
+        "apart by the motion of all sectors at one time and by the direction in which they turn; another start may end elsewhere."
+    )
+    return Plot(f"competing_waves{view.key}", "Competing waves in time", caption, figure)
+
+
+def cycle_table(view: Cycles) -> str:
+    """Return the limit cycles, and the modes that have none."""
+    if not view.has("wave_number"):
+        least = 100 * float(np.nanmin(view.floats("linear_damping_ratio")))
+        return f"<p>No mode that was looked at grows with contacts stuck: the least damping ratio is {number(least)} %.</p>"
+    names = view.names
+    rows = [_row(view, names, c) for c in range(view.cycles)]
+    head = ["mode", "amplitude", "frequency (Hz)", "slope of damping", "harmonics", "stability", "multiplier", "in time"]  # fmt: skip
+    table = shortened(head, rows, "limit cycles") if rows else ""
+    return f"<h3>Limit cycles</h3>{table}{_without(view, names)}"
+
+
+def _row(view: Cycles, names: Sequence[str], c: int) -> list[str]:
+    def value(name: str) -> float:
+        return float(view.floats(f"cycle_{name}")[c])
+
+    word = view.labels_of("cycle_stability")[c]
+    wave = int(view.integers("cycle_growing_wave")[c])
+    grows = f", wave {wave} grows" if word == "unstable" and wave >= 0 else ""
+    multiplier = f"{number(value('multiplier'), 5)} ± {number(value('multiplier_error'), 2)}"
+    in_time = NONE
+    if view.has("cycle_time_amplitude") and np.isfinite(value("time_amplitude")):
+        off = 100 * (value("time_amplitude") / value("amplitude") - 1.0)
+        in_time = f"{quantity(value('time_amplitude'), 'm', 5)} ({number(off, 2)} % off)"
+    few = "" if int(view.integers("cycle_enough")[c]) else " (not enough)"
+    return [
+        names[int(view.integers("cycle_branch")[c])], quantity(value("amplitude"), "m", 5), number(value("frequency_hz"), 7),
+        number(value("slope"), 3), f"{int(view.integers('cycle_harmonics')[c])}{few}", f"<b>{word}</b>{grows}",
+        multiplier if np.isfinite(value("multiplier")) else NONE, in_time,
+    ]  # fmt: skip
+
+
+def _without(view: Cycles, names: Sequence[str]) -> str:
+    """Say which modes friction cannot bound."""
+    ratio, most = view.floats("mode_damping_ratio"), view.floats("largest_damping_ratio")
+    lost = [i for i in range(len(names)) if ratio[i] < 0 and not most[i] > 0]
+    if not lost:
+        return ""
+    said = [f"{names[i]} (at most {number(100 * most[i])} %)" for i in lost]
+    return f"<p><b>Friction cannot bound</b> {joined(said)}: the damping is negative at every amplitude.</p>"
+
+
+def _over_amplitude(view: Cycles, name: str, factor: float) -> go.Figure:
+    figure = go.Figure()
+    every = view.values("amplitude", "branch", "point")
+    scale = scale_for(np.array([np.nanmedian(every)]), "m")
+    for i, label in enumerate(view.names):
+        figure.add_trace(
+            go.Scatter(
+                x=scale.factor * view.of_branch(i, "amplitude"), y=factor * view.of_branch(i, name), mode="lines", name=label,
+                line={"color": colour(i), "width": 2},
+                hovertemplate=f"{label}: %{{y:.6g}} at %{{x:.5g}} {scale.unit}<extra></extra>",
+            )
+        )  # fmt: skip
+    styled(figure, 460)
+    ticks = log_ticks(scale.factor * every[np.isfinite(every)])
+    output = escape(view.text("output"))
+    title = f"amplitude of {output} ({scale.unit})"
+    figure.update_xaxes(type="log", title_text=title, **ticks)
+    figure.update_layout(meta={"factor": scale.factor, "unit": scale.unit})
+    return figure
+
+
+def _mark(view: Cycles, figure: go.Figure, heights: FloatArray) -> None:
+    """Mark limit cycles by what their stability is."""
+    if not view.cycles:
+        return
+    amplitude, words = view.floats("cycle_amplitude"), np.array(view.labels_of("cycle_stability"))
+    factor, unit = figure.layout.meta["factor"], figure.layout.meta["unit"]
+    which: IntArray = view.integers("cycle_branch")
+    for word, symbol in _SYMBOLS.items():
+        own = words == word
+        if not np.any(own):
+            continue
+        lines = [colour(int(i)) for i in which[own]]
+        figure.add_trace(
+            go.Scatter(
+                x=factor * amplitude[own], y=heights[own], mode="markers", name=word,
+                marker={"symbol": symbol, "size": 11, "color": lines, "line": {"width": 2, "color": lines}},
+                hovertemplate=f"{word} limit cycle: %{{x:.5g}} {unit}<extra></extra>",
+            )
+        )  # fmt: skip
+
+
+def _caption(view: Cycles) -> str:
+    top = view.floats("largest_damping_ratio")
+    parts = [_READING]
+    if view.cycles:
+        words = view.labels_of("cycle_stability")
+        counts = [counted(words.count(word), f"{word} limit cycle") for word in _SYMBOLS if word in words]  # fmt: skip
+        parts.append(f"There are {joined(counts)} (marked).")
+    bounded = [f"{name} {number(100 * float(t))} %" for name, t in zip(view.names, top, strict=True) if np.isfinite(t)]  # fmt: skip
+    if bounded:
+        parts.append(f"Most damping: {joined(bounded)}.")
+    return " ".join(parts)
+
+
+def linear_table(view: Cycles) -> str | None:
+    """Return the damping of all modes that were looked at, contacts stuck."""
+    if not view.has("linear_damping_ratio"):
+        return None
+    waves = view.integers("linear_wave")
+    hertz, ratio = (view.values(f"linear_{n}", "linear", "mode") for n in ("frequency_hz", "damping_ratio"))  # fmt: skip
+    head = ["wave", *(f"mode {m + 1}: Hz, damping %" for m in range(hertz.shape[1]))]
+    rows = [
+        [
+            "–" if k < 0 else str(k),
+            *(_small(float(f), float(z)) for f, z in zip(own, damped, strict=True)),
+        ]
+        for k, own, damped in zip(waves, hertz, ratio, strict=True)
+    ]
+    return "<h3>Modes with contacts stuck</h3>" + shortened(head, rows, "waves")
+
+
+def _small(hertz: float, ratio: float) -> str:
+    if not np.isfinite(hertz):
+        return NONE
+    text = f"{number(hertz, 5)}, {number(100 * ratio, 3)}"
+    return f'<b style="color:{ALARM}">{text}</b>' if ratio < 0 else text
+
+
+def _cards(view: Cycles) -> list[Card]:
+    if not view.has("wave_number"):
+        return [Card("0", "modes grow by themselves", "contacts stuck")]
+    words = view.labels_of("cycle_stability") if view.cycles else ()
+    note = f"{words.count('unstable')} unstable, {len(view.names)} modes followed"
+    return [Card(str(words.count("stable")), "stable limit cycles", note)]
+
+
+_BLOCK = Block(
+    "limit-cycles",
+    "Vibration that nothing drives",
+    (damping, frequencies, cycle_table, waves_in_time, linear_table),
+)
+SECTION: Section = Section(
+    "limit_cycle", ("linear_damping_ratio",), Cycles, (_BLOCK,), by_case=True, cards=_cards
+)

@@ -1,0 +1,69 @@
+"""The table [limit_cycle] of a study file."""
+
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from stickslip.study.file.harmonics import HIGHEST
+from stickslip.study.file.section import Positive, Section, once, rising_pair
+
+MODES = 6  # of each wave that are looked at where none is named
+
+
+class LimitCycleTable(Section):
+    """Motions that nothing drives: which amplitude friction holds them at, and where it cannot."""
+
+    wave_numbers: list[Annotated[int, Field(ge=0, le=999)]] | None = Field(
+        None,
+        min_length=1,
+        max_length=200,
+        description="wave numbers of a wheel, 0 to the number of sectors less one: k travels forward, n - k backward; left out: those "
+        "that are unstable with contacts stuck",
+    )
+    modes: list[Annotated[int, Field(ge=1, le=100)]] | None = Field(
+        None,
+        min_length=1,
+        max_length=100,
+        description=f"numbers of modes, by frequency with contacts stuck, from 1; left out: the unstable ones among the first {MODES}",
+    )
+    amplitude_mm: list[Positive] | None = Field(
+        None,
+        min_length=2,
+        max_length=2,
+        description="the range [lowest, highest] of the amplitude of the peak output; left out: from where nothing slips to 300 times "
+        "where slip begins",
+    )
+    points: int = Field(
+        30, ge=5, le=1000, description="least number of amplitudes in the range, 5 to 1000"
+    )
+    harmonics: int = Field(
+        5,
+        ge=1,
+        le=HIGHEST,
+        description=f"harmonics of the curve over the amplitude, 1 to {HIGHEST}",
+    )
+    most_harmonics: int = Field(
+        41,
+        ge=1,
+        le=HIGHEST,
+        description=f"up to which harmonics of each limit cycle are raised until it stays, 1 to {HIGHEST}",
+    )
+    accuracy_percent: Positive = Field(
+        0.001,
+        description="change of amplitude and frequency by twice the harmonics below which these are enough",
+    )
+    in_time: bool = Field(
+        False,
+        description="whether stable limit cycles are compared with time integration, and that of all unstable waves together says which "
+        "one wins; --verify does the same",
+    )
+    periods: int = Field(
+        400, ge=50, le=100_000, description="most periods of a time integration, 50 to 100000"
+    )
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        for key in ("wave_numbers", "modes"):
+            once(getattr(self, key) or [], key)
+        rising_pair(self.amplitude_mm or [], "amplitude_mm", "amplitude")
+        return self

@@ -1,0 +1,135 @@
+"""Motions in time beside limit cycles: whether a stable one is kept, and which of several unstable waves wins."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, IntArray
+from stickslip.contact.interface import Interface
+from stickslip.errors import StickslipError
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.linear import LinearSide
+from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.self_excited.in_time import (
+    Marched,
+    march_periods,
+    mixed_start,
+    wave_history,
+)
+from stickslip.response.system import System
+from stickslip.response.time.sectors import whole_wheel
+from stickslip.response.time.start import TransientStart, start_from_harmonics
+from stickslip.study.analyses.cycles.question import ONE, Question, coordinate
+from stickslip.study.analyses.cycles.records import CycleBranch
+from stickslip.study.analyses.forced.question import MOST_IN_TIME
+from stickslip.study.keep.progress import LOG
+from stickslip.units import HZ
+
+STEPS = 512
+KICK = 1e-3  # of their own amplitude, by which speeds are disturbed
+SETTLED = 1e-7
+GOLDEN = 2.399963  # rad, of which no few multiples are alike
+SHARE = 0.3  # of the limit cycle of each wave, with which waves begin that compete
+
+
+def settle_cycles(question: Question, branch: CycleBranch) -> dict[str, Any]:
+    """Return amplitude (m) and frequency (rad/s) that time integration goes to from beside each attracting cycle; NaN of others."""
+    cycles = len(branch.cycle_amplitude)
+    amplitude, omega = np.full((2, cycles), np.nan)
+    said = ""
+    for i in range(cycles):
+        if not branch.slope[i] > 0.0:
+            continue
+        try:
+            marched = _from_cycle(question, branch, i)
+        except StickslipError as error:
+            said = str(error)
+            continue
+        if not marched.overflowed:
+            amplitude[i], omega[i] = marched.amplitude[0], marched.frequency[0]
+        LOG.info(
+            f"time integration: {1e3 * amplitude[i]:.5g} mm at {omega[i] / HZ:.4f} Hz where the balance has "
+            f"{1e3 * branch.cycle_amplitude[i]:.5g} mm at {branch.cycle_omega[i] / HZ:.4f} Hz"
+        )
+    return {"amplitude": amplitude, "omega": omega, "said": said}
+
+
+def compete(question: Question, branches: Sequence[CycleBranch]) -> dict[str, Any]:
+    """Return what becomes of a mixed start of all unstable waves of a wheel that have an attracting cycle."""
+    there = [(b, int(np.flatnonzero(b.slope > 0.0)[0])) for b in branches if np.any(b.slope > 0.0)]
+    own = {"waves": np.array([b.wave_number for b, _ in there], dtype=np.int64)}
+    nothing = {"time": np.zeros(0), "amplitude": np.zeros((0, 0)), "sentence": "", "kept": "[]"}
+    if len({b.wave_number for b, _ in there}) < 2:
+        return own | nothing
+    try:
+        motions = [(_motion(question, b, i), float(b.cycle_omega[i])) for b, i in there]
+        system = question.system(there[0][0].wave_number)
+        structure, contacts, load, outputs = in_time(system, question)
+    except StickslipError as error:
+        return own | nothing | {"sentence": str(error)}
+    omega = motions[0][1]
+    rest = np.zeros((2, structure.n), dtype=complex)
+    like = start_from_harmonics(rest, omega, contacts.gap_operator, contacts.laws)
+    start = _kicked(mixed_start([(SHARE * m[1], w) for m, w in motions], like), motions)
+    marched = march_periods(structure, contacts, load, omega, outputs, start, question.asked.periods, STEPS)  # fmt: skip
+    history = wave_history(marched)
+    return own | {
+        "time": history.time,
+        "amplitude": history.amplitude,
+        "sentence": history.sentence,
+        "kept": json.dumps(list(history.waves)),
+    }
+
+
+def in_time(
+    system: System, question: Question
+) -> tuple[LinearSide, Interface, HarmonicLoad, IntArray]:
+    """Return what is marched, and the peak output of each sector.
+
+    Raises
+    ------
+    InputError
+        If it is too large.
+    """
+    side = system.structure
+    at = coordinate(system)
+    if not isinstance(side, TunedWheel):
+        return side, system.interface, question.model.load, np.array([at])
+    if side.n * side.sectors > MOST_IN_TIME:
+        raise StickslipError(
+            f"time integration marches all sectors, {side.n * side.sectors} coordinates, more than {MOST_IN_TIME}"
+        )
+    whole = whole_wheel(system)
+    own = whole.structure.n // side.sectors
+    static = np.tile(question.model.load.static[:own], side.sectors)
+    places = at + own * np.arange(side.sectors)
+    return whole.structure, whole.contacts, HarmonicLoad(static), places
+
+
+def _from_cycle(question: Question, branch: CycleBranch, i: int) -> Marched:
+    system = question.system(branch.wave_number)
+    structure, contacts, load, outputs = in_time(system, question)
+    motion, omega = _motion(question, branch, i), float(branch.cycle_omega[i])
+    start = start_from_harmonics(motion, omega, contacts.gap_operator, contacts.laws)
+    start = _kicked(start, [(motion, omega)])
+    return march_periods(
+        structure, contacts, load, omega, outputs, start, question.asked.periods, STEPS, settles=SETTLED
+    )  # fmt: skip
+
+
+def _motion(question: Question, branch: CycleBranch, i: int) -> ComplexArray:
+    """Return the (H+1, n) amplitudes of a cycle; of a wheel those of all sectors."""
+    full = branch.coefficients[i, ..., 0] + 1j * branch.coefficients[i, ..., 1]
+    if branch.wave_number == ONE:
+        return full
+    return whole_wheel(question.system(branch.wave_number)).spread(full)
+
+
+def _kicked(start: TransientStart, motions: Sequence[tuple[ComplexArray, float]]) -> TransientStart:
+    """Return a start with speeds that are off by another share for each coordinate."""
+    size = sum(omega * np.abs(motion[1]) for motion, omega in motions)
+    shares = np.cos(GOLDEN * np.arange(start.velocity.size))
+    return replace(start, velocity=start.velocity + KICK * shares * size)

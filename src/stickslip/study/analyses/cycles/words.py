@@ -1,0 +1,144 @@
+"""What is told of limit cycles: verdicts, and what the terminal prints."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.analyses.verdict import Verdict
+from stickslip.study.keep.netcdf import alike, one_case
+
+CLOSE = 1e-3  # of amplitude or frequency, by which time integration may be off a cycle
+MORE = "Raise limit_cycle.most_harmonics."
+
+
+def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
+    """Return what is to be thought of a case from its variables."""
+    if "linear_damping_ratio" not in case:
+        return []
+    if "wave_number" not in case:
+        least = float(np.nanmin(case["linear_damping_ratio"].values))
+        why = f"no mode that was looked at grows with contacts stuck: the least damping ratio is {100 * least:.3g} %"
+        return [Verdict("trusted", label, None, why, "There is no limit cycle that begins with a linear instability.")]  # fmt: skip
+    found: list[Verdict] = []
+    for i in range(case["wave_number"].size):
+        found += _of_branch(label, case, i)
+    outcome = str(case["outcome"].values) if "outcome" in case else ""
+    if outcome:
+        found.append(Verdict("trusted", label, None, f"from a mixed start of all unstable waves, in time, {outcome}", "That may depend on the start."))  # fmt: skip
+    return found
+
+
+def branch_name(case: Mapping[str, xr.Variable] | xr.Dataset, i: int) -> str:
+    """Return the name of a mode of a wave."""
+    wave, mode = (int(np.asarray(case[n].values)[i]) for n in ("wave_number", "mode"))
+    return f"mode {mode}" if wave < 0 else f"wave {wave}, mode {mode}"
+
+
+def _of_branch(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdict]:
+    name = branch_name(case, i)
+    problem = str(case["problem"].values[i])
+    if problem:
+        return [Verdict("doubtful", label, None, f"{name}: {problem.removesuffix('.')}")]
+    ratio = float(case["mode_damping_ratio"].values[i])
+    own = [c for c in _cycles(case) if case["cycle_branch"].values[c] == i]
+    found = [v for c in own for v in _of_cycle(label, name, case, c)]
+    if ratio < 0.0 and not any(case["cycle_slope"].values[c] > 0.0 for c in own):
+        most = 100 * float(case["largest_damping_ratio"].values[i])
+        why = (
+            f"{name}: friction cannot bound it: its damping ratio is {100 * ratio:.3g} % with contacts stuck and {most:.3g} % at most "
+            "over the amplitudes looked at"
+        )
+        found.append(Verdict("trusted", label, None, why, "Give more damping or friction, or look at larger amplitudes (limit_cycle.amplitude_mm)."))  # fmt: skip
+    return found
+
+
+def _of_cycle(label: str, name: str, case: Mapping[str, xr.Variable], c: int) -> list[Verdict]:
+    amplitude, hertz = (float(case[f"cycle_{n}"].values[c]) for n in ("amplitude", "frequency_hz"))
+    what = f"{name}: the limit cycle of {1e3 * amplitude:.4g} mm"
+    found = []
+    if not case["cycle_enough"].values[c]:
+        change = float(case["cycle_change"].values[c])
+        by = "was solved with one set of harmonics alone" if np.isnan(change) else f"still moves by {100 * change:.2g} % with twice the harmonics"  # fmt: skip
+        found.append(Verdict("doubtful", label, hertz, f"{what} {by}", MORE))
+    word, reason = (str(case[n].values[c]) for n in ("cycle_stability", "cycle_reason"))
+    attracting = float(case["cycle_slope"].values[c]) > 0.0
+    wave = int(case["cycle_growing_wave"].values[c])
+    if attracting and word == "unstable":
+        by = f"a disturbance of wave {wave}" if wave >= 0 else "a disturbance"
+        why = f"{what} is stable in its own amplitude, but {by} grows: {reason}"
+        found.append(Verdict("doubtful", label, hertz, why, "The machine leaves it; limit_cycle.in_time tells for what."))  # fmt: skip
+    elif attracting and word != "stable":
+        why = f"{what} is stable in its own amplitude; other disturbances are {word}: {reason}"
+        found.append(Verdict("doubtful", label, hertz, why, "limit_cycle.in_time tells more."))
+    if "cycle_time_amplitude" in case:
+        found += _of_time(label, what, case, c)
+    return found
+
+
+def _of_time(label: str, what: str, case: Mapping[str, xr.Variable], c: int) -> list[Verdict]:
+    amplitude, hertz = (float(case[f"cycle_{n}"].values[c]) for n in ("amplitude", "frequency_hz"))
+    there = float(case["cycle_time_amplitude"].values[c])
+    away = abs(there / amplitude - 1.0)
+    if not np.isfinite(away) or away <= CLOSE:
+        return []
+    why = f"{what} is {100 * away:.2g} % off where time integration was at its end"
+    return [Verdict("doubtful", label, hertz, why, "Give it more limit_cycle.periods, or look at its stability.")]  # fmt: skip
+
+
+def _cycles(case: Mapping[str, xr.Variable]) -> range:
+    return range(case["cycle_amplitude"].size if "cycle_amplitude" in case else 0)
+
+
+def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
+    """Return what the terminal prints: the limit cycles of each case."""
+    found = []
+    groups = alike(data)
+    for group in groups:
+        case = one_case(data, group[0])
+        labels = [str(data["case_label"].values[i]) for i in group if len(groups) > 1]
+        head = f"{'; '.join(labels)}: " if labels else ""
+        found += _tables(case, head)
+    return tuple(found)
+
+
+def _tables(case: xr.Dataset, head: str) -> list[TextTable]:
+    if "wave_number" not in case:
+        return []
+    rows = [
+        (
+            branch_name(case, i),
+            f"{float(case['mode_frequency_hz'][i]):.6g}",
+            f"{100 * float(case['mode_damping_ratio'][i]):+.4g}",
+            _mm(case["slip_amplitude"][i]),
+            f"{100 * float(case['largest_damping_ratio'][i]):+.4g}",
+        )
+        for i in range(case.sizes["branch"])
+    ]
+    columns = ("mode", "Hz, stuck", "damping %", "slips from mm", "most damping %")
+    found = [TextTable(f"{head}Modes over the amplitude of {case.attrs.get('output', '')}", columns, tuple(rows))]  # fmt: skip
+    if "cycle_amplitude" not in case:
+        return found
+    cycles = []
+    for c in range(case.sizes["cycle"]):
+        wave = int(case["cycle_growing_wave"][c])
+        grows = f", wave {wave}" if wave >= 0 and str(case["cycle_stability"][c].values) == "unstable" else ""  # fmt: skip
+        cycles.append(
+            (
+                branch_name(case, int(case["cycle_branch"][c])),
+                _mm(case["cycle_amplitude"][c]),
+                f"{float(case['cycle_frequency_hz'][c]):.6g}",
+                "attracting" if float(case["cycle_slope"][c]) > 0.0 else "repelling",
+                f"{case['cycle_stability'][c].values!s}{grows}",
+                str(int(case["cycle_harmonics"][c])),
+            )
+        )
+    names = ("mode", "amplitude mm", "Hz", "in its amplitude", "against all disturbances", "H")
+    return [*found, TextTable(f"{head}Limit cycles", names, tuple(cycles))]
+
+
+def _mm(value: Any) -> str:
+    number = 1e3 * float(value)
+    return f"{number:.5g}" if np.isfinite(number) else "-"
