@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from stickslip.cli import app
 from stickslip.response.forced.response import Sweep, forced_response
 from stickslip.study.analyses import forced_response as analysis
-from stickslip.study.analyses.forced import stable
+from stickslip.study.analyses.forced import examination, stable
 from stickslip.study.analyses.forced.comparison import Check
 from stickslip.study.analyses.forced.in_time import MOST_TOLD, check_in_time, shows_after
 from stickslip.study.analyses.forced.points import Response, collect
@@ -191,17 +191,23 @@ def test_doubtful_points_near_the_peak_are_examined_too() -> None:
     assert to_examine(asked, replace(response, peak=-1)) == []
 
 
-def test_one_sector_of_a_tuned_wheel_is_not_examined(tmp_path: Path) -> None:
+def test_a_tuned_wheel_is_examined_with_all_its_sectors_if_they_are_few(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (case,) = read_study(write_shrouded_sector(tmp_path)).cases()
+    monkeypatch.setattr(examination, "MOST_WHEEL", 0.0)
+    monkeypatch.setattr(stable, "MOST_WHEEL", 0.0)
     asked = FORCED_RESPONSE.inputs(case, case.build())
     any_point = response_of(rubbed()).accepted[0]
     found = examine(asked, any_point)
     assert found.verdict == "not examined"
     assert np.isnan(found.multiplier)
-    assert found.sentence.endswith(
-        "not examined: what vibrates is one sector of a tuned wheel, which sees one family of disturbances only"
-    )
-    assert cost_line(asked).startswith("stability: not examined, what vibrates is one sector")
+    assert "not examined: against every wave all 8 sectors count" in found.sentence
+    assert cost_line(asked).startswith("stability: not examined, against every wave all 8 sectors")
+    monkeypatch.setattr(examination, "MOST_WHEEL", np.inf)
+    whole = FORCED_RESPONSE.inputs(case, case.build())
+    assert whole.model.system.structure.has_every_wave
+    assert cost_line(whole).startswith("stability: the peak")
 
 
 def test_what_costs_too_much_is_said_by_its_size(monkeypatch: pytest.MonkeyPatch) -> None:

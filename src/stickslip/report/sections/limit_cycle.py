@@ -78,8 +78,8 @@ def frequencies(view: Cycles) -> Plot | None:
         _mark(view, figure, view.floats("cycle_frequency_hz"))
     figure.update_yaxes(title_text="frequency (Hz)")
     caption = (
-        "Friction that slips takes stiffness away: the frequency falls from that of the mode with all contacts stuck towards that without "
-        "friction. Limit cycles are marked as above."
+        "With the amplitude the frequency goes from that of the mode with all contacts stuck towards that without friction. Limit cycles are "
+        "marked as above."
     )
     return Plot(f"limit_cycle_frequency{view.key}", "Frequency over the amplitude", caption, figure)
 
@@ -118,7 +118,7 @@ def cycle_table(view: Cycles) -> str:
         return f"<p>No mode that was looked at grows with contacts stuck: the least damping ratio is {number(least)} %.</p>"
     names = view.names
     rows = [_row(view, names, c) for c in range(view.cycles)]
-    head = ["mode", "amplitude", "frequency (Hz)", "slope of damping", "harmonics", "stability", "multiplier", "in time"]  # fmt: skip
+    head = ["mode", "amplitude", "frequency (Hz)", "harmonics", "stability", "multiplier", "in time"]  # fmt: skip
     table = shortened(head, rows, "limit cycles") if rows else ""
     return f"<h3>Limit cycles</h3>{table}{_without(view, names)}"
 
@@ -138,7 +138,7 @@ def _row(view: Cycles, names: Sequence[str], c: int) -> list[str]:
     few = "" if int(view.integers("cycle_enough")[c]) else " (not enough)"
     return [
         names[int(view.integers("cycle_branch")[c])], quantity(value("amplitude"), "m", 5), number(value("frequency_hz"), 7),
-        number(value("slope"), 3), f"{int(view.integers('cycle_harmonics')[c])}{few}", f"<b>{word}</b>{grows}",
+        f"{int(view.integers('cycle_harmonics')[c])}{few}", f"<b>{word}</b>{grows}",
         multiplier if np.isfinite(value("multiplier")) else NONE, in_time,
     ]  # fmt: skip
 
@@ -236,7 +236,7 @@ def _cards(view: Cycles) -> list[Card]:
     if not view.has("wave_number"):
         return [Card("0", "modes grow by themselves", "contacts stuck")]
     words = view.labels_of("cycle_stability") if view.cycles else ()
-    note = f"{words.count('unstable')} unstable, {len(view.names)} modes followed"
+    note = f"{words.count('unstable')} unstable, {counted(len(view.names), 'mode')} followed"
     return [Card(str(words.count("stable")), "stable limit cycles", note)]
 
 

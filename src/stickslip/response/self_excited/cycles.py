@@ -1,6 +1,6 @@
 """Limit cycles: where the damping over the amplitude is zero, each solved as the autonomous problem, with as many harmonics as it needs."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -13,9 +13,12 @@ from stickslip.response.self_excited.problem import SelfExcited
 from stickslip.solve.linear import Dense, factorised
 from stickslip.solve.newton_method import Newton, newton
 
+SHORTEST = 1e-3  # share of the damping by which it is taken away at least
+FARTHEST_STEP = 0.2  # of ln a in such a step: beyond, it is another motion
 MORE = 2  # times the harmonics, and one, at each step
-MOST_HALVINGS = 30
+SMALL = 1e-5  # change of the motion over which its energy is differenced
 SHARP = 1e-4  # of ln a, to which an extreme of the damping is found: its value is then known to the square of that
+AT_A_FOLD = 0.02  # of ln a: a curve may turn back between two points
 BRACKETED = 1.0  # times the distance of the two amplitudes by which a cycle may lie outside of them
 
 
@@ -30,7 +33,8 @@ class LimitCycle:
     omega
         rad/s.
     slope
-        ``dζ / d ln a``: positive where friction grows faster with the amplitude than what feeds the motion, so that it is attracting.
+        ``dζ / d ln √E`` with the kinetic energy E of the first harmonic, which is the amplitude of its mode: positive where friction grows
+        faster than what feeds the motion, so that it is attracting.
     order
         Highest harmonic.
     change
@@ -78,14 +82,19 @@ def limit_cycles(
         up to so many; fewer than there are: none is raised.
     """
     found: list[LimitCycle] = []
-    known = with_extremes(problem, curve)
-    for before, after in pairwise(known):
-        if before.level * after.level > 0.0 or before.level == after.level:
-            continue
+    for before, after in crossings(with_extremes(problem, curve)):
         cycle = _between(problem, before, after)
         if cycle is not None:
             found.append(_refined(problem, cycle, most_harmonics, tolerance))
     return sorted(found, key=lambda c: c.amplitude)
+
+
+def crossings(
+    curve: Sequence[AmplitudePoint],
+) -> list[tuple[AmplitudePoint, AmplitudePoint]]:
+    """Return the neighbours on a curve between which the damping changes its sign."""
+    known = [p for p in curve if p.converged]
+    return [(a, b) for a, b in pairwise(known) if a.level * b.level <= 0.0 and a.level != b.level]
 
 
 def with_extremes(problem: SelfExcited, curve: Sequence[AmplitudePoint]) -> list[AmplitudePoint]:
@@ -122,7 +131,7 @@ def _extreme(problem: SelfExcited, three: Sequence[AmplitudePoint]) -> Amplitude
 
 
 def solve_cycle(
-    problem: SelfExcited, start: FloatArray, amplitude: float, omega: float
+    problem: SelfExcited, start: FloatArray, amplitude: float, omega: float, level: float = 0.0
 ) -> FloatArray | None:
     """Return the unknowns of a limit cycle from a motion over its amplitude; None where there is none nearby.
 
@@ -134,6 +143,8 @@ def solve_cycle(
         (size,) unknowns of a motion over its amplitude.
     amplitude, omega
         Its amplitude, m, and frequency, rad/s.
+    level
+        Of damping that the motion is to have in place of none.
     """
     equation = problem.limit_cycle()
     guess = np.append(start, [np.log(omega / problem.mode.omega), np.log(amplitude)])
@@ -142,29 +153,45 @@ def solve_cycle(
         max_iterations=60,
         linear=problem.how.newton.linear,
     )
-    found = newton(lambda y: equation.linearise(y, 0.0), guess, options)
+    found = newton(lambda y: equation.linearise(y, level), guess, options)
     return found.x if found.status.converged else None
 
 
 def _between(
     problem: SelfExcited, before: AmplitudePoint, after: AmplitudePoint
 ) -> LimitCycle | None:
-    """Return the cycle between two points, which are brought together where it is not found from them: slip begins with a corner."""
-    for _ in range(MOST_HALVINGS):
-        share = before.level / (before.level - after.level)
-        y = before.unknowns + share * (after.unknowns - before.unknowns)
-        ends = np.log([before.amplitude, after.amplitude])
-        here = float(ends[0] + share * (ends[1] - ends[0]))
-        found = solve_cycle(problem, y[:-2], float(np.exp(here)), problem.omega(y))
-        if found is not None and abs(found[-1] - here) <= BRACKETED * abs(ends[1] - ends[0]):
+    """Return the cycle between two points: at once, or by less and less damping from either, since slip begins with a corner."""
+    share = before.level / (before.level - after.level)
+    y = before.unknowns + share * (after.unknowns - before.unknowns)
+    ends = np.log([before.amplitude, after.amplitude])
+    here = float(ends[0] + share * (ends[1] - ends[0]))
+    near = max(BRACKETED * abs(ends[1] - ends[0]), AT_A_FOLD)
+    tries: tuple[Callable[[], FloatArray | None], ...] = (
+        lambda: solve_cycle(problem, y[:-2], float(np.exp(here)), problem.omega(y)),
+        lambda: _undamped(problem, before),
+        lambda: _undamped(problem, after),
+    )
+    for attempt in tries:
+        found = attempt()
+        if found is not None and abs(found[-1] - here) <= near:
             return _cycle(problem, found, np.nan, enough=False)
-        middle = at_amplitude(
-            problem, float(np.exp(np.mean(ends))), [before.unknowns, after.unknowns]
-        )
-        if not middle.converged:
-            return None
-        on_first_side = middle.level * before.level > 0.0
-        before, after = (middle, after) if on_first_side else (before, middle)
+    return None
+
+
+def _undamped(problem: SelfExcited, point: AmplitudePoint) -> FloatArray | None:
+    """Take the damping away from a motion, in as many steps as that needs."""
+    level = problem.level(point.level, point.omega)
+    known = np.append(point.unknowns[:-1], np.log(point.amplitude))
+    left, step = 1.0, 0.5
+    while step > SHORTEST:
+        ahead = max(left - step, 0.0)
+        found = solve_cycle(problem, known[:-2], float(np.exp(known[-1])), problem.omega(known), ahead * level)  # fmt: skip
+        if found is None or abs(found[-1] - known[-1]) > FARTHEST_STEP:
+            step *= 0.5
+            continue
+        if ahead == 0.0:
+            return found
+        known, left = found, ahead
     return None
 
 
@@ -199,9 +226,27 @@ def _cycle(problem: SelfExcited, y: FloatArray, change: float, *, enough: bool) 
 
 
 def _slope(problem: SelfExcited, cycle: FloatArray) -> float:
-    """Return ``dζ / d ln a`` along the motions that damping keeps going, at a limit cycle."""
+    """Return ``dζ / d ln √E`` along the motions that damping keeps going, at a limit cycle.
+
+    The amplitude of one coordinate may fall where the motion grows, as where slip begins; the kinetic energy E of the first harmonic does not.
+    """
     y, p = np.append(cycle[:-1], 0.0), float(cycle[-1])
-    at = problem.over_amplitude().linearise(y, p)
+    equation = problem.over_amplitude()
+    at = equation.linearise(y, p)
     inverse = factorised(Dense(), at.jac)
     change = None if inverse is None else inverse(-at.jac_p)
-    return np.nan if change is None else 0.5 * float(change[-1]) * float(np.exp(-cycle[-2]))
+    if change is None:
+        return np.nan
+    step = SMALL / max(1.0, float(np.linalg.norm(change)))
+    ends = [_energy(problem, y + side * step * change, p + side * step) for side in (-1.0, 1.0)]
+    grown = 0.5 * float(np.log(ends[1] / ends[0])) / (2.0 * step)
+    return 0.5 * float(change[-1]) * float(np.exp(-cycle[-2])) / grown
+
+
+def _energy(problem: SelfExcited, y: FloatArray, log_amplitude: float) -> float:
+    """Return the kinetic energy of the first harmonic, over a factor that all motions share."""
+    omega, motion = problem.omega(y), problem.relative(y)
+    linear = problem.balance.linear
+    moving = linear.recover(omega, motion)[1]
+    mass = problem.system.structure.of_harmonic(1).mass
+    return float(omega**2 * np.exp(2.0 * log_amplitude) * np.vdot(moving, mass @ moving).real)

@@ -117,10 +117,13 @@ class SelfExcited:
         return self._bordered(setting)
 
     def limit_cycle(self) -> PeriodicProblem:
-        """Return the equation of a limit cycle: its last unknown is ``ln a``; it has no parameter."""
-        return self._bordered(
-            lambda extra, _: self._setting(self.balance, float(extra[0]), float(extra[1]))
-        )
+        """Return the equation of a motion of given damping, whose last unknown is ``ln a`` and whose parameter is its level: that of a limit cycle is zero."""
+
+        def setting(extra: FloatArray, level: float) -> Setting:
+            balance = self.balance if level == 0.0 else self.damped(level)
+            return self._setting(balance, float(extra[0]), float(extra[1]))
+
+        return self._bordered(setting)
 
     def unknowns(self, coefficients: ComplexArray, omega: float, last: float) -> FloatArray:
         """Return the unknowns of a motion (H+1, n_retained) over its amplitude, its frequency and the last unknown."""
@@ -134,6 +137,10 @@ class SelfExcited:
     def omega(self, y: FloatArray) -> float:
         """Return the frequency of unknowns, rad/s."""
         return self.mode.omega * float(np.exp(y[-2]))
+
+    def level(self, ratio: float, omega: float) -> float:
+        """Return the level of damping of a ratio at a frequency, rad/s."""
+        return 2.0 * ratio * omega / self.mode.omega
 
     def ratio(self, y: FloatArray) -> float:
         """Return the damping ratio of a motion whose last unknown is the level of damping."""

@@ -36,6 +36,8 @@ class CycleBranch:
         (cycles,) wave number and frequency (rad/s) of the disturbance that decides; -1 and NaN where unknown.
     problem
         Why there is no curve; empty where there is one.
+    lost
+        Zeros of the damping that were not solved as limit cycles.
     """
 
     wave_number: int
@@ -63,3 +65,4 @@ class CycleBranch:
     grows_as: IntArray
     grows_omega: FloatArray
     problem: str = ""
+    lost: int = 0

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,7 +16,12 @@ from stickslip.response.self_excited.curve import (
     of_point,
     slip_amplitude,
 )
-from stickslip.response.self_excited.cycles import LimitCycle, limit_cycles, with_extremes
+from stickslip.response.self_excited.cycles import (
+    LimitCycle,
+    crossings,
+    limit_cycles,
+    with_extremes,
+)
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.response.self_excited.problem import SelfExcited, self_excited_motions
 from stickslip.response.self_excited.stable import CycleStability, cycle_stability
@@ -83,7 +89,8 @@ def follow_mode(question: Question, wave: int, mode: StuckMode) -> CycleBranch:
         tolerance=0.01 * question.asked.accuracy_percent,
     )
     every = sorted([p for p in points if not p.converged], key=lambda p: p.amplitude)
-    return _branch(wave, problem, slips, [*solutions, *every], cycles)
+    branch = _branch(wave, problem, slips, [*solutions, *every], cycles)
+    return replace(branch, lost=max(len(crossings(solutions)) - len(cycles), 0))
 
 
 def _branch(

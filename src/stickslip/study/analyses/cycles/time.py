@@ -29,6 +29,7 @@ from stickslip.study.keep.progress import LOG
 from stickslip.units import HZ
 
 STEPS = 512
+FEW_STEPS = 256  # where hundreds of periods are followed for what wins
 KICK = 1e-3  # of their own amplitude, by which speeds are disturbed
 SETTLED = 1e-7
 GOLDEN = 2.399963  # rad, of which no few multiples are alike
@@ -74,7 +75,7 @@ def compete(question: Question, branches: Sequence[CycleBranch]) -> dict[str, An
     rest = np.zeros((2, structure.n), dtype=complex)
     like = start_from_harmonics(rest, omega, contacts.gap_operator, contacts.laws)
     start = _kicked(mixed_start([(SHARE * m[1], w) for m, w in motions], like), motions)
-    marched = march_periods(structure, contacts, load, omega, outputs, start, question.asked.periods, STEPS)  # fmt: skip
+    marched = march_periods(structure, contacts, load, omega, outputs, start, question.asked.periods, FEW_STEPS)  # fmt: skip
     history = wave_history(marched)
     return own | {
         "time": history.time,

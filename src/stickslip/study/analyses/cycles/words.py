@@ -45,8 +45,11 @@ def _of_branch(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verd
     ratio = float(case["mode_damping_ratio"].values[i])
     own = [c for c in _cycles(case) if case["cycle_branch"].values[c] == i]
     found = [v for c in own for v in _of_cycle(label, name, case, c)]
-    if ratio < 0.0 and not any(case["cycle_slope"].values[c] > 0.0 for c in own):
-        most = 100 * float(case["largest_damping_ratio"].values[i])
+    if lost := int(case["lost_cycles"].values[i]):
+        why = f"{name}: the damping has {lost} more zeros than there are limit cycles here"
+        found.append(Verdict("doubtful", label, None, why, "Raise limit_cycle.points or limit_cycle.harmonics."))  # fmt: skip
+    most = 100 * float(case["largest_damping_ratio"].values[i])
+    if ratio < 0.0 and not most > 0.0:
         why = (
             f"{name}: friction cannot bound it: its damping ratio is {100 * ratio:.3g} % with contacts stuck and {most:.3g} % at most "
             "over the amplitudes looked at"
@@ -69,7 +72,7 @@ def _of_cycle(label: str, name: str, case: Mapping[str, xr.Variable], c: int) ->
     if attracting and word == "unstable":
         by = f"a disturbance of wave {wave}" if wave >= 0 else "a disturbance"
         why = f"{what} is stable in its own amplitude, but {by} grows: {reason}"
-        found.append(Verdict("doubtful", label, hertz, why, "The machine leaves it; limit_cycle.in_time tells for what."))  # fmt: skip
+        found.append(Verdict("trusted", label, hertz, why, "The machine leaves it; limit_cycle.in_time tells for what."))  # fmt: skip
     elif attracting and word != "stable":
         why = f"{what} is stable in its own amplitude; other disturbances are {word}: {reason}"
         found.append(Verdict("doubtful", label, hertz, why, "limit_cycle.in_time tells more."))

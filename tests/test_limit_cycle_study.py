@@ -1,0 +1,184 @@
+"""[limit_cycle] of a study: benchmark numbers, resuming, Python, the page; the wheel of examples/flutter_ring run small."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_v2 import EXAMPLES, changed
+
+import stickslip as ss
+from stickslip.errors import InputError
+from stickslip.report.page import plots
+from stickslip.report.sections.limit_cycle import Cycles, cycle_table
+from stickslip.study.analyses.cycles.words import case_verdicts
+from stickslip.study.analyses.limit_cycle import LIMIT_CYCLE
+from stickslip.study.keep.journal import JobJournal
+from stickslip.study.keep.netcdf import one_case
+from stickslip.study.models.study import read_study
+from stickslip.study.outcome import Outcome
+from stickslip.study.run import run_study
+
+B13 = """
+schema_version = 2
+[part.blade]
+shape = "lumped"
+masses_kg = [1.0]
+springs_n_per_m = [["ground", 1, 1.0]]
+dashpots_n_s_per_m = [["ground", 1, -0.1]]
+[contact.damper]
+between = ["blade.m1", "ground"]
+law = "jenkins"
+tangential_stiffness_n_per_m = 0.5
+slip_limit_n = 0.1
+[load.shaker]
+on = "blade.m1"
+force_n = 1.0
+[limit_cycle]
+harmonics = 1
+most_harmonics = 1
+points = 15
+amplitude_mm = [150.0, 3000.0]
+"""
+
+
+def answered(text: str, folder: Path, checks: frozenset[str] = frozenset()) -> Outcome:
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "study.toml"
+    path.write_text(text, encoding="utf-8")
+    return run_study(read_study(path), checks=checks)
+
+
+def test_the_benchmark_from_a_study_and_its_words(tmp_path: Path) -> None:
+    outcome = answered(B13, tmp_path)
+    data = outcome.tree["limit_cycle"].to_dataset()
+    case = one_case(data, 0)
+    assert case["cycle_amplitude"].values == pytest.approx([0.2656867890, 0.9773932296], rel=1e-8)
+    hertz = 2 * np.pi * case["cycle_frequency_hz"].values
+    assert hertz == pytest.approx([1.1848086907, 1.0361251606], rel=1e-8)
+    assert list(case["cycle_slope"].values > 0) == [True, False]
+    assert case["mode_damping_ratio"].values == pytest.approx(-0.05 / np.sqrt(1.5), rel=1e-9)
+    assert float(case["slip_amplitude"][0]) == pytest.approx(0.2, rel=0.02)
+    # the load of the study is left out, and its place is what is reported
+    assert case.attrs["output"] == "shaker.x"
+    # one set of harmonics proves nothing
+    told = " ".join(v.why for v in outcome.verdicts)
+    assert "was solved with one set of harmonics alone" in told
+    assert [t.title for t in outcome.summaries["limit_cycle"]][1] == "Limit cycles"
+    assert "attracting" in str(outcome.summaries["limit_cycle"][1].rows)
+    figures = plots(outcome.tree)
+    assert {"limit_cycles", "limit_cycle_frequency"} <= set(figures)
+    curve = figures["limit_cycles"].data[0]
+    assert np.sign(curve.y[0]) == np.sign(curve.y[-1]) == -1
+    assert max(curve.y) == pytest.approx(100 * float(case["largest_damping_ratio"][0]))
+    assert "985" not in cycle_table(Cycles(case))
+    assert "977.39 mm" in cycle_table(Cycles(case))
+
+
+def test_harmonics_are_raised_and_time_confirms(tmp_path: Path) -> None:
+    text = changed(B13, {"limit_cycle.most_harmonics": "41", "limit_cycle.periods": "60"})
+    outcome = answered(text, tmp_path, frozenset({"verify"}))
+    case = one_case(outcome.tree["limit_cycle"].to_dataset(), 0)
+    assert case["cycle_enough"].values.tolist() == [1, 1]
+    assert case["cycle_harmonics"].values.min() > 10
+    assert case["cycle_stability"].values.tolist() == ["stable", "unstable"]
+    assert np.all(case["cycle_along"].values < 1e-5)
+    assert float(case["cycle_time_amplitude"][0]) == pytest.approx(float(case["cycle_amplitude"][0]), rel=1e-4)  # fmt: skip
+    assert float(case["cycle_time_frequency_hz"][0]) == pytest.approx(float(case["cycle_frequency_hz"][0]), rel=1e-4)  # fmt: skip
+    assert np.isnan(float(case["cycle_time_amplitude"][1]))
+    assert not [v for v in outcome.verdicts if v.rank]
+
+
+def test_python_gives_the_same_and_a_sealed_mode_is_not_solved_again(tmp_path: Path) -> None:
+    (case,) = read_study(_path(B13, tmp_path)).cases()
+    model = case.build()
+    front = ss.Model(**{f: getattr(model, f) for f in ("parts", "contacts", "loads", "outputs")})
+    result = front.limit_cycle(
+        harmonics=1, most_harmonics=1, points=15, amplitude_mm=[150.0, 3000.0]
+    )
+    own = one_case(result.data["limit_cycle"].to_dataset(), 0)
+    question = LIMIT_CYCLE.inputs(case, model)
+    with JobJournal(tmp_path / "a.part", LIMIT_CYCLE.record) as journal:
+        records = list(LIMIT_CYCLE.solve(question, (), journal))
+        assert records[0].cycle_amplitude == pytest.approx(own["cycle_amplitude"].values, rel=1e-12)
+        assert list(LIMIT_CYCLE.solve(question, records, journal)) == []
+
+
+def _path(text: str, folder: Path) -> Path:
+    path = folder / "study.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def flutter_ring(folder: Path, **keys: str) -> str:
+    """The example with few amplitudes and harmonics."""
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copy(EXAMPLES / "flutter_ring" / "coefficients.csv", folder)
+    text = (EXAMPLES / "flutter_ring" / "study.toml").read_text(encoding="utf-8")
+    few = {"points": "8", "harmonics": "3", "most_harmonics": "7", "in_time": "false"}
+    few |= {"amplitude_mm": "[0.004, 0.3]"} | keys
+    return changed(text, {f"limit_cycle.{key}": value for key, value in few.items()})
+
+
+def test_the_ring_holds_two_waves_and_one_is_left(tmp_path: Path) -> None:
+    outcome = answered(flutter_ring(tmp_path), tmp_path)
+    case = one_case(outcome.tree["limit_cycle"].to_dataset(), 0)
+    ratios = case["linear_damping_ratio"].values
+    assert ratios.shape[0] == 12
+    assert sorted(case["linear_wave"].values[np.any(ratios < 0, axis=1)]) == [1, 2]
+    assert case["wave_number"].values.tolist() == [1, 2]
+    assert case["nodal_diameter"].values.tolist() == [1, 2]
+    assert case["cycle_branch"].values.tolist() == [0, 0, 1, 1]
+    assert list(case["cycle_slope"].values > 0) == [True, False, True, False]
+    words = case["cycle_stability"].values.tolist()
+    assert words[0] == "stable"
+    assert words[1] == words[3] == "unstable"
+    assert case["cycle_growing_wave"].values[[1, 3]].tolist() == [1, 2]
+    assert "cycle_time_amplitude" not in case
+    assert "competing_waves" not in plots(outcome.tree)
+
+
+def test_waves_compete_in_time_and_what_has_no_flutter_says_so(tmp_path: Path) -> None:
+    keys = {"in_time": "true", "periods": "64", "most_harmonics": "3", "points": "5"}
+    outcome = answered(flutter_ring(tmp_path / "a", **keys), tmp_path / "a")
+    case = one_case(outcome.tree["limit_cycle"].to_dataset(), 0)
+    assert case["wave_amplitude"].shape == (4, 12)
+    first = case["wave_amplitude"].values[0]
+    assert sorted(np.argsort(first)[-2:]) == [1, 2]
+    assert "competing_waves" in plots(outcome.tree)
+    assert any("mixed start" in v.why for v in outcome.verdicts)
+    # with the ratio of the structure alone twice as large nothing grows
+    text = changed(flutter_ring(tmp_path / "b"), {"part.blisk.damping.modal_ratio": "5e-3"})
+    still = answered(text, tmp_path / "b")
+    none = one_case(still.tree["limit_cycle"].to_dataset(), 0)
+    assert "wave_number" not in none
+    assert none["linear_damping_ratio"].values.min() > 0
+    assert any("no mode that was looked at grows" in v.why for v in still.verdicts)
+    assert plots(still.tree) == {}
+
+
+def test_what_friction_cannot_bound_is_told(tmp_path: Path) -> None:
+    outcome = answered(
+        changed(B13, {"part.blade.dashpots_n_s_per_m": '[["ground", 1, -0.2]]'}), tmp_path
+    )
+    case = one_case(outcome.tree["limit_cycle"].to_dataset(), 0)
+    assert "cycle_amplitude" not in case
+    assert any("friction cannot bound it" in v.why for v in outcome.verdicts)
+    assert "Friction cannot bound" in cycle_table(Cycles(case))
+    assert case_verdicts("", case.variables)
+
+
+def test_what_cannot_be_asked_is_refused(tmp_path: Path) -> None:
+    (case,) = read_study(_path(changed(B13, {"limit_cycle.wave_numbers": "[1]"}), tmp_path)).cases()
+    with pytest.raises(InputError, match="are those of a tuned wheel"):
+        LIMIT_CYCLE.inputs(case, case.build())
+    text = flutter_ring(tmp_path / "ring", wave_numbers="[12]")
+    (wheel,) = read_study(_path(text, tmp_path / "ring")).cases()
+    with pytest.raises(InputError, match="12 sectors have the waves 0 to 11"):
+        LIMIT_CYCLE.inputs(wheel, wheel.build())
+    rigid = B13.replace('law = "jenkins"', 'law = "rigid_coulomb"').replace(
+        "tangential_stiffness_n_per_m = 0.5\nslip_limit_n = 0.1", "friction_coefficient = 0.3\npreload_n = 1.0"
+    )  # fmt: skip
+    (stiff,) = read_study(_path(rigid, tmp_path)).cases()
+    with pytest.raises(InputError, match="a contact is rigid"):
+        LIMIT_CYCLE.inputs(stiff, stiff.build())
