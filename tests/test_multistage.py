@@ -1,0 +1,139 @@
+"""Wheels of different numbers of sectors, coupled by spatial harmonics, against all sectors of both tied node by node."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.sparse
+from cyclic_models import wedge
+
+import stickslip as ss
+from stickslip.model.axis import Axis
+from stickslip.model.fe.solid import Material, assemble_solid
+from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.model.modes import normal_modes
+from stickslip.model.structure import Structure, join
+from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
+from stickslip.reduction.full_wheel import wheel
+from stickslip.reduction.multistage import Flange, constraints, multistage, multistage_modes
+from stickslip.reduction.waves import wave
+
+PLANE = 0.1  # m, of the flange
+AROUND = 24  # nodes on a circle
+
+
+def stage(sectors, inner, outer, base, clamp):
+    """One sector of a ring with 24 nodes around, two circles of the flange at its top or bottom."""
+    mesh = wedge(
+        sectors, cells=(1, AROUND // sectors // 2, 1), inner=inner, outer=outer, clamp=clamp
+    )
+    points = mesh.points + np.array([0.0, 0.0, base])
+    radius = np.hypot(points[:, 0], points[:, 1])
+    on = (np.abs(points[:, 2] - PLANE) < 1e-9) & (radius > 0.74) & (radius < 1.01)
+    sets = dict(mesh.node_sets) | {"flange": np.flatnonzero(on)}
+    mesh = SolidMesh(points, mesh.cells, sets)
+    return cyclic_sector(
+        assemble_solid(mesh, Material(), clamped=("root",) if clamp else ()), sectors
+    )
+
+
+@pytest.fixture(scope="module")
+def stages():
+    return {"first": stage(4, 0.5, 1.0, 0.0, True), "second": stage(3, 0.75, 1.25, PLANE, False)}
+
+
+@pytest.fixture(scope="module")
+def tied(stages):
+    """Frequencies and strain-free check of the whole: every node of the second flange follows its partner on the first."""
+    both = join(**{name: wheel(sector) for name, sector in stages.items()})
+    at, part = both.dofs.position, np.array([p.split(".")[0] for p in both.dofs.part])
+    radius = np.hypot(at[:, 0], at[:, 1])
+    on = (np.abs(at[:, 2] - PLANE) < 1e-9) & (radius > 0.74) & (radius < 1.01)
+
+    def named(name):
+        own = np.flatnonzero(on & (part == name))
+        return {(both.dofs.component[d], *(np.round(at[d], 6) + 0.0)): d for d in own}
+
+    leads, follows = named("first"), named("second")
+    assert set(leads) == set(follows)
+    assert len(leads) == 2 * 3 * AROUND
+    stays = np.setdiff1d(np.arange(both.n), list(follows.values()))
+    column = np.full(both.n, -1)
+    column[stays] = np.arange(stays.size)
+    for key, dof in follows.items():
+        column[dof] = column[leads[key]]
+    tie = scipy.sparse.csr_array((np.ones(both.n), (np.arange(both.n), column)))
+    whole = [
+        scipy.sparse.csr_array(tie.T @ a @ tie) for a in (both.mass, both.damping, both.stiffness)
+    ]
+    return normal_modes(Structure(*whole, both.dofs.take(stays)), 8).frequencies_hz
+
+
+def flange(stages, harmonics):
+    return Flange(
+        ("first", "second"),
+        tuple(s.structure.dof_set("flange") for s in stages.values()),
+        tuple(harmonics),
+    )
+
+
+def test_all_harmonics_are_the_node_by_node_tie_and_fewer_are_softer(stages, tied):
+    errors = []
+    for most in (4, 9, AROUND // 2):
+        assembly = multistage(stages, [flange(stages, range(most + 1))])
+        assert assembly.nodal_diameters == (0,)  # 4 and 3 sectors: aliases tie everything
+        found = multistage_modes(assembly, 0, 8)
+        errors.append(found.frequencies_hz / tied - 1)
+        np.testing.assert_allclose(found.shares.sum(axis=0), 1.0)
+    assert np.all(errors[0] < 1e-9)
+    assert np.all(errors[1] < 1e-9)
+    assert np.all(errors[1] >= errors[0] - 1e-9)
+    assert 1e-4 < np.abs(errors[1]).max() < np.abs(errors[0]).max() < 0.3
+    np.testing.assert_allclose(errors[2], 0.0, atol=1e-9)
+
+
+def test_few_harmonics_leave_diameters_apart_and_shapes_meet_on_the_flange(stages):
+    fine = {"first": stages["first"], "second": stage(6, 0.75, 1.25, PLANE, False)}
+    assembly = multistage(fine, [flange(fine, (0, 1))])
+    assert assembly.nodal_diameters == (0, 1)
+    assert assembly.waves(1) == (("first", 1), ("second", 1))
+    found = multistage_modes(assembly, 1, 3)
+    waves = assembly.waves(1)
+    moved = np.concatenate(
+        [
+            np.linalg.lstsq(fine[name].wave_tie(k).toarray(), found.shapes[name, k], rcond=None)[0]
+            for name, k in waves
+        ]
+    )
+    assert np.abs(constraints(assembly, waves) @ moved).max() < 1e-9 * np.abs(moved).max()
+    # unit mass of all sectors; the neighbour is a phase ahead
+    energy = 0.0
+    for (name, k), shape in found.shapes.items():
+        mass = fine[name].structure.mass
+        energy += fine[name].sectors * np.sum((shape.conj() * (mass @ shape)).real, axis=0)
+        ahead = found.on_sector(name, 1)
+        np.testing.assert_allclose(ahead, wave(k, fine[name].sectors).phase * shape)
+    np.testing.assert_allclose(energy, 1.0)
+    # what stands alone lies below: the flange only holds
+    alone = [normal_modes(travelling_wave(fine[name], 1), 3).frequencies_hz for name in fine]
+    lowest = np.sort(np.concatenate(alone))[:3]
+    assert np.all(found.frequencies_hz > lowest)
+
+
+def test_what_does_not_fit_is_said(stages):
+    with pytest.raises(ss.InputError, match=r"13 is above half of the 24 nodes .* 'first'"):
+        multistage(stages, [flange(stages, (0, 13))])
+    other = flange(stages, (0, 1))
+    at = stages["second"].structure.dofs.position[other.dofs[1]]
+    short = other.dofs[1][np.hypot(at[:, 0], at[:, 1]) < 0.8]
+    with pytest.raises(
+        ss.InputError, match=r"flange of 'first' has nodes at the radius .* 'second' has none there"
+    ):
+        multistage(stages, [replace(other, dofs=(other.dofs[0], short))])
+    tilted = replace(stages["second"], axis=Axis((0.0, 0.1, 1.0)))
+    with pytest.raises(ss.InputError, match="turn about different axes"):
+        multistage(stages | {"second": tilted}, [other])
+    with pytest.raises(ss.InputError, match="no stage 'third'"):
+        multistage(stages, [replace(other, stages=("first", "third"))])
+    with pytest.raises(ss.InputError, match="5 is no kept harmonic of a flange, these are 0, 1"):
+        multistage(stages, [other]).waves(5)
