@@ -1,6 +1,8 @@
 """Wheels of different numbers of sectors, coupled by spatial harmonics, against all sectors of both tied node by node."""
 
+import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,11 +15,15 @@ from stickslip.model.fe.solid import Material, assemble_solid
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure, join
+from stickslip.reduction.coupled_stages import Flange, constraints, multistage, multistage_modes
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.full_wheel import wheel
-from stickslip.reduction.multistage import Flange, constraints, multistage, multistage_modes
 from stickslip.reduction.waves import wave
+from stickslip.study.analyses.waves.results import WaveModes
+from stickslip.study.analyses.waves.stages import flange_doubts
+from stickslip.study.keep.netcdf import one_case
 
+EXAMPLE = Path(__file__).parents[1] / "examples" / "two_stages"
 PLANE = 0.1  # m, of the flange
 AROUND = 24  # nodes on a circle
 
@@ -114,6 +120,14 @@ def test_few_harmonics_leave_diameters_apart_and_shapes_meet_on_the_flange(stage
         ahead = found.on_sector(name, 1)
         np.testing.assert_allclose(ahead, wave(k, fine[name].sectors).phase * shape)
     np.testing.assert_allclose(energy, 1.0)
+    # harmonics left out make it no stiffer than with them held
+    assert np.all(found.stiffest_hz >= found.frequencies_hz)
+    more = multistage(fine, [flange(fine, range(13))])
+    lowest = multistage_modes(more, 0, 12)
+    assert lowest.nodal_diameter == 0
+    assert found.frequencies_hz[0] <= np.min(lowest.frequencies_hz[lowest.frequencies_hz > 1.0]) * (
+        1 + 1e-9
+    )
     # what stands alone lies below: the flange only holds
     alone = [normal_modes(travelling_wave(fine[name], 1), 3).frequencies_hz for name in fine]
     lowest = np.sort(np.concatenate(alone))[:3]
@@ -137,3 +151,62 @@ def test_what_does_not_fit_is_said(stages):
         multistage(stages, [replace(other, stages=("first", "third"))])
     with pytest.raises(ss.InputError, match="5 is no kept harmonic of a flange, these are 0, 1"):
         multistage(stages, [other]).waves(5)
+
+
+def test_few_harmonics_are_doubted_where_holding_the_others_changes_much():
+    def found(stiffest):
+        none = np.zeros((1, 0, 3), dtype=complex)
+        return WaveModes(
+            3, np.array([100.0]), none, np.zeros(1), 0.1, stiffest_hz=np.array(stiffest)
+        )
+
+    (said,) = flange_doubts([found([100.5]), found([104.0])])
+    assert "nodal diameters 3 (up to 4 %)" in said.why
+    assert flange_doubts([found([100.5])]) == []
+    assert flange_doubts([found([])]) == []
+
+
+def test_a_study_of_two_stages_has_their_modes_and_shares(tmp_path):
+    """Against the library's own assembly; every other question is refused."""
+    shutil.copytree(EXAMPLE, tmp_path / "study")
+    file = tmp_path / "study" / "study.toml"
+    whole = file.read_text()
+    file.write_text(whole.replace("number = 4", "nodal_diameters = [2]\nnumber = 4"))
+    study = ss.Study.from_file(file)
+    model = study.model()
+    assert model.stages.nodal_diameters == (0, 1, 2, 3, 4, 5, 6)
+    result = study.run()
+    data = one_case(result.data["modes"].to_dataset(), 0)
+    expected = multistage_modes(model.stages, 2, 4)
+    np.testing.assert_allclose(data["frequency_hz"].values[0], expected.frequencies_hz, rtol=1e-9)
+    np.testing.assert_allclose(data["stage_share"].values[0].T, expected.shares, atol=1e-6)
+    np.testing.assert_allclose(data["stiffest_hz"].values[0], expected.stiffest_hz, rtol=1e-9)
+    assert list(data["stage_name"].values) == ["front", "rear"]
+    assert data["stage_sectors"].values.tolist() == [24, 18]
+    assert data["nodal_diameter"].values.tolist() == [2]
+    assert result.conclusion == "Every answer is trusted."
+    result.report(tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text()
+    for words in ("Which stage vibrates", "front of 24 sectors, rear of 18 sectors"):
+        assert words in page
+    few = whole.replace("[0, 1, 2, 3, 4, 5, 6]", "[0, 1]")
+    wrong = {
+        "[campbell]\nspeeds_rpm = [0.0, 100.0]\nengine_orders = [1]\n": "campbell: is no question for stages",
+        "[rotation]\nspeed_rpm = 10.0\n": "rotation.speed_rpm: gives stages a prestress",
+    }
+    for more, message in wrong.items():
+        file.write_text(few + more)
+        with pytest.raises(ss.InputError, match=message):
+            ss.Study.from_file(file).check()
+    file.write_text(few.replace("number = 4", "number = 4\nnodal_diameters = [3]"))
+    with pytest.raises(
+        ss.InputError, match="3 is no harmonic that a flange couples, these are 0, 1"
+    ):
+        ss.Study.from_file(file).check()
+    file.write_text(few.replace("harmonics = [0, 1]", ""))
+    with pytest.raises(ss.InputError, match="harmonics"):
+        ss.Study.from_file(file)
+    with pytest.raises(ss.InputError, match="of wheels coupled so only the modes are known"):
+        model.at(0.0)
+    with pytest.raises(ss.InputError, match="Give whole numbers from 0 on"):
+        ss.Join(between=("a.x", "b.x"), harmonics=(1,))

@@ -4,10 +4,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 from stickslip.contact.law import ContactLaw
+from stickslip.errors import input_error
 
 GROUND = "ground"
 NEXT = "next."  # prefix of a surface of the neighbouring sector, in the sense of rotation
 PairingKind = Literal["node_to_node", "node_to_segment", "segment_to_segment"]
+SPATIAL: Literal["spatial_harmonics"] = (
+    "spatial_harmonics"  # wheels of different numbers of sectors
+)
 Share = Literal["interface", "point", "area"]
 
 
@@ -61,9 +65,25 @@ class Join:
     Parameters
     ----------
     between, pairing, tolerance
-        As of a `Contact`.
+        As of a `Contact`. ``spatial_harmonics`` couples the flanges of wheels of different numbers of sectors in the mean.
+    harmonics
+        Of such a flange: those of the circumference that are coupled, from 0 on.
+
+    Raises
+    ------
+    InputError
+        If harmonics are missing, or given with another pairing.
     """
 
     between: tuple[str, str]
-    pairing: PairingKind = "node_to_segment"
+    pairing: PairingKind | Literal["spatial_harmonics"] = "node_to_segment"
     tolerance: float | None = None
+    harmonics: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        if bool(self.harmonics) != (self.pairing == SPATIAL) or min(self.harmonics, default=0) < 0:
+            raise input_error(
+                "Join.harmonics",
+                f"are {list(self.harmonics)} with pairing {self.pairing!r}",
+                f"Give whole numbers from 0 on with {SPATIAL}, and with it alone.",
+            )

@@ -15,12 +15,14 @@ from stickslip.assembly.coordinates import Coordinates, coordinates
 from stickslip.assembly.facing import refuse_joined
 from stickslip.assembly.forces import beyond_sectors, engine_order, far_outputs
 from stickslip.assembly.load import Load, Output
+from stickslip.assembly.loose import without_bodies
 from stickslip.assembly.mistuning import Mistuning
 from stickslip.assembly.pairs import Pairs, pair_contacts
-from stickslip.assembly.places import Places, picked
+from stickslip.assembly.places import Places
 from stickslip.assembly.reduced import Spin, Steady, Store, at_speed, damped, in_memory
 from stickslip.assembly.shared_rotation import joined_displacements
 from stickslip.assembly.skin import on_skin, skin_of
+from stickslip.assembly.stages import is_staged, stages_of
 from stickslip.assembly.statics import StaticState, static_state
 from stickslip.assembly.ties import Ties, tie_joins
 from stickslip.assembly.wheel import Neighbours, neighbours, with_joins
@@ -32,7 +34,7 @@ from stickslip.model.facts import Facts, facts_of_parts, unlike_units
 from stickslip.model.modes import with_springs
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure, join
-from stickslip.reduction.basis import in_coordinates, surviving_sets
+from stickslip.reduction.coupled_stages import Multistage
 from stickslip.reduction.cyclic import travelling_wave
 from stickslip.reduction.waves import wave
 
@@ -148,12 +150,18 @@ class Model:
 
     @cached_property
     def _unjoined(self) -> Neighbours | None:
-        return neighbours(self.places, self.parts)
+        return None if is_staged(self.joins) else neighbours(self.places, self.parts)
+
+    @cached_property
+    def stages(self) -> Multistage | None:
+        """Its wheels, where joins couple several by spatial harmonics; None otherwise."""
+        return stages_of(self.places, self.joins, self.contacts, self.speed * self.rotates)
 
     @cached_property
     def neighbours(self) -> Neighbours | None:
         """How its parts meet their neighbours on the wheel; None for a single structure."""
-        return with_joins(self._unjoined, self.ties)
+        found = self._unjoined
+        return None if found is None else with_joins(found, self.ties)
 
     @cached_property
     def ties(self) -> Ties:
@@ -287,7 +295,8 @@ class Model:
         if holds.any():
             structure = with_springs(structure, operators[0] + phase * operators[1], stiffness)
         structure = structure if tie is None else replace(structure, basis=tie)
-        return self._without(structure, self._loose(holds))
+        loose = self._loose(holds)
+        return without_bodies(structure, {self.places.dofs.part[dof] for dof in loose})
 
     def _holding(self, contacts: ContactsAs) -> BoolArray:
         p = len(self.pairs.names)
@@ -311,25 +320,6 @@ class Model:
         rows = np.repeat(holds, 3)
         touched = [m[rows].nonzero()[1] for m in (self.pairs.own, self.pairs.following)]
         return self.places.bodies(np.concatenate([*touched, self.ties.weights.nonzero()[1]]))
-
-    def _without(self, structure: Structure, dofs: IntArray) -> Structure:
-        """Return a structure without coordinates that are some of the dofs of rigid bodies."""
-        if not dofs.size:
-            return structure
-        table = structure.dofs
-        names = {self.places.dofs.part[dof] for dof in dofs}
-        stays = np.array([part not in names for part in table.part])
-        index = np.flatnonzero(stays)
-        if not index.size:
-            raise input_error(
-                "part",
-                "nothing is left without free rigid bodies",
-                "Let contacts stick, or give a part that is held.",
-            )
-        into = picked(np.where(stays, np.cumsum(stays) - 1, -1), index.size)
-        if structure.basis is None:
-            structure = replace(structure, basis=picked(np.arange(structure.n), structure.n))
-        return in_coordinates(structure, into, table.take(index), surviving_sets(structure, index))
 
     @cached_property
     def skin(self) -> Skin | None:

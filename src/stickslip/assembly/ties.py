@@ -8,7 +8,7 @@ import scipy.sparse
 from scipy.spatial import cKDTree
 
 from stickslip.arrays import IntArray, Matrix
-from stickslip.assembly.contact import Join
+from stickslip.assembly.contact import SPATIAL, Join
 from stickslip.assembly.facing import named
 from stickslip.assembly.pairs import Turn, match, sides
 from stickslip.assembly.places import NO_FACETS, Places, Spot, picked
@@ -16,6 +16,7 @@ from stickslip.contact.mortar import mortar_tie
 from stickslip.contact.surface import Surface
 from stickslip.errors import InputError, input_error
 
+ALONE = "Ask for [modes], at rest and without contacts; study one stage alone for anything else."
 MEAN = "segment_to_segment"
 TINY = 1e-12  # weights of partners below are rounding
 
@@ -84,6 +85,12 @@ def tie_joins(places: Places, joins: Mapping[str, Join], turn: Turn | None) -> T
     ahead_of: dict[int, Matrix] = {}
     for name, join in joins.items():
         key = f"join.{name}"
+        if join.pairing == SPATIAL:
+            raise input_error(
+                f"{key}.pairing",
+                f"is {SPATIAL}, and of wheels coupled so only the modes are known",
+                ALONE,
+            )
         first, second, ahead = sides(places, key, join, turn)
         if second is None or first.surface is None or second.surface is None:
             raise input_error(

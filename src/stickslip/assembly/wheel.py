@@ -92,7 +92,7 @@ def neighbours(places: Places, parts: Mapping[str, Part]) -> Neighbours | None:
     tied, ties, warnings, axes = [], {}, [], []
     for name in counts:
         part = parts[name]
-        sector = _faces(name, part)
+        sector = faces_of(name, part)
         if sector is None:
             why = "has no cyclic faces; only contacts and joins lead to its neighbours."
             warnings.append(f"part.{name}: {why}")
@@ -155,7 +155,7 @@ def _refuse_others(parts: Mapping[str, Part], counts: Mapping[str, int]) -> None
             )
 
 
-def _faces(name: str, part: Part) -> CyclicSector | None:
+def faces_of(name: str, part: Part) -> CyclicSector | None:
     """Return the sector that a part is; None where it has no faces."""
     here = [face in part.structure.sets for face in part.faces]
     if not any(here) and part.faces == Part.faces:

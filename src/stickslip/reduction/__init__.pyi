@@ -6,6 +6,11 @@ from .aerodynamics import from_phase_angles as from_phase_angles
 from .aerodynamics import to_phase_angles as to_phase_angles
 from .cache import cached as cached
 from .choice import Reduction as Reduction
+from .coupled_stages import Flange as Flange
+from .coupled_stages import Multistage as Multistage
+from .coupled_stages import MultistageModes as MultistageModes
+from .coupled_stages import multistage as multistage
+from .coupled_stages import multistage_modes as multistage_modes
 from .cyclic import CyclicSector as CyclicSector
 from .cyclic import cyclic_sector as cyclic_sector
 from .cyclic import travelling_wave as travelling_wave

@@ -74,7 +74,7 @@ def circles(sector: CyclicSector, members: IntArray, name: str) -> Circles:
     if sector.axis is None:
         raise input_error(where, "has no axis", "Give the sector of a model with geometry.")
     dofs = sector.structure.dofs
-    members = np.setdiff1d(members, sector.high[sector.low != sector.high])
+    members = np.setdiff1d(members, np.setdiff1d(sector.high, sector.shared))
     table = node_table(dofs.take(members))[:, :3]
     if not len(table):
         raise input_error(where, "has no free node on the flange", "Name the nodes of the flange.")

@@ -76,8 +76,11 @@ def facts(nodes: Mapping[str, Node]) -> str | None:
     if node.stored("mass_kg") is None:
         return None
     sectors = int(node.scalar("sectors", 1))
+    stages = node.text("stages")
+    sectors = 1 if stages else sectors
     mass, each = node.scalar("mass_kg"), " of a sector" if sectors > 1 else ""
     rows = [
+        ["stages", escape(stages) or NONE],
         ["sectors", str(sectors) if sectors > 1 else NONE],
         [f"mass{each}", quantity(1e3 * mass, "g", 6)],
         ["mass of the wheel", quantity(1e3 * sectors * mass, "g", 6) if sectors > 1 else NONE],

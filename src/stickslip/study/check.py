@@ -52,6 +52,9 @@ def _tell(label: str, lines: list[str]) -> None:
 def _size(model: Model) -> str:
     facts = model.facts
     wheel = f"one of {model.sectors} sectors, " if model.sectors > 1 else ""
+    if model.stages is not None:
+        counts = [str(stage.sectors) for stage in model.stages.stages.values()]
+        wheel = f"one sector each of stages of {' and '.join(counts)}, "
     mass = f"mass {facts.mass:.6g} kg, " if math.isfinite(facts.mass) else ""
     elements = f"{facts.elements} elements, " if facts.elements else ""
     return (

@@ -7,7 +7,7 @@ import plotly.graph_objects as go
 
 from stickslip.report.diameters import diameter_axes, mode_lines
 from stickslip.report.mistuned_modes import modes_of_wheel
-from stickslip.report.plot import INK, Plot, ring, styled
+from stickslip.report.plot import INK, Plot, colour, ring, styled
 from stickslip.report.quantities import NONE, counted, number, percent
 from stickslip.report.section import Block, Card, Section
 from stickslip.report.shapes import mode_shapes
@@ -56,7 +56,16 @@ def frequencies(view: Waves) -> str:
     rows = [
         [escape(name), *(number(f, 7) for f in row)] for name, row in zip(names, hz, strict=True)
     ]
-    return "<h3>Natural frequencies</h3>" + html_table(head, rows)
+    found = "<h3>Natural frequencies</h3>" + html_table(head, rows)
+    if not view.has("stiffest_hz"):
+        return found
+    held = view.floats("stiffest_hz")
+    rows = [
+        [escape(name), *(number(f, 7) for f in row)] for name, row in zip(names, held, strict=True)
+    ]
+    title = "<h3>All harmonics held that flanges do not couple</h3>"
+    told = "<p>Flanges move freely in the harmonics that they do not couple, which makes them softer than they are; held there, they are stiffer.</p>"
+    return found + title + told + html_table(head, rows)
 
 
 def in_flow(view: Waves) -> str | None:
@@ -71,6 +80,40 @@ def in_flow(view: Waves) -> str | None:
     ]  # fmt: skip
     text = "<p>Eigenvalues with aerodynamic forces and the structure's damping: frequency and damping ratio.</p>"
     return "<h3>In the flow</h3>" + text + html_table(head, rows)
+
+
+def stage_shares(view: Waves) -> Plot | None:
+    """Show which stage takes part in which mode, as bars that add up to one."""
+    if not view.has("stage_share"):
+        return None
+    share = view.floats("stage_share")
+    hz = view.floats("frequency_hz")
+    stages = [str(name) for name in view.data["stage_name"].values]
+    counts = view.integers("stage_sectors")
+    places = [
+        [name for name, row in zip(view.waves, hz, strict=True) for _ in row],
+        [f"{m + 1}" for row in hz for m in range(len(row))],
+    ]
+    bars = [
+        go.Bar(
+            x=places, y=100 * share[:, :, i].ravel(), name=f"{name} ({count} sectors)", marker={"color": colour(i)},
+            customdata=hz.ravel(), hovertemplate="%{y:.3g} % at %{customdata:.6g} Hz<extra>" + escape(name) + "</extra>",
+        )
+        for i, (name, count) in enumerate(zip(stages, counts, strict=True))
+    ]  # fmt: skip
+    figure = styled(go.Figure(bars), 420)
+    figure.update_layout(barmode="stack", bargap=0.15)
+    figure.update_xaxes(title_text="mode", tickangle=0)
+    figure.update_yaxes(title_text="share of the kinetic energy (%)", range=[0, 100])
+    waves = "; ".join(
+        f"{name}: {text}"
+        for name, text in zip(view.waves, view.data["stage_waves"].values, strict=True)
+    )
+    caption = (
+        "A mode with nearly all its energy in one stage is one of that wheel, to be looked for on it alone; modes that two stages share "
+        f"exist in the assembly only. Waves that the flanges let vibrate together: {escape(waves)}. All else of the flanges moves freely."
+    )
+    return Plot(f"stages{view.key}", "Which stage vibrates", caption, figure)
 
 
 def comparison(view: Waves) -> str | None:
@@ -117,6 +160,16 @@ def _cards(view: Waves) -> list[Card]:
 
 _TITLE = "Natural frequencies and mode shapes"
 _BLOCK = Block(
-    "modes", _TITLE, (diameter_map, mode_shapes, frequencies, modes_of_wheel, in_flow, comparison)
+    "modes",
+    _TITLE,
+    (
+        diameter_map,
+        stage_shares,
+        mode_shapes,
+        frequencies,
+        modes_of_wheel,
+        in_flow,
+        comparison,
+    ),
 )
 SECTION: Section = Section("modes", NEEDED, Waves, (_BLOCK,), by_case=True, cards=_cards)

@@ -21,6 +21,12 @@ from stickslip.study.analyses.waves.of_wheel import solved as solved_wheel
 from stickslip.study.analyses.waves.reference import Reference, read_reference
 from stickslip.study.analyses.waves.results import WaveModes
 from stickslip.study.analyses.waves.solve import Question, solve_wave
+from stickslip.study.analyses.waves.stages import (
+    StagesQuestion,
+    each_diameter,
+    flange_doubts,
+    stages_question,
+)
 from stickslip.study.analyses.waves.tables import Diameter, WaveTable
 from stickslip.study.analyses.waves.texts import modes_tables
 from stickslip.study.file.section import FilePath, custom_error, once
@@ -77,8 +83,28 @@ def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
         "frequency_hz": variable("wave mode", hertz, "Hz", "natural frequency"),
         "growth": growth(waves),
     }
+    more = _of_stages(waves) | _in_flow(waves) | _compared(solved, hertz) | _shapes(waves)
     of_wheel = variables(solved.notes.get(NOTE))
-    return found | _in_flow(waves) | _compared(solved, hertz) | _shapes(waves) | of_wheel, []
+    return found | more | of_wheel, flange_doubts(waves)
+
+
+def _of_stages(waves: Sequence[WaveModes]) -> Variables:
+    """Return what part of the energy each stage has; nothing of a single wheel."""
+    shares = np.array([w.shares.T for w in waves])
+    if not shares.size:
+        return {}
+    stiffest = np.array([w.stiffest_hz for w in waves])
+    return {
+        "stage_share": variable(
+            "wave mode stage", shares, "1", "share of a stage in the kinetic energy"
+        ),
+        "stiffest_hz": variable(
+            "wave mode",
+            stiffest,
+            "Hz",
+            "natural frequency with all harmonics held that flanges do not couple",
+        ),
+    }
 
 
 def _in_flow(waves: Sequence[WaveModes]) -> Variables:
@@ -127,9 +153,11 @@ class Modes(WaveAnalysis):
     of_case = staticmethod(_of_case)
     of_text = staticmethod(modes_tables)
 
-    def inputs(self, case: Case, model: Model) -> Question:
+    def inputs(self, case: Case, model: Model) -> Question | StagesQuestion:
         """Return what is solved."""
         asked: ModesTable = self.asked(case)
+        if model.stages is not None:
+            return stages_question(model, asked.nodal_diameters, asked.number)
         turning = model.coriolis and model.rotates and model.speed > 0
         wheel = Wheel(model.sectors, turning or model.aerodynamics is not None)
         wheel.require(asked.nodal_diameters, "modes.nodal_diameters")
@@ -150,9 +178,12 @@ class Modes(WaveAnalysis):
         )
 
     def solve(
-        self, inputs: Question, done: Sequence[WaveModes], notes: Notes
+        self, inputs: Question | StagesQuestion, done: Sequence[WaveModes], notes: Notes
     ) -> Iterator[WaveModes]:
-        """Yield what is found of each wave, and put down the modes of a wheel whose sectors differ."""
+        """Yield what is found of each wave, or nodal diameter of stages, and put down the modes of a wheel whose sectors differ."""
+        if isinstance(inputs, StagesQuestion):
+            yield from each_diameter(inputs, done, notes)
+            return
         yield from super().solve(inputs, done, notes)
         if inputs.model.mistuning is not None and notes.get(NOTE) is None:
             notes.put(NOTE, solved_wheel(inputs))

@@ -12,7 +12,7 @@ from pydantic import (
     model_validator,
 )
 
-from stickslip.assembly.contact import GROUND, NEXT, PairingKind, Share
+from stickslip.assembly.contact import GROUND, NEXT, SPATIAL, PairingKind, Share
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws import ALL_LAWS
 from stickslip.contact.laws.iwan_populations import FirstLoading, FourParameter, UniformBand
@@ -87,10 +87,27 @@ class Pair(Section):
 class JoinTable(Pair):
     """Two surfaces tied to each other for good: the first follows the second."""
 
-    pairing: PairingKind = Field(
+    pairing: PairingKind | Literal["spatial_harmonics"] = Field(
         "node_to_segment",
-        description="how points find their partners: node_to_node, node_to_segment or segment_to_segment",
+        description="how points find their partners: node_to_node, node_to_segment or segment_to_segment; or spatial_harmonics, for the "
+        "flanges of wheels of different numbers of sectors",
     )
+    harmonics: list[Annotated[int, Field(ge=0, le=1000)]] | None = Field(
+        None,
+        min_length=1,
+        max_length=501,
+        description="with spatial_harmonics: the harmonics of the circumference that are coupled, whole numbers from 0 on",
+    )
+
+    @model_validator(mode="after")
+    def _has_its_harmonics(self) -> Self:
+        if (self.harmonics is None) == (self.pairing == SPATIAL):
+            raise custom_error(
+                f"belong to pairing = {SPATIAL!r}, which needs them",
+                f'Give harmonics = [0, 1, 2] with pairing = "{SPATIAL}", and with it alone.',
+                "harmonics",
+            )
+        return self
 
 
 class ContactBase(Pair):

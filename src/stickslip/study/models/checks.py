@@ -28,9 +28,11 @@ from stickslip.study.file.section import Section
 from stickslip.study.file.tables import Tables
 from stickslip.study.models.areas import without_areas
 from stickslip.study.models.cost import too_large
+from stickslip.study.models.diameters import diameter_refusals
 from stickslip.study.models.files import MESHES
 from stickslip.study.models.fluid import fluid_refusals
 from stickslip.study.models.mistuning import mistuning_refusals
+from stickslip.study.models.stages import stage_refusals, staged
 
 BLADES = ("root", "force", "tip1", "edge1", "tip2")
 SECTOR = ("root", "cyclic_low", "cyclic_high", "tip")
@@ -62,6 +64,7 @@ def refusals(tables: Tables, home: Path) -> Iterator[InputError]:
         yield from _questions(tables)
         yield from fluid_refusals(tables, home, sectors_of(tables))
         yield from mistuning_refusals(tables, home, sectors_of(tables))
+        yield from stage_refusals(tables)
 
 
 def sectors_of(tables: Tables) -> int | None:
@@ -341,8 +344,8 @@ def _questions(tables: Tables) -> Iterator[InputError]:
                     "Say how many periods the force has around the circumference.",
                 )
     yield from _without_a_mesh(tables)
-    for name in ("modes", "campbell"):
-        yield from _diameters(name, getattr(asked, name, None), sectors)
+    if not staged(tables):
+        yield from diameter_refusals(tables, sectors)
 
 
 def _without_a_mesh(tables: Tables) -> Iterator[InputError]:
@@ -369,31 +372,3 @@ def _turns(table: Any) -> bool:
     if isinstance(table, FileModel):
         return table.file.lower().endswith(MESHES)
     return isinstance(table, PrismBlades | Sector)
-
-
-def _diameters(name: str, table: Any, sectors: int | None) -> Iterator[InputError]:
-    given = getattr(table, "nodal_diameters", None)
-    if sectors is None or not given:
-        return
-    if sectors == 1 and max(given) > 0:
-        yield input_error(
-            f"{name}.nodal_diameters",
-            "are of a wheel, and no part is a sector of one",
-            "Leave them out, or give the part its number of sectors.",
-        )
-        return
-    if max(given) > sectors // 2:
-        yield input_error(
-            f"{name}.nodal_diameters",
-            f"{max(given)} is above half of {sectors} sectors",
-            f"The nodal diameters go from 0 to {sectors // 2}.",
-        )
-        return
-    for order in getattr(table, "engine_orders", ()):
-        excited = min(order % sectors, -order % sectors)
-        if excited not in given:
-            yield input_error(
-                f"{name}.engine_orders",
-                f"{order} excites the nodal diameter {excited}, which is not computed",
-                "Add it to nodal_diameters, or leave those out: then all that are excited are computed.",
-            )

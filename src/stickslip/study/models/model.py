@@ -53,6 +53,7 @@ def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
                 between=_between(parts, table.between),
                 pairing=table.pairing,
                 tolerance=table.tolerance_m,
+                harmonics=tuple(table.harmonics or ()),
             )
             for name, table in tables.join.items()
         },

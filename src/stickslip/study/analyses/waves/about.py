@@ -18,6 +18,10 @@ STATIC = ("static_rpm", "static_displacement_m", "static_strain", "static_rotati
 ABOUT = "model"  # note of what is told here
 NUMBERS = {
     "sectors": ("", "1", "number of sectors of the wheel; 1 for a whole structure"),
+    "stages": ("", "1", "the wheels of an assembly"),
+    "stage_name": ("stage", "1", "name of each stage of an assembly of wheels"),
+    "stage_sectors": ("stage", "1", "number of sectors of each stage"),
+    "stage_waves": ("wave", "1", "waves of the stages that vibrate together"),
     "axis_direction": ("xyz", "1", "direction of the axis of rotation"),
     "axis_origin": ("xyz", "m", "a point of the axis of rotation"),
     "speed_rpm": ("", "rpm", "speed of the rotor; NaN for a range"),

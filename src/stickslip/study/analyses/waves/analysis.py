@@ -41,7 +41,7 @@ class WaveAnalysis(ABC):
     of_text: Callable[[xr.Dataset], Sequence[TextTable]]
 
     @abstractmethod
-    def inputs(self, case: Case, model: Model) -> Question:
+    def inputs(self, case: Case, model: Model) -> Any:
         """Return what is solved."""
 
     def asked(self, case: Case) -> Any:

@@ -13,6 +13,14 @@ def _none() -> ComplexArray:
     return np.zeros(0, dtype=complex)
 
 
+def _no_numbers() -> FloatArray:
+    return np.zeros(0)
+
+
+def _no_shares() -> FloatArray:
+    return np.zeros((0, 0))
+
+
 @dataclass(frozen=True, eq=False)
 class WaveModes:
     """Modes of one travelling wave.
@@ -31,6 +39,10 @@ class WaveModes:
         Time of the computation.
     in_flow
         (m,) eigenvalues with aerodynamic forces and the structure's damping, 1/s; none where the model has no such forces.
+    shares
+        (stages, m) of each stage in the kinetic energy; none where there is one wheel.
+    stiffest_hz
+        (m,) frequencies with all harmonics held that flanges do not couple; none where there is one wheel.
     """
 
     wave_number: int
@@ -39,6 +51,8 @@ class WaveModes:
     growth: FloatArray
     seconds: float
     in_flow: ComplexArray = field(default_factory=_none)
+    shares: FloatArray = field(default_factory=_no_shares)
+    stiffest_hz: FloatArray = field(default_factory=_no_numbers)
 
 
 @dataclass(frozen=True, eq=False)

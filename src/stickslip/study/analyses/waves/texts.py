@@ -39,6 +39,9 @@ def modes_tables(case: xr.Dataset) -> list[TextTable]:
         (*name, *(f"{f:.7g}" for f in own)) for name, own in zip(names, hertz, strict=True)
     )
     tables = [TextTable(f"Natural frequencies in Hz {_at(case.attrs['speed_rpm'])}", head, rows)]
+    if "stage_share" in case:
+        tables.append(_stiffest_table(case, names, head))
+        tables.append(_stage_table(case, names, head))
     if "damped_hz" in case and np.isfinite(case["damped_hz"]).any():
         tables.append(_damped_table(case, names))
     tables += of_wheel(case)
@@ -56,6 +59,33 @@ def modes_tables(case: xr.Dataset) -> list[TextTable]:
         )
         tables.append(TextTable(title, head, rows))
     return tables
+
+
+def _stiffest_table(
+    case: xr.Dataset, names: Sequence[tuple[str, str]], head: tuple[str, ...]
+) -> TextTable:
+    """Return the frequencies that the harmonics left out could make."""
+    rows = tuple(
+        (*name, *(f"{f:.7g}" for f in own))
+        for name, own in zip(names, case["stiffest_hz"].values, strict=True)
+    )
+    return TextTable("The same in Hz, all harmonics held that flanges do not couple", head, rows)
+
+
+def _stage_table(
+    case: xr.Dataset, names: Sequence[tuple[str, str]], head: tuple[str, ...]
+) -> TextTable:
+    """Return the share of each stage in the energy of each mode."""
+    counts = zip(case["stage_name"].values, case["stage_sectors"].values, strict=True)
+    stages = [f"{name} ({count} sectors)" for name, count in counts]
+    rows = tuple(
+        (name, stage, *(f"{share:.1%}" for share in shares))
+        for (name, _), own in zip(names, case["stage_share"].values, strict=True)
+        for stage, shares in zip(stages, own.T, strict=True)
+    )
+    return TextTable(
+        "Share of each stage in the kinetic energy", (head[0], "stage", *head[2:]), rows
+    )
 
 
 def flutter_tables(case: xr.Dataset) -> list[TextTable]:

@@ -1,7 +1,7 @@
 """Wheels of different numbers of sectors on one shaft, coupled at their flanges by spatial harmonics of the circumference.
 
-D. Laxalde, J.-P. Lombard and F. Thouverez, "Dynamics of multistage bladed disks systems", Journal of Engineering for Gas Turbines and
-Power 129 (2007) 1058-1064. Here a flange is tied in the mean: of both sides the kept harmonics are equal, and forces of these harmonics
+D. Laxalde, F. Thouverez and J.-P. Lombard, "Dynamics of multistage bladed disks systems", ASME Turbo Expo 2007, GT2007-27051. Here a flange
+is tied in the mean: of both sides the kept harmonics are equal, and forces of these harmonics
 alone go across, so that what is left out makes the joint softer, never stiffer.
 """
 
@@ -133,6 +133,9 @@ class MultistageModes:
         Of the assembly.
     squares
         (n,) of circular frequencies, rad²/s².
+    stiffest
+        (n,) the same with all other harmonics of these waves held at the flanges: what the harmonics left out can do at most;
+        infinite where so many modes are not left.
     shapes
         Wave -> (N, n) displacements of sector 0 of the stage in this wave; the whole assembly has unit mass.
     shares
@@ -142,6 +145,7 @@ class MultistageModes:
     assembly: Multistage
     nodal_diameter: int
     squares: FloatArray
+    stiffest: FloatArray
     shapes: Mapping[Wave, ComplexArray]
     shares: FloatArray
 
@@ -149,6 +153,11 @@ class MultistageModes:
     def frequencies_hz(self) -> FloatArray:
         """(n,) in Hz."""
         return np.asarray(np.sign(self.squares) * np.sqrt(np.abs(self.squares)) / HZ)
+
+    @property
+    def stiffest_hz(self) -> FloatArray:
+        """(n,) `stiffest` in Hz."""
+        return np.asarray(np.sign(self.stiffest) * np.sqrt(np.abs(self.stiffest)) / HZ)
 
     def on_sector(self, stage: str, number: int = 0) -> ComplexArray:
         """Return the (N, n) displacements of a sector of a stage, in its own axes."""
@@ -216,32 +225,18 @@ def multistage_modes(
     waves = assembly.waves(nodal_diameter)
     moving = [travelling_wave(assembly.stages[name], k) for name, k in waves]
     counts = np.array([assembly.stages[name].sectors for name, _ in waves])
-    mass = scipy.sparse.block_diag(
-        [c * scipy.sparse.csr_array(s.mass) for c, s in zip(counts, moving, strict=True)],
-        format="csr",
+    mass, stiffness = (
+        _side_by_side(counts, [getattr(s, which) for s in moving])
+        for which in ("mass", "stiffness")
     )
-    stiffness = scipy.sparse.block_diag(
-        [c * scipy.sparse.csr_array(s.stiffness) for c, s in zip(counts, moving, strict=True)],
-        format="csr",
-    )
-    rows = constraints(assembly, waves)
-    free = int(np.count_nonzero(mass.diagonal())) - rows.shape[0]
-    if not 0 < n <= free:
-        raise input_error(
-            "multistage_modes",
-            f"{n} modes asked of {free} free motions",
-            f"Ask for at most {free}.",
-        )
-    if mass.shape[0] <= DENSE or n > mass.shape[0] // 3:
-        squares, vectors = _dense(stiffness, mass, rows, n)
-    else:
-        shift = min(usual_shift(s) for s in moving)
-        solve = _constrained(stiffness - shift * mass, rows, say)
-        say(f"{n} modes of {mass.shape[0]} dofs of {len(waves)} waves")
-        squares, vectors = lanczos(mass, n, solve, shift, complex)
-        squares = np.where(np.abs(squares) < RIGID * abs(shift), 0.0, squares)
+    problem = _Problem(stiffness, mass, min(usual_shift(s) for s in moving))
+    squares, vectors = problem.modes(constraints(assembly, waves), n, say)
     order = np.argsort(squares)
     squares, vectors = squares[order], vectors[:, order]
+    held = constraints(assembly, waves, held=True)
+    most = min(n, problem.free(held))
+    stiffest = np.full(n, np.inf)
+    stiffest[:most] = np.sort(problem.modes(held, most, say)[0]) if most else np.inf
     ends = np.cumsum([s.n for s in moving])[:-1]
     pieces = np.split(vectors, ends)
     energy = np.array(
@@ -257,52 +252,102 @@ def multistage_modes(
         own: np.asarray(assembly.stages[own[0]].wave_tie(own[1]) @ x)
         for own, x in zip(waves, pieces, strict=True)
     }
-    return MultistageModes(assembly, nodal_diameter, squares, expanded, shares / shares.sum(axis=0))
+    return MultistageModes(
+        assembly,
+        nodal_diameter,
+        squares,
+        np.maximum(stiffest, squares),
+        expanded,
+        shares / shares.sum(axis=0),
+    )
 
 
-def constraints(assembly: Multistage, waves: Sequence[Wave]) -> ComplexArray:
-    """Return the (r, N) orthonormal rows that vanish in what the flanges allow the waves."""
+def _side_by_side(counts: IntArray, matrices: Sequence[Matrix]) -> Matrix:
+    """Return the matrices of sectors as those of whole wheels, uncoupled."""
+    each = [c * scipy.sparse.csr_array(a) for c, a in zip(counts, matrices, strict=True)]
+    return scipy.sparse.block_diag(each, format="csr")
+
+
+def constraints(assembly: Multistage, waves: Sequence[Wave], *, held: bool = False) -> ComplexArray:
+    """Return the (r, N) orthonormal rows that vanish in what the flanges allow the waves; `held`: harmonics that are not kept vanish, too."""
     sizes = [assembly.stages[name].wave_tie(k).shape[1] for name, k in waves]
     ends = np.concatenate([[0], np.cumsum(sizes)])
     place = {own: slice(ends[i], ends[i + 1]) for i, own in enumerate(waves)}
-    rows = []
+    rows = [np.zeros((0, ends[-1]), dtype=complex)]
     for flange, sides in zip(assembly.flanges, assembly.places, strict=True):
-        for m in _signed(flange.harmonics):
+        pairs = list(zip((1, -1), flange.stages, sides, strict=True))
+        kept = _signed(flange.harmonics)
+        for m in kept:
             block = np.zeros((3 * sides[0].count, ends[-1]), dtype=complex)
-            for sign, name, side in zip((1, -1), flange.stages, sides, strict=True):
-                own = name, m % assembly.stages[name].sectors
-                if own in place:
-                    block[:, place[own]] += sign * (
-                        projection(side, m) @ assembly.stages[name].wave_tie(own[1])
-                    )
-            if block.any():
+            for sign, name, side in pairs:
+                _add_harmonic(block, assembly.stages[name], (name, m), place, sign, side)
+            rows.append(block)
+        for _, name, side in pairs if held else ():
+            most = assembly.stages[name].sectors * side.fewest // 2
+            for m in sorted(set(range(-most, most + 1)) - set(kept)):
+                block = np.zeros((3 * side.count, ends[-1]), dtype=complex)
+                _add_harmonic(block, assembly.stages[name], (name, m), place, 1, side)
                 rows.append(block)
-    whole = np.vstack([np.zeros((0, ends[-1]), dtype=complex), *rows])
+    whole = np.vstack([block for block in rows if block.any() or not len(block)])
     squares, turn = np.linalg.eigh(whole @ whole.conj().T)
-    kept = squares > DEPENDENT * np.max(squares, initial=0.0)
-    return np.asarray((turn[:, kept] / np.sqrt(squares[kept])).conj().T @ whole)
+    independent = squares > DEPENDENT * np.max(squares, initial=0.0)
+    turn = turn[:, independent] / np.sqrt(squares[independent])
+    return np.asarray(turn.conj().T @ whole)
 
 
-def _constrained(shifted: Matrix, rows: ComplexArray, say: Say) -> Solve:
-    """Return what solves with a matrix under constraints: forces of the constraints hold them."""
-    plain = factorise(scipy.sparse.csr_array(shifted), say=say)
-    answers = plain(rows.conj().T)
-    inner = scipy.linalg.lu_factor(rows @ answers)
+def _add_harmonic(
+    block: ComplexArray,
+    sector: CyclicSector,
+    harmonic: tuple[str, int],
+    place: Mapping[Wave, slice],
+    sign: int,
+    side: Circles,
+) -> None:
+    """Add a harmonic of a side of a flange, where its wave is one of those at hand."""
+    name, m = harmonic
+    k = m % sector.sectors
+    if (name, k) in place:
+        block[:, place[name, k]] += sign * (projection(side, m) @ sector.wave_tie(k))
 
-    def solve(right: Matrix) -> Matrix:
-        free = plain(right)
-        return free - answers @ scipy.linalg.lu_solve(inner, rows @ free)
 
-    return solve
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    stiffness: Matrix
+    mass: Matrix
+    shift: float
 
+    @cached_property
+    def _plain(self) -> Solve:
+        return factorise(scipy.sparse.csr_array(self.stiffness - self.shift * self.mass))
 
-def _dense(
-    stiffness: Matrix, mass: Matrix, rows: ComplexArray, n: int
-) -> tuple[FloatArray, ComplexArray]:
-    basis = scipy.linalg.null_space(rows) if len(rows) else np.eye(mass.shape[0])
-    K, M = (basis.conj().T @ (a @ basis) for a in (stiffness, mass))
-    squares, vectors = scipy.linalg.eigh(K, M, subset_by_index=(0, n - 1))
-    return squares, basis @ vectors
+    def free(self, rows: ComplexArray) -> int:
+        """Return how many motions with mass constraints leave, or a few more."""
+        return int(np.count_nonzero(self.mass.diagonal())) - len(rows)
+
+    def modes(self, rows: ComplexArray, n: int, say: Say) -> tuple[FloatArray, ComplexArray]:
+        """Return the lowest modes in what constraints allow, in no order."""
+        free, size = self.free(rows), self.mass.shape[0]
+        if not 0 < n <= free:
+            what = f"{n} modes asked of {free} free motions"
+            raise input_error("multistage_modes", what, f"Ask for at most {free}.")
+        if size <= DENSE or n > size // 3:
+            return self._dense(rows, n)
+        answers = self._plain(rows.conj().T)
+        inner = scipy.linalg.lu_factor(rows @ answers)
+
+        def solve(right: Matrix) -> Matrix:
+            free_motion = self._plain(right)
+            return free_motion - answers @ scipy.linalg.lu_solve(inner, rows @ free_motion)
+
+        say(f"{n} modes of {size} dofs")
+        squares, vectors = lanczos(self.mass, n, solve, self.shift, complex)
+        return np.where(np.abs(squares) < RIGID * abs(self.shift), 0.0, squares), vectors
+
+    def _dense(self, rows: ComplexArray, n: int) -> tuple[FloatArray, ComplexArray]:
+        basis = scipy.linalg.null_space(rows) if len(rows) else np.eye(self.mass.shape[0])
+        K, M = (basis.conj().T @ (a @ basis) for a in (self.stiffness, self.mass))
+        squares, vectors = scipy.linalg.eigh(K, M, subset_by_index=(0, n - 1))
+        return squares, basis @ vectors
 
 
 def _signed(harmonics: Sequence[int]) -> list[int]:
