@@ -23,9 +23,9 @@ from stickslip.response.self_excited.in_time import Marched, march_periods, wave
 from stickslip.response.self_excited.modes import stuck_modes
 from stickslip.response.self_excited.problem import SelfExcited, self_excited_motions
 from stickslip.response.self_excited.stable import cycle_stability
-from stickslip.response.stability import stability
+from stickslip.response.stability import multipliers, stability
 from stickslip.response.stability.waves import growing_wave, point_disturbances
-from stickslip.response.time.sectors import all_sectors, whole_wheel
+from stickslip.response.time.sectors import all_in_time, all_sectors, whole_wheel
 from stickslip.response.time.start import start_from_harmonics
 
 TIPS = MOVED + 4 * np.arange(SECTORS)
@@ -133,6 +133,30 @@ def test_a_forced_motion_is_left_by_an_unstable_wave_unless_it_slips_enough() ->
             assert decisive.nodal_diameter(SECTORS) == 2
             gained = (others[-1, 2] / others[10, 2]) ** (1.0 / (16 * (len(others) - 11)))
             assert gained == pytest.approx(found.multiplier, abs=1e-3)
+
+
+def test_a_share_of_the_period_has_the_multipliers_of_the_whole(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Wave 2 of six sectors makes three shares; force 2 N on wave 1 six, with slip in all sectors."""
+    problem, cycles = cycles_of(False)
+    forced_problem, point, _ = forced(2.0)
+    gaps = [
+        (problem.system, cycles[0].coefficients @ problem.balance.interface.gap_operator.T, cycles[0].omega),
+        (forced_problem.system, point.coefficients @ forced_problem.low.interface.gap_operator.T, point.omega),
+    ]  # fmt: skip
+    for (system, own, omega), shares in zip(gaps, (3, 6), strict=True):
+        found = all_in_time(system, own)
+        assert found.shares == shares
+        _, matrix, powers = multipliers.period_matrix(found, omega)
+        assert powers == shares
+        few = np.sort(np.abs(np.linalg.eigvals(matrix)) ** powers)[::-1]
+        monkeypatch.setattr(multipliers, "share_of_monodromy", lambda *_: None)
+        _, matrix, powers = multipliers.period_matrix(found, omega)
+        monkeypatch.undo()
+        assert powers == 1
+        every = np.sort(np.abs(np.linalg.eigvals(matrix)))[::-1]
+        np.testing.assert_allclose(few[:40], every[:40], rtol=1e-10)
 
 
 def test_of_a_wheel_without_all_its_waves_nothing_is_said() -> None:

@@ -8,7 +8,7 @@ from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.self_excited.cycles import LimitCycle, solve_cycle
 from stickslip.response.self_excited.problem import SelfExcited
-from stickslip.response.stability.multipliers import Stability, motion_stability
+from stickslip.response.stability.multipliers import Stability, stability_in_time
 from stickslip.response.stability.waves import (
     WaveDisturbance,
     growing_wave,
@@ -67,7 +67,7 @@ def cycle_stability(problem: SelfExcited, cycle: LimitCycle) -> CycleStability:
 def _of(problem: SelfExcited, unknowns: FloatArray) -> tuple[Stability, complex]:
     """Return the stability without the disturbance along the motion, and the multiplier of this."""
     own = all_in_time(problem.system, _gaps(problem, unknowns))
-    found = motion_stability(*own, problem.omega(unknowns))
+    found = stability_in_time(own, problem.omega(unknowns))
     values = found.floquet.multipliers
     if found.unknown or not values.size:
         return found, complex(np.nan)

@@ -13,7 +13,9 @@ from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.contact.compiled import CompiledContacts
 from stickslip.contact.element import K_N, MU, RESIDUAL, UNILATERAL
 from stickslip.contact.event_integrals import Events
-from stickslip.contact.law import SLIP, STICK
+from stickslip.contact.law import SLIP, STICK, ContactLaw, PiecewiseLinear
+from stickslip.contact.laws.coupled_coulomb import CoupledCoulomb
+from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.slider import ANCHOR, BY_NORMAL, NO_ANCHOR, PERIOD, SIGN, START, STATE
 
 
@@ -77,6 +79,21 @@ class _Spring:
         """Return which segments begin with a change of state; the first may go on from the last of the period before."""
         states = self.segments[:, [STATE, SIGN]]
         return np.asarray(np.any(states != np.roll(states, 1, axis=0), axis=1))
+
+
+def located_part(law: ContactLaw) -> PiecewiseLinear | None:
+    """Return what of a law has transitions that can be located: all of it, the normal contact of planar friction, or nothing."""
+    if isinstance(law, PiecewiseLinear):
+        return law
+    if isinstance(law, CoupledCoulomb) and law.k_n > 0.0:
+        return ElasticCoulomb(k_t=0.0, k_w=0.0, k_n=law.k_n, mu=0.0, preload=law.preload)
+    return None
+
+
+def is_located(law: ContactLaw) -> bool:
+    """Whether all transitions of a law can be located: planar contacts without friction have none but those of their normal springs."""
+    frictionless = isinstance(law, CoupledCoulomb) and law.mu == 0.0 and law.k_n > 0.0
+    return isinstance(law, PiecewiseLinear) or frictionless
 
 
 def contact_states(

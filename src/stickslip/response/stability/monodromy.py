@@ -5,9 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray
+from stickslip.contact.slider import PERIOD
 from stickslip.response.stability.contact_states import ContactStates
 from stickslip.response.stability.modal_states import ModalStates
 from stickslip.response.stability.propagation import propagate
+from stickslip.response.time.sectors import InTime
 
 
 @dataclass(slots=True)
@@ -54,6 +56,46 @@ def monodromy(modes: ModalStates, contacts: ContactStates) -> FloatArray:
         )
         places.take_hold(following, now)
     return np.vstack([now.motion, now.sliders[held]])
+
+
+def share_of_monodromy(
+    modes: ModalStates, contacts: ContactStates, wheel: InTime
+) -> FloatArray | None:
+    """Return the derivative of all states after a share of the period, sectors renumbered, by those before; None where the motion has no shares.
+
+    The motion of a travelling wave does in every share what it does in the first one, in other sectors: the multipliers of the period are
+    those of the share to the power of their number. The share begins in the middle of the longest interval.
+    """
+    times, count = contacts.times, len(contacts.times) - 1
+    sliders = contacts.rows.size
+    if wheel.shares < 2 or sliders % wheel.sectors:
+        return None
+    begin = int(np.argmax(np.diff(times)))
+    start = 0.5 * (times[begin] + times[begin + 1])
+    stop = start + PERIOD / wheel.shares
+    held = contacts.sticks[begin]
+    places, now = Sliders(modes, contacts), identity(modes.n, held, 0)
+    here, at = begin, start
+    while True:
+        i, turn = here % count, (here // count) * PERIOD
+        end = min(float(times[i + 1] + turn), stop)
+        stuck = contacts.sticks[i]
+        matrix = modes.matrix(contacts.stiffness[i])
+        now.motion = propagate(
+            matrix, now.motion, places.pull[:, stuck], now.sliders[stuck], end - at
+        )
+        if end >= stop:
+            break
+        here, at = here + 1, end
+        places.take_hold(here % count, now)
+    if not np.array_equal(wheel.shifted(contacts.sticks[here % count]), held):
+        return None
+    moved = np.linalg.solve(modes.basis, wheel.shifted(modes.basis))
+    turned = moved * modes.speed / modes.speed[:, None]
+    n = modes.n
+    return np.vstack(
+        [moved @ now.motion[:n], turned @ now.motion[n:], wheel.shifted(now.sliders)[held]]
+    )
 
 
 def identity(n: int, held: BoolArray, more: int) -> Disturbance:

@@ -11,23 +11,27 @@ from stickslip.contact.event_integrals import room_for_events
 from stickslip.contact.events import exact_period
 from stickslip.contact.interface import Interface
 from stickslip.contact.law import ContactLaw, PiecewiseLinear
-from stickslip.contact.laws.coupled_coulomb import CoupledCoulomb
-from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import input_error
 from stickslip.harmonic.linear import LinearSide, one_structure
+from stickslip.model.structure import Structure
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
-from stickslip.response.stability.contact_states import ContactStates, contact_states
+from stickslip.response.stability.contact_states import (
+    ContactStates,
+    contact_states,
+    is_located,
+    located_part,
+)
 from stickslip.response.stability.kicks import sample_times, sampled_monodromy
 from stickslip.response.stability.missing_harmonics import corrected
 from stickslip.response.stability.modal_states import ModalStates, modal_states
-from stickslip.response.stability.monodromy import monodromy
+from stickslip.response.stability.monodromy import monodromy, share_of_monodromy
 from stickslip.response.stability.sampled_tangents import (
     Path,
     SampledTangents,
     sampled_tangents,
 )
 from stickslip.response.time.floquet import UNIT_TOLERANCE, Floquet, floquet
-from stickslip.response.time.sectors import all_in_time
+from stickslip.response.time.sectors import InTime, all_in_time
 
 SAMPLES = 256  # of a period, where laws are known by their tangents; and twice as many
 SAMPLES_PER_HARMONIC = 16
@@ -184,7 +188,7 @@ def stability(problem: ForcedProblem, point: ForcedPoint) -> Stability:
 def _of_point(problem: ForcedProblem, point: ForcedPoint) -> Stability:
     """Return the stability of the motion of a point as it was solved; of a wheel that of all its sectors, each moving on its own."""
     gaps = point.coefficients @ problem.low.interface.gap_operator.T
-    return motion_stability(*all_in_time(problem.system, gaps), point.omega)
+    return stability_in_time(all_in_time(problem.system, gaps), point.omega)
 
 
 def _with_change(solved: Stability, better: Stability, times: float) -> Stability:
@@ -221,40 +225,60 @@ def motion_stability(
     InputError
         If a contact is rigid, harmonics vibrate as different structures, or the structure cannot be marched in time.
     """
-    modes, laws = _prepared(structure, interface, omega)
-    contacts = _located(interface, laws, gap_coefficients)
+    whole = one_structure(structure, "stability")
+    return stability_in_time(InTime(whole, interface, gap_coefficients), omega)
+
+
+def stability_in_time(own: InTime, omega: float) -> Stability:
+    """Return the stability of a motion of what is marched in time; see `motion_stability`."""
+    modes, laws = _prepared(own.structure, own.contacts, omega)
+    contacts = _located(own.contacts, laws, own.gaps)
     if contacts is None:
         return _unknown(modes.n)
-    located = np.array([_is_located(law) for law in interface.laws], dtype=bool)
+    located = np.array([is_located(law) for law in own.contacts.laws], dtype=bool)
     if np.all(located):
-        found = floquet(monodromy(modes, contacts)).multipliers
+        found = _powers(*_located_matrix(modes, contacts, own))
         return _judged(contacts, found, np.zeros(found.size), modes.n)
-    return _sampled(modes, contacts, interface, np.flatnonzero(~located), gap_coefficients)
+    return _sampled(modes, contacts, own.contacts, np.flatnonzero(~located), own.gaps)
 
 
-def period_matrix(
-    structure: LinearSide, interface: Interface, gap_coefficients: FloatArray, omega: float
-) -> tuple[ModalStates, FloatArray] | None:
+def period_matrix(own: InTime, omega: float) -> tuple[ModalStates, FloatArray, int] | None:
     """Return the derivative of all states after a period of a motion by those before, the modal ones first; None where nothing is known.
 
-    The arguments are those of `motion_stability`; where laws are known by sampled tangents, it is that of the finest samples there.
+    Of a travelling motion it is that after a share of the period, whose number is returned. Where laws are known by sampled tangents, it is
+    that of the finest samples.
     """
-    modes, laws = _prepared(structure, interface, omega)
-    contacts = _located(interface, laws, gap_coefficients)
+    interface = own.contacts
+    modes, laws = _prepared(own.structure, interface, omega)
+    contacts = _located(interface, laws, own.gaps)
     if contacts is None:
         return None
-    own = np.flatnonzero([not _is_located(law) for law in interface.laws])
-    if not own.size:
-        return modes, monodromy(modes, contacts)
-    times, polynomials = _samples(contacts, own, gap_coefficients, 4)
-    at = _tangents([interface.laws[c] for c in own], own, times, polynomials, modes.omega)
+    sampled = np.flatnonzero([not is_located(law) for law in interface.laws])
+    if not sampled.size:
+        return modes, *_located_matrix(modes, contacts, own)
+    times, polynomials = _samples(contacts, sampled, own.gaps, 4)
+    laws_there = [interface.laws[c] for c in sampled]
+    at = _tangents(laws_there, sampled, times, polynomials, modes.omega)
     if not np.all(np.isfinite(at.jac)):
         return None
-    return modes, sampled_monodromy(modes, contacts, times, at, interface.factors[own])
+    return modes, sampled_monodromy(modes, contacts, times, at, interface.factors[sampled]), 1
+
+
+def _located_matrix(
+    modes: ModalStates, contacts: ContactStates, own: InTime
+) -> tuple[FloatArray, int]:
+    """Return the matrix of a share of the period, where there are shares, and their number."""
+    share = share_of_monodromy(modes, contacts, own)
+    return (monodromy(modes, contacts), 1) if share is None else (share, own.shares)
+
+
+def _powers(matrix: FloatArray, shares: int) -> ComplexArray:
+    """Return the multipliers of the period from the matrix of one of its shares."""
+    return np.asarray(floquet(matrix).multipliers ** shares)
 
 
 def _prepared(
-    structure: LinearSide, interface: Interface, omega: float
+    structure: Structure, interface: Interface, omega: float
 ) -> tuple[ModalStates, list[PiecewiseLinear | None]]:
     """Return the modal states, and of each law what has transitions that can be located."""
     if interface.rigid:
@@ -263,8 +287,7 @@ def _prepared(
             "a contact is rigid: its states have no multipliers that follow from forces as functions of gaps",
             "Give the contacts a stiffness, as elastic_coulomb.",
         )
-    whole = one_structure(structure, "stability")
-    modes = modal_states(whole, interface.gap_operator, interface.stuck_stiffness(), omega)
+    modes = modal_states(structure, interface.gap_operator, interface.stuck_stiffness(), omega)
     return modes, [located_part(law) for law in interface.laws]
 
 
@@ -275,21 +298,6 @@ def _samples(
     samples = max(SAMPLES, SAMPLES_PER_HARMONIC * ((len(gap_coefficients) - 1) // 2))
     polynomials = gap_coefficients.reshape(len(gap_coefficients), -1, 3)[:, own]
     return sample_times(contacts, samples, halves), polynomials
-
-
-def located_part(law: ContactLaw) -> PiecewiseLinear | None:
-    """Return what of a law has transitions that can be located: all of it, the normal contact of planar friction, or nothing."""
-    if isinstance(law, PiecewiseLinear):
-        return law
-    if isinstance(law, CoupledCoulomb) and law.k_n > 0.0:
-        return ElasticCoulomb(k_t=0.0, k_w=0.0, k_n=law.k_n, mu=0.0, preload=law.preload)
-    return None
-
-
-def _is_located(law: ContactLaw) -> bool:
-    """Whether all transitions of a law can be located: planar contacts without friction have none but those of their normal springs."""
-    frictionless = isinstance(law, CoupledCoulomb) and law.mu == 0.0 and law.k_n > 0.0
-    return isinstance(law, PiecewiseLinear) or frictionless
 
 
 def _located(

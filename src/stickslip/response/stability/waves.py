@@ -59,13 +59,14 @@ def wave_disturbances(system: System, gaps: ComplexArray, omega: float) -> list[
     omega
         Frequency of the motion, rad/s.
     """
-    structure, contacts, real = all_in_time(system, gaps)
-    found = period_matrix(structure, contacts, real, omega)
+    own = all_in_time(system, gaps)
+    found = period_matrix(own, omega)
     if found is None:
         return []
-    sectors = contacts.n_contacts // system.interface.n_contacts
-    modes, matrix = found
+    modes, matrix, shares = found
+    sectors = own.sectors
     values, vectors = np.linalg.eig(matrix)
+    values = values**shares
     n = modes.n
     moved = _by_wave(modes.basis @ vectors[:n], sectors)
     rate = _by_wave(omega * (modes.basis @ (modes.speed[:, None] * vectors[n : 2 * n])), sectors)

@@ -154,20 +154,58 @@ def whole_wheel(system: System) -> SectorsInTime:
     return all_sectors(system, still, every=True)
 
 
-def all_in_time(system: System, gaps: ComplexArray) -> tuple[Structure, Interface, FloatArray]:
-    """Return what is marched in time and the real coefficients of its gaps, from those (H+1, 3 n_contacts) of a system.
+@dataclass(frozen=True, eq=False)
+class InTime:
+    """What disturbances of a periodic motion act on; `all_in_time` makes one.
+
+    Parameters
+    ----------
+    structure, contacts
+        One structure, or all sectors of a wheel.
+    gaps
+        (2H+1, 3 n_contacts) real coefficients of the gaps of the motion, m.
+    sectors
+        Number of sectors; 1 for a single structure.
+    shares, ahead
+        After one of so many shares of the period each sector does what the sector so many places further on does now.
+    """
+
+    structure: Structure
+    contacts: Interface
+    gaps: FloatArray
+    sectors: int = 1
+    shares: int = 1
+    ahead: int = 0
+
+    def shifted(self, rows: Matrix) -> Matrix:
+        """Return (sectors · p, ...) rows, sector by sector, as those of the sectors that they stand for after a share of the period."""
+        return WaveMotion(self.sectors, self.ahead).shifted(rows)
+
+
+def all_in_time(system: System, gaps: ComplexArray) -> InTime:
+    """Return what is marched in time, and the gaps of a motion there.
 
     Parameters
     ----------
     system
         Of a wheel with every wave (`TunedWheel.has_every_wave`) all sectors are marched.
     gaps
-        Complex, m.
+        (H+1, 3 n_contacts) complex coefficients, m.
     """
-    if isinstance(system.structure, TunedWheel):
-        whole = whole_wheel(system)
-        return whole.structure, whole.contacts, to_real(whole.travelling(gaps))
-    return one_structure(system.structure, "stability"), system.interface, to_real(gaps)
+    wheel = system.structure
+    if not isinstance(wheel, TunedWheel):
+        return InTime(one_structure(wheel, "stability"), system.interface, to_real(gaps))
+    whole = whole_wheel(system)
+    shares, common = different_sectors(wheel)
+    ahead = pow(wheel.engine_order // common % shares, -1, shares) if shares > 1 else 0
+    return InTime(
+        whole.structure,
+        whole.contacts,
+        to_real(whole.travelling(gaps)),
+        wheel.sectors,
+        shares,
+        ahead,
+    )
 
 
 def different_sectors(wheel: TunedWheel) -> tuple[int, int]:

@@ -2,6 +2,7 @@
 
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.system import System
+from stickslip.response.time.sectors import different_sectors
 
 INTERVALS = 12  # between transitions, for each contact: 2 to 18 at the peaks of the two blades
 PRODUCTS = 20  # of matrices for each of these
@@ -13,11 +14,16 @@ MOST_WHEEL = (
 
 
 def examination_work(system: System) -> float:
-    """Return the operations of one examination, which looks at two motions; of a wheel at those of all its sectors."""
-    side = system.structure
-    sectors = side.sectors if isinstance(side, TunedWheel) else 1
+    """Return the operations of one examination, which looks at two motions; of a wheel at those of all its sectors.
+
+    A travelling motion repeats itself in other sectors, so that a share of the period is enough.
+    """
+    side, sectors, shares = system.structure, 1, 1
+    if isinstance(side, TunedWheel):
+        sectors, shares = side.sectors, different_sectors(side)[0]
     rows = 2 * sectors * side.n
-    return 2.0 * INTERVALS * sectors * system.interface.n_contacts * PRODUCTS * 2.0 * rows**3
+    intervals = INTERVALS * sectors * system.interface.n_contacts / shares
+    return 2.0 * intervals * PRODUCTS * 2.0 * rows**3
 
 
 def examines_every_wave(system: System) -> bool:

@@ -227,7 +227,8 @@ def integrated(
     motion = problem.low.linear.recover(point.omega, point.coefficients)
     structure, contacts = system.structure, system.interface
     if isinstance(structure, TunedWheel):
-        whole = all_sectors(system, load)
+        # with every wave any sector may do something else: what leaves the tuned motion then does so here too
+        whole = all_sectors(system, load, every=structure.has_every_wave)
         motion, structure, contacts = whole.spread(motion), whole.structure, whole.contacts
         load = whole.load
     return integrate(
