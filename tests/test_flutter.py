@@ -340,3 +340,85 @@ def test_a_mistuned_wheel_without_deviations_does_what_one_sector_does_in_the_fl
     np.testing.assert_allclose(sectors[:, :N], np.repeat(tuned[:, :1], N, axis=1), rtol=1e-8)
     dry, wet = (m.assembled(1) for m in (replace(whole, aerodynamics=None), whole))
     np.testing.assert_allclose(wet.static_gap, dry.static_gap, rtol=1e-8)
+
+
+@pytest.mark.parametrize("order", [1, 5])
+def test_friction_in_a_flow_balanced_and_marched_in_time(order: int) -> None:
+    """Blades that slip, engine orders that drive the two directions of a nodal diameter: the sectors of the wheel in time agree."""
+    own = influence()
+    aero = of_blade(InfluenceCoefficients(own.distances, 6 * own.values[:, 22:23]))
+    rub = ss.Contact(
+        between=("sector.blade", "ground"), law=ss.Jenkins(k_t=0.4, limit=0.01), acts="tangential"
+    )
+    loads = {"gas": ss.Load(on="sector.blade", newton=0.02, engine_order=order)}
+    outputs = (ss.Output(name="tip", on="sector.blade"),)
+    there = model(aero, contacts={"rub": rub}, loads=loads, outputs=outputs)
+    found = there.assembled(7)
+    omega = 2 * np.pi * 0.36
+    sweep = ss.Sweep(
+        omega_range=(omega, 1.0001 * omega), low=7, high=7, selection="always_low", frequencies=2, peak_points=0
+    )  # fmt: skip
+    problem = ss.response.forced_problem(found.system, found.load, sweep)
+    point = ss.response.accepted_points(list(ss.forced_response(found.system, found.load, sweep)))[
+        0
+    ]
+    assert point.converged
+    assert ss.response.fields(problem, point).energy.max() > 1e-4  # it slips
+    motion = problem.low.linear.recover(point.omega, point.coefficients)
+    whole = ss.response.all_sectors(found.system, found.load)
+    gaps, laws = whole.contacts.gap_operator, whole.contacts.laws
+    start = ss.response.start_from_harmonics(whole.spread(motion), omega, gaps, laws)
+    stepping = ss.response.TimeStepping(384, tolerance=1e-8, max_periods=300)
+    shot = ss.response.shoot(
+        whole.structure, gaps, laws, whole.load, omega, np.arange(whole.structure.n), start, stepping
+    )  # fmt: skip
+    assert shot.converged
+    expected, size = whole.spread(motion)[:2], np.abs(motion[1]).max()
+    assert np.abs(shot.harmonics[:2] - expected).max() < 2e-3 * size
+    # the other direction is another answer
+    other = replace(there, loads={"gas": replace(loads["gas"], engine_order=N - order)}).assembled(
+        7
+    )
+    mirrored = ss.response.accepted_points(
+        list(ss.forced_response(other.system, other.load, sweep))
+    )[0]
+    far = ss.response.forced_problem(other.system, other.load, sweep).low.linear.recover(
+        omega, mirrored.coefficients
+    )
+    assert abs(abs(far[1]).max() - size) > 1e-2 * size
+
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "flutter"
+
+
+def test_the_example_tells_its_margin_in_terminal_and_page(tmp_path: Path) -> None:
+    """Some of its waves, and [modes] beside them, whose damped frequencies are those of [flutter]."""
+    text = (EXAMPLE / "study.toml").read_text()
+    text = text.replace("number = 1  ", "number = 1\nnodal_diameters = [0, 4, 5]  ")
+    text = text.replace("disk_size_m = 0.030", "disk_size_m = 0.050").replace("= 0.014", "= 0.022")
+    (tmp_path / "study.toml").write_text(text + "[modes]\nnumber = 1\nnodal_diameters = [5]\n")
+    (tmp_path / "coefficients.csv").write_text((EXAMPLE / "coefficients.csv").read_text())
+    result = ss.Study.from_file(tmp_path / "study.toml").run()
+    flutter, modes = (result.data[name].isel(case=0) for name in ("flutter", "modes"))
+    assert flutter["wave_number"].values.tolist() == [0, 4, 5, 15, 16]
+    assert modes["wave_number"].values.tolist() == [5, 15]
+    rows = [flutter["wave_number"].values.tolist().index(k) for k in (5, 15)]
+    np.testing.assert_allclose(modes["damping"], flutter["damping"][rows], rtol=1e-9)
+    np.testing.assert_allclose(modes["damped_hz"], flutter["frequency_in_flow_hz"][rows], rtol=1e-9)
+    least = flutter["wave_number"].values[int(flutter["least_wave"])]
+    assert least == 15
+    assert float(flutter["damping"].min()) < 0
+    assert any("ND 5 forward, mode 1 grows" in str(v) for v in result.verdicts)
+    assert "ND 5 forward, mode 1" in result.summaries["flutter"][0].title
+    assert any("in the flow" in t.title for t in result.summaries["modes"])
+    page = tmp_path / "page.html"
+    result.report(page)
+    html = page.read_text()
+    for words in (
+        "Least stable diagram",
+        "Margins",
+        "unstable",
+        "In the flow",
+        "least damping in the flow",
+    ):
+        assert words in html
