@@ -19,7 +19,7 @@ from stickslip.assembly.loose import without_bodies
 from stickslip.assembly.mistuning import Mistuning
 from stickslip.assembly.pairs import Pairs, pair_contacts
 from stickslip.assembly.places import Places
-from stickslip.assembly.reduced import Spin, Steady, Store, at_speed, damped, in_memory
+from stickslip.assembly.reduced import Spin, Steady, Store, at_speed, damped, in_memory, steady_of
 from stickslip.assembly.shared_rotation import joined_displacements
 from stickslip.assembly.skin import on_skin, skin_of
 from stickslip.assembly.stages import is_staged, stages_of
@@ -243,9 +243,11 @@ class Model:
         """What the displacements of steady rotation obey: cyclic faces, and joins, by which parts share in it."""
         if self.joins and self._has_mesh:
             loose = self._loose(np.zeros(len(self.pairs.names), dtype=bool))
-            return joined_displacements(self.places, self.coordinates, self.neighbours, loose)
+            return joined_displacements(
+                self.places, self.coordinates, (self.neighbours, self.ties), loose
+            )
         ties = {} if self.neighbours is None else self.neighbours.ties
-        return {name: Steady(ties.get(name)) for name in self.parts}
+        return {name: steady_of(part, ties.get(name)) for name, part in self.parts.items()}
 
     @cached_property
     def coordinates(self) -> Coordinates:

@@ -12,6 +12,7 @@ from stickslip.assembly.placing import turned_dofs, turned_structure
 from stickslip.errors import InputError, SingularError
 from stickslip.model.axis import Axis
 from stickslip.model.dofs import Dofs
+from stickslip.model.fe.free_solid import inertia_relief
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
 from stickslip.reduction.basis import surviving_sets, turned_modes, with_modal_dofs
@@ -61,10 +62,13 @@ class Steady:
         That of its cyclic faces; None for none.
     unit
         (n,) the displacement itself at 1 rad/s in m s², where joined parts share in it; None: that of the part alone.
+    carried
+        (n,) of a part that contacts alone hold: what they have to carry at 1 rad/s, N s²; None where it is held.
     """
 
     tie: Matrix | None = None
     unit: FloatArray | None = None
+    carried: FloatArray | None = None
 
     def displacement(self, part: Part, speed: float) -> FloatArray:
         """Return the (n,) displacement in m of a part with a solid at a speed in rad/s."""
@@ -75,6 +79,12 @@ class Steady:
 
 
 ALONE = Steady()
+
+
+def steady_of(part: Part, tie: Matrix | None) -> Steady:
+    """Return what the displacement of steady rotation of a part by itself obeys; of a free one that in balance with its inertia."""
+    relief = None if part.solid is None else inertia_relief(part.solid, tie)
+    return Steady(tie) if relief is None else Steady(tie, *relief)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,16 +122,15 @@ def at_speed(name: str, part: Part, spin: Spin, rest: Steady = ALONE) -> Structu
             spin.speed, tie=rest.tie, unit=rest.unit, tangent=spin.tangent, coriolis=spin.coriolis
         )
     except SingularError as error:
-        raise SingularError(
-            f"part.{name}: {error} What contacts alone hold has no stress of rotation here: clamp it, or join it."
-        ) from None
+        raise SingularError(f"part.{name}: {error}") from None
 
 
 def steady_load(part: Part, spin: Spin, structure: Structure, rest: Steady = ALONE) -> FloatArray:
     """Return the (n,) load on a part's dofs, at a speed, under which it comes to the displacement of steady rotation."""
     if part.solid is None or spin.speed == 0.0:
         return np.zeros(part.structure.n)
-    return np.asarray(structure.stiffness @ rest.displacement(part, spin.speed))
+    load = np.asarray(structure.stiffness @ rest.displacement(part, spin.speed))
+    return load if rest.carried is None else load + spin.speed**2 * rest.carried
 
 
 def damped(name: str, part: Part, structure: Structure) -> Structure:

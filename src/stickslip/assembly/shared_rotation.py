@@ -6,14 +6,15 @@ import scipy.sparse
 from stickslip.arrays import IntArray
 from stickslip.assembly.coordinates import Coordinates
 from stickslip.assembly.places import Places, picked
-from stickslip.assembly.reduced import Steady
+from stickslip.assembly.reduced import Steady, steady_of
+from stickslip.assembly.ties import Ties
 from stickslip.assembly.wheel import Neighbours
 from stickslip.model.fe.factorisation import factorise
 from stickslip.model.structure import join
 
 
 def joined_displacements(
-    places: Places, at: Coordinates, here: Neighbours | None, loose: IntArray
+    places: Places, at: Coordinates, tied: tuple[Neighbours | None, Ties], loose: IntArray
 ) -> dict[str, Steady]:
     """Solve the linear statics of all joined parts at rest under the centrifugal load at 1 rad/s.
 
@@ -21,12 +22,14 @@ def joined_displacements(
     ----------
     places, at
         The parts, and the coordinates that their joins leave.
-    here
-        How they meet their neighbours on a wheel; None for a single structure.
+    tied
+        How they meet their neighbours on a wheel, None for a single structure; and what joins tie.
     loose
         Dofs that nothing holds, which stay where they are.
     """
-    parts = places.parts
+    parts, (here, _) = places.parts, tied
+    free = _free_solids(places, *tied)
+    loose = np.concatenate([loose, *(places.own(name) for name in free)])
     rest = at.tied(join(**{name: part.structure for name, part in parts.items()}))
     tie = picked(np.arange(at.ids.size), at.ids.size) if at.tie is None else at.tie
     if here is not None:
@@ -39,4 +42,17 @@ def joined_displacements(
     ]
     solve = factorise(scipy.sparse.csr_array(tie.T @ stiffness @ tie))
     moved = tie @ solve(tie.T @ np.concatenate(load))
-    return {name: Steady(unit=np.asarray(moved[places.own(name)])) for name in parts}
+    shared = {name: Steady(unit=np.asarray(moved[places.own(name)])) for name in parts}
+    return shared | free
+
+
+def _free_solids(places: Places, here: Neighbours | None, joins: Ties) -> dict[str, Steady]:
+    """Return what the displacements of parts obey that neither a support nor a join holds."""
+    cyclic = {} if here is None else here.ties
+    tied = np.union1d(joins.followers, joins.weights.nonzero()[1])
+    own = {
+        name: steady_of(part, cyclic.get(name))
+        for name, part in places.parts.items()
+        if not np.isin(places.own(name), tied).any()
+    }
+    return {name: steady for name, steady in own.items() if steady.carried is not None}

@@ -187,10 +187,11 @@ class FileModel(PartTable):
     high_face: Name | None = Field(
         None, description="name of the node set of the cyclic face at the higher angle"
     )
-    cyclic: Literal["node_to_node", "segment_to_segment"] = Field(
+    cyclic: Literal["node_to_node", "segment_to_segment", "none"] = Field(
         "node_to_node",
         description="how the cyclic faces are tied: node_to_node where their meshes match, or segment_to_segment, in the mean, where "
-        "they do not; then the high face follows the low one",
+        "they do not; then the high face follows the low one; none: the part has no such faces, and only contacts and joins lead "
+        "to its neighbours, as those of a damper between blades",
     )
     clamped: list[Name] = Field(
         default_factory=list,

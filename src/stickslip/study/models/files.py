@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -182,7 +182,7 @@ def _solid(
         axis,
         sectors=sectors,
         faces=faces,
-        cyclic=table.cyclic,
+        cyclic=_tied(table),
         clamped_sets=gone,
         **others,
     )
@@ -214,7 +214,7 @@ def _from_matrices(key: str, table: FileModel, home: Path, others: dict[str, Any
         mesh=mesh,
         sectors=sectors,
         faces=faces,
-        cyclic=table.cyclic,
+        cyclic=_tied(table),
         axis=table.axis() or Axis(),
         **others,
     )
@@ -249,6 +249,14 @@ def _faces(
     key: str, table: FileModel, sets: Mapping[str, IntArray], sectors: int
 ) -> tuple[str, str]:
     """Return the names of the sets that are the cyclic faces."""
+    if table.cyclic == "none":
+        if set(FACES) & set(sets):
+            raise input_error(
+                f"{key}.cyclic",
+                "is none, and the file has cyclic faces",
+                "Leave it out, or take the cyclic tie out of the file.",
+            )
+        return FACES
     found = []
     for face, usual in zip(("low_face", "high_face"), FACES, strict=True):
         name = getattr(table, face)
@@ -258,11 +266,15 @@ def _faces(
     return found[0], found[1]
 
 
+def _tied(table: FileModel) -> Literal["node_to_node", "segment_to_segment"]:
+    return "segment_to_segment" if table.cyclic == "segment_to_segment" else "node_to_node"
+
+
 def _no_face(place: str, sectors: int, sets: Iterable[str]) -> InputError:
     return input_error(
         place,
         f"is missing with {sectors} sectors, and the file has no cyclic tie",
-        f"Name one of its sets: {', '.join(sorted(sets)) or 'it has none'}.",
+        f'Name one of its sets: {", ".join(sorted(sets)) or "it has none"}. Of a part that only contacts connect say cyclic = "none".',
     )
 
 

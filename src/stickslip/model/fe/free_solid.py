@@ -1,0 +1,80 @@
+"""The static state of a rotating solid that nothing holds: a ring in a groove, a damper of finite elements below platforms."""
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse
+
+from stickslip.arrays import FloatArray, Matrix
+from stickslip.model.fe.factorisation import factorise
+from stickslip.model.fe.rotation import RotatingSolid
+
+RIGID = 1e-9  # of what a motion of the same size would cost: strains below are rounding
+
+
+def inertia_relief(
+    solid: RotatingSolid, tie: Matrix | None = None
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return the static displacement of a free solid under its centrifugal load, in balance with its own inertia.
+
+    The load less the inertia of the rigid motions that it would cause is in balance by itself, and deforms the solid; what is taken
+    off is carried by contacts, whose own share of the stress is left out.
+
+    Parameters
+    ----------
+    solid
+        The solid.
+    tie
+        (n, m) sparse: displacements ``tie @ q`` are admissible (a cyclic sector's tie at wave number 0); None: all.
+
+    Returns
+    -------
+    tuple[FloatArray, FloatArray] | None
+        (n,) displacement at 1 rad/s in m s², without rigid motion, and the (n,) load in N s² that contacts have to carry; None where
+        the solid is held.
+    """
+    free = rigid_motions(solid, tie)
+    if not free.shape[1]:
+        return None
+    mass, stiffness = solid.structure.mass, solid.structure.stiffness
+    weighted = mass @ free
+    square = free.T @ weighted
+    carried = weighted @ np.linalg.solve(square, free.T @ solid.centrifugal)
+    load = solid.centrifugal - carried
+    own = free
+    if tie is not None:
+        load, own = tie.T @ load, _on(tie, free)
+        stiffness = tie.T @ stiffness @ tie
+    # as many coordinates are held as there are rigid motions: the load is in balance, and no reaction arises
+    _, _, order = scipy.linalg.qr(own.T, mode="economic", pivoting=True)
+    rest = np.sort(order[own.shape[1] :])
+    moved = np.zeros(own.shape[0])
+    moved[rest] = factorise(scipy.sparse.csr_array(stiffness)[rest][:, rest])(load[rest])
+    moved = moved if tie is None else np.asarray(tie @ moved)
+    return moved - free @ np.linalg.solve(square, weighted.T @ moved), carried
+
+
+def rigid_motions(solid: RotatingSolid, tie: Matrix | None = None) -> FloatArray:
+    """Return the (n, k) rigid motions that neither supports nor the tie hinder; k from 0 to 6."""
+    places = solid.mesh.points[solid.free]
+    size = float(np.linalg.norm(np.ptp(places, axis=0)))
+    unit = np.eye(3)
+    every = np.empty((solid.mesh.points.size, 6))
+    every[:, :3] = np.tile(unit, (len(solid.mesh.points), 1))
+    whole = (solid.mesh.points - places.mean(axis=0)) / size
+    for k in range(3):
+        every[:, 3 + k] = np.cross(unit[k], whole).ravel()
+    motions = every[solid.moving]
+    stiffness = scipy.sparse.csr_array(solid.structure.stiffness)
+    cost = abs(stiffness) @ np.abs(motions)
+    hindered = [(stiffness @ motions) / cost.max()]
+    if tie is not None:
+        hindered.append(motions - tie @ _on(tie, motions))
+    _, values, rows = np.linalg.svd(np.vstack(hindered), full_matrices=False)
+    return np.asarray(motions @ rows[values < RIGID].T)
+
+
+def _on(tie: Matrix, motions: FloatArray) -> FloatArray:
+    """Return the (m, k) coordinates of admissible displacements that are nearest to motions (n, k)."""
+    square = scipy.sparse.csr_array(tie.T @ tie)
+    solve = factorise(square)
+    return np.column_stack([solve(np.asarray(tie.T @ column)) for column in motions.T])
