@@ -79,8 +79,8 @@ class Blade:
     whole: bool
 
 
-def blade_of(model: Model, of: str, place: str) -> Blade:
-    """Return the blade that a name ``part`` or ``part.set`` means; `place` is the key that has it."""
+def blade_of(model: Model, of: str, place: str, beyond: float | None = None) -> Blade:
+    """Return the blade that a name ``part`` or ``part.set`` means, `beyond` a radius in m; `place` is the key that has it."""
     head, _, rest = of.partition(".")
     part = model.places.part_of(head, place)
     structure = at_speed(head, part, model.spin(model.speed), model.steady[head])
@@ -90,6 +90,9 @@ def blade_of(model: Model, of: str, place: str) -> Blade:
         spot = model.places.spot(of, place)
         dofs = spot.dofs if spot.nodes is None else spot.nodes[spot.nodes >= 0]
         own = np.unique(dofs) - first
+    if beyond is not None:
+        arm = np.linalg.norm(part.axis.arm(structure.dofs.position[own]), axis=1)
+        own = own[arm > beyond]
     if not own.size or part.body is not None:
         raise input_error(
             place, f"{of!r} is nothing that deforms", "Name a blade's node set or a part."
@@ -110,14 +113,16 @@ def blade_alone(blade: Blade, number: int) -> tuple[FloatArray, FloatArray]:
     return found.squares[strained], np.real(found.shapes[:, strained])
 
 
-def blade_alone_hz(model: Model, of: str, number: int, place: str) -> FloatArray:
+def blade_alone_hz(
+    model: Model, of: str, number: int, place: str, beyond: float | None = None
+) -> FloatArray:
     """Return the lowest natural frequencies (r,) of a blade by itself in Hz."""
-    squares, _ = blade_alone(blade_of(model, of, place), number)
+    squares, _ = blade_alone(blade_of(model, of, place, beyond), number)
     return np.asarray(np.sqrt(squares) / HZ)
 
 
 def _of_blades(model: Model, name: str, one: BladeMistuning) -> Deviation:
-    blade = blade_of(model, one.of, f"mistuning.{name}.of")
+    blade = blade_of(model, one.of, f"mistuning.{name}.of", one.beyond_radius)
     factors = one.factors
     if factors.ndim == 2 or one.modes is not None:
         return _of_modes(blade, factors, one.modes)

@@ -56,12 +56,15 @@ class BladeMistuning:
         (component-mode subspace).
     quantity
         What deviates: ``frequency`` or ``stiffness``.
+    beyond_radius
+        Only what lies farther than that from the axis of rotation, m; None: all of `of`.
     """
 
     of: str
     deviations: FloatArray
     modes: int | None = None
     quantity: Literal["frequency", "stiffness"] = "frequency"
+    beyond_radius: float | None = None
 
     def __post_init__(self) -> None:
         values = np.asarray(self.deviations, dtype=float)

@@ -17,6 +17,10 @@ class MistuningTable(Section):
     of: Name | None = Field(
         None, description='blades that differ: a part, or a node set of one such as "blade.airfoil"'
     )
+    beyond_radius_m: Positive | None = Field(
+        None,
+        description="of blades: only what lies farther than that from the axis of rotation in m, greater than zero; left out: all",
+    )
     contact: Name | None = Field(None, description="name of the contact that differs")
     part: Name | None = Field(None, description="part that is another one in a single sector")
     sector: int | None = Field(

@@ -127,14 +127,18 @@ def _blades(name: str, table: MistuningTable, home: Path, model: Model, of: str)
     if table.file is None:
         try:
             return BladeMistuning(
-                of=of, deviations=_values(table, model.sectors), modes=modes, quantity=quantity
+                of=of,
+                deviations=_values(table, model.sectors),
+                modes=modes,
+                quantity=quantity,
+                beyond_radius=table.beyond_radius_m,
             )
         except InputError as error:
             raise error.at(key) from None
     measured = read_blades(home / table.file, model.sectors)
     reference = measured.mean(axis=0)
     if table.relative_to == "model":
-        reference = blade_alone_hz(model, of, measured.shape[1], f"{key}.of")
+        reference = blade_alone_hz(model, of, measured.shape[1], f"{key}.of", table.beyond_radius_m)
         if reference.size < measured.shape[1]:
             raise input_error(
                 f"{key}.file",
@@ -142,7 +146,9 @@ def _blades(name: str, table: MistuningTable, home: Path, model: Model, of: str)
                 "Leave the others out.",
             )
     try:
-        return BladeMistuning(of=of, deviations=measured / reference - 1.0)
+        return BladeMistuning(
+            of=of, deviations=measured / reference - 1.0, beyond_radius=table.beyond_radius_m
+        )
     except InputError as error:
         raise error.at(f"{key}.file") from None
 

@@ -72,7 +72,8 @@ class Estimate:
 
 def estimate(model: Model, sweep: Sweep) -> Estimate:
     """Estimate memory and work of the response of a model that is not assembled yet: how many points slip nobody knows before."""
-    nodes, coordinates = nodes_of(model), retained_of(model)
+    sectors = 1 if model.mistuning is None else model.sectors
+    nodes, coordinates = nodes_of(model), sectors * retained_of(model)
     low, high = (
         (2 * len(own) - 1) * coordinates for own in (sweep.low_harmonics, sweep.high_harmonics)
     )
@@ -95,13 +96,15 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
         f"H = {named(sweep.high_harmonics)} at {100 * share_high:.0f} % of {points:.0f} points"
     )
     stored = points * (sweep.high_harmonics[-1] + 1) * 10 * coordinates * 16 / 1e9
-    memory = memory_gb(nodes) + stored + 6 * high**2 * 8 / 1e9
+    # all sectors: a factor of each harmonic and the wheel's matrices; else one of all harmonics together
+    largest = 6 * high**2 if sectors == 1 else 12 * (high + 4 * coordinates) * coordinates
+    memory = memory_gb(nodes) + stored + largest * 8 / 1e9
     return Estimate(
         nodes=nodes,
         unknowns=high,
         memory_gb=memory,
         newton_steps=round(steps_low + steps_high),
-        model_seconds=nodes * SECONDS_A_NODE,
+        model_seconds=nodes * SECONDS_A_NODE * (sectors // 2 + 1),
         least_seconds=least_seconds,
         most_seconds=most_seconds,
         most="" if kept else harmonics,
