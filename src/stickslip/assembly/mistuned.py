@@ -48,6 +48,7 @@ from stickslip.response.system import System
 RELATIVE = {
     "friction_coefficient": ("mu",),
     "preload": ("preload",),
+    "slip_limit": ("limit",),
     "stiffness": ("k_t", "k_w", "k_n"),
 }  # fields of laws
 

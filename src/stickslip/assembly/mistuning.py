@@ -11,7 +11,7 @@ from stickslip.errors import input_error
 from stickslip.model.part import Part
 
 Distribution = Literal["normal", "uniform"]
-ContactQuantity = Literal["friction_coefficient", "stiffness", "preload", "gap"]
+ContactQuantity = Literal["friction_coefficient", "slip_limit", "stiffness", "preload", "gap"]
 LARGEST = 0.5  # relative deviation of a frequency or a stiffness; beyond, a blade is another blade
 
 
@@ -105,7 +105,7 @@ class ContactMistuning:
     contact
         Name of the model's contact; that of sector n lies in sector n, or between n and n + 1.
     quantity
-        ``friction_coefficient``, ``stiffness`` (all of them alike) or ``preload``: of these `values` are relative deviations; ``gap``:
+        ``friction_coefficient``, ``slip_limit``, ``stiffness`` (all of them alike) or ``preload``: of these `values` are relative deviations; ``gap``:
         `values` are clearances in m, added to what the contact has.
     values
         (n_s,) of each sector.

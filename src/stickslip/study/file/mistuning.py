@@ -30,12 +30,13 @@ class MistuningTable(Section):
         None,
         description="of part: the part [part.NAME] that stands there instead, with the same nodes; it is nowhere else",
     )
-    quantity: Literal["frequency", "stiffness", "friction_coefficient", "preload", "gap"] | None = (
-        Field(
-            None,
-            description="what differs: of blades frequency (the default) or stiffness; of contacts friction_coefficient, stiffness, "
-            "preload or gap",
-        )
+    quantity: (
+        Literal["frequency", "stiffness", "friction_coefficient", "slip_limit", "preload", "gap"]
+        | None
+    ) = Field(
+        None,
+        description="what differs: of blades frequency (the default) or stiffness; of contacts friction_coefficient, slip_limit, "
+        "stiffness, preload or gap",
     )
     deviations: list[Deviation] | None = Field(
         None,
@@ -90,7 +91,7 @@ class MistuningTable(Section):
             self._of_part()
             return self
         wanted = ("frequency", "stiffness") if self.of else None
-        known = wanted or ("friction_coefficient", "stiffness", "preload", "gap")
+        known = wanted or ("friction_coefficient", "slip_limit", "stiffness", "preload", "gap")
         if (self.quantity is None and not self.of) or (
             self.quantity is not None and self.quantity not in known
         ):

@@ -1,0 +1,220 @@
+"""Mistuned wheels from a study: B12 of the literature, measured blades, what is refused, the example, its page."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from evidence.validation.case_b12_mistuning import DEVIATIONS, MISTUNED, TUNED
+from stickslip.errors import InputError
+from stickslip.front.study import Study
+from stickslip.model.dofs import numbered_dofs
+from stickslip.model.structure import Structure
+from stickslip.reduction.mistuned import mistuned_wheel
+from stickslip.study.analyses.forced.bounds import localisation, whitehead
+
+ROOT = Path(__file__).parents[1]
+TURN = 2 * np.pi
+RING = f"""
+schema_version = 2
+
+[part.blade]
+shape = "lumped"
+sectors = 12
+names = ["m"]
+masses_kg = [1.0]
+springs_n_per_m = [["m", "ground", 1.0]]
+dashpots_n_s_per_m = [["m", "ground", 0.004]]
+
+[contact.ring]
+between = ["blade.m", "next.blade.m"]
+law = "bonded"
+tangential_stiffness_n_per_m = 0.02
+axial_stiffness_n_per_m = 0.0
+normal_stiffness_n_per_m = 0.0
+
+[mistuning.scatter]
+of = "blade"
+quantity = "stiffness"
+deviations = {list(DEVIATIONS)}
+modes = "all"
+
+[load.gas]
+on = "blade.m"
+force_n = 1.0
+engine_order = 3
+
+[modes]
+number = 1
+contacts = "stuck"
+
+[forced_response]
+frequencies_hz = [0.1605, 0.1615, {1.01979998 / TURN!r}, {1.02076476 / TURN!r}, 0.1635, 0.1645]
+peak_points = 0
+stability = "off"
+
+[harmonics]
+high = 1
+
+[output]
+points = {{ tip = "blade.m" }}
+"""
+
+
+def study_of(folder: Path, text: str) -> Study:
+    path = folder / "study.toml"
+    path.write_text(text)
+    return Study.from_file(path)
+
+
+@pytest.fixture(scope="module")
+def ring(tmp_path_factory: pytest.TempPathFactory):
+    return study_of(tmp_path_factory.mktemp("b12"), RING).run()
+
+
+def test_b12_has_its_frequencies_its_largest_blade_and_its_amplification(ring) -> None:
+    """Waves, modes of the mistuned ring, peaks and their ratio to the digits of the benchmark."""
+    modes, forced = ring["modes"], ring["forced_response"]
+    half = digits(TUNED)
+    np.testing.assert_allclose(2 * np.pi * modes["frequency_hz"].values[0, :, 0], half, atol=6e-9)
+    found = 2 * np.pi * modes["mistuned_hz"].values[0]
+    np.testing.assert_allclose(found, digits(MISTUNED), atol=6e-9)
+    assert int(forced["largest_blade"][0]) == 2
+    assert str(forced.attrs["report_output"]) == "tip[2].x"
+    assert float(forced["peak_amplitude"][0]) == pytest.approx(326.0181278, rel=1e-8)
+    assert 2 * np.pi * float(forced["peak_frequency_hz"][0]) == pytest.approx(1.02076476, rel=1e-9)
+    assert float(forced["tuned_peak_amplitude"][0]) == pytest.approx(245.14564, rel=3e-8)
+    assert float(forced["amplification"][0]) == pytest.approx(1.32989568, rel=1e-8)
+    assert float(forced["whitehead"][0]) == pytest.approx(2.232051, abs=1e-6)
+    np.testing.assert_array_equal(forced["deviation"].values[0, :, 0], DEVIATIONS)
+
+
+def digits(texts) -> np.ndarray:
+    return np.array([float(text) for text in texts])
+
+
+def test_shares_of_blades_and_waves_are_shares(ring) -> None:
+    modes = ring["modes"]
+    for name in ("sector_share", "wave_share"):
+        share = modes[name].values[0]
+        np.testing.assert_allclose(share.sum(axis=1), 1.0, rtol=1e-12)
+        assert share.min() > -1e-12
+    forced = ring["forced_response"]
+    motion = forced["blade_motion"].values[0] @ np.array([1.0, 1.0j])
+    waves = forced["wave_amplitude"].values[0]
+    assert 12 * np.sum(waves**2) == pytest.approx(np.sum(np.abs(motion) ** 2), rel=1e-12)
+    assert int(np.argmax(waves)) == 3  # what engine order 3 excites
+
+
+def test_page_and_terminal_speak_of_the_blades(ring, tmp_path: Path) -> None:
+    assert {"blades", "blade_peaks", "wheel", "wheel_modes"} <= set(ring.plots)
+    every = ring.plot("blades")
+    assert {"each blade", "largest blade", "all sectors alike"} == {t.name for t in every.data}
+    page = ring.report(tmp_path / "page.html").read_text()
+    for text in ("Amplification 1.33 over the wheel", "one family of modes", "localisation factor"):
+        assert text in page
+    printed = "\n".join(
+        " ".join((t.title, *(c for row in t.rows for c in row), *t.lines))
+        for tables in ring.summaries.values()
+        for t in tables
+    )
+    assert "1.3299" in printed
+    assert "Modes of the wheel" in printed
+
+
+def test_measures_of_amplitudes() -> None:
+    assert [whitehead(n) for n in (4, 36)] == [1.5, 3.5]
+    assert localisation(np.ones(5)) == 0.0
+    assert localisation(np.array([0.0, 2.0, 0.0])) == 1.0
+
+
+def largest(damping: np.ndarray, deviations: np.ndarray) -> float:
+    """Return the largest amplitude of any blade of the ring of B12 with a damping of each wave, from a fine sweep."""
+    k = np.arange(12)
+    stiffness = 1 + 0.04 * (1 - np.cos(2 * np.pi * k / 12))
+    dofs = numbered_dofs(1)
+    waves = [
+        Structure(np.eye(1), np.full((1, 1), c), np.full((1, 1), s), dofs)
+        for c, s in zip(damping, stiffness, strict=True)
+    ]
+    shares = [np.ones((1, 1))] * 12
+    wheel = mistuned_wheel(waves, shares, deviations[:, None], numbered_dofs(12))
+    of = wheel.structure
+    omega = np.linspace(0.99, 1.05, 1201)[:, None, None]
+    stiffness = of.stiffness + 1j * omega * of.damping - omega**2 * of.mass
+    force = np.exp(2j * np.pi * 3 * k / 12)
+    return float(np.abs(np.linalg.solve(stiffness, force[:, None])).max())
+
+
+def test_a_wheel_exceeds_whiteheads_factor_where_its_excited_wave_is_damped_eight_times_as_much() -> (
+    None
+):
+    """The bound supposes one damping of all waves: with it B12 stays far below; a blade that moves alone has that of the other waves."""
+    even = np.full(12, 0.004)
+    none, some = np.zeros(12), np.array(DEVIATIONS)
+    assert largest(even, some) / largest(even, none) == pytest.approx(1.33, abs=0.01)
+    damped = np.where(np.isin(np.arange(12), (3, 9)), 8 * 0.004, 0.004)
+    assert largest(damped, some) / largest(damped, none) > 1.05 * whitehead(12)
+
+
+def test_measured_blades_are_taken_from_a_file(tmp_path: Path) -> None:
+    """Deviations from the mean of each mode, or from the model's own blade."""
+    hertz = (1.0 + np.linspace(-0.02, 0.02, 12)) * 0.16
+    rows = [f"{n},1,{f:.8f}" for n, f in enumerate(hertz)]
+    (tmp_path / "blades.csv").write_text("\n".join(["blade,mode,frequency_hz", *rows]))
+    given = f'deviations = {list(DEVIATIONS)}\nmodes = "all"'
+    text = RING.replace(given, 'file = "blades.csv"').replace('quantity = "stiffness"\n', "")
+    model = study_of(tmp_path, text).model()
+    found = model.mistuning.blades["scatter"].deviations
+    np.testing.assert_allclose(found[:, 0], hertz / hertz.mean() - 1, atol=1e-7)
+    own = text.replace('file = "blades.csv"', 'file = "blades.csv"\nrelative_to = "model"')
+    model = study_of(tmp_path, own).model()
+    found = model.mistuning.blades["scatter"].deviations
+    np.testing.assert_allclose(found[:, 0], 2 * np.pi * hertz - 1, atol=1e-7)
+    (tmp_path / "blades.csv").write_text("\n".join(["blade,mode,frequency_hz", *rows[:-1]]))
+    with pytest.raises(InputError, match="has no frequency of blade 11, mode 1"):
+        study_of(tmp_path, text).model()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('of = "blade"', 'of = "blad"', "mistuning.scatter.of: there is no part 'blad'"),
+        ('"stiffness"', '"preload"', "mistuning.scatter.quantity: is preload"),
+        ('of = "blade"', 'of = "blade"\ncontact = "ring"', "needs one of of, contact and part"),
+        (f"{list(DEVIATIONS)}", "[0.01, 0.02, 0.03, 0.04, 0.05]", "no multiple of that"),
+        ("sectors = 12\n", "", "the model is no sector of a wheel"),
+        (f"deviations = {list(DEVIATIONS)}", 'distribution = "normal"', "standard_deviation"),
+        (f"deviations = {list(DEVIATIONS)}", 'file = "none.csv"', "mistuning.scatter.file"),
+    ],
+)
+def test_what_is_no_mistuning_is_refused_by_its_key(tmp_path: Path, old, new, says) -> None:
+    with pytest.raises(InputError, match=says):
+        study_of(tmp_path, RING.replace(old, new))
+
+
+def test_a_repeated_pattern_and_a_seed_are_in_the_model(tmp_path: Path) -> None:
+    text = RING.replace(f"{list(DEVIATIONS)}", "[0.01, -0.01]")
+    found = study_of(tmp_path, text).model().mistuning.blades["scatter"].deviations
+    np.testing.assert_array_equal(found, np.tile([0.01, -0.01], 6))
+
+
+def test_the_example_runs_small_and_a_worn_wheel_agrees_with_time_integration(
+    tmp_path: Path,
+) -> None:
+    """Eight blades, one frequency near the peak, dampers slipping: `--verify` integrates all of them."""
+    text = (ROOT / "examples" / "mistuned_wheel" / "study.toml").read_text()
+    head, _, _ = text.partition("[vary]")
+    small = head.replace("sectors = 24", "sectors = 8").replace(
+        "engine_order = 6", "engine_order = 2"
+    )
+    small = small.replace("frequency_hz = [195.0, 207.0]\npoints = 30", "frequencies_hz = [199.5]")
+    path = tmp_path / "study.toml"
+    path.write_text(small)
+    result = Study.from_file(path).run(only=("forced_response",), verify=True)
+    data = result["forced_response"]
+    assert data["dissipated_energy"].values.max() > 0
+    assert abs(float(data["verify_difference_percent"][0])) < 0.5
+    assert float(data["amplification"][0]) > 1.0
+    shutil.rmtree(tmp_path / "results", ignore_errors=True)
