@@ -289,10 +289,8 @@ def condense_side(
     By `condense`, whose frequencies cost few products, where all harmonics vibrate as one real symmetric structure; by
     `condense_mistuned` where that is a wheel of sectors; by `condense_waves` otherwise.
     """
-    if isinstance(side, MistunedWheel):
-        if by_sectors(side, retained):
-            return condense_mistuned(side, retained, load)
-        return condense(side.structure, retained, load)
+    if isinstance(side, MistunedWheel) and by_sectors(side, retained):
+        return condense_mistuned(side, retained, load)
     if isinstance(side, TunedWheel) and side.has_every_wave:
         order = max(order, ANY)  # a wave is condensed when a harmonic first asks for it
     structures = tuple(side.of_harmonic(h) for h in range(order + 1))
