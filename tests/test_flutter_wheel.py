@@ -11,11 +11,9 @@ from flutter_wheel import MODE, MOVED, ONE_UNSTABLE, SECTORS, TWO_UNSTABLE, flut
 import stickslip as ss
 from stickslip.errors import InputError
 from stickslip.reduction.aerodynamics import InfluenceCoefficients
-from stickslip.response.branch import branch_of
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.curve import (
     damping_over_amplitude,
-    of_point,
     slip_amplitude,
 )
 from stickslip.response.self_excited.cycles import LimitCycle, limit_cycles
@@ -39,8 +37,7 @@ def cycles_of(two: bool) -> tuple[SelfExcited, list[LimitCycle]]:
     assert mode.unstable
     problem = self_excited_motions(system, load, mode, MOVED, Discretisation(order=11, samples=256))
     slips = slip_amplitude(problem)
-    found = branch_of(damping_over_amplitude(problem, (0.6 * slips, 15.0 * slips), 10))
-    return problem, limit_cycles(problem, [of_point(problem, f) for f in found])
+    return problem, limit_cycles(problem, damping_over_amplitude(problem, (0.6 * slips, 15.0 * slips), 10))  # fmt: skip
 
 
 def marched(whole, motion: np.ndarray, omega: float, periods: int, kick: float) -> Marched:

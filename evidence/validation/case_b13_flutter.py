@@ -10,12 +10,10 @@ from stickslip.contact.interface import Interface
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.matrices import lumped
-from stickslip.response.branch import branch_of
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.curve import (
     AmplitudePoint,
     damping_over_amplitude,
-    of_point,
     parameter_over_amplitude,
     slip_amplitude,
 )
@@ -64,7 +62,7 @@ def motions(c: float, how: Discretisation) -> SelfExcited:
 def curve(problem: SelfExcited) -> list[AmplitudePoint]:
     """Return the damping over the amplitude."""
     slips = slip_amplitude(problem)
-    return [of_point(problem, f) for f in branch_of(damping_over_amplitude(problem, (0.5 * slips, 100 * slips), 40))]  # fmt: skip
+    return damping_over_amplitude(problem, (0.5 * slips, 100 * slips), 40)
 
 
 def in_time(cycle: LimitCycle, c: float) -> tuple[float, float]:

@@ -1,6 +1,6 @@
 """Damping over amplitude: what a mode needs to go on with each amplitude, from where nothing slips to where friction is small."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -104,8 +104,8 @@ def slip_amplitude(problem: SelfExcited) -> float:
 
 
 def damping_over_amplitude(
-    problem: SelfExcited, span: tuple[float, float], points: int, done: Sequence[Followed] = ()
-) -> Iterator[Followed]:
+    problem: SelfExcited, span: tuple[float, float], points: int = 30
+) -> list[AmplitudePoint]:
     """Follow the motions of a mode over their amplitude: what damping each of them has.
 
     Parameters
@@ -116,10 +116,10 @@ def damping_over_amplitude(
         First and last amplitude, m.
     points
         Least number of points.
-    done
-        What an interrupted run has found.
     """
-    yield from _followed(problem, problem.over_amplitude(), span, points, done)
+    return [
+        _of_point(problem, f) for f in _followed(problem, problem.over_amplitude(), span, points)
+    ]
 
 
 def parameter_over_amplitude(
@@ -150,8 +150,8 @@ def parameter_over_amplitude(
     scale = abs(near) or 1.0
     equation = problem.over_amplitude(levels(problem, parameter, near), scale)
     start = np.append(cycle[:-1], near / scale)
-    found = branch_of(_followed(problem, equation, span, points, (), start))
-    return [replace(of_point(problem, f), level=scale * float(f.point.x[-1])) for f in found]
+    found = _followed(problem, equation, span, points, start)
+    return [replace(_of_point(problem, f), level=scale * float(f.point.x[-1])) for f in found]
 
 
 def at_amplitude(
@@ -162,7 +162,7 @@ def at_amplitude(
     return _point(problem, amplitude, found)
 
 
-def of_point(problem: SelfExcited, followed: Followed) -> AmplitudePoint:
+def _of_point(problem: SelfExcited, followed: Followed) -> AmplitudePoint:
     """Return what a point of a curve over the amplitude tells, its level as a damping ratio."""
     return _point(problem, float(np.exp(followed.p)), followed.point.solution)
 
@@ -178,9 +178,8 @@ def _followed(
     equation: PeriodicProblem,
     span: tuple[float, float],
     points: int,
-    done: Sequence[Followed],
     start: FloatArray | None = None,
-) -> Iterator[Followed]:
+) -> list[Followed]:
     first, last = (float(np.log(a)) for a in span)
     control = replace(steps_through(abs(last - first), points), largest=LARGEST)
     way = Following(newton=problem.how.newton, control=control, weights=_weights(problem))
@@ -190,7 +189,7 @@ def _followed(
         return _solved(problem, equation, p, [*near, *own])
 
     route = Route(first=first, last=last, points=points, leaves=False)
-    yield from follow(OneLevel(equation, way, begin), route, done)
+    return branch_of(follow(OneLevel(equation, way, begin), route))
 
 
 def _solved(

@@ -3,3 +3,6 @@
 from .multipliers import Stability as Stability
 from .multipliers import motion_stability as motion_stability
 from .multipliers import stability as stability
+from .waves import WaveDisturbance as WaveDisturbance
+from .waves import point_disturbances as point_disturbances
+from .waves import wave_disturbances as wave_disturbances

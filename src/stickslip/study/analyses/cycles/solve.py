@@ -9,11 +9,9 @@ import numpy as np
 from stickslip.arrays import FloatArray
 from stickslip.errors import StickslipError
 from stickslip.reduction.tuned import TunedWheel
-from stickslip.response.branch import branch_of
 from stickslip.response.self_excited.curve import (
     AmplitudePoint,
     damping_over_amplitude,
-    of_point,
     slip_amplitude,
 )
 from stickslip.response.self_excited.cycles import (
@@ -79,8 +77,7 @@ def follow_mode(question: Question, wave: int, mode: StuckMode) -> CycleBranch:
     span = (BEGINS * slips, ENDS * slips)
     if given is not None:
         span = (1e-3 * given[0], 1e-3 * given[1])
-    found = branch_of(damping_over_amplitude(problem, span, question.asked.points))
-    points = [of_point(problem, f) for f in found]
+    points = damping_over_amplitude(problem, span, question.asked.points)
     solutions = with_extremes(problem, points)
     cycles = limit_cycles(
         problem,
