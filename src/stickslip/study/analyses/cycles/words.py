@@ -76,7 +76,7 @@ def _of_cycle(label: str, name: str, case: Mapping[str, xr.Variable], c: int) ->
     elif attracting and word != "stable":
         why = f"{what} is stable in its own amplitude; other disturbances are {word}: {reason}"
         found.append(Verdict("doubtful", label, hertz, why, "limit_cycle.in_time tells more."))
-    if "cycle_time_amplitude" in case:
+    if "cycle_time_amplitude" in case and word != "unstable":  # what is left is elsewhere in time
         found += _of_time(label, what, case, c)
     return found
 
