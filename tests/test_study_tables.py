@@ -33,6 +33,7 @@ from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.file.quantities import build, table_of
 from stickslip.study.file.study import read_file
 from stickslip.study.file.tables import json_schema
+from stickslip.study.models.cost import memory_gb, waves_gb
 from stickslip.study.models.parts import damper_of
 from stickslip.study.models.study import read_study
 
@@ -420,6 +421,23 @@ def test_what_is_too_large_is_refused_before_it_is_meshed(write, tmp_path):
     assert nodes / 2.5 < told < nodes * 2.5
     with pytest.raises(InputError, match=r"limits\.work_s: the parts, some .* s, the limit"):
         study.replace({"limits.work_s": 0.1})
+
+
+def test_modes_of_waves_of_a_large_sector_are_refused_beforehand(tmp_path):
+    """Factors of what waves share grow faster than the nodes; a forced response alone needs none of them."""
+    fine = {f"part.blade.{name}_size_m": 0.004 for name in ("disk", "platform", "airfoil")}
+    study = read_study(write_shrouded_sector(tmp_path))
+    with pytest.raises(InputError, match=r"limits\.memory_gb: the parts, some") as error:
+        study.replace(fine | {"limits.work_s": 1e6})
+    told = error.value.problem
+    nodes = float(told.partition("some ")[2].partition(" nodes")[0])
+    assert float(told.partition("at ")[2].partition(" GB")[0]) == pytest.approx(
+        waves_gb(nodes), rel=0.05
+    )
+    assert waves_gb(nodes) > 1.5 * memory_gb(nodes)
+    # what was measured
+    for nodes, gigabytes in ((37_683, 4.35), (99_500, 14.9)):
+        assert waves_gb(nodes) == pytest.approx(gigabytes, rel=0.1)
 
 
 def test_a_campbell_diagram_of_masses_is_refused(tmp_path):

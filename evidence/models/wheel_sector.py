@@ -1,7 +1,7 @@
 """A box-shaped sector of a wheel whose upper sides rub on those of its neighbours, and two such boxes beside each other.
 
 Lower sides are tied from sector to sector, the bottom is clamped. Sectors stand in a row with one set of axes, so that no coordinate turns.
-On the upper sides 100 nodes meet as many of the neighbour, under a preload that varies from point to point.
+On the upper sides nodes, usually 100, meet as many of the neighbour, under a preload that varies from point to point.
 """
 
 from dataclasses import dataclass
@@ -16,13 +16,16 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
 from stickslip.model.damping import rayleigh_damping
-from stickslip.model.dofs import Dofs
+from stickslip.model.dofs import Dofs, modal_dofs
 from stickslip.model.fe.solid import Material
 from stickslip.model.structure import Structure, join
-from stickslip.reduction.cyclic import CyclicSector
+from stickslip.reduction.basis import in_coordinates
+from stickslip.reduction.cyclic import CyclicSector, travelling_wave
 from stickslip.reduction.fixed_interface import craig_bampton
+from stickslip.reduction.mistuned import mistuned_wheel
 from stickslip.reduction.relative import in_relative_coordinates
-from stickslip.reduction.tuned import tuned_wheel
+from stickslip.reduction.tuned import conjugate, tuned_wheel
+from stickslip.reduction.waves import wave
 from stickslip.response.system import System
 
 WIDTH, DEPTH, DISK, BLADE = 0.03, 0.06, 0.03, 0.09  # m
@@ -114,7 +117,7 @@ def rubbing_wheel(
     wheel, operator = tuned_wheel(one, engine_order, harmonics, gaps, keep=keep, n_modes=MODES)
     force = np.zeros(s.n)
     force[tip] = PULL
-    return _loaded(wheel, operator, wheel.project(force, 1))
+    return _loaded(wheel, operator, wheel.project(force, 1), _nodes(wheel), along * up)
 
 
 def rubbing_pair(along: int = 10, up: int = 10) -> Rubbing:
@@ -129,7 +132,57 @@ def rubbing_pair(along: int = 10, up: int = 10) -> Rubbing:
     structure, operator = in_relative_coordinates(pair, gaps)
     force = np.zeros(pair.n)
     force[pair.dof_set("a.tip")] = PULL
-    return _loaded(structure, operator, structure.project(force))
+    return _loaded(structure, operator, structure.project(force), _nodes(structure), along * up)
+
+
+def mistuned_rubbing_wheel(
+    sectors: int,
+    engine_order: int,
+    along: int = 3,
+    up: int = 3,
+    modes: int = 20,
+    spread: float = 0.02,
+) -> Rubbing:
+    """Return all sectors of a wheel, the frequencies of the modes of each off by its own share of a normal distribution."""
+    plain = sector(sectors, along, up)
+    s = plain.structure
+    one = CyclicSector(rayleigh_damping(s, *DAMPING), sectors, plain.low, plain.high, axis=None)
+    left, right, tip = (s.dof_set(name) for name in ("left", "right", "tip"))
+    place = np.searchsorted(one.independent, np.concatenate([left, right, tip]))
+    count = left.size
+    turn = _frames(np.arange(count), count).toarray()
+    waves: list[Structure] = []
+    for k in range(sectors):
+        if 2 * k > sectors:
+            waves.append(conjugate(waves[sectors - k]))
+            continue
+        reduced = craig_bampton(travelling_wave(one, k), place, modes)
+        phase = wave(k, sectors).phase
+        way = np.eye(reduced.n, dtype=complex)
+        way[:count, :count] = np.conj(phase) * turn.T
+        way[:count, count : 2 * count] = np.conj(phase) * np.eye(count)
+        waves.append(in_coordinates(reduced, way, modal_dofs(reduced.n), {}))
+    size = waves[0].n
+    picks = np.eye(size, dtype=complex)[size - modes :]
+    squares = waves[0].stiffness.diagonal().real[size - modes :]
+    deviations = spread * np.random.default_rng(1).standard_normal(sectors)
+    factors = np.outer((1 + deviations) ** 2 - 1, squares)
+    wheel = mistuned_wheel(waves, [picks] * sectors, factors, modal_dofs(sectors * size))
+    at = size * np.arange(sectors)[:, None]
+    columns = (at + np.arange(count)).ravel()
+    operator = scipy.sparse.csr_array(
+        (np.ones(columns.size), (np.arange(columns.size), columns)), shape=(columns.size, wheel.n)
+    )
+    tips = at + 2 * count + np.arange(3)
+    force = np.zeros(wheel.n, dtype=complex)
+    phases = np.exp(2j * np.pi * engine_order * np.arange(sectors) / sectors)
+    force[tips] = phases[:, None] * np.array(PULL)
+    return _loaded(wheel, operator, force, tips[0], along * up)
+
+
+def _nodes(side: LinearSide) -> np.ndarray:
+    """Return the coordinates of the first node that is one."""
+    return np.flatnonzero(side.dofs.node >= 0)[:3]
 
 
 def _frames(dofs: np.ndarray, n: int) -> scipy.sparse.csr_array:
@@ -140,22 +193,29 @@ def _frames(dofs: np.ndarray, n: int) -> scipy.sparse.csr_array:
     )
 
 
-def _loaded(side: LinearSide, operator: np.ndarray, force: np.ndarray) -> Rubbing:
-    """Return the system with its contacts, under the pressure and `FORCE` times its sum at `force`."""
-    points = operator.shape[0] // 3
+def _loaded(
+    side: LinearSide,
+    operator: np.ndarray,
+    force: np.ndarray,
+    outputs: np.ndarray,
+    points: int,
+) -> Rubbing:
+    """Return the system with its contacts, under the pressure and `FORCE` times its sum at `force`; `points` are those of an interface."""
     area = DEPTH * BLADE / points
-    rough = np.exp(0.5 * np.random.default_rng(0).standard_normal(points))
+    interfaces = operator.shape[0] // 3 // points
+    one = np.exp(0.5 * np.random.default_rng(0).standard_normal(points))
+    rough = np.tile(one, interfaces)
     laws = tuple(
         ElasticCoulomb(
             k_t=TANGENTIAL * area, k_w=TANGENTIAL * area, k_n=NORMAL * area, mu=FRICTION, preload=PRESSURE * area * r
         )
         for r in rough
     )  # fmt: skip
-    names = tuple(str(i) for i in range(points))
+    names = tuple(str(i) for i in range(rough.size))
     interface = Interface(names, laws, scipy.sparse.csr_array(operator))
     clamping = interface.gap_operator.T @ interface.resting_force()
-    system = System(side, interface, np.flatnonzero(side.dofs.node >= 0)[:3])
-    preload = PRESSURE * area * rough.sum()
+    system = System(side, interface, outputs)
+    preload = PRESSURE * area * one.sum()
     return Rubbing(
         system, HarmonicLoad(clamping, {1: FORCE * preload * np.asarray(force, dtype=complex)})
     )

@@ -14,6 +14,8 @@ from stickslip.study.file.tables import Tables
 from stickslip.study.models.files import MESHES
 
 BYTES_A_NODE = 35e3  # assembly and factorisation of second-order tetrahedra, measured at 10 to 30 thousand nodes
+# modes of five waves: 4.3 GB at 37 683 nodes, 14.9 GB at 99 500
+BYTES_OF_MATRICES, BYTES_OF_FACTORS = 20e3, 2700.0
 BASE_GB = 0.35  # interpreter and libraries
 SECONDS_A_NODE = 2e-3  # assembly, reduction and the full model's frequencies
 NODES_A_CUBE = 8.0  # nodes of second-order tetrahedra in a cube of one element size, measured at 600 to 35000 nodes
@@ -27,11 +29,25 @@ def memory_gb(nodes: float) -> float:
     return BASE_GB + nodes * BYTES_A_NODE / 1e9
 
 
+def waves_gb(nodes: float) -> float:
+    """Return the memory that the modes of several waves of a sector of so many nodes take: matrices, and factors of what they share."""
+    factors = BYTES_OF_FACTORS * float(nodes ** (4 / 3))
+    return BASE_GB + (nodes * BYTES_OF_MATRICES + factors) / 1e9
+
+
 def too_large(tables: Tables, home: Path) -> InputError | None:
     """Return the complaint about parts that take more than the study's limits allow; None if they do not."""
     nodes = sum(_nodes(table, home) for table in tables.part.values())
     what = f"the parts, some {max(round(nodes), 1):.2g} nodes, are estimated"
-    return above(tables.limits, what, memory_gb(nodes), nodes * SECONDS_A_NODE)
+    memory = max(memory_gb(nodes), waves_gb(nodes) if _asks_for_waves(tables) else 0.0)
+    return above(tables.limits, what, memory, nodes * SECONDS_A_NODE)
+
+
+def _asks_for_waves(tables: Tables) -> bool:
+    """Whether modes of the waves of a sector are asked for."""
+    asked = any(getattr(tables, name, None) is not None for name in ("modes", "safe"))
+    sectors: list[Any] = [getattr(table, "sectors", None) for table in tables.part.values()]
+    return asked and any(count is not None and count > 1 for count in sectors)
 
 
 def above(limits: Limits, what: str, memory: float, seconds: float) -> InputError | None:
