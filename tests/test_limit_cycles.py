@@ -151,6 +151,24 @@ def test_time_integration_goes_to_the_stable_cycle_and_away_from_the_unstable_on
     assert above.amplitude[0] > 1.00005 * large.amplitude
 
 
+def test_where_slip_begins_is_found_beside_a_large_static_displacement():
+    """A second mass that never slips is pushed away by ten thousand times the amplitude at which the first one does."""
+    gap = np.zeros((6, 2))
+    gap[0, 0] = gap[3, 1] = 1.0
+    laws = Jenkins(k_t=0.5, limit=0.1), Jenkins(k_t=0.5, limit=1e9)
+    structure = lumped(np.eye(2), np.diag([1.0, 4.0]), np.diag([-0.1, 0.1]))
+    system = System(structure, Interface(("slips", "sticks"), laws, gap), np.array([0]))
+    load = HarmonicLoad(np.array([0.0, 1e4]))
+    problem = self_excited_motions(system, load, stuck_modes(system, 1)[0], 0, Discretisation(order=1))  # fmt: skip
+    slips = slip_amplitude(problem)
+    assert slips == pytest.approx(0.2, rel=0.02)
+    points = damping_over_amplitude(problem, (0.5 * slips, 100.0 * slips), 20)
+    assert all(p.converged for p in points)
+    small, large = limit_cycles(problem, points)
+    assert small.amplitude == pytest.approx(ONE[2][1], rel=1e-7)
+    assert large.amplitude == pytest.approx(ONE[2][3], rel=1e-7)
+
+
 def test_what_has_no_limit_cycle_is_refused():
     system, load = oscillator(-0.1)
     mode, how = stuck_modes(system, 1)[0], Discretisation()

@@ -18,6 +18,10 @@ from stickslip.solve.newton_method import Newton, Solution, first_converged, new
 from stickslip.solve.status import Status
 
 FAINT = 1e-11  # m: a gap that moves less slips nowhere
+STATIC_SHARE = (
+    1e-5  # of the static displacement: a vibration that is smaller stands in its rounding
+)
+NOISE = 10.0  # times what is left of the equations in the linear mode: more is a contact
 MOST_DOUBLINGS = 80
 SLIPS = 1e-6  # of the elastic force of the mode: what a contact adds that leaves its state
 ONSET = 1.01  # to which the amplitude is found at which slip begins
@@ -73,18 +77,21 @@ def slip_amplitude(problem: SelfExcited) -> float:
     static = preload(problem.system, problem.load.static)
     mode = problem.relative(problem.guess(static, 1.0))[1]
     largest = float(np.max(np.abs(problem.balance.interface.gap_operator @ mode), initial=0.0))
-    amplitude = FAINT / largest if largest > 0.0 else np.inf
+    # far below what the static state can be told to, rounding would be all that there is to see
+    least = STATIC_SHARE * float(np.max(np.abs(static), initial=0.0))
+    amplitude = max(FAINT / largest, least) if largest > 0.0 else np.inf
     equation, mean = problem.over_amplitude(), problem.balance.linear.n
     faint = min(amplitude, 1.0)
     small = _solved(problem, equation, float(np.log(faint)), [])
     sticks = small.status.converged and np.isfinite(amplitude)
+    noise = NOISE * float(np.max(np.abs(equation.residual(small.x, float(np.log(faint))))))
 
     def slips(amplitude: float) -> bool:
         # as long as all contacts stick the motion grows in proportion about the same mean
         grown = small.x.copy()
         grown[:mean] *= faint / amplitude
         left = equation.residual(grown, float(np.log(amplitude)))
-        return bool(np.max(np.abs(left)) > SLIPS)
+        return bool(np.max(np.abs(left)) > max(SLIPS, noise))
 
     for _ in range(MOST_DOUBLINGS if sticks else 0):
         if slips(amplitude):

@@ -98,13 +98,14 @@ def crossings(
 
 
 def with_extremes(problem: SelfExcited, curve: Sequence[AmplitudePoint]) -> list[AmplitudePoint]:
-    """Return the solutions of a curve with the motions of most and of least damping between them, which may lie just beyond zero."""
+    """Return the solutions of a curve with extremes of the damping between them: the largest, and those that may lie just beyond zero."""
     known = [p for p in curve if p.converged]
-    out = known[:1]
+    out, top = known[:1], max((p.level for p in known), default=0.0)
     for i in range(1, len(known) - 1):
         three = known[i - 1 : i + 2]
         a, b, c = (p.level for p in three)
-        extreme = _extreme(problem, three) if (b - a) * (b - c) > 0.0 else three[1]
+        near = b == top or abs(b) < abs(b - a) + abs(b - c)
+        extreme = _extreme(problem, three) if near and (b - a) * (b - c) > 0.0 else three[1]
         out += sorted((three[1], extreme), key=lambda p: p.amplitude)
     return list(dict.fromkeys([*out, *known[-1:]]))
 
@@ -118,7 +119,7 @@ def _extreme(problem: SelfExcited, three: Sequence[AmplitudePoint]) -> Amplitude
         nonlocal best
         found = at_amplitude(problem, float(np.exp(log_amplitude)), [best.unknowns])
         if not found.converged:
-            return np.inf
+            return max(upward * p.level for p in three)
         if upward * found.level < upward * best.level:
             best = found
         return upward * found.level
