@@ -13,7 +13,7 @@ import scipy.linalg
 import stickslip as ss
 from stickslip.assembly.aerodynamics import Aerodynamics
 from stickslip.assembly.flow import flow_around, largest_displacements
-from stickslip.assembly.mistuning import Mistuning
+from stickslip.assembly.mistuning import BladeMistuning, Mistuning
 from stickslip.model.dofs import nodal_dofs
 from stickslip.model.part import Part
 from stickslip.model.structure_file import save_structure
@@ -258,8 +258,9 @@ def test_modes_of_unit_mass_and_of_a_largest_displacement_are_the_same_force() -
     plain = flutter_of_wave(moving, flow_around(there).on_structure(1, moving), 2)
     assert plain.by_energy[0] == pytest.approx(0.0, abs=1e-15)
     theta = 2 * np.pi / N
-    G = sum(own[0, 0, i, 0, 0] * np.exp(1j * theta * step) for i, step in enumerate(j))
-    assert plain.by_energy[1] == pytest.approx(-G.imag / (2 * plain.frequencies[1] ** 2), rel=1e-12)
+    omega, L = plain.frequencies[1], own[0, 0, :, 0, 0]
+    G = np.sum((L.real + 1j * omega / 2.0 * L.imag) * np.exp(1j * theta * j))  # frozen at 2 rad/s
+    assert plain.by_energy[1] == pytest.approx(-G.imag / (2 * omega**2), rel=1e-12)
     largest = np.abs(mode(moving)).max()
     scaled = Aerodynamics(
         influence=InfluenceCoefficients(j, own * (0.002 / largest) ** 2),
@@ -422,3 +423,29 @@ def test_the_example_tells_its_margin_in_terminal_and_page(tmp_path: Path) -> No
         "least damping in the flow",
     ):
         assert words in html
+
+
+def test_mistuning_shares_the_damping_of_the_waves() -> None:
+    """The sum of the decay rates stays, the least one of the blades rises (Kaza & Kielb 1982); without deviations they are the waves'."""
+    own = influence()
+    still = InfluenceCoefficients(own.distances, -own.values[:, 24:25])
+    tuned = model(of_blade(still, float(own.frequencies[24])))
+    waves = tuned.flutter(number=2).data["flutter"].isel(case=0)
+    rates, blades_alone = [], []
+    for spread in (0.0, 0.03):
+        shares = spread * np.array([1, -1, 1, -1, 1, -1.0])
+        blades = BladeMistuning(of="sector.blade", deviations=shares, quantity="stiffness")
+        found = replace(tuned, mistuning=Mistuning(blades={"all": blades})).flutter(number=2)
+        data = found.data["flutter"].isel(case=0)
+        rates.append(data["wheel_damping"].values * 2 * np.pi * data["wheel_frequency_hz"].values)
+        blades_alone.append(rates[-1][data["wheel_frequency_hz"].values > 0.3])
+        least = float(data["wheel_damping"].values[0])
+        assert least == data["wheel_damping"].min() < 0
+        assert any("sectors differ has a least damping of" in str(v) for v in found.verdicts)
+        if not spread:
+            np.testing.assert_allclose(
+                np.sort(data["wheel_damping"]), np.sort(waves["damping"].values.ravel()), rtol=1e-6
+            )
+    assert rates[1].sum() == pytest.approx(rates[0].sum(), rel=1e-4)
+    least, before = blades_alone[1].min(), blades_alone[0].min()
+    assert least > 1.02 * before

@@ -107,6 +107,10 @@ class Model:
                 "is given, and the model is no sector of a wheel",
                 "Give a part its number of sectors, or leave the table out.",
             )
+        if self.aerodynamics is not None and is_staged(self.joins):
+            raise input_error(
+                "aero", "is of one wheel, and a join couples several", "Leave one out."
+            )
 
     def __repr__(self) -> str:
         """Return what it is in a line."""

@@ -1,10 +1,10 @@
 """Modes of a wheel whose sectors differ, its contacts open, stuck or as the static loads leave them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stickslip.arrays import BoolArray, FloatArray
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray
 from stickslip.assembly.asked import Asked
 from stickslip.assembly.forces import output_labels
 from stickslip.assembly.mistuned import AllSectors, all_sectors, pairs_of_all
@@ -43,7 +43,7 @@ def wheel_modes(
     Parameters
     ----------
     model
-        With mistuning.
+        With mistuning; in still fluid.
     number
         How many; the reduced wheel's at most.
     contacts
@@ -51,6 +51,44 @@ def wheel_modes(
     store
         As in `Model.assembled`.
     """
+    wheel, structure = _bound(model.without_aerodynamics(), contacts, store)
+    massive = int(np.count_nonzero(structure.mass.diagonal()))
+    found = normal_modes(structure, min(number, massive))
+    strained = found.squares != 0
+    return _shares(model, wheel, found.frequencies_hz[strained], np.real(found.shapes[:, strained]))
+
+
+def wheel_in_flow(
+    model: Model, number: int, contacts: ContactsAs = "static", store: Store = in_memory
+) -> ComplexArray:
+    """Return the eigenvalues (r,), 1/s, of the lowest modes of a mistuned wheel in a flow, with its damping; least damped first.
+
+    Parameters
+    ----------
+    model
+        With mistuning and aerodynamics, whose frozen form counts.
+    number
+        How many; their shapes are combinations of half as many more modes in still fluid.
+    contacts, store
+        As in `wheel_modes`.
+    """
+    wheel, structure = _bound(model, contacts, store)
+    fluid = np.zeros((structure.n, structure.n)) if wheel.fluid is None else wheel.fluid
+    still = replace(structure, stiffness=structure.stiffness + fluid)
+    massive = int(np.count_nonzero(structure.mass.diagonal()))
+    shapes = normal_modes(still, min(number + number // 2, massive)).shapes
+    stiffness, damping = (shapes.T @ (m @ shapes) for m in (structure.stiffness, structure.damping))
+    if structure.loss is not None:
+        stiffness = stiffness + 1j * (shapes.T @ (structure.loss @ shapes))
+    zero, one = np.zeros_like(damping), np.eye(len(damping))
+    values = np.linalg.eigvals(np.block([[zero, one], [-stiffness, -damping]]))
+    lowest = values[values.imag > 0]
+    lowest = lowest[np.argsort(lowest.imag)][:number]
+    return np.asarray(lowest[np.argsort(-lowest.real / np.abs(lowest))])
+
+
+def _bound(model: Model, contacts: ContactsAs, store: Store) -> tuple[AllSectors, Structure]:
+    """Return all sectors, and their matrices with the springs of contacts that hold."""
     labels = output_labels(model.places, model.outputs, model.loads)
     none = Asked(None, {}, {}, labels, (), NO_PLACES)
     wheel = all_sectors(model, none, store)
@@ -58,10 +96,7 @@ def wheel_modes(
     stiffness = _springs(model, structure, _held(model, contacts))
     if stiffness.any():
         structure = with_springs(structure, wheel.gaps, stiffness)
-    massive = int(np.count_nonzero(structure.mass.diagonal()))
-    found = normal_modes(structure, min(number, massive))
-    strained = found.squares != 0
-    return _shares(model, wheel, found.frequencies_hz[strained], np.real(found.shapes[:, strained]))
+    return wheel, structure
 
 
 def _held(model: Model, contacts: ContactsAs) -> BoolArray:

@@ -170,6 +170,23 @@ class InfluenceCoefficients:
         L, phases = self.at(reference), self._phases(phase_angle)
         return _summed(L.real, phases), _summed(L.imag / reference, phases)
 
+    def force(self, phase_angle: float, omega: complex, reference: float) -> ComplexArray:
+        """Return the (m, m) G of a wave at ω in rad/s: of the table, or, of coefficients of one frequency, of their frozen form.
+
+        Parameters
+        ----------
+        phase_angle
+            θ in rad.
+        omega
+            ω in rad/s; complex for the frozen form of a motion that grows or decays.
+        reference
+            ω_r of the frozen form, rad/s.
+        """
+        if self.depends_on_frequency:
+            return self.of_wave(phase_angle, omega.real)
+        stiff, damp = self.frozen(phase_angle, reference)
+        return np.asarray(stiff + 1j * omega * damp)
+
     def _phases(self, phase_angle: float) -> ComplexArray:
         return np.asarray(np.exp(1j * phase_angle * self.distances))
 
@@ -318,9 +335,9 @@ class Feedback:
         K, C = (_dense(m) for m in (structure.stiffness, structure.damping))
         return replace(structure, stiffness=K - self._outer(stiff), damping=C - self._outer(damp))
 
-    def force(self, omega: float) -> ComplexArray:
-        """Return the (m, m) G at ω in rad/s."""
-        return self.influence.of_wave(self.phase_angle, omega)
+    def force(self, omega: complex) -> ComplexArray:
+        """Return the (m, m) G at ω in rad/s; of coefficients of one frequency their frozen form, also where a motion grows or decays."""
+        return self.influence.force(self.phase_angle, omega, self.reference)
 
     def beyond_frozen(self, omega: float) -> tuple[ComplexArray, ComplexArray]:
         """Return what G at ω has beyond the frozen form, (m, m), and the derivative by ω."""

@@ -93,6 +93,20 @@ def margins(view: Waves) -> str:
     return "<h3>Margins</h3>" + html_table(head, rows)
 
 
+def mistuned(view: Waves) -> str | None:
+    """Return what becomes of the wheel whose sectors differ."""
+    if not view.has("wheel_damping"):
+        return None
+    damping, hertz = _PERCENT * view.floats("wheel_damping"), view.floats("wheel_frequency_hz")
+    tuned = _PERCENT * float(view.floats("damping").min())
+    grows = int(np.count_nonzero(damping < 0))
+    return (
+        f"<h3>With the sectors as they differ</h3><p>No wave is a mode then. The least damped mode of the wheel has "
+        f"{number(float(damping[0]), 4)} % at {number(float(hertz[0]), 6)} Hz, where the least stable wave of the tuned wheel has "
+        f"{number(tuned, 4)} %; {grows} of {len(damping)} modes grow. The coefficients are those of the reference frequency.</p>"
+    )
+
+
 def _cards(view: Waves) -> list[Card]:
     total = view.floats("damping")
     i, m = int(view.scalar("least_wave", 0)), int(view.scalar("least_mode", 0))
@@ -102,5 +116,5 @@ def _cards(view: Waves) -> list[Card]:
     ]
 
 
-_BLOCK = Block("flutter", "Flutter", (least_stable_diagram, margins))
+_BLOCK = Block("flutter", "Flutter", (least_stable_diagram, margins, mistuned))
 SECTION: Section = Section("flutter", _NEEDED, Waves, (_BLOCK,), by_case=True, cards=_cards)

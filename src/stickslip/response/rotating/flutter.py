@@ -159,7 +159,9 @@ def _followed(
     """Return the eigenvalue whose coefficients are those of its own frequency."""
     pair = start
     for _ in range(ITERATIONS):
-        force = P @ feedback.force(pair[0].imag) @ P.conj().T
+        # matrices know the motion as it grows or decays, a table its frequency
+        omega = pair[0].imag if feedback.influence.depends_on_frequency else -1j * pair[0]
+        force = P @ feedback.force(omega) @ P.conj().T
         found = _nearest(stiffness, damping, force, pair)
         if abs(found[0] - pair[0]) <= SETTLED * abs(found[0]):
             return found
@@ -189,6 +191,7 @@ def least_stable_curve(
     angles: FloatArray,
     waves: Sequence[FlutterOfWave],
     phase_angles: FloatArray,
+    reference: float,
 ) -> FloatArray:
     """Return the aerodynamic damping ratio (n, a) of each mode over any inter-blade phase angle, by the energy method.
 
@@ -202,6 +205,8 @@ def least_stable_curve(
         Of phase angles that the wheel has.
     phase_angles
         (w,) theirs, in rad.
+    reference
+        Frequency of the frozen form, rad/s, as of `Feedback`.
 
     Notes
     -----
@@ -223,7 +228,7 @@ def least_stable_curve(
         outer = (1 - share) * work[right - 1] + share * work[right]
         for n in range(omega.size):
             if np.any(outer[n]):
-                G = influence.of_wave(float(angle), float(omega[n]))
+                G = influence.force(float(angle), float(omega[n]), reference)
                 out[n, a] = -np.sum(G * outer[n].T).imag / (2 * omega[n] ** 2)
             else:
                 out[n, a] = 0.0

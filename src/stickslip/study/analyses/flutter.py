@@ -7,9 +7,10 @@ from typing import Any, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.assembly.flow import flow_around
 from stickslip.assembly.model import Model
+from stickslip.assembly.wheel_modes import wheel_in_flow
 from stickslip.errors import input_error
 from stickslip.reduction.aerodynamics import InfluenceCoefficients
 from stickslip.reduction.waves import wave
@@ -28,10 +29,15 @@ from stickslip.study.file.section import once
 from stickslip.study.keep.netcdf import variable
 from stickslip.units import HZ, RPM
 
-INFLUENCE = "influence"  # note of the coefficients
+INFLUENCE, WHEEL = (
+    "influence",
+    "wheel",
+)  # notes of the coefficients, and of a wheel whose sectors differ
 EVERY = 2.0  # degrees of inter-blade phase angle between points of the curve
 APART = 0.1  # of the largest damping: energy method and eigenvalue differ by more
 PERCENT = 100.0
+FLUTTERS = "The wheel flutters: friction may limit the vibration, more damping or another blade prevent it."
+MORE = "Add damping, or change the blade."
 
 
 class FlutterTable(WaveTable):
@@ -87,9 +93,10 @@ def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
     angles = np.array([wave(w.wave_number, sectors).phase_angle for w in waves])
     least = np.unravel_index(total.argmin(), total.shape)
     around = np.arange(-180.0, 180.0 + EVERY / 2, EVERY)
-    curve = least_stable_curve(
-        _influence(solved.notes[INFLUENCE]), np.radians(around), [w.solved for w in waves], angles
-    )
+    known = solved.notes[INFLUENCE]
+    each = [w.solved for w in waves]
+    reference = float(known["reference"])
+    curve = least_stable_curve(_influence(known), np.radians(around), each, angles, reference)
     signed = np.degrees(np.where(angles > np.pi + 1e-9, angles - 2 * np.pi, angles))
     found = {
         "frequency_hz": variable("wave mode", np.array([w.frequencies_hz for w in waves]), "Hz", "natural frequency in still fluid"),
@@ -104,7 +111,35 @@ def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
         "least_mode": variable("", int(least[1]), "1", "index of its mode"),
         "required_damping": variable("", asked.required_percent / PERCENT, "1", "damping ratio that every wave must have"),
     }  # fmt: skip
-    return found, [*_unstable(waves, total, sectors, asked), *_doubts(energy, by_eigenvalue)]
+    told = _unstable(waves, total, sectors, asked)
+    if WHEEL in solved.notes:  # then no wave is a mode
+        own = np.asarray(solved.notes[WHEEL]["eigenvalues"])
+        found |= _of_wheel(own)
+        told = _unstable_wheel(own, asked)
+    return found, [*told, *_doubts(energy, by_eigenvalue)]
+
+
+def _of_wheel(eigenvalues: ComplexArray) -> Variables:
+    """Return the modes of a wheel whose sectors differ, in the flow, the least damped first."""
+    about = "of a mode of the wheel whose sectors differ, in the flow with its own damping"
+    return {
+        "wheel_damping": variable("wheel_mode", damping_ratio(eigenvalues), "1", f"damping ratio {about}"),
+        "wheel_frequency_hz": variable("wheel_mode", eigenvalues.imag / HZ, "Hz", f"frequency {about}"),
+    }  # fmt: skip
+
+
+def _unstable_wheel(eigenvalues: ComplexArray, asked: FlutterTable) -> list[Verdict]:
+    damping = damping_ratio(eigenvalues)
+    if damping[0] >= asked.required_percent / PERCENT:
+        return []
+    grows = int(np.count_nonzero(damping < 0))
+    what = (
+        f"{grows} of its modes grow"
+        if grows
+        else f"it has less than the {asked.required_percent:g} % required"
+    )
+    why = f"the wheel whose sectors differ has a least damping of {PERCENT * damping[0]:.4g} % at {eigenvalues[0].imag / HZ:.5g} Hz: {what}"
+    return [Verdict("trusted", why=why, remedy=FLUTTERS if grows else MORE)]
 
 
 def _influence(note: Any) -> InfluenceCoefficients:
@@ -129,12 +164,7 @@ def _unstable(
     )
     others = f" ({len(rows)} waves and modes in all)" if len(rows) > 1 else ""
     why = f"{name}, mode {m + 1} {what}: damping {PERCENT * worst:.4g} % at {waves[i].frequencies_hz[m]:.5g} Hz{others}"
-    remedy = (
-        "The wheel flutters: friction may limit the vibration, more damping or another blade prevent it."
-        if worst < 0
-        else "Add damping, or change the blade."
-    )
-    return [Verdict("trusted", why=why, remedy=remedy)]
+    return [Verdict("trusted", why=why, remedy=FLUTTERS if worst < 0 else MORE)]
 
 
 def _doubts(energy: FloatArray, by_eigenvalue: FloatArray) -> list[Verdict]:
@@ -196,9 +226,14 @@ class Flutter(WaveAnalysis):
                     "values": own.values,
                     "frequencies": own.frequencies,
                     "speeds": own.speeds,
+                    "reference": flow.given.reference,
                 },
             )
         yield from super().solve(inputs, done, notes)
+        model = inputs.model
+        if model.mistuning is not None and notes.get(WHEEL) is None:
+            found = wheel_in_flow(model, inputs.n_modes * model.sectors, inputs.contacts)
+            notes.put(WHEEL, {"eigenvalues": found})
 
 
 FLUTTER = Flutter()

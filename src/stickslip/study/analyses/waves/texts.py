@@ -10,6 +10,7 @@ from stickslip.study.analyses.waves.numbers import label, wave_name
 from stickslip.study.analyses.waves.of_wheel import table as of_wheel
 from stickslip.study.keep.netcdf import alike, one_case
 
+LEAST = 5  # modes of a mistuned wheel that are shown
 MOST_PAIRS = 30  # of an interference table on the screen
 NEARBY = 0.2  # margin up to which the tangent of a frequency over the speed is good to a digit after the point
 
@@ -113,7 +114,20 @@ def flutter_tables(case: xr.Dataset) -> list[TextTable]:
         f"Flutter margins {_at(case.attrs['speed_rpm'])}: the least stable is {labels[i]}, mode {m + 1}, with "
         f"{100 * (total[i, m] - required):.4g} %"
     )
-    return [TextTable(title, head, rows)]
+    return [TextTable(title, head, rows), *_mistuned_flutter(case)]
+
+
+def _mistuned_flutter(case: xr.Dataset) -> list[TextTable]:
+    """Return the least damped modes of a wheel whose sectors differ; nothing where they are alike."""
+    if "wheel_damping" not in case:
+        return []
+    hertz, damping = case["wheel_frequency_hz"].values, case["wheel_damping"].values
+    rows = tuple(
+        (f"{f:.6g}", f"{100 * d:.4g}", "UNSTABLE" if d < 0 else "")
+        for f, d in zip(hertz[:LEAST], damping[:LEAST], strict=True)
+    )
+    title = f"The wheel, its sectors as they differ: least damping {100 * damping[0]:.4g} %"
+    return [TextTable(title, ("Hz", "with structure %", ""), rows)]
 
 
 def _flutter_row(
