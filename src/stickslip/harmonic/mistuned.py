@@ -241,15 +241,22 @@ class At:
     @property
     def stiffness(self) -> ComplexArray:
         """(n, n), N/m, made when it is asked for: it is large."""
-        sector, share = self.linear.wheel.active
-        r = self.far.shape[1]
         out = circulant(np.fft.ifft(self._tuned, axis=0))
-        if sector.size:
-            place = sector * r + share
-            felt = circulant(np.fft.ifft(self._felt, axis=0))[:, place]
-            seen = circulant(np.fft.ifft(self._seen, axis=0))[place]
-            out += felt @ (self._reaction @ seen)
+        if self.linear.wheel.active[0].size:
+            out += self._deviation()
         return out if self._springs is None else np.asarray(out + self._springs)
+
+    def _deviation(self) -> ComplexArray:
+        """Return the (n, n) stiffness of the deviations: between waves they act by small blocks."""
+        sector, share = self.linear.wheel.active
+        count, r = self.linear.wheel.sectors, self.far.shape[1]
+        reaction = np.zeros((count, r, count, r), dtype=complex)
+        reaction[sector[:, None], share[:, None], sector, share] = self._reaction
+        waves = np.fft.ifft(np.fft.fft(reaction, axis=0, norm="ortho"), axis=2, norm="ortho")
+        blocks = self._felt[:, None] @ waves.transpose(0, 2, 1, 3) @ self._seen
+        sectors = np.fft.fft(np.fft.ifft(blocks, axis=0, norm="ortho"), axis=1, norm="ortho")
+        n = count * self.near.shape[2]
+        return np.asarray(sectors.transpose(0, 2, 1, 3).reshape(n, n))
 
     @cached_property
     def _springs(self) -> Matrix | None:
