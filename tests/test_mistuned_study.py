@@ -108,7 +108,7 @@ def test_shares_of_blades_and_waves_are_shares(ring) -> None:
 
 
 def test_page_and_terminal_speak_of_the_blades(ring, tmp_path: Path) -> None:
-    assert {"blades", "blade_peaks", "wheel", "wheel_modes"} <= set(ring.plots)
+    assert {"blades", "blade_peaks", "wheel", "wheel_motion", "wheel_modes"} <= set(ring.plots)
     every = ring.plot("blades")
     assert {"each blade", "largest blade", "all sectors alike"} == {t.name for t in every.data}
     page = ring.report(tmp_path / "page.html").read_text()

@@ -87,9 +87,10 @@ def peaks_of_blades(response: Response) -> Plot | None:
     size = response.values("blade_peak_amplitude", "case", "blade")
     scale = scale_for(size, response.length)
     names = response.labels("mistuned") if response.has("deviation") else []
+    rows = 1 + len(names)
     figure = make_subplots(
-        2 if names else 1, 1, shared_xaxes=True, vertical_spacing=0.08, row_heights=[0.6, 0.4][: 2 if names else 1]
-    )  # fmt: skip
+        rows, 1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[2.0, *[1.0] * len(names)]
+    )
     numbers = np.arange(size.shape[1])
     for case in response.peaked:
         own = size[case.index] * scale.factor
@@ -108,14 +109,16 @@ def peaks_of_blades(response: Response) -> Plot | None:
             values = response.values("deviation", "case", "blade", "mistuned")[case.index, :, k]
             factor = 1e6 if name.endswith(GAP) else 100
             figure.add_bar(
-                x=numbers, y=factor * values, name=name, marker_color=colour(2 + k), meta=case.index, row=2, col=1
+                x=numbers, y=factor * values, name=name, marker_color=colour(2 + k), meta=case.index,
+                showlegend=False, row=2 + k, col=1
             )  # fmt: skip
-    styled(figure, 520 if names else 360)
+    styled(figure, 340 + 130 * len(names))
     legend_above(figure)
     figure.update_yaxes(title_text=f"amplitude ({scale.unit})", row=1)
-    if names:
-        figure.update_yaxes(title_text="deviation (%, gaps µm)", row=2)
-    figure.update_xaxes(title_text="blade", row=2 if names else 1)
+    for k, name in enumerate(names):
+        unit = "µm" if name.endswith(GAP) else "%"
+        figure.update_yaxes(title_text=f"{name.removesuffix(', ' + GAP)} ({unit})", row=2 + k)
+    figure.update_xaxes(title_text="blade", row=rows)
     text = "Largest amplitude of each blade at any frequency" + (
         ", and what it deviates by." if names else "."
     )

@@ -12,6 +12,7 @@ from stickslip.report.forced.orders import of_each_order
 from stickslip.report.forced.stability import stability
 from stickslip.report.forced.surface import surface_map
 from stickslip.report.forced.wheel import blades, peaks_of_blades, statistics, wheel_at_peak
+from stickslip.report.forced.wheel_motion import wheel_in_motion
 from stickslip.report.forced.working import where_friction_works
 from stickslip.report.response import NEEDED, Response
 from stickslip.report.section import Block, Section
@@ -36,7 +37,11 @@ SECTION: Section = Section(
                 where_friction_works,
             ),
         ),
-        Block("wheel", "Blades of the wheel", (blades, peaks_of_blades, wheel_at_peak, statistics)),
+        Block(
+            "wheel",
+            "Blades of the wheel",
+            (blades, peaks_of_blades, wheel_at_peak, wheel_in_motion, statistics),
+        ),
         Block(
             "contact",
             "Contacts at the peak",
