@@ -20,7 +20,15 @@ PARTS_OF_THE_PAGE = {
     "aero": ("aero",),
     "mistuning": ("mistuning",),
     "output": ("output", "measured"),
-    "analyses": ("forced_response", "limit_cycle", "modes", "campbell", "flutter", "safe"),
+    "analyses": (
+        "forced_response",
+        "limit_cycle",
+        "modes",
+        "campbell",
+        "flutter",
+        "safe",
+        "run_up",
+    ),
     "settings": ("harmonics", "solver", "retention", "limits"),
 }
 RESULTS = Path(__file__).parent.parent / "evidence" / "validation" / "out" / "results.json"

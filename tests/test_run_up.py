@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 from test_assembly_wheel import H, sector_model, shrouded_sector
 
+import stickslip as ss
 from stickslip.assembly.over_speed import over_speed, with_engine_order
 from stickslip.errors import InputError
 from stickslip.reduction.choice import Reduction
 from stickslip.response.forced.response import Sweep, forced_problem, forced_response
 from stickslip.response.recovery import fields
+from stickslip.study.analyses.analysis import Case
+from stickslip.study.analyses.run_up import RUN_UP as RUN_UP_ANALYSIS
+from stickslip.study.analyses.running.question import question_of
+from stickslip.study.file.study import read_file
 
 ORDER = 42  # wave 2 of five, at 2000 to 2300 Hz where the shrouds are pressed
 
@@ -31,7 +36,7 @@ def along(speeds, **others):
 def test_each_point_is_that_of_a_study_at_its_speed(modes, coriolis):
     """With slip; the speed is none of those that the polynomials go through. A reduction has modes of its own at each speed."""
     model = turning_model(modes, coriolis=coriolis)
-    found = over_speed(model, (200.0, 500.0), H)
+    found = over_speed(model, ORDER, (200.0, 500.0), H)
     assert found.error < 1e-9
     sweep = along((300.0, 340.0), frequencies=3, peak_points=0)
     problem = forced_problem(found.assembled.system, found.assembled.load, sweep)
@@ -52,7 +57,7 @@ def test_each_point_is_that_of_a_study_at_its_speed(modes, coriolis):
 
 
 def test_the_slope_of_the_line_contains_that_of_the_matrices():
-    found = over_speed(turning_model(), (200.0, 500.0), H)
+    found = over_speed(turning_model(), ORDER, (200.0, 500.0), H)
     load = found.assembled.load
     linear = found.assembled.system.condensed(load, H)
     omega, step = ORDER * 320.0, ORDER * 320.0 * 1e-5
@@ -76,7 +81,122 @@ def test_the_slope_of_the_line_contains_that_of_the_matrices():
 def test_what_a_line_of_speeds_cannot_be_is_named():
     model = turning_model()
     with pytest.raises(InputError, match="growing speeds"):
-        over_speed(model, (500.0, 200.0), H)
-    still = {"gas": replace(model.loads["gas"], engine_order=0)}
-    with pytest.raises(InputError, match="engine order"):
-        over_speed(replace(model, loads=still), (200.0, 500.0), H)
+        over_speed(model, ORDER, (500.0, 200.0), H)
+    with pytest.raises(InputError, match="engine orders from 1"):
+        over_speed(model, 0, (200.0, 500.0), H)
+
+
+LUMPED = """schema_version = 2
+[part.wheel]
+shape = "lumped"
+sectors = 6
+masses_kg = [0.5, 0.4]
+names = ["disk", "tip"]
+springs_n_per_m = [["ground", "disk", 4e6], ["disk", "tip", 1e6], ["disk", "next.disk", 5e5]]
+dashpots_n_s_per_m = [["ground", "disk", 4.0], ["disk", "tip", 1.0]]
+[contact.shroud]
+between = ["wheel.tip", "next.wheel.tip"]
+law = "jenkins"
+acts = "tangential"
+tangential_stiffness_n_per_m = 2e5
+slip_limit_n = 12.0
+[load.gas]
+on = "wheel.tip"
+force_n = 10.0
+engine_order = 2
+[output]
+points = { tip = "wheel.tip" }
+[harmonics]
+high = 3
+"""
+RUN_UP = """[run_up]
+speeds_rpm = [3500.0, 10000.0]
+engine_orders = [2, 3]
+points = 5
+peak_points = 1
+modes = 2
+"""
+
+
+def small_study(folder, run_up):
+    path = folder / "study.toml"
+    path.write_text(LUMPED + run_up)
+    return path
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    path = small_study(tmp_path_factory.mktemp("run_up"), RUN_UP)
+    return path, ss.Study.from_file(path).run()
+
+
+def test_a_study_follows_engine_orders_over_speed(finished):
+    path, result = finished
+    data = result.data["run_up"].to_dataset().isel(case=0)
+    assert data["engine_orders"].values.tolist() == [2, 3]
+    assert data["wave_number"].values.tolist() == [2, 3]
+    assert np.all(data["converged"].values == 1)
+    np.testing.assert_allclose(
+        data["frequency_hz"], data["points_order"] * data["speed_rpm"] / 60, rtol=1e-12
+    )
+    top = int(data["peak_point"].values[0])
+    assert data["amplitude"].values[top, int(data["report_output"])] == pytest.approx(
+        data["peak_amplitude"].values[0]
+    )
+    assert data["slipping"].values.max() > 0.5
+    assert data["dissipated_w"].values.max() > 0
+    assert np.all(data["stuck_hz"].values >= data["open_hz"].values * (1 - 1e-9))
+    assert float(data["speed_error"].max()) < 1e-12
+    assert "TRUSTED" in " ".join(str(v) for v in result.verdicts)
+
+    hz = float(data["frequency_hz"].values[top])
+    alone = ss.Study.from_file(path).model()
+    at = alone.forced_response([0.999 * hz, hz, 1.001 * hz], high=3, stability="off")
+    single = at.data["forced_response"].to_dataset()
+    expected = single["amplitude"].values[np.argmin(abs(single["frequency_hz"].values - hz))]
+    np.testing.assert_allclose(data["amplitude"].values[top], expected, rtol=1e-8)
+
+
+def test_python_and_an_interrupted_run_give_the_same(finished, tmp_path):
+    path, result = finished
+    model = ss.Study.from_file(path).model()
+    keys = {"engine_orders": [3], "points": 5, "peak_points": 1, "modes": 2, "high": 3}
+    mine = model.run_up(speeds_rpm=(3500.0, 10000.0), **keys).data["run_up"].to_dataset()
+    theirs = result.data["run_up"].to_dataset()
+    own = theirs["points_order"].values[0] == 3
+    np.testing.assert_array_equal(mine["amplitude"].values[0], theirs["amplitude"].values[0][own])
+    page = result.report(tmp_path / "report.html").read_text()
+    for words in ("Campbell diagram with the response", "Amplitude over speed", "engine order"):
+        assert words in page
+
+    question = question_of(case_of(path), model)
+    points = list(RUN_UP_ANALYSIS.solve(question, (), Kept()))
+    notes = Kept()
+    again = [*points[:6], *RUN_UP_ANALYSIS.solve(question, points[:6], notes)]
+    assert [(p.stage, p.engine_order, p.omega) for p in again] == [
+        (p.stage, p.engine_order, p.omega) for p in points
+    ]
+    for one, other in zip(again, points, strict=True):
+        np.testing.assert_array_equal(one.coefficients, other.coefficients)
+
+
+class Kept(dict):
+    """Notes of a job, in memory."""
+
+    def put(self, name, values):
+        self[name] = values
+
+
+def case_of(path):
+    (tables,) = read_file(path).cases
+    return Case(0, "", {}, tables.tables, lambda: None, "", path.parent)
+
+
+def test_keys_of_a_run_up_that_do_not_fit_are_named(tmp_path):
+    for wrong, said in (
+        ("[run_up]\nspeeds_rpm = [8000.0, 5000.0]", "speeds_rpm"),
+        ("[run_up]\nspeeds_rpm = [0.0, 5000.0]", "speeds_rpm"),
+        ("speeds_rpm = [1200.0, 1700.0]\nengine_orders = [2, 2]", "engine_orders"),
+    ):
+        with pytest.raises(InputError, match=said):
+            ss.Study.from_file(small_study(tmp_path, wrong))

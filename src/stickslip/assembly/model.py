@@ -70,8 +70,8 @@ class Model:
     mistuning
         How the sectors of a wheel differ; None: all are alike.
     modes_like
-        Speed in rad/s to whose modes the modal coordinates of reductions are turned, so that reduced matrices change smoothly with the
-        speed; None: they are the modes at `speed`.
+        Speeds in rad/s. One: the modal coordinates of reductions are turned to its modes, so that reduced matrices change smoothly
+        with the speed. Several: what the modes of all of them span is kept. Empty: they are the modes at `speed`.
     aerodynamics
         Of a sector of a wheel: what blades feel of their neighbours' motion through the fluid; None for nothing. `at` leaves it out.
 
@@ -95,7 +95,7 @@ class Model:
     interface_modes: int | None = None
     retention: float = 0.0
     mistuning: Mistuning | None = None
-    modes_like: float | None = None
+    modes_like: tuple[float, ...] = ()
     aerodynamics: Aerodynamics | None = None
 
     def __post_init__(self) -> None:

@@ -14,6 +14,7 @@ from stickslip.assembly.model import Model
 from stickslip.assembly.reduced import Store, in_memory
 from stickslip.errors import input_error
 from stickslip.model.structure import Structure
+from stickslip.reduction.common_modes import ModesExchangedError
 from stickslip.reduction.speed_line import AtRest, SpeedLine, speed_nodes
 from stickslip.reduction.tuned import TunedWheel
 
@@ -37,16 +38,22 @@ class OverSpeed:
         middle between two of theirs.
     static_force
         (k, p, 3) contact forces under the static loads alone at the speeds of the line, N.
+    common
+        Whether what the modes of three speeds span is kept at all speeds, because at some speed one that is left out would take the
+        place of one kept.
     """
 
     assembled: Assembled
     line: SpeedLine
     error: float
     static_force: FloatArray
+    common: bool = False
 
 
 def with_engine_order(model: Model, order: int) -> Model:
-    """Return a model whose harmonic loads all have an engine order, each in the harmonic that the study gives it."""
+    """Return a model whose harmonic loads all have an engine order, each in its own harmonic; of a single structure the model itself."""
+    if model.sectors == 1:
+        return model
     loads = {
         name: replace(load, engine_order=order) if load.harmonic > 0 else load
         for name, load in model.loads.items()
@@ -56,6 +63,7 @@ def with_engine_order(model: Model, order: int) -> Model:
 
 def over_speed(
     model: Model,
+    engine_order: int,
     speeds: tuple[float, float],
     harmonics: int,
     store: Store = in_memory,
@@ -66,7 +74,9 @@ def over_speed(
     Parameters
     ----------
     model
-        Its own speed is of no meaning here; its loads have an engine order.
+        Its own speed is of no meaning here.
+    engine_order
+        Of the frequency of the first harmonic, from 1: of a wheel that of the loads.
     speeds
         Lowest and highest, rad/s, the lowest above zero.
     harmonics
@@ -79,7 +89,7 @@ def over_speed(
     Raises
     ------
     InputError
-        If the loads have no engine order, or the model is mistuned or reduced to different coordinates at different speeds.
+        If there is no such engine order, or the model is mistuned or reduced to different coordinates at different speeds.
     """
     if not 0.0 < speeds[0] < speeds[1]:
         raise input_error(
@@ -87,23 +97,54 @@ def over_speed(
             f"goes from {speeds[0]:g} to {speeds[1]:g} rad/s",
             "Give growing speeds above 0.",
         )
+    if model.aerodynamics is not None:
+        raise input_error(
+            "run_up",
+            "does not follow aerodynamic forces over speed",
+            "Leave [aero] out, or compute forced responses at single speeds.",
+        )
     if model.mistuning is not None:
         raise input_error(
             "run_up", "is of tuned wheels, and the model is mistuned", "Leave [mistuning] out."
         )
-    order = _order(model)
+    if engine_order < 1:
+        raise input_error(
+            "run_up",
+            f"follows engine orders from 1, got {engine_order}",
+            "What all sectors feel alike has no speed that it goes with.",
+        )
+    lowest, highest = speeds
+    middle = float(speed_nodes(lowest, highest, 2)[1])
+    for like in ((highest,), (lowest, middle, highest)):
+        own = replace(model, modes_like=like)
+        try:
+            found = _assembled(own, engine_order, speeds, harmonics, store, tolerance)
+        except ModesExchangedError:
+            continue
+        return replace(found, common=len(like) > 1)
+    raise AssertionError("modes of several speeds are not turned")
+
+
+def _assembled(
+    model: Model,
+    engine_order: int,
+    speeds: tuple[float, float],
+    harmonics: int,
+    store: Store,
+    tolerance: float,
+) -> OverSpeed:
     known: dict[float, Assembled] = {}
 
     def at(speed: float) -> Assembled:
         if speed not in known:
-            turning = replace(model, speed=speed, modes_like=speeds[1])
+            turning = replace(model, speed=speed)
             known[speed] = assemble(turning, harmonics, store, checked=speed == speeds[1])
         return known[speed]
 
     for intervals in INTERVALS:
         nodes = speed_nodes(*speeds, intervals)
         every = [at(float(s)) for s in nodes]
-        line = _line(order, every, nodes)
+        line = _line(engine_order, every, nodes)
         # in the middle between two speeds, which the next attempt takes as well
         beside = float(speed_nodes(*speeds, 2 * intervals)[1 + 2 * (intervals // 2)])
         error = _difference(line, beside, at(beside))
@@ -113,19 +154,6 @@ def over_speed(
     system = replace(top.system, structure=line)
     assembled = replace(top, system=system, bare=system)
     return OverSpeed(assembled, line, error, np.array([a.static_force for a in every]))
-
-
-def _order(model: Model) -> int:
-    """Return the engine order of the loads, of several their base."""
-    given = [(load.engine_order or 0) * load.harmonic for load in model.loads.values()]
-    order = model.engine_order or int(np.gcd.reduce([m for m in given if m] or [0]))
-    if order < 1:
-        raise input_error(
-            "run_up",
-            "has no load with an engine order from 1 on",
-            "Give run_up.engine_orders, or the loads engine_order.",
-        )
-    return int(order)
 
 
 def _line(order: int, every: Sequence[Assembled], nodes: FloatArray) -> SpeedLine:

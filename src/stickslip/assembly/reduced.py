@@ -15,8 +15,10 @@ from stickslip.model.dofs import Dofs
 from stickslip.model.fe.free_solid import inertia_relief
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
-from stickslip.reduction.basis import surviving_sets, turned_modes, with_modal_dofs
+from stickslip.reduction.basis import surviving_sets, with_modal_dofs
 from stickslip.reduction.cache import content_hash
+from stickslip.reduction.choice import Reduction
+from stickslip.reduction.common_modes import modes_of, on_modes_of_others
 
 Store = Callable[[str, Callable[[], Mapping[str, Any]]], Mapping[str, Any]]
 REMEMBERED = 4  # reductions of a part that are kept in memory
@@ -35,21 +37,21 @@ class Spin:
     axis
         That rigid bodies turn about; solids have their own.
     like
-        Speed in rad/s whose modal coordinates those of reductions are to be near to, see `Model.modes_like`; None: any.
+        Speeds in rad/s whose modes those of reductions are to be near to, see `Model.modes_like`; empty: any.
     """
 
     speed: float = 0.0
     tangent: Literal["consistent", "textbook"] = "consistent"
     coriolis: bool = False
     axis: Axis = Axis()  # noqa: RUF009  # frozen
-    like: float | None = None
+    like: tuple[float, ...] = ()
 
     @property
-    def reference(self) -> "Spin | None":
-        """How it turns where its modal coordinates are the modes; None: here."""
-        if self.like is None or self.like == self.speed:
-            return None
-        return replace(self, speed=self.like, like=None)
+    def references(self) -> tuple["Spin", ...]:
+        """How it turns where its modes are known; empty: here."""
+        if self.like in ((), (self.speed,)):
+            return ()
+        return tuple(replace(self, speed=speed, like=()) for speed in self.like)
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,12 +248,14 @@ def _reduce(name: str, part: Part, kept: IntArray, spin: Spin, rest: Steady) -> 
         if part.reduction is None or part.body is not None:
             whole = full if part.damping is None else part.damping.of_modes(full)
             return ReducedPart(whole, np.arange(full.n), steady)
-        small = part.reduction.of(full, kept)
+        if spin.references and part.solid is not None and isinstance(part.reduction, Reduction):
+            known = [at_speed(name, part, other, rest) for other in spin.references]
+            others = [modes_of(one, kept, part.reduction) for one in known]
+            small = on_modes_of_others(full, kept, part.reduction, others)
+        else:
+            small = part.reduction.of(full, kept)
         if part.damping is not None:
             small = part.damping.of_modes(small)
-        if spin.reference is not None and part.solid is not None:
-            known = part.reduction.of(at_speed(name, part, spin.reference, rest), kept)
-            small = turned_modes(small, known, full.mass, kept.size)
     except InputError as error:
         raise error.inside(f"part.{name}") from None
     except SingularError as error:

@@ -27,9 +27,9 @@ from stickslip.assembly.wave_damping import DampingOfParts
 from stickslip.assembly.wheel import (
     ReducedSector,
     leaders,
+    modes_of_wave,
     reduced_wave,
     wave_numbers,
-    wave_with_way_back,
     wheel_of,
 )
 from stickslip.errors import InputError, input_error
@@ -44,6 +44,7 @@ from stickslip.reduction.tuned import conjugate
 from stickslip.reduction.whole_wheel import goes_both_ways
 
 REMEMBERED = 64  # waves kept in memory
+MODES_REMEMBERED = 24  # modes of waves at other speeds kept in memory
 
 
 def reduced_sector(
@@ -154,29 +155,28 @@ def sector_waves(
     wheel = (
         sector.structure, sector.low, sector.high, sector.sectors, sector.axis, sector.weights,
     )  # fmt: skip
-    like = None if reduction is None else spin.reference
-    own = "" if like is None else content_hash(*wheel[1:], kept, like.speed, like.coriolis)
+    like = () if reduction is None else spin.references
+    own = _content_of(model, like, wheel[1:], kept)
     content = content_hash("wave", *wheel, kept, damping, loads, own)
     memo, spread = next(iter(model.parts.values())).memo, _spread(model)
     mirrored = goes_both_ways(sector, sector.structure)
 
-    def reference(
-        k: int, how: tuple[Reduction | None, Damping | DampingOfParts | None]
-    ) -> Structure:
-        assert like is not None
-        key = f"modes like {own} {how} {k}"
+    def modes_at(other: Spin, k: int, reduction: Reduction) -> Matrix:
+        key = f"modes {own} {other.speed!r} {reduction} {k}"
         if key not in memo:
-            there = here.sector(at.tied(_sector_at_speed(model, like)[0]), at)
-            memo[key] = wave_with_way_back(there, kept, k, how)
-        found: Structure = memo[key]
-        return found
+            there = here.sector(at.tied(_sector_at_speed(model, other)[0]), at)
+            memo[key] = modes_of_wave(there, kept, k, reduction)
+            forget(memo, np.ndarray, MODES_REMEMBERED)
+        return memo[key]
+
+    def others(k: int, reduction: Reduction | None) -> list[Matrix]:
+        return [] if reduction is None else [modes_at(one, k, reduction) for one in like]
 
     def made(k: int, reduction: Reduction | None) -> tuple[Structure, Matrix]:
         columns, more = _columns(at, loads, flow, spread, k)
         key = f"{content} {reduction} {k}{more}"
         if key not in memo:
-            how = reduction, damping
-            known = None if like is None else partial(reference, k, how)
+            how, known = (reduction, damping), partial(others, k, reduction)
             memo[key] = _kept(sector, kept, k, how, columns, (key, store), known)
             forget(memo, tuple, REMEMBERED)
         found: tuple[Structure, Matrix] = memo[key]
@@ -239,6 +239,15 @@ def _parted(
 
 def _dense(matrix: Matrix) -> Matrix:
     return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)
+
+
+def _content_of(model: Model, like: Sequence[Spin], wheel: Sequence[Any], kept: IntArray) -> str:
+    """Return what the modes at other speeds depend on, as text; empty where none are asked for."""
+    if not like:
+        return ""
+    parts = [part.structure for part in model.parts.values()]
+    turning = [(one.speed, one.tangent, one.coriolis) for one in like]
+    return content_hash(*wheel, kept, *parts, str(turning))
 
 
 def _sector_at_speed(model: Model, spin: Spin) -> tuple[Structure, FloatArray]:
@@ -319,11 +328,11 @@ def _kept(
     how: tuple[Reduction | None, Damping | DampingOfParts | None],
     steady: Matrix,
     where: tuple[str, Store],
-    known: Callable[[], Structure] | None = None,
+    others: Callable[[], Sequence[Matrix]] = list,
 ) -> tuple[Structure, Matrix]:
     def make() -> tuple[Structure, Matrix]:
         try:
-            return reduced_wave(sector, kept, k, how, steady, None if known is None else known())
+            return reduced_wave(sector, kept, k, how, steady, others())
         except InputError as error:
             raise error.inside(f"wave {k}") from None
 

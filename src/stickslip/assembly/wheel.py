@@ -17,8 +17,9 @@ from stickslip.errors import InputError, input_error
 from stickslip.model.damping import Damping
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
-from stickslip.reduction.basis import in_coordinates, turned_modes
+from stickslip.reduction.basis import in_coordinates
 from stickslip.reduction.choice import Reduction
+from stickslip.reduction.common_modes import modes_of, on_modes_of_others
 from stickslip.reduction.cyclic import CyclicSector, cyclic_sector, travelling_wave
 from stickslip.reduction.nodal import nodal_coordinates
 from stickslip.reduction.relative import in_relative_coordinates
@@ -273,31 +274,37 @@ def reduced_wave(
     k: int,
     how: tuple[Reduction | None, Damping | DampingOfParts | None],
     steady: Matrix,
-    known: Structure | None = None,
+    others: Sequence[Matrix] = (),
 ) -> tuple[Structure, Matrix]:
     """Return a wave, its first coordinates the kept dofs, without its way back, and the load of steady rotation, or several, on it.
 
-    It is reduced, and damped by its modes, as the two of `how` say; None: not. Modal coordinates are turned to those of the same wave
-    in another state, where that is `known` with its way back.
+    It is reduced, and damped by its modes, as the two of `how` say; None: not. Modal coordinates are those that its modes at
+    other speeds ask for, see `on_modes_of_others`.
     """
-    moving = wave_with_way_back(sector, kept, k, how)
-    if known is not None:
-        moving = turned_modes(moving, known, sector.structure.mass, kept.size)
+    moving = _with_way_back(sector, kept, k, how, others)
     load = moving.project(steady)
     return replace(moving, basis=None), load.toarray() if scipy.sparse.issparse(load) else load
 
 
-def wave_with_way_back(
+def modes_of_wave(sector: CyclicSector, kept: IntArray, k: int, reduction: Reduction) -> Matrix:
+    """Return the modes that a reduction of a wave adds to the static shapes of the kept dofs, on the coordinates of the wave."""
+    place = np.searchsorted(sector.independent, kept)
+    return modes_of(travelling_wave(sector, k), place, reduction)
+
+
+def _with_way_back(
     sector: CyclicSector,
     kept: IntArray,
     k: int,
     how: tuple[Reduction | None, Damping | DampingOfParts | None],
+    others: Sequence[Matrix],
 ) -> Structure:
-    """Return a wave as `reduced_wave` does, with its way back to the sector."""
     reduction, damping = how
     place = np.searchsorted(sector.independent, kept)
     moving = travelling_wave(sector, k)
-    if reduction is not None:
+    if reduction is not None and others:
+        moving = on_modes_of_others(moving, place, reduction, others)
+    elif reduction is not None:
         moving = reduction.of(moving, place)
     else:
         rest = np.setdiff1d(np.arange(moving.n), place)

@@ -27,6 +27,7 @@ from stickslip.units import RPM
 _SHARED = {  # tables that analyses take beside their own
     "forced_response": ("harmonics", "solver", "limits"),
     "limit_cycle": ("solver",),
+    "run_up": ("harmonics", "solver", "limits"),
 }
 _OF_THE_MODEL = ("alert_over",)  # keys of them that a model has itself
 
@@ -110,6 +111,10 @@ class Model(Assembly):
         """
         checks = frozenset({"verify"} if verify else ())
         return self._answer("limit_cycle", keys, folder, checks)
+
+    def run_up(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+        """Follow the response over speed along engine orders; keys such as ``speeds_rpm=(3000, 9000), engine_orders=[4, 6], high=3``."""
+        return self._answer("run_up", keys, folder)
 
     def _answer(
         self,

@@ -55,7 +55,7 @@ class TurningStiffness:
     @property
     def most(self) -> int | None:
         """Highest harmonic for which there are matrices; None: any."""
-        return self.line.harmonics
+        return self._at_speed(float(self.line.speeds[-1])).most
 
     @property
     def nn(self) -> Blocks:

@@ -65,39 +65,6 @@ def in_coordinates(
     )
 
 
-def turned_modes(structure: Structure, known: Structure, mass: Matrix, kept: int) -> Structure:
-    """Return a reduced structure whose modal coordinates are turned to be as near as can be to those of another reduction.
-
-    Modes of neighbouring states, as those of two speeds, may differ in sign and order, and change fast where frequencies come
-    close; what they span changes little. Turned, matrices change as smoothly as that.
-
-    Parameters
-    ----------
-    structure, known
-        Reductions of one model in two states to the same dofs, with their way back.
-    mass
-        Of the full model.
-    kept
-        Number of kept dofs, which come first.
-
-    Raises
-    ------
-    InputError
-        If the numbers of modes differ.
-    """
-    if structure.n != known.n:
-        raise input_error(
-            "reduction",
-            f"keeps {structure.n - kept} modes in one state and {known.n - kept} in another",
-            "Give a number of modes instead of a frequency or an error.",
-        )
-    mine, theirs = (np.asarray(s.expand(np.eye(s.n)[:, kept:])) for s in (structure, known))
-    left, _, right = np.linalg.svd(mine.conj().T @ (mass @ theirs))
-    turn = np.eye(structure.n, dtype=np.result_type(left, right))
-    turn[kept:, kept:] = left @ right
-    return in_coordinates(structure, turn, structure.dofs, structure.sets)
-
-
 def is_hermitian(matrix: Matrix) -> bool:
     """Whether a matrix equals its conjugate transpose to rounding."""
     difference = abs(matrix - matrix.conj().T)

@@ -6,6 +6,7 @@ as fast as they change.
 """
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse
@@ -55,6 +56,7 @@ class SpeedLine:
     sides: tuple[AtRest, ...]
     loads: dict[int, ComplexArray]
     known: dict[float, AtRest] = field(default_factory=dict, repr=False)
+    stacks: dict[int, tuple[Any, ...]] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         sizes = {side.n for side in self.sides}
@@ -67,14 +69,14 @@ class SpeedLine:
             )
         if any(side.feedback for side in self.sides if isinstance(side, TunedWheel)):
             raise input_error(
-                "run_up",
-                "the model has aerodynamic forces, which are not followed over speed",
-                "Leave [aero] out, or compute forced responses at single speeds.",
+                "SpeedLine",
+                "holds a wheel with aerodynamic forces, which are not followed over speed",
+                "Compute forced responses at single speeds.",
             )
 
     def __getstate__(self) -> dict[str, object]:
         """Leave what can be computed again behind."""
-        return self.__dict__ | {"known": {}}
+        return self.__dict__ | {"known": {}, "stacks": {}}
 
     def __setstate__(self, state: dict[str, object]) -> None:
         """Take what was kept."""
@@ -115,7 +117,7 @@ class SpeedLine:
     def grounded(self, springs: Matrix) -> "SpeedLine":
         """Return the same with springs, a sparse matrix (n, n) in N/m, from its coordinates to the ground."""
         sides = tuple(side.grounded(springs) for side in self.sides)
-        return replace(self, sides=sides, known={})
+        return replace(self, sides=sides, known={}, stacks={})
 
     def speed(self, omega: float) -> float:
         """Return the speed at which the engine order has a frequency, both in rad/s."""
@@ -145,35 +147,52 @@ class SpeedLine:
         return np.asarray(share / share.sum())
 
     def _between(self, weights: FloatArray, ratio: FloatArray) -> AtRest:
+        if np.any(weights == 1.0):
+            return self.sides[int(np.flatnonzero(weights == 1.0)[0])]
         top = self.top
         if isinstance(top, Structure):
-            return _mixed([s for s in self.sides if isinstance(s, Structure)], weights, ratio)
+            return self._mixed(
+                0, [s for s in self.sides if isinstance(s, Structure)], weights, ratio
+            )
         wheels = [side for side in self.sides if isinstance(side, TunedWheel)]
-        waves = {k: _mixed([w.waves[k] for w in wheels], weights, ratio) for k in top.waves}
+        waves = {k: self._mixed(k, [w.waves[k] for w in wheels], weights, ratio) for k in top.waves}
         return replace(top, waves=waves)
 
+    def _mixed(
+        self, k: int, structures: list[Structure], weights: FloatArray, ratio: FloatArray
+    ) -> Structure:
+        """Return the weighted sum of matrices; the skew part of the damping is proportional to the speed, whose `ratio` to each is given."""
+        if k not in self.stacks:
+            self.stacks[k] = _stacked(structures)
+        mass, even, skew, stiffness, loss = self.stacks[k]
+        first = structures[-1]
+        return Structure(
+            _summed(mass, weights),
+            _summed(even, weights) + _summed(skew, weights * ratio),
+            _summed(stiffness, weights),
+            first.dofs,
+            first.sets,
+            None,
+            None if loss is None else _summed(loss, weights),
+        )
 
-def _mixed(structures: list[Structure], weights: FloatArray, ratio: FloatArray) -> Structure:
-    """Return the weighted sum of matrices; the skew part of the damping is proportional to the speed, whose `ratio` to each is given."""
-    picked = np.flatnonzero(weights == 1.0)
-    if picked.size:
-        return structures[int(picked[0])]
-    first = structures[-1]
-    loss = None if first.loss is None else _summed([s.loss for s in structures], weights)
+
+def _stacked(structures: list[Structure]) -> tuple[Any, ...]:
+    """Return mass, both parts of the damping, stiffness and loss of all speeds, each stacked where it is dense."""
     damping = [s.damping for s in structures]
     skew = [(d - d.conj().T) / 2 for d in damping]
     even = [d - g for d, g in zip(damping, skew, strict=True)]
-    return Structure(
-        _summed([s.mass for s in structures], weights),
-        _summed(even, weights) + _summed(skew, weights * ratio),
-        _summed([s.stiffness for s in structures], weights),
-        first.dofs,
-        first.sets,
-        None,
-        loss,
-    )
+    loss = [s.loss for s in structures if s.loss is not None]
+    every = [s.mass for s in structures], even, skew, [s.stiffness for s in structures], loss
+    return tuple(_stack(one) if one else None for one in every)
 
 
-def _summed(matrices: list[Matrix], weights: FloatArray) -> Matrix:
+def _stack(matrices: list[Matrix]) -> Any:
+    return matrices if scipy.sparse.issparse(matrices[0]) else np.array(matrices)
+
+
+def _summed(matrices: Any, weights: FloatArray) -> Matrix:
+    if isinstance(matrices, np.ndarray):
+        return np.asarray(np.tensordot(weights, matrices, 1))
     total = sum(w * m for w, m in zip(weights, matrices, strict=True))
-    return scipy.sparse.csr_array(total) if scipy.sparse.issparse(total) else np.asarray(total)
+    return scipy.sparse.csr_array(total)

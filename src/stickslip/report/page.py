@@ -32,6 +32,7 @@ from stickslip.report.sections import (
     forced_response,
     limit_cycle,
     modes,
+    run_up,
     safe,
 )
 from stickslip.report.tables import html_table
@@ -45,6 +46,7 @@ SECTIONS: tuple[Section, ...] = (
     campbell.SECTION,
     flutter.SECTION,
     safe.SECTION,
+    run_up.SECTION,
 )
 
 

@@ -7,4 +7,5 @@ ANALYSES = {
     "campbell": "stickslip.study.analyses.campbell:CAMPBELL",
     "flutter": "stickslip.study.analyses.flutter:FLUTTER",
     "safe": "stickslip.study.analyses.safe:SAFE",
+    "run_up": "stickslip.study.analyses.run_up:RUN_UP",
 }
