@@ -14,6 +14,7 @@ from stickslip.assembly.forces import (
     output_labels,
 )
 from stickslip.assembly.held import refuse_unheld
+from stickslip.assembly.load import Load
 from stickslip.assembly.model import Model
 from stickslip.assembly.pulled import refuse_pulled
 from stickslip.assembly.rigid import refuse_rigid
@@ -70,7 +71,7 @@ def asked(model: Model, harmonics: int) -> Asked:
     """
     order, driven = model.engine_order, model.driven
     forces = {name: force_of(model.places, name, load) for name, load in model.loads.items()}
-    _refuse_beyond(driven, harmonics)
+    _refuse_beyond(driven, model.loads, harmonics)
     labels = output_labels(model.places, model.outputs, model.loads)
     if not labels.names:
         raise input_error(
@@ -90,12 +91,13 @@ def asked(model: Model, harmonics: int) -> Asked:
     return Asked(order, orders, forces, labels, names, watched, model.spread)
 
 
-def _refuse_beyond(driven: Mapping[str, int], harmonics: int) -> None:
+def _refuse_beyond(driven: Mapping[str, int], loads: Mapping[str, Load], harmonics: int) -> None:
     for name, harmonic in driven.items():
         if harmonic > harmonics:
+            given = harmonic == loads[name].harmonic
             raise input_error(
-                f"load.{name}",
-                f"acts in harmonic {harmonic}, and harmonics up to {harmonics} are computed",
+                f"load.{name}.harmonic" if given else f"load.{name}",
+                f"{'is' if given else 'acts in harmonic'} {harmonic}, and harmonics up to {harmonics} are computed",
                 "Keep more harmonics.",
             )
 
