@@ -12,7 +12,7 @@ import scipy.linalg
 
 import stickslip as ss
 from stickslip.assembly.aerodynamics import Aerodynamics
-from stickslip.assembly.flow import flow_around, largest_displacements
+from stickslip.assembly.flow import flow_around, largest_displacements, phases
 from stickslip.assembly.mistuning import BladeMistuning, Mistuning
 from stickslip.model.dofs import nodal_dofs
 from stickslip.model.part import Part
@@ -449,3 +449,61 @@ def test_mistuning_shares_the_damping_of_the_waves() -> None:
     assert rates[1].sum() == pytest.approx(rates[0].sum(), rel=1e-4)
     least, before = blades_alone[1].min(), blades_alone[0].min()
     assert least > 1.02 * before
+
+
+RING = """
+schema_version = 2
+[part.wheel]
+shape = "lumped"
+sectors = 6
+masses_kg = [0.85, 0.5]
+names = ["disk", "blade"]
+springs_n_per_m = [
+  ["disk", "ground", 3.3e5], ["disk", "next.disk", 4.7e5], ["disk", "blade", 2.5e5], ["blade", "next.disk", 6.8e3],
+]
+[contact.shroud]
+between = ["wheel.blade", "next.wheel.blade"]
+law = "jenkins"
+tangential_stiffness_n_per_m = 3e4
+slip_limit_n = 1e6
+[aero]
+file = "c.csv"
+reference_hz = 100
+shapes = "wave"
+contacts = "open"
+[flutter]
+"""
+
+
+def test_the_phase_of_a_mode_is_that_of_the_sectors_own_dofs(tmp_path: Path) -> None:
+    """The contact makes the sector hold copies of the neighbour's dofs, as large as its own and a phase angle ahead."""
+    rows = [f"0,{a},{b},1.0,1.0" for a in (1, 2) for b in (1, 2)]
+    head = "neighbour,force_mode,motion_mode,real_per_s2,imag_per_s2"
+    (tmp_path / "c.csv").write_text("\n".join([head, *rows]), encoding="utf-8")
+    (tmp_path / "study.toml").write_text(RING, encoding="utf-8")
+    there = read_study(tmp_path / "study.toml").model()
+    flow = flow_around(there)
+    M = np.diag([0.85, 0.5])
+    for k in range(6):
+        ahead = np.exp(2j * np.pi * k / 6)
+        K = np.diag([3.3e5 + 2.5e5, 2.5e5]).astype(complex)
+        K[0, 1] = K[1, 0] = -2.5e5
+        for value, row in ((4.7e5, [1 - ahead, 0]), (6.8e3, [ahead, -1])):
+            K += value * np.outer(np.conj(row), row)
+        shapes = scipy.linalg.eigh(K, M)[1]
+        top = np.abs(shapes).argmax(axis=0)
+        assert np.all(np.diff(np.sort(np.abs(shapes), axis=0), axis=0) > 0.01)  # no tie of its own
+        leading = shapes[top, [0, 1]]
+        moving = there.at(0.0, k, "open")
+        patterns = flow.on_structure(k, moving).patterns
+        np.testing.assert_allclose(
+            patterns, M @ shapes * np.abs(leading) / leading, rtol=1e-9, atol=1e-9
+        )
+
+
+def test_rounding_does_not_choose_the_phase() -> None:
+    shape = np.array([[3j, 3j], [2.0, 2.0], [-2.0, -2.0], [2j, 2j]])
+    shape[2] *= 1 + np.array([1e-9, -1e-9])
+    np.testing.assert_allclose(phases(shape, np.array([1, 2, 3])), [1.0, 1.0])
+    shape[2] *= 1.001
+    np.testing.assert_allclose(phases(shape, np.array([1, 2, 3])), [-1.0, -1.0])

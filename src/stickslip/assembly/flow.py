@@ -27,6 +27,8 @@ from stickslip.reduction.waves import wave
 from stickslip.response.equilibrium import preload
 from stickslip.response.system import System
 
+TIE = 1e-4  # share by which components of a mode have to differ for the larger one to fix its phase
+
 
 @dataclass(frozen=True, eq=False)
 class Flow:
@@ -92,7 +94,7 @@ class Flow:
         moving = self.model.at(self.speed, number, self.given.contacts)
         modes = self._modes(moving, f"modes of wave {number}")
         shapes = np.asarray(moving.expand(modes))
-        shapes = shapes * phases(shapes)
+        shapes = shapes * phases(shapes, own_dofs(self.model))
         mass = self._whole.mass
         if self.given.shapes == "nodal_diameter":
             shapes = shapes.real
@@ -114,7 +116,7 @@ class Flow:
         alone = Structure(mass, damping, stiffness, whole.dofs.take(free))
         shapes, patterns = np.zeros((2, whole.n, len(self.given.modes)))
         shapes[free] = self._modes(alone, f"modes of {clamped!r} held")
-        shapes = shapes * phases(shapes).real
+        shapes = shapes * phases(shapes, free).real
         patterns[free] = alone.mass @ shapes[free]
         return np.asarray(patterns / self._scale(shapes))
 
@@ -160,7 +162,16 @@ class Flow:
         met = (pairs.own, pairs.following, repr(pairs.laws), given.contacts, pressed)
         faces = () if here is None else (here.low, here.high, here.weights)
         tie = model.coordinates.tie
-        return content_hash("aero", self._whole, model.sectors, given.modes, what, met, faces, tie)
+        return content_hash(
+            "aero: phases of own dofs",
+            self._whole,
+            model.sectors,
+            given.modes,
+            what,
+            met,
+            faces,
+            tie,
+        )
 
 
 def flow_around(model: Model, store: Store = in_memory, speed: float | None = None) -> Flow | None:
@@ -177,9 +188,20 @@ def flow_around(model: Model, store: Store = in_memory, speed: float | None = No
     return Flow(model, own, model.aerodynamics.influence.at_speed(own), store)
 
 
-def phases(shapes: Matrix) -> ComplexArray | FloatArray:
-    """Return the (m,) factors that make the largest component of each shape (n, m) real and positive."""
-    top = np.abs(shapes).argmax(axis=0)
+def own_dofs(model: Model) -> IntArray:
+    """Return the dofs of all parts that are the sector's own: all but those that follow the neighbour's, a phase angle ahead."""
+    here = model.neighbours
+    following = np.zeros(0, dtype=np.int64) if here is None else np.setdiff1d(here.high, here.low)
+    return np.setdiff1d(np.arange(model.places.n), following)
+
+
+def phases(shapes: Matrix, own: IntArray) -> ComplexArray | FloatArray:
+    """Return the (m,) factors that make the largest component of each shape (n, m) on the dofs `own` real and positive.
+
+    Of components that are equally large to `TIE` the first one counts, so that rounding does not choose.
+    """
+    sizes = np.abs(shapes[own])
+    top = own[(sizes >= (1 - TIE) * sizes.max(axis=0)).argmax(axis=0)]
     leading = shapes[top, np.arange(shapes.shape[1])]
     return np.asarray(np.conj(leading) / np.abs(leading))
 

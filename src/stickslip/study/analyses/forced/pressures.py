@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from stickslip.arrays import ComplexArray
-from stickslip.assembly.flow import phases
+from stickslip.assembly.flow import own_dofs, phases
 from stickslip.assembly.forces import force_of
 from stickslip.assembly.load import Load
 from stickslip.assembly.model import Model
@@ -40,7 +40,7 @@ def _about(model: Model, name: str, load: Load, count: int) -> list[str]:
     moving = model.at(model.speed, number)
     shapes = normal_modes(moving, count)
     turned = np.asarray(moving.expand(shapes.shapes))
-    turned = turned * phases(turned)
+    turned = turned * phases(turned, own_dofs(model))
     modal = turned.conj().T @ force_of(model.places, name, load)
     wave = label(number, model.sectors, parted=True)
     told = ", ".join(
