@@ -182,3 +182,64 @@ def test_what_cannot_be_asked_is_refused(tmp_path: Path) -> None:
     (stiff,) = read_study(_path(rigid, tmp_path)).cases()
     with pytest.raises(InputError, match="a contact is rigid"):
         LIMIT_CYCLE.inputs(stiff, stiff.build())
+
+
+SHROUDS = """
+schema_version = 2
+[part.wheel]
+shape = "lumped"
+sectors = 5
+masses_kg = [1.2, 0.33]
+names = ["disk", "blade"]
+springs_n_per_m = [["disk", "ground", 6.5e5], ["disk", "next.disk", 2.2e5], ["disk", "blade", 7.9e4]]
+dashpots_n_s_per_m = [["disk", "ground", 4.5], ["disk", "blade", 0.9]]
+[contact.shroud]
+between = ["wheel.blade", "next.wheel.blade"]
+law = "jenkins"
+tangential_stiffness_n_per_m = 7.5e3
+slip_limit_n = 1.9
+[output]
+points = { tip = "wheel.blade" }
+[aero]
+file = "c.csv"
+reference_hz = 80
+points = { tip = { on = "wheel.blade", direction = "x" } }
+[limit_cycle]
+harmonics = 3
+most_harmonics = 3
+points = 6
+amplitude_mm = [0.05, 2.0]
+in_time = true
+periods = 60
+"""
+
+
+def test_shrouds_between_neighbours_bound_a_wave(tmp_path: Path) -> None:
+    """Contacts know a blade as a sector's own and as its neighbour's: the copy has no mass and is no motion of its own."""
+    fluid = {-1: 250 - 500j, 0: -150 + 100j, 1: -250 + 500j}
+    rows = [f"{j},tip,tip,{c.real},{c.imag}" for j, c in fluid.items()]
+    head = "neighbour,force_point,motion_point,real_n_per_m,imag_n_per_m"
+    (tmp_path / "c.csv").write_text("\n".join([head, *rows]), encoding="utf-8")
+    case = one_case(answered(SHROUDS, tmp_path).tree["limit_cycle"].to_dataset(), 0)
+    # all sectors at once, without waves
+    n, M, blades = 5, np.tile([1.2, 0.33], 5), 2 * np.arange(5) + 1
+    K, C, G = np.zeros((3, 2 * n, 2 * n), dtype=complex)
+    for s in range(n):
+        disk, blade, next_disk, next_blade = (np.eye(2 * n)[i % (2 * n)] for i in 2 * s + np.arange(4))  # fmt: skip
+        for k, c, row in ((6.5e5, 4.5, disk), (2.2e5, 0, disk - next_disk), (7.9e4, 0.9, disk - blade), (7.5e3, 0, blade - next_blade)):  # fmt: skip
+            K += k * np.outer(row, row)
+            C += c * np.outer(row, row)
+        for j, own in fluid.items():
+            G[2 * s + 1, (2 * (s + j) + 1) % (2 * n)] += own
+    squares = np.linalg.eigvalsh((K - (G.real + G.real.T) / 2) / np.sqrt(np.outer(M, M)))
+    hertz = np.sqrt(squares) / (2 * np.pi)
+    np.testing.assert_allclose(np.sort(case["linear_frequency_hz"].values.ravel()), hertz, rtol=1e-9)  # fmt: skip
+    C, K = C - G.imag / (2 * np.pi * 80), K - G.real
+    states = np.block([[0 * K, np.eye(2 * n)], [-K / M[:, None], -C / M[:, None]]])
+    values, vectors = np.linalg.eig(states)
+    grows = np.flatnonzero((values.real > 0) & (values.imag > 0))
+    waves = [int(np.abs(np.fft.fft(vectors[blades, i])).argmax()) for i in grows]
+    assert case["wave_number"].values.tolist() == waves
+    ratio = -values[grows].real / np.abs(values[grows])
+    np.testing.assert_allclose(case["mode_damping_ratio"].values, ratio, rtol=0.05)
+    assert case["cycle_time_amplitude"].values[0] == pytest.approx(case["cycle_amplitude"].values[0], rel=1e-3)  # fmt: skip

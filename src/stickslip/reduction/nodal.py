@@ -154,3 +154,27 @@ def nodal_coordinates(
         copies = np.flatnonzero(shift == s)
         operator[:, n + copies] = part[:, copied[copies]].toarray()
     return NodalCoordinates(ahead, copied, shift - first[copied], operator)
+
+
+def own_motions(structure: Structure, multipliers: IntArray) -> Matrix:
+    """Return the (n, m) matrix from the coordinates of a wave that move by themselves to all of its coordinates.
+
+    The copies of coordinates follow as the constraints of the wave say; the forces of the constraints are zero in it.
+
+    Parameters
+    ----------
+    structure
+        In coordinates of `NodalCoordinates`, or any where nothing is tied.
+    multipliers
+        (c,) coordinates that are forces of constraints, the last ones; the c before them are the copies.
+    """
+    n, ties = structure.n, multipliers.size
+    if not np.array_equal(multipliers, np.arange(n - ties, n)):
+        raise input_error(
+            "TunedWheel", "has forces of constraints among its motions", "Put them behind these."
+        )
+    own = n - 2 * ties
+    held = structure.stiffness[n - ties :]
+    dense = held.toarray() if scipy.sparse.issparse(held) else np.asarray(held)
+    copies = -np.linalg.solve(dense[:, own : own + ties], dense[:, :own])
+    return np.vstack([np.eye(own), copies, np.zeros((ties, own))])

@@ -5,9 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse
 
-from stickslip.arrays import BoolArray, ComplexArray, FloatArray, Matrix
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.model.modes import normal_modes, with_springs
 from stickslip.model.structure import Structure
+from stickslip.reduction.basis import in_coordinates
+from stickslip.reduction.nodal import own_motions
 from stickslip.response.system import System
 
 
@@ -25,7 +27,8 @@ class StuckMode:
         Damping ratio by the energy method: the work of all damping and aerodynamic forces along the mode over ``4π`` times its energy.
         Negative: the mode grows.
     shape
-        (n,) complex displacement of all coordinates, normalised to unit modal mass.
+        (n,) complex displacement of all coordinates, normalised to unit modal mass; of a wheel whose contacts know a dof in several
+        phases also the forces that hold its copies.
     """
 
     number: int
@@ -57,13 +60,29 @@ def stuck_modes(system: System, count: int, holds: BoolArray | None = None) -> l
         springs = np.where(np.repeat(holds, 3), springs, 0.0)
     elastic = replace(own, stiffness=_hermitian(own.stiffness), mass=_hermitian(own.mass))
     bound = with_springs(elastic, system.interface.gap_operator, springs)
-    moving = int(np.count_nonzero(bound.mass.diagonal()))
-    found = normal_modes(bound, min(count, moving))
+    # copies that contacts know, and what holds them, have no mass and are no motions of their own
+    way = own_motions(bound, system.structure.multipliers)
+    free = in_coordinates(bound, way, bound.dofs.take(np.arange(way.shape[1])), {})
+    moving = int(np.count_nonzero(free.mass.diagonal()))
+    found = normal_modes(free, min(count, moving))
+    shapes = _with_forces(bound, way @ found.shapes, system.structure.multipliers)
     return [
-        _mode(own, i + 1, float(square), found.shapes[:, i])
+        _mode(own, i + 1, float(square), shapes[:, i])
         for i, square in enumerate(found.squares)
         if square > 0.0
     ]
+
+
+def _with_forces(bound: Structure, shapes: Matrix, multipliers: IntArray) -> Matrix:
+    """Return shapes with the forces that hold copies, which the contacts pull and no mass does."""
+    if not multipliers.size:
+        return shapes
+    copies = multipliers - multipliers.size
+    held = bound.stiffness[np.ix_(copies, multipliers)]
+    forces = np.linalg.solve(held, -(bound.stiffness @ shapes)[copies])
+    out = shapes.astype(np.result_type(shapes, forces))
+    out[multipliers] = forces
+    return out
 
 
 def _mode(structure: Structure, number: int, square: float, shape: Matrix) -> StuckMode:

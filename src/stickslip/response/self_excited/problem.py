@@ -208,7 +208,8 @@ def self_excited_motions(
             "a harmonic load acts: the motion would have two frequencies",
             "Leave it out; the stability of the forced response says whether it is kept.",
         )
-    share = abs(mode.shape[dof]) / float(np.max(np.abs(mode.shape)))
+    moving = np.delete(np.abs(mode.shape), system.structure.multipliers)
+    share = abs(mode.shape[dof]) / float(np.max(moving))
     if share < STILL:
         raise input_error(
             "limit_cycle",

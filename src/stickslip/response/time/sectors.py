@@ -21,6 +21,7 @@ from stickslip.harmonic.fourier import to_real
 from stickslip.harmonic.linear import one_structure
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
+from stickslip.reduction.nodal import own_motions
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.reduction.waves import excited_wave
 from stickslip.response.system import System
@@ -127,7 +128,9 @@ def all_sectors(system: System, load: HarmonicLoad, *, every: bool = False) -> S
         loads[h] = _travelling(wheel, h, amplitude[:own], sectors)
     waves = [_wave(wheel, common * k) for k in range(sectors)]
     weights = None if interface.weights is None else np.tile(interface.weights, sectors)
-    gaps = _circulant([_gaps(wheel, w, interface.gap_operator) for w in waves])
+    gaps = _circulant(
+        [_dense(interface.gap_operator) @ own_motions(w, wheel.multipliers) for w in waves]
+    )
     turns = sectors > 1 and alike == (sectors, common)
     motion = WaveMotion(1, 0)
     if turns:
@@ -216,20 +219,7 @@ def different_sectors(wheel: TunedWheel) -> tuple[int, int]:
 
 def _kept(wheel: TunedWheel) -> int:
     """Return the number of a sector's coordinates that move by themselves; behind them are copies of neighbours' and what ties these."""
-    ties = wheel.multipliers.size
-    if not np.array_equal(wheel.multipliers, np.arange(wheel.n - ties, wheel.n)):
-        raise input_error(
-            "all_sectors", "has forces of constraints among its motions", "Put them behind these."
-        )
-    return wheel.n - 2 * ties
-
-
-def _gaps(wheel: TunedWheel, wave: Structure, operator: Matrix) -> Matrix:
-    """Return the gaps in a wave by what moves by itself: copies follow from the constraints of the wave."""
-    own, ties = _kept(wheel), wheel.multipliers.size
-    gaps, held = _dense(operator), _dense(wave.stiffness)[wheel.n - ties :]
-    copies = -np.linalg.solve(held[:, own : own + ties], held[:, :own])
-    return gaps[:, :own] + gaps[:, own : own + ties] @ copies
+    return wheel.n - 2 * wheel.multipliers.size
 
 
 def _travelling(wheel: TunedWheel, harmonic: int, row: Matrix, sectors: int) -> ComplexArray:

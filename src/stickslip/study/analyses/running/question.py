@@ -16,6 +16,7 @@ from stickslip.model.gyroscopic import gyroscopic_modes
 from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.structure import Structure
 from stickslip.reduction.basis import in_coordinates
+from stickslip.reduction.nodal import own_motions
 from stickslip.reduction.speed_line import SpeedLine
 from stickslip.reduction.waves import excited_wave
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, Sweep, forced_problem
@@ -118,18 +119,8 @@ class Along:
 
 def _unconstrained(structure: Structure, line: SpeedLine) -> Structure:
     """Return a structure on the motions that its constraints leave."""
-    held = line.multipliers
-    if not held.size:
-        return structure
-    moving = np.setdiff1d(np.arange(structure.n), held)
-    stiffness = structure.stiffness
-    dense = stiffness.toarray() if hasattr(stiffness, "toarray") else np.asarray(stiffness)
-    rows = dense[np.ix_(held, moving)]
-    rows = rows / np.linalg.norm(rows, axis=1, keepdims=True)
-    free = np.linalg.svd(rows)[2][held.size :].conj().T
-    way = np.zeros((structure.n, free.shape[1]), dtype=free.dtype)
-    way[moving] = free
-    return in_coordinates(structure, way, structure.dofs.take(moving[: free.shape[1]]), {})
+    way = own_motions(structure, line.multipliers)
+    return in_coordinates(structure, way, structure.dofs.take(np.arange(way.shape[1])), {})
 
 
 @dataclass(frozen=True, eq=False)
