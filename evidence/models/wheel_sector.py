@@ -16,16 +16,13 @@ from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
 from stickslip.model.damping import rayleigh_damping
-from stickslip.model.dofs import Dofs, modal_dofs
+from stickslip.model.dofs import Dofs
 from stickslip.model.fe.solid import Material
 from stickslip.model.structure import Structure, join
-from stickslip.reduction.basis import in_coordinates
-from stickslip.reduction.cyclic import CyclicSector, travelling_wave
+from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.fixed_interface import craig_bampton
-from stickslip.reduction.mistuned import mistuned_wheel
 from stickslip.reduction.relative import in_relative_coordinates
-from stickslip.reduction.tuned import conjugate, tuned_wheel
-from stickslip.reduction.waves import wave
+from stickslip.reduction.tuned import tuned_wheel
 from stickslip.response.system import System
 
 WIDTH, DEPTH, DISK, BLADE = 0.03, 0.06, 0.03, 0.09  # m
@@ -133,51 +130,6 @@ def rubbing_pair(along: int = 10, up: int = 10) -> Rubbing:
     force = np.zeros(pair.n)
     force[pair.dof_set("a.tip")] = PULL
     return _loaded(structure, operator, structure.project(force), _nodes(structure), along * up)
-
-
-def mistuned_rubbing_wheel(
-    sectors: int,
-    engine_order: int,
-    along: int = 3,
-    up: int = 3,
-    modes: int = 20,
-    spread: float = 0.02,
-) -> Rubbing:
-    """Return all sectors of a wheel, the frequencies of the modes of each off by its own share of a normal distribution."""
-    plain = sector(sectors, along, up)
-    s = plain.structure
-    one = CyclicSector(rayleigh_damping(s, *DAMPING), sectors, plain.low, plain.high, axis=None)
-    left, right, tip = (s.dof_set(name) for name in ("left", "right", "tip"))
-    place = np.searchsorted(one.independent, np.concatenate([left, right, tip]))
-    count = left.size
-    turn = _frames(np.arange(count), count).toarray()
-    waves: list[Structure] = []
-    for k in range(sectors):
-        if 2 * k > sectors:
-            waves.append(conjugate(waves[sectors - k]))
-            continue
-        reduced = craig_bampton(travelling_wave(one, k), place, modes)
-        phase = wave(k, sectors).phase
-        way = np.eye(reduced.n, dtype=complex)
-        way[:count, :count] = np.conj(phase) * turn.T
-        way[:count, count : 2 * count] = np.conj(phase) * np.eye(count)
-        waves.append(in_coordinates(reduced, way, modal_dofs(reduced.n), {}))
-    size = waves[0].n
-    picks = np.eye(size, dtype=complex)[size - modes :]
-    squares = waves[0].stiffness.diagonal().real[size - modes :]
-    deviations = spread * np.random.default_rng(1).standard_normal(sectors)
-    factors = np.outer((1 + deviations) ** 2 - 1, squares)
-    wheel = mistuned_wheel(waves, [picks] * sectors, factors, modal_dofs(sectors * size))
-    at = size * np.arange(sectors)[:, None]
-    columns = (at + np.arange(count)).ravel()
-    operator = scipy.sparse.csr_array(
-        (np.ones(columns.size), (np.arange(columns.size), columns)), shape=(columns.size, wheel.n)
-    )
-    tips = at + 2 * count + np.arange(3)
-    force = np.zeros(wheel.n, dtype=complex)
-    phases = np.exp(2j * np.pi * engine_order * np.arange(sectors) / sectors)
-    force[tips] = phases[:, None] * np.array(PULL)
-    return _loaded(wheel, operator, force, tips[0], along * up)
 
 
 def _nodes(side: LinearSide) -> np.ndarray:
