@@ -5,10 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.linalg
 import scipy.sparse
 from test_assembly_wheel import (
     LAW,
     ORDER,
+    RADII,
     SECTORS,
     STEEL,
     H,
@@ -21,6 +23,8 @@ from test_assembly_wheel import (
 )
 
 from stickslip.assembly import BladeMistuning, ContactMistuning, Mistuning, OwnSector, pattern
+from stickslip.assembly.deviations import blade_alone_hz
+from stickslip.assembly.wheel_modes import wheel_modes
 from stickslip.contact.interface import Interface
 from stickslip.errors import InputError
 from stickslip.harmonic.dynamic_stiffness import condense
@@ -31,11 +35,13 @@ from stickslip.model.axis import Axis
 from stickslip.model.damping import rayleigh_damping
 from stickslip.model.fe.rotation import rotating_solid
 from stickslip.model.fe.solid import Material
+from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.modes import natural_frequencies
 from stickslip.model.part import solid_part
 from stickslip.reduction.mistuned import MistunedWheel
 from stickslip.reduction.relative import in_relative_coordinates
 from stickslip.response.system import System
+from stickslip.study.models.study import read_study
 
 DEVIATIONS = np.array([0.03, -0.05, 0.02, 0.06, -0.04])
 FRICTION = np.array([0.0, 0.5, -0.3, 0.2, -0.4])
@@ -174,6 +180,81 @@ def test_all_modes_of_a_blade_are_the_whole_blade_and_a_common_deviation_scales_
     np.testing.assert_allclose(frequencies[3], frequencies[None], rtol=1e-3)
 
 
+def around_one_blade(stiffness, dofs):
+    """What a blade does beyond the static motion by all that is around it, from the matrix of the whole wheel."""
+    rows = stiffness[dofs]
+    return rows.T @ np.linalg.solve(rows[:, dofs], rows)
+
+
+@pytest.mark.parametrize("modes", [None, 200])
+def test_a_blade_with_the_cyclic_face_counts_what_both_sectors_do_to_it(modes):
+    """A set with both cyclic faces: what lies on the high one is the next blade's."""
+    plain = shrouded_sector()
+    radius = np.linalg.norm(plain.points[:, :2], axis=1)
+    members = np.flatnonzero((radius > np.mean(RADII[:2])) & (radius < np.mean(RADII[2:])))
+    mesh = SolidMesh(plain.points, plain.cells, {**plain.node_sets, "inner": members})
+    model = replace(sector_model(mesh), speed=0.0)
+    own = model.parts["blade"].structure
+    full, nodes, stiffness = assembled_wheel(mesh, model, [own.stiffness] * SECTORS)
+    stiffness = stiffness.toarray()
+    members = np.setdiff1d(members, mesh.node_sets["cyclic_high"])
+    blades = [dofs_of(full, nodes[s, members]).ravel() for s in range(SECTORS)]
+    more = [((1 + d) ** 2 - 1) * around_one_blade(stiffness, b) for b, d in zip(blades, DEVIATIONS, strict=True)]  # fmt: skip
+    whole = replace(full, stiffness=stiffness + sum(more))
+    one = BladeMistuning(of="blade.inner", deviations=DEVIATIONS, modes=modes)
+    wheel = replace(model, mistuning=Mistuning(blades={"b": one})).assembled(2)
+    found = natural_frequencies(wheel.bare.structure.of_harmonic(0), 10)
+    np.testing.assert_allclose(found, natural_frequencies(whole, 10), rtol=1e-9)
+    b, mass = blades[0], full.mass.toarray()
+    squares = scipy.linalg.eigh(stiffness[np.ix_(b, b)], mass[np.ix_(b, b)], eigvals_only=True)
+    alone = blade_alone_hz(model, "blade.inner", 5, "mistuning.b.of")
+    np.testing.assert_allclose(2 * np.pi * alone, np.sqrt(squares[:5]), rtol=1e-9)
+
+
+RING = """
+schema_version = 2
+[part.wheel]
+shape = "lumped"
+sectors = 5
+masses_kg = [1.0, 0.3]
+names = ["disk", "tip"]
+springs_n_per_m = [["disk", "ground", 2e5], ["disk", "tip", 1e5], ["tip", "next.tip", 3e4], SPRING]
+[mistuning.blades]
+of = "wheel.tip"
+MORE
+"""
+
+
+@pytest.mark.parametrize("spring", ['["tip", "next.disk", 2e4]', '["disk", "next.tip", 2e4]'])
+@pytest.mark.parametrize("measured", [False, True])
+def test_a_blade_tied_to_both_neighbours_is_held_by_both(tmp_path, spring, measured):
+    """Springs are written in one of the two sectors that they tie; a wheel written the other way round is its mirror image."""
+    more = f'quantity = "frequency"\nmodes = "all"\ndeviations = {DEVIATIONS.tolist()}'
+    alone = math.sqrt((1e5 + 2 * 3e4 + 2e4) / 0.3) / (2 * math.pi)
+    if measured:
+        more = 'file = "b.csv"\nrelative_to = "model"'
+        rows = [f"{n},1,{float(alone * (1 + d))!r}" for n, d in enumerate(DEVIATIONS)]
+        (tmp_path / "b.csv").write_text("\n".join(["blade,mode,frequency_hz", *rows]))
+    path = tmp_path / "study.toml"
+    path.write_text(RING.replace("SPRING", spring).replace("MORE", more))
+    model = read_study(path).model()
+    place = [2 * n + np.arange(2) for n in range(5)]
+    links = [("disk", "tip", 0, 1e5), ("tip", "tip", 1, 3e4)]
+    links.append(("tip", "disk", 1, 2e4) if spring.startswith('["tip') else ("disk", "tip", 1, 2e4))
+    K = np.diag(np.tile([2e5, 0.0], 5))
+    for n in range(5):
+        for a, b, ahead, k in links:
+            row = np.zeros(10)
+            row[place[n][int(a == "tip")]] += 1
+            row[place[(n + ahead) % 5][int(b == "tip")]] -= 1
+            K += k * np.outer(row, row)
+    assert blade_alone_hz(model, "wheel.tip", 1, "") == pytest.approx(alone, rel=1e-12)
+    more = [((1 + d) ** 2 - 1) * around_one_blade(K, [p[1]]) for p, d in zip(place, DEVIATIONS, strict=True)]  # fmt: skip
+    squares = scipy.linalg.eigh(K + sum(more), np.diag(np.tile([1.0, 0.3], 5)), eigvals_only=True)
+    found = wheel_modes(model, 10, "open").frequencies_hz
+    np.testing.assert_allclose(2 * np.pi * found, np.sqrt(squares), rtol=1e-10)
+
+
 def test_a_sector_with_a_part_of_its_own_is_that_part():
     """Another material in sector 3 alone, all modes of the waves kept: the frequencies of the assembled wheel."""
     model = replace(sector_model(shrouded_sector()), speed=0.0)
@@ -218,6 +299,8 @@ def test_what_is_no_mistuning_is_refused_with_its_key():
     refused("mistuning.a", "has 3 values, and the wheel has 5", blades={"a": few})
     nowhere = BladeMistuning(of="blad", deviations=np.zeros(5))
     refused("mistuning.a.of", "there is no part", blades={"a": nowhere})
+    one_side = BladeMistuning(of="blade.cyclic_high", deviations=np.zeros(5))
+    refused("mistuning.a.of", "those of the next blade", blades={"a": one_side})
     gone = ContactMistuning(contact="rim", quantity="gap", values=np.zeros(5))
     refused("mistuning.a.contact", "there is no such contact", contacts={"a": gone})
     far = OwnSector(sector=5, part="blade", by=model.parts["blade"])

@@ -11,11 +11,13 @@ from stickslip.assembly.mistuning import BladeMistuning, OwnSector
 from stickslip.assembly.model import Model
 from stickslip.assembly.places import picked, stacked
 from stickslip.assembly.reduced import at_speed, damped
+from stickslip.assembly.wheel import faces_of, leaders, own_and_onward
 from stickslip.errors import input_error
 from stickslip.model.dofs import numbered_dofs
 from stickslip.model.fe.factorisation import factorise
 from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
+from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.sectors import of_alike, strip
 from stickslip.units import HZ
 
@@ -37,11 +39,14 @@ class Deviation:
         (n_s, r) stiffness that each share has beyond the tuned one; None where shares are many and `change` tells it all.
     change
         From the couplings (n_s, r, m) of these rows with all coordinates to what the matrices of the wheel change by.
+    behind
+        (r, N) CSR: what the motion of the sector before adds to each share; None: nothing.
     """
 
     rows: Matrix
     factors: FloatArray | None = None
     change: Callable[[Matrix], Changes] | None = None
+    behind: Matrix | None = None
 
 
 def deviations(model: Model) -> list[Deviation]:
@@ -61,7 +66,7 @@ def deviations(model: Model) -> list[Deviation]:
 
 @dataclass(frozen=True, eq=False)
 class Blade:
-    """A blade held where it meets the rest of its part.
+    """A blade held where it meets the rest of its part, in its own sector and in those beside it.
 
     Parameters
     ----------
@@ -71,12 +76,15 @@ class Blade:
         (b, N) CSR: the forces on them by the motion of the whole part, on the dofs of all parts.
     whole
         Whether it is the whole part, which nothing holds.
+    behind
+        (b, N) CSR: the forces on them by the motion of the sector before, whose high face they are; None: no dof lies on a face.
     """
 
     stiffness: Matrix
     mass: Matrix
     rows: Matrix
     whole: bool
+    behind: Matrix | None = None
 
 
 def blade_of(model: Model, of: str, place: str, beyond: float | None = None) -> Blade:
@@ -97,10 +105,44 @@ def blade_of(model: Model, of: str, place: str, beyond: float | None = None) -> 
         raise input_error(
             place, f"{of!r} is nothing that deforms", "Name a blade's node set or a part."
         )
-    rows = scipy.sparse.csr_array(structure.stiffness)[own]
-    wide = rows @ picked(first + np.arange(structure.n), n)
-    K, M = (scipy.sparse.csr_array(m)[:, own][own] for m in (structure.stiffness, structure.mass))
-    return Blade(K, M, wide, own.size == structure.n)
+    K, M = (scipy.sparse.csr_array(m) for m in (structure.stiffness, structure.mass))
+    wide = picked(first + np.arange(structure.n), n)
+    sector = faces_of(head, part) if part.sectors > 1 else None
+    if own.size == structure.n:
+        return Blade(K, M, K @ wide, whole=True)
+    if np.isin(first + own, np.concatenate([model.ties.low, model.ties.high])).any():
+        raise input_error(
+            place,
+            f"{of!r} has dofs that a join ties to the next sector, so that none of them is of one blade alone",
+            "Leave the joined surfaces out of the set.",
+        )
+    if sector is None:
+        return Blade(K[own][:, own], M[own][:, own], K[own] @ wide, whole=False)
+    own = _of_one_blade(sector, own, of, place)
+    # a dof of the low face is also the high face of the sector before, whose matrices act on it, too
+    here, there = own_and_onward(sector, own)
+    behind = (there.T @ K @ wide).tocsr() if there.nnz else None
+    stiffness, mass = (
+        scipy.sparse.csr_array(here.T @ m @ here + there.T @ m @ there) for m in (K, M)
+    )
+    rows = scipy.sparse.csr_array(here.T @ K @ wide)
+    return Blade(stiffness, mass, rows, whole=False, behind=behind)
+
+
+def _of_one_blade(sector: CyclicSector, own: IntArray, of: str, place: str) -> IntArray:
+    """Return the dofs of a blade without those of the high face, which are the next one's."""
+    if np.isin(own, sector.shared).any():
+        raise input_error(
+            place, f"{of!r} has dofs that all sectors share", "Leave the axis or the hub out."
+        )
+    left = np.setdiff1d(own, sector.high)
+    if np.setdiff1d(leaders(sector, own), left).size:
+        raise input_error(
+            place,
+            f"{of!r} has dofs of the high cyclic face, which are those of the next blade, and not their partners on the low face",
+            "Take the partners on the low face into the set, or leave the face out.",
+        )
+    return left
 
 
 def blade_alone(blade: Blade, number: int) -> tuple[FloatArray, FloatArray]:
@@ -129,17 +171,22 @@ def _of_blades(model: Model, name: str, one: BladeMistuning) -> Deviation:
     b = blade.stiffness.shape[0]
     first = model.places.offset(one.of.partition(".")[0])
     rows = picked(first + np.arange(b), model.places.n) if blade.whole else blade.rows
+    behind = None if blade.whole else blade.behind
     if b <= FEW_ROWS:
         # K = V diag(w) Vᵀ; of a blade that is held, [K K_r]ᵀ K⁻¹ [K K_r]
         values, vectors = np.linalg.eigh(blade.stiffness.toarray())
         weights = values if blade.whole else 1.0 / values
-        return Deviation(scipy.sparse.csr_array(vectors.T @ rows), factors[:, None] * weights)
+        return Deviation(
+            scipy.sparse.csr_array(vectors.T @ rows),
+            factors[:, None] * weights,
+            behind=None if behind is None else scipy.sparse.csr_array(vectors.T @ behind),
+        )
     kernel = blade.stiffness if blade.whole else factorise(blade.stiffness)
 
     def of_blade(blocks: Matrix) -> Changes:
         return {"stiffness": of_alike(blocks, kernel, factors)}
 
-    return Deviation(rows, change=of_blade)
+    return Deviation(rows, change=of_blade, behind=behind)
 
 
 def _of_modes(blade: Blade, factors: FloatArray, number: int | None) -> Deviation:
@@ -147,8 +194,9 @@ def _of_modes(blade: Blade, factors: FloatArray, number: int | None) -> Deviatio
     squares, shapes = blade_alone(blade, factors.shape[1] if number is None else number)
     each = np.broadcast_to(factors.reshape(len(factors), -1), (len(factors), squares.size))
     # with K φ = ω² M φ, φᵀ [K K_r] u = ω² times the mode's share of what u is beyond the static motion by the rest
-    rows = scipy.sparse.csr_array((shapes / np.sqrt(squares)).T @ blade.rows)
-    return Deviation(rows, each)
+    weights = (shapes / np.sqrt(squares)).T
+    behind = None if blade.behind is None else scipy.sparse.csr_array(weights @ blade.behind)
+    return Deviation(scipy.sparse.csr_array(weights @ blade.rows), each, behind=behind)
 
 
 def _of_own(model: Model, name: str, one: OwnSector) -> Deviation:

@@ -19,7 +19,7 @@ from stickslip.assembly.build import (
     static_state,
 )
 from stickslip.assembly.contact import Contact
-from stickslip.assembly.deviations import deviations
+from stickslip.assembly.deviations import Deviation, deviations
 from stickslip.assembly.flow import about_static_state
 from stickslip.assembly.held import held_warnings
 from stickslip.assembly.mistuning import ContactMistuning
@@ -198,7 +198,10 @@ def all_sectors(model: Model, what: Asked, store: Store) -> AllSectors:
     """Reduce all waves of a wheel, return to its sectors, and add what these differ by."""
     kept, _ = physical(model, what.kept)
     changes = deviations(model)
-    rows = scipy.sparse.vstack([c.rows for c in changes], format="csr") if changes else None
+    behind = [c.behind for c in changes if c.behind is not None]
+    rows = None
+    if changes:
+        rows = scipy.sparse.vstack([*(c.rows for c in changes), *behind], format="csr")
     waves = sector_waves(model, range(model.sectors), kept, store, rows)
     sector, gaps = _in_sectors(model, waves, what)
     structures = [sector.wheel.waves[k] for k in range(model.sectors)]
@@ -206,7 +209,8 @@ def all_sectors(model: Model, what: Asked, store: Store) -> AllSectors:
     for k in range(model.sectors):
         loads = waves.waves[k][1]
         shares = loads[:, 1:].conj().T if loads.ndim > 1 else np.zeros((0, loads.size))
-        seen.append(shares @ sector.ways[k])
+        back = np.conj(wave(k, model.sectors).phase)
+        seen.append(_with_behind(changes, shares, back) @ sector.ways[k])
     few = [change.factors is not None for change in changes]
     counts = [change.rows.shape[0] for change in changes]
     factors = [c.factors for c in changes if c.factors is not None]
@@ -230,6 +234,21 @@ def all_sectors(model: Model, what: Asked, store: Store) -> AllSectors:
             for kind, added in change.change(blocks).items():
                 structure = replace(structure, **{kind: getattr(structure, kind) + added})
     return AllSectors(model, sector, structure, gaps, fluid)
+
+
+def _with_behind(changes: Sequence[Deviation], shares: Matrix, back: complex | float) -> Matrix:
+    """Return the shares of deviations of a sector in a wave, with what the motion of the sector before, times `back`, adds."""
+    first = np.cumsum([0, *(c.rows.shape[0] for c in changes)])
+    found, next_one = shares[: first[-1]], int(first[-1])
+    if next_one == shares.shape[0]:
+        return found
+    found = found.astype(np.result_type(shares, type(back)))
+    for start, change in zip(first, changes, strict=False):
+        if change.behind is not None:
+            count = change.rows.shape[0]
+            found[start : start + count] += back * shares[next_one : next_one + count]
+            next_one += count
+    return found
 
 
 def _in_sectors(model: Model, waves: SectorWaves, what: Asked) -> tuple[ReducedSector, Matrix]:

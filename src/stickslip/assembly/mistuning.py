@@ -42,7 +42,7 @@ def pattern(
 class BladeMistuning:
     """Blades whose natural frequencies differ, their shapes as they are.
 
-    The stiffness that changes is that of the blade held where it meets the rest of its part: its static deformation by that rest
+    The stiffness that changes is that of the blade held where it meets the rest of its part and its neighbours: its static deformation by that rest
     does not change, and all its frequencies alone change by the deviations.
 
     Parameters

@@ -196,6 +196,18 @@ def leaders(sector: CyclicSector, dofs: IntArray) -> IntArray:
     return np.union1d(np.setdiff1d(dofs, high), low[followed])
 
 
+def own_and_onward(sector: CyclicSector, dofs: IntArray) -> tuple[Matrix, Matrix]:
+    """Return the (n, b) matrices from dofs that do not follow to what they move in their own sector, and in the one before it."""
+    tie = sector.tie[:, np.searchsorted(sector.independent, dofs)]
+    high = np.zeros(sector.structure.n)
+    high[sector.high] = 1.0
+    own, onward = (
+        scipy.sparse.csr_array(scipy.sparse.diags_array(d) @ tie) for d in (1 - high, high)
+    )
+    onward.eliminate_zeros()
+    return own, onward
+
+
 @dataclass(frozen=True, eq=False)
 class ReducedSector:
     """The waves of a wheel, reduced, on coordinates that mean the same to its contacts.
