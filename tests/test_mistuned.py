@@ -22,8 +22,12 @@ from test_assembly_wheel import (
     whole_with_gaps,
 )
 
+import stickslip as ss
 from stickslip.assembly import BladeMistuning, ContactMistuning, Mistuning, OwnSector, pattern
+from stickslip.assembly.contact import Contact
 from stickslip.assembly.deviations import blade_alone_hz
+from stickslip.assembly.mistuned import changed
+from stickslip.assembly.shares import at_rest
 from stickslip.assembly.wheel_modes import wheel_modes
 from stickslip.contact.interface import Interface
 from stickslip.errors import InputError
@@ -275,6 +279,26 @@ def test_a_sector_with_a_part_of_its_own_is_that_part():
     np.testing.assert_allclose(
         natural_frequencies(found, 12), natural_frequencies(whole, 12), rtol=1e-9
     )
+
+
+def test_a_clearance_in_sectors_is_added_to_that_of_the_contact():
+    """More, less, none left, and pressed: 1 mm of interference with 1e6 N/m is 1 kN."""
+    added = np.array([0.0, 2e-5, -3e-5, -5e-5, -1.05e-3])
+    for law in (
+        ss.UnilateralSpring(k_n=1e6, initial_gap=5e-5),
+        ss.ElasticCoulomb(k_t=1e6, k_w=1e6, k_n=1e6, mu=0.3, preload=-50.0),
+    ):
+        one = ContactMistuning(contact="rim", quantity="gap", values=added)
+        found = [changed(law, "mistuning.g", one, value) for value in added]
+        forces = [law.preload - 1e6 * getattr(law, "initial_gap", 0.0) for law in found]
+        np.testing.assert_allclose(forces, -1e6 * (5e-5 + added), atol=1e-9)
+    with pytest.raises(InputError) as refused:
+        changed(ss.Jenkins(k_t=1e6, limit=1.0), "mistuning.g", one, 1e-5)
+    assert refused.value.place == "mistuning.g.quantity"
+    # a preload of the law beside a clearance of the contact
+    spring = ss.UnilateralSpring(k_n=1e6, preload=20.0)
+    assert at_rest("", Contact(between=("", ""), law=spring, gap=5e-5)).initial_gap == pytest.approx(3e-5)  # fmt: skip
+    assert at_rest("", Contact(between=("", ""), law=spring, gap=1e-5)).preload == pytest.approx(10)
 
 
 def test_patterns_are_the_same_for_the_same_seed_and_have_the_spread_asked_for():

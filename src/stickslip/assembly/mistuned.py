@@ -35,7 +35,7 @@ from stickslip.assembly.wheel import ReducedSector, wheel_of
 from stickslip.contact.interface import Interface
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws import law_name
-from stickslip.errors import input_error
+from stickslip.errors import InputError, input_error
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector
@@ -345,7 +345,10 @@ def changed(law: ContactLaw, key: str, one: ContactMistuning, value: float) -> C
     """Return the law of a contact point of which a quantity deviates; `key` is that of the deviation."""
     if one.quantity == "gap":
         spot = Contact(between=("", ""), law=law, gap=value)
-        return at_rest(key, spot)
+        try:
+            return at_rest(key, spot)
+        except InputError as error:
+            raise error.at(f"{key}.quantity") from None
     names = RELATIVE[one.quantity]
     has = [name for name in names if getattr(law, name, None) is not None]
     if not has:

@@ -29,11 +29,20 @@ def at_rest(key: str, contact: Contact) -> ContactLaw:
         )
     if contact.gap != 0.0 and law.k_n == 0.0:
         raise _at_rest_alike(key, contact, "has no normal stiffness here: its pressure is constant")
+    if isinstance(law, UnilateralSpring):
+        return _pressed_or_open(law, contact)
     pressed = law.preload + contact.preload - law.k_n * contact.gap
-    if isinstance(law, UnilateralSpring) and pressed < 0.0:
-        return replace(law, preload=0.0, initial_gap=law.initial_gap - pressed / law.k_n)
     found: ContactLaw = replace(law, preload=pressed)
     return found
+
+
+def _pressed_or_open(law: UnilateralSpring, contact: Contact) -> UnilateralSpring:
+    """Return the law with a preload or a clearance: what is left of its own and of the contact's."""
+    preload, gap = law.preload + contact.preload, law.initial_gap + contact.gap
+    clearance = gap - preload / law.k_n
+    if clearance > 0.0:
+        return replace(law, preload=0.0, initial_gap=clearance)
+    return replace(law, preload=max(preload - law.k_n * gap, 0.0), initial_gap=0.0)
 
 
 def _at_rest_alike(key: str, contact: Contact, why: str) -> InputError:
