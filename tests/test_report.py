@@ -313,6 +313,14 @@ def test_symbols_say_what_is_doubtful_and_what_is_wrong() -> None:
     assert told["verdict on the case"] == ("doubtful", "of 13 points 1 doubtful, 1 wrong")
 
 
+def test_the_table_of_cases_names_the_harmonics_of_the_first_passage() -> None:
+    """With ``always_high`` that is what is kept at every frequency, not the few of `low`."""
+    data = small_result()
+    assert f'with H = 1</th><th scope="col">with H = {HIGH}</th>' in peaks(Response(data))
+    data.attrs["selection"] = "always_high"
+    assert f'with H = {HIGH}</th><th scope="col">with other H</th>' in peaks(Response(data))
+
+
 def test_the_tile_counts_the_doubtful_points_of_trusted_cases() -> None:
     data = synthetic_result(ratios=(20, 5), n=10)
     levels = np.zeros(data.sizes["point"], dtype=np.int64)

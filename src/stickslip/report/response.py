@@ -185,8 +185,13 @@ class Response(Node):
 
     @property
     def low_name(self) -> str:
-        """Harmonics of the first passage as text."""
+        """Few harmonics as text: those of the first passage, but with ``always_high``."""
         return named(self.low_harmonics)
+
+    @property
+    def first_name(self) -> str:
+        """Harmonics of the first passage as text."""
+        return self.high_name if self.selection == "always_high" else self.low_name
 
     @property
     def high_name(self) -> str:

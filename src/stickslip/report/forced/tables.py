@@ -14,8 +14,8 @@ def peaks(response: Response) -> str:
     """One row a case: peak, points, work."""
     scale = scale_for(np.array([response.peak_response(c) for c in response.cases]), response.unit)
     head = [
-        "excitation", "peak", f"peak / force ({scale.unit})", "at (Hz)", "verdict", "points", f"with H = {response.low_name}",
-        f"with {response.more_name}", "failed", "Newton steps", "unknowns solved", "contact (s)", "linear (s)", "rest (s)",
+        "excitation", "peak", f"peak / force ({scale.unit})", "at (Hz)", "verdict", "points", f"with H = {response.first_name}",
+        f"with {response.more_name if response.decides else 'other H'}", "failed", "Newton steps", "unknowns solved", "contact (s)", "linear (s)", "rest (s)",
     ]  # fmt: skip
     counts = [
         "points",
