@@ -9,6 +9,7 @@ import lumped_fluid as fluid
 import numpy as np
 import pytest
 import scipy.linalg
+from test_assembly_wheel import SECTORS, sector_model, shrouded_sector
 
 import stickslip as ss
 from stickslip.assembly.aerodynamics import Aerodynamics
@@ -507,3 +508,24 @@ def test_rounding_does_not_choose_the_phase() -> None:
     np.testing.assert_allclose(phases(shape, np.array([1, 2, 3])), [1.0, 1.0])
     shape[2] *= 1.001
     np.testing.assert_allclose(phases(shape, np.array([1, 2, 3])), [-1.0, -1.0])
+
+
+def test_diagrams_of_still_fluid_and_equal_sectors_say_so() -> None:
+    """The coefficients are those of 10 to 20 Hz, where no mode is."""
+    base = sector_model(shrouded_sector())
+    narrow = InfluenceCoefficients(
+        np.array([0]), np.full((1, 2, 1, 1, 1), 1j), 2 * np.pi * np.array([10.0, 20.0])
+    )
+    aero = Aerodynamics(influence=narrow, reference=70.0, points={"tip": ("blade.tip", (0, 1, 0))})
+    scatter = BladeMistuning(of="blade.tip", deviations=np.full(SECTORS, 0.1))
+    plain = ss.Model(parts=base.parts)
+    full = replace(plain, aerodynamics=aero, mistuning=Mistuning(blades={"all": scatter}))
+    keys = {"engine_orders": [1, 2], "modes": 2}
+    for name, more in (("safe", {"speed_rpm": 3000.0}), ("campbell", {"speeds_rpm": [0.0, 3000.0], "points": 2})):  # fmt: skip
+        found, still = (getattr(m, name)(**keys, **more) for m in (full, plain))
+        a, b = (r.data[name].to_dataset()["frequency_hz"].values for r in (found, still))
+        np.testing.assert_array_equal(a, b)
+        told = [v.why for v in found.verdicts if v.word == "note"]
+        assert any("in still fluid" in why for why in told)
+        assert any("all sectors alike" in why for why in told)
+        assert not any("in still fluid" in v.why for v in still.verdicts)

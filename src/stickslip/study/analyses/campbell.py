@@ -13,6 +13,7 @@ from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.analyses.waves.analysis import WaveAnalysis
 from stickslip.study.analyses.waves.dataset import Variables, frequencies
 from stickslip.study.analyses.waves.doubts import basis_doubts, campbell_doubts, unfollowed_from
+from stickslip.study.analyses.waves.left_out import in_still_fluid
 from stickslip.study.analyses.waves.numbers import Wheel
 from stickslip.study.analyses.waves.results import WaveBranches
 from stickslip.study.analyses.waves.solve import Question, follow_wave
@@ -147,14 +148,16 @@ class Campbell(WaveAnalysis):
             )
         wheel = Wheel(model.sectors, model.coriolis)
         wheel.require(asked.nodal_diameters, "campbell.nodal_diameters")
+        still, left_out = in_still_fluid(model)
         return Question(
-            model,
+            still,
             asked.contacts,
             wheel,
             asked.numbers(wheel),
             asked.modes,
             asked.speeds,
             engine_orders=tuple(asked.engine_orders),
+            left_out=left_out,
         )
 
 

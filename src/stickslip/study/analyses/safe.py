@@ -16,6 +16,7 @@ from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.analyses.waves.analysis import WaveAnalysis
 from stickslip.study.analyses.waves.dataset import Variables, frequencies, growth
 from stickslip.study.analyses.waves.doubts import safe_doubts
+from stickslip.study.analyses.waves.left_out import in_still_fluid
 from stickslip.study.analyses.waves.numbers import Wheel
 from stickslip.study.analyses.waves.results import WaveModes
 from stickslip.study.analyses.waves.solve import Question, solve_wave
@@ -133,7 +134,11 @@ class SafeDiagram(WaveAnalysis):
             )
         at = rpm * RPM if model.rotates else 0.0
         wheel = Wheel(model.sectors, model.coriolis and model.rotates)
-        return Question(model, asked.contacts, wheel, wheel.numbers(), asked.modes, (at,), rpm=rpm)
+        still, left_out = in_still_fluid(model)
+        numbers = wheel.numbers()
+        return Question(
+            still, asked.contacts, wheel, numbers, asked.modes, (at,), rpm=rpm, left_out=left_out
+        )
 
 
 SAFE = SafeDiagram()

@@ -1,6 +1,6 @@
 """What results say of the model beside its frequencies: mass, size, axis, what rotation does, the skin for pictures."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ import xarray as xr
 from stickslip.assembly.model import ContactsAs, Model
 from stickslip.assembly.statics import StaticState
 from stickslip.study.analyses.facts import facts_of
-from stickslip.study.analyses.verdict import doubt, to_json
+from stickslip.study.analyses.verdict import Verdict, doubt, to_json
 from stickslip.study.analyses.waves.doubts import static_doubts
 from stickslip.study.keep.netcdf import variable
 from stickslip.units import RPM
@@ -44,7 +44,13 @@ NUMBERS = {
 }
 
 
-def about(model: Model, contacts: ContactsAs, rpm: float, highest: float) -> dict[str, Any]:
+def about(
+    model: Model,
+    contacts: ContactsAs,
+    rpm: float,
+    highest: float,
+    more: Sequence[Verdict] = (),
+) -> dict[str, Any]:
     """Return the note about a model.
 
     Parameters
@@ -57,13 +63,15 @@ def about(model: Model, contacts: ContactsAs, rpm: float, highest: float) -> dic
         Speed of the rotor; NaN for a range.
     highest
         Speed at which the static displacement is told, rad/s.
+    more
+        What else is said.
     """
     state = model.static_state(highest)
     doubts = static_doubts(state, contacts=bool(model.contacts))
     note = facts_of(model, rpm) | {
         "speed_rpm": rpm,
         "contacts": contacts if model.contacts else "none",
-        "verdicts": to_json([*map(doubt, model.warnings), *doubts]),
+        "verdicts": to_json([*map(doubt, model.warnings), *doubts, *more]),
     }
     return note | _static(state)
 

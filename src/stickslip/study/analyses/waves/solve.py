@@ -18,6 +18,7 @@ from stickslip.reduction.speed_basis import speed_basis
 from stickslip.reduction.wave_family import WaveFamily
 from stickslip.response.rotating.campbell import campbell
 from stickslip.study.analyses.analysis import Notes
+from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.analyses.waves.about import ABOUT, about, skin_note
 from stickslip.study.analyses.waves.in_flow import wave_in_flow
 from stickslip.study.analyses.waves.numbers import Wheel
@@ -51,6 +52,8 @@ class Question:
         Whether mode shapes are kept.
     engine_orders
         Whose crossings are looked for.
+    left_out
+        What is said of what the frequencies leave out.
     """
 
     model: Model
@@ -62,6 +65,7 @@ class Question:
     rpm: float = math.nan
     shapes: bool = False
     engine_orders: tuple[int, ...] = ()
+    left_out: tuple[Verdict, ...] = ()
 
     @property
     def turning(self) -> bool:
@@ -83,7 +87,7 @@ def each_wave(
 ) -> Iterator[W]:
     """Yield what `solve` finds for the waves that are not done; what is told of the model goes into the notes first."""
     if notes.get(ABOUT) is None:
-        note = about(asked.model, asked.contacts, asked.rpm, asked.speeds[-1])
+        note = about(asked.model, asked.contacts, asked.rpm, asked.speeds[-1], asked.left_out)
         note |= {"parted": asked.wheel.parted}
         notes.put(ABOUT, note | (skin_note(asked.model) if asked.shapes else {}))
     known = {w.wave_number for w in done}
