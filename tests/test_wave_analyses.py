@@ -10,9 +10,13 @@ import xarray as xr
 from small_v2 import changed, write_four_masses, write_shrouded_sector, write_two_blades
 
 from evidence.validation.case_calculix_materials import our_solid, write_decks
+from stickslip.assembly.model import Model
 from stickslip.errors import InputError
 from stickslip.model.fe.prestress import strain_and_rotation
+from stickslip.model.fe.solid import Material
+from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.modes import normal_modes, with_springs
+from stickslip.model.part import solid_part
 from stickslip.model.readers.calculix_deck import read_deck
 from stickslip.model.structure_file import save_structure
 from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
@@ -474,3 +478,31 @@ def test_cases_that_differ_in_harmonic_loads_alone_are_computed_and_shown_once(
     made = made.replace({"vary.part.chain.masses_kg": [[1.0] * 4, [2.0, 1.0, 1.0, 1.0]]})
     titles = [t.title for t in run_study(made, only=["modes"]).summaries["modes"]]
     assert len(list((made.folder / "jobs").glob("*.job"))) == len(titles) == 2
+
+
+def test_shapes_of_both_directions_are_conjugates() -> None:
+    """A ring of six sectors, of two elements each: nodes of the high face move as much as those of the low one and of the middle."""
+    half, n = np.pi / 6, 6
+    angles = np.array([-half, 0.0, half])
+    points = np.array([[r * np.cos(a), r * np.sin(a), z] for r in (0.1, 0.13) for a in angles for z in (0.0, 0.02)])  # fmt: skip
+    at = np.arange(12).reshape(2, 3, 2)
+    cells = [
+        [*(at[i, j, 0] for i, j in corners), *(at[i, j, 1] for i, j in corners)]
+        for corners in (((0, a), (1, a), (1, a + 1), (0, a + 1)) for a in (0, 1))
+    ]
+    sets = {"root": at[0].ravel(), "cyclic_low": at[1, 0], "cyclic_high": at[1, 2]}
+    mesh = SolidMesh(points, np.array(cells), sets)
+    material = Material(young_modulus=2.1e11, density=7850.0)
+    model = Model(parts={"ring": solid_part(mesh, material, sectors=n, clamped=("root",))})
+    asked = Question(model, "open", Wheel(n, parted=True), tuple(range(n)), 4, (0.0,), shapes=True)
+    skin = model.skin.points
+    own = np.arctan2(skin[:, 1], skin[:, 0]) < half - 1e-6
+    for k in (1, 2):
+        there, back = (solve_wave(asked, number) for number in (k, n - k))
+        np.testing.assert_allclose(there.frequencies_hz, back.frequencies_hz, rtol=1e-9)
+        np.testing.assert_allclose(there.shapes, back.shapes.conj(), atol=1e-6)
+        np.testing.assert_allclose(np.linalg.norm(there.shapes, axis=2).max(axis=1), 1.0)
+        for shape in there.shapes:
+            mine = shape[own].ravel()
+            near = mine[np.abs(mine) > (1 - 1e-4) * np.abs(mine).max()]
+            assert near[0] == pytest.approx(abs(near[0]), abs=1e-12)

@@ -9,7 +9,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray, FloatArray, Matrix
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.assembly.flow import own_dofs, phases
 from stickslip.assembly.model import ContactsAs, Model
 from stickslip.model.gyroscopic import gyroscopic_modes
 from stickslip.model.modes import normal_modes
@@ -125,7 +126,8 @@ def solve_wave(asked: Question, wave_number: int) -> WaveModes:
         hertz, vectors = modes.frequencies_hz, np.asarray(modes.shapes, dtype=complex)
     moved = np.zeros((asked.n_modes, 0, 3), dtype=complex)
     if asked.shapes:
-        moved = _unit(asked.model.on_skin(np.asarray(structure.expand(vectors), dtype=complex)))
+        moved = asked.model.on_skin(np.asarray(structure.expand(vectors), dtype=complex))
+        moved = unit_shapes(moved, _own_points(asked.model))
     growth = _growth(asked, wave_number, hertz, vectors)
     flow = wave_in_flow(asked.model, asked.contacts, asked.speeds[0], wave_number, asked.n_modes)
     found = WaveModes(wave_number, hertz, moved, growth, perf_counter() - began)
@@ -153,15 +155,21 @@ def _growth(asked: Question, wave_number: int, hertz: FloatArray, vectors: Matri
     return np.asarray((2 * omega * (by_x + omega * turning / (2 * x)) / by_omega).real)
 
 
-def _unit(shapes: ComplexArray) -> ComplexArray:
-    """Return shapes (m, n, 3) whose largest displacement has length 1 and is real along its largest component."""
+def _own_points(model: Model) -> IntArray:
+    """Return the points of the skin that do not follow the neighbour's, as those of the high cyclic face do."""
+    following = np.ones((model.places.n, 1))
+    following[own_dofs(model)] = 0.0
+    return np.flatnonzero(~model.on_skin(following).any(axis=(0, 2)))
+
+
+def unit_shapes(shapes: ComplexArray, own: IntArray) -> ComplexArray:
+    """Return shapes (m, n, 3) whose largest displacement has length 1; the largest component among the points `own` is real and positive."""
     out = np.zeros_like(shapes)
+    components = (3 * own[:, None] + np.arange(3)).ravel()
     for i, shape in enumerate(shapes):
-        length = np.linalg.norm(shape, axis=1)
-        top = int(length.argmax())
-        if length[top] > 0:
-            leading = shape[top, np.abs(shape[top]).argmax()]
-            out[i] = shape * (abs(leading) / leading / length[top])
+        if shape[own].any():
+            flat = shape.reshape(-1, 1)
+            out[i] = shape * (phases(flat, components) / np.linalg.norm(shape, axis=1).max())
     return out
 
 
