@@ -12,6 +12,7 @@ from stickslip.report.quantities import counted, number, percent, quantity, scal
 from stickslip.report.section import Block, Card, Section
 from stickslip.report.tables import shortened
 
+_DASHES = ("dash", "dot", "dashdot", "longdash")
 _LARGEST, _SMALLEST = 26.0, 3.0  # markers of the largest and of no amplitude
 _SCALE = [[0.0, "#dfe6ee"], [0.35, "#56b4e9"], [0.7, "#e69f00"], [1.0, "#c0262d"]]
 
@@ -131,6 +132,65 @@ def amplitudes(view: RunUpView) -> Plot:
     return Plot(f"run_up_amplitude{view.key}", "Amplitude over speed", caption, figure)
 
 
+def fast(view: RunUpView) -> Plot | None:
+    """Show fast run-ups beside the steady response."""
+    if not view.has("fast_speed_rpm", "fast_amplitude"):
+        return None
+    rpm, swept = view.floats("fast_speed_rpm"), view.floats("fast_amplitude")
+    steady = view.values("amplitude", "point", "output")[:, view.output]
+    scale = scale_for(steady, "m")
+    figure = go.Figure()
+    for i, order in enumerate(view.orders):
+        own = view.own(order)
+        figure.add_scatter(
+            x=view.floats("speed_rpm")[own], y=scale.factor * steady[own], mode="lines", name=f"EO {order}, steady",
+            line={"color": colour(i), "width": 2.2},
+            hovertemplate=f"EO {order}, steady: %{{y:.5g}} {scale.unit} at %{{x:.6g}} rpm<extra></extra>",
+        )  # fmt: skip
+        for j, k in enumerate(np.flatnonzero(view.integers("fast_order") == order)):
+            rate = float(view.floats("fast_rate_rpm_per_s")[k])
+            figure.add_scatter(
+                x=rpm[k], y=scale.factor * swept[k], mode="lines", name=f"EO {order}, {rate:g} rpm/s",
+                line={"color": colour(i), "width": 1.2, "dash": _DASHES[j % len(_DASHES)]},
+                hovertemplate=f"EO {order}, {rate:g} rpm/s: %{{y:.5g}} {scale.unit} at %{{x:.6g}} rpm<extra></extra>",
+            )  # fmt: skip
+    styled(figure, 480)
+    figure.update_xaxes(title_text="speed (rpm)", exponentformat="none", separatethousands=True)
+    figure.update_yaxes(
+        title_text=f"amplitude of {view.output_name} ({scale.unit})", rangemode="tozero"
+    )
+    ratios = view.floats("fast_ratio")
+    known = ratios[np.isfinite(ratios)]
+    told = (
+        f": the smallest peak is {number(100 * known.min(), 4)} % of the steady one"
+        if known.size
+        else ""
+    )
+    caption = (
+        f"Amplitude while the speed changes at a constant rate, beside that of the steady motion{told}. Contact forces are those of the "
+        "momentary amplitude; beats behind a peak are less certain than the peak."
+    )
+    return Plot(f"run_up_fast{view.key}", "Fast run-up", caption, figure)
+
+
+def fast_peaks(view: RunUpView) -> str | None:
+    """Return the peaks of fast run-ups as a table."""
+    if not view.has("fast_speed_rpm"):
+        return None
+    rows = []
+    for k in range(len(view.integers("fast_order"))):
+        peak, rpm, ratio, shift, off = (
+            float(view.floats(f"fast_{name}")[k])
+            for name in ("peak_amplitude", "peak_speed_rpm", "ratio", "shift_rpm", "neglected")
+        )
+        rate = float(view.floats("fast_rate_rpm_per_s")[k])
+        first = [str(view.integers("fast_order")[k]), number(rate, 6), quantity(peak, "m", 5)]
+        later = [number(ratio, 4), number(rpm, 6), number(shift, 4), percent(100 * off)]
+        rows.append([*first, *later])
+    head = ["engine order", "rpm/s", "peak", "of the steady one", "at rpm", "shift in rpm", "left out"]  # fmt: skip
+    return "<h3>Peaks of fast run-ups</h3>" + shortened(head, rows, "run-ups")
+
+
 def static_forces(view: RunUpView) -> Plot:
     """Show how the static normal force of the contacts grows with the speed."""
     rpm, force = (
@@ -189,5 +249,7 @@ def _cards(view: RunUpView) -> list[Card]:
 
 
 _NEEDS = ("engine_orders", "speed_rpm", "amplitude", "stuck_hz")
-_BLOCK = Block("run_up", "Run-up", (campbell_with_response, amplitudes, peaks, static_forces))
+_BLOCK = Block(
+    "run_up", "Run-up", (campbell_with_response, amplitudes, peaks, fast, fast_peaks, static_forces)
+)
 SECTION: Section = Section("run_up", _NEEDS, RunUpView, (_BLOCK,), by_case=True, cards=_cards)

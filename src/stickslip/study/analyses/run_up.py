@@ -4,14 +4,13 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-import numpy as np
 import xarray as xr
 
 from stickslip.assembly.model import Model
-from stickslip.errors import SingularError
 from stickslip.response.forced.response import forced_response
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
 from stickslip.study.analyses.forced.estimate import estimate
+from stickslip.study.analyses.running.fast import NO_SOLUTION, fast_run_ups
 from stickslip.study.analyses.running.question import (
     Along,
     Question,
@@ -34,7 +33,6 @@ from stickslip.study.analyses.verdict import (
 from stickslip.study.keep.progress import LOG, advance
 from stickslip.units import HZ, RPM
 
-NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
 MODEL, VALUES = "model", "values"
 
 
@@ -68,9 +66,10 @@ class RunUp:
             for point in self._points(along, every, i / len(inputs.lines), len(inputs.lines)):
                 every.append(point)
                 yield point
+        fast_run_ups(inputs, every, notes)
         told = [doubt(text) for a in inputs.lines for text in a.model.warnings]
         notes.put(MODEL, {"verdicts": to_json(dict.fromkeys(told)), "limit": inputs.limit})
-        notes.put(VALUES, values_of(inputs, every))
+        notes.put(VALUES, values_of(inputs, every, notes))
 
     def _points(
         self, along: Along, every: Sequence[RunUpPoint], before: float, count: int

@@ -135,6 +135,8 @@ class Question:
         One an engine order.
     modes
         Natural frequencies shown.
+    rates
+        Of fast run-ups, rpm/s.
     limit
         Change that more harmonics may make before there is a warning, a fraction.
     facts
@@ -144,6 +146,7 @@ class Question:
     label: str
     lines: tuple[Along, ...]
     modes: int
+    rates: tuple[float, ...]
     limit: float
     facts: Mapping[str, Any] = field(default_factory=dict)
 
@@ -179,6 +182,7 @@ def question_of(case: Case, model: Model) -> Question:
         case.label,
         tuple(lines),
         table.modes,
+        tuple(table.rate_rpm_per_s or ()),
         settings.harmonics.alert_threshold_percent / 100,
         facts_of(model, float("nan")),
     )

@@ -46,6 +46,13 @@ class RunUpTable(Section):
         description="number of natural frequencies shown beside the response, 1 to 100",
     )
 
+    rate_rpm_per_s: list[Positive] | None = Field(
+        None,
+        min_length=1,
+        max_length=20,
+        description="rates in rpm a second at which the speed is swept in addition, a list: the peak of a fast run-up, in the direction "
+        "of direction, is lower and later than that of the steady motion; left out: steady motions alone",
+    )
     tolerance: float = Field(
         1e-6,
         gt=0,
@@ -58,6 +65,7 @@ class RunUpTable(Section):
     def _agrees(self) -> Self:
         rising_pair(self.speeds_rpm, "speeds_rpm", "speed")
         once(self.engine_orders or [], "engine_orders")
+        once(self.rate_rpm_per_s or [], "rate_rpm_per_s")
         if self.speeds_rpm[0] == self.speeds_rpm[1]:
             raise custom_error("is one speed", "Give two, or a forced response.", "speeds_rpm")
         return self

@@ -8,7 +8,9 @@ import xarray as xr
 
 from stickslip.response.forced.response import OF_PEAK
 from stickslip.response.recovery import signals
+from stickslip.study.analyses.analysis import Notes
 from stickslip.study.analyses.forced.points import Accepted, Response, collect
+from stickslip.study.analyses.running.fast import name_of
 from stickslip.study.analyses.running.question import DRAWN, Along, Question, RunUpPoint
 from stickslip.study.keep.netcdf import stacked, variable
 from stickslip.units import HZ, RPM
@@ -43,6 +45,17 @@ NUMBERS = {
     "stuck_hz": ("line line_speed mode", "Hz", "the same with all contacts stuck"),
     "static_speed_rpm": ("static_speed", "rpm", "speeds at which the model was assembled"),
     "static_normal_n": ("line static_speed", "N", "sum of the static normal forces of all contacts, pressure positive; of a wheel, of one sector"),
+    "fast_order": ("fast", "1", "engine order of a fast run-up"),
+    "fast_rate_rpm_per_s": ("fast", "rpm/s", "rate of the speed of a fast run-up"),
+    "fast_peak_amplitude": ("fast", "m", "largest amplitude of the reported output in a fast run-up"),
+    "fast_peak_speed_rpm": ("fast", "rpm", "speed at which it is reached"),
+    "fast_ratio": ("fast", "1", "largest amplitude over that of the steady motion"),
+    "fast_shift_rpm": ("fast", "rpm", "speed of the largest amplitude less that of the steady motion"),
+    "fast_harmonic": ("fast", "1", "highest harmonic kept"),
+    "fast_finished": ("fast", "1", "1 if the fast run-up was followed to its end"),
+    "fast_neglected": ("fast", "1", "second derivative of the amplitude over 2ω times the first around the peak: what slow amplitudes leave out"),
+    "fast_speed_rpm": ("fast fast_step", "rpm", "speed along a fast run-up"),
+    "fast_amplitude": ("fast fast_step", "m", "amplitude of the reported output along a fast run-up"),
     "output_label": ("output", "1", "name of the output"),
     "report_output": ("", "1", "index of the output whose peak is resolved"),
     "sectors": ("", "1", "number of sectors of the wheel; 1 for a whole structure"),
@@ -50,8 +63,8 @@ NUMBERS = {
 }  # fmt: skip
 
 
-def values_of(question: Question, points: Sequence[RunUpPoint]) -> Values:
-    """Return all that the dataset holds of a case."""
+def values_of(question: Question, points: Sequence[RunUpPoint], notes: Notes) -> Values:
+    """Return all that the dataset holds of a case; fast run-ups are among the notes."""
     each, rows = [], []
     offset = 0
     for along in question.lines:
@@ -71,6 +84,7 @@ def values_of(question: Question, points: Sequence[RunUpPoint]) -> Values:
         **{name: np.concatenate([r[name] for r in rows]) for name in rows[0]},
         **hertz,
         **_of_statics(question.lines),
+        **_of_fast(question, each, notes),
         "line_speed_rpm": drawn / RPM,
         "output_label": np.array(first.model.output_labels),
         "report_output": first.model.peak_output,
@@ -144,6 +158,38 @@ def _of_statics(lines: Sequence[Along]) -> Values:
         force = -along.static_force[:, :, 2].sum(axis=1)
         found[i] = np.interp(widest.line.speeds, along.line.speeds, force, left=np.nan)
     return {"static_speed_rpm": widest.line.speeds / RPM, "static_normal_n": found}
+
+
+def _of_fast(question: Question, each: Sequence[Values], notes: Notes) -> Values:
+    """Return the fast run-ups beside the peaks of the steady motions."""
+    found = []
+    for along, steady in zip(question.lines, each, strict=True):
+        for rate in question.rates:
+            told = notes.get(name_of(along.order, rate))
+            assert told is not None
+            top = int(np.argmax(told["amplitude"]))
+            peak, rpm = told["amplitude"][top], told["speed_rpm"][top]
+            found.append(
+                {
+                    "order": along.order,
+                    "rate_rpm_per_s": rate,
+                    "peak_amplitude": peak,
+                    "peak_speed_rpm": rpm,
+                    "ratio": peak / steady["peak_amplitude"],
+                    "shift_rpm": rpm - steady["peak_speed_rpm"],
+                    **told,
+                }
+            )
+    if not found:
+        return {}
+    longest = max(len(one["speed_rpm"]) for one in found)
+    for one in found:
+        for name in ("speed_rpm", "amplitude"):
+            rest = longest - len(one[name])
+            one[name] = np.pad(
+                np.asarray(one[name], dtype=float), (0, rest), constant_values=np.nan
+            )
+    return {f"fast_{name}": np.array([one[name] for one in found]) for name in found[0]}
 
 
 def dataset(cases: Sequence[Mapping[str, Any]]) -> xr.Dataset:

@@ -9,6 +9,7 @@ from stickslip.study.analyses.analysis import TextTable
 from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.keep.netcdf import one_case
 
+TOO_FAST = 0.05  # share that slowly varying amplitudes leave out, above which there is a doubt
 BETWEEN = 1e-5  # error between the speeds of the model above which there is a doubt
 UNKNOWN = Verdict(
     "trusted",
@@ -20,6 +21,7 @@ UNKNOWN = Verdict(
 def verdicts_of(case: xr.Dataset, label: str, limit: float) -> list[Verdict]:
     """Return what is to be thought of a case."""
     found = [v for i in range(case.sizes["line"]) for v in _of_line(case, i, label, limit)]
+    found += _of_fast(case, label)
     return found or [Verdict("trusted", label, None, "every engine order was followed")]
 
 
@@ -68,6 +70,27 @@ def _of_line(case: xr.Dataset, i: int, label: str, limit: float) -> Iterator[Ver
         )
 
 
+def _of_fast(case: xr.Dataset, label: str) -> Iterator[Verdict]:
+    for i in range(case.sizes.get("fast", 0)):
+        order, rate = (
+            int(case["fast_order"].values[i]),
+            float(case["fast_rate_rpm_per_s"].values[i]),
+        )
+        name = f"engine order {order} at {rate:g} rpm/s"
+        if not case["fast_finished"].values[i]:
+            yield Verdict(
+                "doubtful", label, None, f"{name}: the fast run-up was not followed to its end",
+                "Take a smaller range of speeds, or another rate.",
+            )  # fmt: skip
+        share = float(case["fast_neglected"].values[i])
+        if share > TOO_FAST:
+            yield Verdict(
+                "doubtful", label, None,
+                f"{name}: the amplitude varies so fast that {100 * share:.2g} % of its change is left out, and the peak may be off by as much",
+                "Take a slower rate, or integrate in time.",
+            )  # fmt: skip
+
+
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     """Return what the terminal prints."""
     found = []
@@ -76,6 +99,8 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
         label = str(data["case_label"].values[k])
         head = f"{label}: " if label and data.sizes["case"] > 1 else ""
         found.append(_peaks(case, head))
+        if case.sizes.get("fast"):
+            found.append(_fast(case, head))
     return tuple(found)
 
 
@@ -111,3 +136,16 @@ def _peaks(case: xr.Dataset, head: str) -> TextTable:
             "what the modes of three speeds span is kept at all: at some speed another mode would take the place of one kept"
         )
     return TextTable(f"{head}Run-up along engine orders", names, tuple(rows), tuple(lines))
+
+
+def _fast(case: xr.Dataset, head: str) -> TextTable:
+    """Return the fast run-ups beside the steady peaks."""
+    columns = ("order", "rate_rpm_per_s", "peak_amplitude", "ratio", "peak_speed_rpm", "shift_rpm", "harmonic", "neglected")  # fmt: skip
+    rows = tuple(
+        (f"{m:.0f}", f"{rate:g}", f"{1e3 * peak:.5g}", f"{ratio:.4f}", f"{rpm:.6g}", f"{shift:+.4g}", f"{h:.0f}", f"{100 * off:.2g} %")
+        for m, rate, peak, ratio, rpm, shift, h, off in zip(
+            *(case[f"fast_{name}"].values for name in columns), strict=True
+        )
+    )  # fmt: skip
+    names = ("engine order", "rpm/s", "peak mm", "of the steady one", "at rpm", "shift rpm", "H", "left out")  # fmt: skip
+    return TextTable(f"{head}Fast run-up", names, rows)
