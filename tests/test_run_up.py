@@ -1,6 +1,8 @@
 """Run-up: amplitude along engine-order lines, each speed with its own stiffness and preload."""
 
+import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -110,7 +112,7 @@ points = { tip = "wheel.tip" }
 high = 3
 """
 RUN_UP = """[run_up]
-speeds_rpm = [3500.0, 10000.0]
+speeds_rpm = [8100.0, 9000.0]
 engine_orders = [2, 3]
 points = 5
 peak_points = 1
@@ -147,7 +149,9 @@ def test_a_study_follows_engine_orders_over_speed(finished):
     assert data["dissipated_w"].values.max() > 0
     assert np.all(data["stuck_hz"].values >= data["open_hz"].values * (1 - 1e-9))
     assert float(data["speed_error"].max()) < 1e-12
-    assert "TRUSTED" in " ".join(str(v) for v in result.verdicts)
+    said = " ".join(str(v) for v in result.verdicts)
+    assert "engine order 3: the largest amplitude is at an end of the range" in said
+    assert "engine order 2" not in said
 
     hz = float(data["frequency_hz"].values[top])
     alone = ss.Study.from_file(path).model()
@@ -161,7 +165,7 @@ def test_python_and_an_interrupted_run_give_the_same(finished, tmp_path):
     path, result = finished
     model = ss.Study.from_file(path).model()
     keys = {"engine_orders": [3], "points": 5, "peak_points": 1, "modes": 2, "high": 3}
-    mine = model.run_up(speeds_rpm=(3500.0, 10000.0), **keys).data["run_up"].to_dataset()
+    mine = model.run_up(speeds_rpm=(8100.0, 9000.0), **keys).data["run_up"].to_dataset()
     theirs = result.data["run_up"].to_dataset()
     own = theirs["points_order"].values[0] == 3
     np.testing.assert_array_equal(mine["amplitude"].values[0], theirs["amplitude"].values[0][own])
@@ -190,6 +194,42 @@ class Kept(dict):
 def case_of(path):
     (tables,) = read_file(path).cases
     return Case(0, "", {}, tables.tables, lambda: None, "", path.parent)
+
+
+AERO = """[aero]
+file = "coefficients.csv"
+shapes = "blade_alone"
+clamped = "wheel.disk"
+mode = 1
+reference_hz = 250.0
+"""
+MISTUNED = '[mistuning.blades]\nof = "wheel.tip"\ndistribution = "normal"\nstandard_deviation = 0.01\nseed = 1\n'
+RIGID = LUMPED.replace('"jenkins"', '"rigid_coulomb"').replace(
+    'acts = "tangential"\ntangential_stiffness_n_per_m = 2e5\nslip_limit_n = 12.0',
+    "friction_coefficient = 0.5\npreload_n = 4.0",
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (LUMPED + AERO + RUN_UP, r"run_up: does not follow the aerodynamic forces of \[aero\]"),
+        (LUMPED + MISTUNED + RUN_UP, r"run_up: is of tuned wheels, and \[mistuning.blades\]"),
+        (
+            RIGID + RUN_UP + "rate_rpm_per_s = [9.0]\n",
+            r"run_up.rate_rpm_per_s: .*contact.shroud.law",
+        ),
+    ],
+)
+def test_what_does_not_go_with_the_speed_is_refused_before_anything_is_computed(
+    tmp_path, text, said
+):
+    path = tmp_path / "study.toml"
+    path.write_text(text)
+    flutter = Path(__file__).parents[1] / "examples" / "flutter_ring" / "coefficients.csv"
+    shutil.copy(flutter, tmp_path)
+    with pytest.raises(InputError, match=f"study.toml: {said}"):
+        ss.Study.from_file(path).check()
 
 
 def test_keys_of_a_run_up_that_do_not_fit_are_named(tmp_path):

@@ -32,6 +32,7 @@ from stickslip.study.models.diameters import diameter_refusals
 from stickslip.study.models.files import MESHES
 from stickslip.study.models.fluid import fluid_refusals
 from stickslip.study.models.mistuning import mistuning_refusals
+from stickslip.study.models.running import run_up_refusals
 from stickslip.study.models.stages import stage_refusals, staged
 
 BLADES = ("root", "force", "tip1", "edge1", "tip2")
@@ -65,6 +66,7 @@ def refusals(tables: Tables, home: Path) -> Iterator[InputError]:
         yield from fluid_refusals(tables, home, sectors_of(tables))
         yield from mistuning_refusals(tables, home, sectors_of(tables))
         yield from stage_refusals(tables)
+        yield from run_up_refusals(tables)
 
 
 def sectors_of(tables: Tables) -> int | None:
