@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
+from stickslip.arrays import FloatArray
 from stickslip.study.analyses.analysis import TextTable
 from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.keep.netcdf import one_case
@@ -82,6 +83,13 @@ def _of_fast(case: xr.Dataset, label: str) -> Iterator[Verdict]:
                 "doubtful", label, None, f"{name}: the fast run-up was not followed to its end",
                 "Take a smaller range of speeds, or another rate.",
             )  # fmt: skip
+        elif case["fast_peak_speed_rpm"].values[i] in _ends(case["fast_speed_rpm"].values[i]):
+            # no peak was passed, whose error could be told
+            yield Verdict(
+                "trusted", label, None, f"{name}: the largest amplitude is at an end of the range",
+                "Widen speeds_rpm to see the peak.",
+            )  # fmt: skip
+            continue
         share = float(case["fast_neglected"].values[i])
         if share > TOO_FAST:
             yield Verdict(
@@ -89,6 +97,11 @@ def _of_fast(case: xr.Dataset, label: str) -> Iterator[Verdict]:
                 f"{name}: the amplitude varies so fast that {100 * share:.2g} % of its change is left out, and the peak may be off by as much",
                 "Take a slower rate, or integrate in time.",
             )  # fmt: skip
+
+
+def _ends(speeds: FloatArray) -> FloatArray:
+    """Return the first and the last speed of a fast run-up, which may be padded with NaN."""
+    return np.asarray(speeds[np.isfinite(speeds)][[0, -1]])
 
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
