@@ -10,14 +10,20 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 import xarray as xr
 from test_assembly_wheel import SECTORS, SPEED, STEEL
 from test_cli import done
-from test_parts_between_sectors import HALF, answered, around, brick
+from test_parts_between_sectors import HALF, H, answered, around, brick
 
+import stickslip.harmonic.balance as balance_module
 from stickslip.model.axis import Axis
 from stickslip.model.deck import write_deck
 from stickslip.model.mesh.solid_mesh import SolidMesh
+from stickslip.response.parameter import Discretisation
+from stickslip.response.tracking import track_peak
+from stickslip.solve.krylov import Automatic, Krylov
+from stickslip.solve.newton_method import Newton
 from stickslip.study.models.study import read_study
 
 Vector = Sequence[float]
@@ -158,3 +164,22 @@ def test_one_sector_from_a_file_answers_as_all(tmp_path: Path) -> None:
     pair = one["output_displacement"].isel(point=0).values
     apart = pair[..., 0] + 1j * pair[..., 1] - every.outputs
     assert np.abs(apart).max() < 1e-8 * np.abs(every.outputs).max()
+
+
+def test_its_peak_is_tracked_by_products_as_by_arrays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
+    """More friction, two engine orders, Coriolis forces; the slope along the peaks is that of their difference."""
+    found = read_study(write_one_sector(tmp_path / "one") / "study.toml").model().assembled(H)
+    values, span = (0.2, 0.202), (2 * math.pi * 930, 2 * math.pi * 960)
+    how = Discretisation(order=H, samples=128)
+    arrays = list(track_peak(found.system, found.load, "mu", values, span, output=1, discretisation=how))  # fmt: skip
+    assert all(point.converged and point.is_maximum for point in arrays)
+    krylov = Krylov()
+    monkeypatch.setattr(balance_module, "CROSSOVER", 1)
+    how = replace(how, newton=Newton(linear=Automatic(krylov=krylov)))
+    products = list(track_peak(found.system, found.load, "mu", values, span, output=1, discretisation=how))  # fmt: skip
+    assert krylov.counts.products > 0
+    for one, other in zip(arrays, products, strict=True):
+        assert other.amplitude == pytest.approx(one.amplitude, rel=1e-8)
+        assert other.omega == pytest.approx(one.omega, rel=1e-8)
+    slope = (arrays[1].amplitude - arrays[0].amplitude) / (values[1] - values[0])
+    assert slope == pytest.approx((arrays[0].slope + arrays[1].slope) / 2, rel=1e-4)
