@@ -303,3 +303,7 @@ def test_a_run_says_whether_its_peaks_are_stable(tmp_path: Path) -> None:
     code, said = invoke("check", str(wrong))
     assert code == 2
     assert "forced_response.stability" in said
+
+
+def test_a_long_time_is_told_in_hours_and_days() -> None:
+    assert [stable._lasting(t) for t in (8.0, 7000.0, 9000.0, 1252940.0)] == ["8 s", "7000 s", "2 hours", "15 days"]  # fmt: skip

@@ -160,10 +160,18 @@ def unexaminable(question: Question) -> str:
     if work > MOST_WORK:
         return (
             f"{system.structure.n} coordinates with {system.interface.n_contacts} contacts would take about "
-            f"{work / FLOPS:.0f} s a point, more than {MOST_WORK / FLOPS:.0f} s: each interval between two transitions costs "
+            f"{_lasting(work / FLOPS)} a point, more than {MOST_WORK / FLOPS:.0f} s: each interval between two transitions costs "
             "the exponential of a matrix of twice as many rows"
         )
     return ""
+
+
+def _lasting(seconds: float) -> str:
+    """Return a long time as it is read: in seconds, hours or days."""
+    for name, unit in (("days", 86400.0), ("hours", 3600.0)):
+        if seconds > 2 * unit:
+            return f"{seconds / unit:.0f} {name}"
+    return f"{seconds:.0f} s"
 
 
 def _unexaminable_wheel(wheel: TunedWheel, work: float) -> str:
@@ -172,7 +180,7 @@ def _unexaminable_wheel(wheel: TunedWheel, work: float) -> str:
     if work > MOST_WHEEL:
         return (
             f"against every wave all {wheel.sectors} sectors count, {wheel.sectors * wheel.n} coordinates, which would take about "
-            f"{work / FLOPS:.0f} s a point, more than {MOST_WHEEL / FLOPS:.0f} s"
+            f"{_lasting(work / FLOPS)} a point, more than {MOST_WHEEL / FLOPS:.0f} s"
         )
     return ONE_SECTOR
 
