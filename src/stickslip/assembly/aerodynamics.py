@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from stickslip.errors import input_error
-from stickslip.reduction.aerodynamics import InfluenceCoefficients
+from stickslip.reduction.aerodynamics import InfluenceCoefficients, one_twice
 
 Direction = tuple[float, float, float] | None
 
@@ -71,6 +71,22 @@ class Aerodynamics:
             raise input_error("Aerodynamics.largest_displacement", f"is {size}", "Give metres.")
         if min(self.modes) < 1:
             raise input_error("Aerodynamics.modes", f"are {self.modes}", "The lowest is 1.")
+
+    def require(self, sectors: int) -> None:
+        """Refuse what does not fit a wheel: a blade that is a neighbour twice, nodal diameters that it does not have."""
+        twice = one_twice(self.influence.distances, sectors)
+        if twice:
+            raise input_error(
+                "Aerodynamics.influence",
+                f"has the neighbours {twice[0]} and {twice[1]}, one blade of {sectors}, whose motion would count twice",
+                "Leave one of them out.",
+            )
+        if self.shapes == "nodal_diameter" and not 0 <= 2 * self.nodal_diameter <= sectors:
+            raise input_error(
+                "aero.nodal_diameter",
+                f"is {self.nodal_diameter}, and {sectors} sectors have the nodal diameters 0 to {sectors // 2}",
+                "Name the one whose modes the coefficients belong to.",
+            )
 
     @property
     def of_points(self) -> bool:

@@ -111,6 +111,8 @@ class Model:
             raise input_error(
                 "aero", "is of one wheel, and a join couples several", "Leave one out."
             )
+        if self.aerodynamics is not None:
+            self.aerodynamics.require(self.sectors)
 
     def __repr__(self) -> str:
         """Return what it is in a line."""

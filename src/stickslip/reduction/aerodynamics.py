@@ -265,6 +265,16 @@ def from_phase_angles(
     return distances, np.asarray(spread[distances % count])
 
 
+def one_twice(numbers: Sequence[int] | IntArray, sectors: int) -> tuple[int, int] | None:
+    """Return the first two of some neighbours, or wave numbers, that are the same one on a wheel; None where all differ."""
+    found: dict[int, int] = {}
+    for own in (int(number) for number in numbers):
+        if own % sectors in found:
+            return found[own % sectors], own
+        found[own % sectors] = own
+    return None
+
+
 def to_phase_angles(
     distances: IntArray, values: ComplexArray, angles: Sequence[float] | FloatArray
 ) -> ComplexArray:

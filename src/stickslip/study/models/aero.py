@@ -10,7 +10,7 @@ from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.assembly.aerodynamics import Aerodynamics
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.readers.measured_columns import MeasuredColumns, read_columns
-from stickslip.reduction.aerodynamics import InfluenceCoefficients, from_phase_angles
+from stickslip.reduction.aerodynamics import InfluenceCoefficients, from_phase_angles, one_twice
 from stickslip.study.file.aero import AeroTable
 from stickslip.study.file.tables import Tables
 from stickslip.study.file.toml import read_toml
@@ -46,6 +46,16 @@ def aero_refusals(tables: Tables, home: Path, sectors: int | None) -> Iterator[I
         )
 
 
+def knows_speeds(table: AeroTable | None, home: Path) -> bool:
+    """Return whether coefficients are given over the speed, which then chooses among them; True where the file cannot be read."""
+    if table is None:
+        return False
+    try:
+        return "speed_rpm" in _columns(home / table.file).names
+    except InputError:  # which is told where it belongs
+        return True
+
+
 def aerodynamics_of(
     table: AeroTable, home: Path, sectors: int, points: Mapping[str, str], clamped: str
 ) -> Aerodynamics:
@@ -70,7 +80,7 @@ def aerodynamics_of(
         Naming file, line, column and value.
     """
     path = home / table.file
-    columns = _from_toml(path) if path.suffix.lower() == ".toml" else read_columns(path)
+    columns = _columns(path)
     _check_names(columns, table)
     names, pairs = _between(columns, table)
     values = _values(columns, table)
@@ -95,6 +105,10 @@ def aerodynamics_of(
 def _direction(table: AeroTable, name: str) -> tuple[float, float, float] | None:
     given = table.points[name].direction
     return None if given is None else (given[0], given[1], given[2])
+
+
+def _columns(path: Path) -> MeasuredColumns:
+    return _from_toml(path) if path.suffix.lower() == ".toml" else read_columns(path)
 
 
 def _from_toml(path: Path) -> MeasuredColumns:
@@ -224,7 +238,7 @@ def _influence(
         line[cell] = i
         table[cell] = values[i]
     _refuse_gaps(columns, line, who, once, speeds, frequencies)
-    _refuse_far(columns, who, once, sectors)
+    _refuse_numbers(columns, who, once, sectors)
     if who in ("neighbour", "recorded_on"):
         return InfluenceCoefficients(once.astype(np.int64), table, frequencies, speeds)
     angles = once * DEG if who == "phase_angle_deg" else 2 * np.pi * once / sectors
@@ -283,10 +297,36 @@ def _refuse_gaps(
     )
 
 
-def _refuse_far(columns: MeasuredColumns, who: str, once: FloatArray, sectors: int) -> None:
-    if who in ("neighbour", "recorded_on") and np.abs(once).max() >= sectors:
+def _refuse_numbers(columns: MeasuredColumns, who: str, once: FloatArray, sectors: int) -> None:
+    """Refuse neighbours that the wheel does not have or has once, and waves that lack others."""
+    place = f"{columns.path}: {who}"
+    if who == "phase_angle_deg":
+        if once.size == 1:
+            raise input_error(
+                place,
+                f"holds {once[0]:g} alone, and says nothing of the waves of other angles",
+                "Give all of them; a force by the blade's own motion alone is neighbour 0.",
+            )
+        return
+    given = np.sort(-once if who == "recorded_on" else once).astype(np.int64)
+    waves = who == "wave_number"
+    if not waves and np.abs(given).max() >= sectors:
         raise input_error(
-            f"{columns.path}: {who}",
-            f"goes to {int(np.abs(once).max())}, and the wheel has {sectors} sectors",
+            place,
+            f"goes to {np.abs(given).max()}, and the wheel has {sectors} sectors",
             "A blade's farthest neighbour is half the wheel away.",
+        )
+    twice = one_twice(given, sectors)
+    if twice:
+        raise input_error(
+            place,
+            f"has {twice[0]} and {twice[1]}, which are one {'wave' if waves else 'blade'} of {sectors}",
+            "Leave one of them out.",
+        )
+    missing = sorted(set(range(sectors)) - {int(k) % sectors for k in given}) if waves else []
+    if missing:
+        raise input_error(
+            place,
+            f"lacks {', '.join(map(str, missing))} of the waves 0 to {sectors - 1}",
+            "Give them all, or coefficients by neighbour, of which those that are left out are zero.",
         )

@@ -26,6 +26,7 @@ from stickslip.study.file.parts import (
 )
 from stickslip.study.file.section import Section
 from stickslip.study.file.tables import Tables
+from stickslip.study.models.aero import knows_speeds
 from stickslip.study.models.areas import without_areas
 from stickslip.study.models.cost import too_large
 from stickslip.study.models.diameters import diameter_refusals
@@ -62,7 +63,7 @@ def refusals(tables: Tables, home: Path) -> Iterator[InputError]:
         yield from _shapes_of_joins(tables)
         yield from _loads(tables)
         yield from _outputs(tables)
-        yield from _questions(tables)
+        yield from _questions(tables, home)
         yield from fluid_refusals(tables, home, sectors_of(tables))
         yield from mistuning_refusals(tables, home, sectors_of(tables))
         yield from stage_refusals(tables)
@@ -315,7 +316,7 @@ def _directions(tables: Tables, point: Any) -> tuple[str, ...]:
     return tuple(point.directions or tables.output.directions or COMPONENTS[:3])
 
 
-def _questions(tables: Tables) -> Iterator[InputError]:
+def _questions(tables: Tables, home: Path) -> Iterator[InputError]:
     """Yield the complaints about analyses that lack what they need."""
     asked: Any = tables
     forced = getattr(asked, "forced_response", None)
@@ -345,12 +346,12 @@ def _questions(tables: Tables) -> Iterator[InputError]:
                     f"is missing on a wheel of {sectors} sectors",
                     "Say how many periods the force has around the circumference.",
                 )
-    yield from _without_a_mesh(tables)
+    yield from _without_a_mesh(tables, home)
     if not staged(tables):
         yield from diameter_refusals(tables, sectors)
 
 
-def _without_a_mesh(tables: Tables) -> Iterator[InputError]:
+def _without_a_mesh(tables: Tables, home: Path) -> Iterator[InputError]:
     """Yield the complaints about speeds where nothing turns that they change."""
     originals = [original(tables, name) for name in tables.part]
     if any(map(_turns, originals)):
@@ -362,10 +363,12 @@ def _without_a_mesh(tables: Tables) -> Iterator[InputError]:
             "needs a part that a speed changes, and none is a mesh",
             "Give a part a shape, a deck (.inp) or an archive (.cdb).",
         )
-    if tables.rotation.speed_rpm > 0 and not any(isinstance(part, BODIES) for part in originals):
+    still = tables.rotation.speed_rpm == 0 or any(isinstance(part, BODIES) for part in originals)
+    if not still and not knows_speeds(tables.aero, home):
         yield input_error(
             "rotation.speed_rpm",
-            f"is {tables.rotation.speed_rpm:g}, but no part is a mesh or a rigid body, and a speed changes nothing else",
+            f"is {tables.rotation.speed_rpm:g}, but no part is a mesh or a rigid body, and no aero.file has a column speed_rpm: "
+            "a speed changes nothing else",
             "Give 0, or bring a mesh. Matrices that were exported at speed hold its effects already.",
         )
 
