@@ -143,7 +143,7 @@ def _refuse_waves(asked: LimitCycleTable, model: Model) -> None:
         raise input_error(
             "limit_cycle.wave_numbers",
             f"holds {beyond[0]}, and {model.sectors} sectors have the waves 0 to {model.sectors - 1}",
-            f"Backward waves of d nodal diameters are {model.sectors} - d.",
+            f"A backward wave of d nodal diameters is d, a forward one {model.sectors} - d.",
         )
 
 

@@ -17,7 +17,7 @@ class LimitCycleTable(Section):
         None,
         min_length=1,
         max_length=200,
-        description="wave numbers of a wheel, 0 to the number of sectors less one: k travels forward, n - k backward; left out: those "
+        description="wave numbers of a wheel, 0 to the number of sectors n less one: k below n/2 travels backward, n - k forward; left out: those "
         "that are unstable with contacts stuck",
     )
     modes: list[Annotated[int, Field(ge=1, le=100)]] | None = Field(
