@@ -13,6 +13,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.travelling import condense_side
 from stickslip.model.matrices import lumped
 from stickslip.response.parameter import Discretisation
+from stickslip.response.self_excited import modes
 from stickslip.response.self_excited.curve import (
     AmplitudePoint,
     damping_over_amplitude,
@@ -61,6 +62,33 @@ def curve(problem: SelfExcited, last: float = 100.0) -> list[AmplitudePoint]:
     points = damping_over_amplitude(problem, (0.5 * slips, last * slips), 30)
     assert all(p.converged for p in points)
     return points
+
+
+@pytest.mark.parametrize("whole", [400, 10])
+def test_modes_that_grow_are_those_of_the_eigenvalues_with_coriolis_and_flow(whole, monkeypatch):
+    monkeypatch.setattr(modes, "WHOLE", whole)
+    rng = np.random.default_rng(4)
+    n, number = 60, 5
+    turn = np.linalg.qr(rng.standard_normal((n, n)))[0]
+    stiffness = turn @ np.diag(np.linspace(1.0, 60.0, n) ** 2) @ turn.T
+    skew, flow = rng.standard_normal((2, n, n))
+    damping = 1e-3 * np.eye(n) + 0.1 * (skew - skew.T)
+    stiffness += 0.02 * flow
+    gap = np.zeros((3, n))
+    gap[0, 3] = 1.0
+    contacts = Interface(("damper",), (Jenkins(k_t=0.5, limit=0.1),), gap)
+    own = replace(lumped(np.eye(n), np.eye(n)), stiffness=stiffness.copy(), damping=damping)
+    found = stuck_modes(System(own, contacts, np.array([0])), number)
+    stiffness[3, 3] += 0.5
+    values = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]]))
+    values = values[values.imag > 0]
+    values = values[np.argsort(values.imag)][:number]
+    assert np.any(values.real > 0)
+    assert np.any(values.real < 0)
+    np.testing.assert_allclose([m.omega for m in found], np.abs(values), rtol=1e-6)
+    np.testing.assert_allclose(
+        [m.ratio for m in found], -values.real / np.abs(values), rtol=1e-3, atol=1e-7
+    )
 
 
 @pytest.mark.parametrize(("rows", "order"), [(ONE, 1), (MANY, 21)])

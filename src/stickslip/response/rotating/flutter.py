@@ -135,11 +135,11 @@ def _mode(
 ) -> tuple[float, ComplexArray, float, complex, complex]:
     none = np.zeros_like(still)
     start = 1j * np.sqrt(still[i, i].real), np.eye(len(still))[i].astype(complex)
-    value, vector = _nearest(still, turning, none, start)
+    value, vector = nearest_mode(still, turning, none, start)
     omega = value.imag
     amplitude = P.conj().T @ vector
     if not np.any(amplitude):
-        damped = _nearest(lossy, damping, none, (value, vector))[0]
+        damped = nearest_mode(lossy, damping, none, (value, vector))[0]
         return omega, amplitude, 0.0, 1j * omega, damped
     force = feedback.force(omega)
     energy = -float((amplitude.conj() @ force @ amplitude).imag) / (2 * omega**2)
@@ -162,14 +162,14 @@ def _followed(
         # matrices know the motion as it grows or decays, a table its frequency
         omega = pair[0].imag if feedback.influence.depends_on_frequency else -1j * pair[0]
         force = P @ feedback.force(omega) @ P.conj().T
-        found = _nearest(stiffness, damping, force, pair)
+        found = nearest_mode(stiffness, damping, force, pair)
         if abs(found[0] - pair[0]) <= SETTLED * abs(found[0]):
             return found
         pair = found
     return pair
 
 
-def _nearest(
+def nearest_mode(
     stiffness: ComplexArray,
     damping: ComplexArray,
     force: ComplexArray,

@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.response.self_excited.curve import AmplitudePoint, at_amplitude
 from stickslip.response.self_excited.problem import SelfExcited
-from stickslip.solve.linear import Dense, factorised
+from stickslip.solve.linear import factorised
 from stickslip.solve.newton_method import Newton, newton
 
 SHORTEST = 1e-3  # share of the damping by which it is taken away at least
@@ -234,7 +234,7 @@ def _slope(problem: SelfExcited, cycle: FloatArray) -> float:
     y, p = np.append(cycle[:-1], 0.0), float(cycle[-1])
     equation = problem.over_amplitude()
     at = equation.linearise(y, p)
-    inverse = factorised(Dense(), at.jac)
+    inverse = factorised(problem.how.newton.linear, at.jac)
     change = None if inverse is None else inverse(-at.jac_p)
     if change is None:
         return np.nan

@@ -8,9 +8,17 @@ import scipy.sparse
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.model.modes import normal_modes, with_springs
 from stickslip.model.structure import Structure
-from stickslip.reduction.basis import in_coordinates
+from stickslip.reduction.aerodynamics import Feedback
+from stickslip.reduction.basis import in_basis, in_coordinates
 from stickslip.reduction.nodal import own_motions
+from stickslip.response.rotating.flutter import ITERATIONS, SETTLED, damping_ratio, nearest_mode
 from stickslip.response.system import System
+
+WHOLE = 400  # coordinates up to which eigenvalues are those of all motions
+SPARE = 20  # undamped modes beyond twice as many as are asked for
+STILL = (
+    1e-7  # of the fastest rate: what turns more slowly creeps, or is free to move but for rounding
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,10 +30,9 @@ class StuckMode:
     number
         From 1, by frequency.
     omega
-        rad/s, undamped.
+        Modulus of the eigenvalue, rad/s.
     ratio
-        Damping ratio by the energy method: the work of all damping and aerodynamic forces along the mode over ``4π`` times its energy.
-        Negative: the mode grows.
+        Damping ratio ``−Re λ / |λ|`` of the eigenvalue with all damping, Coriolis and aerodynamic forces. Negative: the mode grows.
     shape
         (n,) complex displacement of all coordinates, normalised to unit modal mass; of a wheel whose contacts know a dof in several
         phases also the forces that hold its copies.
@@ -50,27 +57,88 @@ def stuck_modes(system: System, count: int, holds: BoolArray | None = None) -> l
     system
         What vibrates, and its contacts.
     count
-        How many; fewer where there are fewer.
+        How many; fewer where there are fewer, or some of them do not vibrate.
     holds
         (n_contacts,) contact points that stick under the static loads; None: all.
+
+    Notes
+    -----
+    Eigenvalues of ``λ²M + λC + K`` with all that C and K hold, Coriolis terms and unsymmetric ones of a flow included: undamped modes are
+    other shapes where waves that travel both ways have equal frequencies, or rotation parts them. Aerodynamic coefficients are those of
+    each mode's own frequency. Of more than 400 coordinates the motions are spanned by undamped modes and the static answers to the forces
+    that couple these.
     """
     own = system.structure.of_harmonic(1)
     springs = system.springs.stuck_stiffness()
     if holds is not None:
         springs = np.where(np.repeat(holds, 3), springs, 0.0)
-    elastic = replace(own, stiffness=_hermitian(own.stiffness), mass=_hermitian(own.mass))
-    bound = with_springs(elastic, system.interface.gap_operator, springs)
+    bound = with_springs(own, system.interface.gap_operator, springs)
+    elastic = replace(bound, stiffness=_hermitian(bound.stiffness), mass=_hermitian(bound.mass))
     # copies that contacts know, and what holds them, have no mass and are no motions of their own
-    way = own_motions(bound, system.structure.multipliers)
-    free = in_coordinates(bound, way, bound.dofs.take(np.arange(way.shape[1])), {})
-    moving = int(np.count_nonzero(free.mass.diagonal()))
-    found = normal_modes(free, min(count, moving))
-    shapes = _with_forces(bound, way @ found.shapes, system.structure.multipliers)
+    way = own_motions(elastic, system.structure.multipliers)
+    dofs = elastic.dofs.take(np.arange(way.shape[1]))
+    still, free = (in_coordinates(one, way, dofs, {}) for one in (elastic, bound))
+    basis, rigid = _basis(still, free, count)
+    feedback = system.structure.feedback_of(1)
+    if feedback is not None:
+        feedback = replace(feedback, patterns=(way @ basis).conj().T @ feedback.patterns)
+    stiffness, damping = (in_basis(m, basis) for m in (free.stiffness, free.damping))
+    if free.loss is not None:
+        stiffness = stiffness + 1j * in_basis(free.loss, basis)
+    values, vectors = _eigenpairs(stiffness, damping, feedback, count - rigid)
+    shapes = _with_forces(elastic, way @ (basis @ vectors), system.structure.multipliers)
+    ratios = damping_ratio(values)
     return [
-        _mode(own, i + 1, float(square), shapes[:, i])
-        for i, square in enumerate(found.squares)
-        if square > 0.0
+        StuckMode(rigid + i + 1, float(abs(value)), float(ratio), np.asarray(shape, dtype=complex))
+        for i, (value, ratio, shape) in enumerate(zip(values, ratios, shapes.T, strict=True))
     ]
+
+
+def _basis(still: Structure, free: Structure, count: int) -> tuple[Matrix, int]:
+    """Return motions of unit mass that span the lowest modes, and how many of those asked for do not vibrate without damping."""
+    moving = int(np.count_nonzero(still.mass.diagonal()))
+    wanted = moving if moving <= WHOLE else min(moving, 2 * count + SPARE)
+    modes = normal_modes(still, wanted)
+    rigid = int(np.count_nonzero(modes.squares[: min(count, moving)] <= 0.0))
+    shapes = np.asarray(modes.shapes)
+    if wanted == moving:
+        return shapes, rigid
+    coupling = free.damping @ shapes * np.sqrt(np.maximum(modes.squares, 0.0))
+    coupling = coupling + (free.stiffness - still.stiffness) @ shapes
+    shift = (
+        float(np.max(modes.squares)) * 1e-3
+    )  # a body that is free to move has a static answer, too
+    answers = np.linalg.solve(still.stiffness + shift * still.mass, coupling)
+    both = np.hstack([shapes, answers / np.linalg.norm(answers, axis=0)])
+    square, turn = np.linalg.eigh(both.conj().T @ (still.mass @ both))
+    kept = square > 1e-10 * square[-1]
+    return both @ (turn[:, kept] / np.sqrt(square[kept])), rigid
+
+
+def _eigenpairs(
+    stiffness: Matrix, damping: Matrix, feedback: Feedback | None, count: int
+) -> tuple[ComplexArray, ComplexArray]:
+    """Return eigenvalues and shapes in motions of unit mass, frequency above zero, lowest first."""
+    stiffness, damping = (np.asarray(m, dtype=complex) for m in (stiffness, damping))
+    n = len(stiffness)
+    zero, one = np.zeros((n, n)), np.eye(n)
+    values, vectors = np.linalg.eig(np.block([[zero, one], [-stiffness, -damping]]))
+    turning = np.flatnonzero(values.imag > STILL * np.abs(values).max(initial=0.0))
+    lowest = turning[np.argsort(values.imag[turning], kind="stable")][: max(count, 0)]
+    shapes = vectors[:n, lowest] / np.linalg.norm(vectors[:n, lowest], axis=0)
+    values = values[lowest]
+    if feedback is None or not feedback.influence.depends_on_frequency:
+        return values, shapes
+    P = np.asarray(feedback.patterns)
+    for i in range(values.size):
+        value, shape = complex(values[i]), shapes[:, i]
+        for _ in range(ITERATIONS):
+            force = P @ feedback.beyond_frozen(value.imag)[0] @ P.conj().T
+            before, (value, shape) = value, nearest_mode(stiffness, damping, force, (value, shape))
+            if abs(value - before) <= SETTLED * abs(value):
+                break
+        values[i], shapes[:, i] = value, shape
+    return values, shapes
 
 
 def _with_forces(bound: Structure, shapes: Matrix, multipliers: IntArray) -> Matrix:
@@ -83,19 +151,6 @@ def _with_forces(bound: Structure, shapes: Matrix, multipliers: IntArray) -> Mat
     out = shapes.astype(np.result_type(shapes, forces))
     out[multipliers] = forces
     return out
-
-
-def _mode(structure: Structure, number: int, square: float, shape: Matrix) -> StuckMode:
-    omega = float(np.sqrt(square))
-    work = omega * _along(structure.damping, shape).real + _along(structure.stiffness, shape).imag
-    if structure.loss is not None:
-        work += _along(structure.loss, shape).real
-    ratio = work / (2.0 * square * _along(structure.mass, shape).real)
-    return StuckMode(number, omega, float(ratio), np.asarray(shape, dtype=complex))
-
-
-def _along(matrix: Matrix, shape: Matrix) -> complex:
-    return complex(np.conj(shape) @ (matrix @ shape))
 
 
 def _hermitian(matrix: Matrix) -> Matrix:

@@ -24,7 +24,7 @@ from stickslip.harmonic.parameters import BalanceAt
 from stickslip.response.parameter import Discretisation, Parameter, parameter_family
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.response.system import System
-from stickslip.solve.linear import Dense, factorised
+from stickslip.solve.linear import factorised
 
 WANDERED = 1.0  # |ln(ω / ω_0)| at which a corrector has lost the mode
 FARTHEST = 100.0  # |ln a| beyond which there are no motions
@@ -170,7 +170,7 @@ class SelfExcited:
             Held(self.position, 1, 1.0),
             Held(self.position, 2, 0.0),
         )
-        return PeriodicProblem(settings, held, partial(factorised, Dense()))
+        return PeriodicProblem(settings, held, partial(factorised, self.how.newton.linear))
 
 
 def self_excited_motions(
