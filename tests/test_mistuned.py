@@ -329,6 +329,12 @@ def test_what_is_no_mistuning_is_refused_with_its_key():
     refused("mistuning.a.contact", "there is no such contact", contacts={"a": gone})
     far = OwnSector(sector=5, part="blade", by=model.parts["blade"])
     refused("mistuning.a.sector", "the sectors are 0 to 4", own={"a": far})
+    here = replace(far, sector=2)
+    refused("mistuning.b.sector", "mistuning.a puts another part", own={"a": here, "b": here})
+    seven = replace(here, by=replace(model.parts["blade"], sectors=7))
+    refused("mistuning.a.by", "is one of 7 sectors, and the part", own={"a": seven})
+    many = BladeMistuning(of="blade.shroud_high", deviations=np.zeros((5, 200)))
+    refused("mistuning.a.deviations", "is of 200 modes, and the model's blade", blades={"a": many})
 
 
 def test_a_wheel_condensed_wave_by_wave_is_the_wheel_condensed_as_a_whole():

@@ -172,26 +172,115 @@ def test_measured_blades_are_taken_from_a_file(tmp_path: Path) -> None:
     model = study_of(tmp_path, own).model()
     found = model.mistuning.blades["scatter"].deviations
     np.testing.assert_allclose(found[:, 0], 2 * np.pi * hertz - 1, atol=1e-7)
-    (tmp_path / "blades.csv").write_text("\n".join(["blade,mode,frequency_hz", *rows[:-1]]))
-    with pytest.raises(InputError, match="has no frequency of blade 11, mode 1"):
-        study_of(tmp_path, text).model()
+
+
+SIX = """
+schema_version = 2
+[part.wheel]
+shape = "lumped"
+sectors = 6
+names = ["disk", "tip"]
+masses_kg = [1.0, 0.3]
+springs_n_per_m = [["disk", "ground", 2e5], ["disk", "next.disk", 4e5], ["disk", "tip", 1e5]]
+[contact.c]
+between = ["wheel.tip", "next.wheel.tip"]
+law = "elastic_coulomb"
+tangential_stiffness_n_per_m = 5e4
+axial_stiffness_n_per_m = 5e4
+normal_stiffness_n_per_m = 1e5
+friction_coefficient = 0.4
+preload_n = 2.0
+[modes]
+number = 1
+[output]
+points = { tip = "wheel.tip" }
+"""
+OF = '[mistuning.b]\nof = "wheel.tip"\n'
+LIST = OF + "deviations = [0.01, -0.01]\n"
+FILE = OF + 'file = "one.csv"\n'
+AT = '[mistuning.c]\ncontact = "c"\n'
+STIFF = AT + 'quantity = "stiffness"\n'
+RANDOM = 'distribution = "normal"\n'
+SPREAD, SPREAD_M = "standard_deviation = 0.1\n", "standard_deviation_m = 1e-6\n"
+REPAIRED = SIX[SIX.index("[part") : SIX.index("[contact")].replace("wheel", "repaired")
+OWN = '[mistuning.o]\npart = "wheel"\nsector = 2\nby = "repaired"\n'
+ONE = "blade,mode,frequency_hz\n" + "".join(f"{n},1,{90 + n}\n" for n in range(6))
+FILES = {
+    "one.csv": ONE,
+    "two.csv": ONE + "".join(f"{n},2,{190 + n}\n" for n in range(6)),
+    "far.csv": ONE + "0,1000000000000,90",
+    "five.csv": ONE.replace("5,1,95", ""),
+}
+TWO = FILE.replace("one", "two")
+
+
+@pytest.mark.parametrize("more", [FILE, FILE + 'relative_to = "model"\n', REPAIRED + OWN])
+def test_six_blades_that_differ_are_no_mistake(tmp_path: Path, more: str) -> None:
+    (tmp_path / "one.csv").write_text(ONE)
+    assert study_of(tmp_path, SIX + more).model().mistuning is not None
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "says"),
+    ("more", "says"),
     [
-        ('of = "blade"', 'of = "blad"', "mistuning.scatter.of: there is no part 'blad'"),
-        ('"stiffness"', '"preload"', "mistuning.scatter.quantity: is preload"),
-        ('of = "blade"', 'of = "blade"\ncontact = "ring"', "needs one of of, contact and part"),
-        (f"{list(DEVIATIONS)}", "[0.01, 0.02, 0.03, 0.04, 0.05]", "no multiple of that"),
-        ("sectors = 12\n", "", "the model is no sector of a wheel"),
-        (f"deviations = {list(DEVIATIONS)}", 'distribution = "normal"', "standard_deviation"),
-        (f"deviations = {list(DEVIATIONS)}", 'file = "none.csv"', "mistuning.scatter.file"),
+        (LIST.replace("wheel", "weel"), "mistuning.b.of: there is no part 'weel'"),
+        (LIST + 'quantity = "preload"', "mistuning.b.quantity: is preload"),
+        (LIST + 'contact = "c"', "needs one of of, contact and part"),
+        (LIST.replace("1]", "1, 0.0, 0.0]"), "b.deviations: has 4 values.* no multiple of that"),
+        (OF + RANDOM, "mistuning.b.standard_deviation: is missing"),
+        (FILE.replace("one", "none"), "mistuning.b.file: there is no file"),
+        # files of other blades
+        (TWO, "mistuning.b.file: has 2 modes, and the model's blade has 1"),
+        (TWO + 'relative_to = "model"', "mistuning.b.file: has 2 modes, .* blade has 1"),
+        (FILE.replace("one", "far"), "far.csv: line 8: mode: is above 200.* '1000000000000'"),
+        (FILE.replace("one", "five"), "five.csv: has no frequency of blade 5, mode 1"),
+        # a spread in the wrong unit
+        (STIFF + RANDOM + SPREAD + SPREAD_M, "c.standard_deviation_m: is 1e-06 beside .*stiffness"),
+        (STIFF + RANDOM + SPREAD_M, "c.standard_deviation_m: .* Give standard_deviation instead"),
+        (OF + RANDOM + SPREAD_M, "b.standard_deviation_m: is 1e-06 beside .*frequency"),
+        (AT + 'quantity = "gap"\n' + RANDOM + SPREAD, "c.standard_deviation: is 0.1 beside .*gap"),
+        # keys that nothing would come of
+        (LIST + "sector = 3", "mistuning.b.sector: is 3 without part"),
+        (LIST + 'by = "wheel"', "mistuning.b.by: is 'wheel' without part"),
+        (LIST + SPREAD, "mistuning.b.standard_deviation: is 0.1 without distribution"),
+        (LIST + "seed = 1", "mistuning.b.seed: is 1 without distribution"),
+        (LIST + 'relative_to = "model"', "mistuning.b.relative_to: is 'model' without file"),
+        (FILE + "seed = 3", "mistuning.b.seed: is 3 without distribution"),
+        (FILE + 'modes = "all"', "mistuning.b.modes: is 'all' beside file"),
+        (FILE + 'quantity = "frequency"', "mistuning.b.quantity: is 'frequency' beside file"),
+        (STIFF + "deviations = [0.1]\nmodes = 6", "mistuning.c.modes: is 6 without of"),
+        (STIFF + "deviations = [0.1]\nbeyond_radius_m = 3.0", "c.beyond_radius_m: .*without of"),
+        (REPAIRED + OWN + "seed = 3", "mistuning.o.seed: is 3 without distribution"),
+        # parts of their own
+        (OWN.replace("repaired", "wheel"), "mistuning.o.by: is 'wheel', the wheel's own part"),
+        (REPAIRED + OWN + OWN.replace(".o]", ".p]"), "mistuning.p.sector: is 2, .* mistuning.o"),
+        (
+            REPAIRED.replace("= 6", "= 7") + OWN,
+            "mistuning.o.by: is 'repaired' of 7 sectors.* has 6",
+        ),
+        (
+            REPAIRED.replace('"disk", "tip"]', '"tip", "disk"]', 1) + OWN,
+            "mistuning.o.by: is 'repaired' with the masses tip, disk, and 'wheel'",
+        ),
+        (REPAIRED + OWN + LIST.replace("wheel", "repaired"), "b.of: .*in a single sector alone"),
+        (
+            REPAIRED + OWN + '[load.l]\non = "repaired.tip"\nforce_n = 1.0\nengine_order = 2',
+            "load.l.on: .*in a single sector alone. Name it of 'wheel'",
+        ),
     ],
 )
-def test_what_is_no_mistuning_is_refused_by_its_key(tmp_path: Path, old, new, says) -> None:
+def test_what_is_no_mistuning_is_refused_by_its_key(tmp_path: Path, more: str, says: str) -> None:
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=says):
-        study_of(tmp_path, RING.replace(old, new))
+        study_of(tmp_path, SIX + more).model().assembled(0)
+
+
+def test_a_wheel_is_needed_for_mistuning(tmp_path: Path) -> None:
+    with pytest.raises(
+        InputError, match=r"mistuning.scatter: is given, and the model is no sector"
+    ):
+        study_of(tmp_path, RING.replace("sectors = 12\n", ""))
 
 
 def test_a_repeated_pattern_and_a_seed_are_in_the_model(tmp_path: Path) -> None:

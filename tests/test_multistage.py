@@ -193,6 +193,7 @@ def test_a_study_of_two_stages_has_their_modes_and_shares(tmp_path):
     wrong = {
         "[campbell]\nspeeds_rpm = [0.0, 100.0]\nengine_orders = [1]\n": "campbell: is no question for stages",
         "[rotation]\nspeed_rpm = 10.0\n": "rotation.speed_rpm: gives stages a prestress",
+        '[mistuning.b]\nof = "front"\ndeviations = [0.01]\n': "mistuning: is of one wheel",
     }
     for more, message in wrong.items():
         file.write_text(few + more)

@@ -16,6 +16,7 @@ from stickslip.errors import input_error
 from stickslip.model.dofs import numbered_dofs
 from stickslip.model.fe.factorisation import factorise
 from stickslip.model.modes import normal_modes
+from stickslip.model.part import Part
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.sectors import of_alike, strip
@@ -59,7 +60,6 @@ def deviations(model: Model) -> list[Deviation]:
     """
     here = model.mistuning
     assert here is not None
-    here.require(model.sectors)
     found = [_of_blades(model, name, one) for name, one in here.blades.items()]
     return [*found, *(_of_own(model, name, one) for name, one in here.own.items())]
 
@@ -167,7 +167,7 @@ def _of_blades(model: Model, name: str, one: BladeMistuning) -> Deviation:
     blade = blade_of(model, one.of, f"mistuning.{name}.of", one.beyond_radius)
     factors = one.factors
     if factors.ndim == 2 or one.modes is not None:
-        return _of_modes(blade, factors, one.modes)
+        return _of_modes(name, blade, factors, one.modes)
     b = blade.stiffness.shape[0]
     first = model.places.offset(one.of.partition(".")[0])
     rows = picked(first + np.arange(b), model.places.n) if blade.whole else blade.rows
@@ -189,9 +189,15 @@ def _of_blades(model: Model, name: str, one: BladeMistuning) -> Deviation:
     return Deviation(rows, change=of_blade, behind=behind)
 
 
-def _of_modes(blade: Blade, factors: FloatArray, number: int | None) -> Deviation:
+def _of_modes(name: str, blade: Blade, factors: FloatArray, number: int | None) -> Deviation:
     """Return the deviation that single modes of the blades carry: each has the share of the motion that is its own."""
     squares, shapes = blade_alone(blade, factors.shape[1] if number is None else number)
+    if factors.ndim == 2 and factors.shape[1] > squares.size:
+        raise input_error(
+            f"mistuning.{name}.deviations",
+            f"is of {factors.shape[1]} modes, and the model's blade has {squares.size}",
+            "Leave the others out.",
+        )
     each = np.broadcast_to(factors.reshape(len(factors), -1), (len(factors), squares.size))
     # with K φ = ω² M φ, φᵀ [K K_r] u = ω² times the mode's share of what u is beyond the static motion by the rest
     weights = (shapes / np.sqrt(squares)).T
@@ -203,7 +209,7 @@ def _of_own(model: Model, name: str, one: OwnSector) -> Deviation:
     """Return what another part in one sector changes, seen by the motions of the tuned wheel."""
     key = f"mistuning.{name}"
     old = model.places.part_of(one.part, f"{key}.part")
-    _refuse_unlike(key, old.structure, one.by.structure)
+    _refuse_unlike(key, old, one.by)
     spin, rest = model.spin(model.speed), model.steady[one.part]
     before, after = (damped(one.part, p, at_speed(one.part, p, spin, rest)) for p in (old, one.by))
     kinds = ("mass", "damping", "stiffness")
@@ -223,11 +229,18 @@ def _of_own(model: Model, name: str, one: OwnSector) -> Deviation:
     return Deviation(rows, change=of_own)
 
 
-def _refuse_unlike(key: str, old: Structure, new: Structure) -> None:
-    same = old.n == new.n and old.dofs.component == new.dofs.component
-    if not (same and np.array_equal(old.dofs.node, new.dofs.node)):
+def _refuse_unlike(key: str, old: Part, new: Part) -> None:
+    if new.sectors != old.sectors:
         raise input_error(
             f"{key}.by",
-            f"has {new.n} dofs, and the part in whose place it stands has {old.n}, or they are numbered otherwise",
+            f"is one of {new.sectors} sectors, and the part in whose place it stands one of {old.sectors}",
+            f"Give it sectors = {old.sectors}.",
+        )
+    before, after = old.structure, new.structure
+    same = before.n == after.n and before.dofs.component == after.dofs.component
+    if not (same and np.array_equal(before.dofs.node, after.dofs.node)):
+        raise input_error(
+            f"{key}.by",
+            f"has {after.n} dofs, and the part in whose place it stands has {before.n}, or they are numbered otherwise",
             "Take the same mesh, its nodes moved or of another material.",
         )

@@ -56,12 +56,6 @@ RELATIVE = {
 def assemble_mistuned(model: Model, harmonics: int, store: Store) -> Assembled:
     """Return a wheel with all its sectors as solvers see it; see `Model.assembled`."""
     assert model.mistuning is not None
-    if model.neighbours is None:
-        raise input_error(
-            "mistuning",
-            "is of a wheel, and no part is a sector of one",
-            "Give a part its number of sectors.",
-        )
     alike = replace(model, mistuning=None)
     tuned = assemble(alike, harmonics, store)
     what = asked(alike, harmonics)

@@ -187,7 +187,7 @@ class Mistuning:
         }
 
     def require(self, sectors: int) -> None:
-        """Refuse deviations of another number of blades than `sectors`, and sectors that are not there."""
+        """Refuse deviations of another number of blades than `sectors`, sectors that are not there, and two parts in one place."""
         values = {name: one.deviations for name, one in self.blades.items()}
         values |= {name: one.values for name, one in self.contacts.items()}
         for name, own in values.items():
@@ -203,4 +203,13 @@ class Mistuning:
                     f"mistuning.{name}.sector",
                     f"is {one.sector}, and the sectors are 0 to {sectors - 1}",
                     "Sector 0 is the one that the parts describe.",
+                )
+        taken: dict[tuple[str, int], str] = {}
+        for name, one in self.own.items():
+            first = taken.setdefault((one.part, one.sector), name)
+            if first != name:
+                raise input_error(
+                    f"mistuning.{name}.sector",
+                    f"is {one.sector}, where mistuning.{first} puts another part in the place of {one.part!r} already",
+                    "Leave one of them out, or name another sector.",
                 )

@@ -101,18 +101,20 @@ class Model:
     def __post_init__(self) -> None:
         if not self.parts:
             raise input_error("part", "there is none", "Give a model at least one part.")
-        if self.aerodynamics is not None and self.sectors == 1:
-            raise input_error(
-                "aero",
-                "is given, and the model is no sector of a wheel",
-                "Give a part its number of sectors, or leave the table out.",
-            )
-        if self.aerodynamics is not None and is_staged(self.joins):
-            raise input_error(
-                "aero", "is of one wheel, and a join couples several", "Leave one out."
-            )
-        if self.aerodynamics is not None:
-            self.aerodynamics.require(self.sectors)
+        for name, one in (("aero", self.aerodynamics), ("mistuning", self.mistuning)):
+            if one is None:
+                continue
+            if self.sectors == 1:
+                raise input_error(
+                    name,
+                    "is given, and the model is no sector of a wheel",
+                    "Give a part its number of sectors, or leave the table out.",
+                )
+            if is_staged(self.joins):
+                raise input_error(
+                    name, "is of one wheel, and a join couples several", "Leave one out."
+                )
+            one.require(self.sectors)
 
     def __repr__(self) -> str:
         """Return what it is in a line."""

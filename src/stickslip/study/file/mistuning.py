@@ -1,14 +1,36 @@
 """The tables [mistuning.NAME]: blades, contacts and sectors that differ."""
 
+from collections.abc import Iterator
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
 
-from stickslip.study.file.section import FilePath, Name, Positive, Section, custom_error
+from stickslip.study.file.section import (
+    FilePath,
+    Name,
+    Positive,
+    Section,
+    custom_error,
+    refuse_all,
+)
 
 MODES = 6  # blade-alone modes that carry a deviation where the study does not say
+MOST_MODES = 200  # of a blade that a study or a file may name
 Deviation = Annotated[float, Field(ge=-0.5, le=0.5)]
 KINDS = ("of", "contact", "part")
+WAYS = ("deviations", "gaps_m", "distribution", "file")
+# keys that mean something beside another one alone
+BESIDE = {
+    "beyond_radius_m": "of",
+    "modes": "of",
+    "sector": "part",
+    "by": "part",
+    "standard_deviation": "distribution",
+    "standard_deviation_m": "distribution",
+    "seed": "distribution",
+    "relative_to": "file",
+}
 
 
 class MistuningTable(Section):
@@ -54,7 +76,7 @@ class MistuningTable(Section):
         None, description="of random deviations: normal or uniform"
     )
     standard_deviation: Annotated[float, Field(gt=0, le=0.2)] | None = Field(
-        None, description="of random deviations, relative, above 0 to 0.2"
+        None, description="of random deviations but gaps, relative, above 0 to 0.2"
     )
     standard_deviation_m: Positive | None = Field(
         None, description="of random gaps in m, greater than zero"
@@ -72,10 +94,10 @@ class MistuningTable(Section):
         description="of a file: deviations are taken from the mean of each mode over the blades, or from the frequencies of the model's "
         "blade by itself",
     )
-    modes: Annotated[int, Field(ge=1, le=200)] | Literal["all"] = Field(
+    modes: Annotated[int, Field(ge=1, le=MOST_MODES)] | Literal["all"] = Field(
         MODES,
         description="of blades: number of blade-alone modes that carry the deviation, or all (whatever the blade does; long for wheels "
-        "of many blades)",
+        "of many blades); a file says it itself",
     )
 
     @model_validator(mode="after")
@@ -87,9 +109,13 @@ class MistuningTable(Section):
                 f"needs one of of, contact and part, got {found}",
                 'Say what differs: of = "blade.airfoil", contact = "shroud", or part = "blade".',
             )
-        if self.part is not None:
-            self._of_part()
-            return self
+        if self.part is None:
+            self._quantity()
+            self._pattern()
+        refuse_all([*self._missing_of_part(), *self._idle()])
+        return self
+
+    def _quantity(self) -> None:
         wanted = ("frequency", "stiffness") if self.of else None
         known = wanted or ("friction_coefficient", "slip_limit", "stiffness", "preload", "gap")
         if (self.quantity is None and not self.of) or (
@@ -100,34 +126,28 @@ class MistuningTable(Section):
                 f"Give one of {', '.join(known)}.",
                 "quantity",
             )
-        self._pattern()
-        return self
-
-    def _of_part(self) -> None:
-        for key in ("sector", "by"):
-            if getattr(self, key) is None:
-                raise custom_error(
-                    "is missing beside part", "Say which sector, and what stands there.", key
-                )
-        for key in ("quantity", "deviations", "gaps_m", "distribution", "file"):
-            if getattr(self, key) is not None:
-                raise custom_error("is given beside part", "A part of its own has no pattern.", key)
 
     def _pattern(self) -> None:
-        ways = ("deviations", "gaps_m", "distribution", "file")
-        given = [key for key in ways if getattr(self, key) is not None]
+        given = [key for key in WAYS if getattr(self, key) is not None]
         if len(given) != 1:
             raise custom_error(
-                f"needs one of {', '.join(ways)}, got {' and '.join(given) or 'neither'}",
+                f"needs one of {', '.join(WAYS)}, got {' and '.join(given) or 'neither'}",
                 'For example distribution = "normal" with standard_deviation = 0.01.',
             )
         gap = self.quantity == "gap"
-        spread = "standard_deviation_m" if gap else "standard_deviation"
         if (given[0] == "deviations" and gap) or (given[0] == "gaps_m" and not gap):
             raise custom_error(
                 f"does not go with quantity = {self.quantity!r}",
                 "Gaps are gaps_m, everything else deviations.",
                 given[0],
+            )
+        spread, other = "standard_deviation", "standard_deviation_m"
+        spread, other = (other, spread) if gap else (spread, other)
+        if self.distribution is not None and getattr(self, other) is not None:
+            raise custom_error(
+                f"is {getattr(self, other):g} beside quantity = {self.quantity or 'frequency'!r}",
+                f"Give {spread} instead: gaps scatter by standard_deviation_m, everything else by standard_deviation.",
+                other,
             )
         if self.distribution is not None and getattr(self, spread) is None:
             raise custom_error(
@@ -135,3 +155,32 @@ class MistuningTable(Section):
             )
         if self.file is not None and (self.of is None or self.quantity == "stiffness"):
             raise custom_error("is of blades' frequencies", "Give a list of deviations.", "file")
+
+    def _missing_of_part(self) -> Iterator[PydanticCustomError]:
+        if self.part is None:
+            return
+        for key in ("sector", "by"):
+            if getattr(self, key) is None:
+                yield custom_error(
+                    "is missing beside part", "Say which sector, and what stands there.", key
+                )
+        for key in ("quantity", *WAYS):
+            if getattr(self, key) is not None:
+                yield custom_error("is given beside part", "A part of its own has no pattern.", key)
+
+    def _idle(self) -> Iterator[PydanticCustomError]:
+        """Yield the complaints about keys that nothing would come of."""
+        for key, needed in BESIDE.items():
+            if key in self.model_fields_set and getattr(self, needed) is None:
+                yield custom_error(
+                    f"is {getattr(self, key)!r} without {needed}, and means nothing there",
+                    f"Leave it out, or give {needed}.",
+                    key,
+                )
+        for key in ("quantity", "modes"):
+            if self.file is not None and key in self.model_fields_set:
+                yield custom_error(
+                    f"is {getattr(self, key)!r} beside file, which says it itself",
+                    "Leave it out: the file has frequencies, of the modes it names.",
+                    key,
+                )

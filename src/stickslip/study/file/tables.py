@@ -16,7 +16,7 @@ from stickslip.study.file.loads import Limits, LoadTable, Output, Retention, Rot
 from stickslip.study.file.material import DampingTable, MaterialTable, StudyReduction
 from stickslip.study.file.measured import Measured
 from stickslip.study.file.mistuning import MistuningTable
-from stickslip.study.file.parts import AnyPart
+from stickslip.study.file.parts import AnyPart, Copy
 from stickslip.study.file.section import Name, Section
 
 VERSION = 2
@@ -123,3 +123,9 @@ def asked_of(tables: Tables) -> tuple[str, ...]:
 def json_schema() -> str:
     """Return the JSON Schema of study files."""
     return json.dumps(study_tables().model_json_schema(), indent=2)
+
+
+def original(tables: Tables, name: str) -> Any:
+    """Return the table of a part; of a copy, the one of what is copied."""
+    table = tables.part[name]
+    return original(tables, table.of) if isinstance(table, Copy) else table

@@ -25,7 +25,7 @@ from stickslip.study.file.parts import (
     Sector,
 )
 from stickslip.study.file.section import Section
-from stickslip.study.file.tables import Tables
+from stickslip.study.file.tables import Tables, original
 from stickslip.study.models.aero import knows_speeds
 from stickslip.study.models.areas import without_areas
 from stickslip.study.models.cost import too_large
@@ -124,12 +124,6 @@ def _copied(tables: Tables, name: str, of: str) -> Iterator[InputError]:
         yield input_error(
             place, f"{' is a copy of '.join([*line, of])}", "Let one of them be no copy."
         )
-
-
-def original(tables: Tables, name: str) -> Any:
-    """Return the table of a part; of a copy, the one of what is copied."""
-    table = tables.part[name]
-    return original(tables, table.of) if isinstance(table, Copy) else table
 
 
 def _nodes_at(tables: Tables, place: str, table: Any) -> Iterator[InputError]:

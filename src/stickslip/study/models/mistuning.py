@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.assembly.contact import NEXT
 from stickslip.assembly.deviations import blade_alone_hz
 from stickslip.assembly.mistuning import (
     BladeMistuning,
@@ -19,8 +20,9 @@ from stickslip.assembly.model import Model
 from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.part import Part
 from stickslip.model.readers.measured_columns import read_columns
-from stickslip.study.file.mistuning import MistuningTable
-from stickslip.study.file.tables import Tables
+from stickslip.study.file.mistuning import MOST_MODES, MistuningTable
+from stickslip.study.file.parts import Lumped
+from stickslip.study.file.tables import Tables, original
 
 
 def spare_parts(tables: Tables) -> set[str]:
@@ -30,6 +32,7 @@ def spare_parts(tables: Tables) -> set[str]:
 
 def mistuning_refusals(tables: Tables, home: Path, sectors: int | None) -> Iterator[InputError]:
     """Yield what is wrong with [mistuning] before any mesh is made."""
+    yield from _spare_refusals(tables)
     for name, table in tables.mistuning.items():
         key = f"mistuning.{name}"
         if sectors == 1:
@@ -45,13 +48,7 @@ def mistuning_refusals(tables: Tables, home: Path, sectors: int | None) -> Itera
                 f"there is no contact {table.contact!r}",
                 did_you_mean(table.contact, known),
             )
-        for word in ("part", "by"):
-            named = getattr(table, word)
-            if named is not None and named not in tables.part:
-                known = list(tables.part)
-                yield input_error(
-                    f"{key}.{word}", f"there is no part {named!r}", did_you_mean(named, known)
-                )
+        yield from _own_refusals(tables, key, table)
         if table.of is not None and table.of.partition(".")[0] not in tables.part:
             head = table.of.partition(".")[0]
             known = list(tables.part)
@@ -68,6 +65,75 @@ def mistuning_refusals(tables: Tables, home: Path, sectors: int | None) -> Itera
                 f"{key}.{'gaps_m' if table.gaps_m else 'deviations'}",
                 f"has {len(given)} values, and {sectors} sectors are no multiple of that",
                 "Give each sector one, or a pattern that fits.",
+            )
+
+
+def _own_refusals(tables: Tables, key: str, table: MistuningTable) -> Iterator[InputError]:
+    """Yield what is wrong with the part of a single sector."""
+    unknown = False
+    for word in ("part", "by"):
+        named = getattr(table, word)
+        if named is not None and named not in tables.part:
+            unknown = True
+            yield input_error(
+                f"{key}.{word}",
+                f"there is no part {named!r}",
+                did_you_mean(named, list(tables.part)),
+            )
+    if table.part is None or table.by is None or unknown:
+        return
+    whole = {one.part for one in tables.mistuning.values() if one.part is not None}
+    if table.by in whole:
+        own = "the wheel's own part" if table.by == table.part else "a part of all sectors"
+        yield input_error(
+            f"{key}.by",
+            f"is {table.by!r}, {own}",
+            "Name another [part.NAME], which stands in this sector alone.",
+        )
+    old, new = original(tables, table.part), original(tables, table.by)
+    before, after = getattr(old, "sectors", None), getattr(new, "sectors", None)
+    if before is not None and after is not None and before != after:
+        yield input_error(
+            f"{key}.by",
+            f"is {table.by!r} of {after} sectors, and {table.part!r}, in whose place it stands, has {before}",
+            f"Give both sectors = {before}.",
+        )
+    if isinstance(old, Lumped) and isinstance(new, Lumped) and _elsewhere(old, new):
+        yield input_error(
+            f"{key}.by",
+            f"is {table.by!r} with the masses {', '.join(new.labels)}, and {table.part!r}, in whose place it stands, "
+            f"has {', '.join(old.labels)}",
+            "Give both the same masses in the same order.",
+        )
+
+
+def _elsewhere(old: Lumped, new: Lumped) -> bool:
+    """Whether a name that both have is that of another mass: masses are matched by their order."""
+    at = {name: i for i, name in enumerate(new.labels)}
+    return any(at.get(name, i) != i for i, name in enumerate(old.labels))
+
+
+def _spare_refusals(tables: Tables) -> Iterator[InputError]:
+    """Yield the complaints about surfaces of parts that stand in single sectors alone."""
+    spare = {one.by: one.part for one in tables.mistuning.values() if one.by and one.part}
+    named = [
+        *(
+            (f"{kind}.{n}.between", w)
+            for kind in ("contact", "join")
+            for n, t in getattr(tables, kind).items()
+            for w in t.between
+        ),
+        *((f"load.{n}.on", t.on) for n, t in tables.load.items()),
+        *((f"output.points.{n}", t.on) for n, t in tables.output.points.items()),
+        *((f"mistuning.{n}.of", t.of) for n, t in tables.mistuning.items() if t.of),
+    ]
+    for key, word in named:
+        part = word.removeprefix(NEXT).partition(".")[0]
+        if part in spare and part not in spare.values():
+            yield input_error(
+                key,
+                f"names {word!r}, and {part!r} stands in a single sector alone",
+                f"Name it of {spare[part]!r}, which is in all sectors.",
             )
 
 
@@ -136,15 +202,14 @@ def _blades(name: str, table: MistuningTable, home: Path, model: Model, of: str)
         except InputError as error:
             raise error.at(key) from None
     measured = read_blades(home / table.file, model.sectors)
-    reference = measured.mean(axis=0)
-    if table.relative_to == "model":
-        reference = blade_alone_hz(model, of, measured.shape[1], f"{key}.of", table.beyond_radius_m)
-        if reference.size < measured.shape[1]:
-            raise input_error(
-                f"{key}.file",
-                f"has {measured.shape[1]} modes, and the model's blade has {reference.size}",
-                "Leave the others out.",
-            )
+    alone = blade_alone_hz(model, of, measured.shape[1], f"{key}.of", table.beyond_radius_m)
+    if alone.size < measured.shape[1]:
+        raise input_error(
+            f"{key}.file",
+            f"has {measured.shape[1]} modes, and the model's blade has {alone.size}",
+            "Leave the others out.",
+        )
+    reference = alone if table.relative_to == "model" else measured.mean(axis=0)
     try:
         return BladeMistuning(
             of=of, deviations=measured / reference - 1.0, beyond_radius=table.beyond_radius_m
@@ -170,8 +235,7 @@ def read_blades(path: Path, sectors: int) -> FloatArray:
             "The columns are blade (from 0), mode (from 1) and frequency_hz.",
         )
     blade, mode, hertz = (columns.numbers(n) for n in ("blade", "mode", "frequency_hz"))
-    modes = int(mode.max())
-    found = np.full((sectors, max(modes, 1)), np.nan)
+    found = np.full((sectors, MOST_MODES), np.nan)
     for row, (b, m, f) in enumerate(zip(blade, mode, hertz, strict=True)):
         if b != int(b) or not 0 <= b < sectors:
             raise columns.wrong(
@@ -179,6 +243,10 @@ def read_blades(path: Path, sectors: int) -> FloatArray:
             )
         if m != int(m) or m < 1:
             raise columns.wrong(row, "mode", "is no number of a mode", "The lowest mode is 1.")
+        if m > MOST_MODES:
+            raise columns.wrong(
+                row, "mode", f"is above {MOST_MODES}, the most that are read", "Mend the line."
+            )
         if f <= 0:
             raise columns.wrong(row, "frequency_hz", "is no frequency", "Mend the line.")
         if np.isfinite(found[int(b), int(m) - 1]):
@@ -186,6 +254,7 @@ def read_blades(path: Path, sectors: int) -> FloatArray:
                 row, "mode", f"stands there twice for blade {int(b)}", "Leave one out."
             )
         found[int(b), int(m) - 1] = f
+    found = found[:, : int(mode.max())]
     lost = np.argwhere(np.isnan(found))
     if lost.size:
         raise input_error(
