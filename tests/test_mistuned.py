@@ -25,7 +25,7 @@ from test_assembly_wheel import (
 import stickslip as ss
 from stickslip.assembly import BladeMistuning, ContactMistuning, Mistuning, OwnSector, pattern
 from stickslip.assembly.contact import Contact
-from stickslip.assembly.deviations import blade_alone_hz
+from stickslip.assembly.deviations import Blade, blade_alone, blade_alone_hz
 from stickslip.assembly.mistuned import changed
 from stickslip.assembly.shares import at_rest
 from stickslip.assembly.wheel_modes import wheel_modes
@@ -213,6 +213,15 @@ def test_a_blade_with_the_cyclic_face_counts_what_both_sectors_do_to_it(modes):
     squares = scipy.linalg.eigh(stiffness[np.ix_(b, b)], mass[np.ix_(b, b)], eigvals_only=True)
     alone = blade_alone_hz(model, "blade.inner", 5, "mistuning.b.of")
     np.testing.assert_allclose(2 * np.pi * alone, np.sqrt(squares[:5]), rtol=1e-9)
+
+
+def test_modes_of_a_blade_that_nothing_holds_are_those_that_deform_it():
+    """A free chain of three masses: the squares are 0, k/m and 3 k/m."""
+    stiffness = scipy.sparse.csr_array([[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    one = scipy.sparse.eye_array(3, format="csr")
+    free = Blade(stiffness, one, stiffness, whole=True)
+    for number, squares in ((1, [1.0]), (2, [1.0, 3.0]), (6, [1.0, 3.0])):
+        np.testing.assert_allclose(blade_alone(free, number)[0], squares, rtol=1e-12)
 
 
 RING = """

@@ -148,11 +148,19 @@ def _of_one_blade(sector: CyclicSector, own: IntArray, of: str, place: str) -> I
 def blade_alone(blade: Blade, number: int) -> tuple[FloatArray, FloatArray]:
     """Return squares (r,) of the circular frequencies and shapes (b, r) of the lowest modes of a blade by itself, rigid ones left out."""
     b = blade.stiffness.shape[0]
-    number = min(number, int(np.count_nonzero(blade.mass.diagonal())))
-    zero = scipy.sparse.csr_array((b, b))
-    found = normal_modes(Structure(blade.mass, zero, blade.stiffness, numbered_dofs(b)), number)
-    strained = found.squares > 0.0
-    return found.squares[strained], np.real(found.shapes[:, strained])
+    every = int(np.count_nonzero(blade.mass.diagonal()))
+    structure = Structure(
+        blade.mass, scipy.sparse.csr_array((b, b)), blade.stiffness, numbered_dofs(b)
+    )
+    squares: FloatArray = np.zeros(0)
+    shapes: FloatArray = np.zeros((b, 0))
+    asked = 0
+    while squares.size < number and asked < every:
+        asked = min(asked + number - squares.size, every)  # rigid ones come first
+        found = normal_modes(structure, asked)
+        strained = found.squares > 0.0
+        squares, shapes = found.squares[strained], np.real(found.shapes[:, strained])
+    return squares, shapes
 
 
 def blade_alone_hz(
@@ -192,6 +200,12 @@ def _of_blades(model: Model, name: str, one: BladeMistuning) -> Deviation:
 def _of_modes(name: str, blade: Blade, factors: FloatArray, number: int | None) -> Deviation:
     """Return the deviation that single modes of the blades carry: each has the share of the motion that is its own."""
     squares, shapes = blade_alone(blade, factors.shape[1] if number is None else number)
+    if not squares.size:
+        raise input_error(
+            f"mistuning.{name}.of",
+            "has no mode by itself that deforms it, which a deviation could change",
+            "Name more of the blade.",
+        )
     if factors.ndim == 2 and factors.shape[1] > squares.size:
         raise input_error(
             f"mistuning.{name}.deviations",
