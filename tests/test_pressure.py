@@ -12,10 +12,12 @@ from small_v2 import SECTOR
 from test_assembly_wheel import ORDER, SECTORS, H, sector_model, shrouded_sector
 
 import stickslip as ss
-from stickslip.assembly.places import Spot
-from stickslip.assembly.pressure import PressureField
+from stickslip.assembly.places import Places
+from stickslip.assembly.pressure import PressureField, put_on
 from stickslip.contact.surface import nodal_surface
+from stickslip.model.fe.solid import Material
 from stickslip.reduction.waves import wave
+from stickslip.study.analyses.forced.pressures import pressure_lines
 from stickslip.study.models.pressure import read_pressure
 
 WIDE, HIGH = 0.05, 0.03
@@ -32,12 +34,7 @@ def plate(cells=(4, 3), triangles=False):
     quads = np.column_stack([c.ravel() for c in corners])
     facets = np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]) if triangles else quads
     dofs = np.arange(3 * len(points)).reshape(-1, 3)
-    return Spot(
-        "plate",
-        "part",
-        nodal_surface(points, dofs, 3 * len(points), facets),
-        np.zeros(0, dtype=int),
-    )
+    return nodal_surface(points, dofs, 3 * len(points), facets)
 
 
 def points_on(n, away=0.0):
@@ -52,11 +49,11 @@ def points_on(n, away=0.0):
 @pytest.mark.parametrize("known_areas", [False, True])
 def test_uniform_pressure_on_a_plane_face(triangles: bool, known_areas: bool) -> None:
     points, area = points_on(7)
-    area = (
-        -area if known_areas else None
-    )  # the direction of an area does not count: the facet's does
+    area = -area if known_areas else None  # all normals may point into the body
     field = PressureField(points, np.full(len(points), 2000.0 + 500j), area)
-    put = field.on(plate(triangles=triangles), "load.gas.on")
+    put = put_on(field, plate(triangles=triangles), "plate")
+    assert put.inward == known_areas
+    assert not put.warnings
     force = -(2000 + 500j) * WIDE * HIGH
     moment = np.cross([WIDE / 2, HIGH / 2, 0.01], [0, 0, force])
     for sums in (put.before, put.after):
@@ -69,19 +66,19 @@ def test_harmonic_pattern_against_its_integral() -> None:
     """p = e^{iκx}: force and moment in closed form; a mesh of other points and none of its own areas."""
     kappa = 80.0
     points, area = points_on(40)
-    spot = plate((20, 6))
+    surface = plate((20, 6))
     pressure = np.exp(1j * kappa * points[:, 0])
     turn = np.exp(1j * kappa * WIDE)
     force = -HIGH * (turn - 1) / (1j * kappa)
     along = HIGH * (turn * (1 - 1j * kappa * WIDE) - 1) / kappa**2  # ∫ x p dA
     for known, accuracy in ((None, 1e-3), (area, 2e-4)):
-        put = PressureField(points, pressure, known).on(spot, "load.gas.on")
+        put = put_on(PressureField(points, pressure, known), surface, "plate")
         assert abs(put.after[0, 2] - force) < accuracy * WIDE * HIGH
         assert abs(put.after[1, 1] - along) < accuracy * WIDE**2 * HIGH
         # force and moment of the field are those of the nodes
         np.testing.assert_allclose(put.after, put.before, atol=1e-14)
         # the work on a bending shape, which no resultant tells
-        w = spot.surface.points[:, 0] ** 2
+        w = surface.points[:, 0] ** 2
         work = put.force.reshape(-1, 3)[:, 2] @ w
         x = (np.arange(4000) + 0.5) / 4000 * WIDE
         exact = -HIGH * WIDE * np.mean(np.exp(1j * kappa * x) * x**2)
@@ -90,16 +87,115 @@ def test_harmonic_pattern_against_its_integral() -> None:
 
 def test_a_field_that_stands_off_keeps_its_force_and_says_how_far_it_is() -> None:
     points, area = points_on(9, away=4e-4)
-    put = PressureField(points, points[:, 0] * 1e5, area).on(plate(), "load.gas.on")
+    put = put_on(PressureField(points, points[:, 0] * 1e5, area), plate(), "plate")
     assert put.offset == pytest.approx(4e-4)
     np.testing.assert_allclose(put.after[0], put.before[0], atol=1e-12)
     # normal forces: the offset along the normal moves no moment
     np.testing.assert_allclose(put.after[1], put.before[1], atol=1e-12)
     with pytest.raises(ss.InputError, match=r"away from 'plate'.*Check the unit"):
-        PressureField(1e3 * points, points[:, 0]).on(plate(), "load.gas.on")
-    bare = replace(plate(), surface=None)
+        put_on(PressureField(1e3 * points, points[:, 0]), plate(), "plate")
+    # interpolated along the surface: the distance does not thin the pressure
+    bare = put_on(PressureField(points, points[:, 0] * 1e5), plate(), "plate")
+    np.testing.assert_allclose(bare.after[0], put.after[0], atol=1e-12)
+    beam = Places({"beam": ss.model.structure_part(ss.model.chain(2, 1.0, 1.0))})
     with pytest.raises(ss.InputError, match="has no facets"):
-        PressureField(points, points[:, 0]).on(bare, "load.gas.on")
+        PressureField(points, points[:, 0]).on(beam, "beam.node0.x", "load.gas.on")
+
+
+THIN = 0.002
+
+
+def blade():
+    """A thin plate of one element through its thickness y, clamped at z = 0: all free nodes are its skin."""
+    axes = (np.linspace(0, 0.04, 5), [0.0, THIN], np.linspace(0, HIGH, 7))
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    n = np.arange(len(points)).reshape(5, 2, 7)
+    low, high = n[:, :, :-1], n[:, :, 1:]
+    square = [(slice(0, -1), 0), (slice(1, None), 0), (slice(1, None), 1), (slice(0, -1), 1)]
+    cells = np.column_stack([layer[x, y].ravel() for layer in (low, high) for x, y in square])
+    root = np.flatnonzero(points[:, 2] == 0)
+    sets = {"root": root, "skin": np.setdiff1d(np.arange(len(points)), root)}
+    sets["upper"] = sets["skin"][points[sets["skin"], 1] > 0]
+    mesh = ss.model.SolidMesh(points, cells, sets)
+    part = ss.model.solid_part(
+        mesh, Material(young_modulus=2.1e11, poisson_ratio=0.3, density=7850.0)
+    )
+    return Places({"w": part})
+
+
+def both_sides(n=9):
+    """A field on both faces: points, pressures, areas outward; and its force, by its own integral."""
+    x = (np.arange(n) + 0.5) / n
+    x, z = (c.ravel() for c in np.meshgrid(0.04 * x, HIGH * x, indexing="ij"))
+    points = np.vstack([np.column_stack([x, 0 * x + y, z]) for y in (THIN, 0.0)])
+    pressure = np.concatenate([1000 + 2e4 * x + 500j, 200j - 1000 - 1e4 * z])
+    area = np.tile([0.0, 0.04 * HIGH / n**2, 0.0], (2 * n * n, 1))
+    area[n * n :] *= -1
+    force = -(1400 + 500j + 1000 + 5e3 * HIGH - 200j) * 0.04 * HIGH
+    return points, pressure, area, force
+
+
+@pytest.mark.parametrize("normals", [1.0, -1.0, None])
+@pytest.mark.parametrize("shift", [0.0, 0.2])
+def test_both_sides_of_a_thin_blade_keep_their_own_pressure(
+    normals: float | None, shift: float
+) -> None:
+    """In place, and off by a fifth of the thickness: the force is that of the field, the clamped row of facets included."""
+    points, pressure, area, force = both_sides()
+    places, given = blade(), None if normals is None else normals * area
+    moved = points + np.array([0, shift * THIN, 0])
+    put = PressureField(moved, pressure, given).on(places, "w.skin", "x")
+    accuracy = 2e-3 if given is None else 1e-12
+    for sums in (put.before, put.after):
+        assert abs(sums[0, 1] - force) < accuracy * abs(force)
+    assert put.inward == (normals == -1.0)
+    assert not put.warnings
+    # what the linear shape functions of the first row of height h leave at z = 0; points with areas are 1.5 a row
+    h = HIGH / 6
+    clamped = -((1400 + 500j + 1000 - 200j) * h / 2 + 1e4 * h**2 / 6) * 0.04
+    assert abs(put.clamped[1] - clamped) < (0.01 if given is None else 0.15) * abs(clamped)
+    on_free = put.force.reshape(-1, 3).sum(axis=0)
+    np.testing.assert_allclose(on_free + put.clamped, put.after[0], atol=1e-12 * abs(force))
+
+
+def test_a_field_whose_side_is_in_doubt_is_warned_of_or_refused() -> None:
+    points, pressure, area, force = both_sides()
+    places = blade()
+
+    def put(points, area, name="w.skin"):
+        return PressureField(points, pressure, area, "gas.csv").on(places, name, "load.gas.on")
+
+    off = np.array([0, 0.6 * THIN, 0])
+    inside = points - off * np.sign(area[:, 1:2])  # each side beyond the middle
+    for moved in (points + off, inside):
+        found = put(moved, area)
+        np.testing.assert_allclose(found.after[0, 1], force, rtol=1e-12)
+        assert "1.2 mm off w.skin (median), too far to tell" in found.warnings[0]
+    assert "pressures of both its sides are mixed" in put(points + off, None).warnings[0]
+    few = area.copy()
+    few[:9] *= -1
+    with pytest.raises(ss.InputError, match=r"gas\.csv.* 9 of 162 points, 5\.56 %"):
+        put(points, few)
+    with pytest.raises(ss.InputError, match=r"81 of 162 points.*name a set that holds both sides"):
+        put(points, area, "w.upper")
+    with pytest.raises(ss.InputError, match=r"90° off in the median.*axes"):
+        put(points, area[:, [1, 2, 0]])
+
+
+def test_a_model_tells_of_clamped_nodes_normals_and_doubts() -> None:
+    points, pressure, area, _ = both_sides()
+
+    def model(points, area):
+        gas = ss.Load(on="w.skin", newton=1.0, field=PressureField(points, pressure, area))
+        return ss.Model(parts=blade().parts, loads={"gas": gas})
+
+    (line,) = pressure_lines(model(points, -area), {"gas": 0})
+    assert re.search(r"up to 0 mm off it, their normals point into the body; .* N act on clamped nodes", line)  # fmt: skip
+    assert not model(points, -area).warnings
+    off = np.array([0, 0.6 * THIN, 0])
+    assert any(
+        text.startswith("load.gas: the points") for text in model(points + off, area).warnings
+    )
 
 
 def flank_field(mesh):
@@ -124,7 +220,7 @@ def test_a_pressure_drives_a_wheel_as_its_nodal_forces_do() -> None:
     assert model.spread == ("gas", "more")
     found = model.assembled(H)
     whole = replace(model, mistuning=ss.assembly.Mistuning()).assembled(H)
-    put = gas.field.on(model.places.spot("blade.flank_low", "x"), "x")
+    put = gas.field.on(model.places, "blade.flank_low", "x")
     for h, share in ((1, np.exp(0.3j)), (2, 0.5)):
         side = found.system.structure
         k = h * ORDER % SECTORS
@@ -161,12 +257,12 @@ def write_fields(folder: Path, mesh_points, quads, pressure):
 
 
 def test_csv_and_vtk_hold_the_same_field(tmp_path: Path) -> None:
-    spot = plate((20, 8))
-    pressure = 1e3 * np.exp(60j * spot.surface.points[:, 0])
-    write_fields(tmp_path, spot.surface.points, spot.surface.facets, pressure)
+    surface = plate((20, 8))
+    pressure = 1e3 * np.exp(60j * surface.points[:, 0])
+    write_fields(tmp_path, surface.points, surface.facets, pressure)
     of_vtk = read_pressure(tmp_path / "field.vtu", "mm", static=False)
     of_csv = read_pressure(tmp_path / "field.csv", "m", static=False)
-    one, other = (f.on(spot, "x") for f in (of_vtk, of_csv))
+    one, other = (put_on(f, surface, "x") for f in (of_vtk, of_csv))
     np.testing.assert_allclose(of_vtk.area.sum(axis=0), [0, 0, WIDE * HIGH], atol=1e-15)
     # planes through eight points smooth a wave of 42 points a period by 1.6e-3
     np.testing.assert_allclose(one.after, other.after, atol=2e-3 * np.abs(one.after).max())
@@ -248,5 +344,5 @@ def test_a_study_tells_force_and_modal_forces_of_its_pressure(
     modes = ss.model.normal_modes(moving, 1)
     shape = np.asarray(moving.expand(modes.shapes))[:, 0]
     assert float(told[2]) == pytest.approx(modes.frequencies_hz[0], rel=1e-5)
-    force = model.loads["gas"].field.on(model.places.spot("blade.tip", "x"), "x").force
+    force = model.loads["gas"].field.on(model.places, "blade.tip", "x").force
     assert float(told[3]) == pytest.approx(abs(shape.conj() @ force), rel=1e-3)

@@ -8,17 +8,16 @@ import numpy as np
 import scipy.sparse
 from scipy.spatial import cKDTree
 
-from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.arrays import FloatArray, Matrix
+from stickslip.assembly.clamped_rim import clamped_rim
 from stickslip.assembly.contact import NEXT, Contact, Join
 from stickslip.assembly.places import Places, Spot
-from stickslip.contact.facets import centres, normals
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.contact.pairing import Pairing
 from stickslip.contact.projection import facet_balls
-from stickslip.contact.surface import SMOOTH, Surface
+from stickslip.contact.surface import Surface
 from stickslip.errors import InputError, input_error
-from stickslip.model.mesh.mesh_facets import facets_of
 
 Found = TypeVar("Found")
 
@@ -27,7 +26,6 @@ STEEPEST = 45.0  # degrees from opposite at which surfaces cannot be meant to to
 OFF = 1e-3  # of a facet's radius: what surfaces that touch may be off everywhere, by rounding in their files
 DEEP = 0.05  # of a facet's radius: what facets of curved surfaces overlap by is less
 FLAT = 1e-9  # part of a motion along a normal that is rounding
-NONE: IntArray = np.zeros(0, dtype=np.int64)
 MEET_FACETS = 'Give pairing = "node_to_segment": each point of a rigid body meets a facet'
 NAMED = 5  # points that a message names
 Normals = tuple[FloatArray, FloatArray]  # points (n, 3) and their unit normals
@@ -181,38 +179,16 @@ def flat_warning(key: str, operator: Matrix, law: ContactLaw) -> tuple[str, ...]
 
 def rim_warning(places: Places, key: str, spot: Spot) -> tuple[str, ...]:
     """Warn of facets at the rim of a surface that its clamped nodes, which readers take out of sets, leave out."""
-    mesh, word = places.parts[spot.part].mesh, spot.name.partition(".")[2]
-    if mesh is None or spot.surface is None or "root" not in mesh.node_sets:
-        return ()
-    own, root = (mesh.node_sets.get(name, NONE) for name in (word, "root"))
-    if not len(spot.surface.facets) or np.isin(own, root).any():
-        return ()
-    both = facets_of(mesh, np.concatenate([own, root]))
-    mine = np.isin(both, own)
-    rim = both[mine.any(axis=1) & ~mine.all(axis=1)]
-    if not len(rim):
-        return ()
-    inside = facets_of(mesh, own)
-    kept, lost = (_middles(mesh.points, facets) for facets in (inside, rim))
-    near = cKDTree(kept[0]).query(lost[0])[1]
-    flush = np.einsum("pc,pc->p", lost[1], kept[1][near]) > SMOOTH
-    left = np.setdiff1d(rim[flush], own)
-    if not left.size:
+    mesh, (rim, left) = places.parts[spot.part].mesh, clamped_rim(places, spot)
+    if mesh is None or spot.surface is None or not left.size:
         return ()
     listed = ", ".join(str(n) for n in mesh.numbers[left[:NAMED]])
     more = f" and {left.size - NAMED} more" if left.size > NAMED else ""
     text = (
-        f"{key}: {spot.name} borders on clamped nodes, {listed}{more}; the facets between them and it, {np.count_nonzero(flush)} "
-        f"beside {len(inside)}, take no part in the contact."
+        f"{key}: {spot.name} borders on clamped nodes, {listed}{more}; the facets between them and it, {len(rim)} "
+        f"beside {len(spot.surface.facets)}, take no part in the contact."
     )
     return (text,)
-
-
-def _middles(points: FloatArray, facets: IntArray) -> Normals:
-    """Return the middles of facets and their unit normals."""
-    normal = normals(points, facets, centres(facets))
-    middle = points[facets].mean(axis=1)
-    return middle, normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
 def twice_warning(found: Mapping[str, tuple[Matrix, bool]]) -> tuple[str, ...]:

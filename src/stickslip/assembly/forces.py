@@ -27,7 +27,7 @@ def amplitude(places: Places, name: str, load: Load) -> float:
     if load.field is None:
         return abs(load.newton)
     key = f"load.{name}.on"
-    return abs(load.newton) * load.field.on(places.spot(load.on, key), key).newton
+    return abs(load.newton) * load.field.on(places, load.on, key).newton
 
 
 def force_at(places: Places, key: str, load: Load) -> Matrix:
@@ -38,11 +38,11 @@ def force_at(places: Places, key: str, load: Load) -> Matrix:
     InputError
         If the place is not there or cannot move, or the direction is missing.
     """
-    spot = places.spot(load.on, f"{key}.on")
     amplitude = load.newton * (cmath.exp(1j * load.phase) if load.phase else 1.0)
     if load.field is not None:
-        spread = load.field.on(spot, f"{key}.on").force
+        spread = load.field.on(places, load.on, f"{key}.on").force
         return amplitude * (spread if load.harmonic else spread.real)
+    spot = places.spot(load.on, f"{key}.on")
     force = np.zeros(places.n, dtype=type(amplitude))
     if spot.surface is None:
         _refuse_direction(places, key, load, spot)
@@ -253,6 +253,16 @@ def far_outputs(places: Places, outputs: tuple[Output, ...]) -> list[str]:
                 f"{points[np.argmin(away)].tolist()} m. Is the place in metres?"
             )
     return found
+
+
+def doubtful_fields(places: Places, loads: Mapping[str, Load]) -> list[str]:
+    """Return the warnings about pressure fields."""
+    return [
+        f"load.{name}: {text}"
+        for name, load in loads.items()
+        if load.field is not None
+        for text in load.field.on(places, load.on, f"load.{name}.on").warnings
+    ]
 
 
 def _nearest(places: Places, output: Output, key: str) -> IntArray:

@@ -13,7 +13,7 @@ from stickslip.assembly.assembled import Assembled, Skin
 from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.coordinates import Coordinates, coordinates
 from stickslip.assembly.facing import refuse_joined
-from stickslip.assembly.forces import beyond_sectors, engine_order, far_outputs
+from stickslip.assembly.forces import beyond_sectors, doubtful_fields, engine_order, far_outputs
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.loose import without_bodies
 from stickslip.assembly.mistuning import Mistuning
@@ -226,11 +226,14 @@ class Model:
         of_parts = [text for part in self.parts.values() for text in part.warnings]
         of_wheel = () if self.neighbours is None else self.neighbours.warnings
         of_units = unlike_units(self.parts)
-        of_outputs = far_outputs(self.places, self.outputs)
+        of_places = [
+            *far_outputs(self.places, self.outputs),
+            *doubtful_fields(self.places, self.loads),
+        ]
         orders = beyond_sectors(self.loads, self.sectors)
         return tuple(
             dict.fromkeys(
-                [*of_parts, *of_units, *of_outputs, *of_wheel, *orders, *self.pairs.warnings]
+                [*of_parts, *of_units, *of_places, *of_wheel, *orders, *self.pairs.warnings]
             )
         )
 

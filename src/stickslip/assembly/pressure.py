@@ -4,22 +4,24 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import scipy.spatial
+import scipy.sparse
+from scipy.spatial import cKDTree
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
-from stickslip.assembly.places import Spot
+from stickslip.assembly.clamped_rim import with_rim
+from stickslip.assembly.facing_field import Feet, between_sides, nearest, on_sides, unit_normals
+from stickslip.assembly.places import Places, Spot
 from stickslip.contact.facets import (
     corner_counts,
     interpolation,
     normals,
     positions,
 )
-from stickslip.contact.projection import closest
 from stickslip.contact.surface import Surface
 from stickslip.errors import input_error
 
-NEAR = 8  # facets, by their middles, among which the nearest one is looked for
 FAR = 0.1  # of the surface's size: no flow solver's mesh stands so far off
+BETWEEN = 0.1  # share of the points of a field that may stand nearer to the middle of a thin body than to its surface
 AROUND = 8  # points of a field from which the pressure between them follows
 PLANE = 1e-6  # singular values below this share of the largest: the points lie on a line
 
@@ -35,8 +37,8 @@ class PressureField:
     pressure
         (n,) in Pa: positive presses on the surface.
     area
-        (n, 3) vector of the area in m² that belongs to each point, normal to the surface, either way; None: the pressure is interpolated
-        and integrated on the facets of the structure.
+        (n, 3) vector of the area in m² that belongs to each point, normal to the surface; all point out of the body, or all into it.
+        None: the pressure is interpolated and integrated on the facets of the structure.
     source
         Where it comes from, for messages.
 
@@ -64,17 +66,20 @@ class PressureField:
                 self.source, f"has {shapes[0]} points for {shapes[1]} pressures", "Give (n, 3) and (n,), n from 3 on."
             )  # fmt: skip
 
-    def on(self, spot: Spot, place: str) -> "Projected":
-        """Return the field as forces on the nodes of a surface; `place` is the key that names the surface.
+    def on(self, places: Places, name: str, place: str) -> "Projected":
+        """Return the field as forces on the nodes of a surface and of its clamped rim; `place` is the key that names the surface.
 
         Raises
         ------
         InputError
-            If the surface has no facets, or the field lies elsewhere.
+            If the surface has no facets, the field lies elsewhere, or its normals point partly out of the body and partly into it.
         """
-        key = (spot.name, spot.part)
+        spot = places.spot(name, place)
+        surface = _with_facets(spot, place)
+        moves = scipy.sparse.csr_array(surface.displacement)
+        key = (name, places.n, surface.points.tobytes(), moves.indptr.tobytes(), moves.indices.tobytes())  # fmt: skip
         if key not in self.memo:
-            self.memo[key] = _projected(self, spot, place)
+            self.memo[key] = put_on(self, with_rim(places, spot), name)
         found: Projected = self.memo[key]
         return found
 
@@ -89,14 +94,23 @@ class Projected:
         (N,) on the dofs of all parts, N; what acts on clamped nodes is in none of them.
     before, after
         (2, 3) force in N and moment about the origin in N m: of the field, and of the forces on all nodes of the surface.
+    clamped
+        (3,) force in N on clamped nodes.
     offset
         Largest distance of a point of the field from the surface, m.
+    inward
+        Whether its normals point into the body.
+    warnings
+        What the user should know.
     """
 
     force: ComplexArray
     before: ComplexArray
     after: ComplexArray
+    clamped: ComplexArray
     offset: float
+    inward: bool = False
+    warnings: tuple[str, ...] = ()
 
     @property
     def newton(self) -> float:
@@ -104,38 +118,63 @@ class Projected:
         return float(np.linalg.norm(self.after[0]))
 
 
-def _projected(given: PressureField, spot: Spot, place: str) -> Projected:
-    surface = spot.surface
-    if surface is None or not len(surface.facets):
+def _with_facets(spot: Spot, place: str) -> Surface:
+    if spot.surface is None or not len(spot.surface.facets):
         raise input_error(
             place,
             f"{spot.name!r} has no facets, on which a pressure could act",
             "Name a node set that holds whole faces of elements.",
         )
+    return spot.surface
+
+
+def put_on(given: PressureField, surface: Surface, name: str) -> Projected:
+    """Return a field as forces on the nodes of a surface; `name` is that of the surface, for messages.
+
+    Raises
+    ------
+    InputError
+        As `PressureField.on`.
+    """
     size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
-    facet, reference, offset = _nearest(surface, given.points)
+    feet = nearest(surface, given.points)
+    warnings: tuple[str, ...] = ()
+    offset = feet.offset
     farthest = int(offset.argmax())
     if offset[farthest] > FAR * size:
         raise input_error(
             given.source,
-            f"has a point {given.points[farthest].tolist()} m that is {offset[farthest]:.3g} m away from {spot.name!r}, "
+            f"has a point {given.points[farthest].tolist()} m that is {offset[farthest]:.3g} m away from {name!r}, "
             f"which is {size:.3g} m large",
             "Check the unit and the axes of its points: they are those of the sector.",
         )
     if given.area is None:
-        facet, reference, at, forces = _integrated(given, surface)
+        facet, reference, at, forces = _integrated(given, surface, feet)
+        if between_sides(surface, feet, given.points, FAR * size) > BETWEEN:
+            text = (
+                f"the points of {given.source} stand {1e3 * float(np.median(offset)):.3g} mm off {name} (median), where it is so "
+                "thin that the pressures of both its sides are mixed. Put the points in place, or give area_m2 and the normals."
+            )
+            warnings = (text,)
     else:
-        at = given.points
-        outward = normals(surface.points, surface.facets[facet], reference)
-        sign = np.sign(np.einsum("nc,nc->n", outward, given.area))
-        forces = -(given.pressure * sign)[:, None] * given.area
+        feet, warnings = on_sides(surface, given.points, given.area, FAR * size, given.source, name)
+        facet, reference, at, offset = feet.facet, feet.reference, given.points, feet.offset
+        forces = -feet.sense * given.pressure[:, None] * given.area
     nodes = surface.facets[facet]
     weights = interpolation(nodes, reference)
     on_nodes = np.zeros((len(surface.points), 3), dtype=complex)
     np.add.at(on_nodes, np.maximum(nodes, 0), weights[:, :, None] * forces[:, None])
-    force = surface.displacement.T @ on_nodes.ravel()
-    before, after = _sums(at, forces), _sums(surface.points, on_nodes)
-    return Projected(force, before, after, float(offset.max()))
+    moves = scipy.sparse.csr_array(surface.displacement)
+    still = (np.diff(moves.indptr) == 0).reshape(-1, 3)
+    return Projected(
+        moves.T @ on_nodes.ravel(),
+        _sums(at, forces),
+        _sums(surface.points, on_nodes),
+        np.where(still, on_nodes, 0).sum(axis=0),
+        float(offset.max()),
+        feet.sense < 0,
+        warnings,
+    )
 
 
 def _sums(points: FloatArray, forces: ComplexArray) -> ComplexArray:
@@ -143,30 +182,8 @@ def _sums(points: FloatArray, forces: ComplexArray) -> ComplexArray:
     return np.array([forces.sum(axis=0), np.cross(points, forces).sum(axis=0)])
 
 
-def _nearest(surface: Surface, points: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the facet (n,) nearest to each point, the place (n, 2) on it and the distance (n,)."""
-    facets = surface.facets
-    middle = np.array([surface.points[row[row >= 0]].mean(axis=0) for row in facets])
-    count = min(NEAR, len(facets))
-    _, near = scipy.spatial.cKDTree(middle).query(points, k=count)
-    near = np.asarray(near).reshape(len(points), count)
-    best = np.full(len(points), np.inf)
-    facet = np.zeros(len(points), dtype=np.int64)
-    reference = np.zeros((len(points), 2))
-    for candidate in near.T:
-        own, _ = closest(surface.points, facets[candidate], points)
-        away = np.linalg.norm(positions(surface.points, facets[candidate], own) - points, axis=1)
-        better = away < best
-        best[better], facet[better], reference[better] = (
-            away[better],
-            candidate[better],
-            own[better],
-        )
-    return facet, reference, best
-
-
 def _integrated(
-    given: PressureField, surface: Surface
+    given: PressureField, surface: Surface, feet: Feet
 ) -> tuple[IntArray, FloatArray, FloatArray, ComplexArray]:
     """Return quadrature points on the facets, their places and the forces of the interpolated pressure there."""
     x, w = np.polynomial.legendre.leggauss(4)
@@ -184,17 +201,28 @@ def _integrated(
     f, r, s = np.concatenate(facet), np.concatenate(reference), np.concatenate(share)
     area = normals(surface.points, surface.facets[f], r) * s[:, None]
     place = positions(surface.points, surface.facets[f], r)
-    pressure = _interpolated(given, place)
+    theirs = unit_normals(surface, feet.facet, feet.reference)
+    pressure = _interpolated(given, theirs, place, unit_normals(surface, f, r))
     return f, r, place, -pressure[:, None] * area
 
 
-def _interpolated(given: PressureField, places: FloatArray) -> ComplexArray:
-    """Return the pressure at places: by a plane through the nearest points, the nearer the heavier; between all of them."""
+def _interpolated(
+    given: PressureField, theirs: FloatArray, places: FloatArray, outward: FloatArray
+) -> ComplexArray:
+    """Return the pressure at places: by a plane through the nearest points, the nearer the heavier; between all of them.
+
+    Points count as nearer where the normals of their facets, `theirs`, are alike to those of the places, `outward`: a thin body has
+    another pressure on its other side. The plane lies along the surface, so that points may stand off it.
+    """
     count = min(AROUND, len(given.points))
-    away, near = scipy.spatial.cKDTree(given.points).query(places, k=count)
+    apart = cKDTree(given.points).query(given.points, k=count)[0][:, -1]
+    far = float(np.median(apart))
+    tree = cKDTree(np.hstack([given.points, far * theirs]))
+    away, near = tree.query(np.hstack([places, far * outward]), k=count)
     reach = away[:, -1:] * 1.001 + np.finfo(float).tiny
     weight = (1 - (away / reach) ** 2) ** 2
     shift = (given.points[near] - places[:, None]) / reach[:, :, None]
+    shift -= np.einsum("pkc,pc->pk", shift, outward)[:, :, None] * outward[:, None]
     rows = np.concatenate([np.ones((*shift.shape[:2], 1)), shift], axis=2)
     inverse = np.linalg.pinv(weight[:, :, None] * rows, rcond=PLANE)
     values = given.pressure[near]

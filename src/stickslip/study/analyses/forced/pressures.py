@@ -13,6 +13,7 @@ from stickslip.model.modes import normal_modes
 from stickslip.reduction.waves import excited_wave
 from stickslip.study.analyses.waves.numbers import label
 
+ROUNDING = 1e-12  # m
 MODES = 3  # whose modal force is told where a study does not say
 
 
@@ -27,9 +28,13 @@ def pressure_lines(model: Model, modes: Mapping[str, int]) -> tuple[str, ...]:
 
 def _about(model: Model, name: str, load: Load, count: int) -> list[str]:
     assert load.field is not None
-    put = load.field.on(model.places.spot(load.on, f"load.{name}.on"), f"load.{name}.on")
+    put = load.field.on(model.places, load.on, f"load.{name}.on")
     (force, moment), (own_force, own_moment) = put.before, put.after
-    offset = "" if load.field.area is None else f"; points up to {1e3 * put.offset:.3g} mm off it"
+    offset = f"; points up to {1e3 * put.offset if put.offset > ROUNDING else 0.0:.3g} mm off it"
+    if put.inward:
+        offset += ", their normals point into the body"
+    if np.any(put.clamped):
+        offset += f"; {_vector(put.clamped)} N act on clamped nodes"
     sums = (
         f"load.{name}: pressure on {load.on}: force {_vector(force)} N, on its nodes {_vector(own_force)} N; moment about the origin "
         f"{_vector(moment)} N m, on its nodes {_vector(own_moment)} N m{offset}"
