@@ -214,12 +214,33 @@ periods = 60
 """
 
 
-def test_shrouds_between_neighbours_bound_a_wave(tmp_path: Path) -> None:
-    """Contacts know a blade as a sector's own and as its neighbour's: the copy has no mass and is no motion of its own."""
+def flow(folder: Path) -> dict[int, complex]:
+    """Write coefficients by neighbour that feed wave 4 of the wheel."""
     fluid = {-1: 250 - 500j, 0: -150 + 100j, 1: -250 + 500j}
     rows = [f"{j},tip,tip,{c.real},{c.imag}" for j, c in fluid.items()]
     head = "neighbour,force_point,motion_point,real_n_per_m,imag_n_per_m"
-    (tmp_path / "c.csv").write_text("\n".join([head, *rows]), encoding="utf-8")
+    (folder / "c.csv").write_text("\n".join([head, *rows]), encoding="utf-8")
+    return fluid
+
+
+def test_blades_that_hardly_differ_come_to_the_cycle_of_the_tuned_wheel(tmp_path: Path) -> None:
+    """Undamped modes of such a wheel stand still and are fed from one side as much as they lose on the other."""
+    flow(tmp_path)
+    text = SHROUDS.replace("in_time = true\nperiods = 60\n", "")
+    blades = (
+        "[mistuning.blades]\nof = 'wheel.blade'\ndeviations = [1e-6, -2e-6, 0.5e-6, 1e-6, -1e-6]\n"
+    )
+    tuned, mistuned = (
+        one_case(answered(written, tmp_path).tree["limit_cycle"].to_dataset(), 0)
+        for written in (text, text + blades)
+    )
+    for name, off in (("mode_damping_ratio", 1e-4), ("cycle_amplitude", 1e-4), ("cycle_frequency_hz", 2e-6)):  # fmt: skip
+        np.testing.assert_allclose(mistuned[name].values, tuned[name].values, rtol=off)
+
+
+def test_shrouds_between_neighbours_bound_a_wave(tmp_path: Path) -> None:
+    """Contacts know a blade as a sector's own and as its neighbour's: the copy has no mass and is no motion of its own."""
+    fluid = flow(tmp_path)
     case = one_case(answered(SHROUDS, tmp_path).tree["limit_cycle"].to_dataset(), 0)
     # all sectors at once, without waves
     n, M, blades = 5, np.tile([1.2, 0.33], 5), 2 * np.arange(5) + 1

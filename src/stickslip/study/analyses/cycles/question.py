@@ -78,7 +78,9 @@ class Question:
 
     def modes(self, wave: int) -> list[StuckMode]:
         """Return the modes of a wave that are looked at."""
-        count = max([MODES, *(self.asked.modes or [])])
+        blades = self.model.blades
+        every = MODES if blades is None else MODES * blades.sectors
+        count = max([every, *(self.asked.modes or [])])
         return stuck_modes(self.system(wave), count, self.holds)
 
     def followed(self, modes: list[StuckMode]) -> list[StuckMode]:

@@ -20,11 +20,12 @@ class LimitCycleTable(Section):
         description="wave numbers of a wheel, 0 to the number of sectors n less one: k below n/2 travels backward, n - k forward; left out: those "
         "that are unstable with contacts stuck",
     )
-    modes: list[Annotated[int, Field(ge=1, le=100)]] | None = Field(
+    modes: list[Annotated[int, Field(ge=1, le=999)]] | None = Field(
         None,
         min_length=1,
         max_length=100,
-        description=f"numbers of modes, by frequency with contacts stuck, from 1; left out: the unstable ones among the first {MODES}",
+        description=f"numbers of modes, by frequency with contacts stuck, from 1; left out: the unstable ones among the first {MODES}, of a mistuned wheel "
+        f"{MODES} of each sector",
     )
     amplitude_mm: list[Positive] | None = Field(
         None,
