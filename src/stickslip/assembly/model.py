@@ -226,16 +226,11 @@ class Model:
         of_parts = [text for part in self.parts.values() for text in part.warnings]
         of_wheel = () if self.neighbours is None else self.neighbours.warnings
         of_units = unlike_units(self.parts)
-        of_places = [
-            *far_outputs(self.places, self.outputs),
-            *doubtful_fields(self.places, self.loads),
-        ]
+        of_outputs = far_outputs(self.places, self.outputs)
+        of_fields = doubtful_fields(self.places, self.loads)
         orders = beyond_sectors(self.loads, self.sectors)
-        return tuple(
-            dict.fromkeys(
-                [*of_parts, *of_units, *of_places, *of_wheel, *orders, *self.pairs.warnings]
-            )
-        )
+        own = [*of_parts, *of_units, *of_outputs, *of_wheel, *orders, *of_fields]
+        return tuple(dict.fromkeys([*own, *self.pairs.warnings]))
 
     def spin(self, speed: float) -> Spin:
         """Return how it turns at a speed in rad/s."""
