@@ -147,6 +147,10 @@ def test_waves_compete_in_time_and_what_has_no_flutter_says_so(tmp_path: Path) -
     assert sorted(np.argsort(first)[-2:]) == [1, 2]
     assert "competing_waves" in plots(outcome.tree)
     assert any("mixed start" in v.why for v in outcome.verdicts)
+    # that a mode was left out which grows is told
+    assert not any("not followed" in v.why for v in case_verdicts("", case.variables))
+    first = case.isel(branch=[0]).drop_dims("cycle")
+    assert "1 of 2 modes that grow" in case_verdicts("", first.variables)[0].why
     # with the ratio of the structure alone twice as large nothing grows
     text = changed(flutter_ring(tmp_path / "b"), {"part.blisk.damping.modal_ratio": "5e-3"})
     still = answered(text, tmp_path / "b")

@@ -41,6 +41,7 @@ ND9 = (
 ROTATING = ("[damping]", "[rotation]\nspeed_rpm = 4000\n[damping]")
 BY = "real_per_s2,imag_per_s2"
 ONE = f"neighbour,{BY}\n-1,100,50\n0,20,-900\n1,-90,40\n"
+GROWS = f"neighbour,{BY}\n0,20,1900\n"
 AT_SPEEDS = f"neighbour,speed_rpm,{BY}\n0,3000,20,-900\n0,5000,20,-800\n"
 
 
@@ -66,6 +67,10 @@ def waves(*numbers: int) -> str:
         (f"phase_angle_deg,{BY}\n0,20,-900\n", FLUTTER, ("", ""), r"phase_angle_deg: holds 0 alone"),
         (ONE, FLUTTER, ND9, r"aero\.nodal_diameter: is 9, and 6 sectors have the nodal diameters 0 to 3"),
         (ONE, FLUTTER, ROTATING, r"rotation\.speed_rpm: is 4000, .*no aero\.file has a column speed_rpm"),
+        (ONE, "[flutter]\nnumber = 99\n", ("", ""), r"flutter\.number: is 99, and the wave 0 has 3 modes"),
+        (ONE, FLUTTER, ("[aero]", "[aero]\nmode = 3"), r"aero\.mode: is 3, .*'wheel\.disk' held there are 2"),
+        (GROWS, "[limit_cycle]\nmodes = [1, 99]\n", ("", ""), r"limit_cycle\.modes: holds 99, and what is looked at has 3 modes"),
+        (GROWS, "[limit_cycle]\nmodes = [2]\n", ("", ""), ""),
         (AT_SPEEDS, FLUTTER, ROTATING, ""),
         (waves(1, 2, 3, 4, 5, 6), FLUTTER, ("", ""), ""),
     ],

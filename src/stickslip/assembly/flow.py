@@ -15,7 +15,7 @@ from stickslip.assembly.load import Load
 from stickslip.assembly.model import Model
 from stickslip.assembly.places import AXES
 from stickslip.assembly.reduced import Store, in_memory
-from stickslip.errors import InputError
+from stickslip.errors import InputError, input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import LinearSide
 from stickslip.model.dofs import Dofs
@@ -122,6 +122,12 @@ class Flow:
 
     def _modes(self, structure: Structure, what: str) -> Matrix:
         numbers = np.array(self.given.modes)
+        if (most := int(np.count_nonzero(structure.mass.diagonal()))) < numbers.max():
+            raise input_error(
+                "aero.mode",
+                f"is {numbers.max()}, and of the {what} there are {most}",
+                f"Name modes up to {most}, here or in the columns force_mode and motion_mode of aero.file.",
+            )
         try:
             return normal_modes(structure, int(numbers.max())).shapes[:, numbers - 1]
         except InputError as error:

@@ -199,11 +199,12 @@ class Flutter(WaveAnalysis):
                 "needs aerodynamic coefficients",
                 "Add the table [aero] with their file, or give the model `aerodynamics`.",
             )
-        flow_around(model)
+        flow = flow_around(model)
+        assert flow is not None
         wheel = Wheel(model.sectors, parted=True)
         wheel.require(asked.nodal_diameters, "flutter.nodal_diameters")
         number = asked.number or (1 if given.of_points else max(given.modes))
-        return Question(
+        question = Question(
             model,
             asked.contacts,
             wheel,
@@ -212,6 +213,10 @@ class Flutter(WaveAnalysis):
             (model.speed,),
             rpm=float(f"{model.speed / RPM:.12g}"),
         )
+        if question.small:
+            question.require("flutter.number" if asked.number else "aero.mode")
+            flow.patterns(question.numbers[0])
+        return question
 
     def solve(self, inputs: Question, done: Sequence[Any], notes: Notes) -> Iterator[Any]:
         """Yield what is found of each wave; the coefficients go into the notes first."""

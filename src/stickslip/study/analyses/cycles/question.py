@@ -120,7 +120,7 @@ def question_of(case: Case, model: Model) -> Question:
             "a contact is rigid: its force is no function of the gap",
             "Give the contacts a stiffness, such as elastic_coulomb.",
         )
-    return Question(
+    question = Question(
         case.label,
         peak_first(assembled),
         asked,
@@ -128,6 +128,23 @@ def question_of(case: Case, model: Model) -> Question:
         asked.in_time or IN_TIME in case.checks,
         facts_of(model, model.speed / RPM),
     )
+    _refuse_modes(question)
+    return question
+
+
+def _refuse_modes(question: Question) -> None:
+    """Refuse numbers of modes that no wave has that is looked at."""
+    wanted = max(question.asked.modes or [0])
+    most = wanted
+    if wanted:
+        own = [question.modes(wave) for wave in question.waves]
+        most = max((mode.number for modes in own for mode in modes), default=0)
+    if wanted > most:
+        raise input_error(
+            "limit_cycle.modes",
+            f"holds {wanted}, and what is looked at has {most} modes",
+            "Name others, or leave it out: then the unstable ones are followed.",
+        )
 
 
 def _refuse_waves(asked: LimitCycleTable, model: Model) -> None:

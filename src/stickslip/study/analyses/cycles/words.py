@@ -22,13 +22,28 @@ def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
         least = float(np.nanmin(case["linear_damping_ratio"].values))
         why = f"no mode that was looked at grows with contacts stuck: the least damping ratio is {100 * least:.3g} %"
         return [Verdict("trusted", label, None, why, "There is no limit cycle that begins with a linear instability.")]  # fmt: skip
-    found: list[Verdict] = []
+    found = _not_followed(label, case)
     for i in range(case["wave_number"].size):
         found += _of_branch(label, case, i)
     outcome = str(case["outcome"].values) if "outcome" in case else ""
     if outcome:
         found.append(Verdict("trusted", label, None, f"from a mixed start of all unstable waves, in time, {outcome}", "That may depend on the start."))  # fmt: skip
     return found
+
+
+def _not_followed(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
+    """Say that modes grow which were looked at and not asked for."""
+    ratios, hertz = (case[f"linear_{n}"].values for n in ("damping_ratio", "frequency_hz"))
+    grows = int(np.count_nonzero(ratios < 0.0))
+    left = grows - int(np.count_nonzero(case["mode_damping_ratio"].values < 0.0))
+    if left <= 0:
+        return []
+    worst = np.unravel_index(np.nanargmin(ratios), ratios.shape)
+    why = (
+        f"{left} of {grows} modes that grow with contacts stuck were not followed; the least damping ratio is {100 * ratios[worst]:.3g} % "
+        f"at {hertz[worst]:.5g} Hz"
+    )
+    return [Verdict("trusted", label, None, why, "Leave limit_cycle.modes out: then all that grow are followed.")]  # fmt: skip
 
 
 def branch_name(case: Mapping[str, xr.Variable] | xr.Dataset, i: int) -> str:

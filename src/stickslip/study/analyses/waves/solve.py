@@ -12,6 +12,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.flow import own_dofs, phases
 from stickslip.assembly.model import ContactsAs, Model
+from stickslip.errors import input_error
 from stickslip.model.gyroscopic import gyroscopic_modes
 from stickslip.model.modes import normal_modes
 from stickslip.model.structure import Structure
@@ -25,6 +26,8 @@ from stickslip.study.analyses.waves.in_flow import wave_in_flow
 from stickslip.study.analyses.waves.numbers import Wheel
 from stickslip.study.analyses.waves.results import WaveBranches, WaveFlutter, WaveModes
 from stickslip.study.keep.progress import advance
+
+MANY = 2000  # dofs of a sector, of which no wave has fewer modes than may be asked for
 
 W = TypeVar("W", WaveModes, WaveBranches, WaveFlutter)
 
@@ -72,6 +75,23 @@ class Question:
     def turning(self) -> bool:
         """Whether Coriolis forces act at the first speed; forces of a flow part the directions of waves as well."""
         return self.model.coriolis and self.model.rotates and self.speeds[0] > 0
+
+    @property
+    def small(self) -> bool:
+        """Whether a wave may have fewer modes than are asked for, and is soon looked at."""
+        return own_dofs(self.model).size <= MANY
+
+    def require(self, place: str) -> None:
+        """Refuse more modes than a wave has."""
+        for number in self.numbers:
+            mass = self.at(self.speeds[0], number).mass.diagonal()
+            most = int(np.count_nonzero(mass))
+            if self.n_modes > most:
+                raise input_error(
+                    place,
+                    f"is {self.n_modes}, and the wave {number} has {most} modes",
+                    f"Ask for {most} at most." if most else "Free a part of it.",
+                )
 
     def at(self, speed: float, wave_number: int) -> Structure:
         """Return the structure at a speed in rad/s as a wave."""
