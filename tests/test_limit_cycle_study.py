@@ -1,6 +1,7 @@
 """[limit_cycle] of a study: benchmark numbers, resuming, Python, the page; the wheel of examples/flutter_ring run small."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ import stickslip as ss
 from stickslip.errors import InputError
 from stickslip.report.page import plots
 from stickslip.report.sections.limit_cycle import Cycles, cycle_table
+from stickslip.study.analyses.cycles.solve import _without
+from stickslip.study.analyses.cycles.time import compete
 from stickslip.study.analyses.cycles.words import case_verdicts
 from stickslip.study.analyses.limit_cycle import LIMIT_CYCLE
 from stickslip.study.keep.journal import JobJournal
@@ -159,6 +162,22 @@ def test_waves_compete_in_time_and_what_has_no_flutter_says_so(tmp_path: Path) -
     assert none["linear_damping_ratio"].values.min() > 0
     assert any("no mode that was looked at grows" in v.why for v in still.verdicts)
     assert plots(still.tree) == {}
+
+
+def test_waves_without_a_found_cycle_compete_from_where_they_slip(tmp_path: Path) -> None:
+    (case,) = read_study(_path(flutter_ring(tmp_path, periods="64"), tmp_path)).cases()
+    question = LIMIT_CYCLE.inputs(case, case.build())
+    found = [(w, m) for w in (1, 2) for m in question.followed(question.modes(w))]
+    lost = [_without(wave, mode, "") for wave, mode in found]
+    assert "slips" in compete(question, lost)["left_out"]
+    slip = {1: 1e-7, 2: 3e-7}
+    told = compete(question, [replace(b, slips=slip[b.wave_number]) for b in lost])
+    assert told["left_out"] == ""
+    grown = told["amplitude"][0, [1, 2]] / [1e-7, 3e-7]
+    # so small everything sticks: in the middle of the first window, eight periods on, each has grown by its damping
+    wanted = [np.exp(-m.ratio * m.omega * told["time"][0]) for _, m in found]
+    np.testing.assert_allclose(grown, wanted, rtol=0.02)
+    assert np.all(np.delete(told["amplitude"][0], [1, 2]) < 0.01 * told["amplitude"][0, 2])
 
 
 def test_what_friction_cannot_bound_is_told(tmp_path: Path) -> None:

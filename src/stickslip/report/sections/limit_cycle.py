@@ -105,8 +105,9 @@ def waves_in_time(view: Cycles) -> Plot | None:
     figure.update_xaxes(title_text="time (s)")
     figure.update_yaxes(title_text=f"amplitude of each wave ({scale.unit})", rangemode="tozero")
     caption = (
-        f"All sectors in time from a mixed start, 30 % of the limit cycle of each unstable wave: <b>{escape(view.text('outcome'))}</b>. Waves are told "
-        "apart by the motion of all sectors at one time and by the direction in which they turn; another start may end elsewhere."
+        "All sectors in time from a mixed start, 30 % of the limit cycle of each unstable wave, or its mode where slip begins if none was "
+        f"found: <b>{escape(view.text('outcome'))}</b>. Waves are told apart by the motion of all sectors at "
+        "one time and by the direction in which they turn; another start may end elsewhere."
     )
     return Plot(f"competing_waves{view.key}", "Competing waves in time", caption, figure)
 

@@ -56,6 +56,7 @@ ABOUT = {
     "time": ("window", "s", "time since the mixed start of all unstable waves"),
     "wave_amplitude": ("window wave", "m", "amplitude of each wave number at the output"),
     "outcome": ("", "1", "what became of the mixed start"),
+    "outcome_missing": ("", "1", "why there is no mixed start; empty where there is one or it was not asked for"),
 }  # fmt: skip
 
 
@@ -166,6 +167,7 @@ def _in_time(
             "time": own["time"],
             "wave_amplitude": own["amplitude"],
             "outcome": str(own["sentence"]),
+            "outcome_missing": str(own["left_out"]),
         }
     return values
 

@@ -33,7 +33,7 @@ FEW_STEPS = 256  # where hundreds of periods are followed for what wins
 KICK = 1e-3  # of their own amplitude, by which speeds are disturbed
 SETTLED = 1e-7
 GOLDEN = 2.399963  # rad, of which no few multiples are alike
-SHARE = 0.3  # of the limit cycle of each wave, with which waves begin that compete
+SHARE = 0.3  # of the attracting cycle of each wave, with which waves begin that compete
 
 
 def settle_cycles(question: Question, branch: CycleBranch) -> dict[str, Any]:
@@ -59,30 +59,62 @@ def settle_cycles(question: Question, branch: CycleBranch) -> dict[str, Any]:
 
 
 def compete(question: Question, branches: Sequence[CycleBranch]) -> dict[str, Any]:
-    """Return what becomes of a mixed start of all unstable waves of a wheel that have an attracting cycle."""
-    there = [(b, int(np.flatnonzero(b.slope > 0.0)[0])) for b in branches if np.any(b.slope > 0.0)]
-    own = {"waves": np.array([b.wave_number for b, _ in there], dtype=np.int64)}
-    nothing = {"time": np.zeros(0), "amplitude": np.zeros((0, 0)), "sentence": "", "kept": "[]"}
-    if len({b.wave_number for b, _ in there}) < 2:
+    """Return what becomes of a mixed start of all waves of a wheel that are unstable or have an attracting cycle."""
+    there = [b for b in branches if b.wave_number != ONE and (b.ratio < 0.0 or _attracts(b))]
+    own = {"waves": np.array([b.wave_number for b in there], dtype=np.int64)}
+    nothing = {"time": np.zeros(0), "amplitude": np.zeros((0, 0)), "sentence": "", "kept": "[]", "left_out": ""}  # fmt: skip
+    if len({b.wave_number for b in there}) < 2:
         return own | nothing
     try:
-        motions = [(_motion(question, b, i), float(b.cycle_omega[i])) for b, i in there]
-        system = question.system(there[0][0].wave_number)
+        system = question.system(there[0].wave_number)
         structure, contacts, load, outputs = in_time(system, question)
+        motions = _beginnings(question, there)
     except StickslipError as error:
-        return own | nothing | {"sentence": str(error)}
+        return own | nothing | {"left_out": str(error)}
     omega = motions[0][1]
     rest = np.zeros((2, structure.n), dtype=complex)
     like = start_from_harmonics(rest, omega, contacts.gap_operator, contacts.laws)
-    start = _kicked(mixed_start([(SHARE * m[1], w) for m, w in motions], like), motions)
+    start = _kicked(mixed_start(motions, like), motions)
     marched = march_periods(structure, contacts, load, omega, outputs, start, question.asked.periods, FEW_STEPS)  # fmt: skip
     history = wave_history(marched)
+    if not history.time.size:
+        return own | nothing | {"left_out": f"it grew beyond all numbers in {len(marched.first)} periods"}  # fmt: skip
     return own | {
         "time": history.time,
         "amplitude": history.amplitude,
         "sentence": history.sentence,
         "kept": json.dumps(list(history.waves)),
+        "left_out": "",
     }
+
+
+def _attracts(branch: CycleBranch) -> bool:
+    return bool(np.any(branch.slope > 0.0))
+
+
+def _beginnings(
+    question: Question, branches: Sequence[CycleBranch]
+) -> list[tuple[ComplexArray, float]]:
+    """Return amplitudes (n,) of all sectors and frequencies, rad/s, with which waves begin: a share of their attracting cycle.
+
+    Where none was found the mode itself begins, with the amplitude at which it slips; where it never does, with the least of the others.
+    """
+    slips = [b.slips for b in branches if np.isfinite(b.slips)]
+    found = []
+    for branch in branches:
+        if _attracts(branch):
+            i = int(np.flatnonzero(branch.slope > 0.0)[0])
+            found.append((SHARE * _motion(question, branch, i)[1], float(branch.cycle_omega[i])))
+            continue
+        if not slips:
+            raise StickslipError("no wave has an amplitude from which on it slips")
+        amplitude = branch.slips if np.isfinite(branch.slips) else min(slips)
+        system = question.system(branch.wave_number)
+        mode = next(m for m in question.modes(branch.wave_number) if m.number == branch.mode)
+        shape = amplitude / abs(mode.shape[coordinate(system)]) * mode.shape
+        full = np.array([np.zeros_like(shape), shape])
+        found.append((whole_wheel(system).spread(full)[1], mode.omega))
+    return found
 
 
 def in_time(
@@ -115,7 +147,7 @@ def _from_cycle(question: Question, branch: CycleBranch, i: int) -> Marched:
     structure, contacts, load, outputs = in_time(system, question)
     motion, omega = _motion(question, branch, i), float(branch.cycle_omega[i])
     start = start_from_harmonics(motion, omega, contacts.gap_operator, contacts.laws)
-    start = _kicked(start, [(motion, omega)])
+    start = _kicked(start, [(motion[1], omega)])
     return march_periods(
         structure, contacts, load, omega, outputs, start, question.asked.periods, STEPS, settles=SETTLED
     )  # fmt: skip
@@ -131,6 +163,6 @@ def _motion(question: Question, branch: CycleBranch, i: int) -> ComplexArray:
 
 def _kicked(start: TransientStart, motions: Sequence[tuple[ComplexArray, float]]) -> TransientStart:
     """Return a start with speeds that are off by another share for each coordinate."""
-    size = sum(omega * np.abs(motion[1]) for motion, omega in motions)
+    size = sum(omega * np.abs(motion) for motion, omega in motions)
     shares = np.cos(GOLDEN * np.arange(start.velocity.size))
     return replace(start, velocity=start.velocity + KICK * shares * size)

@@ -28,6 +28,10 @@ def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     outcome = str(case["outcome"].values) if "outcome" in case else ""
     if outcome:
         found.append(Verdict("trusted", label, None, f"from a mixed start of all unstable waves, in time, {outcome}", "That may depend on the start."))  # fmt: skip
+    missing = str(case["outcome_missing"].values) if "outcome_missing" in case else ""
+    if missing:
+        why = f"what becomes of all unstable waves together was not found in time: {missing}"
+        found.append(Verdict("doubtful", label, None, why, "Each wave is answered by itself."))
     return found
 
 
@@ -87,13 +91,22 @@ def _of_cycle(label: str, name: str, case: Mapping[str, xr.Variable], c: int) ->
     if attracting and word == "unstable":
         by = f"a disturbance of wave {wave}" if wave >= 0 else "a disturbance"
         why = f"{what} is stable in its own amplitude, but {by} grows: {reason}"
-        found.append(Verdict("trusted", label, hertz, why, "The machine leaves it; limit_cycle.in_time tells for what."))  # fmt: skip
+        found.append(Verdict("trusted", label, hertz, why, f"The machine leaves it; {_what_tells(case)}."))  # fmt: skip
     elif attracting and word != "stable":
         why = f"{what} is stable in its own amplitude; other disturbances are {word}: {reason}"
         found.append(Verdict("doubtful", label, hertz, why, "limit_cycle.in_time tells more."))
     if "cycle_time_amplitude" in case and word != "unstable":  # what is left is elsewhere in time
         found += _of_time(label, what, case, c)
     return found
+
+
+def _what_tells(case: Mapping[str, xr.Variable]) -> str:
+    """Return what tells to which motion a machine goes that leaves a limit cycle."""
+    if "outcome" in case and str(case["outcome"].values):
+        return "the march of all unstable waves together tells for what"
+    if "cycle_time_amplitude" in case:
+        return "time integration began beside it, and its last amplitude is in the result"
+    return "limit_cycle.in_time tells for what"
 
 
 def _of_time(label: str, what: str, case: Mapping[str, xr.Variable], c: int) -> list[Verdict]:
