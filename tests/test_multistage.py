@@ -20,7 +20,7 @@ from stickslip.reduction.cyclic import cyclic_sector, travelling_wave
 from stickslip.reduction.full_wheel import wheel
 from stickslip.reduction.waves import wave
 from stickslip.study.analyses.waves.results import WaveModes
-from stickslip.study.analyses.waves.stages import flange_doubts
+from stickslip.study.analyses.waves.stages import flange_doubts, unreached
 from stickslip.study.keep.netcdf import one_case
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "two_stages"
@@ -103,6 +103,15 @@ def test_few_harmonics_leave_diameters_apart_and_shapes_meet_on_the_flange(stage
     assembly = multistage(fine, [flange(fine, (0, 1))])
     assert assembly.nodal_diameters == (0, 1)
     assert assembly.waves(1) == (("first", 1), ("second", 1))
+    assert assembly.unreached == (("first", 2), ("second", 2), ("second", 3))
+    (told,) = unreached(assembly)
+    assert "first 2, second 2 and 3" in told.why
+    assert "harmonics 2, 3" in told.remedy
+    every = multistage(
+        fine, [flange(fine, (0, 1, 4, 9))]
+    )  # 4 and 9: wave 0, wave 4 (−2); wave 1, wave 3
+    assert every.unreached == (("first", 2),)
+    assert unreached(multistage(fine, [flange(fine, range(4))])) == []
     found = multistage_modes(assembly, 1, 3)
     waves = assembly.waves(1)
     moved = np.concatenate(

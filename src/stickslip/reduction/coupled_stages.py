@@ -108,6 +108,14 @@ class Multistage:
             seen |= own | {self._wave(name, -k) for name, k in own}
         return tuple(lowest)
 
+    @property
+    def unreached(self) -> tuple[Wave, ...]:
+        """Waves, up to half the sectors of their stage, that no nodal diameter of the assembly has: no kept harmonic leads to them."""
+        found = {own for m in self.nodal_diameters for own in self.waves(m)}
+        found |= {self._wave(name, -k) for name, k in found}
+        each = [(name, k) for name, s in self.stages.items() for k in range(s.sectors // 2 + 1)]
+        return tuple(own for own in each if own not in found)
+
     def _wave(self, name: str, harmonic: int) -> Wave:
         return name, harmonic % self.stages[name].sectors
 

@@ -26,6 +26,7 @@ from stickslip.study.analyses.waves.stages import (
     each_diameter,
     flange_doubts,
     stages_question,
+    unreached,
 )
 from stickslip.study.analyses.waves.tables import Diameter, WaveTable
 from stickslip.study.analyses.waves.texts import modes_tables
@@ -177,6 +178,10 @@ class Modes(WaveAnalysis):
             shapes=asked.shapes and model.skin is not None,
         )
 
+    def check(self, case: Case, model: Model) -> tuple[str, ...]:
+        """Say how many modes there will be, and which waves of several stages are in no list."""
+        return (*super().check(case, model), *_unreached(self.inputs(case, model)))
+
     def solve(
         self, inputs: Question | StagesQuestion, done: Sequence[WaveModes], notes: Notes
     ) -> Iterator[WaveModes]:
@@ -187,6 +192,12 @@ class Modes(WaveAnalysis):
         yield from super().solve(inputs, done, notes)
         if inputs.model.mistuning is not None and notes.get(NOTE) is None:
             notes.put(NOTE, solved_wheel(inputs))
+
+
+def _unreached(asked: Question | StagesQuestion) -> list[str]:
+    """Say which waves of several stages will be in no list."""
+    told = unreached(asked.assembly) if isinstance(asked, StagesQuestion) else []
+    return [f"modes: {v.why}. {v.remedy}" for v in told]
 
 
 def _refuse_too_many(model: Model, number: int) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 from stickslip.model.facts import facts_of_part
-from stickslip.reduction.coupled_stages import Multistage, multistage_modes
+from stickslip.reduction.coupled_stages import Multistage, Wave, multistage_modes
 from stickslip.study.analyses.analysis import Notes
 from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.verdict import Verdict, doubt, to_json
@@ -108,6 +108,19 @@ def flange_doubts(waves: Sequence[WaveModes]) -> list[Verdict]:
     return [Verdict("doubtful", why=why, remedy="Give join.NAME.harmonics more of them.")]
 
 
+def unreached(assembly: Multistage) -> list[Verdict]:
+    """Say which waves of the stages are in no list of modes, as no kept harmonic leads to them."""
+    own = _in_words(assembly, assembly.unreached)
+    if not own:
+        return []
+    why = (
+        f"no kept harmonic of the flanges leads to the waves {own}: their modes are in no list here"
+    )
+    lowest = sorted({k for _, k in assembly.unreached})
+    remedy = f"Add the harmonics {', '.join(map(str, lowest))} to join.NAME.harmonics."
+    return [Verdict("trusted", why=why, remedy=remedy)]
+
+
 def _about(asked: StagesQuestion) -> dict[str, Any]:
     """Return the note about the model; its sectors are those of the smallest wheel that is one with all stages."""
     stages = asked.assembly.stages
@@ -128,13 +141,16 @@ def _about(asked: StagesQuestion) -> dict[str, Any]:
         "speed_rpm": 0.0,
         "contacts": "none",
         "parted": False,
-        "verdicts": to_json([doubt(text) for text in asked.model.warnings]),
+        "verdicts": to_json([*unreached(asked.assembly), *map(doubt, asked.model.warnings)]),
         **dict.fromkeys(STATIC, np.nan),
     }
 
 
 def _waves(assembly: Multistage, number: int) -> str:
     """Return the waves of a nodal diameter in words: first 2, second 2 and 7."""
-    waves = assembly.waves(number)
+    return _in_words(assembly, assembly.waves(number))
+
+
+def _in_words(assembly: Multistage, waves: Sequence[Wave]) -> str:
     own = {name: [str(k) for other, k in waves if other == name] for name in assembly.stages}
     return ", ".join(f"{name} {' and '.join(numbers)}" for name, numbers in own.items() if numbers)
