@@ -20,6 +20,8 @@ from stickslip.units import HZ, RPM
 
 Beyond = Literal["refuse", "nearest"]
 LARGEST = 5000  # dofs of a full matrix: 0.4 GB of complex numbers
+EDGE = 1e-9  # of the highest frequency of a table: so far outside is rounding
+OUTSIDE = 'Add rows of more frequencies, keep fewer harmonics, or say beyond = "nearest" in [aero].'
 SAME_ANGLE = 1e-6  # rad by which phase angles that come from a file may be off
 
 
@@ -187,6 +189,24 @@ class InfluenceCoefficients:
         stiff, damp = self.frozen(phase_angle, reference)
         return np.asarray(stiff + 1j * omega * damp)
 
+    def require(self, low: float, high: float, what: str) -> None:
+        """Refuse a table that does not hold the frequencies from `low` to `high`, rad/s, which `what` needs.
+
+        Raises
+        ------
+        InputError
+            With the range of the table and that of the need, unless those outside are to have the nearest.
+        """
+        if not self.depends_on_frequency or self.beyond == "nearest":
+            return
+        first, last = (float(f) for f in self.frequencies[[0, -1]])
+        if low < first - EDGE * last or high > last * (1 + EDGE):
+            raise input_error(
+                "aero.file",
+                f"has coefficients for {first / HZ:.6g} to {last / HZ:.6g} Hz, and {what} needs {low / HZ:.6g} to {high / HZ:.6g} Hz",
+                OUTSIDE,
+            )
+
     def _phases(self, phase_angle: float) -> ComplexArray:
         return np.asarray(np.exp(1j * phase_angle * self.distances))
 
@@ -202,12 +222,12 @@ class InfluenceCoefficients:
         """Return ω, or the end of the table that is nearest where that is wanted."""
         low, high = (float(f) for f in self.frequencies[[0, -1]])
         held = min(max(omega, low), high)
-        if abs(held - omega) <= 1e-9 * high or self.beyond == "nearest":
+        if abs(held - omega) <= EDGE * high or self.beyond == "nearest":
             return held
         raise input_error(
             "aero.file",
             f"has coefficients for {low / HZ:.6g} to {high / HZ:.6g} Hz, asked for {omega / HZ:.6g} Hz",
-            'Add rows of more frequencies, keep fewer harmonics, or say beyond = "nearest" in [aero].',
+            OUTSIDE,
         )
 
     @cached_property
