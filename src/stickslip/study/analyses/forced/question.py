@@ -158,7 +158,7 @@ def question_of(case: Case, model: Model) -> Question:
         _require_sectors(model, assembled)
     if (share := settings.forced_response.static_friction_share) is not None:
         assembled = _with_frozen_sliders(assembled, share)
-    _require_coefficients(assembled, sweep, case.checks)
+    _require_coefficients(assembled, sweep)
     try:
         forced_problem(assembled.system, assembled.load, sweep)
     except InputError as error:
@@ -178,18 +178,16 @@ def question_of(case: Case, model: Model) -> Question:
     )
 
 
-def _require_coefficients(model: Assembled, sweep: Sweep, checks: frozenset[str]) -> None:
-    """Refuse aerodynamic coefficients that do not reach to all harmonics that may be kept, or looked at for the error."""
+def _require_coefficients(model: Assembled, sweep: Sweep) -> None:
+    """Refuse aerodynamic coefficients that do not reach to all harmonics that may be kept."""
     force = model.system.structure.feedback_of(1)
     if force is None:
         return
-    first, most = sweep.first_harmonics, sweep.high_harmonics[-1]
-    kept = f"a response with harmonics up to {most}"
-    if always_kept(sweep.strategy) is not None or HARMONICS in checks:
-        most = FACTOR * (most if HARMONICS in checks else first[-1])
-        kept = f"a response with harmonics up to {most // FACTOR}, and twice as many for its error,"
+    first = sweep.first_harmonics
+    most = (first if always_kept(sweep.strategy) is not None else sweep.high_harmonics)[-1]
     low, high = sweep.omega_range
-    force.influence.require(min(h for h in first if h) * low, most * high, kept)
+    what = f"a response with harmonics up to {most}"
+    force.influence.require(min(h for h in first if h) * low, most * high, what)
 
 
 def _with_frozen_sliders(model: Assembled, share: float) -> Assembled:
