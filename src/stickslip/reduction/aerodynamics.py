@@ -114,6 +114,11 @@ class InfluenceCoefficients:
         """Whether the coefficients are those of several frequencies."""
         return self.frequencies.size > 1
 
+    @property
+    def refuses(self) -> bool:
+        """Whether frequencies outside of the table are refused."""
+        return self.depends_on_frequency and self.beyond == "refuse"
+
     def at_speed(self, speed: float) -> "InfluenceCoefficients":
         """Return the coefficients at a speed in rad/s; an `InputError` tells the range where it is outside."""
         if not self.speeds.size:
@@ -197,7 +202,7 @@ class InfluenceCoefficients:
         InputError
             With the range of the table and that of the need, unless those outside are to have the nearest.
         """
-        if not self.depends_on_frequency or self.beyond == "nearest":
+        if not self.refuses:
             return
         first, last = (float(f) for f in self.frequencies[[0, -1]])
         if low < first - EDGE * last or high > last * (1 + EDGE):

@@ -216,6 +216,7 @@ class Flutter(WaveAnalysis):
         if question.small:
             question.require("flutter.number" if asked.number else "aero.mode")
             flow.patterns(question.numbers[0])
+        question.require_coefficients()
         return question
 
     def solve(self, inputs: Question, done: Sequence[Any], notes: Notes) -> Iterator[Any]:

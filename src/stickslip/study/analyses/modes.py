@@ -167,7 +167,7 @@ class Modes(WaveAnalysis):
         known = asked.compared_with(case.home)
         if known is not None:
             known.of_waves(numbers, asked.number, model.sectors)
-        return Question(
+        question = Question(
             model,
             asked.contacts,
             wheel,
@@ -177,6 +177,8 @@ class Modes(WaveAnalysis):
             rpm=float(f"{model.speed / RPM:.12g}"),
             shapes=asked.shapes and model.skin is not None,
         )
+        question.require_coefficients()
+        return question
 
     def check(self, case: Case, model: Model) -> tuple[str, ...]:
         """Say how many modes there will be, and which waves of several stages are in no list."""

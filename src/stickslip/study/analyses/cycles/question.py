@@ -1,6 +1,6 @@
 """What a job solves: the model, the waves and modes that are asked for, and those that grow by themselves."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -128,17 +128,23 @@ def question_of(case: Case, model: Model) -> Question:
         asked.in_time or IN_TIME in case.checks,
         facts_of(model, model.speed / RPM),
     )
-    _refuse_modes(question)
+    force = question.model.system.structure.feedback_of(1)
+    table = None if force is None or not force.influence.refuses else force.influence
+    if asked.modes is None and table is None:
+        return question
+    modes = [question.modes(wave) for wave in question.waves]
+    _refuse_modes(asked, modes)
+    followed = [mode.omega for own in modes for mode in question.followed(own)]
+    if table is not None and followed:
+        what = f"a limit cycle with up to {most} harmonics (most_harmonics)"
+        table.require(min(followed), most * max(followed), what)
     return question
 
 
-def _refuse_modes(question: Question) -> None:
+def _refuse_modes(asked: LimitCycleTable, modes: Sequence[Sequence[StuckMode]]) -> None:
     """Refuse numbers of modes that no wave has that is looked at."""
-    wanted = max(question.asked.modes or [0])
-    most = wanted
-    if wanted:
-        own = [question.modes(wave) for wave in question.waves]
-        most = max((mode.number for modes in own for mode in modes), default=0)
+    most = max((mode.number for own in modes for mode in own), default=0)
+    wanted = max(asked.modes or [0])
     if wanted > most:
         raise input_error(
             "limit_cycle.modes",

@@ -27,6 +27,7 @@ from stickslip.study.analyses.waves.numbers import Wheel
 from stickslip.study.analyses.waves.results import WaveBranches, WaveFlutter, WaveModes
 from stickslip.study.keep.progress import advance
 
+FEW = 300  # dofs of a sector, of which all waves are solved in no time
 MANY = 2000  # dofs of a sector, of which no wave has fewer modes than may be asked for
 
 W = TypeVar("W", WaveModes, WaveBranches, WaveFlutter)
@@ -92,6 +93,17 @@ class Question:
                     f"is {self.n_modes}, and the wave {number} has {most} modes",
                     f"Ask for {most} at most." if most else "Free a part of it.",
                 )
+
+    def require_coefficients(self) -> None:
+        """Refuse aerodynamic coefficients that do not reach to the natural frequencies, where these are soon found."""
+        given = self.model.aerodynamics
+        if given is None or not given.influence.refuses or own_dofs(self.model).size > FEW:
+            return
+        waves = (self.at(self.speeds[0], number) for number in self.numbers)
+        squares = [normal_modes(moving, self.n_modes).squares for moving in waves]
+        omega = np.sqrt(np.maximum(squares, 0.0))
+        low, high = float(omega.min()), float(omega.max())
+        given.influence.require(low, high, f"the question for {self.n_modes} modes of each wave")
 
     def at(self, speed: float, wave_number: int) -> Structure:
         """Return the structure at a speed in rad/s as a wave."""
