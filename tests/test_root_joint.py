@@ -221,6 +221,7 @@ fixed_interface_modes = 8
 [forced_response]
 frequencies_hz = [4000.0, 4100.0]
 peak_points = 0
+stability = "off"
 [harmonics]
 low = 3
 high = 3
