@@ -7,7 +7,7 @@ import numpy as np
 import scipy.sparse
 from scipy.spatial import cKDTree
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.assembly.clamped_rim import with_rim
 from stickslip.assembly.facing_field import Feet, between_sides, nearest, on_sides, unit_normals
 from stickslip.assembly.places import Places, Spot
@@ -23,6 +23,8 @@ from stickslip.errors import input_error
 FAR = 0.1  # of the surface's size: no flow solver's mesh stands so far off
 BETWEEN = 0.1  # share of the points of a field that may stand nearer to the middle of a thin body than to its surface
 AROUND = 8  # points of a field from which the pressure between them follows
+ELSEWHERE = 1.2  # distance of a place from the field over that of the field's points from each other: from here on the field is elsewhere
+BARE = 0.1, 0.25  # share of a surface where the field is elsewhere: told, refused
 PLANE = 1e-6  # singular values below this share of the largest: the points lie on a line
 
 
@@ -149,13 +151,14 @@ def put_on(given: PressureField, surface: Surface, name: str) -> Projected:
             "Check the unit and the axes of its points: they are those of the sector.",
         )
     if given.area is None:
-        facet, reference, at, forces = _integrated(given, surface, feet)
+        facet, reference, at, forces, bare = _integrated(given, surface, feet)
+        warnings = _bare(bare, given.source, name)
         if between_sides(surface, feet, given.points, FAR * size) > BETWEEN:
             text = (
                 f"the points of {given.source} stand {1e3 * float(np.median(offset)):.3g} mm off {name} (median), where it is so "
                 "thin that the pressures of both its sides are mixed. Put the points in place, or give area_m2 and the normals."
             )
-            warnings = (text,)
+            warnings = (*warnings, text)
     else:
         feet, warnings = on_sides(surface, given.points, given.area, FAR * size, given.source, name)
         facet, reference, at, offset = feet.facet, feet.reference, given.points, feet.offset
@@ -184,8 +187,8 @@ def _sums(points: FloatArray, forces: ComplexArray) -> ComplexArray:
 
 def _integrated(
     given: PressureField, surface: Surface, feet: Feet
-) -> tuple[IntArray, FloatArray, FloatArray, ComplexArray]:
-    """Return quadrature points on the facets, their places and the forces of the interpolated pressure there."""
+) -> tuple[IntArray, FloatArray, FloatArray, ComplexArray, float]:
+    """Return quadrature points on the facets, their places and the forces of the interpolated pressure there, and the share of bare area."""
     x, w = np.polynomial.legendre.leggauss(4)
     square = np.stack(np.meshgrid(x, x, indexing="ij"), axis=-1).reshape(-1, 2)
     weights = np.outer(w, w).ravel()
@@ -202,14 +205,27 @@ def _integrated(
     area = normals(surface.points, surface.facets[f], r) * s[:, None]
     place = positions(surface.points, surface.facets[f], r)
     theirs = unit_normals(surface, feet.facet, feet.reference)
-    pressure = _interpolated(given, theirs, place, unit_normals(surface, f, r))
-    return f, r, place, -pressure[:, None] * area
+    pressure, elsewhere = _interpolated(given, theirs, place, unit_normals(surface, f, r))
+    size = np.linalg.norm(area, axis=1)
+    return f, r, place, -pressure[:, None] * area, float(size[elsewhere].sum() / size.sum())
+
+
+def _bare(share: float, source: str, name: str) -> tuple[str, ...]:
+    """Say or refuse that a field covers only part of a surface."""
+    told, refused = BARE
+    if share <= told:
+        return ()
+    why = f"leaves {100 * share:.0f} % of the area of {name!r} without a point near that looks the same way"
+    remedy = "Name a set of the faces that the field covers, or give area_m2 and the normals."
+    if share > refused:
+        raise input_error(source, why, remedy)
+    return (f"{source} {why}: the nearest pressure acts there, too. {remedy}",)
 
 
 def _interpolated(
     given: PressureField, theirs: FloatArray, places: FloatArray, outward: FloatArray
-) -> ComplexArray:
-    """Return the pressure at places: by a plane through the nearest points, the nearer the heavier; between all of them.
+) -> tuple[ComplexArray, BoolArray]:
+    """Return the pressure at places, and where the field is elsewhere: by a plane through the nearest points, the nearer the heavier; between all of them.
 
     Points count as nearer where the normals of their facets, `theirs`, are alike to those of the places, `outward`: a thin body has
     another pressure on its other side. The plane lies along the surface, so that points may stand off it.
@@ -230,4 +246,5 @@ def _interpolated(
     # no pressure beyond those around it
     low, high = (part(values.real, axis=1) for part in (np.min, np.max))
     below, above = (part(values.imag, axis=1) for part in (np.min, np.max))
-    return np.asarray(np.clip(found.real, low, high) + 1j * np.clip(found.imag, below, above))
+    inside = np.clip(found.real, low, high) + 1j * np.clip(found.imag, below, above)
+    return np.asarray(inside), away[:, 0] > ELSEWHERE * far
