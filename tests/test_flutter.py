@@ -205,6 +205,8 @@ def wrong(tmp_path: Path, rows: list[str], change: tuple[str, str] = ("", "")) -
     [
         ("neighbour,real_per_s2,imag_n_per_m", "0,1,2", "real_per_s2.*points are in N/m.*real_n_per_m"),
         ("neighbur,real_n_per_m,imag_n_per_m", "0,1,2", "neighbur.*not known.*neighbour"),
+        ("ibpa,real_n_per_m,imag_n_per_m", "0,1,2", "'ibpa', which is not known. The columns are one of neighbour, recorded_on, wave_number"),
+        ("phase_angle_deg,real_n_per_m,imag_n_per_m", "-180,1,2\n0,1,2\n180,1,2", "-180 and 180 degrees are the same angle. Leave one"),
         ("note,real_n_per_m,imag_n_per_m", "0,1,2", "whose motion.*neighbour, recorded_on"),
         ("neighbour,real_n_per_m,phase_deg", "0,1,2", "real_n_per_m and phase_deg of the values"),
         ("neighbour,real_n_per_m,imag_n_per_m", "0.5,1,2", "line 2: neighbour: is no whole number, got '0.5'"),

@@ -170,6 +170,7 @@ def test_points_of_other_varied_keys_go_to_their_curves(tmp_path: Path) -> None:
         (f"{KEY},peak_amplitude_um\n\n1,-3\n", "peaks.csv: line 3: peak_amplitude_um: must be above zero, got '-3'"),
         (f"{KEY},peak_amplitude_um,peak_amplitude_std_um\n1,3,-1\n", "line 2: peak_amplitude_std_um: must not be negative, got '-1'"),
         (f"{KEY},peak_amplitude_um,peak_amplitud_std_um\n1,3,1\n", "line 1: has a column 'peak_amplitud_std_um'.*Did you mean 'peak_amplitude_std_um'"),
+        (f"{KEY},peak_amplitude_um,run\n1,3,1\n", f"line 1: has a column 'run', which is not known. The columns are {KEY}, peak_amplitude_um"),
         ("load.shaker.forc_n,peak_amplitude_um\n1,3\n", f"line 1: has no column {KEY}. Did you mean 'load.shaker.forc_n'"),
         (f"{KEY},note\n1,3\n", "has neither peak amplitudes nor frequencies. Add a column such as peak_amplitude_um"),
         (f"{KEY},peak_amplitude_um,peak_frequency_hz\n1,,\n", "line 2: has neither amplitude nor frequency"),

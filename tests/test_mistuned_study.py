@@ -1,5 +1,6 @@
 """Mistuned wheels from a study: B12 of the literature, measured blades, what is refused, the example, its page."""
 
+import logging
 import shutil
 from pathlib import Path
 
@@ -158,8 +159,11 @@ def test_a_wheel_exceeds_whiteheads_factor_where_its_excited_wave_is_damped_eigh
     assert largest(damped, some) / largest(damped, none) > 1.05 * whitehead(12)
 
 
-def test_measured_blades_are_taken_from_a_file(tmp_path: Path) -> None:
-    """Deviations from the mean of each mode, or from the model's own blade."""
+def test_measured_blades_are_taken_from_a_file(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Deviations from the mean of each mode, or from the model's own blade; both means are told."""
+    caplog.set_level(logging.INFO, "stickslip")
     hertz = (1.0 + np.linspace(-0.02, 0.02, 12)) * 0.16
     rows = [f"{n},1,{f:.8f}" for n, f in enumerate(hertz)]
     (tmp_path / "blades.csv").write_text("\n".join(["blade,mode,frequency_hz", *rows]))
@@ -168,10 +172,13 @@ def test_measured_blades_are_taken_from_a_file(tmp_path: Path) -> None:
     model = study_of(tmp_path, text).model()
     found = model.mistuning.blades["scatter"].deviations
     np.testing.assert_allclose(found[:, 0], hertz / hertz.mean() - 1, atol=1e-7)
+    told = "measured blades have a mean of 0.16 Hz, the model's blade 0.159155 Hz. Relative to the"
+    assert f'{told} mean, so the mean is left out; relative_to = "model" takes it' in caplog.text
     own = text.replace('file = "blades.csv"', 'file = "blades.csv"\nrelative_to = "model"')
     model = study_of(tmp_path, own).model()
     found = model.mistuning.blades["scatter"].deviations
     np.testing.assert_allclose(found[:, 0], 2 * np.pi * hertz - 1, atol=1e-7)
+    assert f"{told} model, so the difference of the mean counts" in caplog.text
 
 
 SIX = """
@@ -209,6 +216,8 @@ FILES = {
     "one.csv": ONE,
     "two.csv": ONE + "".join(f"{n},2,{190 + n}\n" for n in range(6)),
     "far.csv": ONE + "0,1000000000000,90",
+    "later.csv": "blade,mode,frequency_hz\n" + "".join(f"{n + 1},1,{90 + n}\n" for n in range(6)),
+    "late.csv": ONE.replace("0,1,90\n", ""),
     "five.csv": ONE.replace("5,1,95", ""),
 }
 TWO = FILE.replace("one", "two")
@@ -234,6 +243,11 @@ def test_six_blades_that_differ_are_no_mistake(tmp_path: Path, more: str) -> Non
         (TWO + 'relative_to = "model"', "mistuning.b.file: has 2 modes, .* blade has 1"),
         (FILE.replace("one", "far"), "far.csv: line 8: mode: is above 200.* '1000000000000'"),
         (FILE.replace("one", "five"), "five.csv: has no frequency of blade 5, mode 1"),
+        (
+            FILE.replace("one", "later"),
+            "line 7: blade: .* got '6'. Blades count from 0, not from 1",
+        ),
+        (FILE.replace("one", "late"), "of blade 0, mode 1, 1 missing.* number them 0 to 5"),
         # a spread in the wrong unit
         (STIFF + RANDOM + SPREAD + SPREAD_M, "c.standard_deviation_m: is 1e-06 beside .*stiffness"),
         (STIFF + RANDOM + SPREAD_M, "c.standard_deviation_m: .* Give standard_deviation instead"),

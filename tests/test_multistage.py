@@ -201,6 +201,7 @@ def test_a_study_of_two_stages_has_their_modes_and_shares(tmp_path):
     few = whole.replace("[0, 1, 2, 3, 4, 5, 6]", "[0, 1]")
     wrong = {
         "[campbell]\nspeeds_rpm = [0.0, 100.0]\nengine_orders = [1]\n": "campbell: is no question for stages",
+        "[forced_response]\nfrequency_hz = [10.0, 20.0]\n": r"(?<!\n)study.toml: forced_response: is no question for stages",
         "[rotation]\nspeed_rpm = 10.0\n": "rotation.speed_rpm: gives stages a prestress",
         '[mistuning.b]\nof = "front"\ndeviations = [0.01]\n': "mistuning: is of one wheel",
     }

@@ -280,6 +280,7 @@ def test_csv_and_vtk_hold_the_same_field(tmp_path: Path) -> None:
         ("x_m,y_m,z_m,real_pa,imag_pa,area_m2\n0,0,0,1,1,1", "area_m2 alone"),
         ("x_m,y_m,z_m,real_pa,imag_pa\n0,0,zero,1,1", "line 2: z_m: is no finite number"),
         ("x_m,y_m,z_m,real_pa,imag_pas\n0,0,0,1,1", "imag_pas.*imag_pa"),
+        ("n,x_m,y_m,z_m,real_pa,imag_pa\n1,0,0,0,1,1", "'n', which is not known. The columns are x_m, y_m, z_m, then"),
         ("x_m,y_m,z_m,real_pa,imag_pa,area_m2,normal_x,normal_y,normal_z\n0,0,0,1,1,1,1,1,0", "length 1"),
     ],
 )  # fmt: skip

@@ -448,9 +448,10 @@ def test_a_campbell_diagram_of_masses_is_refused(tmp_path):
 
 def test_what_is_no_file_and_no_toml_is_told(tmp_path):
     assert "there is no such file" in refused(tmp_path / "none.toml")
-    assert "is not a file" in refused(tmp_path)
+    assert "is a folder. Give the study file itself" in refused(tmp_path)
     path = tmp_path / "study.toml"
     path.write_text("a = = 1", encoding="utf-8")
+    assert f"is a folder. Give {path}." in refused(tmp_path)
     assert "is not valid TOML" in refused(path)
     path.write_bytes(b"\xff\xfe")
     assert "is not UTF-8 text" in refused(path)

@@ -148,6 +148,20 @@ def did_you_mean(word: str, known: list[str]) -> str:
     return f"Known: {', '.join(sorted(known))}." if known else "There is none."
 
 
+MOST_NAMES = 12  # of sets that a message lists
+
+
+def nearest_and_known(word: str, known: list[str]) -> str:
+    """Return ``did you mean 'word'?`` where a known word is near, and in any case the known ones, or how many more there are."""
+    near = did_you_mean(word, known)
+    if not near.startswith("Did"):
+        near = ""
+    names = sorted(known)
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    listed = f"Known: {', '.join(names[:MOST_NAMES])}{more}." if names else "There is none."
+    return f"{near} {listed}".strip()
+
+
 IMPORTED_AS = {"scikit-fem": "skfem", "feral-solver": "feral"}  # packages with another name
 
 

@@ -10,7 +10,7 @@ import scipy.sparse
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.contact.surface import Surface, nodal_surface, rigid_surface
-from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.errors import InputError, did_you_mean, input_error, nearest_and_known
 from stickslip.model.dofs import Dofs, is_numbered, join_dofs
 from stickslip.model.mesh.mesh_facets import facets_of
 from stickslip.model.part import BodyPoints, Part
@@ -220,7 +220,7 @@ def _unknown(name: str, head: str, part: Part, place: str) -> InputError:
         first = f"{head}.{table.labels[0]}"
         remedy = f"Dofs of this part are called by node and direction: {first!r}."
     else:
-        remedy = did_you_mean(name, known) if known else "The part has no sets."
+        remedy = nearest_and_known(name, known) if known else "The part has no sets."
     return input_error(place, f"there is no surface or set {name!r}", remedy)
 
 

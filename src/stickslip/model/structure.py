@@ -8,7 +8,7 @@ import scipy.linalg
 import scipy.sparse
 
 from stickslip.arrays import IntArray, Matrix
-from stickslip.errors import did_you_mean, input_error
+from stickslip.errors import input_error, nearest_and_known
 from stickslip.model.dofs import Dofs, join_dofs
 
 NAMED = 8  # sets that a short description names
@@ -99,7 +99,7 @@ class Structure:
         """Return the dof indices of the set `name`; an `InputError` names the known sets."""
         if name not in self.sets:
             raise input_error(
-                "Structure", f"there is no set {name!r}", did_you_mean(name, list(self.sets))
+                "Structure", f"there is no set {name!r}", nearest_and_known(name, list(self.sets))
             )
         return self.sets[name]
 

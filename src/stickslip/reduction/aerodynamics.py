@@ -267,11 +267,16 @@ def from_phase_angles(
     Raises
     ------
     InputError
-        If the angles are not spread evenly, or there are more than sectors.
+        If two angles are the same, they are not spread evenly, or there are more than sectors.
     """
     turned = np.mod(np.asarray(angles, dtype=float) + SAME_ANGLE, 2 * np.pi) - SAME_ANGLE
     order = np.argsort(turned)
     count = turned.size
+    same = np.flatnonzero(np.diff(turned[order]) < SAME_ANGLE)
+    if same.size:
+        first, second = sorted(np.degrees(np.asarray(angles)[order[same[0] : same[0] + 2]]))
+        same_angle = f"{first:g} and {second:g} degrees are the same angle"
+        raise input_error("from_phase_angles: angles", same_angle, "Leave one of the two out.")
     even = 2 * np.pi * np.arange(count) / max(count, 1)
     if not count or np.abs(turned[order] - even).max() > SAME_ANGLE:
         raise input_error(

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
-from stickslip.errors import did_you_mean, input_error
+from stickslip.errors import input_error, nearest_and_known
 from stickslip.model.dofs import nodal_dofs
 from stickslip.model.fe.elements import (
     EXACT,
@@ -109,7 +109,7 @@ def _clamped_nodes(mesh: SolidMesh, clamped: tuple[str, ...]) -> BoolArray:
             raise input_error(
                 "clamped",
                 f"there is no node set {name!r}",
-                did_you_mean(name, list(mesh.node_sets)),
+                nearest_and_known(name, list(mesh.node_sets)),
             )
     return held
 

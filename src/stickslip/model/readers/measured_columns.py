@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -93,6 +93,13 @@ class MeasuredColumns:
                 f"{self.path}: line 1", f"has no column {' or '.join(choices)}", remedy
             )
         return factor * self.numbers(name)
+
+    def unknown(self, name: str, known: Sequence[str], columns: str) -> InputError:
+        """Return the complaint about a column that is none of the known ones, with the nearest, or with what `columns` says there are."""
+        near = did_you_mean(name, [*known])
+        remedy = near if near.startswith("Did") else f"The columns are {columns}. One of words is called note."  # fmt: skip
+        place = f"{self.path}: {self.word} 1" if self.word == "line" else str(self.path)
+        return input_error(place, f"has a column {name!r}, which is not known", remedy)
 
     def wrong(self, row: int, name: str, problem: str, remedy: str) -> InputError:
         """Return the complaint about the cell of a row in the column `name`."""

@@ -52,8 +52,10 @@ def _text(path: Path) -> str:
             "Check the name, or write an example with 'stickslip new NAME'.",
         )
     if not path.is_file():
+        inside = path / "study.toml"
+        name = f"{inside}." if inside.is_file() else "the study file itself, for example two_blades/study.toml."  # fmt: skip
         raise input_error(
-            place, "is not a file", "Name the study file itself, for example two_blades/study.toml."
+            place, "is a folder" if path.is_dir() else "is not a file", f"Give {name}"
         )
     try:
         with path.open("rb") as stream:

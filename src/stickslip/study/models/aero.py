@@ -156,9 +156,9 @@ def _check_names(columns: MeasuredColumns, table: AeroTable) -> None:
             raise input_error(
                 place, f"has a column {name!r}, and {why}", f"Write {stem}_{unit}, in that unit."
             )
-        near = did_you_mean(name, known)
-        remedy = near if near.startswith("Did") else "Name it 'note' if it holds words, or leave it out."  # fmt: skip
-        raise input_error(place, f"has a column {name!r}, which is not known", remedy)
+        between = f"{' and '.join(pair)}; frequency_hz, speed_rpm"
+        values = f"{' and '.join(numbers[:2])}, or {' and '.join(numbers[2:])}"
+        raise columns.unknown(name, known, f"one of {', '.join(WHO)}; {values}; {between}")
     who = [name for name in WHO if name in columns.names]
     if len(who) != 1:
         found = f"has {' and '.join(who)}" if who else "does not say whose motion it is"

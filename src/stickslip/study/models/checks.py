@@ -7,7 +7,7 @@ from typing import Any
 
 from stickslip.assembly.contact import GROUND, NEXT
 from stickslip.assembly.forces import engine_order
-from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.errors import InputError, did_you_mean, input_error, nearest_and_known
 from stickslip.model.dofs import is_numbered
 from stickslip.study.file.bodies import (
     BODIES,
@@ -200,7 +200,9 @@ def _refused(tables: Tables, place: str, word: str, what: tuple[str, ...]) -> It
         return
     ahead = NEXT if word.startswith(NEXT) else ""
     own = [f"{ahead}{head}.{name}" for name in known]
-    yield input_error(place, f"there is no {' or '.join(what)} {word!r}", did_you_mean(word, own))
+    yield input_error(
+        place, f"there is no {' or '.join(what)} {word!r}", nearest_and_known(word, own)
+    )
 
 
 def names_of(tables: Tables, part: str) -> tuple[str, ...] | None:
@@ -313,7 +315,8 @@ def _directions(tables: Tables, point: Any) -> tuple[str, ...]:
 def _questions(tables: Tables, home: Path) -> Iterator[InputError]:
     """Yield the complaints about analyses that lack what they need."""
     asked: Any = tables
-    forced = getattr(asked, "forced_response", None)
+    # stages are asked for modes alone, and that is said by itself
+    forced = None if staged(tables) else getattr(asked, "forced_response", None)
     driven = [table for table in tables.load.values() if table.harmonic > 0]
     if forced is not None and not driven:
         yield input_error(

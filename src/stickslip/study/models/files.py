@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from stickslip.arrays import IntArray
-from stickslip.errors import InputError, did_you_mean, input_error
+from stickslip.errors import InputError, input_error, nearest_and_known
 from stickslip.model.axis import Axis
 from stickslip.model.damping import dissipates
 from stickslip.model.fe.elements import EXACT, Quadrature
@@ -286,7 +286,7 @@ def _known(place: str, name: str, sets: Mapping[str, IntArray]) -> str:
     raise input_error(
         place,
         f"the file has no set {name!r} of free nodes",
-        did_you_mean(name, list(sets)),
+        nearest_and_known(name, list(sets)),
     )
 
 

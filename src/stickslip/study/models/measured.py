@@ -164,9 +164,8 @@ def _check_names(columns: MeasuredColumns, key: str, others: Sequence[str]) -> N
         known += [f"{name}_{bar}_{unit}" for bar in ERRORS for unit in of]
     for name in columns.names:
         if name not in {k.lower() for k in known}:
-            near = did_you_mean(name, known)
-            remedy = near if near.startswith("Did") else "Name it 'note' if it holds words, or leave it out."  # fmt: skip
-            raise input_error(place, f"has a column {name!r}, which is not known", remedy)
+            told = [key, *others, f"{AMPLITUDE}_um", f"{FREQUENCY}_hz", f"{AMPLITUDE}_std_um", f"{FREQUENCY}_std_hz", EXCITATION]  # fmt: skip
+            raise columns.unknown(name, known, ", ".join(told))
 
 
 def _quantity(

@@ -23,6 +23,10 @@ from stickslip.model.readers.measured_columns import read_columns
 from stickslip.study.file.mistuning import MOST_MODES, MistuningTable
 from stickslip.study.file.parts import Lumped
 from stickslip.study.file.tables import Tables, original
+from stickslip.study.keep.progress import LOG
+
+FROM_ZERO = "Blades count from 0, not from 1: number them 0 to "
+BLADE_COLUMNS = ("blade", "mode", "frequency_hz")
 
 
 def spare_parts(tables: Tables) -> set[str]:
@@ -209,6 +213,7 @@ def _blades(name: str, table: MistuningTable, home: Path, model: Model, of: str)
             f"has {measured.shape[1]} modes, and the model's blade has {alone.size}",
             "Leave the others out.",
         )
+    LOG.info(f"{key}: {_means(table, measured.mean(axis=0), alone)}")
     reference = alone if table.relative_to == "model" else measured.mean(axis=0)
     try:
         return BladeMistuning(
@@ -216,6 +221,18 @@ def _blades(name: str, table: MistuningTable, home: Path, model: Model, of: str)
         )
     except InputError as error:
         raise error.at(f"{key}.file") from None
+
+
+def _means(table: MistuningTable, mean: FloatArray, alone: FloatArray) -> str:
+    """Say how far the measured blades are off the model's as a whole, and whether that counts."""
+    pairs = zip(mean, alone, strict=False)
+    told = "; ".join(
+        f"mode {m}: measured blades have a mean of {f:.6g} Hz, the model's blade {own:.6g} Hz"
+        for m, (f, own) in enumerate(pairs, start=1)
+    )
+    if table.relative_to == "model":
+        return f"{told}. Relative to the model, so the difference of the mean counts"
+    return f'{told}. Relative to the mean, so the mean is left out; relative_to = "model" takes it'
 
 
 def read_blades(path: Path, sectors: int) -> FloatArray:
@@ -227,19 +244,19 @@ def read_blades(path: Path, sectors: int) -> FloatArray:
         If a blade or mode is missing, or stands there twice.
     """
     columns = read_columns(path)
-    missing = [n for n in ("blade", "mode", "frequency_hz") if n not in columns.names]
+    missing = [n for n in BLADE_COLUMNS if n not in columns.names]
     if missing:
         raise input_error(
             f"{path}: line 1",
             f"has no column {missing[0]}",
             "The columns are blade (from 0), mode (from 1) and frequency_hz.",
         )
-    blade, mode, hertz = (columns.numbers(n) for n in ("blade", "mode", "frequency_hz"))
+    blade, mode, hertz = (columns.numbers(n) for n in BLADE_COLUMNS)
     found = np.full((sectors, MOST_MODES), np.nan)
     for row, (b, m, f) in enumerate(zip(blade, mode, hertz, strict=True)):
         if b != int(b) or not 0 <= b < sectors:
             raise columns.wrong(
-                row, "blade", f"is no blade of 0 to {sectors - 1}", "Mend the line."
+                row, "blade", f"is no blade of 0 to {sectors - 1}", f"{FROM_ZERO}{sectors - 1}."
             )
         if m != int(m) or m < 1:
             raise columns.wrong(row, "mode", "is no number of a mode", "The lowest mode is 1.")
@@ -260,6 +277,7 @@ def read_blades(path: Path, sectors: int) -> FloatArray:
         raise input_error(
             str(path),
             f"has no frequency of blade {lost[0][0]}, mode {lost[0][1] + 1}, {len(lost)} missing in all",
-            "Give every blade all modes that one blade has.",
+            "Give every blade all modes that one blade has."
+            + (f" {FROM_ZERO}{sectors - 1}." if blade.min() > 0 else ""),
         )
     return found

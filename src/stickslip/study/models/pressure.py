@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.assembly.pressure import PressureField
-from stickslip.errors import InputError, did_you_mean, input_error, missing_package
+from stickslip.errors import InputError, input_error, missing_package
 from stickslip.model.readers.measured_columns import MeasuredColumns, read_columns
 from stickslip.study.file.tables import Tables
 from stickslip.units import DEG
@@ -19,6 +19,10 @@ PRESSURES = {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "bar": 1e5}
 VTK = (".vtk", ".vtu")
 NORMAL = ("normal_x", "normal_y", "normal_z")
 WORDS = ("note", "comment")
+COLUMNS = (
+    "x_m, y_m, z_m, then pressure_pa, or real_pa and imag_pa, or amplitude_pa and phase_deg; area_m2 with normal_x, normal_y, normal_z. "
+    "_mm, _mm2, _kpa, _mpa and _bar are other units"
+)
 UNIT = 1e-3  # by which the length of a normal may be off
 
 
@@ -67,10 +71,7 @@ def _check_names(columns: MeasuredColumns) -> None:
     known += ["phase_deg", *(f"area_{unit}" for unit in AREAS), *NORMAL, *WORDS]
     for name in columns.names:
         if name not in known:
-            near = did_you_mean(name, known)
-            remedy = near if near.startswith("Did") else "Name it 'note' if it holds words, or leave it out."  # fmt: skip
-            place = f"{columns.path}: line 1"
-            raise input_error(place, f"has a column {name!r}, which is not known", remedy)
+            raise columns.unknown(name, known, COLUMNS)
 
 
 def _pressure(columns: MeasuredColumns, *, static: bool) -> ComplexArray:
