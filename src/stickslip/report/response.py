@@ -1,5 +1,6 @@
 """A forced response as figures and tables see it."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,11 +17,12 @@ from stickslip.report.cases import ShownCase, cases_of, varied
 from stickslip.report.node import Node
 from stickslip.report.quantities import Scale, number, predicted, scale_for
 from stickslip.report.tables import html_table
-from stickslip.study.analyses.forced.curve import Curve, branch_length
+from stickslip.study.analyses.forced.curve import Curve, branch_length, peak_output
 from stickslip.study.analyses.verdict import LEVELS
 
 NEEDED = ("point_case", "frequency_hz", "order", "status", "amplitude", "harmonic_kept")
 _TURNS = (".rx", ".ry", ".rz")
+_BLADE = re.compile(r"\[\d+\]")  # of the label of an output
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,22 +73,43 @@ class Response(Node):
         """(point,) frequency of each point."""
         return self.floats("frequency_hz")
 
+    @cached_property
+    def outputs(self) -> IntArray:
+        """(case,) position along ``output`` of the output whose peak counts in each case: that of the largest blade of a mistuned wheel."""
+        return np.array([peak_output(self.data, c.index) for c in self.cases])
+
     @property
-    def output(self) -> int:
-        """Position of the output whose peak counts along ``output``."""
-        names = [str(v) for v in self.data["output"].values] if "output" in self.data.coords else []
-        wanted = self.text("report_output")
-        return names.index(wanted) if wanted in names else 0
+    def mistuned(self) -> bool:
+        """Whether it is of the largest blade of a wheel whose sectors differ, not of one that was named."""
+        if not self.has("largest_blade", "blade_peak_amplitude"):
+            return False
+        each = self.data.sizes["output"] // self.data.sizes["blade"]
+        largest = self.integers("largest_blade")
+        return all(self.outputs[c.index] // each == largest[c.index] for c in self.peaked)
 
     @property
     def output_name(self) -> str:
-        """Label of that output, escaped."""
-        return self.labels("output")[self.output]
+        """Label of the output whose peak counts, escaped; of a mistuned wheel with several cases it says of which blade."""
+        labels = self.labels("output")
+        own = labels[int(self.outputs[0])]
+        if not self.mistuned:
+            return own
+        if len(self.cases) == 1:
+            return f"{own}, the largest blade at the peak"
+        return f"{_BLADE.sub('', own)} of the blade that is largest at the peak of each case"
+
+    def blade_at_peak(self, case: ShownCase) -> str:
+        """Return `` (tip[7].y)`` of the peak of a case where the largest blade of a mistuned wheel counts, else nothing."""
+        return f" ({self.labels('output')[self.outputs[case.index]]})" if self.mistuned else ""
+
+    def at_outputs(self, values: FloatArray) -> FloatArray:
+        """Return of values (point, ..., output) those of the output whose peak counts in the case of each point."""
+        return np.asarray(values[np.arange(len(values)), ..., self.outputs[self.point_case]])
 
     @property
     def length(self) -> str:
         """Unit of the output's motion."""
-        return "rad" if self.output_name.endswith(_TURNS) else "m"
+        return "rad" if self.labels("output")[self.outputs[0]].endswith(_TURNS) else "m"
 
     @property
     def per_force(self) -> bool:
@@ -218,7 +241,7 @@ class Response(Node):
 
     def response(self, name: str = "amplitude") -> FloatArray:
         """(point,) amplitude of the report output, divided by the excitation where there is one."""
-        values = np.asarray(self.data[name].isel(output=self.output).values, dtype=np.float64)
+        values = self.at_outputs(self.values(name, "point", "output"))
         force = np.array([c.excitation for c in self.cases])[self.point_case]
         return np.asarray(values / force) if self.per_force else values
 

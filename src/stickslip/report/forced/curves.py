@@ -65,7 +65,7 @@ def _curve(response: Response, case: ShownCase) -> go.Scatter:
         },
         customdata=list(zip(kept, said, response.hz[at], reasons, strict=True)),
         hovertemplate=(
-            f"{case.named}<br>%{{x:.2f}} {unit}: %{{y:.4g}} {scale.unit}<br>"
+            f"{case.named}{response.blade_at_peak(case)}<br>%{{x:.2f}} {unit}: %{{y:.4g}} {scale.unit}<br>"
             f"H = %{{customdata[0]}}, {about} %{{customdata[1]}}%{{customdata[3]}}<extra></extra>"
         ),
     )  # fmt: skip
@@ -117,7 +117,7 @@ def _peaks(response: Response) -> str:
     known = [c for c in response.peaked if response.resonates(c)] or response.peaked
     scale, ends = response.scale, (*known[:1], *known[1:][-1:])
     peaks = [
-        f"{number(response.peak_response(c) * scale.factor)} {scale.unit} at {number(response.peak_hz(c), 5)} Hz{c.where}"
+        f"{number(response.peak_response(c) * scale.factor)} {scale.unit} at {number(response.peak_hz(c), 5)} Hz{response.blade_at_peak(c)}{c.where}"
         for c in ends
     ]
     if len(ends) > 1:

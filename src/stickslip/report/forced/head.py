@@ -36,7 +36,8 @@ def _peak_card(response: Response) -> Card:
     if not within:
         return Card(size, cases[best].label, f"in every case {no_resonance}")
     left_out = len(cases) - len(within)
-    note = f"smallest peak of {counted(len(within), 'case')}, {percent(100 * float(peaks[best] / peaks.max()))} of the largest"
+    blade = response.blade_at_peak(within[best])
+    note = f"smallest peak of {counted(len(within), 'case')}{blade}, {percent(100 * float(peaks[best] / peaks.max()))} of the largest"
     if within[best] in (response.cases[0], response.cases[-1]):
         note += f"; the {'first' if within[best] is response.cases[0] else 'last'} case, so that a smaller one may lie beyond"
     if left_out:
@@ -50,9 +51,29 @@ def _shift_card(response: Response) -> Card | None:
         return None
     first, last = within[0], within[-1]
     a, b = response.peak_hz(first), response.peak_hz(last)
-    note = f"from {number(a, 5)} Hz{first.where} to {number(b, 5)} Hz{last.where}"
+    blades = [response.blade_at_peak(c) for c in (first, last)]
+    note = f"from {number(a, 5)} Hz{blades[0]}{first.where} to {number(b, 5)} Hz{blades[1]}{last.where}"
     label = f"shift of the peak over the cases ({percent(100 * (b / a - 1))})"
     return Card(f"{number(b - a)} Hz", label, note)
+
+
+def _blade_card(response: Response) -> Card | None:
+    """Return the largest amplification of a wheel whose sectors differ, and of which blade."""
+    if not response.has("amplification", "largest_blade"):
+        return None
+    factors = {c: response.number_of("amplification", c) for c in response.peaked}
+    known = sorted((c for c in factors if np.isfinite(factors[c])), key=lambda c: factors[c])
+    if not known:
+        return None
+    told = [
+        f"blade {int(response.number_of('largest_blade', c))}{c.where}"
+        for c in (known[-1], known[0])
+    ]
+    note = f"largest: {told[0]}"
+    if len(known) > 1:
+        note += f"; smallest of {len(known)} cases {number(factors[known[0]])}, {told[1]}"
+    label = f"{'largest ' * (len(known) > 1)}amplification over the wheel with all sectors alike"
+    return Card(number(factors[known[-1]]), label, note)
 
 
 def _loss_card(response: Response) -> Card | None:
@@ -119,6 +140,7 @@ def cards(response: Response) -> list[Card]:
     """Return the numbers that sum the response up."""
     first = (
         _peak_card(response),
+        _blade_card(response),
         _verdict_card(response),
         _shift_card(response),
         _loss_card(response),

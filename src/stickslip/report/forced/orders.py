@@ -17,7 +17,7 @@ def of_each_order(response: Response) -> Plot | None:
     orders = several_orders(response.data)
     if not orders or not response.has("driven_amplitude"):
         return None
-    size = response.values("driven_amplitude", "point", "driven", "output")[:, :, response.output]
+    size = response.at_outputs(response.values("driven_amplitude", "point", "driven", "output"))
     size = np.where(response.converged[:, None], size, np.nan)
     scale = scale_for(size, response.length)
     x, name, unit = abscissa(response)

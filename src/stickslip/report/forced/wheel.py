@@ -28,7 +28,7 @@ def blades(response: Response) -> Plot | None:
         return None
     count = response.data.sizes["blade"]
     own = response.data.sizes["output"] // count
-    size = response.values("amplitude", "point", "output")[:, response.output % own :: own]
+    size = response.values("amplitude", "point", "output")[:, response.outputs[0] % own :: own]
     size = np.where(response.converged[:, None], size, np.nan)
     scale = scale_for(size, response.length)
     x, name, unit = abscissa(response)

@@ -36,6 +36,18 @@ def branch_length(refinement: FloatArray) -> int:
     return int(along[-1]) + 1 if along.size else 0
 
 
+def peak_output(data: xr.Dataset, case: int) -> int:
+    """Return the position of the output whose peak counts in a case: of a wheel whose sectors differ that of the blade which attains it."""
+    labels = [str(x) for x in data["output"].values] if "output" in data.coords else []
+    wanted = str(data.attrs.get("report_output", ""))
+    named = labels.index(wanted) if wanted in labels else 0
+    top = float(data["peak_point"].values[case]) if "largest_blade" in data else -1.0
+    if not 0 <= top < data.sizes["point"]:
+        return named
+    off = np.abs(data["amplitude"].values[int(top)] - data["peak_amplitude"].values[case])
+    return named if off[named] <= off.min() else int(np.argmin(off))
+
+
 @dataclass(frozen=True, eq=False)
 class Curve:
     """A case.
@@ -99,15 +111,13 @@ class Curve:
     @cached_property
     def output(self) -> str:
         """Label of the output whose peak counts."""
-        labels = [str(x) for x in self.data["output"].values]
-        own = str(self.data.attrs.get("report_output", ""))
-        return own if own in labels else labels[0]
+        return str(self.data["output"].values[peak_output(self.data, self.case)])
 
     @cached_property
     def amplitude(self) -> FloatArray:
         """(n,) amplitude of that output, m."""
-        labels = [str(x) for x in self.data["output"].values]
-        return np.asarray(self.data["amplitude"].values[self.at, labels.index(self.output)])
+        column = peak_output(self.data, self.case)
+        return np.asarray(self.data["amplitude"].values[self.at, column])
 
     @cached_property
     def dissipation(self) -> FloatArray:

@@ -1,0 +1,74 @@
+"""The page of a mistuned wheel: its peak is that of the largest blade of each case, as in the terminal."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from synthetic_result import synthetic_result
+
+from stickslip.report.forced.curves import frequency_response
+from stickslip.report.forced.head import cards
+from stickslip.report.response import Response
+from stickslip.study.analyses.forced.curve import Curve, peak_output
+
+BLADES = [f"tip[{n}].x" for n in range(3)]
+
+
+def wheel(report_output: str = BLADES[0], largest: tuple[int, int] = (0, 2)) -> xr.Dataset:
+    """Two cases whose largest blade differs: of the others, one moves half as much and one a tenth."""
+    data = synthetic_result(ratios=(20, 5), n=12)
+    share = np.full((2, 3), 0.1)
+    share[[0, 1], [0, 2]] = 1.0
+    share[:, 1] = 0.5
+    size = data["amplitude"].values[:, :1] * share[data["point_case"].values]
+    data = data.assign_coords(output=BLADES)
+    data["amplitude"] = ("point", "output"), size
+    data["largest_blade"] = "case", list(largest)
+    data["blade_peak_amplitude"] = ("case", "blade"), share
+    data["amplification"] = "case", [1.25, 1.5]
+    data["peak_amplitude"] = (
+        "case",
+        [
+            size[int(p), BLADES.index(report_output) if report_output != BLADES[0] else (0, 2)[c]]
+            for c, p in enumerate(data["peak_point"].values)
+        ],
+    )
+    return data.assign_attrs(report_output=report_output)
+
+
+def test_the_peak_is_of_the_largest_blade_of_each_case() -> None:
+    data = wheel()
+    view = Response(data)
+    assert view.outputs.tolist() == [0, 2]
+    for case in view.cases:
+        peak = data["peak_amplitude"].values[case.index]
+        assert view.peak_response(case) * case.excitation == pytest.approx(peak, rel=1e-12)
+        curve = Curve(data, case.index)
+        assert curve.amplitude[curve.peak] == peak
+        assert curve.output == BLADES[(0, 2)[case.index]]
+    plot = frequency_response(view)
+    assert plot is not None
+    drawn = [np.nanmax(plot.figure.data[k].y) for k in (0, 1)]
+    peaks = [view.peak_response(c) * view.scale.factor for c in view.cases]
+    assert drawn == pytest.approx(peaks, rel=1e-12)
+    assert "tip.x of the blade that is largest at the peak of each case" in plot.caption
+    assert "Hz (tip[2].x) for load.shaker.ratio = 5" in plot.caption
+
+
+def test_a_tile_tells_amplification_and_largest_blade() -> None:
+    shown = cards(Response(wheel()))
+    (tile,) = (c for c in shown if "amplification" in c.label)
+    assert tile.value == "1.5"
+    assert tile.note.startswith(
+        "largest: blade 2 for load.shaker.ratio = 5; smallest of 2 cases 1.25, blade 0"
+    )
+    (shift,) = (c for c in shown if "shift of the peak" in c.label)
+    assert "Hz (tip[0].x) for" in shift.note
+    assert "Hz (tip[2].x) for" in shift.note
+
+
+def test_a_blade_that_is_named_stays_the_one_of_the_peak() -> None:
+    data = wheel(BLADES[1])
+    view = Response(data)
+    assert [peak_output(data, k) for k in (0, 1)] == [1, 1]
+    assert view.output_name == BLADES[1]
+    assert not view.mistuned
