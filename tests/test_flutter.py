@@ -1,5 +1,6 @@
 """Flutter from a study file and from Python, against a whole wheel with a fluid of its own."""
 
+import logging
 import re
 from dataclasses import replace
 from itertools import pairwise
@@ -19,6 +20,7 @@ from stickslip.model.dofs import nodal_dofs
 from stickslip.model.part import Part
 from stickslip.model.structure_file import save_structure
 from stickslip.reduction import InfluenceCoefficients
+from stickslip.report.page import report_html
 from stickslip.response.rotating.flutter import flutter_of_wave
 from stickslip.study.models.study import read_study
 
@@ -113,11 +115,21 @@ def test_coefficients_recorded_with_one_moved_blade_give_the_eigenvalues_of_the_
     assert "the least stable is" in result.summaries["flutter"][0].title
 
 
-def test_the_least_stable_wave_is_told_and_an_unstable_one_is_a_note() -> None:
+def test_the_least_stable_wave_is_told_and_an_unstable_one_is_a_warning(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(logging.getLogger(), "handlers", [])
     shaken = replace(influence(), values=-influence().values)
     result = model(of_blade(shaken)).flutter(number=1)
     told = [str(v) for v in result.verdicts]
-    assert any("NOTE" in t and "grows: damping" in t and "flutters" in t for t in told)
+    (grows,) = (t for t in told if t.startswith("WARNING: ") and "grows: damping" in t)
+    assert "flutters" in grows
+    assert grows in capsys.readouterr().err
+    assert result.conclusion == "1 warning, see the verdicts. Every answer is trusted."
+    page = report_html(result.data)
+    assert '<div class="box some"><b>1 warning, see the verdicts.' in page
+    assert '<b class="warning">WARNING:</b>' in page
+    assert '<div class="card danger">' in page
     data = result.data["flutter"].isel(case=0)
     w, m = int(data["least_wave"]), int(data["least_mode"])
     assert float(data["damping"][w, m]) == float(data["damping"].min()) < 0

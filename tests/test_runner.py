@@ -68,7 +68,7 @@ def test_result_is_a_tree_with_its_origin(whole: ToyStudy) -> None:
     np.testing.assert_array_equal(node.vary_value, [[1.5], [2.5]])
     assert node.value.dims == ("case", "term", "entry")
     log = (whole.folder / "run.log").read_text()
-    assert "WARNING: factor = 2.5: large." in log
+    assert "DOUBTFUL: factor = 2.5: large." in log
     assert "term 3" not in log  # progress is no line
 
 

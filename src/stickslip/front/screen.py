@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from stickslip.errors import printable
+from stickslip.study.keep.progress import head
 
 LOG = logging.getLogger("stickslip")
 STEPS = 10  # plain lines that a job writes on its way
@@ -23,7 +24,7 @@ class Screen(logging.Handler):
     bars
         Most bars at a time: one a worker.
     warnings
-        Whether to write warnings: not where they are listed at the end.
+        Whether to write warnings and verdicts: not where they are listed at the end.
     """
 
     def __init__(self, console: Console, bars: int = 1, *, warnings: bool = True) -> None:
@@ -54,10 +55,8 @@ class Screen(logging.Handler):
         text, fraction = record.getMessage(), getattr(record, "fraction", None)
         if fraction is not None:
             self._advance(str(getattr(record, "job", "")), float(fraction), text)
-        elif record.levelno < logging.WARNING:
-            self._line(text)
-        elif self._warnings:
-            self._line(f"WARNING: {text}")
+        elif self._warnings or not head(record):
+            self._line(f"{head(record)}{text}")
 
     def _line(self, text: str) -> None:
         self._console.print(printable(text), markup=False, highlight=False, soft_wrap=True)

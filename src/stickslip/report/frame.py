@@ -47,7 +47,7 @@ def chapter(key: str, title: str, body: str) -> str:
 def cards_html(cards: Sequence[Card]) -> str:
     """Return the boxes at the top."""
     boxes = "".join(
-        f'<div class="card"><b>{c.value}</b><span>{c.label}</span><small>{c.note}</small></div>'
+        f'<div class="card{" danger" * c.danger}"><b>{c.value}</b><span>{c.label}</span><small>{c.note}</small></div>'
         for c in cards
     )
     return f'<div class="cards">{boxes}</div>' if boxes else ""
@@ -68,7 +68,7 @@ def verdicts_html(verdicts: Sequence[Verdict], told: str, *, bad: bool) -> str:
     every = worst_first(verdicts)
     shown = [v for v in every if v.told]
     good = [v for v in every if not v.told]
-    kind = "bad" if bad else "some" if any(v.rank for v in shown) else "good"
+    kind = "bad" if bad else "some" if any(v.rank or v.warns for v in shown) else "good"
     items = f"<ul>{''.join(map(_verdict, shown))}</ul>" if shown else ""
     top = f'<div class="box {kind}"><b>{escape(told)}</b>{items}</div>'
     if not good:

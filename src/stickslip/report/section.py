@@ -14,11 +14,12 @@ Part = Callable[[Any], Shown]  # of a view of the dataset
 
 @dataclass(frozen=True)
 class Card:
-    """A box at the top of the page: one number, what it is, and more about it."""
+    """A box at the top of the page: one number, what it is, and more about it; red where it tells of danger."""
 
     value: str
     label: str
     note: str
+    danger: bool = False
 
 
 @dataclass(frozen=True)

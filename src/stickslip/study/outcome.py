@@ -13,7 +13,7 @@ from stickslip.study.analyses.forced.working_range import with_regimes
 from stickslip.study.analyses.verdict import ATTRIBUTE, Verdict, of_tree, to_json
 from stickslip.study.keep.journal import read_note, read_sealed
 from stickslip.study.keep.netcdf import variable
-from stickslip.study.keep.progress import LOG
+from stickslip.study.keep.progress import tell
 from stickslip.study.keep.provenance import Provenance
 from stickslip.study.measured_variables import with_measured
 from stickslip.study.models.measured import MeasuredPeaks
@@ -94,11 +94,10 @@ class Book:
             node = with_regimes(with_measured(node, self.measured))
         unsolved = [_unsolved(s) for s in solved if UNSOLVED in s.notes]
         found = (*unsolved, *asked.verdicts(node))
-        new = dict.fromkeys(v.sentence for v in found if v.told)
-        for text in new:
-            if text not in self.told:
-                LOG.warning(text)
-        self.told.update(new)
+        for verdict in found:
+            if verdict.told and verdict.sentence not in self.told:
+                self.told.add(verdict.sentence)
+                tell(verdict.word, verdict.sentence)
         failed = int(node.attrs.get("failed", 0)) + len(unsolved)
         own = {ATTRIBUTE: to_json(found), "failed": failed}
         self.nodes[asked.name] = node.assign_attrs(own)

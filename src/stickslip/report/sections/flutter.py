@@ -110,10 +110,30 @@ def mistuned(view: Waves) -> str | None:
 def _cards(view: Waves) -> list[Card]:
     total = view.floats("damping")
     i, m = int(view.scalar("least_wave", 0)), int(view.scalar("least_mode", 0))
+    least, required = float(total[i, m]), view.scalar("required_damping", 0.0)
     note = f"{view.waves[i]}, mode {m + 1}"
-    return [
-        Card(f"{number(_PERCENT * float(total[i, m]), 4)} %", "least damping in the flow", note)
+    if least < required:
+        grow = int(np.count_nonzero(total < 0))
+        fate = (
+            f"{counted(grow, 'mode')} of all waves unstable"
+            if grow
+            else f"less than the {number(_PERCENT * required)} % required"
+        )
+        note += f"; {fate}"
+    found = [
+        Card(
+            f"{number(_PERCENT * least, 4)} %", "least damping in the flow", note, least < required
+        )
     ]
+    if view.has("wheel_damping"):
+        wheel = view.floats("wheel_damping")
+        grow = int(np.count_nonzero(wheel < 0))
+        note = f"{grow} of {counted(wheel.size, 'mode')} unstable"
+        text = f"{number(_PERCENT * float(wheel[0]), 4)} %"
+        found.append(
+            Card(text, "least damping with the sectors as they differ", note, wheel[0] < required)
+        )
+    return found
 
 
 _BLOCK = Block("flutter", "Flutter", (least_stable_diagram, margins, mistuned))

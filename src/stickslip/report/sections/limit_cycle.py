@@ -146,12 +146,17 @@ def _row(view: Cycles, names: Sequence[str], c: int) -> list[str]:
 
 def _without(view: Cycles, names: Sequence[str]) -> str:
     """Say which modes friction cannot bound."""
-    ratio, most = view.floats("mode_damping_ratio"), view.floats("largest_damping_ratio")
-    lost = [i for i in range(len(names)) if ratio[i] < 0 and not most[i] > 0]
+    most, lost = view.floats("largest_damping_ratio"), _unbounded(view)
     if not lost:
         return ""
     said = [f"{names[i]} (at most {number(100 * most[i])} %)" for i in lost]
     return f"<p><b>Friction cannot bound</b> {joined(said)}: the damping is negative at every amplitude.</p>"
+
+
+def _unbounded(view: Cycles) -> list[int]:
+    """Return the modes that friction cannot bound."""
+    ratio, most = view.floats("mode_damping_ratio"), view.floats("largest_damping_ratio")
+    return [i for i in range(len(view.names)) if ratio[i] < 0 and not most[i] > 0]
 
 
 def _over_amplitude(view: Cycles, name: str, factor: float) -> go.Figure:
@@ -238,7 +243,10 @@ def _cards(view: Cycles) -> list[Card]:
         return [Card("0", "modes grow by themselves", "contacts stuck")]
     words = view.labels_of("cycle_stability") if view.cycles else ()
     note = f"{words.count('unstable')} unstable, {counted(len(view.names), 'mode')} followed"
-    return [Card(str(words.count("stable")), "stable limit cycles", note)]
+    lost = len(_unbounded(view))
+    if lost:
+        note += f"; friction cannot bound {counted(lost, 'mode')}"
+    return [Card(str(words.count("stable")), "stable limit cycles", note, lost > 0)]
 
 
 _BLOCK = Block(

@@ -139,7 +139,7 @@ def _unstable_wheel(eigenvalues: ComplexArray, asked: FlutterTable) -> list[Verd
         else f"it has less than the {asked.required_percent:g} % required"
     )
     why = f"the wheel whose sectors differ has a least damping of {PERCENT * damping[0]:.4g} % at {eigenvalues[0].imag / HZ:.5g} Hz: {what}"
-    return [Verdict("trusted", why=why, remedy=FLUTTERS if grows else MORE)]
+    return [Verdict("trusted", why=why, remedy=FLUTTERS if grows else MORE, warns=True)]
 
 
 def _influence(note: Any) -> InfluenceCoefficients:
@@ -164,7 +164,7 @@ def _unstable(
     )
     others = f" ({len(rows)} waves and modes in all)" if len(rows) > 1 else ""
     why = f"{name}, mode {m + 1} {what}: damping {PERCENT * worst:.4g} % at {waves[i].frequencies_hz[m]:.5g} Hz{others}"
-    return [Verdict("trusted", why=why, remedy=FLUTTERS if worst < 0 else MORE)]
+    return [Verdict("trusted", why=why, remedy=FLUTTERS if worst < 0 else MORE, warns=True)]
 
 
 def _doubts(energy: FloatArray, by_eigenvalue: FloatArray) -> list[Verdict]:

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -32,6 +32,8 @@ class Verdict:
         Half a sentence or more, without a full stop.
     remedy
         What to do, in whole sentences; empty where nothing is to be done.
+    warns
+        Whether an answer that is trusted tells of danger: a wheel that flutters.
     """
 
     level: Level
@@ -39,6 +41,7 @@ class Verdict:
     frequency_hz: float | None = None
     why: str = ""
     remedy: str = ""
+    warns: bool = False
 
     @property
     def rank(self) -> int:
@@ -48,11 +51,13 @@ class Verdict:
     @property
     def told(self) -> bool:
         """Whether the user is told of it unasked: it is not trusted, or there is something to do or to know."""
-        return self.rank > 0 or bool(self.remedy)
+        return self.rank > 0 or self.warns or bool(self.remedy)
 
     @property
     def word(self) -> str:
-        """What begins it wherever it is shown: its level, or ``note`` where it is trusted and there is something to do or to know."""
+        """What begins it wherever it is shown: its level; of what is trusted ``warning`` or ``note`` where there is something to do or to know."""
+        if self.warns and not self.rank:
+            return "warning"
         return "note" if self.told and not self.rank else self.level
 
     @property
@@ -92,18 +97,18 @@ def of_all_cases(each: Sequence[Verdict], labels: Sequence[str]) -> tuple[Verdic
     """Return verdicts in their order, and once without a case what holds as a whole for each of several."""
     cases: dict[tuple[Any, ...], list[str]] = {}
     for v in each:
-        cases.setdefault((v.level, v.frequency_hz, v.why, v.remedy), []).append(v.case)
+        cases.setdefault((v.level, v.frequency_hz, v.why, v.remedy, v.warns), []).append(v.case)
     found: dict[Verdict, None] = {}
     for v in each:
-        known = set(cases[v.level, v.frequency_hz, v.why, v.remedy])
+        known = set(cases[v.level, v.frequency_hz, v.why, v.remedy, v.warns])
         everywhere = v.told and v.frequency_hz is None and len(labels) > 1 and known >= set(labels)
-        found[Verdict(v.level, "", None, v.why, v.remedy) if everywhere else v] = None
+        found[replace(v, case="") if everywhere else v] = None
     return tuple(found)
 
 
 def worst_first(verdicts: Iterable[Verdict]) -> list[Verdict]:
-    """Return verdicts as they are read: wrong, doubtful, notes, trusted; the order of the cases within each."""
-    return sorted(verdicts, key=lambda v: (-v.rank, not v.told))
+    """Return verdicts as they are read: wrong, doubtful, warnings, notes, trusted; the order of the cases within each."""
+    return sorted(verdicts, key=lambda v: (-v.rank, not v.warns, not v.told))
 
 
 def to_json(verdicts: Iterable[Verdict]) -> str:
@@ -150,19 +155,19 @@ def not_trusted(tree: xr.DataTree) -> str:
 
 
 def conclusion(tree: xr.DataTree) -> str:
-    """Say in a line whether a result is to be trusted: `not_trusted`, or else which single points are not."""
+    """Say in a line whether a result is to be trusted: `not_trusted`, or else which single points are not, after how many warnings there are."""
     told = not_trusted(tree)
     if told:
         return told
+    warnings = sum(v.word == "warning" for v in of_tree(tree))
+    head = f"{warnings} warning{'s' * (warnings > 1)}, see the verdicts. " if warnings else ""
     found = [node["verdict"].values for node in tree.children.values() if "verdict" in node]
     every = np.concatenate([np.zeros(0, dtype=np.int64), *found])
     counts = {LEVELS[k]: int(np.sum(every == k)) for k in (2, 1)}
     off = ", ".join(f"{n} {level}" for level, n in counts.items() if n)
     if not off:
-        return "Every answer is trusted."
-    return (
-        f"Every case is trusted; of {every.size} points {off}, none of them the peak of its case."
-    )
+        return f"{head}Every answer is trusted."
+    return f"{head}Every case is trusted; of {every.size} points {off}, none of them the peak of its case."
 
 
 def _not_trusted(name: str, data: xr.Dataset) -> str:

@@ -28,6 +28,19 @@ def advance(fraction: float, text: str) -> None:
     LOG.info(text, extra={"fraction": fraction, "job": _JOB.get()})
 
 
+def tell(word: str, text: str) -> None:
+    """Tell a verdict with the word that begins it everywhere; a note is no warning."""
+    level = logging.INFO if word == "note" else logging.WARNING
+    LOG.log(level, text, extra={"verdict": word.upper()})
+
+
+def head(record: logging.LogRecord) -> str:
+    """Return what a line begins with: the word of a verdict, ``WARNING`` of other warnings, or nothing."""
+    plain = "WARNING" if record.levelno >= logging.WARNING else ""
+    word = getattr(record, "verdict", plain)
+    return f"{word}: " if word else ""
+
+
 @contextmanager
 def at_work(job: str) -> Iterator[None]:
     """Name the job whose progress is told."""
@@ -52,7 +65,7 @@ def written_down(path: Path) -> Iterator[None]:
         handler = _LogFile(path, encoding="utf-8")
     except OSError as error:
         raise unwritable(path, error) from None
-    formatter = logging.Formatter("%(asctime)s %(warning)s%(message)s", "%Y-%m-%dT%H:%M:%S+00:00")
+    formatter = logging.Formatter("%(asctime)s %(head)s%(message)s", "%Y-%m-%dT%H:%M:%S+00:00")
     formatter.converter = time.gmtime
     handler.setFormatter(formatter)
     handler.addFilter(_line)
@@ -81,6 +94,6 @@ class _LogFile(logging.FileHandler):
 
 
 def _line(record: logging.LogRecord) -> bool:
-    """Say whether a record is a line of its own, and mark warnings."""
-    record.warning = "WARNING: " if record.levelno >= logging.WARNING else ""
+    """Say whether a record is a line of its own, and give it its head."""
+    record.head = head(record)
     return not hasattr(record, "fraction")

@@ -73,7 +73,7 @@ def _of_branch(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verd
             f"{name}: friction cannot bound it: its damping ratio is {100 * ratio:.3g} % with contacts stuck and {most:.3g} % at most "
             "over the amplitudes looked at"
         )
-        found.append(Verdict("trusted", label, None, why, "Give more damping or friction, or look at larger amplitudes (limit_cycle.amplitude_mm)."))  # fmt: skip
+        found.append(Verdict("trusted", label, None, why, "Give more damping or friction, or look at larger amplitudes (limit_cycle.amplitude_mm).", warns=True))  # fmt: skip
     return found
 
 
