@@ -12,11 +12,22 @@ from test_forced_analysis import dataset, lifted, question, rubbing, solved
 from typer.testing import CliRunner
 
 from stickslip.cli import app
+from stickslip.contact.interface import Interface
+from stickslip.model.dofs import numbered_dofs
+from stickslip.model.structure import Structure
+from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.response import Sweep, forced_response
+from stickslip.response.system import System
+from stickslip.response.time.sectors import sectors_in_time
 from stickslip.study.analyses import forced_response as analysis
 from stickslip.study.analyses.forced import examination, stable
 from stickslip.study.analyses.forced.comparison import Check
-from stickslip.study.analyses.forced.in_time import MOST_TOLD, check_in_time, shows_after
+from stickslip.study.analyses.forced.in_time import (
+    MOST_TOLD,
+    check_in_time,
+    seconds_in_time,
+    shows_after,
+)
 from stickslip.study.analyses.forced.points import Response, collect
 from stickslip.study.analyses.forced.question import Question
 from stickslip.study.analyses.forced.stable import (
@@ -196,7 +207,6 @@ def test_a_tuned_wheel_is_examined_with_all_its_sectors_if_they_are_few(
 ) -> None:
     (case,) = read_study(write_shrouded_sector(tmp_path)).cases()
     monkeypatch.setattr(examination, "MOST_WHEEL", 0.0)
-    monkeypatch.setattr(stable, "MOST_WHEEL", 0.0)
     asked = FORCED_RESPONSE.inputs(case, case.build())
     any_point = response_of(rubbed()).accepted[0]
     found = examine(asked, any_point)
@@ -210,11 +220,51 @@ def test_a_tuned_wheel_is_examined_with_all_its_sectors_if_they_are_few(
     assert cost_line(whole).startswith("stability: the peak")
 
 
+def on_a_wheel(asked: Question, n: int, contacts: int, *, every: bool) -> Question:
+    """Return a question whose model is a wheel of 12 sectors of n coordinates, with every wave or those of two harmonics."""
+    structure = Structure(np.eye(n), np.zeros((n, n)), np.eye(n), numbered_dofs(n))
+    waves = dict.fromkeys(range(12) if every else (0, 5, 10), structure)
+    names = tuple(str(i) for i in range(contacts))
+    law = asked.model.system.interface.laws[0]
+    gaps = Interface(names, (law,) * contacts, np.zeros((3 * contacts, n)))
+    wheel = System(TunedWheel(waves, 12, 5, 2), gaps, np.array([0]))
+    return replace(asked, model=replace(asked.model, system=wheel))
+
+
+@pytest.mark.parametrize(("n", "contacts"), [(200, 20), (200, 0), (30, 1)])
+@pytest.mark.parametrize("every", [True, False])
+def test_a_large_wheel_is_not_examined_whatever_waves_it_has(
+    n: int, contacts: int, every: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Harmonics 0 to 6 of engine order 5 lead to all waves of 12 sectors: the wheel is no smaller for it."""
+    small = rubbed()
+    point = response_of(small).accepted[0]
+    asked = on_a_wheel(small, n, contacts, every=every)
+    wheel = asked.model.system
+    assert wheel.structure.has_every_wave == every
+    monkeypatch.setattr(stable, "stability", lambda *_: pytest.fail("it was examined"))
+    assert f"not examined, against every wave all 12 sectors count, {12 * n} " in cost_line(asked)
+    assert examine(asked, point).verdict == "not examined"
+    assert not examination.examines_every_wave(wheel)
+    # a limit cycle has all waves in any case and may take a minute
+    assert bool(examination.too_long(wheel, forced=False)) == (n > 30)
+
+
+def test_the_integration_of_a_wheel_counts_all_sectors_that_are_marched() -> None:
+    small = rubbed()
+    whole = on_a_wheel(small, 30, 1, every=True).model.system
+    one = replace(whole, structure=whole.structure.waves[0])
+    assert sectors_in_time(whole) == 12
+    assert seconds_in_time(whole) > 12**2 * seconds_in_time(one)
+    even = replace(whole.structure, engine_order=6, waves={0: one.structure, 6: one.structure})
+    assert sectors_in_time(replace(whole, structure=even)) == 2
+
+
 def test_what_costs_too_much_is_said_by_its_size(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = rubbed()
     response = response_of(asked)
     assert "about" in cost_line(asked)
-    monkeypatch.setattr(stable, "MOST_WORK", 1.0)
+    monkeypatch.setattr(examination, "MOST_WORK", 1.0)
     assert to_examine(replace(asked, examine="all"), response) == [response.peak]
     assert response.top is not None
     found = examine(asked, response.top)
@@ -306,4 +356,4 @@ def test_a_run_says_whether_its_peaks_are_stable(tmp_path: Path) -> None:
 
 
 def test_a_long_time_is_told_in_hours_and_days() -> None:
-    assert [stable._lasting(t) for t in (8.0, 7000.0, 9000.0, 1252940.0)] == ["8 s", "7000 s", "2 hours", "15 days"]  # fmt: skip
+    assert [examination._lasting(t) for t in (8.0, 7000.0, 9000.0, 1252940.0)] == ["8 s", "7000 s", "2 hours", "15 days"]  # fmt: skip

@@ -105,7 +105,7 @@ def test_a_wheel_of_too_many_coordinates_is_refused(tmp_path: Path) -> None:
     path.write_text(changed(text, {"load.gas.engine_order": "1"}), encoding="utf-8")
     (case,) = read_study(path).cases()
     asked = replace(case, checks=frozenset({"verify"}))
-    said = r"part\.blade\.sectors: --verify integrates all sectors that do different things, \d+ coordinates, more than 600"
+    said = r"part\.blade\.sectors: --verify integrates all sectors that may do different things, \d+ coordinates, more than 600"
     with pytest.raises(InputError, match=said):
         FORCED_RESPONSE.inputs(asked, asked.build())
 

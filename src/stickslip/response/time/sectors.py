@@ -217,6 +217,14 @@ def different_sectors(wheel: TunedWheel) -> tuple[int, int]:
     return wheel.sectors // common, common
 
 
+def sectors_in_time(system: System) -> int:
+    """Return how many sectors a forced motion is marched with: those of a tuned wheel that do different things, with every wave all; else 1."""
+    wheel = system.structure
+    if not isinstance(wheel, TunedWheel):
+        return 1
+    return wheel.sectors if wheel.has_every_wave else different_sectors(wheel)[0]
+
+
 def _kept(wheel: TunedWheel) -> int:
     """Return the number of a sector's coordinates that move by themselves; behind them are copies of neighbours' and what ties these."""
     return wheel.n - 2 * wheel.multipliers.size

@@ -10,9 +10,10 @@ from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
 from stickslip.study.analyses.cycles.dataset import dataset
 from stickslip.study.analyses.cycles.question import IN_TIME, ONE, Question, question_of
 from stickslip.study.analyses.cycles.records import CycleBranch
-from stickslip.study.analyses.cycles.solve import solve, unexaminable
+from stickslip.study.analyses.cycles.solve import solve
 from stickslip.study.analyses.cycles.table import LimitCycleTable
 from stickslip.study.analyses.cycles.words import tables
+from stickslip.study.analyses.forced.examination import too_long
 from stickslip.study.analyses.verdict import Verdict, stored
 
 
@@ -54,7 +55,7 @@ class LimitCycleAnalysis:
                 lines.append(
                     f"limit_cycle: {of}mode {mode.number}, damping ratio {100 * mode.ratio:+.3g} %"
                 )
-        why = unexaminable(question.model.system)
+        why = too_long(question.model.system, forced=False)
         stability = f"limit_cycle: stability not examined, {why}" if why else ""
         none = "limit_cycle: no mode grows with contacts stuck"
         return tuple(line for line in (*(lines or [none]), stability) if line)

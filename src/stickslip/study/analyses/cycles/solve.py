@@ -8,7 +8,6 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import StickslipError
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.self_excited.curve import (
     AmplitudePoint,
     damping_over_amplitude,
@@ -23,12 +22,11 @@ from stickslip.response.self_excited.cycles import (
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.response.self_excited.problem import SelfExcited, self_excited_motions
 from stickslip.response.self_excited.stable import CycleStability, cycle_stability
-from stickslip.response.system import System
 from stickslip.study.analyses.analysis import Notes
 from stickslip.study.analyses.cycles.question import ONE, Question, coordinate
 from stickslip.study.analyses.cycles.records import CycleBranch
 from stickslip.study.analyses.cycles.time import compete, settle_cycles
-from stickslip.study.analyses.forced.examination import FLOPS, MOST_WORK, examination_work
+from stickslip.study.analyses.forced.examination import too_long
 from stickslip.study.keep.progress import LOG, advance
 from stickslip.units import HZ
 
@@ -149,26 +147,13 @@ def _motions(problem: SelfExcited, cycles: Sequence[LimitCycle]) -> FloatArray:
 
 def _examined(problem: SelfExcited, cycle: LimitCycle) -> CycleStability | str:
     """Return the stability of a cycle, or why it is not examined."""
-    why = unexaminable(problem.system)
+    why = too_long(problem.system, forced=False)
     if why:
         return why
     try:
         return cycle_stability(problem, cycle)
     except (StickslipError, FloatingPointError, np.linalg.LinAlgError) as error:
         return str(error)
-
-
-def unexaminable(system: System) -> str:
-    """Return why the stability of motions is not examined; empty where nothing is known against it."""
-    work = examination_work(system)
-    if work <= MOST_WORK:
-        return ""
-    side = system.structure
-    sectors = side.sectors if isinstance(side, TunedWheel) else 1
-    return (
-        f"{sectors * side.n} coordinates with {sectors * system.interface.n_contacts} contacts would take about "
-        f"{work / FLOPS:.0f} s, more than {MOST_WORK / FLOPS:.0f} s"
-    )
 
 
 def _without(wave: int, mode: StuckMode, problem: str) -> CycleBranch:

@@ -1,4 +1,4 @@
-"""What an examination of the stability costs: all sectors of a wheel count, each of which may do something else."""
+"""What an examination of the stability costs, and whether it is begun: all sectors of a wheel count, each of which may do something else."""
 
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.system import System
@@ -10,22 +10,60 @@ FLOPS = 2e10  # a second, of such products on one core
 MOST_WORK = 60 * FLOPS  # of one examination
 MOST_WHEEL = (
     4 * FLOPS
-)  # the same of all sectors of a wheel, whose other waves are reduced for nothing else
+)  # the same of a forced motion of a wheel, whose other waves are reduced for nothing else
 
 
 def examination_work(system: System) -> float:
     """Return the operations of one examination, which looks at two motions; of a wheel at those of all its sectors.
 
-    A travelling motion repeats itself in other sectors, so that a share of the period is enough.
+    A travelling motion repeats itself in other sectors, so that a share of the period is enough; modes and multipliers of all
+    coordinates are found in any case, and take about as much as one interval.
     """
     side, sectors, shares = system.structure, 1, 1
     if isinstance(side, TunedWheel):
         sectors, shares = side.sectors, different_sectors(side)[0]
     rows = 2 * sectors * side.n
-    intervals = INTERVALS * sectors * system.interface.n_contacts / shares
+    intervals = max(1.0, INTERVALS * sectors * system.interface.n_contacts / shares)
     return 2.0 * intervals * PRODUCTS * 2.0 * rows**3
 
 
+def too_long(system: System, *, forced: bool) -> str:
+    """Return why no examination is begun, by the size of what is marched; empty where it is soon done.
+
+    Which waves of a wheel there are makes no difference: harmonics may have led to all of them without making the wheel any smaller.
+
+    Parameters
+    ----------
+    system
+        What vibrates.
+    forced
+        Whether a load drives it.
+    """
+    side, work = system.structure, examination_work(system)
+    wheel = isinstance(side, TunedWheel)
+    most = MOST_WHEEL if forced and wheel else MOST_WORK
+    if work <= most:
+        return ""
+    would = f"would take about {_lasting(work / FLOPS)} a motion, more than {most / FLOPS:.0f} s"
+    if isinstance(side, TunedWheel):
+        return (
+            f"against every wave all {side.sectors} sectors count, {side.sectors * side.n} coordinates with "
+            f"{side.sectors * system.interface.n_contacts} contacts, which {would}"
+        )
+    return (
+        f"{side.n} coordinates with {system.interface.n_contacts} contacts {would}: each interval between two transitions costs "
+        "the exponential of a matrix of twice as many rows"
+    )
+
+
 def examines_every_wave(system: System) -> bool:
-    """Whether a tuned wheel is so small that the stability of its motions is examined against every wave."""
-    return isinstance(system.structure, TunedWheel) and examination_work(system) <= MOST_WHEEL
+    """Whether a tuned wheel is so small that the stability of its forced motions is examined against every wave."""
+    return isinstance(system.structure, TunedWheel) and not too_long(system, forced=True)
+
+
+def _lasting(seconds: float) -> str:
+    """Return a long time as it is read: in seconds, hours or days."""
+    for name, unit in (("days", 86400.0), ("hours", 3600.0)):
+        if seconds > 2 * unit:
+            return f"{seconds / unit:.0f} {name}"
+    return f"{seconds:.0f} s"

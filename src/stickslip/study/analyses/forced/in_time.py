@@ -12,7 +12,7 @@ from stickslip.harmonic.linear import one_structure
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.response import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.response.system import System
-from stickslip.response.time.sectors import all_sectors
+from stickslip.response.time.sectors import all_sectors, sectors_in_time
 from stickslip.response.time.start import TransientStart, start_from_harmonics
 from stickslip.response.time.transient import (
     TimeStepping,
@@ -108,8 +108,9 @@ def shows_after(multiplier: float) -> int:
 
 
 def seconds_in_time(system: System) -> float:
-    """Return about how long an integration takes that does not settle, s, by the size of the model."""
-    rows, gaps = 2 * system.structure.n, 3 * system.interface.n_contacts
+    """Return about how long an integration takes that does not settle, s, by the size of all sectors that are marched."""
+    sectors = sectors_in_time(system)
+    rows, gaps = 2 * sectors * system.structure.n, 3 * sectors * system.interface.n_contacts
     return PATIENCE * STEPS * (2.0 * rows**2 + float(gaps) ** 3) / FLOPS
 
 

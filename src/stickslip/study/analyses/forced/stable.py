@@ -13,9 +13,8 @@ from stickslip.study.analyses.forced.comparison import Check
 from stickslip.study.analyses.forced.curve import branch_length
 from stickslip.study.analyses.forced.examination import (
     FLOPS,
-    MOST_WHEEL,
-    MOST_WORK,
     examination_work,
+    too_long,
 )
 from stickslip.study.analyses.forced.in_time import seconds_in_time
 from stickslip.study.analyses.forced.jumps import jumps, stored_energy
@@ -154,35 +153,10 @@ def unexaminable(question: Question) -> str:
     system = question.model.system
     if system.interface.rigid:
         return "a contact is rigid: its force is no function of the gap"
-    work, wheel = examination_work(system), system.structure
-    if isinstance(wheel, TunedWheel):
-        return _unexaminable_wheel(wheel, work)
-    if work > MOST_WORK:
-        return (
-            f"{system.structure.n} coordinates with {system.interface.n_contacts} contacts would take about "
-            f"{_lasting(work / FLOPS)} a point, more than {MOST_WORK / FLOPS:.0f} s: each interval between two transitions costs "
-            "the exponential of a matrix of twice as many rows"
-        )
-    return ""
-
-
-def _lasting(seconds: float) -> str:
-    """Return a long time as it is read: in seconds, hours or days."""
-    for name, unit in (("days", 86400.0), ("hours", 3600.0)):
-        if seconds > 2 * unit:
-            return f"{seconds / unit:.0f} {name}"
-    return f"{seconds:.0f} s"
-
-
-def _unexaminable_wheel(wheel: TunedWheel, work: float) -> str:
-    if wheel.has_every_wave:
-        return ""
-    if work > MOST_WHEEL:
-        return (
-            f"against every wave all {wheel.sectors} sectors count, {wheel.sectors * wheel.n} coordinates, which would take about "
-            f"{_lasting(work / FLOPS)} a point, more than {MOST_WHEEL / FLOPS:.0f} s"
-        )
-    return ONE_SECTOR
+    why, wheel = too_long(system, forced=True), system.structure
+    if not why and isinstance(wheel, TunedWheel) and not wheel.has_every_wave:
+        return ONE_SECTOR
+    return why
 
 
 def cost_line(question: Question) -> str:
