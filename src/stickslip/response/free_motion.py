@@ -63,23 +63,27 @@ def _least_held(matrix: FloatArray) -> tuple[float, FloatArray]:
     All singular values of the Jacobian of a mistuned wheel would take longer than its response.
     """
     rng = np.random.default_rng(0)
-    large = rng.standard_normal(len(matrix))
-    largest = 0.0
+    matrix = matrix / np.max(np.abs(matrix))
+    large: FloatArray = rng.standard_normal(len(matrix))
+    largest = inverse = 0.0
     for _ in range(STEPS):
-        large = matrix.T @ (matrix @ large)
-        largest = float(np.linalg.norm(large))
-        large /= largest
-    largest = np.sqrt(largest)
+        large, _ = _unit(matrix @ large)
+        large, largest = _unit(matrix.T @ large)
     lu, pivots, _ = scipy.linalg.lapack.dgetrf(matrix)
     tiny = np.finfo(float).eps * largest
     diagonal = np.einsum("ii->i", lu)
-    diagonal[np.abs(diagonal) < tiny] = (
-        tiny  # a singular matrix is told by its vector, not by a division
-    )
-    small = rng.standard_normal(len(matrix))
-    inverse = 0.0
+    # a singular matrix is told by its vector, not by a division by zero
+    diagonal[np.abs(diagonal) < tiny] = tiny
+    small: FloatArray = rng.standard_normal(len(matrix))
     for _ in range(STEPS):
-        small = scipy.linalg.lu_solve((lu, pivots), small / np.linalg.norm(small), trans=1)
-        small = scipy.linalg.lu_solve((lu, pivots), small)
-        inverse = float(np.linalg.norm(small))
-    return 1.0 / (np.sqrt(inverse) * largest), small / inverse
+        small, _ = _unit(scipy.linalg.lu_solve((lu, pivots), small, trans=1))
+        small, inverse = _unit(scipy.linalg.lu_solve((lu, pivots), small))
+    return 1.0 / (inverse * largest), small
+
+
+def _unit(vector: FloatArray) -> tuple[FloatArray, float]:
+    """Return a vector of unit length and the length, whose square may be beyond all numbers."""
+    most = float(np.max(np.abs(vector)))
+    scaled = vector / most
+    length = float(np.linalg.norm(scaled))
+    return scaled / length, length * most
