@@ -22,6 +22,7 @@ from stickslip.model.structure_file import save_structure
 from stickslip.reduction import InfluenceCoefficients
 from stickslip.report.page import report_html
 from stickslip.response.rotating.flutter import flutter_of_wave
+from stickslip.study.analyses.flutter import _others as others
 from stickslip.study.models.study import read_study
 
 N = fluid.BLADES
@@ -136,6 +137,11 @@ def test_the_least_stable_wave_is_told_and_an_unstable_one_is_a_warning(
     assert f"mode {m + 1} grows" in " ".join(told)
     calm = model(of_blade(influence())).flutter(number=1, required_percent=1.0)
     assert any("less damping than the 1 % required" in str(v) for v in calm.verdicts)
+    rows = [(-0.2, 1, 0), (-0.1, 2, 0), (0.001, 3, 0)]
+    assert others(rows, -0.2) == "; 2 waves grow in all"
+    assert others([*rows, (-0.1, 2, 1)], -0.2) == "; 3 modes of 2 waves grow in all"
+    assert others([(0.1, 1, 0), (0.2, 2, 0)], 0.1) == "; 2 waves have too little in all"
+    assert others(rows[1:], -0.1) == ""
 
 
 @pytest.mark.parametrize("wave", [1, 4])

@@ -1,5 +1,6 @@
 """[limit_cycle] of a study: benchmark numbers, resuming, Python, the page; the wheel of examples/flutter_ring run small."""
 
+import logging
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -141,7 +142,10 @@ def test_the_ring_holds_two_waves_and_one_is_left(tmp_path: Path) -> None:
     assert "competing_waves" not in plots(outcome.tree)
 
 
-def test_waves_compete_in_time_and_what_has_no_flutter_says_so(tmp_path: Path) -> None:
+def test_waves_compete_in_time_and_what_has_no_flutter_says_so(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO, "stickslip")
     keys = {"in_time": "true", "periods": "64", "most_harmonics": "3", "points": "5"}
     outcome = answered(flutter_ring(tmp_path / "a", **keys), tmp_path / "a")
     case = one_case(outcome.tree["limit_cycle"].to_dataset(), 0)
@@ -149,7 +153,22 @@ def test_waves_compete_in_time_and_what_has_no_flutter_says_so(tmp_path: Path) -
     first = case["wave_amplitude"].values[0]
     assert sorted(np.argsort(first)[-2:]) == [1, 2]
     assert "competing_waves" in plots(outcome.tree)
-    assert any("mixed start" in v.why for v in outcome.verdicts)
+    # so few periods leave no cycle and settle nothing: neither reads as an answer
+    assert "; that confirms nothing: the cycle is unstable" in caplog.text
+    assert "% off; unstable, no confirmation)" in cycle_table(Cycles(case))
+    (leaves,) = (v for v in outcome.verdicts if "amplitude, but wave 1 at 619." in v.why)
+    assert "from a mixed start of all unstable waves, in time: not settled yet" in leaves.remedy
+    (mixed,) = (v for v in outcome.verdicts if "mixed start" in v.why)
+    assert mixed.rank
+    assert "the motion still grows, wave 1 most (wave 1 has 0.00" in mixed.why
+    assert mixed.remedy == "limit_cycle.periods were too few to settle: raise it."
+    own = case.assign(cycle_growing_wave=("cycle", [2, 1, 2, 2]))
+    told = [v.why for v in case_verdicts("", own.variables)]
+    assert any("but a modulation of it, by wave 2 itself at 619." in why for why in told)
+    words = ("cycle", ["stable", "unstable", "unstable", "unstable"])
+    stable = case.assign(cycle_stability=words, outcome=case.attrs["outcome"])
+    told = [v.why for v in case_verdicts("", stable.variables) if "mixed start" in v.why]
+    assert "; its stable limit cycle 0.0231 mm)" in told[0]
     # that a mode was left out which grows is told
     assert not any("not followed" in v.why for v in case_verdicts("", case.variables))
     first = case.isel(branch=[0]).drop_dims("cycle")

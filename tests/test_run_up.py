@@ -17,6 +17,7 @@ from stickslip.response.recovery import fields
 from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.run_up import RUN_UP as RUN_UP_ANALYSIS
 from stickslip.study.analyses.running.question import question_of
+from stickslip.study.analyses.running.words import verdicts_of
 from stickslip.study.file.study import read_file
 
 ORDER = 42  # wave 2 of five, at 2000 to 2300 Hz where the shrouds are pressed
@@ -154,6 +155,13 @@ def test_a_study_follows_engine_orders_over_speed(finished):
     assert "engine order 3: the largest amplitude is at an end of the range" in said
     assert "doubtful" not in said
     assert "engine order 2" not in said  # steady or fast, its peak is inside
+    # whether more harmonics were examined is told either way
+    steady = data.drop_dims("fast").assign(peak_inside=0 * data["peak_inside"] + 1)
+    (calm,) = verdicts_of(steady.assign(error=0 * data["error"] + 0.0312), "", 0.05)
+    assert calm.why.endswith("more harmonics are predicted to change their peaks by 3.1 % at most")
+    blind = verdicts_of(steady.assign(error=np.nan * data["error"]), "", 0.05)
+    assert [v.level for v in blind] == 2 * ["doubtful"]
+    assert "whether more harmonics than H = 1 change the peak was not examined" in blind[0].why
     assert "engine order 3 at 5000 rpm/s: the largest amplitude is at an end of the range" in said
     assert data["fast_amplitude"].values.shape[0] == 2
 

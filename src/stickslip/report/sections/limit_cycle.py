@@ -135,7 +135,10 @@ def _row(view: Cycles, names: Sequence[str], c: int) -> list[str]:
     in_time = NONE
     if view.has("cycle_time_amplitude") and np.isfinite(value("time_amplitude")):
         off = 100 * (value("time_amplitude") / value("amplitude") - 1.0)
-        in_time = f"{quantity(value('time_amplitude'), 'm', 5)} ({number(off, 2)} % off)"
+        told = f"{number(off, 2)} % off"
+        if word == "unstable":  # to be near it after so many periods is no confirmation
+            told += "; unstable, no confirmation"
+        in_time = f"{quantity(value('time_amplitude'), 'm', 5)} ({told})"
     few = "" if int(view.integers("cycle_enough")[c]) else " (not enough)"
     return [
         names[int(view.integers("cycle_branch")[c])], quantity(value("amplitude"), "m", 5), number(value("frequency_hz"), 7),

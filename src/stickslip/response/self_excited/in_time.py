@@ -25,6 +25,8 @@ WINDOW = 16  # periods of a window in which waves are told apart
 SMALL = 1e-2  # of the largest wave: what is below has lost
 STEADY = 1e-2  # relative change of an amplitude over the last third that counts as none
 
+UNSETTLED = "not settled yet"  # how sentences begin where the periods were too few
+
 Outcome = Literal["one wave", "several waves", "decays", "grows", "not settled"]
 
 
@@ -182,8 +184,8 @@ class WaveHistory:
             "one wave": f"wave {named} wins",
             "several waves": f"waves {named} coexist",
             "decays": "the motion dies",
-            "grows": f"the motion still grows, wave {waves[0] if waves else 0} most",
-            "not settled": f"not settled yet, waves {named} are there",
+            "grows": f"{UNSETTLED}: the motion still grows, wave {waves[0] if waves else 0} most",
+            "not settled": f"{UNSETTLED}: waves {named} are there",
         }[self.outcome]
 
     @property

@@ -162,9 +162,18 @@ def _unstable(
     what = (
         "grows" if worst < 0 else f"has less damping than the {asked.required_percent:g} % required"
     )
-    others = f" ({len(rows)} waves and modes in all)" if len(rows) > 1 else ""
-    why = f"{name}, mode {m + 1} {what}: damping {PERCENT * worst:.4g} % at {waves[i].frequencies_hz[m]:.5g} Hz{others}"
+    why = f"{name}, mode {m + 1} {what}: damping {PERCENT * worst:.4g} % at {waves[i].frequencies_hz[m]:.5g} Hz{_others(rows, worst)}"
     return [Verdict("trusted", why=why, remedy=FLUTTERS if worst < 0 else MORE, warns=True)]
+
+
+def _others(rows: Sequence[tuple[float, int, int]], worst: float) -> str:
+    """Say how many waves are as the worst: that grow, or have too little damping; and how many modes, where that differs."""
+    alike = [row for row in rows if row[0] < 0 or worst >= 0]
+    if len(alike) == 1:
+        return ""
+    count, are = len({i for _, i, _ in alike}), "grow" if worst < 0 else "have too little"
+    of = f"{len(alike)} modes of {count} wave{'s' if count > 1 else ''}"
+    return f"; {of if len(alike) > count else f'{count} waves'} {are} in all"
 
 
 def _doubts(energy: FloatArray, by_eigenvalue: FloatArray) -> list[Verdict]:

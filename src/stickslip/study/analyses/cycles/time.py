@@ -53,9 +53,16 @@ def settle_cycles(question: Question, branch: CycleBranch) -> dict[str, Any]:
             amplitude[i], omega[i] = marched.amplitude[0], marched.frequency[0]
         LOG.info(
             f"time integration: {1e3 * amplitude[i]:.5g} mm at {omega[i] / HZ:.4f} Hz where the balance has "
-            f"{1e3 * branch.cycle_amplitude[i]:.5g} mm at {branch.cycle_omega[i] / HZ:.4f} Hz"
+            f"{1e3 * branch.cycle_amplitude[i]:.5g} mm at {branch.cycle_omega[i] / HZ:.4f} Hz{_unconfirmed(branch, i, marched)}"
         )
     return {"amplitude": amplitude, "omega": omega, "said": said}
+
+
+def _unconfirmed(branch: CycleBranch, i: int, marched: Marched) -> str:
+    """Say that to stay near an unstable cycle for so many periods does not confirm it."""
+    if json.loads(branch.stable)[i] != "unstable":
+        return ""
+    return f"; that confirms nothing: the cycle is unstable, and {len(marched.first)} periods may be too few to leave it"
 
 
 def compete(question: Question, branches: Sequence[CycleBranch]) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from stickslip.response.self_excited.in_time import UNSETTLED
 from stickslip.study.analyses.analysis import TextTable
 from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.keep.netcdf import alike, one_case
@@ -27,12 +28,34 @@ def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
         found += _of_branch(label, case, i)
     outcome = str(case["outcome"].values) if "outcome" in case else ""
     if outcome:
-        found.append(Verdict("trusted", label, None, f"from a mixed start of all unstable waves, in time, {outcome}", "That may depend on the start."))  # fmt: skip
+        found.append(_of_competition(label, outcome, case))
     missing = str(case["outcome_missing"].values) if "outcome_missing" in case else ""
     if missing:
         why = f"what becomes of all unstable waves together was not found in time: {missing}"
         found.append(Verdict("doubtful", label, None, why, "Each wave is answered by itself."))
     return found
+
+
+def _of_competition(label: str, outcome: str, case: Mapping[str, xr.Variable]) -> Verdict:
+    why = f"from a mixed start of all unstable waves, in time, {outcome}"
+    if not outcome.startswith(UNSETTLED):
+        return Verdict("trusted", label, None, why, "That may depend on the start.")
+    last = case["wave_amplitude"].values[-1]
+    wave = int(np.argmax(last))
+    there = f" (wave {wave} has {1e3 * last[wave]:.4g} mm{_stable_of(case, wave)})"
+    remedy = "limit_cycle.periods were too few to settle: raise it."
+    return Verdict("doubtful", label, None, why + there, remedy)
+
+
+def _stable_of(case: Mapping[str, xr.Variable], wave: int) -> str:
+    """Name the stable limit cycles of a wave."""
+    own = [
+        f"{1e3 * float(case['cycle_amplitude'].values[c]):.4g} mm"
+        for c in _cycles(case)
+        if str(case["cycle_stability"].values[c]) == "stable"
+        and int(case["wave_number"].values[int(case["cycle_branch"].values[c])]) == wave
+    ]
+    return f"; its stable limit cycle {' or '.join(own)}" if own else ""
 
 
 def _not_followed(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
@@ -89,7 +112,7 @@ def _of_cycle(label: str, name: str, case: Mapping[str, xr.Variable], c: int) ->
     attracting = float(case["cycle_slope"].values[c]) > 0.0
     wave = int(case["cycle_growing_wave"].values[c])
     if attracting and word == "unstable":
-        by = f"a disturbance of wave {wave}" if wave >= 0 else "a disturbance"
+        by = _named_disturbance(case, c, wave)
         why = f"{what} is stable in its own amplitude, but {by} grows: {reason}"
         found.append(Verdict("trusted", label, hertz, why, f"The machine leaves it; {_what_tells(case)}."))  # fmt: skip
     elif attracting and word != "stable":
@@ -100,10 +123,20 @@ def _of_cycle(label: str, name: str, case: Mapping[str, xr.Variable], c: int) ->
     return found
 
 
+def _named_disturbance(case: Mapping[str, xr.Variable], c: int, wave: int) -> str:
+    """Say what grows; of the cycle's own wave it is a motion at another frequency beside it, which modulates it."""
+    if wave < 0:
+        return "another motion"
+    own = int(case["wave_number"].values[int(case["cycle_branch"].values[c])])
+    hertz = float(case["cycle_growing_frequency_hz"].values[c])
+    return f"a modulation of it, by wave {wave} itself at {hertz:.5g} Hz," if wave == own else f"wave {wave} at {hertz:.5g} Hz"  # fmt: skip
+
+
 def _what_tells(case: Mapping[str, xr.Variable]) -> str:
     """Return what tells to which motion a machine goes that leaves a limit cycle."""
-    if "outcome" in case and str(case["outcome"].values):
-        return "the march of all unstable waves together tells for what"
+    outcome = str(case["outcome"].values) if "outcome" in case else ""
+    if outcome:
+        return f"from a mixed start of all unstable waves, in time: {outcome}"
     if "cycle_time_amplitude" in case:
         return "time integration began beside it, and its last amplitude is in the result"
     return "limit_cycle.in_time tells for what"

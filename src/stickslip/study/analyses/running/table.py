@@ -50,8 +50,9 @@ class RunUpTable(Section):
         None,
         min_length=1,
         max_length=20,
-        description="rates in rpm a second at which the speed is swept in addition, a list: the peak of a fast run-up, in the direction "
-        "of direction, is lower and later than that of the steady motion; left out: steady motions alone",
+        description="rates in rpm a second at which the speed is swept in addition, a list: the peak of a fast run-up is as a rule "
+        "lower than that of the steady motion and, in the direction of direction, later; it may be slightly above where the steady curve "
+        "has a notch that a sweep passes over; left out: steady motions alone",
     )
     tolerance: float = Field(
         1e-6,

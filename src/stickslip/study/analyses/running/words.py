@@ -23,7 +23,12 @@ def verdicts_of(case: xr.Dataset, label: str, limit: float) -> list[Verdict]:
     """Return what is to be thought of a case."""
     found = [v for i in range(case.sizes["line"]) for v in _of_line(case, i, label, limit)]
     found += _of_fast(case, label)
-    return found or [Verdict("trusted", label, None, "every engine order was followed")]
+    return found or [Verdict("trusted", label, None, _followed(case))]
+
+
+def _followed(case: xr.Dataset) -> str:
+    most = float(case["error"].values[case["peak_point"].values].max())
+    return f"every engine order was followed; more harmonics are predicted to change their peaks by {100 * most:.2g} % at most"
 
 
 def _of_line(case: xr.Dataset, i: int, label: str, limit: float) -> Iterator[Verdict]:
@@ -52,6 +57,10 @@ def _of_line(case: xr.Dataset, i: int, label: str, limit: float) -> Iterator[Ver
             f"{name}: missing harmonics may change the peak by {100 * error:.2g} %",
             "Raise harmonics.high.",
         )
+    if np.isnan(error):
+        h = int(case["harmonic"].values[top])
+        why = f"{name}: whether more harmonics than H = {h} change the peak was not examined"
+        yield Verdict("doubtful", label, hertz, why, 'harmonics.high = "auto" examines it.')
     between = float(case["speed_error"].values[i])
     if between > BETWEEN:
         yield Verdict(
