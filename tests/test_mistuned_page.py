@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 from synthetic_result import synthetic_result
 
+from stickslip.assembly.mistuned import listed, of_all
 from stickslip.report.forced.curves import frequency_response
 from stickslip.report.forced.head import cards
 from stickslip.report.response import Response
@@ -72,3 +73,11 @@ def test_a_blade_that_is_named_stays_the_one_of_the_peak() -> None:
     assert [peak_output(data, k) for k in (0, 1)] == [1, 1]
     assert view.output_name == BLADES[1]
     assert not view.mistuned
+
+
+def test_labels_of_all_blades_are_told_by_the_first_and_the_last() -> None:
+    both = of_all(("tip.x", "root.y"), 24)
+    assert listed(both) == "tip[0].x to tip[23].x, root[0].y to root[23].y"
+    assert listed(of_all(("tip",), 3)) == "tip[0] to tip[2]"
+    for few in (("tip[0].x", "tip[1].x"), ("a[0].x", "a[2].x", "a[3].x"), ("tip1.x", "L1.2.w")):
+        assert listed(few) == ", ".join(few)

@@ -283,6 +283,36 @@ def test_harmonics_that_were_raised_along_the_branch_are_told_as_such(tmp_path: 
     assert "of points asked for more harmonics" not in [c.label for c in cards(view)]
 
 
+def test_the_figure_of_errors_says_what_became_of_what_lies_above_the_threshold() -> None:
+    data = synthetic_result(ratios=(5,), n=10)
+    n = data.sizes["point"]
+    data.attrs["passages"] = "auto"
+    own, audit, level = np.full(n, 0.5), np.full(n, np.nan), np.zeros(n, dtype=np.int64)
+    own[[3, 4]], audit[[3, 4]] = (np.inf, 6.0), (2.5, 1.0)
+    data["own_error_percent"], data["audit_error_percent"] = ("point", own), ("point", audit)
+    data["verdict"] = "point", level
+    caption = errors(Response(data)).caption
+    assert "Above it: 2 points, 2 of them solved again with more harmonics" in caption
+    assert "the difference is 2.5 % at most. None of them is doubtful or wrong." in caption
+    own[5], level[5] = 8.0, 1
+    caption = errors(Response(data)).caption
+    assert "Above it: 3 points, 2 of them solved again" in caption
+    assert "1 of them is doubtful or wrong." in caption
+    assert (
+        "None lies above it."
+        in errors(Response(data.assign(own_error_percent=("point", np.full(n, 0.5))))).caption
+    )
+
+
+def test_errors_of_rounding_alone_are_not_drawn() -> None:
+    data = synthetic_result(ratios=(5,), n=10).drop_vars("real_error_percent")
+    data.attrs["passages"] = "auto"
+    data["own_error_percent"] = "point", np.full(data.sizes["point"], 8.7e-5)
+    assert errors(Response(data)) is None
+    data["own_error_percent"][3] = 0.002
+    assert errors(Response(data)) is not None
+
+
 def test_warnings_of_older_results_are_doubts(tmp_path: Path) -> None:
     data = synthetic_result()
     data.attrs["warnings"] = json.dumps(["3 points did not converge. Take more."])

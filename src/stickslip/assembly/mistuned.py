@@ -120,6 +120,25 @@ def _of_sector(name: str, sector: int) -> str:
     return f"{head}[{sector}].{last}" if dot else f"{name}[{sector}]"
 
 
+def listed(labels: Sequence[str]) -> str:
+    """Return labels as text; those of three and more sectors in a row as ``tip[0].x to tip[23].x``."""
+    sectors: dict[tuple[str, str], list[int | None]] = {}
+    for label in labels:
+        head, _, rest = label.partition("[")
+        number, closed, tail = rest.partition("]")
+        alike = bool(closed) and number.isdecimal()
+        key = (f"{head}[", f"]{tail}") if alike else (label, "")
+        sectors.setdefault(key, []).append(int(number) if alike else None)
+    return ", ".join(_in_a_row(*key, own) for key, own in sectors.items())
+
+
+def _in_a_row(head: str, tail: str, sectors: Sequence[int | None]) -> str:
+    each = [head if n is None else f"{head}{n}{tail}" for n in sectors]
+    first = sectors[0]
+    row = first is not None and list(sectors) == list(range(first, first + len(sectors)))
+    return f"{each[0]} to {each[-1]}" if row and len(each) > 2 else ", ".join(each)
+
+
 def _peak(what: Asked, model: Model, names: tuple[str, ...]) -> IntArray:
     """Return the outputs of which the largest counts: the one named, of all sectors where no sector is."""
     wanted = model.peak_output

@@ -17,7 +17,12 @@ from stickslip.report.cases import ShownCase, cases_of, varied
 from stickslip.report.node import Node
 from stickslip.report.quantities import Scale, number, predicted, scale_for
 from stickslip.report.tables import html_table
-from stickslip.study.analyses.forced.curve import Curve, branch_length, peak_output
+from stickslip.study.analyses.forced.curve import (
+    Curve,
+    branch_length,
+    of_largest_blade,
+    peak_output,
+)
 from stickslip.study.analyses.verdict import LEVELS
 
 NEEDED = ("point_case", "frequency_hz", "order", "status", "amplitude", "harmonic_kept")
@@ -81,11 +86,7 @@ class Response(Node):
     @property
     def mistuned(self) -> bool:
         """Whether it is of the largest blade of a wheel whose sectors differ, not of one that was named."""
-        if not self.has("largest_blade", "blade_peak_amplitude"):
-            return False
-        each = self.data.sizes["output"] // self.data.sizes["blade"]
-        largest = self.integers("largest_blade")
-        return all(self.outputs[c.index] // each == largest[c.index] for c in self.peaked)
+        return bool(self.peaked) and all(of_largest_blade(self.data, c.index) for c in self.peaked)
 
     @property
     def output_name(self) -> str:

@@ -72,7 +72,10 @@ def choice(response: Response) -> str | None:
     alert, middle, text = _other_row, ("harmonics kept", "largest indicator"), _other_text
     if response.auto:
         alert, text = _auto_row, _auto_text
-        middle = ("harmonics kept", "largest error predicted of what was accepted; found by audits")
+        middle = (
+            "harmonics kept",
+            "largest error predicted of what was accepted; found by audits, which overrule it",
+        )
     elif response.is_error:
         middle = (f"{response.more_name} asked for", "largest predicted error")
         alert, text = _alert_row, _alert_text

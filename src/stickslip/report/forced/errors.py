@@ -52,7 +52,7 @@ def _caption(response: Response) -> str:
     if response.auto:
         text = (
             f"The error that <code>{response.selection}</code> predicts of each accepted solution's own harmonics; the dashed line "
-            f"is the threshold of {percent(response.threshold)}. What lies above it is doubtful. "
+            f"is the threshold of {percent(response.threshold)}. {_above(response)}"
         )
     elif response.is_error:
         text = (
@@ -82,15 +82,36 @@ def _caption(response: Response) -> str:
     return text + (f"Not drawn, beyond all bounds: {counted(endless, 'point')}." if endless else "")
 
 
+def _above(response: Response) -> str:
+    """Say what became of the solutions whose harmonics are predicted to be too few: a solution with more overrules the prediction."""
+    known, audit = (response.floats(f"{name}_error_percent") for name in ("own", "audit"))
+    above = response.converged & (known > response.threshold)
+    if not above.any():
+        return "None lies above it. "
+    solved, doubtful = above & np.isfinite(audit), above & (response.levels > 0)
+    told = f"Above it: {counted(int(above.sum()), 'point')}"
+    if solved.any():
+        most = response.shown(float(audit[solved].max()))
+        told += f", {int(solved.sum())} of them solved again with more harmonics, which overrules the prediction: the difference is {most} at most"
+    bad = int(doubtful.sum())
+    return f"{told}. {bad or 'None'} of them {'are' if bad > 1 else 'is'} doubtful or wrong. "
+
+
 def _floor(response: Response) -> float:
     """Smallest value drawn: an error below is rounding; other indicators may be smaller."""
     return _SMALLEST_ERROR if response.is_error else _SMALLEST_INDICATOR
 
 
+def _all_rounding(response: Response) -> bool:
+    """Whether all errors lie under the axis, where nothing would be drawn."""
+    every = np.concatenate([response.alert.error, response.floats("real_error_percent")])
+    return response.is_error and not np.any(every >= _SMALLEST_ERROR)
+
+
 def errors(response: Response) -> Plot | None:
     """Predicted and real error against frequency (Gastaldi and Berruti 2017, fig. 6)."""
     error, real = response.alert.error, response.floats("real_error_percent")
-    if not error.size or not response.decides:
+    if not error.size or not response.decides or _all_rounding(response):
         return None
     two = response.is_error and bool(np.isfinite(real).any())
     titles = ["predicted (line) and real (circles)"] if two else []

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.arrays import BoolArray
+from stickslip.assembly.mistuned import listed
 from stickslip.harmonic.selection import STRATEGIES
 from stickslip.harmonic.selection.strategy import Strategy, always_kept
 from stickslip.harmonic.support import Harmonics, named
@@ -93,7 +94,7 @@ class Chooser:
             "high_harmonics": list(self.high),
             "selection_threshold": self.threshold,
             "indicator_name": self.indicator,
-            "error_over": ", ".join(self.over),
+            "error_over": listed(self.over),
         }
         # the name that results have had from the beginning
         return own | ({"alert_threshold_percent": 100 * self.threshold} if self.is_error else {})
@@ -118,7 +119,7 @@ class Chooser:
                     f"raised along the branch from {named(self.low)} {most}, until the {self.indicator} of {self.name} is well below "
                     f"{self.limit}; audits at every tenth point and at the peak"
                 ),
-                f"its error is that of harmonic {of} over {', '.join(self.over)}",
+                f"its error is that of harmonic {of} over {listed(self.over)}",
             ]
         how = (
             "single passage: each frequency is settled before the next one"
@@ -133,7 +134,7 @@ class Chooser:
         ]
         if self.is_error:
             of = ", ".join(map(str, self.harmonics))
-            said.append(f"its error is that of harmonic {of} over {', '.join(self.over)}")
+            said.append(f"its error is that of harmonic {of} over {listed(self.over)}")
         elif passages_asked == "double":
             said.append(
                 f"{self.name} foretells the harmonics of the next frequency or raises them step by step, which needs a single "

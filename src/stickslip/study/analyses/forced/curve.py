@@ -48,6 +48,14 @@ def peak_output(data: xr.Dataset, case: int) -> int:
     return named if off[named] <= off.min() else int(np.argmin(off))
 
 
+def of_largest_blade(data: xr.Dataset, case: int) -> bool:
+    """Whether the peak of a case is of the largest blade of a wheel whose sectors differ, not of one that was named."""
+    if "blade_peak_amplitude" not in data or "largest_blade" not in data:
+        return False
+    each = data.sizes["output"] // data.sizes["blade"]
+    return bool(peak_output(data, case) // each == int(data["largest_blade"].values[case]))
+
+
 @dataclass(frozen=True, eq=False)
 class Curve:
     """A case.
@@ -115,9 +123,12 @@ class Curve:
 
     @cached_property
     def amplitude(self) -> FloatArray:
-        """(n,) amplitude of that output, m."""
-        column = peak_output(self.data, self.case)
-        return np.asarray(self.data["amplitude"].values[self.at, column])
+        """(n,) amplitude of that output, m; of the largest blade at each point where the largest of a mistuned wheel counts."""
+        column, size = peak_output(self.data, self.case), self.data["amplitude"].values[self.at]
+        if not of_largest_blade(self.data, self.case):
+            return np.asarray(size[:, column])
+        each = self.data.sizes["output"] // self.data.sizes["blade"]
+        return np.asarray(np.fmax.reduce(size[:, column % each :: each], axis=1))
 
     @cached_property
     def dissipation(self) -> FloatArray:
