@@ -235,7 +235,8 @@ def test_check_tells_of_strategies_that_take_no_double_passage(base: Study) -> N
 def test_check_tells_where_resonances_are_and_what_it_will_cost(base: Study) -> None:
     said = check(base)
     assert re.fullmatch(
-        r"estimate: about \d+ s for the parts, once, and [\d.]+ to \d+ s to solve this case \(the most: H = 41 at 10 % of \d+ points\); "
+        r"estimate: about \d+ s for the parts, once, and [\d.]+ to \d+ s to solve this case "
+        r"\(the least: hardly a contact slips; the most: contacts slip at every point, H = 41 at 10 % of \d+ points\); "
         r"stability and time integration not counted\. At most \d+ Newton steps, \d+ unknowns, [\d.]+ GB of memory\. "
         r"limits\.work_s is held against \d+ s",
         said[0],

@@ -18,7 +18,10 @@ POINTS = 1.7  # points of a branch for each one asked: more are taken where the 
 NEWTON_A_POINT = 6  # repeats and failed tries included: the two blades took 1 to 19 in a case and 6 over all, four masses 11
 AT_THE_CAP = 0.1  # share of points that "auto" solves with the most harmonics there may be
 REPEATED = 0.6  # share of points that a strategy solves with many harmonics
+FEWEST_A_POINT = 2  # where hardly a contact slips: two wheels took 1.6 to 3
 SECONDS_A_STEP = 1.5e-3  # of Newton, however few unknowns it has
+# of a step where hardly a contact slips: 10 ms with 190 to 300 unknowns, 12 to 30 ms with 440 to 570, 20 ms with 1900
+SECONDS_AN_UNKNOWN = 3e-5
 FLOPS = 2e9  # of a Newton step: a small dense factorisation on one core, and the contacts
 
 
@@ -39,10 +42,11 @@ class Estimate:
     model_seconds
         Of one core, to mesh and reduce the parts and find their frequencies; cases with the same parts share it.
     least_seconds, most_seconds
-        Of one core, to solve the response: where the fewest harmonics do at every point, and where as many points as may be need the most.
+        Of one core, to solve the response: where hardly a contact slips and the fewest harmonics do at every point, and where contacts slip
+        at all points and as many of these as may be need the most harmonics.
         Stability and time integration are not counted.
     most
-        What the most stands for, in words; empty where both are the same.
+        How many harmonics the most stands for, in words; empty where their number is fixed.
     """
 
     nodes: int
@@ -61,8 +65,13 @@ class Estimate:
 
     def __str__(self) -> str:
         least, most = (f"{s:.1g}" if s < 10 else f"{s:.0f}" for s in (self.least_seconds, self.most_seconds))  # fmt: skip
-        solving = f"{least} to {most} s" if least != most else f"{most} s"
-        meant = f" (the most: {self.most})" if self.most else ""
+        solving = f"{least} to {most} s"
+        many = (
+            f"contacts slip at every point, {self.most}"
+            if self.most
+            else "contacts slip at every point"
+        )
+        meant = f" (the least: hardly a contact slips; the most: {many})"
         return (
             f"estimate: about {self.model_seconds:.0f} s for the parts, once, and {solving} to solve this case{meant}; stability and time "
             f"integration not counted. At most {self.newton_steps} Newton steps, {self.unknowns} unknowns, {self.memory_gb:.1f} GB of "
@@ -89,9 +98,9 @@ def estimate(model: Model, sweep: Sweep) -> Estimate:
     of_low, of_high = (_flops(n) / FLOPS + SECONDS_A_STEP for n in (low, high))
     most_seconds = steps_low * of_low + (steps_high + judged) * of_high
     # without a budget strategies look at the larger space wherever they stand
-    least_seconds = (
-        most_seconds if kept else steps_low * of_low + (0 if sweep.auto else judged * of_high)
-    )
+    easy_low, easy_high = (SECONDS_AN_UNKNOWN * n + SECONDS_A_STEP for n in (low, high))
+    easy = FEWEST_A_POINT * points * (easy_high if kept == "high" else easy_low)
+    least_seconds = min(easy + (0 if sweep.auto else judged * easy_high), most_seconds)
     harmonics = (
         f"H = {named(sweep.high_harmonics)} at {100 * share_high:.0f} % of {points:.0f} points"
     )
