@@ -20,6 +20,10 @@ _READING = (
     "goes on by itself. Crossings upward attract motions of the same wave, crossings downward repel them: beyond these friction "
     "cannot bound the motion."
 )
+_JOINED = (
+    "Straight lines join the amplitudes that were looked at and the limit cycles, which lie between these and have harmonics enough of "
+    "their own."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,19 +52,35 @@ class Cycles(Node):
         """Number of limit cycles."""
         return int(self.data.sizes.get("cycle", 0)) if self.has("cycle_amplitude") else 0
 
-    def of_branch(self, i: int, name: str) -> FloatArray:
-        """Return a variable along the amplitudes of a mode, in their order."""
+    def of_branch(self, i: int, name: str, at_cycles: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the amplitudes of a mode in their order, its limit cycles among them, and a variable there.
+
+        Parameters
+        ----------
+        i
+            The mode.
+        name
+            The variable.
+        at_cycles
+            (cycles,) the variable at all limit cycles.
+        """
         amplitude = self.values("amplitude", "branch", "point")[i]
-        order = np.argsort(amplitude[np.isfinite(amplitude)], kind="stable")
-        own = self.values(name, "branch", "point")[i][np.isfinite(amplitude)]
-        return np.asarray(own[order])
+        known = np.isfinite(amplitude)
+        own = self.values(name, "branch", "point")[i][known]
+        amplitude = amplitude[known]
+        if self.cycles:
+            mine = self.integers("cycle_branch") == i
+            amplitude = np.append(amplitude, self.floats("cycle_amplitude")[mine])
+            own = np.append(own, at_cycles[mine])
+        order = np.argsort(amplitude, kind="stable")
+        return amplitude[order], own[order]
 
 
 def damping(view: Cycles) -> Plot | None:
     """Show the damping that each amplitude has; limit cycles are its zeros."""
     if not view.has("amplitude"):
         return None
-    figure = _over_amplitude(view, "damping_ratio", 100.0)
+    figure = _over_amplitude(view, "damping_ratio", 100.0, np.zeros(view.cycles))
     for i, name in enumerate(view.names):
         figure.data[i].name = name
     figure.add_hline(y=0.0, line={"color": INK, "width": 1})
@@ -73,13 +93,13 @@ def frequencies(view: Cycles) -> Plot | None:
     """Show the frequency of the motions."""
     if not view.has("amplitude"):
         return None
-    figure = _over_amplitude(view, "frequency_hz", 1.0)
-    if view.cycles:
-        _mark(view, figure, view.floats("cycle_frequency_hz"))
+    own = view.floats("cycle_frequency_hz") if view.cycles else np.zeros(0)
+    figure = _over_amplitude(view, "frequency_hz", 1.0, own)
+    _mark(view, figure, own)
     figure.update_yaxes(title_text="frequency (Hz)")
     caption = (
         "With the amplitude the frequency goes from that of the mode with all contacts stuck towards that without friction. Limit cycles are "
-        "marked as above."
+        f"marked as above. {_JOINED}"
     )
     return Plot(f"limit_cycle_frequency{view.key}", "Frequency over the amplitude", caption, figure)
 
@@ -162,14 +182,15 @@ def _unbounded(view: Cycles) -> list[int]:
     return [i for i in range(len(view.names)) if ratio[i] < 0 and not most[i] > 0]
 
 
-def _over_amplitude(view: Cycles, name: str, factor: float) -> go.Figure:
+def _over_amplitude(view: Cycles, name: str, factor: float, at_cycles: FloatArray) -> go.Figure:
     figure = go.Figure()
     every = view.values("amplitude", "branch", "point")
     scale = scale_for(np.array([np.nanmedian(every)]), "m")
     for i, label in enumerate(view.names):
+        amplitude, own = view.of_branch(i, name, at_cycles)
         figure.add_trace(
             go.Scatter(
-                x=scale.factor * view.of_branch(i, "amplitude"), y=factor * view.of_branch(i, name), mode="lines", name=label,
+                x=scale.factor * amplitude, y=factor * own, mode="lines", name=label,
                 line={"color": colour(i), "width": 2},
                 hovertemplate=f"{label}: %{{y:.6g}} at %{{x:.5g}} {scale.unit}<extra></extra>",
             )
