@@ -75,6 +75,14 @@ def test_the_benchmark_from_a_study_and_its_words(tmp_path: Path) -> None:
     curve = figures["limit_cycles"].data[0]
     assert np.sign(curve.y[0]) == np.sign(curve.y[-1]) == -1
     assert max(curve.y) == pytest.approx(100 * float(case["largest_damping_ratio"][0]))
+    # the line over the amplitude goes through the limit cycles
+    along = figures["limit_cycle_frequency"]
+    at = np.array(along.data[0].x) / along.layout.meta["factor"]
+    for amplitude, hz in zip(
+        case["cycle_amplitude"].values, case["cycle_frequency_hz"].values, strict=True
+    ):
+        nearest = int(np.argmin(np.abs(at - amplitude)))
+        assert (at[nearest], along.data[0].y[nearest]) == pytest.approx((amplitude, hz), rel=1e-12)
     assert "985" not in cycle_table(Cycles(case))
     assert "977.39 mm" in cycle_table(Cycles(case))
 

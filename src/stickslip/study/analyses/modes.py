@@ -51,7 +51,7 @@ class ModesTable(WaveTable):
     reference: FilePath | None = Field(
         None,
         description="CSV file of frequencies to compare with, relative to the study; columns nodal_diameter, mode (1 is the "
-        "lowest), frequency_hz",
+        "lowest), frequency_hz, and speed_rpm if it shall be told where that is another speed",
     )
     reference_case: str | None = Field(
         None,
@@ -86,7 +86,7 @@ def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
     }
     more = _of_stages(waves) | _in_flow(waves) | _compared(solved, hertz) | _shapes(waves)
     of_wheel = variables(solved.notes.get(NOTE))
-    return found | more | of_wheel, flange_doubts(waves)
+    return found | more | of_wheel, [*flange_doubts(waves), *_of_other_speed(solved)]
 
 
 def _of_stages(waves: Sequence[WaveModes]) -> Variables:
@@ -132,6 +132,18 @@ def _compared(solved: Solved, hertz: FloatArray) -> Variables:
         "reference_hz": variable("wave mode", reference, "Hz", "frequency to compare with"),
         "difference": variable("wave mode", off, "1", "relative difference from the reference"),
     }
+
+
+def _of_other_speed(solved: Solved) -> list[Verdict]:
+    """Tell of frequencies to compare with that are of another speed."""
+    asked: ModesTable = solved.case.settings.modes
+    known, rpm = asked.compared_with(solved.case.home), float(solved.notes["model"]["speed_rpm"])
+    others = known.not_at(rpm) if known is not None else ()
+    if not others:
+        return []
+    speeds = ", ".join(f"{s:g} rpm" for s in others)
+    why = f"the frequencies of modes.reference are of {speeds}, those of [modes] of {rpm:g} rpm: the differences hold what the speed does"
+    return [Verdict("trusted", why=why, remedy="Compare at the same speed.")]
 
 
 def _shapes(waves: Sequence[WaveModes]) -> Variables:

@@ -1,6 +1,7 @@
 """Frequencies to compare with, from a CSV file."""
 
 import csv
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,8 @@ from stickslip.errors import input_error
 from stickslip.reduction.waves import wave
 
 MOST_ROWS = 100_000
+SAME_SPEED = 1e-6  # relative
+_SPEED = re.compile(r"(\d+(?:\.\d+)?)[ _]*rpm", re.IGNORECASE)  # in the name of a case
 
 
 class Row(BaseModel):
@@ -22,6 +25,9 @@ class Row(BaseModel):
     nodal_diameter: int = Field(ge=0, description="a whole number")
     mode: int = Field(ge=0, description="a whole number")
     frequency_hz: float = Field(gt=0, allow_inf_nan=False, description="a frequency above zero")
+    speed_rpm: float | None = Field(
+        None, ge=0, allow_inf_nan=False, description="a speed of zero or more, or nothing"
+    )
 
 
 @dataclass(frozen=True)
@@ -34,10 +40,17 @@ class Reference:
         Their file.
     frequencies_hz
         (nodal diameter, mode from 1) -> Hz.
+    speeds_rpm
+        Those that the column ``speed_rpm`` tells, or else the name of the case, as ``prestressed_8000rpm``; none: not told.
     """
 
     path: Path
     frequencies_hz: Mapping[tuple[int, int], float]
+    speeds_rpm: tuple[float, ...] = ()
+
+    def not_at(self, rpm: float) -> tuple[float, ...]:
+        """Return the speeds of these frequencies that differ from one."""
+        return tuple(s for s in self.speeds_rpm if abs(s - rpm) > SAME_SPEED * max(s, rpm))
 
     def of_waves(self, numbers: Sequence[int], n_modes: int, sectors: int) -> FloatArray:
         """Return the (k, m) frequencies in Hz of wave numbers, NaN where there is none.
@@ -77,11 +90,16 @@ def read_reference(path: Path, case: str | None) -> Reference:
             f"there is no file {path}",
             "Check the name; it is relative to the study's folder.",
         )
-    return Reference(path, _rows(path, case))
+    found, speeds = _rows(path, case)
+    named = _SPEED.search(case or "")
+    if named and not speeds:
+        speeds = {float(named[1])}
+    return Reference(path, found, tuple(sorted(speeds)))
 
 
-def _rows(path: Path, case: str | None) -> dict[tuple[int, int], float]:
+def _rows(path: Path, case: str | None) -> tuple[dict[tuple[int, int], float], set[float]]:
     found: dict[tuple[int, int], float] = {}
+    speeds: set[float] = set()
     try:
         with path.open(encoding="utf-8", newline="") as stream:
             for line, row in _lines(path, stream, case):
@@ -93,17 +111,19 @@ def _rows(path: Path, case: str | None) -> dict[tuple[int, int], float]:
                         "Choose the rows by a column 'case' and modes.reference_case.",
                     )
                 found[key] = row.frequency_hz
+                speeds |= set() if row.speed_rpm is None else {row.speed_rpm}
     except (UnicodeDecodeError, csv.Error) as error:
         raise input_error(
             str(path), f"is not a CSV file in UTF-8 ({error})", "Save it as CSV."
         ) from None
-    return found
+    return found, speeds
 
 
 def _lines(path: Path, stream: TextIO, case: str | None) -> Iterator[tuple[int, Row]]:
     """Yield the rows that are compared with and the numbers of their lines."""
     reader = csv.DictReader(stream)
-    needed = [*Row.model_fields, *(["case"] if case is not None else [])]
+    required = [name for name, field in Row.model_fields.items() if field.is_required()]
+    needed = [*required, *(["case"] if case is not None else [])]
     missing = [name for name in needed if name not in (reader.fieldnames or [])]
     if missing:
         raise input_error(
@@ -122,7 +142,7 @@ def _lines(path: Path, stream: TextIO, case: str | None) -> Iterator[tuple[int, 
 
 def _row(place: str, row: dict[str, str]) -> Row:
     try:
-        return Row.model_validate(row)
+        return Row.model_validate({k: v for k, v in row.items() if v or k != "speed_rpm"})
     except ValidationError as error:
         column = str(error.errors()[0]["loc"][0])
         raise input_error(
