@@ -16,7 +16,7 @@ from test_cli_files import file_study, write_deck
 
 import stickslip as ss
 from stickslip.contact.interface import Interface
-from stickslip.errors import InputError, did_you_mean, missing_package
+from stickslip.errors import InputError, did_you_mean, missing_package, nearest_and_known
 from stickslip.harmonic.selection.guarded_alert import GuardedAlert
 from stickslip.model.dofs import Dofs
 from stickslip.model.facts import unlike_units
@@ -249,6 +249,14 @@ def test_a_faint_excitation_is_refused_by_its_key(tmp_path):
 )
 def test_the_nearest_name_is_found_whatever_its_capitals(word, known, told):
     assert did_you_mean(word, known) == told
+
+
+def test_a_set_that_there_is_not_is_told_with_those_that_there_are():
+    known = [f"blade.n{i:02}" for i in range(14)]
+    told = nearest_and_known("blade.airfoil", ["blade.root", "blade.tip"])
+    assert told.endswith("Known: blade.root, blade.tip.")
+    assert nearest_and_known("zz", known).endswith(", blade.n11 and 2 more.")
+    assert nearest_and_known("zz", []) == "There is none."
 
 
 def test_a_file_or_a_link_in_place_of_the_results_is_called_so(tmp_path):
