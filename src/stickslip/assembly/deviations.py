@@ -22,8 +22,6 @@ from stickslip.reduction.cyclic import CyclicSector
 from stickslip.reduction.sectors import of_alike, strip
 from stickslip.units import HZ
 
-BLADE_MODES = 20  # blade-alone modes looked for where a study names none
-
 FEW_ROWS = 30  # shares of a sector's motion: above, all coordinates of the wheel are no more
 Changes = dict[str, FloatArray]  # "mass", "damping", "stiffness" -> (n_s m, n_s m)
 

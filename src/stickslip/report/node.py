@@ -18,9 +18,12 @@ class Node:
     ----------
     data
         Its variables, and the attributes of the whole result with its own over them.
+    key
+        Added to the names of its figures where each case has its own: empty for the first case.
     """
 
     data: xr.Dataset
+    key: str = ""
 
     def has(self, *names: str) -> bool:
         """Say whether all the variables are there and none is empty."""

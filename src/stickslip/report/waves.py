@@ -12,15 +12,7 @@ NEEDED = ("wave_number", "nodal_diameter", "wave_kind", "frequency_hz")
 
 @dataclass(frozen=True, eq=False)
 class Waves(Node):
-    """One case of an analysis by waves.
-
-    Parameters
-    ----------
-    key
-        Added to the names of its figures: empty for the first case.
-    """
-
-    key: str = ""
+    """One case of an analysis by waves."""
 
     @property
     def sectors(self) -> int:

@@ -28,15 +28,7 @@ _JOINED = (
 
 @dataclass(frozen=True, eq=False)
 class Cycles(Node):
-    """One case.
-
-    Parameters
-    ----------
-    key
-        Added to the names of its figures: empty for the first case.
-    """
-
-    key: str = ""
+    """One case."""
 
     @property
     def names(self) -> list[str]:

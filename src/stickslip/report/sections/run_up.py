@@ -19,15 +19,7 @@ _SCALE = [[0.0, "#dfe6ee"], [0.35, "#56b4e9"], [0.7, "#e69f00"], [1.0, "#c0262d"
 
 @dataclass(frozen=True, eq=False)
 class RunUpView(Node):
-    """One case of a run-up.
-
-    Parameters
-    ----------
-    key
-        Added to the names of its figures: empty for the first case.
-    """
-
-    key: str = ""
+    """One case of a run-up."""
 
     @property
     def orders(self) -> list[int]:

@@ -4,7 +4,7 @@ The wave is written in its lowest undamped modes. The energy method takes each m
 it in a period; the eigenvalues are those of the modes together, with coefficients at the frequency of the motion itself.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -135,41 +135,44 @@ def _mode(
 ) -> tuple[float, ComplexArray, float, complex, complex]:
     none = np.zeros_like(still)
     start = 1j * np.sqrt(still[i, i].real), np.eye(len(still))[i].astype(complex)
-    value, vector = nearest_mode(still, turning, none, start)
+    value, vector = _nearest(still, turning, none, start)
     omega = value.imag
     amplitude = P.conj().T @ vector
     if not np.any(amplitude):
-        damped = nearest_mode(lossy, damping, none, (value, vector))[0]
+        damped = _nearest(lossy, damping, none, (value, vector))[0]
         return omega, amplitude, 0.0, 1j * omega, damped
     force = feedback.force(omega)
     energy = -float((amplitude.conj() @ force @ amplitude).imag) / (2 * omega**2)
     pair = value, vector
-    in_flow = _followed(still, turning, P, feedback, pair)
-    both = _followed(lossy, damping, P, feedback, in_flow)
+
+    def felt(eigenvalue: complex) -> Matrix:
+        # matrices know the motion as it grows or decays, a table its frequency
+        known = feedback.influence.depends_on_frequency
+        inner = feedback.force(eigenvalue.imag if known else -1j * eigenvalue)
+        return np.asarray(P @ inner @ P.conj().T)
+
+    in_flow = followed_mode(still, turning, felt, pair)
+    both = followed_mode(lossy, damping, felt, in_flow)
     return omega, amplitude, energy, in_flow[0], both[0]
 
 
-def _followed(
+def followed_mode(
     stiffness: ComplexArray,
     damping: ComplexArray,
-    P: Matrix,
-    feedback: Feedback,
+    force: Callable[[complex], Matrix],
     start: tuple[complex, ComplexArray],
 ) -> tuple[complex, ComplexArray]:
-    """Return the eigenvalue whose coefficients are those of its own frequency."""
+    """Return the eigenvalue and shape, in motions of unit mass, whose aerodynamic force is that at the eigenvalue itself."""
     pair = start
     for _ in range(ITERATIONS):
-        # matrices know the motion as it grows or decays, a table its frequency
-        omega = pair[0].imag if feedback.influence.depends_on_frequency else -1j * pair[0]
-        force = P @ feedback.force(omega) @ P.conj().T
-        found = nearest_mode(stiffness, damping, force, pair)
+        found = _nearest(stiffness, damping, force(pair[0]), pair)
         if abs(found[0] - pair[0]) <= SETTLED * abs(found[0]):
             return found
         pair = found
     return pair
 
 
-def nearest_mode(
+def _nearest(
     stiffness: ComplexArray,
     damping: ComplexArray,
     force: ComplexArray,

@@ -11,7 +11,7 @@ from stickslip.model.structure import Structure
 from stickslip.reduction.aerodynamics import Feedback
 from stickslip.reduction.basis import in_basis, in_coordinates
 from stickslip.reduction.nodal import own_motions
-from stickslip.response.rotating.flutter import ITERATIONS, SETTLED, damping_ratio, nearest_mode
+from stickslip.response.rotating.flutter import damping_ratio, followed_mode
 from stickslip.response.system import System
 
 WHOLE = 400  # coordinates up to which eigenvalues are those of all motions
@@ -130,14 +130,16 @@ def _eigenpairs(
     if feedback is None or not feedback.influence.depends_on_frequency:
         return values, shapes
     P = np.asarray(feedback.patterns)
+    stiff, damp = feedback.influence.frozen(feedback.phase_angle, feedback.reference)
+
+    def beyond(eigenvalue: complex) -> Matrix:
+        # a table knows the frequency of a motion and not its growth; the matrices hold the frozen form of both
+        inner = feedback.force(eigenvalue.imag) - stiff - eigenvalue * damp
+        return np.asarray(P @ inner @ P.conj().T)
+
     for i in range(values.size):
-        value, shape = complex(values[i]), shapes[:, i]
-        for _ in range(ITERATIONS):
-            force = P @ feedback.beyond_frozen(value.imag)[0] @ P.conj().T
-            before, (value, shape) = value, nearest_mode(stiffness, damping, force, (value, shape))
-            if abs(value - before) <= SETTLED * abs(value):
-                break
-        values[i], shapes[:, i] = value, shape
+        start = complex(values[i]), shapes[:, i]
+        values[i], shapes[:, i] = followed_mode(stiffness, damping, beyond, start)
     return values, shapes
 
 

@@ -1,6 +1,7 @@
 """The table [forced_response] of a study file, and the sweep that it becomes."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
@@ -114,12 +115,32 @@ def sweep_of(settings: Any, engine_order: int | None, driven: Iterable[int] = (1
     InputError
         If a response over speed is asked for and no load has an engine order.
     """
-    table, h = settings.forced_response, settings.harmonics
-    lowest, highest = _range(table, engine_order)
+    table = settings.forced_response
+    sweep = sweep_through(settings, table, _range(table, engine_order), driven)
+    own = tuple(HZ * f for f in table.frequencies_hz or ())
+    return replace(sweep, at=own, frequencies=table.frequencies or 0)
+
+
+def sweep_through(
+    settings: Any, table: Any, omega_range: tuple[float, float], driven: Iterable[int]
+) -> Sweep:
+    """Return the sweep of a table with ``direction``, ``points`` and ``peak_points``, harmonics and solver as the study says.
+
+    Parameters
+    ----------
+    settings
+        With the tables ``harmonics`` and ``solver``.
+    table
+        Whose response it is.
+    omega_range
+        Lowest and highest frequency, rad/s.
+    driven
+        Harmonics that loads act in.
+    """
+    h = settings.harmonics
     low = h.beginning(driven)
     return Sweep(
-        omega_range=(lowest, highest),
-        at=tuple(HZ * f for f in table.frequencies_hz or ()),
+        omega_range=omega_range,
         direction=table.direction,
         low=low,
         high="auto" if h.high == "auto" else h.high_harmonics,
@@ -131,7 +152,6 @@ def sweep_of(settings: Any, engine_order: int | None, driven: Iterable[int] = (1
         passages=h.passages,
         error_harmonics=h.alert_harmonics,
         points=table.points,
-        frequencies=table.frequencies or 0,
         peak_points=table.peak_points,
     )
 

@@ -13,7 +13,6 @@ from stickslip.study.analyses.forced.working_range import (
 from stickslip.study.analyses.verdict import said
 
 TITLE = "Where friction works"
-BEST_OF_STUCK = 0.995  # of the stuck peak: above, nothing is said of the smallest one
 
 
 def range_lines(data: xr.Dataset) -> tuple[str, ...]:

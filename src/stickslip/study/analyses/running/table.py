@@ -6,8 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from stickslip.response.forced.response import Sweep
-from stickslip.response.forced.sweep import RUNGS
-from stickslip.study.analyses.forced.section import MULTIPLE
+from stickslip.study.analyses.forced.section import sweep_through
 from stickslip.study.analyses.waves.tables import Order
 from stickslip.study.file.section import Positive, Section, custom_error, once, rising_pair
 from stickslip.units import RPM
@@ -90,21 +89,6 @@ def sweep_along(settings: Any, engine_order: int, driven: Iterable[int] = (1,)) 
     driven
         Harmonics that loads act in.
     """
-    table, h = settings.run_up, settings.harmonics
+    table = settings.run_up
     lowest, highest = (engine_order * speed for speed in table.speeds)
-    low = h.beginning(driven)
-    return Sweep(
-        omega_range=(lowest, highest),
-        direction=table.direction,
-        low=low,
-        high="auto" if h.high == "auto" else h.high_harmonics,
-        samples=h.samples,
-        evaluator=settings.solver.evaluator,
-        cap=max(RUNGS[-1], MULTIPLE * low[-1]),
-        threshold=h.alert_threshold_percent / 100,
-        selection=h.chooser,
-        passages=h.passages,
-        error_harmonics=h.alert_harmonics,
-        points=table.points,
-        peak_points=table.peak_points,
-    )
+    return sweep_through(settings, table, (lowest, highest), driven)
