@@ -186,6 +186,18 @@ class HarmonicBalance:
             period.events if period.events is not None and period.events.whole else None,
         )
 
+    def linear_residual(self, x: FloatArray, omega: float) -> FloatArray:
+        """Return the (size,) scaled residual without the contact forces."""
+        q = x.reshape(self.n_rows, self.linear.n) * self.displacement_scale
+        if self.large or self.structured:
+            part = _product(self.linear, self.harmonics, omega)
+            force: FloatArray = part.product(q) - part.load
+        else:
+            own = _linear_part(self.linear, self.harmonics, omega)
+            product = own.operators[0] @ to_complex(q)[:, :, None] - own.loads[0]
+            force = to_real(product[..., 0])
+        return force.reshape(-1) / self.force_scale
+
     def _by_matrices(
         self, x: FloatArray, omega: float, period: ContactPeriod
     ) -> tuple[FloatArray, FloatArray, FloatArray]:

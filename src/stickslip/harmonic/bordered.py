@@ -32,11 +32,14 @@ class Setting:
         Frequency, rad/s; NaN where the extra unknowns are out of bounds.
     slopes
         (m,) derivative of `omega` by the extra unknowns; those for which it is zero change the balance.
+    linear_alone
+        Whether they change nothing of it but its linear forces.
     """
 
     balance: HarmonicBalance
     omega: float
     slopes: FloatArray
+    linear_alone: bool = False
 
 
 Invert = Callable[[Jacobian], Inverse | None]
@@ -106,12 +109,17 @@ class State:
     def columns(self) -> FloatArray:
         """(size, m) derivatives of the balance by the extra unknowns: exact by the frequency, else central differences."""
         own = [
-            slope * self.at.jac_p
-            if slope != 0.0
-            else self.by_extra(place, lambda state: state.at.residual)
+            slope * self.at.jac_p if slope != 0.0 else self.by_extra(place, State.changed_residual)
             for place, slope in enumerate(self.setting.slopes)
         ]
         return np.stack(own, axis=1)
+
+    def changed_residual(self) -> FloatArray:
+        """Return the residual of the balance, without what extra unknowns do not change."""
+        balance, omega = self.setting.balance, self.setting.omega
+        if self.setting.linear_alone:
+            return balance.linear_residual(self.x, omega)
+        return self.at.residual
 
     @cached_property
     def inverse(self) -> Inverse | None:
@@ -158,12 +166,15 @@ class PeriodicProblem:
     row
         (size + 1,) what closes the equations of the tangent of the motion and the first extra unknown; None: that unknown grows by one, which
         it cannot at a fold.
+    by_parameter
+        Derivative of all equations by the parameter at a state, where it is known; None: a central difference.
     """
 
     settings: Settings
     conditions: tuple[Condition, ...]
     invert: Invert
     row: FloatArray | None = None
+    by_parameter: Callable[[State], FloatArray] | None = None
 
     def state(self, y: FloatArray, p: float) -> State:
         """Return the problem at the unknowns `y` and the parameter `p`; nothing is evaluated yet."""
@@ -186,9 +197,10 @@ class PeriodicProblem:
                 row[:] = condition.gradient(state)
         size = n - values.size
         jac = Bordered(state.at.jac, state.columns, rows[:, :size], rows[:, size:])
+        known = self.by_parameter
         return ParameterLinearisation(
             np.append(state.at.residual, values),
             jac,
             state.at.seconds_contact,
-            lambda: difference(lambda v: self.residual(y, v), p),
+            lambda: difference(lambda v: self.residual(y, v), p) if known is None else known(state),
         )

@@ -21,6 +21,7 @@ from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.bordered import Condition, PeriodicProblem, Setting, State
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import BalanceAt
+from stickslip.operators import times
 from stickslip.response.parameter import Discretisation, Parameter, parameter_family
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.response.system import System
@@ -106,15 +107,23 @@ class SelfExcited:
         return replace(self.balance, linear=self.balance.linear.with_mass_damping(rate))
 
     def over_amplitude(
-        self, family: BalanceAt | None = None, scale: float = 1.0
+        self,
+        family: BalanceAt | None = None,
+        scale: float = 1.0,
+        held: tuple[Condition, ...] | None = None,
     ) -> PeriodicProblem:
-        """Return the equation whose parameter is ``ln a`` and whose last unknown is a level, over `scale`; None: that of damping."""
+        """Return the equation whose parameter is ``ln a`` and whose last unknown is a level, over `scale`; None: that of damping.
+
+        What is `held`, size and phase of the motion over `a`, is that of the coordinate unless other conditions are given.
+        """
         members = family or self.damped
 
         def setting(extra: FloatArray, p: float) -> Setting:
-            return self._setting(members(scale * float(extra[1])), float(extra[0]), p)
+            made = self._setting(members(scale * float(extra[1])), float(extra[0]), p)
+            return replace(made, linear_alone=family is None)
 
-        return self._bordered(setting)
+        whole = self._bordered(setting, held)
+        return replace(whole, by_parameter=_by_size) if family is None else whole
 
     def limit_cycle(self) -> PeriodicProblem:
         """Return the equation of a motion of given damping, whose last unknown is ``ln a`` and whose parameter is its level: that of a limit cycle is zero."""
@@ -165,12 +174,19 @@ class SelfExcited:
         scaled = self.at_amplitude(balance, log_amplitude) if near else balance
         return Setting(scaled, omega, np.array([omega, 0.0]))
 
-    def _bordered(self, settings: Callable[[FloatArray, float], Setting]) -> PeriodicProblem:
-        held: tuple[Condition, ...] = (
-            Held(self.position, 1, 1.0),
-            Held(self.position, 2, 0.0),
-        )
-        return PeriodicProblem(settings, held, partial(factorised, self.how.newton.linear))
+    def _bordered(
+        self,
+        settings: Callable[[FloatArray, float], Setting],
+        held: tuple[Condition, ...] | None = None,
+    ) -> PeriodicProblem:
+        own = (Held(self.position, 1, 1.0), Held(self.position, 2, 0.0))
+        return PeriodicProblem(settings, held or own, partial(factorised, self.how.newton.linear))
+
+
+def _by_size(state: State) -> FloatArray:
+    """Return the derivative of the equations by the logarithm of the amplitude that is their scale: ``J x - r``, and of the conditions zero."""
+    at = state.at
+    return np.append(times(at.jac, state.x) - at.residual, np.zeros(state.extra.size))
 
 
 def self_excited_motions(

@@ -1,0 +1,5 @@
+"""Nonlinear modes: periodic motions of a structure with contacts that nothing drives, over their amplitude."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

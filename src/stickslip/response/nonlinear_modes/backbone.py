@@ -1,0 +1,246 @@
+"""Backbones: frequency and damping ratio of a mode over its amplitude, from where nothing slips on.
+
+The extended periodic motion concept (Krack, Journal of Sound and Vibration 340 (2015) 70-86): with ``C - ξ M`` in place of the damping C the motion of every
+amplitude is periodic, and ``ξ / 2ω`` is the damping ratio that it has without the added term. A conservative mode is one for which ξ comes out as zero.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.branch import Followed, Route
+from stickslip.response.follow import follow
+from stickslip.response.nonlinear_modes.contacts import Contacts, contacts_of
+from stickslip.response.nonlinear_modes.levels import ModeCurve
+from stickslip.response.parameter import Discretisation
+from stickslip.response.self_excited.curve import slip_amplitude
+from stickslip.response.self_excited.modes import StuckMode
+from stickslip.response.self_excited.problem import self_excited_motions
+from stickslip.response.system import System
+from stickslip.solve.status import Status
+
+BEGINS = 0.5  # of the amplitude at which slip begins
+ENDS = 300.0  # times that amplitude
+LOST = 3  # points in a row that are not found, after which a curve is at its end
+
+
+@dataclass(frozen=True, eq=False)
+class ModePoint:
+    """A periodic motion of a nonlinear mode.
+
+    Attributes
+    ----------
+    amplitude
+        Of the followed coordinate in the first harmonic, m.
+    omega
+        rad/s.
+    ratio
+        Damping ratio ``ξ / 2ω``, linear damping included: that at which the motion decays where nothing feeds it.
+    coefficients
+        (H+1, n) displacement of all dofs at that amplitude, m, static term included.
+    modal_amplitude
+        ``sqrt(X_1^H M X_1)``, kg^0.5 m.
+    energy
+        Twice the mean kinetic energy of all harmonics, J, of a wheel that of one sector: the whole energy, where springs are linear.
+    order
+        Highest harmonic.
+    status
+        How the solver ended; a point that did not converge is no motion.
+    slipping
+        Share of the contact points that slip or open at some time.
+    open_for
+        Largest share of the period for which a contact point is open.
+    change
+        Relative change of frequency or damping ratio, the larger one, that more harmonics are foretold to make; NaN where nobody looked.
+    """
+
+    amplitude: float
+    omega: float
+    ratio: float
+    coefficients: ComplexArray
+    modal_amplitude: float
+    energy: float
+    order: int
+    status: Status
+    slipping: float = np.nan
+    open_for: float = np.nan
+    change: float = np.nan
+
+    @property
+    def converged(self) -> bool:
+        """Whether the point is a solution."""
+        return self.status.converged
+
+
+@dataclass(frozen=True, eq=False)
+class Backbone:
+    """A nonlinear mode: its motions over the amplitude.
+
+    Attributes
+    ----------
+    system, load
+        What vibrates, and its static load.
+    mode
+        The linear mode from which it starts.
+    dof
+        The followed coordinate.
+    points
+        In the order of the curve; the amplitude turns back at a fold.
+    end
+        How it ended, in words.
+    """
+
+    system: System
+    load: HarmonicLoad
+    mode: StuckMode
+    dof: int
+    points: tuple[ModePoint, ...]
+    end: str
+
+    @property
+    def solutions(self) -> tuple[ModePoint, ...]:
+        """The points that converged."""
+        return tuple(p for p in self.points if p.converged)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModeSweep:
+    """Over which amplitudes a nonlinear mode is followed, and with how many harmonics.
+
+    Parameters
+    ----------
+    span
+        First and last amplitude, m: of the coordinate as long as the motion has the shape of the linear mode, else of the motion of the
+        same kinetic energy over the square of its frequency. None: from half of that at which slip begins to 300 times that.
+    points
+        Least number of points.
+    most_harmonics
+        Up to which harmonics are raised, to twice as many and one, where frequency or damping ratio would change by more than the
+        `tolerance`; as many as there are, or fewer: none is raised.
+    tolerance
+        Relative.
+    to_gross_slip
+        Whether the curve ends where every contact that can slip has slipped or opened.
+    """
+
+    span: tuple[float, float] | None = None
+    points: int = 30
+    most_harmonics: int = 0
+    tolerance: float = 1e-3
+    to_gross_slip: bool = False
+
+
+def nonlinear_mode(
+    system: System,
+    load: HarmonicLoad,
+    mode: StuckMode,
+    dof: int,
+    how: Discretisation | None = None,
+    sweep: ModeSweep | None = None,
+) -> Backbone:
+    """Follow a nonlinear mode over its amplitude.
+
+    Parameters
+    ----------
+    system
+        What vibrates and its contacts; of a wheel, with the wave number of the mode as its engine order.
+    load
+        Static forces.
+    mode
+        One of `stuck_modes`.
+    dof
+        The coordinate whose amplitude is told.
+    how
+        Harmonics, samples, solver; the least number of harmonics where these are raised.
+    sweep
+        Amplitudes, and how far harmonics are raised.
+
+    Raises
+    ------
+    InputError
+        If a contact is rigid, a harmonic load acts, the coordinate is none of the mode, or nothing slips and there is no span.
+    """
+    problem = self_excited_motions(system, load, mode, dof, how or Discretisation())
+    along, span = sweep or ModeSweep(), None if sweep is None else sweep.span
+    if span is None:
+        slips = slip_amplitude(problem)
+        span = (BEGINS * slips, ENDS * slips)
+    curve = ModeCurve.of(problem, span, along.points, along.most_harmonics, along.tolerance)
+    first, last = (float(np.log(a)) for a in span)
+    route = Route(first=first, last=last, points=along.points, leaves=False)
+    found = _followed(curve, route, to_gross_slip=along.to_gross_slip)
+    made = tuple(mode_point(curve, f) for f in found)
+    stopped = along.to_gross_slip and found[-1].p != route.last
+    return Backbone(system, load, mode, dof, made, _end(made, stopped=stopped))
+
+
+def mode_point(curve: ModeCurve, found: Followed) -> ModePoint:
+    """Return what a point of the curve tells."""
+    problem, y = curve.problems[found.level], found.point.x
+    scale = float(np.exp(found.p))
+    omega, order = problem.omega(y), problem.balance.order
+    motion = scale * problem.relative(y)
+    full = problem.damped(float(y[-1])).linear.recover(omega, motion)
+    energies = [_product(problem.system, h, full[h]) for h in range(1, order + 1)]
+    squares = (omega * np.arange(1, order + 1)) ** 2
+    contacts = contacts_of(problem, y, scale) if found.converged else Contacts(np.nan, np.nan)
+    return ModePoint(
+        float(abs(full[1, problem.dof])),
+        omega,
+        problem.ratio(y),
+        full,
+        float(np.sqrt(energies[0])),
+        0.5 * float(squares @ np.array(energies)),
+        order,
+        found.point.solution.status,
+        contacts.slipping,
+        contacts.open_for,
+        found.judged.bound,
+    )
+
+
+def _product(system: System, harmonic: int, moving: ComplexArray) -> float:
+    """Return ``X^H M X`` of a harmonic."""
+    return float(np.vdot(moving, system.structure.of_harmonic(harmonic).mass @ moving).real)
+
+
+def _followed(curve: ModeCurve, route: Route, *, to_gross_slip: bool) -> list[Followed]:
+    """Follow a curve to its end, or to where it is lost for good."""
+    branch: list[Followed] = []
+    for one in follow(curve, route):
+        if one.kind == "point":
+            branch = [*branch[: one.index], one]
+        elif one.kind == "found":
+            branch[one.index] = one
+        else:
+            continue
+        if len(branch) > LOST and not any(f.converged for f in branch[-LOST:]):
+            break
+        if to_gross_slip and one.converged and curve.slips_grossly(one):
+            break
+    return branch
+
+
+def _end(points: Iterable[ModePoint], *, stopped: bool) -> str:
+    """Say how a curve ended."""
+    known = list(points)
+    solved = [p for p in known if p.converged]
+    if not solved:
+        return "no motion found at the first amplitude"
+    end = solved[-1]
+    gross = next((p.amplitude for p in solved if p.slipping == 1.0), None)
+    if known[-1] is end:
+        if stopped:
+            return f"gross slip at {end.amplitude:.4g} m"
+        slips = "" if gross is None else f", gross slip from {gross:.4g} m on"
+        return f"amplitude reached{slips}"
+    opened = (
+        f", contacts open for {100 * end.open_for:.0f} % of the period"
+        if end.open_for > 0.0
+        else ""
+    )
+    word = "lift-off ends it" if end.open_for > 0.0 else "lost"
+    return f"{word} at {end.amplitude:.4g} m{opened}"

@@ -1,0 +1,161 @@
+"""A nonlinear mode as a curve whose harmonics are raised where frequency or damping ratio ask for it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.harmonic.bordered import PeriodicProblem
+from stickslip.response.branch import Curve, Followed, Judged, steps_through
+from stickslip.response.equilibrium import preload
+from stickslip.response.nonlinear_modes.contacts import contacts_of
+from stickslip.response.nonlinear_modes.measure import by_energy
+from stickslip.response.self_excited.curve import LARGEST, PATIENT
+from stickslip.response.self_excited.problem import SelfExcited
+from stickslip.solve.branch import Following, Latest
+from stickslip.solve.continuation import Point, StepControl
+from stickslip.solve.linear import factorised
+from stickslip.solve.newton_method import Solution, first_converged, newton
+
+MORE = 2  # times the harmonics, and one, from one level to the next
+SAFETY = 1.25
+AGREE = 0.5  # share of the tolerance by which neighbouring levels may differ
+NEAR = 0.3
+FAINT_RATIO = 1e-4  # damping ratios below are compared with this one
+SMALL = 100.0  # unknowns whose part of a Newton step costs as much as the rest
+
+
+@dataclass(frozen=True, eq=False)
+class ModeCurve(Curve):
+    """The motions of a mode over ``ln a``.
+
+    Parameters
+    ----------
+    problems
+        The mode with the harmonics of each level.
+    control
+        Steps.
+    tolerance
+        Relative change of frequency or damping ratio beyond which harmonics are raised.
+    """
+
+    problems: tuple[SelfExcited, ...]
+    control: StepControl
+    tolerance: float
+
+    @classmethod
+    def of(
+        cls,
+        problem: SelfExcited,
+        span: tuple[float, float],
+        points: int,
+        most: int = 0,
+        tolerance: float = 1e-3,
+    ) -> "ModeCurve":
+        """Return the curve of a mode with its harmonics, and levels of more up to `most`."""
+        every = [problem]
+        while every[-1].balance.order < most:
+            every.append(problem.with_order(min(MORE * every[-1].balance.order + 1, most)))
+        length = abs(float(np.log(span[1] / span[0])))
+        control = replace(steps_through(length, points), largest=LARGEST)
+        return cls(tuple(every), control, tolerance)
+
+    @property
+    def levels(self) -> int:
+        """Number of levels."""
+        return len(self.problems)
+
+    @cached_property
+    def equations(self) -> tuple[PeriodicProblem, ...]:
+        """The equation of each level."""
+        return tuple(p.over_amplitude(held=by_energy(p)) for p in self.problems)
+
+    @cached_property
+    def static(self) -> FloatArray:
+        """(n_retained,) displacement under the static load, m."""
+        own = self.problems[0]
+        return preload(own.system, own.load.static)
+
+    def problem(self, level: int) -> PeriodicProblem:
+        """Return the equation of a level."""
+        return self.equations[level]
+
+    def following(self, level: int) -> Following:
+        """Return how its branch is followed: lengths are those of the vibration, the frequency and the level, not of the mean."""
+        own = self.problems[level]
+        weights = np.ones(own.balance.size + 2)
+        weights[: own.balance.linear.n] = 0.0
+        return Following(newton=own.how.newton, control=self.control, weights=weights)
+
+    def fresh(self, level: int, p: float, near: Sequence[Followed], most: bool) -> Solution:
+        """Solve at an amplitude from motions nearby, or from the linear mode about the static state."""
+        own, equation = self.problems[level], self.problem(level)
+        starts = [self.lifted(n.point.x, n.level, level) for n in near]
+        starts.append(own.guess(self.static, float(np.exp(p))))
+        options = own.how.newton, replace(PATIENT, linear=own.how.newton.linear)
+        attempts = (
+            newton(lambda y: equation.linearise(y, p), start, one)
+            for one in options[: 2 if most else 1]
+            for start in starts
+        )
+        return first_converged(attempts)
+
+    def lifted(self, x: FloatArray, level: int, to: int) -> FloatArray:
+        """Return unknowns of one level as those of another; missing harmonics are zero."""
+        if level == to:
+            return x
+        balances = (replace(self.problems[i].balance, displacement_scale=1.0) for i in (level, to))
+        own, other = balances
+        return np.append(other.unknowns(own.coefficients(x[:-2])), x[-2:])
+
+    def cost(self, level: int) -> float:
+        """Return the work of a Newton step."""
+        return 1.0 + self.problems[level].balance.size / SMALL
+
+    def judge(self, level: int, point: Point, latest: Latest) -> Judged:
+        """Foretell by a Newton step with the harmonics of the next level what these change of frequency and damping ratio."""
+        if self.levels == 1:
+            return Judged()
+        if level + 1 == self.levels:
+            return Judged()
+        more = self.lifted(point.x, level, level + 1)
+        at = self.problem(level + 1).linearise(more, point.p)
+        inverse = factorised(self.problems[level + 1].how.newton.linear, at.jac)
+        step = None if inverse is None else inverse(-at.residual)
+        if step is None:
+            return Judged(np.inf)
+        return Judged(SAFETY * self._change(level + 1, more, more + step))
+
+    def quiet(self, level: int, judged: Judged) -> bool:
+        """Whether a bound is below the tolerance, or nobody can tell."""
+        return not judged.bound > self.tolerance
+
+    def agree(self, fewer: Followed, more: Followed) -> bool:
+        """Whether frequency and damping ratio differ by clearly less than the tolerance."""
+        return self._between(fewer, more) <= AGREE * self.tolerance
+
+    def near(self, fewer: Followed, more: Followed) -> bool:
+        """Whether two motions differ by so little that they cannot stand on different sheets."""
+        return self._between(fewer, more) <= NEAR
+
+    def height(self, found: Followed) -> float:
+        """Return the damping ratio."""
+        return self.problems[found.level].ratio(found.point.x)
+
+    def slips_grossly(self, found: Followed) -> bool:
+        """Whether every contact that can slip has slipped or opened in a motion."""
+        own = self.problems[found.level]
+        return contacts_of(own, found.point.x, float(np.exp(found.p))).slipping == 1.0
+
+    def _between(self, fewer: Followed, more: Followed) -> float:
+        lifted = self.lifted(fewer.point.x, fewer.level, more.level)
+        return self._change(more.level, lifted, more.point.x)
+
+    def _change(self, level: int, one: FloatArray, other: FloatArray) -> float:
+        """Return the relative difference of two motions in frequency or damping ratio, the larger one."""
+        own = self.problems[level]
+        ratios = own.ratio(one), own.ratio(other)
+        size = max(abs(ratios[0]), abs(ratios[1]), FAINT_RATIO)
+        return max(abs(float(np.expm1(other[-2] - one[-2]))), abs(ratios[1] - ratios[0]) / size)
