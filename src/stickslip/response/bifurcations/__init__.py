@@ -1,0 +1,5 @@
+"""Bifurcations of a forced response: where they are on a branch, and the branches that leave there."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

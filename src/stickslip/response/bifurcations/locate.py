@@ -1,0 +1,304 @@
+"""Where multipliers cross the unit circle along a branch: between points whose numbers of multipliers outside of it differ."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+
+from stickslip.errors import StickslipError, input_error
+from stickslip.response.bifurcations.found import Bifurcation, BifurcationKind, Bifurcations
+from stickslip.response.bifurcations.spectra import (
+    ON_AXIS,
+    Examine,
+    Spectrum,
+    nearest_to_one,
+    neutral_of,
+    spectrum,
+)
+from stickslip.response.bifurcations.stretch import Stretch, stretch
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
+from stickslip.response.stability.multipliers import Stability, stability
+from stickslip.solve.branch import Point
+
+TOLERANCE = 1e-6  # length along the branch to which a bifurcation is located
+MOST = 300  # motions whose multipliers are asked for
+FOR_LOCATING = 0.5  # share of these that is kept for locating what the points of the branch show
+JUMP = (
+    5e-3  # change of a modulus within the last bracket, a hundred times smaller where it is smooth
+)
+NO_CORNER = "no solution with the harmonics of both ends is found at one of them"
+GAP = "the branch has a gap there, and goes on elsewhere"
+UNKNOWN = "no multipliers are known at one of its ends"
+SPENT = "the multipliers of as many motions were asked for as was allowed"
+
+
+def bifurcations(
+    problem: ForcedProblem,
+    points: Sequence[ForcedPoint],
+    *,
+    examine: Examine | None = stability,
+    tolerance: float = TOLERANCE,
+    most: int = MOST,
+) -> Bifurcations:
+    """Locate the bifurcations along a branch of a forced response.
+
+    Folds are where the tangent of the branch turns back, whatever the multipliers say. The others lie between two points of which one has
+    more multipliers outside of the unit circle: there the branch is solved on planes across the chord until the modulus that crosses is 1
+    (Brent's method), or until the two sides of a jump are as near to each other as the tolerance. Multipliers that leave and
+    come back within one step are not seen.
+
+    Parameters
+    ----------
+    problem
+        The forced response that the points belong to.
+    points
+        In the order of the branch; peak points at its end are left out. The branch is interrupted where one did not converge.
+    examine
+        Multipliers of a solution; None: folds alone.
+    tolerance
+        Length along the branch to which they are located, see `StepControl`.
+    most
+        Motions whose multipliers are asked for. Where the branch has more than half as many points, only every second, third, ... is
+        looked at, and those between where the numbers differ.
+
+    Raises
+    ------
+    InputError
+        If the tolerance is not positive, or fewer than 20 motions are allowed; and what `examine` refuses.
+    """
+    if not 0.0 < tolerance < 1.0:
+        raise input_error("bifurcations: tolerance", f"must be between 0 and 1, got {tolerance:g}", "1e-6 is usual.")  # fmt: skip
+    if most < 20:
+        raise input_error(
+            "bifurcations: most",
+            f"must be at least 20, got {most}",
+            "One bifurcation takes about ten motions.",
+        )
+    walk = _Walk(problem, examine, tolerance, most)
+    branch = list(points)
+    while branch and branch[-1].stage == "peak":
+        branch.pop()
+    for run in _runs(branch):
+        walk.through(branch, run)
+    return Bifurcations(tuple(walk.ordered()), tuple(walk.unseen), walk.examined)
+
+
+def _runs(branch: Sequence[ForcedPoint]) -> Iterator[range]:
+    """Yield the positions of points that converged one after the other."""
+    begin = 0
+    for place, point in enumerate(branch):
+        if not point.converged:
+            yield range(begin, place)
+            begin = place + 1
+    yield range(begin, len(branch))
+
+
+@dataclass(frozen=True, eq=False)
+class _Crossing:
+    """A bifurcation, and where along its step it lies."""
+
+    share: float
+    found: Bifurcation
+
+
+@dataclass(eq=False)
+class _Walk:
+    """Goes along a branch and collects what it finds."""
+
+    problem: ForcedProblem
+    examine: Examine | None
+    tolerance: float
+    most: int
+    unseen: list[tuple[float, float, str]] = field(default_factory=list)
+    crossings: list[_Crossing] = field(default_factory=list)
+    examined: int = 0
+    seen: dict[int, tuple[ForcedPoint, Stability | None]] = field(default_factory=dict)
+
+    def through(self, branch: Sequence[ForcedPoint], run: range) -> None:
+        """Look at points that follow each other."""
+        steps = {i: stretch(self.problem, branch[i], branch[i + 1]) for i in run[:-1]}
+        for i, step in steps.items():
+            if step is None:
+                self._lost(branch[i].omega, branch[i + 1].omega, NO_CORNER)
+            elif step.folds:
+                self._fold(step, i)
+        if self.examine is None or len(run) < 2:
+            return
+        stride = max(1, int(np.ceil(len(run) / (FOR_LOCATING * self.most))))
+        looked = sorted({*run[::stride], run[-1]})
+        for a, b in pairwise(looked):
+            self._compare(branch, steps, a, b)
+
+    def ordered(self) -> list[Bifurcation]:
+        """Return the bifurcations along the branch, a fold's multiplier not being counted twice."""
+        own = sorted(self.crossings, key=lambda c: (c.found.place, c.share))
+        folds = [c for c in own if c.found.kind == "fold"]
+        taken: set[int] = set()
+        for fold in folds:
+            near = [
+                c
+                for c in own
+                if c.found.kind in ("branch point", "jump of multipliers")
+                and c.found.multiplicity == 1
+                and c.found.multiplier.real > 0.0
+                and id(c) not in taken
+                and abs(c.found.place[0] - fold.found.place[0]) <= 1
+            ]
+            if near:
+                way = fold.found.place[0] + fold.share
+                taken.add(id(min(near, key=lambda c: abs(c.found.place[0] + c.share - way))))
+        return [c.found for c in own if id(c) not in taken]
+
+    def _lost(self, first: float, last: float, why: str) -> None:
+        self.unseen.append((first, last, why))
+
+    def _look(self, point: ForcedPoint) -> Stability | None:
+        """Return what the multipliers of a point are; None where they are not known, or no more may be asked for."""
+        known = self.seen.get(id(point))
+        if known is None:
+            if self.examine is None or self.examined >= self.most:
+                return None
+            self.examined += 1
+            found: Stability | None
+            try:
+                found = self.examine(self.problem, point)
+            except np.linalg.LinAlgError:
+                found = None
+            known = (point, None if found is None or found.unknown else found)
+            self.seen[id(point)] = known
+        return known[1]
+
+    def _fold(self, step: Stretch, place: int) -> None:
+        at = step.fold()
+        if not at.solution.status.converged:
+            self._lost(step.before.p, step.after.p, GAP)
+            return
+        point = step.forced(at)
+        found = None
+        try:
+            found = self._look(point)
+        except StickslipError:  # said by the search for the others
+            self.examine = None if self.examined <= 1 else self.examine
+        value, error = (complex(np.nan), np.inf) if found is None else nearest_to_one(found)
+        made = Bifurcation(
+            "fold", point, self.problem.amplitude(point), value, error, self._fold_error(step, at),
+            0, 0, (place, place + 1),
+        )  # fmt: skip
+        self.crossings.append(_Crossing(step.along(at), made))
+
+    def _fold_error(self, step: Stretch, at: Point) -> float:
+        """Return the distance of a fold from the same one with more harmonics, rad/s; infinite where that is not found."""
+        order = 2 * step.balance.order + 3
+        more = self.problem.balance(tuple(range(order + 1)))
+        ends = [step.forced(p) for p in (step.before, step.after)]
+        padded = [replace(p, harmonics=np.array(more.harmonics)) for p in ends]
+        again = stretch(self.problem, padded[0], padded[1])
+        if again is None or not again.folds:
+            return np.inf
+        found = again.fold()
+        return abs(found.p - at.p) if found.solution.status.converged else np.inf
+
+    def _compare(
+        self, branch: Sequence[ForcedPoint], steps: dict[int, Stretch | None], a: int, b: int
+    ) -> None:
+        """Look for the steps between two points in which numbers differ."""
+        first, last = self._look(branch[a]), self._look(branch[b])
+        if first is None or last is None:
+            spent = self.examined >= self.most
+            self._lost(branch[a].omega, branch[b].omega, SPENT if spent else UNKNOWN)
+            return
+        neutral = min(neutral_of(first), neutral_of(last))
+        if spectrum(first, neutral).outside == spectrum(last, neutral).outside:
+            return
+        if b > a + 1:
+            middle = (a + b) // 2
+            self._compare(branch, steps, a, middle)
+            self._compare(branch, steps, middle, b)
+            return
+        step = steps[a]
+        if step is not None:
+            self._locate(step, a)
+
+    def _locate(self, step: Stretch, place: int) -> None:
+        """Locate all that crosses within a step: one after the other, in what is left on both sides."""
+        ends = [self._look(step.forced(p)) for p in (step.before, step.after)]
+        if ends[0] is None or ends[1] is None:
+            self._lost(step.before.p, step.after.p, SPENT)
+            return
+        neutral = min(neutral_of(ends[0]), neutral_of(ends[1]))
+        self._within(step, step, place, spectrum(ends[0], neutral), spectrum(ends[1], neutral), neutral)  # fmt: skip
+
+    def _within(
+        self, whole: Stretch, step: Stretch, place: int, first: Spectrum, last: Spectrum, neutral: int
+    ) -> None:  # fmt: skip
+        if first.outside == last.outside or step.length <= 10.0 * self.tolerance:
+            return
+        k = min(first.outside, last.outside)
+        known: list[tuple[Point, Spectrum]] = [(step.before, first), (step.after, last)]
+
+        def value(point: Point) -> float:
+            for had, own in known:
+                if had is point:
+                    return own.excess(k)
+            found = self._look(step.forced(point))
+            if found is None:
+                raise _NoMultipliersError
+            own = spectrum(found, neutral)
+            known.append((point, own))
+            return own.excess(k)
+
+        try:
+            at = step.where(value, self.tolerance)
+        except _NoMultipliersError:
+            self._lost(step.before.p, step.after.p, SPENT if self.examined >= self.most else UNKNOWN)  # fmt: skip
+            return
+        if not at.solution.status.converged:
+            self._lost(step.before.p, step.after.p, GAP)
+            return
+        here = step.along(at)
+        side = np.sign(first.excess(k))
+        low = max((n for n in known if step.along(n[0]) <= here and np.sign(n[1].excess(k)) == side), key=lambda n: step.along(n[0]))  # fmt: skip
+        high = min((n for n in known if step.along(n[0]) >= here and np.sign(n[1].excess(k)) != side), key=lambda n: step.along(n[0]))  # fmt: skip
+        if not step.connected(low[0], high[0], self.tolerance):
+            self._lost(low[0].p, high[0].p, GAP)
+        else:
+            made = self._described(step, place, k, (first, last), (low, high), at)
+            self.crossings.append(_Crossing(whole.along(at), made))
+        self._within(whole, step.between(step.before, low[0]), place, first, low[1], neutral)
+        self._within(whole, step.between(high[0], step.after), place, high[1], last, neutral)
+
+    def _described(
+        self,
+        step: Stretch,
+        place: int,
+        k: int,
+        ends: tuple[Spectrum, Spectrum],
+        sides: tuple[tuple[Point, Spectrum], tuple[Point, Spectrum]],
+        at: Point,
+    ) -> Bifurcation:
+        """Return what crosses between two neighbours of a located point."""
+        (low, before), (high, after) = sides
+        larger, smaller = (before, after) if before.excess(k) > after.excess(k) else (after, before)
+        value, error = larger.of_place(k)
+        jumps = larger.excess(k) - smaller.excess(k) > JUMP
+        kind: BifurcationKind
+        if jumps:
+            kind = "jump of multipliers"
+        elif abs(value.imag) > ON_AXIS:
+            kind = "Neimark-Sacker"
+        else:
+            kind = "period doubling" if value.real < 0.0 else "branch point"
+        across = abs(ends[1].excess(k) - ends[0].excess(k))
+        slope = abs(step.after.p - step.before.p) / across if across > 0.0 else np.inf
+        bracket = abs(high.p - low.p)
+        off = bracket if jumps or error == 0.0 else bracket + slope * error
+        point = step.forced(at)
+        return Bifurcation(
+            kind, point, self.problem.amplitude(point), value, error, off,
+            before.outside, after.outside, (place, place + 1), all(own.known(k) for own in ends),
+        )  # fmt: skip
+
+
+class _NoMultipliersError(Exception):
+    """A motion on the way has no multipliers, or no more may be asked for."""
