@@ -29,7 +29,6 @@ import numpy as np
 
 from evidence.strategies.cases import HZ, SelectionCase
 from stickslip.arrays import ComplexArray, FloatArray
-from stickslip.assembly.statics import static_contact_force
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import SingularError
@@ -37,6 +36,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.damping import modal_damping
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
+from stickslip.response.at_rest import static_contact_force
 from stickslip.response.equilibrium import preload
 from stickslip.response.system import System
 

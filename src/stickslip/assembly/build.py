@@ -23,7 +23,6 @@ from stickslip.assembly.points import in_points
 from stickslip.assembly.pulled import refuse_pulled
 from stickslip.assembly.reduced import Store, in_memory, reduced_parts
 from stickslip.assembly.rigid import held_gaps, in_gaps, refuse_mixed_gaps
-from stickslip.assembly.statics import pressed_by, static_contact_force
 from stickslip.assembly.waves import reduced_sector
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws import law_name
@@ -34,6 +33,7 @@ from stickslip.model.modes import natural_frequencies, with_springs
 from stickslip.model.structure import Structure, join
 from stickslip.reduction.cache import content_hash
 from stickslip.reduction.waves import excited_wave, wave
+from stickslip.response.at_rest import pressed_by, static_contact_force
 from stickslip.response.equilibrium import preload
 from stickslip.response.system import System
 

@@ -29,7 +29,6 @@ from stickslip.assembly.places import picked
 from stickslip.assembly.reduced import Store
 from stickslip.assembly.rigid import refuse_mixed_gaps
 from stickslip.assembly.shares import at_rest
-from stickslip.assembly.statics import pressed_by
 from stickslip.assembly.waves import SectorWaves, sector_waves
 from stickslip.assembly.wheel import ReducedSector, wheel_of
 from stickslip.contact.interface import Interface
@@ -43,6 +42,7 @@ from stickslip.reduction.mistuned import MistunedWheel, mistuned_wheel
 from stickslip.reduction.sectors import circulant, couplings, repeated, travelling
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.reduction.waves import excited_wave, wave
+from stickslip.response.at_rest import pressed_by
 from stickslip.response.system import System
 
 RELATIVE = {

@@ -8,10 +8,10 @@ import scipy.optimize
 from stickslip.arrays import FloatArray
 from stickslip.assembly.held import free_motions
 from stickslip.assembly.model import Model
-from stickslip.assembly.statics import opening
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.errors import input_error
+from stickslip.response.at_rest import opening
 
 WORK = 1e-6  # of what the loads could do at most, below which work is rounding
 STEEP = 1e3  # friction coefficient taken for a law that names none

@@ -1,59 +1,17 @@
-"""Contacts under static loads: their forces, and which of them stick in small vibrations."""
+"""What static loads do to the solids of a model."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from stickslip.arrays import BoolArray, FloatArray
-from stickslip.contact.interface import Interface
-from stickslip.contact.law import OPEN, ContactLaw
-from stickslip.harmonic.aft import contact_forces
+from stickslip.arrays import FloatArray
 from stickslip.model.fe.prestress import strain_and_rotation
 from stickslip.model.part import Part
 
-FAR = 1.0  # m: no contact is closed there
 MOST_STRAIN = 0.01  # several times the yield strain of alloys for disks and blades
 MOST_ROTATION = 0.05  # rad; linear statics leaves out its square
 MOST_DISPLACEMENT = 0.02  # of the largest radius
-
-
-def static_contact_force(interface: Interface, gap: FloatArray) -> FloatArray:
-    """Return the (p, 3) forces t, w, n of contacts loaded once from rest to `gap` (p, 3)."""
-    coefficients = gap.reshape(1, -1)
-    return contact_forces(coefficients, interface.compiled(), samples=1).force[:, :, 0]
-
-
-def pressed_by(laws: Sequence[ContactLaw], force: FloatArray) -> BoolArray:
-    """Return the contact points that stick in small vibrations: those under pressure, and those whose law never opens.
-
-    Parameters
-    ----------
-    laws
-        One a point.
-    force
-        (p, 3) static contact forces t, w, n, N.
-    """
-    return np.asarray((force[:, 2] < 0.0) | ~opening(laws))
-
-
-def opening(laws: Sequence[ContactLaw]) -> BoolArray:
-    """Return the contact points (p,) whose law lets go of them where they are far away."""
-    found: dict[int, bool] = {}
-    for law in laws:
-        found.setdefault(id(law), _opens(law))
-    return np.array([found[id(law)] for law in laws], dtype=bool)
-
-
-def _opens(law: ContactLaw) -> bool:
-    """Tell whether a law lets go of a point that is far away."""
-    state = law.initial_state()
-    jac = np.zeros((3 + state.size, 6 + state.size))
-    status = np.empty(2, dtype=np.int64)
-    force, after = np.empty(3), np.empty_like(state)
-    parameters = law.parameters()
-    law.kernel(np.array([0.0, 0.0, FAR]), np.zeros(3), state, parameters, force, after, jac, status)
-    return bool(np.all(status == OPEN))
 
 
 @dataclass(frozen=True)

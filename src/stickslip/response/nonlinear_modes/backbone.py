@@ -13,9 +13,9 @@ from stickslip.arrays import ComplexArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.branch import Followed, Route
 from stickslip.response.follow import follow
-from stickslip.response.nonlinear_modes.contacts import Contacts, contacts_of
 from stickslip.response.nonlinear_modes.levels import ModeCurve
 from stickslip.response.parameter import Discretisation
+from stickslip.response.self_excited.contacts import Contacts, contacts_of
 from stickslip.response.self_excited.curve import slip_amplitude
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.response.self_excited.problem import self_excited_motions

@@ -10,8 +10,8 @@ from stickslip.arrays import FloatArray
 from stickslip.harmonic.bordered import PeriodicProblem
 from stickslip.response.branch import Curve, Followed, Judged, steps_through
 from stickslip.response.equilibrium import preload
-from stickslip.response.nonlinear_modes.contacts import contacts_of
 from stickslip.response.nonlinear_modes.measure import by_energy
+from stickslip.response.self_excited.contacts import contacts_of
 from stickslip.response.self_excited.curve import LARGEST, PATIENT
 from stickslip.response.self_excited.problem import SelfExcited
 from stickslip.solve.branch import Following, Latest

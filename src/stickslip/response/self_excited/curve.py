@@ -12,6 +12,7 @@ from stickslip.response.branch import Followed, OneLevel, Route, branch_of, step
 from stickslip.response.equilibrium import preload
 from stickslip.response.follow import follow
 from stickslip.response.parameter import Parameter
+from stickslip.response.self_excited.contacts import contacts_of
 from stickslip.response.self_excited.problem import SelfExcited, levels
 from stickslip.solve.branch import Following
 from stickslip.solve.newton_method import Newton, Solution, first_converged, newton
@@ -69,6 +70,8 @@ class AmplitudePoint:
 def slip_amplitude(problem: SelfExcited) -> float:
     """Return the amplitude, m, at which the first contact leaves the state that it has in the mode, to a percent.
 
+    Contacts that stand on their limits under the static load leave it at once, and stick again about another mean: that is none.
+
     Raises
     ------
     InputError
@@ -80,34 +83,66 @@ def slip_amplitude(problem: SelfExcited) -> float:
     # far below what the static state can be told to, rounding would be all that there is to see
     least = STATIC_SHARE * float(np.max(np.abs(static), initial=0.0))
     amplitude = max(FAINT / largest, least) if largest > 0.0 else np.inf
-    equation, mean = problem.over_amplitude(), problem.balance.linear.n
-    faint = min(amplitude, 1.0)
-    small = _solved(problem, equation, float(np.log(faint)), [])
-    sticks = small.status.converged and np.isfinite(amplitude)
-    noise = NOISE * float(np.max(np.abs(equation.residual(small.x, float(np.log(faint))))))
-
-    def slips(amplitude: float) -> bool:
-        # as long as all contacts stick the motion grows in proportion about the same mean
-        grown = small.x.copy()
-        grown[:mean] *= faint / amplitude
-        left = equation.residual(grown, float(np.log(amplitude)))
-        return bool(np.max(np.abs(left)) > max(SLIPS, noise))
-
-    for _ in range(MOST_DOUBLINGS if sticks else 0):
-        if slips(amplitude):
-            below = 0.5 * amplitude
-            while amplitude > ONSET * below:
-                middle = float(np.sqrt(below * amplitude))
-                below, amplitude = (below, middle) if slips(middle) else (middle, amplitude)
-            return amplitude
-        amplitude *= 2.0
-    if not sticks and np.isfinite(amplitude):
+    equation = problem.over_amplitude()
+    known = _Sticking.at(problem, equation, min(amplitude, 1.0), [])
+    if known is None and np.isfinite(amplitude):
         return amplitude
+    for _ in range(MOST_DOUBLINGS if np.isfinite(amplitude) else 0):
+        assert known is not None
+        if known.leaves(amplitude):
+            again = _Sticking.at(problem, equation, 2.0 * amplitude, [known.grown(2.0 * amplitude)])
+            if again is None:
+                below = 0.5 * amplitude
+                while amplitude > ONSET * below:
+                    middle = float(np.sqrt(below * amplitude))
+                    below, amplitude = (
+                        (below, middle) if known.leaves(middle) else (middle, amplitude)
+                    )
+                return amplitude
+            known = again
+        amplitude *= 2.0
     raise input_error(
         "limit_cycle",
         f"no contact slips or opens in mode {problem.mode.number}, however large its amplitude",
         "Nothing bounds the motion: look at the linear stability alone.",
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Sticking:
+    """A motion in which no contact changes its state; as long as none does it grows in proportion about the same mean."""
+
+    problem: SelfExcited
+    equation: PeriodicProblem
+    amplitude: float
+    y: FloatArray
+    noise: float
+
+    @classmethod
+    def at(
+        cls,
+        problem: SelfExcited,
+        equation: PeriodicProblem,
+        amplitude: float,
+        near: Sequence[FloatArray],
+    ) -> "_Sticking | None":
+        """Return the motion at an amplitude, from others that may be near; None if there is none."""
+        found = _solved(problem, equation, float(np.log(amplitude)), near)
+        if not found.status.converged or contacts_of(problem, found.x, amplitude).slipping > 0.0:
+            return None
+        left = equation.residual(found.x, float(np.log(amplitude)))
+        return cls(problem, equation, amplitude, found.x, NOISE * float(np.max(np.abs(left))))
+
+    def grown(self, amplitude: float) -> FloatArray:
+        """Return the unknowns in proportion at another amplitude."""
+        out = self.y.copy()
+        out[: self.problem.balance.linear.n] *= self.amplitude / amplitude
+        return out
+
+    def leaves(self, amplitude: float) -> bool:
+        """Whether a contact leaves its state before an amplitude."""
+        left = self.equation.residual(self.grown(amplitude), float(np.log(amplitude)))
+        return bool(np.max(np.abs(left)) > max(SLIPS, self.noise))
 
 
 def damping_over_amplitude(

@@ -9,10 +9,10 @@ import numpy as np
 from stickslip.arrays import BoolArray
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
-from stickslip.assembly.statics import pressed_by
 from stickslip.contact.compiled import Evaluator
 from stickslip.errors import input_error
 from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.at_rest import pressed_by
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import StuckMode, stuck_modes
 from stickslip.response.self_excited.problem import SAMPLES_A_HARMONIC

@@ -1,4 +1,4 @@
-"""What contacts do in a motion of a nonlinear mode."""
+"""What contacts do in a motion that nothing drives."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray
 from stickslip.contact.interface import Interface
-from stickslip.contact.law import OPEN, STICK, ContactLaw
+from stickslip.contact.law import OPEN, SLIP, STICK, ContactLaw
 from stickslip.response.self_excited.problem import SelfExcited
 
 FAR = 1.0  # m: whatever can slip has slipped there
@@ -19,7 +19,7 @@ class Contacts:
     Attributes
     ----------
     slipping
-        Share of the contact points that can slip or open and do so at some time; NaN where none can.
+        Share of the contact points that can slip or open and do so, or close, at some time; NaN where none can.
     open_for
         Largest share of the period for which one is open.
     """
@@ -33,7 +33,8 @@ def contacts_of(problem: SelfExcited, y: FloatArray, amplitude: float) -> Contac
     balance = problem.at_amplitude(problem.balance, float(np.log(amplitude)))
     state = balance.contacts(y[:-2], problem.omega(y)).state
     leaves = leaving(problem.system.interface)
-    moved = np.any(state != STICK, axis=(1, 2))
+    # one that stays open does nothing
+    moved = np.any(state == SLIP, axis=(1, 2)) | np.any(state != state[:, :, :1], axis=(1, 2))
     share = float(np.mean(moved[leaves])) if np.any(leaves) else np.nan
     opened = np.mean(np.any(state == OPEN, axis=1), axis=1)
     return Contacts(share, float(np.max(opened, initial=0.0)))
