@@ -23,8 +23,8 @@ from stickslip.operators import Bordered, array_of
 from stickslip.response.branch import following_vibration, steps_through
 from stickslip.response.ladder import without_branch
 from stickslip.response.parameter import Discretisation
+from stickslip.response.resonances.tracking import track_peak
 from stickslip.response.system import System
-from stickslip.response.tracking import track_peak
 from stickslip.solve.continuation import FOLD, start_point, trace
 from stickslip.solve.krylov import Krylov
 from stickslip.solve.linear import Dense, factorised

@@ -34,11 +34,11 @@ from stickslip.response.forced.response import accepted_points, forced_problem, 
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.parameter import Discretisation
 from stickslip.response.recovery import fields
+from stickslip.response.resonances.tracking import track_peak
 from stickslip.response.rigid import rigid_response
 from stickslip.response.system import System
 from stickslip.response.time.shooting import shoot
 from stickslip.response.time.transient import integrate
-from stickslip.response.tracking import track_peak
 from stickslip.solve.krylov import Krylov
 from stickslip.solve.newton_method import Newton
 

@@ -25,8 +25,8 @@ from stickslip.response.parameter import (
     branch_in_parameter,
     parameter_family,
 )
+from stickslip.response.resonances.tracking import smallest_peak, track_peak
 from stickslip.response.system import System
-from stickslip.response.tracking import smallest_peak, track_peak
 from stickslip.solve.continuation import start_point, trace
 from stickslip.solve.krylov import Automatic, Krylov
 from stickslip.solve.linear import Dense, factorised
@@ -98,7 +98,7 @@ def dense_peak(system, load, parameter, value, how, omegas):
 # ---- the equation of the peak --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("condition", ["horizontal_tangent", "phase_quadrature"])
+@pytest.mark.parametrize("condition", ["horizontal_tangent", "phase_quadrature", "variable_phase"])
 @pytest.mark.parametrize("case", [damped, block, duffing])
 def test_derivatives_of_the_peak_problem(case, condition):
     system, load = case()

@@ -21,7 +21,7 @@ from stickslip.model.axis import Axis
 from stickslip.model.deck import write_deck
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.response.parameter import Discretisation
-from stickslip.response.tracking import track_peak
+from stickslip.response.resonances.tracking import track_peak
 from stickslip.solve.krylov import Automatic, Krylov
 from stickslip.solve.newton_method import Newton
 from stickslip.study.models.study import read_study

@@ -12,9 +12,9 @@ import numpy as np
 from evidence.models.many_contacts import two_plates
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response import PeakPoint, track_peak
 from stickslip.response.parameter import Discretisation
 from stickslip.response.system import System
-from stickslip.response.tracking import PeakPoint, track_peak
 from stickslip.solve.krylov import Automatic, Krylov
 from stickslip.solve.newton_method import Newton
 

@@ -18,9 +18,9 @@ from stickslip.contact.laws.cubic_spring import CubicSpring
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.reduction.tuned import tuned_wheel
+from stickslip.response import PeakPoint, track_peak
 from stickslip.response.parameter import Discretisation
 from stickslip.response.system import System
-from stickslip.response.tracking import PeakPoint, track_peak
 
 CASE = "ANSYS {}"
 MANUAL = "ANSYS Mechanical APDL verification manual, {}"

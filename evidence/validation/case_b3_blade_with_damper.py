@@ -17,7 +17,7 @@ from evidence.validation.compare import Record, digits
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.response.parameter import Discretisation
-from stickslip.response.tracking import smallest_peak, track_peak
+from stickslip.response.resonances.tracking import smallest_peak, track_peak
 
 SOURCE = "literature benchmark B3"
 PEAK_SAMPLES = 2**16  # sampling error of a peak amplitude near 1e-9, of its frequency below 1e-7

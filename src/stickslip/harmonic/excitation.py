@@ -70,6 +70,10 @@ class HarmonicLoad:
                 out[h] = amplitude
         return out
 
+    def over_periods(self, periods: int) -> "HarmonicLoad":
+        """Return the same load as one of `periods` times the period: at ω / periods, for motions that repeat themselves only then (subharmonics)."""
+        return HarmonicLoad(self.static, {periods * h: f for h, f in self.harmonics.items()})
+
     @property
     def scale(self) -> float:
         """Largest force amplitude, N."""

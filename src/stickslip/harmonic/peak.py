@@ -5,7 +5,8 @@ drives, the condition is
 
 - by horizontal tangent, ``d|a|/dω = 0`` along the response, with the exact sensitivity ``dx/dω = -J⁻¹ ∂r/∂ω``: true for every maximum,
   minimum and saddle of the amplitude (Krack et al. 2017, section 3.4 and note 22);
-- by phase quadrature, the coordinate lags the force by 90°: no second derivative is needed, and it is not exactly the maximum.
+- by phase quadrature, the coordinate lags the force by 90°: no second derivative is needed, and it is not exactly the maximum;
+- by variable phase, the coordinate has the phase of the last known maximum (Förster and Krack, arXiv 2012.14458, hold the lag of the linear resonance).
 
 It is asked for along the response, by a tangent (v, τ) of x and ln ω that is there at folds too: ``v`` is τ times the sensitivity. Its gradient
 follows from an adjoint μ. The matrix ``∂(J v + τ ∂r/∂ω)/∂x`` is, by the symmetry of second derivatives, the derivative of J along the
@@ -32,8 +33,12 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import BalanceAt, ParameterLinearisation, by_parameter
 from stickslip.operators import transposed_times
 
-Peak = Literal["horizontal_tangent", "phase_quadrature"]
-EVALUATIONS: dict[Peak, int] = {"horizontal_tangent": 3, "phase_quadrature": 1}
+Peak = Literal["horizontal_tangent", "phase_quadrature", "variable_phase"]
+EVALUATIONS: dict[Peak, int] = {
+    "horizontal_tangent": 3,
+    "phase_quadrature": 1,
+    "variable_phase": 1,
+}
 ALONG = 1e-6  # relative change of the state over which the Jacobian is differenced
 # the same where forces are sampled, in samples: J changes only when an event passes one
 ALONG_SAMPLES = 8.0
@@ -222,7 +227,8 @@ class PeakProblem:
     driven
         What peaks.
     phase
-        Phase of the force in the first harmonic of `driven`, rad; the phase condition asks the coordinate to lag it by 90°.
+        What the coordinate lags by 90° where a phase is asked for, rad, in the first harmonic of `driven`: the phase of the force; by variable
+        phase 90° more than the coordinate had at the last known maximum, see `of_the_top`.
     omega_scale
         Frequency at which the last unknown is zero, rad/s.
     invert
@@ -246,7 +252,7 @@ class PeakProblem:
     def bordered(self) -> PeriodicProblem:
         """The equation."""
         condition: Condition = HorizontalTangent(self.driven)
-        if self.by == "phase_quadrature":
+        if self.by != "horizontal_tangent":
             condition = PhaseQuadrature(self.driven, self.phase)
         settings = unknown_frequency(self.family, self.omega_scale)
         return PeriodicProblem(settings, (condition,), self.invert, self.row)
@@ -271,6 +277,18 @@ class PeakProblem:
         measure[-1] = self.sharpness**2
         row = measure * state.along
         return replace(self, row=row / np.sqrt(row @ state.along))
+
+    def of_the_top(self, state: State) -> "PeakProblem":
+        """Return the problem by variable phase, with the phase that the coordinate has at the maximum beside a `state`, as far as `top` sees it; else at the state."""
+        if state.along is None:
+            return self
+        away, _ = self.top(state)
+        if not abs(away) * self.sharpness < 1.0:
+            away = 0.0
+        places = self.driven.places(state.setting.balance)[:2]
+        (c, s), (by_c, by_s) = state.x[places], state.along[places]
+        turn = (s * by_c - c * by_s) / (c**2 + s**2)  # of the angle of c - i s
+        return replace(self, phase=float(np.arctan2(-s, c) + turn * away + 0.5 * np.pi))
 
     def omega(self, y: FloatArray) -> float:
         """Return the frequency of the unknowns `y`, rad/s."""
@@ -300,14 +318,25 @@ class PeakProblem:
         by_own = change / square - 2.0 * float(own @ change) * own / square**2
         return float(_gradient(self.driven, state, state.along, by_own, own / square) @ state.along)
 
+    def top(self, state: State) -> tuple[float, float]:
+        """Return how far in ln ω the maximum beside a `state` is, and how much higher, relatively; NaN where none can be seen.
+
+        ``1/|a|²`` is taken for a parabola, as it is for a linear mode.
+        """
+        slope, curvature = self.rate(state), self.curvature(state)
+        bends = 2.0 * slope**2 - curvature
+        if not (np.isfinite(bends) and bends > slope**2):
+            return np.nan, np.nan
+        return slope / bends, 1.0 / np.sqrt(1.0 - slope**2 / bends) - 1.0
+
     def amplitude_slope(self, state: State) -> float:
         """Return ``d ln|a| / dp`` along the curve of peaks; NaN where the problem is singular.
 
         By horizontal tangent a shift of the frequency does not change the amplitude (envelope theorem): the slope is that at fixed frequency.
         """
         by_p = by_parameter(self.family, state.x, state.setting.omega, state.p)
-        quadrature = self.by == "phase_quadrature"
-        inverse = self.invert(self.linearise(state.y, state.p).jac) if quadrature else state.inverse
+        lagging = self.by != "horizontal_tangent"
+        inverse = self.invert(self.linearise(state.y, state.p).jac) if lagging else state.inverse
         change = None if inverse is None else inverse(-np.append(by_p, 0.0))
         if change is None:
             return np.nan

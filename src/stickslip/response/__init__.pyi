@@ -16,6 +16,11 @@ from .recovery import Fields as Fields
 from .recovery import Signals as Signals
 from .recovery import fields as fields
 from .recovery import signals as signals
+from .resonances.first import Resonance as Resonance
+from .resonances.point import PeakPoint as PeakPoint
+from .resonances.tracking import follow_peaks as follow_peaks
+from .resonances.tracking import smallest_peak as smallest_peak
+from .resonances.tracking import track_peak as track_peak
 from .rigid import RigidPoint as RigidPoint
 from .rigid import rigid_response as rigid_response
 from .rotating.campbell import Campbell as Campbell
@@ -40,8 +45,5 @@ from .time.start import start_from_harmonics as start_from_harmonics
 from .time.transient import TimeStepping as TimeStepping
 from .time.transient import TransientResult as TransientResult
 from .time.transient import integrate as integrate
-from .tracking import PeakPoint as PeakPoint
-from .tracking import smallest_peak as smallest_peak
-from .tracking import track_peak as track_peak
 from .verification import SupportCheck as SupportCheck
 from .verification import check_support as check_support

@@ -1,0 +1,217 @@
+"""Where the peaks of a response are: one sweep, and the maxima that stand out of it."""
+
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import get_args
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.errors import check_choice, input_error
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.parameters import BalanceAt
+from stickslip.harmonic.peak import Driven, Peak, PeakProblem, driven_by
+from stickslip.response.ladder import plain_sweep
+from stickslip.response.parameter import Discretisation, Parameter, parameter_family, system_at
+from stickslip.response.system import System
+from stickslip.solve.continuation import Point
+from stickslip.solve.krylov import to_tolerance
+from stickslip.solve.linear import factorised
+from stickslip.solve.newton_method import Newton
+
+SWEEP_POINTS = 40  # at least, of the one sweep that finds the first peak
+STEPS = 12  # of Newton from peak to peak
+EVALUATIONS_BESIDE = 2  # of a point of a sweep, beside one a Newton step: the start and the tangent
+EXACT = 1e-12  # relative residual of sensitivities that are found by iteration ...
+STEP = 1e-6  # ... and of Newton steps, each of which costs three evaluations and two sensitivities
+STANDS_OUT = 1.01  # a maximum over the higher one of the minima on its sides
+
+
+@dataclass(frozen=True, eq=False)
+class Resonance:
+    """Which resonance is followed, and by what condition.
+
+    Parameters
+    ----------
+    system, load, parameter, omega_range, by, output, how
+        As in `track_peak`, `how` its discretisation.
+    harmonic
+        Whose amplitude peaks, as that of a superharmonic resonance; None: those that the load drives.
+
+    Raises
+    ------
+    InputError
+        If the condition, the output or the harmonic is unknown, or the range is none.
+    """
+
+    system: System
+    load: HarmonicLoad
+    parameter: Parameter
+    omega_range: tuple[float, float]
+    by: Peak = "horizontal_tangent"
+    output: int = 0
+    how: Discretisation = field(default_factory=Discretisation)
+    harmonic: int | None = None
+
+    def __post_init__(self) -> None:
+        check_choice("by", self.by, get_args(Peak))
+        if not 0 <= self.output < self.system.outputs.size:
+            have = self.system.outputs.size
+            raise input_error(
+                "output", f"is {self.output}, of {have} outputs", f"Give 0 to {have - 1}."
+            )
+        begin, end = self.omega_range
+        if not 0.0 < begin < end < np.inf:
+            raise input_error(
+                "omega_range",
+                f"must be positive and growing, got {begin} to {end} rad/s",
+                "Swap them.",
+            )
+        if self.harmonic is not None and not 1 <= self.harmonic <= self.how.order:
+            raise input_error(
+                "harmonic",
+                f"is {self.harmonic}, of {self.how.order} harmonics",
+                "Give one of them, or take more harmonics.",
+            )
+
+    @property
+    def dof(self) -> int:
+        """Whose amplitude peaks."""
+        return int(self.system.outputs[self.output])
+
+    def family(self, first: float) -> BalanceAt:
+        """Return the balances of the values of the parameter, scaled as the `first` one."""
+        return parameter_family(
+            self.system,
+            self.load,
+            self.parameter,
+            first,
+            lambda s, f: self.how.balance(s, f, np.array([self.dof])),
+        )
+
+    def problem(self, first: float) -> PeakProblem:
+        """Return the equation of a peak, its frequencies measured by the end of the range."""
+        family = self.family(first)
+        balance = family(first)
+        harmonics, phase = driven_by(balance.linear.load)
+        if self.harmonic is not None:
+            times = self.harmonic / harmonics[0]
+            if self.by == "phase_quadrature" and times % 2 != 1:
+                raise input_error(
+                    "by",
+                    f"is phase_quadrature for harmonic {self.harmonic} under a load in harmonic {harmonics[0]}",
+                    "Only odd multiples of the load's harmonic peak in quadrature with it: take horizontal_tangent or variable_phase.",
+                )
+            own = balance.linear.load.harmonics.get(self.harmonic)
+            # the phase that a shift of the origin of time gives this harmonic; of a driven one that of its own force
+            phase = phase * times if own is None else float(np.angle(own[np.argmax(np.abs(own))]))
+            harmonics = (self.harmonic,)
+        position = int(np.searchsorted(balance.linear.retained, self.dof))
+        invert = partial(factorised, to_tolerance(self.how.newton.linear, EXACT))
+        driven = Driven(position, harmonics)
+        scale = self.omega_range[1]
+        return PeakProblem(family, self.by, driven, phase, scale, invert)
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Near a peak.
+
+    Parameters
+    ----------
+    problem
+        The equation, its frequencies measured by that of the peak.
+    y
+        (size + 1,) unknowns.
+    value
+        Of the parameter.
+    newton
+        Corrector from peak to peak.
+    height
+        Amplitude, m.
+    """
+
+    problem: PeakProblem
+    y: FloatArray
+    value: float
+    newton: Newton
+    height: float
+
+
+def first_peaks(resonance: Resonance, value: float) -> tuple[list[Start], int]:
+    """Return the peaks of the response at a value of the parameter, the highest first, and what evaluations the sweep took.
+
+    Raises
+    ------
+    InputError
+        If the range holds no peak.
+    """
+    if not np.isfinite(value):
+        raise input_error("values", "are empty or not finite", "Give numbers.")
+    problem, how = resonance.problem(value), resonance.how
+    balance = problem.family(value)
+    changed = system_at(resonance.system, resonance.parameter, value, balance)
+    found = plain_sweep(changed, balance, resonance.omega_range, SWEEP_POINTS, how.newton)
+    points = [f.point for f in found if f.converged]
+    few = replace(
+        how.newton,
+        max_iterations=min(STEPS, how.newton.max_iterations),
+        linear=to_tolerance(how.newton.linear, STEP),
+    )
+    motions = np.array([problem.driven.motion(balance, p.x) for p in points])
+    heights = np.linalg.norm(motions, axis=1) if points else np.zeros(0)
+    if not points or int(np.argmax(heights)) in (0, len(points) - 1):
+        raise input_error(
+            "omega_range",
+            f"holds no peak at the first value: of {len(points)} solutions the first or the last is the highest",
+            "Widen it, or choose another output.",
+        )
+    starts = []
+    for top in maxima(heights):
+        x, omega = _near(problem, points, motions, top)
+        own, y = replace(problem, omega_scale=omega), np.append(x, 0.0)
+        here = own.state(y, value)
+        own = own.sharpened(here).aligned(here)
+        starts.append(Start(own, y, value, few, float(heights[top])))
+    return starts, sum(p.solution.iterations + EVALUATIONS_BESIDE for p in points)
+
+
+def maxima(heights: FloatArray) -> list[int]:
+    """Return where heights along a branch have maxima that stand out, the highest first; those at the ends are none."""
+    order = np.argsort(-heights)
+    found = []
+    for top in map(int, order):
+        if top in (0, heights.size - 1):
+            continue
+        sides = [_descent(heights, top, way) for way in (-1, 1)]
+        if heights[top] >= STANDS_OUT * max(sides) or top == order[0]:
+            found.append(top)
+    return found
+
+
+def _descent(heights: FloatArray, top: int, way: int) -> float:
+    """Return the lowest height between a place and the next higher one in a direction; of equal ones the first is the higher one."""
+    beside = heights[top + 1 :] if way > 0 else heights[top - 1 :: -1]
+    higher = np.flatnonzero(beside > heights[top] if way > 0 else beside >= heights[top])
+    between = beside[: higher[0]] if higher.size else beside
+    return float(np.min(between, initial=heights[top]))
+
+
+def _near(
+    problem: PeakProblem, points: list[Point], motions: ComplexArray, top: int
+) -> tuple[FloatArray, float]:
+    """Return state and frequency near a maximum of a sweep, or near the quadrature next to it."""
+    if problem.by != "phase_quadrature":
+        return points[top].x, points[top].p
+    in_phase = np.real(motions[:, 0] * np.exp(-1j * problem.phase))
+    crossings = np.flatnonzero(in_phase[:-1] * in_phase[1:] <= 0.0)
+    if crossings.size == 0:
+        raise input_error(
+            "omega_range",
+            "holds no frequency at which the output is in quadrature with the force",
+            "Track the horizontal tangent.",
+        )
+    i = int(crossings[np.argmin(np.abs(crossings + 0.5 - top))])
+    share = in_phase[i] / (in_phase[i] - in_phase[i + 1])
+    a, b = points[i], points[i + 1]
+    return a.x + share * (b.x - a.x), a.p + share * (b.p - a.p)

@@ -1,0 +1,144 @@
+"""The resonance peak followed directly while a design parameter varies, without a sweep for each value.
+
+Each peak is the solution of one equation (see `harmonic.peak`), started from the peak before. A damper optimisation curve costs a few
+Newton steps a point, and its lowest point is the root of the exact slope of the peak amplitude.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import scipy.optimize
+
+from stickslip.arrays import FloatArray
+from stickslip.errors import input_error
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.peak import Peak
+from stickslip.response.parameter import Discretisation, Parameter
+from stickslip.response.resonances.first import Resonance
+from stickslip.response.resonances.point import PeakPoint
+from stickslip.response.resonances.tracker import trackers
+from stickslip.response.system import System
+
+
+def track_peak(
+    system: System,
+    load: HarmonicLoad,
+    parameter: Parameter,
+    values: Sequence[float] | FloatArray,
+    omega_range: tuple[float, float],
+    by: Peak = "horizontal_tangent",
+    output: int = 0,
+    discretisation: Discretisation | None = None,
+) -> Iterator[PeakPoint]:
+    """Follow the highest resonance peak through the values of a design parameter; `follow_peaks` follows several, and harmonics that are not driven.
+
+    Parameters
+    ----------
+    system
+        Structure, contacts and outputs.
+    load
+        Static and harmonic forces on all dofs, N.
+    parameter
+        As in `branch_in_parameter`: a factor on a load, a field of the contact laws, or a function of the value.
+    values
+        Values of the parameter, in the order in which they are to be visited.
+    omega_range
+        Frequencies between which the first peak is searched for by a sweep, rad/s.
+    by
+        ``horizontal_tangent``: the largest amplitude; ``phase_quadrature``: the output lags the force by 90°, which is close to it for
+        a lightly damped resonance, and cheaper; ``variable_phase``: the motion, weighted with the forces, lags them by what it did at the
+        largest amplitude beside the last peak, which serves several forces and modes and harmonics that are not driven.
+    output
+        Position among the outputs of the dof whose amplitude peaks.
+    discretisation
+        Harmonics, samples, solver.
+
+    Yields
+    ------
+    PeakPoint
+        One a value. After one that is not found the next is tried from the last that was.
+
+    Raises
+    ------
+    InputError
+        If there are no values, the parameter, the condition or the output is unknown, the load drives no harmonic, or the range holds no
+        peak at the first value.
+    """
+    how = discretisation or Discretisation()
+    one = Resonance(system, load, parameter, omega_range, by, output, how)
+    yield from follow_peaks(one, values, 1)
+
+
+def follow_peaks(
+    resonance: Resonance, values: Sequence[float] | FloatArray, most: int = 3
+) -> Iterator[PeakPoint]:
+    """Follow several resonance peaks through the values of a design parameter, each from its own last one.
+
+    Parameters
+    ----------
+    resonance
+        Of what, and by which condition.
+    values
+        Values of the parameter, in the order in which they are to be visited.
+    most
+        Number of peaks, the highest of the first value; fewer where it has fewer.
+
+    Yields
+    ------
+    PeakPoint
+        One a value and peak, all peaks of a value before the next. Where two run into each other both go on as the same.
+
+    Raises
+    ------
+    InputError
+        If there are no values, or the range holds no peak at the first.
+    """
+    followed = trackers(resonance, float(values[0]) if len(values) else np.nan, most)
+    for value in values:
+        for tracker in followed:
+            yield tracker.point(float(value))
+
+
+def smallest_peak(
+    system: System,
+    load: HarmonicLoad,
+    parameter: Parameter,
+    span: tuple[float, float],
+    omega_range: tuple[float, float],
+    output: int = 0,
+    discretisation: Discretisation | None = None,
+) -> PeakPoint:
+    """Return the design with the smallest resonance peak: the value of the parameter at which the peak amplitude is stationary.
+
+    Parameters
+    ----------
+    system, load, parameter, omega_range, output, discretisation
+        As in `track_peak`.
+    span
+        Two values between which the peak falls first and then rises.
+
+    Raises
+    ------
+    InputError
+        If the peak is not found at an end, or its amplitude has a slope of the same sign at both.
+    """
+    how = discretisation or Discretisation()
+    asked = Resonance(system, load, parameter, omega_range, "horizontal_tangent", output, how)
+    (tracker,) = trackers(asked, float(span[0]), 1)
+    ends = [tracker.point(value) for value in span]
+    for end in (e for e in ends if not e.status.converged):
+        raise input_error(
+            "span",
+            f"the peak at {end.value:g} was not found ({end.status.advice})",
+            "Take another end.",
+        )
+    if not ends[0].slope * ends[1].slope < 0.0:
+        raise input_error(
+            "span",
+            f"the peak amplitude changes by {ends[0].slope:.3g} and {ends[1].slope:.3g} per unit at its ends",
+            "Give two values with the smallest peak between them.",
+        )
+    value = scipy.optimize.brentq(
+        lambda v: tracker.point(float(v)).slope, *span, xtol=1e-12 * max(map(abs, span)), rtol=1e-12
+    )
+    return tracker.point(float(value))
