@@ -1,0 +1,255 @@
+"""A backbone as an oscillator of one degree of freedom: its frequency, damping and force at every amplitude.
+
+The motion of a nonlinear mode needs damping of ``-2 ζ ω`` times the mass to go on. What a force of the frequency Ω has to do in its place
+follows from the balance of the first harmonic, weighted by the shape ψ of unit modal mass:
+
+    D(Ω, a) a = ψᴴ f ,    D = ω² - Ω² + i (2 ζ ω² + (Ω - ω) ψᴴ C ψ) .
+
+The friction force of a motion does not know how fast it runs, a dashpot does: that is the difference to ``2 i ζ ω Ω`` of M. Krack, L. Panning-von
+Scheidt and J. Wallaschek, "On the computation of the slow dynamics of nonlinear modes of mechanical systems", Mechanical Systems and Signal
+Processing 42 (2014) 71-87, which has it for all damping.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.errors import input_error
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint
+
+FEWEST = 4  # points of a backbone between which there is something to interpolate
+LINEAR = 1e-3  # relative difference of frequency and damping from those of the linear mode at which a backbone counts as begun in it
+BELOW = 1e-6  # times the first amplitude: how far a linear mode is continued
+STEPS_TO_LEAST = 6  # of Newton to the frequency that needs the least force
+INSIDE = 24  # places between two points at which the force is looked at
+
+
+@dataclass(frozen=True, eq=False)
+class Oscillation:
+    """The oscillator at some places of its backbone, all arrays (p,).
+
+    Parameters
+    ----------
+    amplitude
+        Modal amplitude, kg^0.5 m.
+    omega, ratio
+        Frequency, rad/s, and damping ratio of the nonlinear mode.
+    force
+        Complex modal force of the unit level, N kg^-0.5.
+    viscous
+        ``ψᴴ C ψ``, 1/s: the part of the damping that grows with the frequency; its imaginary part is gyroscopic.
+    """
+
+    amplitude: FloatArray
+    omega: FloatArray
+    ratio: FloatArray
+    force: ComplexArray
+    viscous: ComplexArray
+
+    def stiffness(self, omega: FloatArray) -> ComplexArray:
+        """Return the modal dynamic stiffness D at frequencies, rad/s."""
+        rate = 2.0 * self.ratio * self.omega**2 + (omega - self.omega) * self.viscous
+        return np.asarray(self.omega**2 - omega**2 + 1j * rate)
+
+    @property
+    def eigenvalue(self) -> ComplexArray:
+        """(p,) λ near ``-ζω + iω``, 1/s, at which a free motion goes on: ``D(Ω) = (iΩ - λ) (iΩ + ψᴴ C ψ + λ)``."""
+        half = 0.5 * self.viscous
+        rest = self.omega**2 + 1j * (2.0 * self.ratio * self.omega**2 - self.omega * self.viscous)
+        return np.asarray(1j * np.sqrt(rest - half**2) - half)
+
+    def polynomial(self) -> FloatArray:
+        """Return (p, 5) coefficients of ``|D(Ω)|²`` in powers of Ω, the highest first."""
+        turn, damp = self.viscous.imag, self.viscous.real
+        real = self.omega**2 + self.omega * turn
+        rest = 2.0 * self.ratio * self.omega**2 - self.omega * damp
+        one = np.ones_like(real)
+        return np.stack(
+            [
+                one,
+                2.0 * turn,
+                turn**2 - 2.0 * real + damp**2,
+                2.0 * (rest * damp - turn * real),
+                real**2 + rest**2,
+            ],
+            axis=-1,
+        )
+
+    def resonance(self) -> FloatArray:
+        """Return the frequencies, rad/s, at which the least force keeps the amplitude."""
+        q = self.polynomial()
+        omega = self.omega.copy()
+        for _ in range(STEPS_TO_LEAST):
+            slope = ((4 * omega + 3 * q[..., 1]) * omega + 2 * q[..., 2]) * omega + q[..., 3]
+            omega = omega - slope / ((12 * omega + 6 * q[..., 1]) * omega + 2 * q[..., 2])
+        return omega
+
+
+@dataclass(frozen=True, eq=False)
+class ModalOscillator:
+    """A backbone and a load on it; `modal_oscillator` makes one.
+
+    Places on the backbone are counted in the change of ln a from its beginning, so that one that turns back is no exception.
+
+    Parameters
+    ----------
+    backbone
+        The nonlinear mode.
+    load
+        What drives it at the level 1.
+    place
+        (p,) growing places of the points.
+    motion
+        (p, H+1, n) displacements of the points, m; the phases of the first harmonic are such that the shape does not turn along the backbone.
+    begins
+        Place at which the backbone itself begins; before it, the linear mode.
+    """
+
+    backbone: Backbone
+    load: HarmonicLoad
+    place: FloatArray
+    motion: ComplexArray
+    begins: float
+    numbers: PchipInterpolator
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """First and last place."""
+        return float(self.place[0]), float(self.place[-1])
+
+    def at(self, place: FloatArray) -> Oscillation:
+        """Return the oscillator at places."""
+        v = self.numbers(place)
+        return Oscillation(
+            np.exp(v[..., 0]), np.exp(v[..., 1]), v[..., 2], v[..., 3] + 1j * v[..., 4], v[..., 5] + 1j * v[..., 6]
+        )  # fmt: skip
+
+    def needed(self, place: FloatArray) -> FloatArray:
+        """Return the least level that keeps the amplitudes at places."""
+        here = self.at(place)
+        own = np.abs(here.stiffness(here.resonance())) * here.amplitude
+        with np.errstate(divide="ignore"):
+            return np.asarray(own / np.abs(here.force))
+
+    def table(self) -> FloatArray:
+        """Return places with the points of the backbone among them, and enough between for whatever varies."""
+        gaps = np.linspace(self.place[:-1], self.place[1:], INSIDE, endpoint=False)
+        return np.append(gaps.T.reshape(-1), self.place[-1])
+
+    def displacement(self, place: FloatArray, dofs: IntArray | None = None) -> ComplexArray:
+        """Return (p, H+1, k) displacements of dofs at places, m, in the phase of the backbone; None: all dofs."""
+        own = self.motion if dofs is None else self.motion[:, :, dofs]
+        size = self.at(self.place).amplitude[:, None, None]
+        # what vibrates grows with the amplitude, and the mean does not
+        relative = np.concatenate([own[:, :1], own[:, 1:] / size], axis=1)
+        parts = PchipInterpolator(self.place, np.stack([relative.real, relative.imag]), axis=1)(place)  # fmt: skip
+        found = parts[0] + 1j * parts[1]
+        found[:, 1:] *= self.at(place).amplitude[:, None, None]
+        return np.asarray(found)
+
+    def coarser(self) -> "ModalOscillator":
+        """Return the oscillator by every second point of the backbone, to see what the others were good for."""
+        points = self.backbone.points
+        kept = [p for i, p in enumerate(points) if i % 2 == 0 or i == len(points) - 1]
+        return modal_oscillator(replace(self.backbone, points=tuple(kept)), self.load)
+
+
+def modal_oscillator(backbone: Backbone, load: HarmonicLoad) -> ModalOscillator:
+    """Make the oscillator of a nonlinear mode under a harmonic load.
+
+    Parameters
+    ----------
+    backbone
+        The mode, with the static load that it was found with.
+    load
+        Forces on all dofs, N; the harmonic ones are those of level 1.
+
+    Raises
+    ------
+    InputError
+        If the load drives another harmonic than the first or not the mode, its static part is another one, or the backbone has too few
+        points that converged.
+    """
+    points = [p for p in backbone.points if p.status.converged]
+    if len(points) < FEWEST:
+        raise input_error(
+            "modal_synthesis",
+            f"the backbone has {len(points)} points that converged, and {FEWEST} are the fewest",
+            "Follow it over more amplitudes, or with more points.",
+        )
+    force = _driving(backbone, load)
+    mass, damping = (getattr(backbone.system.structure.of_harmonic(1), m) for m in ("mass", "damping"))  # fmt: skip
+    motion = _transported([p.coefficients for p in points], mass)
+    begins_linear = _is_linear(backbone, points[0])
+    logs = np.log([p.modal_amplitude for p in points])
+    rows = [
+        [
+            logs[i], np.log(p.omega), p.ratio, *_parts(np.vdot(shape, force)),
+            *_parts(np.vdot(shape, damping @ shape)),
+        ]
+        for i, p in enumerate(points)
+        for shape in [motion[i, 1] / p.modal_amplitude]
+    ]  # fmt: skip
+    place = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(logs)))])
+    begins = 0.0
+    if begins_linear:  # below the first point the mode is linear, and its motion in proportion
+        less = np.log(BELOW)
+        faint = motion[:1].copy()
+        faint[:, 1:] *= BELOW
+        motion = np.concatenate([faint, motion])
+        rows = [[rows[0][0] + less, *rows[0][1:]], *rows]
+        place = np.append(0.0, place - less)
+        begins = -less
+    kept = np.append(True, np.diff(place) > 0.0)
+    numbers = PchipInterpolator(place[kept], np.array(rows)[kept])
+    return ModalOscillator(backbone, load, place[kept], motion[kept], float(begins), numbers)
+
+
+def _driving(backbone: Backbone, load: HarmonicLoad) -> ComplexArray:
+    """Return the force of the first harmonic, after checking that it is one of this mode."""
+    others = sorted(h for h, f in load.harmonics.items() if h != 1 and np.any(f))
+    if others:
+        raise input_error(
+            "modal_synthesis",
+            f"a load drives harmonic {others[0]}, and the mode answers to the first",
+            "Leave it out, or ask for the forced response.",
+        )
+    force = load.harmonics.get(1)
+    if force is None or not np.any(force):
+        raise input_error("modal_synthesis", "no load drives the mode", "Give a harmonic load.")
+    if np.any(np.abs(load.static - backbone.load.static) > 1e-9 * backbone.load.scale):
+        raise input_error(
+            "modal_synthesis",
+            "the static load is another one than that of the backbone",
+            "Follow the nonlinear mode under the same static load.",
+        )
+    return force
+
+
+def _is_linear(backbone: Backbone, first: ModePoint) -> bool:
+    mode = backbone.mode
+    return (
+        abs(first.omega / mode.omega - 1.0) < LINEAR
+        and abs(first.ratio - mode.ratio) < LINEAR * max(abs(mode.ratio), LINEAR)
+    )  # fmt: skip
+
+
+def _transported(motions: Sequence[ComplexArray], mass: Matrix) -> ComplexArray:
+    """Return (p, H+1, n) motions, harmonics that a point lacks being zero, whose first harmonics do not turn from point to point."""
+    most = max(len(m) for m in motions)
+    out = np.zeros((len(motions), most, motions[0].shape[1]), dtype=complex)
+    for i, own in enumerate(motions):
+        out[i, : len(own)] = own
+        if i:
+            turn = np.vdot(mass @ out[i - 1, 1], own[1])
+            phase = np.exp(-1j * np.angle(turn) * np.arange(len(own)))
+            out[i, : len(own)] *= phase[:, None]
+    return out
+
+
+def _parts(value: complex) -> tuple[float, float]:
+    return float(np.real(value)), float(np.imag(value))

@@ -1,0 +1,249 @@
+"""Nonlinear modal synthesis: the forced response at any level from one backbone, without solving the equations of motion again.
+
+At each amplitude of the backbone the frequencies at which a force of a level keeps it are the roots of a polynomial of fourth degree in Ω (see
+`oscillator`): one below and one above the resonance. Where the amplitude needs more than the level at every frequency there is none, so that the
+places at which the least level needed crosses the level are the peaks, and several stretches of the backbone below it are several
+curves: the first is that on which the machine comes up from small amplitudes, the others are detached.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import scipy.optimize
+
+from stickslip.arrays import BoolArray, FloatArray, IntArray
+from stickslip.errors import input_error
+from stickslip.response.nonlinear_modes.oscillator import ModalOscillator
+
+POINTS = 161  # of the amplitudes of a curve, each with a frequency on either side
+REAL = 1e-6  # relative imaginary part of a root that counts as none: where two meet, rounding has its square root
+DIFFERENCE = 1e-5  # of the place, over which derivatives are taken
+AT_A_CORNER = 1e-9  # of the place, in finding a peak
+
+
+@dataclass(frozen=True, eq=False)
+class Synthesised:
+    """The response at one level, its curves one after the other, all arrays (p,).
+
+    Parameters
+    ----------
+    level
+        Factor on the harmonic load.
+    place
+        On the backbone.
+    omega
+        Frequency, rad/s, in the order of the curve.
+    amplitude
+        Modal amplitude, kg^0.5 m.
+    phase
+        Of the motion against that of the backbone, rad.
+    curve
+        0: that which comes from small amplitudes; 1 and so on: detached ones.
+    stable
+        Whether slow changes of amplitude and phase of this mode die out.
+    """
+
+    level: float
+    place: FloatArray
+    omega: FloatArray
+    amplitude: FloatArray
+    phase: FloatArray
+    curve: IntArray
+    stable: BoolArray
+
+
+@dataclass(frozen=True)
+class Resonance:
+    """A place at which the level is just enough, where both sides of a curve meet.
+
+    Parameters
+    ----------
+    level
+        Factor on the harmonic load.
+    place
+        On the backbone.
+    omega
+        Frequency, rad/s.
+    amplitude
+        Modal amplitude, kg^0.5 m.
+    top
+        Whether the curve lies below it: a peak. Otherwise it is the least amplitude of a detached curve.
+    """
+
+    level: float
+    place: float
+    omega: float
+    amplitude: float
+    top: bool
+
+
+def resonances(oscillator: ModalOscillator, level: float) -> list[Resonance]:
+    """Return the resonances of a level in the order of the backbone; none where its end does not need so much.
+
+    Parameters
+    ----------
+    oscillator
+        Backbone and load.
+    level
+        Factor on the harmonic load, above zero.
+    """
+    table = oscillator.table()
+    excess = np.log(oscillator.needed(table) / checked_level(level))
+    found = []
+    for i in np.flatnonzero(np.sign(excess[:-1]) * np.sign(excess[1:]) <= 0.0):
+        if excess[i] == excess[i + 1] or excess[i + 1] == 0.0:
+            continue
+
+        def more(place: float) -> float:
+            return float(np.log(oscillator.needed(np.array([place]))[0] / level))
+
+        place = float(scipy.optimize.brentq(more, table[i], table[i + 1], xtol=AT_A_CORNER))
+        here = oscillator.at(np.array([place]))
+        omega = float(here.resonance()[0])
+        found.append(Resonance(level, place, omega, float(here.amplitude[0]), bool(excess[i] < 0.0)))  # fmt: skip
+    return found
+
+
+def synthesise(oscillator: ModalOscillator, level: float, points: int = POINTS) -> Synthesised:
+    """Return the forced response at a level.
+
+    Parameters
+    ----------
+    oscillator
+        Backbone and load.
+    level
+        Factor on the harmonic load, above zero.
+    points
+        Amplitudes of a curve, each with a frequency on either side of the resonance.
+    """
+    meets = [r.place for r in resonances(oscillator, level)]
+    first, last = oscillator.ends
+    parts: list[tuple[FloatArray, FloatArray]] = []
+    for a, b in pairwise([first, *meets, last]):
+        middle = oscillator.needed(np.array([0.5 * (a + b)]))[0]
+        if b > a and middle <= level:
+            parts.append(_curve(oscillator, level, a, b, points, a in meets, b in meets))
+    place = np.concatenate([p for p, _ in parts]) if parts else np.zeros(0)
+    omega = np.concatenate([w for _, w in parts]) if parts else np.zeros(0)
+    curve = np.repeat(np.arange(len(parts)), [p.size for p, _ in parts])
+    here = oscillator.at(place)
+    phase = np.angle(here.force / here.stiffness(omega)) if parts else np.zeros(0)
+    stable = _stable(oscillator, place, omega)
+    return Synthesised(level, place, omega, here.amplitude, phase, curve.astype(np.int64), stable)
+
+
+def motions_at(oscillator: ModalOscillator, level: float, omega: float) -> FloatArray:
+    """Return the places of the steady motions at a frequency, rad/s, in the order of the backbone."""
+    table = oscillator.table()
+
+    def more(place: FloatArray) -> FloatArray:
+        here = oscillator.at(place)
+        own = np.abs(here.stiffness(np.full(place.shape, omega))) * here.amplitude
+        return np.asarray(np.log(own / (level * np.abs(here.force))))
+
+    excess = more(table)
+    at = np.flatnonzero(np.sign(excess[:-1]) * np.sign(excess[1:]) < 0.0)
+    found = [
+        scipy.optimize.brentq(lambda s: float(more(np.array([s]))[0]), table[i], table[i + 1])
+        for i in at
+    ]
+    return np.array(found)
+
+
+def free_motions(oscillator: ModalOscillator) -> FloatArray:
+    """Return the places of limit cycles: zeros of the damping, which with aerodynamic forces may be negative."""
+    table = oscillator.table()
+    ratio = oscillator.at(table).ratio
+    at = np.flatnonzero(ratio[:-1] * ratio[1:] < 0.0)
+    found = [
+        scipy.optimize.brentq(
+            lambda s: float(oscillator.at(np.array([s])).ratio[0]), table[i], table[i + 1]
+        )
+        for i in at
+    ]
+    return np.array(found)
+
+
+def _curve(
+    oscillator: ModalOscillator,
+    level: float,
+    first: float,
+    last: float,
+    points: int,
+    closes_below: bool,
+    closes_above: bool,
+) -> tuple[FloatArray, FloatArray]:
+    """Return places and frequencies of a stretch of the backbone: up on the lower side of the resonance, and down on the upper one."""
+    own = oscillator.table()
+    # both sides meet like a root, so that places stand close where they do
+    share = np.linspace(0.0, 1.0, points)
+    if closes_below and closes_above:
+        share = 0.5 - 0.5 * np.cos(np.pi * share)
+    elif closes_above:
+        share = 1.0 - (1.0 - share) ** 2
+    elif closes_below:
+        share = share**2
+    place = first + (last - first) * share
+    corners = oscillator.place[(oscillator.place > first) & (oscillator.place < last)]
+    place = np.union1d(place, corners) if own.size else place
+    below, above = _sides(oscillator, level, place)
+    if closes_above:
+        below[-1] = above[-1] = oscillator.at(place[-1:]).resonance()[0]
+    if closes_below:
+        below[0] = above[0] = oscillator.at(place[:1]).resonance()[0]
+    low, high = np.isfinite(below), np.isfinite(above)
+    upward, downward = (place[low], below[low]), (place[high][::-1], above[high][::-1])
+    twice = 1 if closes_above and low[-1] and high[-1] else 0
+    return (
+        np.concatenate([upward[0], downward[0][twice:]]),
+        np.concatenate([upward[1], downward[1][twice:]]),
+    )
+
+
+def _sides(
+    oscillator: ModalOscillator, level: float, place: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the frequencies below and above the resonance at which the level keeps the amplitudes; NaN where there is none."""
+    here = oscillator.at(place)
+    q = here.polynomial()
+    q[:, 4] -= (level * np.abs(here.force) / here.amplitude) ** 2
+    scale = here.omega  # of the roots
+    companion = np.zeros((place.size, 4, 4))
+    companion[:, 1:, :-1] = np.eye(3)
+    companion[:, 0] = -q[:, 1:] / scale[:, None] ** np.arange(1, 5)
+    roots = np.linalg.eigvals(companion) * scale[:, None]
+    top = here.resonance()[:, None]
+    real = (np.abs(roots.imag) < REAL * np.abs(roots)) & (roots.real > 0.0)
+    below = np.max(np.where(real & (roots.real <= top), roots.real, -np.inf), axis=1)
+    above = np.min(np.where(real & (roots.real > top), roots.real, np.inf), axis=1)
+    return np.where(np.isfinite(below), below, np.nan), np.where(np.isfinite(above), above, np.nan)
+
+
+def _stable(oscillator: ModalOscillator, place: FloatArray, omega: FloatArray) -> BoolArray:
+    """Return where slow changes of amplitude and phase die out; see `passage` for their equation."""
+    first, last = oscillator.ends
+    low = np.clip(place - DIFFERENCE, first, last)
+    high = np.clip(place + DIFFERENCE, first, last)
+    ends = [oscillator.at(one) for one in (low, high)]
+    here = oscillator.at(place)
+    stiffness = here.stiffness(omega)
+    logs = [np.log(e.stiffness(omega) * e.amplitude / e.force) for e in ends]
+    turned = logs[1] - logs[0]
+    turned = turned.real + 1j * np.angle(np.exp(1j * turned.imag))  # a logarithm may jump by 2πi
+    grown = np.log(ends[1].amplitude / ends[0].amplitude)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        by_size = turned / grown
+    rate = 1j * omega + here.viscous + here.eigenvalue
+    # of ln a and of the phase: d/dt (ln a + iθ) = (level f exp(-iθ) / a - D) / rate
+    by_amplitude, by_phase = -stiffness * by_size / rate, -1j * stiffness / rate
+    trace = by_amplitude.real + by_phase.imag
+    determinant = by_amplitude.real * by_phase.imag - by_amplitude.imag * by_phase.real
+    return np.asarray((trace < 0.0) & (determinant > 0.0))
+
+
+def checked_level(level: float) -> float:
+    """Return a factor on the load, which has to be above zero."""
+    if not 0.0 < level < np.inf:
+        raise input_error("modal_synthesis: levels", f"holds {level}", "Give factors above zero.")
+    return level

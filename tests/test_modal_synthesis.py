@@ -1,0 +1,200 @@
+"""Nonlinear modal synthesis: forced responses and passages from one backbone, against closed forms, direct solutions and small steps in time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_envelope import oscillator, swept_by_quadrature
+from test_limit_cycles import ONE
+from test_limit_cycles import oscillator as damped_by_friction
+
+from stickslip.errors import InputError
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.nonlinear_modes.backbone import (
+    Backbone,
+    ModePoint,
+    ModeSweep,
+    nonlinear_mode,
+)
+from stickslip.response.nonlinear_modes.oscillator import ModalOscillator, modal_oscillator
+from stickslip.response.nonlinear_modes.passage import Swept, passage_through_resonance
+from stickslip.response.nonlinear_modes.synthesis import (
+    free_motions,
+    motions_at,
+    resonances,
+    synthesise,
+)
+from stickslip.response.parameter import Discretisation
+from stickslip.response.self_excited.modes import stuck_modes
+from stickslip.solve.status import Status
+
+# literature benchmark B3: friction limit, then peak and its frequency with one harmonic
+PEAKS = (
+    (0.02, 3.7388820, 1.000334),
+    (0.05, 1.9693838, 1.004519),
+    (0.1, 0.6260618, 1.065886),
+    (0.14, 0.5509276, 1.119652),
+    (0.5, 1.1288107, 1.211484),
+)
+EXACT = ((1.10, 0.56839426), (1.15, 0.46660338), (1.20, 0.38916153))  # of B3 at fc = 0.1: |X1|
+PUSH = HarmonicLoad(np.zeros(1), {1: np.array([0.1])})
+
+
+def point(amplitude, omega, ratio):
+    motion = np.array([[0.0], [amplitude]], dtype=complex)
+    return ModePoint(amplitude, omega, ratio, motion, amplitude, np.nan, 1, Status.CONVERGED)
+
+
+def one_mass(amplitudes, omega, ratio, c=0.02):
+    """Return the backbone of a unit mass from closed forms."""
+    system, load = damped_by_friction(c)
+    mode = replace(stuck_modes(system, 1)[0], omega=float(omega[0]), ratio=float(ratio[0]))
+    points = tuple(point(*p) for p in zip(amplitudes, omega, ratio, strict=True))
+    return Backbone(system, load, mode, 0, points, "")
+
+
+def b4(limit, c=0.02, count=300):
+    """Return the nonlinear mode of the oscillator of B3 and B4 with one harmonic, in closed form."""
+    slips = limit / 0.5
+    a = slips * np.geomspace(0.5, 300.0, count)
+    theta = np.arccos(1.0 - 2.0 * np.minimum(slips / a, 1.0))
+    stiffness = np.where(a > slips, 0.5 / np.pi * (theta - np.sin(2 * theta) / 2), 0.5)
+    loss = np.where(a > slips, 4 * limit / (np.pi * a) * (1 - slips / a), 0.0)
+    omega = np.sqrt(1.0 + stiffness)
+    return one_mass(a, omega, (c + loss / omega) / (2.0 * omega), c)
+
+
+def amplitude_at(own: ModalOscillator, omega: float) -> float:
+    """Return the amplitude of the only steady motion at a frequency."""
+    (place,) = motions_at(own, 1.0, omega)
+    return float(own.at(np.array([place])).amplitude[0])
+
+
+@pytest.mark.parametrize(("limit", "peak", "omega"), PEAKS)
+def test_the_peaks_of_b3_come_out_of_the_mode_of_b4(limit, peak, omega):
+    (found,) = resonances(modal_oscillator(b4(limit), PUSH), 1.0)
+    assert found.amplitude == pytest.approx(peak, rel=1e-5)
+    assert found.omega == pytest.approx(omega, rel=1e-5)
+
+
+def test_a_followed_mode_gives_the_exact_response_to_a_thousandth():
+    system, load = damped_by_friction(0.02)
+    mode = stuck_modes(system, 1)[0]
+    sweep = ModeSweep(span=(0.1, 20.0), points=60)
+    backbone = nonlinear_mode(system, load, mode, 0, Discretisation(order=11), sweep)
+    own = modal_oscillator(backbone, PUSH)
+    for omega, exact in EXACT:
+        place = motions_at(own, 1.0, omega)
+        motion = own.displacement(place, np.array([0]))
+        assert abs(motion[0, 1, 0]) == pytest.approx(exact, rel=1.5e-3)
+    response = synthesise(own, 1.0)
+    assert response.stable.all()
+    assert response.amplitude.max() == pytest.approx(resonances(own, 1.0)[0].amplitude)
+
+
+def test_a_level_is_met_at_every_point_and_the_phase_is_that_of_the_force():
+    own = modal_oscillator(b4(0.1), PUSH)
+    for level in (0.3, 1.0, 6.0):
+        found = synthesise(own, level)
+        here = own.at(found.place)
+        motion = found.amplitude * np.exp(1j * found.phase)
+        np.testing.assert_allclose(here.stiffness(found.omega) * motion, level * 0.1, rtol=2e-6)
+
+
+def test_a_hardening_spring_has_an_unstable_branch_between_its_folds():
+    ratio, cubic = 0.01, 0.2
+    a = np.geomspace(1e-3, 20.0, 300)
+    omega = np.sqrt(1.0 + 0.75 * cubic * a**2)
+    own = modal_oscillator(one_mass(a, omega, ratio / omega, c=2 * ratio), PUSH)
+    found = synthesise(own, 1.0)
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(found.omega))))
+    assert turns.size == 2
+    # squares of the amplitudes solve a cubic; folds are where its discriminant changes sign
+    grid = np.linspace(1.05, 2.2, 4_000)
+    q = (1 - grid**2) ** 2 + (2 * ratio * grid) ** 2
+    three = np.array([2 * (1 - w**2) * 0.75 * cubic for w in grid])
+    roots = [np.roots([(0.75 * cubic) ** 2, b, c, -0.01]) for b, c in zip(three, q, strict=True)]
+    several = np.array([np.sum((r.real > 0) & (abs(r.imag) < 1e-9 * abs(r))) == 3 for r in roots])
+    folds = grid[several][[0, -1]]
+    assert sorted(found.omega[turns + 1]) == pytest.approx(folds, rel=3e-3)
+    between = np.zeros(found.omega.size, dtype=bool)
+    between[turns[0] + 3 : turns[1] - 1] = True
+    assert not found.stable[between].any()
+    assert found.stable[: turns[0] - 1].all()
+    assert found.stable[turns[1] + 3 :].all()
+
+
+def test_limit_cycles_are_zeros_of_the_damping_and_a_small_force_has_curves_around_them():
+    for c, small, _, large, _ in ONE:
+        own = modal_oscillator(b4(0.1, c, 2000), PUSH)
+        amplitudes = own.at(free_motions(own)).amplitude
+        assert amplitudes == pytest.approx([small, large], rel=1e-4)
+    found = synthesise(own, 0.05)
+    assert set(found.curve) == {0, 1, 2}
+    tops = [r.top for r in resonances(own, 0.05)]
+    assert tops == [True, False, True, False, True]
+    attracting = (found.curve == 1) & (found.amplitude > small)
+    assert found.stable[attracting].any()
+    assert not found.stable[found.curve == 2].any()
+
+
+@pytest.mark.parametrize("seconds", [5.0, 20.0])
+def test_a_linear_passage_is_that_of_the_quadrature(seconds):
+    system, load = oscillator(100.0, 0.01)
+    ends = (70.0, 130.0)
+    points = tuple(point(a, 100.0, 0.01) for a in np.geomspace(1e-6, 1.0, 8))
+    own = modal_oscillator(Backbone(system, HarmonicLoad(load.static), stuck_modes(system, 1)[0], 0, points, ""), load)  # fmt: skip
+    found = passage_through_resonance(own, 1.0, Swept(ends=ends, rate=60.0 / seconds))
+    time, exact = swept_by_quadrature(100.0, 0.01, ends, seconds)
+    assert found.finished
+    assert found.amplitude.max() == pytest.approx(abs(exact).max(), rel=1e-4)
+    assert found.amplitude == pytest.approx(np.interp(found.time, time, abs(exact)), abs=1e-4 * abs(exact).max())  # fmt: skip
+
+
+def in_small_steps(limit, ends, seconds):
+    """Return the motion of the mass of `oscillator` with 0.2 % damping and 30 % of its stiffness in the contact under a chirp of 10 N."""
+    steps = int(seconds * max(ends) / (2 * np.pi) * 300)
+    dt = seconds / steps
+    time = np.arange(steps) * dt
+    force = 10.0 * np.cos(ends[0] * time + (ends[1] - ends[0]) / seconds * time**2 / 2)
+    place = speed = friction = largest = 0.0
+    for f in force.tolist():
+        speed += dt * (f - 0.4 * speed - 7e3 * place - friction)
+        place += dt * speed
+        friction = min(max(friction + 3e3 * dt * speed, -limit), limit)
+        largest = max(largest, abs(place))
+    return largest
+
+
+@pytest.mark.parametrize(
+    ("limit", "ends", "away"),
+    [(8.0, (75.0, 115.0), 0.012), (8.0, (115.0, 75.0), 0.008), (30.0, (75.0, 115.0), 0.004)],
+)
+def test_a_passage_with_friction_peaks_as_small_steps_in_time_do(limit, ends, away):
+    system, _ = oscillator(100.0, 0.002, 0.3, limit)
+    rest, mode = HarmonicLoad(np.zeros(1)), stuck_modes(system, 1)[0]
+    backbone = nonlinear_mode(system, rest, mode, 0, Discretisation(order=5), ModeSweep(points=50))
+    own = modal_oscillator(backbone, HarmonicLoad(np.zeros(1), {1: np.array([10.0])}))
+    found = passage_through_resonance(own, 1.0, Swept(ends=ends, rate=4.0))
+    turn = np.exp(1j * np.outer(np.arange(6), np.linspace(0.0, 2 * np.pi, 65)))
+    size = np.abs((own.displacement(found.place)[:, :, 0] @ turn).real).max(axis=1)
+    in_time = in_small_steps(limit, ends, 10.0)
+    assert size.max() == pytest.approx(in_time, rel=away)
+    assert size.max() < own.displacement(np.array([resonances(own, 1.0)[0].place]))[0, 1, 0].real  # fmt: skip
+
+
+def test_what_the_synthesis_has_no_form_for_is_refused():
+    backbone = b4(0.1)
+    with pytest.raises(InputError, match="harmonic 3"):
+        modal_oscillator(backbone, HarmonicLoad(np.zeros(1), {1: np.ones(1), 3: np.ones(1)}))
+    with pytest.raises(InputError, match="no load"):
+        modal_oscillator(backbone, HarmonicLoad(np.zeros(1)))
+    with pytest.raises(InputError, match="static load"):
+        modal_oscillator(replace(backbone, load=HarmonicLoad(np.ones(1))), PUSH)
+    with pytest.raises(InputError, match="fewest"):
+        modal_oscillator(replace(backbone, points=backbone.points[:3]), PUSH)
+    own = modal_oscillator(backbone, PUSH)
+    with pytest.raises(InputError, match="above zero"):
+        resonances(own, -1.0)
+    with pytest.raises(InputError, match="above zero"):
+        Swept(ends=(1.0, 2.0), rate=-1.0)
