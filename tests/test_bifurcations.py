@@ -1,5 +1,6 @@
 """Bifurcations of a branch against SciPy's integration of the same oscillators, which shares nothing with the package."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -8,7 +9,9 @@ import scipy.integrate
 
 import stickslip as ss
 from stickslip.errors import InputError
-from stickslip.response.bifurcations import bifurcations
+from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.bifurcations import bifurcations, side_branches, subharmonic_branch
+from stickslip.response.stability import stability
 
 DAMPING, STOP = 0.05, 10.0  # of a mass that meets a stop ten times as stiff as its spring
 
@@ -32,8 +35,8 @@ def impacting(omega_range, *, highest=15, points=20):
 
 @cache
 def doubling():
-    """Return the response from 2 to 2.6 rad/s and its bifurcations."""
-    problem, points = impacting((2.0, 2.6))
+    """Return the response from 1.5 to 2.6 rad/s and its bifurcations."""
+    problem, points = impacting((1.5, 2.6))
     return problem, points, bifurcations(problem, points)
 
 
@@ -106,3 +109,114 @@ def test_bad_requests_are_refused():
         bifurcations(problem, points, tolerance=0.0)
     with pytest.raises(InputError, match="most"):
         bifurcations(problem, points, most=3)
+
+
+def test_a_doubled_period_is_followed_and_closes_in_time_after_two_periods():
+    problem, _, all_of_it = doubling()
+    (branch,) = side_branches(problem, all_of_it.found[0], points=12)
+    assert branch.periods == 2
+    middle = branch.points[6]
+    sizes = [branch.subharmonic(p) for p in branch.points]
+    assert sizes[0] < 0.1 < sizes[6] < sizes[-1]
+    omega, state = 2 * middle.omega, start_of(middle)
+    once, _ = marched(omega, state)
+    twice, matrix = marched(omega, state, periods=2)
+    assert np.abs(once - state).max() > 0.3
+    assert np.abs(twice - state).max() < 1e-3
+    known = np.abs(stability(branch.problem, middle).floquet.multipliers).max()
+    assert known == pytest.approx(np.abs(np.linalg.eigvals(matrix)).max(), abs=2e-3)
+
+
+SECTORS, COUPLING, CLEARANCE = 4, 0.03, 0.1
+
+
+def ring():
+    """Return problem and points of a wheel of four masses coupled in a ring, each between two stops, neighbours driven against each other."""
+
+    def of_wave(k):
+        stiffness = 1.0 + 2 * COUPLING * (1 - np.cos(2 * np.pi * k / SECTORS))
+        return ss.model.lumped(
+            np.ones(1), np.array([[stiffness]]), damping=np.array([[0.02]]), names=("mass",)
+        )
+
+    wheel = TunedWheel({k: of_wave(k) for k in range(SECTORS)}, SECTORS, SECTORS // 2, 8)
+    stop = ss.UnilateralSpring(k_n=1.0, initial_gap=CLEARANCE)
+    gaps = np.zeros((6, 1))
+    gaps[[2, 5], 0] = 1.0, -1.0
+    system = ss.System(wheel, ss.Interface(("above", "below"), (stop, stop), gaps), np.array([0]))
+    load = ss.HarmonicLoad(np.zeros(1), {1: np.array([0.008 + 0j])})
+    sweep = ss.Sweep(
+        omega_range=(1.0, 1.06), low=[1, 3, 5], high=[1, 3, 5], selection="always_high", points=12
+    )
+    problem = ss.response.forced_problem(system, load, sweep)
+    return problem, ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))
+
+
+def marched_ring(omega, state, periods):
+    """Return the state of all masses after some periods, by SciPy."""
+    turn = np.roll(np.eye(SECTORS), 1, axis=0)
+    stiffness = np.eye(SECTORS) + COUPLING * (2 * np.eye(SECTORS) - turn - turn.T)
+    against = (-1.0) ** np.arange(SECTORS)
+
+    def rate(t, y):
+        x, v = np.split(y, 2)
+        stop = np.sign(x) * np.maximum(np.abs(x) - CLEARANCE, 0.0)
+        return np.append(v, 0.008 * against * np.cos(omega * t) - 0.02 * v - stiffness @ x - stop)
+
+    end = 2 * np.pi / omega * periods
+    return scipy.integrate.solve_ivp(rate, (0.0, end), state, "DOP853", rtol=1e-6, atol=1e-9).y[:, -1]  # fmt: skip
+
+
+def test_a_wheel_loses_its_symmetry_where_a_localised_branch_leaves():
+    problem, points = ring()
+    found = bifurcations(problem, points).found
+    (first,) = (b for b in found if b.kind == "branch point")
+    assert (first.before, first.after) == (0, 1)
+    (branch,) = side_branches(problem, first, points=20)
+    sizes = np.array([np.abs(p.coefficients[1]) for p in branch.points])
+    ratio = sizes.max(axis=1) / sizes.min(axis=1)
+    assert ratio[0] < 1.2
+    there = int(np.argmax(ratio > 2.5))
+    assert branch.localisation(branch.points[there]) > 0.4
+    # stable by the multipliers of all sectors; in time a disturbance of a hundredth dies, and the localised motion stays
+    point = branch.points[there]
+    assert stability(branch.problem, point).verdict == "stable"
+    rows = np.arange(len(point.coefficients))[:, None] * 1j * point.omega
+    state = np.concatenate([point.coefficients.real.sum(axis=0), (rows * point.coefficients).real.sum(axis=0)])  # fmt: skip
+    after = marched_ring(point.omega, 1.01 * state, 30)
+    assert np.abs(after - state).max() < 3e-3 * np.abs(state).max()
+
+
+def test_a_subharmonic_motion_closes_after_three_periods():
+    structure = ss.model.lumped(
+        np.ones(1), np.ones((1, 1)), damping=np.array([[0.02]]), names=("mass",)
+    )
+    spring = ss.Interface(
+        ("spring",), (ss.CubicSpring(cubic_t=1.0),), np.array([[1.0], [0.0], [0.0]])
+    )
+    system = ss.System(structure, spring, outputs=structure.sets["mass"])
+    load = ss.HarmonicLoad(np.zeros(1), {1: np.array([3.0 + 0j])})
+    sweep = ss.Sweep(omega_range=(3.0, 4.5), low=5, high=5, selection="always_high", points=20)
+    problem = ss.response.forced_problem(system, load, sweep)
+    omega = 3.6
+    guess = np.zeros((4, 1), dtype=complex)
+    guess[1], guess[3] = np.sqrt(((omega / 3) ** 2 - 1) / 0.75), 3.0 / (1 - omega**2)
+    branch = subharmonic_branch(problem, omega, 3, guess, points=40)
+    assert branch.omegas.min() > 3.1  # it folds there: subharmonic motions have an onset
+    point = max(branch.points, key=branch.subharmonic)
+    state = start_of(point)
+    period = 2 * np.pi / point.omega
+
+    def rate(t, y):
+        return [y[1], 3.0 * np.cos(3 * point.omega * t) - 0.02 * y[1] - y[0] - y[0] ** 3]
+
+    course = scipy.integrate.solve_ivp(rate, (0.0, period), state, "DOP853", rtol=1e-9, t_eval=[period / 3, period]).y  # fmt: skip
+    assert np.abs(course[:, 0] - state).max() > 0.3
+    assert np.abs(course[:, 1] - state).max() < 1e-3
+
+
+def test_nothing_leaves_a_fold_or_a_torus():
+    problem, _, all_of_it = doubling()
+    for kind in ("fold", "Neimark-Sacker"):
+        with pytest.raises(InputError, match=kind):
+            side_branches(problem, replace(all_of_it.found[0], kind=kind))

@@ -1,0 +1,138 @@
+"""The same forced response with more freedom: over several periods of its load, or with every sector of a wheel for itself."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, IntArray
+from stickslip.errors import input_error
+from stickslip.harmonic.linear import one_structure
+from stickslip.reduction.speed_line import SpeedLine
+from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_problem
+from stickslip.response.system import System
+from stickslip.response.time.sectors import SectorsInTime, all_sectors
+
+
+def over_periods(problem: ForcedProblem, periods: int, order: int) -> ForcedProblem:
+    """Return the forced response whose period is that of several `periods` of the load.
+
+    Its frequency is ω over their number; the harmonics h of the load are its harmonics `periods` times h, and those between are
+    subharmonic. Frequencies of its sweep, points and amplitudes are in terms of this lower frequency.
+
+    Parameters
+    ----------
+    problem
+        Of one structure; a tuned wheel is taken sector by sector, see `every_sector`.
+    periods
+        2 for a doubled period.
+    order
+        Highest harmonic of the load's frequency that is kept; all up to `periods` times as many are.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two periods, or what vibrates is not one structure.
+    """
+    if periods < 2:
+        raise input_error(
+            "over_periods: periods", f"must be at least 2, got {periods}", "2 doubles the period."
+        )
+    system, sweep = problem.system, problem.sweep
+    if isinstance(system.structure, SpeedLine):
+        raise input_error(
+            "over_periods: problem",
+            "is that of a speed that changes with the frequency, whose matrices would be those of another speed",
+            "Take the model at the speed of the bifurcation.",
+        )
+    one_structure(system.structure, "over_periods")
+    load = problem.low.linear.load.over_periods(periods)
+    most = periods * order
+    first, last = sweep.omega_range
+    longer = replace(
+        sweep,
+        omega_range=(first / periods, last / periods),
+        low=most,
+        high=most,
+        samples=max(periods * problem.low.samples, 8 * most),
+        selection="always_high",
+        error_harmonics=None,
+        frequencies=0,
+        at=(),
+    )
+    return forced_problem(system, load, longer)
+
+
+def in_periods(point: ForcedPoint, periods: int) -> ForcedPoint:
+    """Return a point as one of `over_periods`, in whose period it does the same several times."""
+    order = point.order * periods
+    coefficients = np.zeros((order + 1, point.coefficients.shape[1]), dtype=complex)
+    coefficients[::periods] = point.coefficients
+    return replace(
+        point,
+        omega=point.omega / periods,
+        coefficients=coefficients,
+        harmonics=np.arange(order + 1),
+        kept=np.zeros((0, 0), dtype=np.int64),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class EverySector:
+    """A tuned wheel of which every sector may do something else.
+
+    Parameters
+    ----------
+    problem
+        The forced response of all sectors as one structure; outputs are those of sector 0, then those of sector 1, and so on.
+    tuned
+        That of one sector, which stands for all.
+    sectors
+        All sectors in time.
+    """
+
+    problem: ForcedProblem
+    tuned: ForcedProblem
+    sectors: SectorsInTime
+
+    @property
+    def sector_of(self) -> IntArray:
+        """(n_retained,) the sector of each retained coordinate."""
+        own = self.sectors.structure.n // self.sectors.count
+        return np.asarray(self.problem.system.retained // own)
+
+    def spread(self, point: ForcedPoint) -> ForcedPoint:
+        """Return a point of the tuned wheel as the motion of all sectors."""
+        wheel = self.tuned.system
+        whole = np.zeros((len(point.coefficients), wheel.structure.n), dtype=complex)
+        whole[:, wheel.retained] = point.coefficients
+        own = self.sectors.structure.n // self.sectors.count
+        rows: ComplexArray = self.sectors.travelling(whole[:, :own])
+        moved = rows[:, self.problem.system.retained]
+        return replace(point, coefficients=moved, kept=np.zeros((0, 0), dtype=np.int64))
+
+
+def every_sector(problem: ForcedProblem) -> EverySector:
+    """Return the forced response of a tuned wheel with all its sectors as one structure.
+
+    Raises
+    ------
+    InputError
+        If what vibrates is no tuned wheel with every wave; and what `stickslip.response.all_sectors` refuses.
+    """
+    wheel = problem.system.structure
+    if not (isinstance(wheel, TunedWheel) and wheel.has_every_wave):
+        raise input_error(
+            "every_sector: problem",
+            "is not that of a tuned wheel with every wave",
+            "Give Model.assembled(every_wave=True), or tuned_wheel all waves.",
+        )
+    system = problem.system
+    found = all_sectors(system, problem.low.linear.load, every=True)
+    own = found.structure.n // found.count
+    places = own * np.arange(found.count)
+    alert = system.outputs if system.alert_dofs is None else system.alert_dofs
+    outputs, alert = ((places[:, None] + d[d < own]).ravel() for d in (system.outputs, alert))
+    peak_of = np.arange(outputs.size) if system.peak_of is None else system.peak_of
+    whole = System(found.structure, found.contacts, outputs, alert, peak_of=peak_of)
+    return EverySector(forced_problem(whole, found.load, problem.sweep), problem, found)

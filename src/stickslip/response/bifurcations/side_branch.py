@@ -1,0 +1,341 @@
+"""Branches that leave the forced response: of a doubled period, of less symmetry, or subharmonic ones that nothing leads to."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.errors import input_error
+from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.bifurcations.found import Bifurcation
+from stickslip.response.bifurcations.larger import every_sector, in_periods, over_periods
+from stickslip.response.bifurcations.leave import first_point, localised, open_directions
+from stickslip.response.forced.problem import (
+    Balance,
+    ForcedPoint,
+    ForcedProblem,
+    forced_point,
+    with_stiffness,
+)
+from stickslip.solve.branch import Following, Point, measure_at, reversed_point
+from stickslip.solve.continuation import advance, start_point, step_to
+from stickslip.units import HZ
+
+POINTS = 80  # of a branch, at most
+ALIKE = 1e-3  # relative difference from the branch that was left below which a motion is one of it
+CLOSED = 0.5  # steps by which a branch may miss its first point where it closes
+FEWEST = 6  # points before which it does not
+TURNS = 24  # points that lie within a share of the longest step where a corner holds a branch
+SHORT = 0.02  # that share
+
+
+@dataclass(frozen=True, eq=False)
+class SideBranch:
+    """A branch of motions that another forced response does not hold.
+
+    Parameters
+    ----------
+    problem
+        What its points are solutions of: over several periods of the load, of all sectors of a wheel, or the one it was asked of.
+    periods
+        Periods of the load in one of the motion.
+    points
+        Along the branch, the first one where it was found; their frequency is that of the load over `periods`.
+    end
+        Where it ended, in words.
+    sector_of
+        (n_retained,) sector of each retained coordinate of a wheel; None elsewhere.
+    """
+
+    problem: ForcedProblem
+    periods: int
+    points: tuple[ForcedPoint, ...]
+    end: str
+    sector_of: IntArray | None = None
+
+    @property
+    def omegas(self) -> FloatArray:
+        """(points,) frequencies of the load, rad/s."""
+        return self.periods * np.array([p.omega for p in self.points])
+
+    @property
+    def amplitudes(self) -> FloatArray:
+        """(points,) amplitudes over the harmonics that the load drives, m."""
+        return np.array([self.problem.amplitude(p) for p in self.points])
+
+    def subharmonic(self, point: ForcedPoint, output: int = 0) -> float:
+        """Return the amplitude of an output over all harmonics that are no multiples of the load's frequency, m."""
+        motion = self.problem.low.linear.recover(point.omega, point.coefficients)
+        row = motion[:, self.problem.system.outputs[output]].copy()
+        row[:: self.periods] = 0.0
+        return float(np.linalg.norm(row))
+
+    def localisation(self, point: ForcedPoint) -> float:
+        """Return the share of the vibration, by squares, that the sector with the largest one has; of what is no wheel that of a coordinate."""
+        size = np.sum(np.abs(point.coefficients[1:]) ** 2, axis=0)
+        group = np.arange(size.size) if self.sector_of is None else self.sector_of
+        each = np.bincount(group, size)
+        return float(each.max() / each.sum())
+
+    @property
+    def sentence(self) -> str:
+        """What it is, in words."""
+        kind = f"period of {self.periods} periods of the load" if self.periods > 1 else "less symmetry"  # fmt: skip
+        if not self.points:
+            return f"no branch with a {kind} was found: {self.end}"
+        ends = self.omegas / HZ
+        return (
+            f"branch with a {kind}, {len(self.points)} points between {ends.min():.6g} and {ends.max():.6g} Hz, "
+            f"amplitude up to {self.amplitudes.max():.4g} m; {self.end}"
+        )
+
+
+def side_branches(
+    problem: ForcedProblem, bifurcation: Bifurcation, *, points: int = POINTS
+) -> list[SideBranch]:
+    """Follow the branches that leave a forced response at a bifurcation.
+
+    At a period doubling the motion is taken over two periods; at a branch point harmonics stay, and on a tuned wheel every sector may
+    do something else. Branches leave along the directions in which the equations are singular, and are followed by arc length until they
+    come back, leave the range of frequencies, or have as many points as are allowed. Harmonics stay as they are.
+
+    Parameters
+    ----------
+    problem
+        The forced response that has the bifurcation.
+    bifurcation
+        A period doubling, a branch point, or a jump of a real multiplier.
+    points
+        Most points of each.
+
+    Raises
+    ------
+    InputError
+        At a fold, where no other branch leaves, and at a Neimark-Sacker bifurcation, whose motions are not periodic.
+    """
+    periods = _periods(bifurcation)
+    point, group, own = bifurcation.point, None, problem
+    if isinstance(problem.system.structure, TunedWheel):
+        wheel = every_sector(problem)
+        own, point, group = wheel.problem, wheel.spread(point), wheel.sector_of
+    if periods > 1:
+        own, point = over_periods(own, periods, point.order), in_periods(point, periods)
+    balance = with_stiffness(own.balance(point.support))
+    following = own.following(balance)
+    x = balance.unknowns(point.coefficients)
+    main = start_point(balance, x, point.omega, following)
+    if not main.solution.status.converged:
+        return [SideBranch(own, periods, (), "the bifurcation is no solution there", group)]
+    count = max(1, bifurcation.multiplicity)
+    open_ways = open_directions(balance, main, following, count)
+    way = _Way(own, balance, following, points)
+    made: list[SideBranch] = []
+    begun: list[Point] = []
+    for direction in localised(open_ways, balance, group):
+        first = first_point(balance, main, direction, following, way.ends[1])
+        if first is not None and _same(balance, first, begun, group):
+            continue
+        if first is None:
+            end = "no solution lies beside the bifurcation in the direction that its equations leave open"
+            made.append(SideBranch(own, periods, (), end, group))
+            continue
+        begun.append(first)
+        found, end = way.followed(first, _Apart(balance, following, main, first))
+        made.append(SideBranch(own, periods, tuple(map(way.point, found)), end, group))
+    return made
+
+
+def subharmonic_branch(
+    problem: ForcedProblem,
+    omega: float,
+    periods: int,
+    start: ComplexArray,
+    *,
+    points: int = POINTS,
+) -> SideBranch:
+    """Follow subharmonic motions from a given one, in both directions; nothing may lead to them from the forced response.
+
+    Parameters
+    ----------
+    problem
+        The forced response, of one structure.
+    omega
+        Frequency of the load at the start, rad/s.
+    periods
+        Periods of the load in one of the motion: 3 for a motion of ω/3.
+    start
+        (H+1, n_retained) coefficients of the motion to begin with, m, harmonics of ω over `periods`; as from a time integration, or a guess.
+    points
+        Most points.
+
+    Raises
+    ------
+    InputError
+        If `start` is not of the retained coordinates.
+    """
+    order = problem.sweep.high_harmonics[-1] if not problem.sweep.auto else problem.sweep.supports[min(1, len(problem.sweep.supports) - 1)][-1]  # fmt: skip
+    own = over_periods(problem, periods, order)
+    balance = own.low
+    given = np.asarray(start, dtype=complex)
+    if given.ndim != 2 or given.shape[1] != balance.linear.n:
+        raise input_error(
+            "subharmonic_branch: start",
+            f"has shape {given.shape}, the retained coordinates are {balance.linear.n}",
+            "Give coefficients (harmonics, retained coordinates), harmonic 0 first.",
+        )
+    following = own.following(balance)
+    patient = replace(following, newton=problem.sweep.newton)
+    first = start_point(balance, balance.unknowns(given), omega / periods, patient)
+    if not first.solution.status.converged:
+        said = f"no motion was found from the start ({first.solution.status.advice})"
+        return SideBranch(own, periods, (), said)
+    made = SideBranch(own, periods, (_point(balance, first),), "")
+    if made.subharmonic(made.points[0]) <= ALIKE * own.amplitude(made.points[0]):
+        return replace(
+            made, points=(), end="the start leads to the motion of the load's own period"
+        )
+    way = _Way(own, balance, following, points)
+    upward, end = way.followed(first, way.closes(first))
+    ends = [end]
+    downward: list[Point] = []
+    if end != CLOSES and len(upward) < points:
+        left = replace(way, points=points - len(upward) + 1)
+        downward, other = left.followed(reversed_point(first), None)
+        ends.insert(0, other)
+    along = [*downward[:0:-1], *upward]
+    return replace(made, points=tuple(map(way.point, along)), end="; ".join(ends))
+
+
+CLOSES = "it closes in itself"
+Stop = Callable[[Point, Point], str]
+
+
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """How branches of a problem are followed."""
+
+    problem: ForcedProblem
+    balance: Balance
+    following: Following
+    points: int
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The range of frequencies, rad/s."""
+        return self.problem.sweep.omega_range
+
+    def point(self, point: Point) -> ForcedPoint:
+        """Return a point as one of a response."""
+        return _point(self.balance, point)
+
+    def followed(self, first: Point, stops: Stop | None) -> tuple[list[Point], str]:
+        """Return the points from a first one on along its tangent, and why they end."""
+        low, high = self.ends
+        found = [first]
+        while len(found) < self.points:
+            here = found[-1]
+            end = high if here.tangent[-1] > 0.0 else low
+            if not low < here.p < high:
+                return found, "it leaves the range of frequencies"
+            after = advance(self.balance, here, end, self.following)
+            if not after.solution.status.converged:
+                return found, f"lost at {here.p * self._load / HZ:.6g} Hz ({after.solution.status.advice})"  # fmt: skip
+            why = stops(here, after) if stops else ""
+            if why:
+                return found, why
+            found.append(after)
+            if self._stuck(found):
+                return found[:-TURNS], "its contacts hold it at a corner, where it turns to and fro"
+        return found, "it goes on beyond as many points as were allowed"
+
+    def _stuck(self, found: list[Point]) -> bool:
+        """Whether the last points lie within a step of usual length."""
+        if len(found) <= 2 * TURNS:
+            return False
+        last = found[-TURNS:]
+        measure = measure_at(last[0].x, self.following)
+        far = max(measure.of(p.y - last[0].y) for p in last)
+        return far < SHORT * self.following.control.largest
+
+    @property
+    def _load(self) -> float:
+        """Periods of the load in one of the motion."""
+        return float(min(h for h, f in self.problem.low.linear.load.harmonics.items() if np.any(f)))
+
+    def closes(self, first: Point) -> Stop:
+        """Return what ends a branch that comes back to its first point in its direction."""
+        count = [0]
+
+        def stop(before: Point, after: Point) -> str:
+            count[0] += 1
+            measure = measure_at(first.x, self.following)
+            step = measure.of(after.y - before.y)
+            near = measure.of(first.y - after.y) <= CLOSED * step
+            alike = measure.cosine(first.tangent, after.tangent) > 0.0
+            return CLOSES if count[0] >= FEWEST and near and alike else ""
+
+        return stop
+
+
+@dataclass(eq=False)
+class _Apart:
+    """How far a branch is from the one that it left, which goes along beside it; zero is passed where it comes back."""
+
+    balance: Balance
+    following: Following
+    main: Point
+    first: Point
+
+    def __post_init__(self) -> None:
+        self.before: FloatArray | None = self._apart(self.first)
+
+    def _apart(self, point: Point) -> FloatArray | None:
+        main = self.main if self.main.tangent[-1] > 0.0 else reversed_point(self.main)
+        beside = step_to(self.balance, main, point.p, self.following)
+        if not beside.solution.status.converged:
+            return None
+        self.main = beside
+        return np.asarray(point.x - beside.x)
+
+    def __call__(self, before: Point, after: Point) -> str:
+        apart, had = self._apart(after), self.before
+        self.before = apart
+        if apart is None or had is None:
+            return ""
+        size = float(np.linalg.norm(apart))
+        back = apart @ had < 0.0 or size <= ALIKE * float(np.linalg.norm(after.x))
+        return "it comes back to the branch that it left" if back else ""
+
+
+def _periods(bifurcation: Bifurcation) -> int:
+    """Return the periods of the load in one of a motion that leaves."""
+    value = bifurcation.multiplier
+    smooth = bifurcation.kind in ("period doubling", "branch point")
+    if not smooth and (bifurcation.kind != "jump of multipliers" or abs(value.imag) > 0.0):
+        raise input_error(
+            "side_branches: bifurcation",
+            f"is a {bifurcation.kind}, where no branch of periodic motions leaves",
+            "Beyond a fold the branch itself goes on; motions of two frequencies are asked for with [quasi_periodic].",
+        )
+    return 2 if value.real < 0.0 else 1
+
+
+def _same(balance: Balance, first: Point, others: list[Point], group: IntArray | None) -> bool:
+    """Whether a branch begins as another one does with its sectors renumbered."""
+    own = _sizes(balance, first, group)
+    return any(
+        np.allclose(own, _sizes(balance, other, group), rtol=1e-6)
+        and np.isclose(first.p, other.p, rtol=1e-9)
+        for other in others
+    )
+
+
+def _sizes(balance: Balance, point: Point, group: IntArray | None) -> FloatArray:
+    """Return the size of the vibration of each sector, or coordinate, in growing order."""
+    size = np.sum(np.abs(balance.coefficients(point.x)[1:]) ** 2, axis=0)
+    return np.sort(np.bincount(np.arange(size.size) if group is None else group, size))
+
+
+def _point(balance: Balance, point: Point) -> ForcedPoint:
+    return forced_point(balance, point.solution, "branch", 0, point.p, 0.0)
