@@ -1,0 +1,114 @@
+"""How a torus of two phases is sampled: along the ways on which both phases grow with time, closed after whole turns of both.
+
+A contact remembers along time, and time moves both phases at once: it goes around the torus on a characteristic,
+``θ1 = ω1 t, θ2 = ω2 t + φ``. With a ratio of whole numbers q / p in place of ``ω2 / ω1`` a characteristic closes after p turns of the first phase
+and q of the second. Samples on it are then those of one long period: the state of a contact is marched along them, and nothing has to
+be interpolated. Where few turns close already, several characteristics lie beside each other.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import ceil, gcd
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.errors import input_error
+
+Indices = tuple[tuple[int, int], ...]  # (0, 0) first, then one of each pair (j, k), (-j, -k)
+
+TURNS_A_HARMONIC, LEAST_TURNS = 4, 24
+SAMPLES_A_HARMONIC, LEAST_SAMPLES = 8, 48  # a turn of the faster phase
+
+
+@dataclass(frozen=True)
+class TorusPath:
+    """Samples on a torus.
+
+    Parameters
+    ----------
+    turns
+        Of the first and of the second phase after which a characteristic closes; they have no common divisor.
+    ways
+        Characteristics beside each other.
+    samples
+        On each of them.
+    """
+
+    turns: tuple[int, int]
+    ways: int
+    samples: int
+
+    @property
+    def ratio(self) -> float:
+        """What stands for ω2 / ω1 in the contacts."""
+        return self.turns[1] / self.turns[0]
+
+    def phases(self, way: int) -> tuple[FloatArray, FloatArray]:
+        """Return the (samples,) phases along a characteristic."""
+        along = 2.0 * np.pi * np.arange(self.samples) / self.samples
+        offset = 2.0 * np.pi * way / (self.ways * self.turns[0])
+        return self.turns[0] * along, self.turns[1] * along + offset
+
+    def slip(self, ratio: float) -> float:
+        """Return by how much the second phase is off after a turn of the first, rad."""
+        return 2.0 * np.pi * abs(ratio - self.ratio)
+
+
+def half_plane(order: int) -> Indices:
+    """Return the indices (j, k) of combined frequencies ``j ω1 + k ω2`` with ``|j| + |k|`` up to `order`, one of each pair.
+
+    Raises
+    ------
+    InputError
+        If the order is below 1.
+    """
+    if order < 1:
+        raise input_error("harmonics", f"is {order}", "Keep at least the two frequencies: 1.")
+    first = [(j, 0) for j in range(1, order + 1)]
+    rest = [
+        (j, k)
+        for k in range(1, order + 1)
+        for j in sorted(range(k - order, order - k + 1), key=lambda v: (abs(v), -v))
+    ]
+    return ((0, 0), *first, *rest)
+
+
+def closed_path(ratio: float, order: int, refine: float = 1.0) -> TorusPath:
+    """Return the path whose ratio of whole numbers is nearest to `ratio`, ω2 / ω1.
+
+    Parameters
+    ----------
+    ratio
+        Above zero.
+    order
+        Highest sum of harmonics kept.
+    refine
+        Times the usual number of turns and of samples a turn.
+    """
+    least = ceil(refine * max(TURNS_A_HARMONIC * order, LEAST_TURNS))
+    choices = [
+        (p, q) for p in range(1, 2 * least) for q in (max(1, round(ratio * p)),) if gcd(p, q) == 1
+    ]
+    p, q = min(choices, key=lambda c: (round(abs(ratio - c[1] / c[0]), 12), c[0]))
+    a_turn = ceil(refine * max(SAMPLES_A_HARMONIC * order, LEAST_SAMPLES) * max(1.0, ratio))
+    return TorusPath((p, q), ceil(least / p), p * a_turn)
+
+
+@lru_cache(maxsize=64)
+def torus_basis(path: TorusPath, indices: Indices, way: int) -> FloatArray:
+    """Return (samples, m) values of ``1, cos(jθ1 + kθ2), sin(jθ1 + kθ2), ...`` along a characteristic."""
+    first, second = path.phases(way)
+    basis = np.ones((path.samples, 2 * len(indices) - 1))
+    for place, (j, k) in enumerate(indices[1:]):
+        angle = j * first + k * second
+        basis[:, 1 + 2 * place], basis[:, 2 + 2 * place] = np.cos(angle), np.sin(angle)
+    return basis
+
+
+def torus_rates(basis: FloatArray, frequencies: FloatArray) -> FloatArray:
+    """Return the time derivative of a basis whose functions have the `frequencies` (one an index, rad/s)."""
+    rates = np.zeros_like(basis)
+    rates[:, 1::2] = -frequencies[1:] * basis[:, 2::2]
+    rates[:, 2::2] = frequencies[1:] * basis[:, 1::2]
+    return rates

@@ -1,0 +1,1 @@
+"""Motions with two frequencies, and what is not periodic at all."""

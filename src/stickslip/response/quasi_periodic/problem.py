@@ -1,0 +1,288 @@
+"""Motions with two given frequencies."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.errors import input_error
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.linear import DynamicStiffness
+from stickslip.harmonic.torus import MOST_UNKNOWNS, TorusBalance, torus_balance
+from stickslip.harmonic.torus_path import Indices, TorusPath, closed_path, half_plane
+from stickslip.harmonic.torus_side import TorusSide
+from stickslip.harmonic.travelling import condense_side
+from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.equilibrium import preload
+from stickslip.response.quasi_periodic.motion import TorusMotion
+from stickslip.response.system import NO_DOFS, System
+from stickslip.solve.newton_method import Newton, Solution, newton
+
+LEVELS = 8  # steps of the second load where Newton's method does not find the way at once
+MOST_RAISES = 6
+SHARE = 0.5  # of the tolerance, below which together combined frequencies stay out
+
+
+@dataclass(frozen=True, eq=False)
+class _Evaluation:
+    residual: FloatArray
+    jac: FloatArray
+    seconds_contact: float
+
+
+@dataclass(frozen=True, eq=False)
+class TwoTones:
+    """A system under two loads of different frequencies; `two_tones` makes one.
+
+    Attributes
+    ----------
+    system
+        What vibrates.
+    balance
+        The equations.
+    newton
+        Their solver.
+    """
+
+    system: System
+    balance: TorusBalance
+    newton: Newton = Newton()  # noqa: RUF009  # frozen
+
+    def with_indices(self, indices: Indices) -> "TwoTones":
+        """Return the same with other combined frequencies."""
+        return replace(self, balance=self.balance.with_indices(indices))
+
+    def path(self, ratio: float, refine: float = 1.0) -> TorusPath:
+        """Return how the torus is sampled."""
+        return closed_path(ratio, self.balance.order, refine)
+
+    def motion(
+        self, x: FloatArray, omegas: tuple[float, float], solution: Solution, path: TorusPath
+    ) -> TorusMotion:
+        """Return what unknowns are."""
+        balance = self.balance
+        full = balance.side.recover(balance.indices, omegas, balance.coefficients(x))
+        return TorusMotion(
+            balance.indices, omegas, full, x, solution.status, solution.iterations,
+            solution.residual_norm, path.slip(omegas[1] / omegas[0]),
+            balance.forces(x, omegas, path).unsettled,
+        )  # fmt: skip
+
+    def stuck(self, omegas: tuple[float, float]) -> FloatArray:
+        """Return the unknowns of the motion with all contacts stuck about the static state."""
+        balance, side = self.balance, self.balance.side
+        rows = self.system.springs.restricted(side.first.retained)
+        operator = rows.gap_operator
+        springs = operator.T @ (rows.stuck_stiffness()[:, None] * operator.toarray())
+        stiffness, _ = side.stiffness(balance.indices, omegas)
+        load, _, _ = side.load(balance.indices, omegas)
+        q = np.zeros((len(balance.indices), side.n), dtype=complex)
+        q[0, np.searchsorted(side.first.retained, self.system.retained)] = preload(
+            self.system, side.first.load.static
+        )
+        for place in range(1, len(q)):
+            if np.any(load[place]):
+                q[place] = np.linalg.solve(stiffness[place] + springs, load[place])
+        return balance.unknowns(q)
+
+    def solve(
+        self,
+        omegas: tuple[float, float],
+        start: FloatArray | None = None,
+        path: TorusPath | None = None,
+    ) -> TorusMotion:
+        """Return the motion at two frequencies, rad/s.
+
+        Parameters
+        ----------
+        omegas
+            ω1 and ω2.
+        start
+            Unknowns to begin from; None: contacts stuck, and where that does not lead to a solution the second load from nothing up.
+        path
+            How the torus is sampled; None: as `path` says.
+        """
+        check_frequencies(omegas)
+        path = path or self.path(omegas[1] / omegas[0])
+        x = self.stuck(omegas) if start is None else start
+        solution = self.corrected(x, omegas, path)
+        if not solution.status.converged:
+            solution = self._raised(omegas, path, solution)
+        return self.motion(solution.x, omegas, solution, path)
+
+    def corrected(self, x: FloatArray, omegas: tuple[float, float], path: TorusPath) -> Solution:
+        """Return what Newton's method comes to from the unknowns `x`."""
+
+        def evaluate(v: FloatArray) -> _Evaluation:
+            at = self.balance.linearise(v, omegas, path)
+            return _Evaluation(at.residual, at.jac, at.seconds_contact)
+
+        return newton(evaluate, x, self.newton)
+
+    def _raised(self, omegas: tuple[float, float], path: TorusPath, failed: Solution) -> Solution:
+        """Raise the second load from nothing, each step begun where the line through the last two leads."""
+        x = self._at_level(0.0).stuck(omegas)
+        before: FloatArray | None = None
+        solution, spent = failed, failed.iterations
+        for step in range(LEVELS + 1):
+            level = step / LEVELS
+            guess = x if before is None else 2.0 * x - before
+            solution = self._at_level(level).corrected(guess, omegas, path)
+            spent += solution.iterations
+            if not solution.status.converged:
+                break
+            before, x = (None if step == 0 else x), solution.x
+        return replace(solution, iterations=spent)
+
+    def _at_level(self, level: float) -> "TwoTones":
+        side = self.balance.side
+        load = side.second.load
+        less = HarmonicLoad(load.static, {h: level * f for h, f in load.harmonics.items()})
+        own = replace(side, second=side.second.with_load(less))
+        return replace(self, balance=replace(self.balance, side=own))
+
+
+def two_tones(
+    system: System,
+    first: HarmonicLoad,
+    second: HarmonicLoad,
+    order: int,
+    *,
+    waves: tuple[int, int] | None = None,
+    more: IntArray = NO_DOFS,
+    newton_options: Newton | None = None,
+) -> TwoTones:
+    """Set up the motion under two loads of different frequencies.
+
+    Parameters
+    ----------
+    system
+        What vibrates and its contacts; of a tuned wheel, with every wave.
+    first
+        The static load, and that whose harmonics are those of ω1.
+    second
+        That whose harmonics are those of ω2; its static part is not used.
+    order
+        Largest sum of harmonics ``|j| + |k|``.
+    waves
+        Of a tuned wheel: the wave numbers of both frequencies. Loads are given in the coordinates of their own waves.
+    more
+        Dofs that are retained beside those of the contacts.
+    newton_options
+        Solver; None: as usual.
+
+    Raises
+    ------
+    InputError
+        If a tuned wheel lacks waves, or `torus_balance` refuses.
+    """
+    side = torus_side(system, first, second, order, waves, more)
+    balance = torus_balance(side, system.interface, order)
+    return TwoTones(system, balance, newton_options or Newton())
+
+
+def torus_side(
+    system: System,
+    first: HarmonicLoad,
+    second: HarmonicLoad,
+    order: int,
+    waves: tuple[int, int] | None = None,
+    more: IntArray = NO_DOFS,
+) -> TorusSide:
+    """Condense what vibrates; the rest as in `two_tones`."""
+    structure = system.structure
+    retained = np.union1d(system.retained, more)
+    zero = HarmonicLoad(np.zeros(structure.n))
+    second = HarmonicLoad(zero.static, second.harmonics)
+    if not isinstance(structure, TunedWheel):
+        one = condense_side(structure, retained, first, order)
+        return TorusSide(one, one.with_load(second), {0: one.with_load(zero)})
+    if waves is None or not structure.has_every_wave:
+        raise input_error(
+            "quasi_periodic",
+            "of a tuned wheel needs the wave numbers of both frequencies and all waves",
+            "Give `waves`, and reduce every wave.",
+        )
+
+    def travelling(wave: int, load: HarmonicLoad) -> DynamicStiffness:
+        return condense_side(structure.travelling_as(wave), retained, load, order)
+
+    still = {k: travelling(k, zero) for k in range(structure.sectors)}
+    own = waves[0] % structure.sectors, waves[1] % structure.sectors
+    return TorusSide(
+        travelling(own[0], first),
+        travelling(own[1], second),
+        still,
+        (own[0], own[1], structure.sectors),
+    )
+
+
+def check_frequencies(omegas: tuple[float, float]) -> None:
+    """Raise `InputError` unless both frequencies are positive numbers, and not one and the same."""
+    if not all(np.isfinite(w) and w > 0.0 for w in omegas) or omegas[0] == omegas[1]:
+        raise input_error(
+            "quasi_periodic",
+            f"has the frequencies {omegas[0]:g} and {omegas[1]:g} rad/s",
+            "Give two different ones above zero; loads of one frequency are a matter of forced_response.",
+        )
+
+
+def with_enough(
+    problem: TwoTones,
+    motion: TorusMotion,
+    most: int,
+    tolerance: float,
+    solve: Callable[[TwoTones, FloatArray, TorusPath], TorusMotion],
+) -> tuple[TwoTones, TorusMotion]:
+    """Add combined frequencies until what is left out would move the contacts by less than `tolerance` of their motion.
+
+    Two lightly damped resonances are hit by some combined frequency of almost any order: those are taken which the contact forces move
+    most, not all up to an order.
+
+    Parameters
+    ----------
+    problem, motion
+        What to begin with.
+    most
+        Largest sum of harmonics that is looked at.
+    tolerance
+        Root mean square, relative.
+    solve
+        Returns the motion with other indices, from unknowns and on a path.
+
+    Returns
+    -------
+    TwoTones, TorusMotion
+        The last that converged, `left_out` telling what is left out.
+    """
+    candidates = half_plane(most)
+    for _ in range(MOST_RAISES):
+        ratio = motion.omegas[1] / motion.omegas[0]
+        path = closed_path(ratio, most, 0.5)
+        size = np.sum(np.abs(problem.balance.coefficients(motion.x)[1:]) ** 2)
+        own = set(problem.balance.indices[1:])
+        more = tuple(i for i in candidates if i not in own)
+        moved = problem.balance.left_out(motion.x, motion.omegas, path, more)
+        square = np.sum(np.abs(moved) ** 2, axis=1) / size
+        motion = replace(motion, left_out=float(np.sqrt(np.sum(square))))
+        if motion.left_out <= tolerance:
+            break
+        order = np.argsort(square, kind="stable")
+        rest = np.cumsum(square[order])
+        added = order[rest > (SHARE * tolerance) ** 2]
+        added = added[::-1][: max(1, room(problem))]
+        if room(problem) < 1:
+            break
+        wider = problem.with_indices((*problem.balance.indices, *(more[i] for i in sorted(added))))
+        start = wider.balance.from_other(problem.balance, motion.x)
+        found = solve(wider, start, wider.path(ratio))
+        if not found.converged:
+            break
+        problem, motion = wider, found
+    return problem, motion
+
+
+def room(problem: TwoTones) -> int:
+    """Return how many combined frequencies may be added."""
+    return MOST_UNKNOWNS // (2 * problem.balance.side.n) - len(problem.balance.indices)

@@ -1,0 +1,341 @@
+"""Motions whose second frequency nothing drives: a forced motion that has become unstable, or flutter beside it.
+
+Beyond a Neimark-Sacker point a second tone of an own frequency grows out of the forced motion. It has a phase that nothing fixes, since time may
+begin anywhere for it, and so its frequency is one more unknown. For a given amplitude ``a`` of the second tone, the damping that has to
+be taken away wherever it takes part to keep it going is another unknown, a *level*: small and below zero at first, at zero where the
+motion goes on by itself. The curve over ``a`` begins with the disturbance that grows, at the angle of its multiplier or the frequency of
+its mode.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray
+from stickslip.harmonic.torus_path import TorusPath
+from stickslip.response.quasi_periodic.motion import TorusMotion
+from stickslip.response.quasi_periodic.problem import TwoTones
+from stickslip.solve.newton_method import Solution, newton
+from stickslip.solve.status import Status
+
+FIRST = 0.02  # of the forced motion: amplitude of the second tone that the curve begins with
+STEP = 1.5  # factor of the amplitude from one point to the next
+SHORTEST, LONGEST = 1.02, 4.0  # factors below which a step is given up, and of the longest
+FEW = 3  # Newton steps after which the next step is longer
+FARTHEST = 300.0  # times the forced motion, where the curve ends
+HALVINGS = 8  # of the interval in which a level is zero
+WANDERED = 0.3  # |ln(ω2 / guess)| at which the second tone is lost
+STILL = 1e-6  # of the motion: a second tone that is smaller is none
+
+
+@dataclass(frozen=True, eq=False)
+class Beginning:
+    """A second tone at very small amplitudes.
+
+    Attributes
+    ----------
+    problem
+        With all combined frequencies; nothing acts with the second one.
+    omegas
+        ω1 and the frequency near which the second tone is, rad/s.
+    forced
+        Unknowns of the forced motion; the second tone does not take part.
+    shape
+        Unknowns of the second tone, of unit amplitude at `position`.
+    position
+        Of the retained coordinate whose amplitude stands for it.
+    defect
+        Smallest singular value over the largest of what the second tone obeys; zero at a Neimark-Sacker point.
+    share
+        Of the second frequency itself in the shape.
+    """
+
+    problem: TwoTones
+    omegas: tuple[float, float]
+    forced: FloatArray
+    shape: FloatArray
+    position: int
+    defect: float
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class ToneOfAmplitude:
+    """A second tone of a given amplitude, kept going by a level of damping.
+
+    Attributes
+    ----------
+    amplitude
+        Of the coordinate that stands for it, m.
+    omega
+        Its frequency, rad/s.
+    ratio
+        Damping ratio that it has: below zero it grows.
+    x
+        Unknowns of the motion.
+    converged
+        Whether it is a solution.
+    """
+
+    amplitude: float
+    omega: float
+    ratio: float
+    x: FloatArray
+    converged: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Evaluation:
+    residual: FloatArray
+    jac: FloatArray
+    seconds_contact: float
+
+
+def forced_motion(
+    problem: TwoTones, omega: float, start: ComplexArray | None = None
+) -> TorusMotion:
+    """Return the periodic motion under the first load alone, as a motion of two frequencies of which the second takes no part.
+
+    Parameters
+    ----------
+    problem
+        With all combined frequencies.
+    omega
+        ω1, rad/s.
+    start
+        (H + 1, n_retained) coefficients to begin from, m; None: contacts stuck.
+    """
+    indices = tuple(i for i in problem.balance.indices if i[1] == 0)
+    alone = problem.with_indices(indices)
+    path = TorusPath((1, 1), 1, 2 * problem.path(1.0).samples)
+    x = None
+    if start is not None:
+        rows = np.zeros((len(indices), problem.balance.side.n), dtype=complex)
+        own = min(len(rows), len(start))
+        rows[:own] = start[:own]
+        x = alone.balance.unknowns(rows)
+    return alone.solve((omega, np.sqrt(2.0) * omega), x, path)
+
+
+def beginnings(problem: TwoTones, forced: TorusMotion, guesses: Sequence[float]) -> list[Beginning]:
+    """Return what a second tone near each of some frequencies begins with, the most likely first.
+
+    Parameters
+    ----------
+    problem
+        With all combined frequencies.
+    forced
+        From `forced_motion`.
+    guesses
+        rad/s, above zero.
+    """
+    balance = problem.balance
+    alone = problem.with_indices(forced.indices)
+    x = balance.from_other(alone.balance, forced.x)
+    found = []
+    for guess in guesses:
+        omegas = forced.omegas[0], float(guess)
+        jac = balance.linearise(x, omegas, problem.path(guess / omegas[0])).jac
+        second = _of_second(problem)
+        _, sizes, right = np.linalg.svd(jac[np.ix_(second, second)])
+        unit = np.zeros(balance.size)
+        unit[second] = right[-1]
+        motion = balance.coefficients(unit)
+        own = motion[balance.indices.index((0, 1))]
+        position = int(np.argmax(np.abs(own)))
+        share = float(np.linalg.norm(own) / np.linalg.norm(motion))
+        turned = _turned(balance.indices, motion, own[position])
+        shape = balance.unknowns(turned / np.abs(own[position]))
+        found.append(Beginning(problem, omegas, x, shape, position, float(sizes[-1] / sizes[0]), share))  # fmt: skip
+    return sorted(found, key=lambda b: (-round(b.share, 2), b.defect))
+
+
+def over_amplitude(beginning: Beginning) -> Iterator[ToneOfAmplitude]:
+    """Yield second tones of growing amplitude, up to where they go on by themselves or are lost."""
+    balance = beginning.problem.balance
+    size = float(np.max(np.abs(balance.coefficients(beginning.forced)[1:])))
+    amplitude, factor = FIRST * size, STEP
+    y = np.append(beginning.forced + amplitude * beginning.shape, [0.0, 0.0])
+    before: tuple[float, FloatArray] | None = None
+    last: tuple[float, FloatArray] | None = None
+    while amplitude < FARTHEST * size:
+        solution = _of_amplitude(beginning, y, amplitude)
+        if not solution.status.converged:
+            factor = np.sqrt(factor)
+            if last is None or factor < SHORTEST:
+                yield _told(beginning, amplitude, solution)
+                return
+            amplitude = last[0] * factor
+            y = _guess(before, last, amplitude)
+            continue
+        found = _told(beginning, amplitude, solution)
+        yield found
+        before, last = last, (amplitude, solution.x)
+        factor = min(factor**1.5, LONGEST) if solution.iterations <= FEW else factor
+        amplitude *= factor
+        y = _guess(before, last, amplitude)
+
+
+def second_tone(beginning: Beginning) -> TorusMotion | None:
+    """Return the motion whose second tone goes on by itself; None where no amplitude has one."""
+    last: ToneOfAmplitude | None = None
+    for tone in over_amplitude(beginning):
+        if not tone.converged:
+            return None
+        if last is not None and (last.ratio < 0.0) != (tone.ratio < 0.0):
+            return _between(beginning, last, tone)
+        last = tone
+    return None
+
+
+def _between(
+    beginning: Beginning, below: ToneOfAmplitude, above: ToneOfAmplitude
+) -> TorusMotion | None:
+    """Return the motion without a level between two amplitudes, the interval halved as long as Newton's method does not find it."""
+    for _ in range(HALVINGS):
+        share = below.ratio / (below.ratio - above.ratio)
+        x = below.x + share * (above.x - below.x)
+        omega = below.omega + share * (above.omega - below.omega)
+        found = solve_free(beginning.problem, x, (beginning.omegas[0], omega))
+        if found.converged:
+            return found
+        amplitude = float(np.sqrt(below.amplitude * above.amplitude))
+        half = (amplitude - below.amplitude) / (above.amplitude - below.amplitude)
+        guess = below.x + half * (above.x - below.x)
+        rest = [np.log(omega / beginning.omegas[1]), 0.0]
+        solution = _of_amplitude(beginning, np.append(guess, rest), amplitude)
+        if not solution.status.converged:
+            return None
+        middle = _told(beginning, amplitude, solution)
+        if (middle.ratio < 0.0) == (below.ratio < 0.0):
+            below = middle
+        else:
+            above = middle
+    return None
+
+
+def solve_free(
+    problem: TwoTones,
+    x: FloatArray,
+    omegas: tuple[float, float],
+    path: TorusPath | None = None,
+) -> TorusMotion:
+    """Return the motion with an unknown second frequency; the phase of the second tone is that of the start.
+
+    Parameters
+    ----------
+    problem
+        Nothing acts with the second frequency.
+    x
+        Unknowns to begin from, a second tone among them.
+    omegas
+        ω1, and near ω2, rad/s.
+    path
+        How the torus is sampled; None: as follows from the frequencies, chosen once more when ω2 is known.
+    """
+    balance = problem.balance
+    own = balance.coefficients(x)[balance.indices.index((0, 1))]
+    position = int(np.argmax(np.abs(own)))
+    turned = _turned(balance.indices, balance.coefficients(x), own[position])
+    y = np.append(balance.unknowns(turned), 0.0)
+    row = _row(problem) + 1
+
+    def evaluate(v: FloatArray) -> _Evaluation:
+        log_omega = float(v[-1])
+        if not abs(log_omega) < WANDERED:
+            return _out_of_bounds(v)
+        now = omegas[0], omegas[1] * float(np.exp(log_omega))
+        at = balance.linearise(v[:-1], now, used)
+        jac = np.zeros((v.size, v.size), order="F")
+        jac[:-1, :-1], jac[:-1, -1] = at.jac, now[1] * at.by_second
+        jac[-1, row * balance.side.n + position] = 1.0
+        held = v[row * balance.side.n + position]
+        return _Evaluation(np.append(at.residual, held), jac, at.seconds_contact)
+
+    used = path or problem.path(omegas[1] / omegas[0])
+    solution = newton(evaluate, y, problem.newton)
+    spent = solution.iterations
+    if solution.status.converged:
+        better = path or problem.path(omegas[1] * float(np.exp(solution.x[-1])) / omegas[0])
+        if better != used:
+            used = better
+            solution = newton(evaluate, solution.x, problem.newton)
+            spent += solution.iterations
+    solution = replace(solution, iterations=spent)
+    now = omegas[0], omegas[1] * float(np.exp(np.clip(solution.x[-1], -WANDERED, WANDERED)))
+    motion = problem.motion(solution.x[:-1], now, solution, used)
+    size = float(np.max(np.abs(motion.coefficients[1:])))
+    alone = [place for place, (_, k) in enumerate(motion.indices) if k != 0]
+    if float(np.max(np.abs(motion.coefficients[alone]))) < STILL * size:
+        # the second tone has died: the equation of its frequency is none
+        return replace(motion, status=Status.SINGULAR)
+    return motion
+
+
+def _of_amplitude(beginning: Beginning, y: FloatArray, amplitude: float) -> Solution:
+    """Solve for the motion, ln ω2 and the level of damping, over the amplitude of the second tone."""
+    problem = beginning.problem
+    balance, (first, guess) = problem.balance, beginning.omegas
+    place = _row(problem) * balance.side.n + beginning.position
+    rows = place, place + balance.side.n
+    target = amplitude / balance.displacement_scale
+    path = problem.path(guess * float(np.exp(y[-2])) / first)
+
+    def evaluate(v: FloatArray) -> _Evaluation:
+        log_omega, level = float(v[-2]), float(v[-1])
+        if not abs(log_omega) < WANDERED:
+            return _out_of_bounds(v)
+        omegas = first, guess * float(np.exp(log_omega))
+        rate = level * guess
+        x = v[:-2]
+        at = balance.linearise(x, omegas, path, rate)
+        jac = np.zeros((v.size, v.size), order="F")
+        jac[:-2, :-2], jac[:-2, -2] = at.jac, omegas[1] * at.by_second
+        jac[:-2, -1] = guess * balance.by_damping(x, omegas, rate, 1e-4 * guess)
+        jac[-2, rows[0]] = jac[-1, rows[1]] = 1.0
+        held = [x[rows[0]] - target, x[rows[1]]]
+        return _Evaluation(np.append(at.residual, held), jac, at.seconds_contact)
+
+    return newton(evaluate, y, problem.newton)
+
+
+def _told(beginning: Beginning, amplitude: float, solution: Solution) -> ToneOfAmplitude:
+    guess = beginning.omegas[1]
+    omega = guess * float(np.exp(np.clip(solution.x[-2], -WANDERED, WANDERED)))
+    ratio = 0.5 * float(solution.x[-1]) * guess / omega
+    return ToneOfAmplitude(amplitude, omega, ratio, solution.x[:-2], solution.status.converged)
+
+
+def _guess(
+    before: tuple[float, FloatArray] | None, last: tuple[float, FloatArray], amplitude: float
+) -> FloatArray:
+    """Continue the line through two points; through one the second tone alone grows by as much as the amplitude does."""
+    if before is None:
+        return last[1]
+    share = (amplitude - last[0]) / (last[0] - before[0])
+    return np.asarray(last[1] + share * (last[1] - before[1]))
+
+
+def _of_second(problem: TwoTones) -> BoolArray:
+    """Return which unknowns belong to combined frequencies in which the second takes part."""
+    rows = [k != 0 for _, k in problem.balance.indices[1:] for _ in range(2)]
+    return np.repeat([False, *rows], problem.balance.side.n)
+
+
+def _turned(
+    indices: Sequence[tuple[int, int]], motion: ComplexArray, along: complex
+) -> ComplexArray:
+    """Return a motion with the second phase begun where `along`, a coefficient of (0, 1), is real and positive."""
+    angle = float(np.angle(along))
+    turns = np.array([np.exp(-1j * k * angle) for _, k in indices])
+    return np.asarray(turns[:, None] * motion)
+
+
+def _row(problem: TwoTones) -> int:
+    """Return the row of the cosine part of the second frequency."""
+    return 2 * problem.balance.indices.index((0, 1)) - 1
+
+
+def _out_of_bounds(v: FloatArray) -> _Evaluation:
+    return _Evaluation(np.full(v.size, np.inf), np.eye(v.size), 0.0)

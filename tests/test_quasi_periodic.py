@@ -1,0 +1,240 @@
+"""Motions with two frequencies against judges of their own: a march with friction sliders by hand, and SciPy's integrator."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import stickslip as ss
+from stickslip.errors import InputError
+from stickslip.harmonic.torus_path import closed_path, half_plane, torus_basis
+from stickslip.model.matrices import lumped
+from stickslip.response.quasi_periodic.motion import TorusMotion, envelope
+from stickslip.response.quasi_periodic.problem import TwoTones, two_tones, with_enough
+from stickslip.response.quasi_periodic.second_tone import (
+    beginnings,
+    forced_motion,
+    over_amplitude,
+    second_tone,
+    solve_free,
+)
+from stickslip.response.quasi_periodic.start import distinct, tones_of_multipliers
+from stickslip.response.stability import stability
+
+MASS = np.eye(2)
+STIFFNESS = np.array([[3e4, -1e4], [-1e4, 4e4]])
+DAMPING = 1e-4 * STIFFNESS + 4.0 * np.eye(2)
+SPRING, LIMIT = 1e4, 5.0
+BOTH = np.array([0, 1])
+NONE = ss.HarmonicLoad(np.zeros(2))
+
+
+def rubbing_pair(damping: np.ndarray) -> ss.System:
+    """Two masses with a friction spring between them."""
+    structure = replace(lumped(MASS, STIFFNESS), damping=damping)
+    operator = np.zeros((3, 2))
+    operator[0] = 1.0, -1.0
+    law = ss.Jenkins(k_t=SPRING, limit=LIMIT)
+    return ss.System(structure, ss.Interface(("joint",), (law,), operator), BOTH)
+
+
+def tone(*newton: float) -> ss.HarmonicLoad:
+    return ss.HarmonicLoad(np.zeros(2), {1: np.array(newton, dtype=complex)})
+
+
+def by_hand(damping: np.ndarray, tones: list, seconds: float, step: float):  # type: ignore[no-untyped-def,type-arg]
+    """March the pair from rest by Runge-Kutta steps with a slider that is dragged along: shares no code with the package."""
+    steps = round(seconds / step)
+    q, v, slider = np.zeros(2), np.zeros(2), 0.0
+    out = np.zeros((steps + 1, 2))
+
+    def acceleration(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        friction = min(max(SPRING * (q[0] - q[1] - slider), -LIMIT), LIMIT)
+        force = np.array([-friction, friction])
+        for omega, amplitude in tones:
+            force = force + np.cos(omega * t) * np.asarray(amplitude)
+        return force - damping @ v - STIFFNESS @ q
+
+    for i in range(steps):
+        t = i * step
+        a1 = acceleration(t, q, v)
+        a2 = acceleration(t + step / 2, q + step / 2 * v, v + step / 2 * a1)
+        a3 = acceleration(t + step / 2, q + step / 2 * (v + step / 2 * a1), v + step / 2 * a2)
+        a4 = acceleration(t + step, q + step * (v + step / 2 * a2), v + step * a3)
+        q = q + step * v + step**2 / 6 * (a1 + a2 + a3)
+        v = v + step / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+        stretch = SPRING * (q[0] - q[1] - slider)
+        if abs(stretch) > LIMIT:
+            slider = q[0] - q[1] - np.sign(stretch) * LIMIT / SPRING
+        out[i + 1] = q
+    return step * np.arange(steps + 1), out
+
+
+def off(found: np.ndarray, judge: np.ndarray) -> float:
+    return float(np.linalg.norm(found - judge) / np.linalg.norm(judge - judge.mean(axis=0)))
+
+
+def with_all(problem: TwoTones, motion: TorusMotion, tolerance: float) -> TorusMotion:
+    def solve(wider, start, path):  # type: ignore[no-untyped-def]
+        return wider.solve(motion.omegas, start, path)
+
+    return with_enough(problem, motion, 15, tolerance, solve)[1]
+
+
+def test_indices_are_half_of_the_plane() -> None:
+    indices = half_plane(3)
+    assert indices[0] == (0, 0)
+    every = {(j, k) for j in range(-3, 4) for k in range(-3, 4) if 0 < abs(j) + abs(k) <= 3}
+    assert {*indices[1:], *((-j, -k) for j, k in indices[1:])} == every
+    assert 2 * len(indices[1:]) == len(every)
+    with pytest.raises(InputError, match="harmonics"):
+        half_plane(0)
+
+
+@pytest.mark.parametrize("ratio", [np.sqrt(2.0), 1.5, 0.0837, 7.3, 1.0213])
+def test_functions_are_orthogonal_on_a_closed_path(ratio: float) -> None:
+    indices = half_plane(5)
+    path = closed_path(ratio, 5)
+    assert path.slip(ratio) < 0.01
+    product = sum(torus_basis(path, indices, w).T @ torus_basis(path, indices, w) for w in range(path.ways))  # fmt: skip
+    size = path.ways * path.samples / 2
+    wanted = np.diag([2.0, *np.ones(2 * len(indices) - 2)])
+    assert np.abs(product / size - wanted).max() < 1e-10
+
+
+def test_two_loads_are_what_a_march_by_hand_comes_to() -> None:
+    omegas = 140.0, 140.0 * 0.93 * np.sqrt(2.0)
+    problem = two_tones(rubbing_pair(DAMPING), tone(10.0, 0.0), tone(0.0, 8.0), 3)
+    motion = problem.solve(omegas)
+    assert motion.converged
+    assert motion.unsettled == 0
+    better = with_all(problem, motion, 0.01)
+    assert better.left_out < 0.01
+    times, judge = by_hand(DAMPING, [(omegas[0], (10.0, 0.0)), (omegas[1], (0.0, 8.0))], 2.5, 3e-4)
+    late = times > 1.8
+    few, more = (off(m.at_times(BOTH, times[late]), judge[late]) for m in (motion, better))
+    assert more < 0.5 * few
+    assert more < 0.01
+
+
+def test_derivatives_are_those_of_the_residual() -> None:
+    omegas = 140.0, 180.0
+    operator = np.zeros((6, 2))
+    operator[0], operator[3] = (1.0, -1.0), (0.0, 1.0)
+    laws = (
+        ss.CubicSpring(k_t=1e3, cubic_t=1e10),
+        ss.RegularisedCoulomb(mu=0.3, preload=10.0, transition_velocity=0.1),
+    )
+    structure = replace(lumped(MASS, STIFFNESS), damping=DAMPING)
+    system = ss.System(structure, ss.Interface(("cubic", "rub"), laws, operator), BOTH)
+    problem = two_tones(system, tone(10.0, 0.0), tone(0.0, 8.0), 3)
+    x, path = problem.solve(omegas).x, problem.path(omegas[1] / omegas[0])
+    rng = np.random.default_rng(3)
+    step = 1e-5 * rng.normal(size=x.size) * np.abs(x).max()
+
+    def residual(x: np.ndarray, first: float, second: float) -> np.ndarray:
+        return problem.balance.linearise(x, (first, second), path).residual
+
+    at = problem.balance.linearise(x, omegas, path)
+    for found, ends in (
+        (at.jac @ step, [residual(x + s * step, *omegas) for s in (1, -1)]),
+        (1e-2 * at.by_first, [residual(x, omegas[0] + s * 1e-2, omegas[1]) for s in (1, -1)]),
+        (1e-2 * at.by_second, [residual(x, omegas[0], omegas[1] + s * 1e-2) for s in (1, -1)]),
+    ):
+        assert found == pytest.approx((ends[0] - ends[1]) / 2, abs=1e-5 * np.abs(found).max())
+
+
+def test_frequencies_in_a_ratio_of_small_numbers_are_no_exception() -> None:
+    """At 3 to 2 the motion is periodic for each phase between the loads, and the balance is that of all of them."""
+    problem = two_tones(rubbing_pair(DAMPING), tone(10.0, 0.0), tone(0.0, 8.0), 3)
+    exact, near = (problem.solve((130.0, 130.0 * r)) for r in (1.5, 1.5 + 1e-9))
+    assert exact.slip == 0.0
+    assert exact.coefficients == pytest.approx(near.coefficients, abs=1e-4 * np.abs(exact.coefficients).max())  # fmt: skip
+    one = ss.HarmonicLoad(np.zeros(2), {2: np.array([10.0, 0.0j]), 3: np.array([0.0j, 8.0])})
+    sweep = ss.Sweep(omega_range=(65.0, 65.0001), low=21, high=21, selection="always_low", frequencies=2, peak_points=0)  # fmt: skip
+    system = rubbing_pair(DAMPING)
+    point = ss.response.accepted_points(list(ss.forced_response(system, one, sweep)))[0]
+    times = np.arange(512) * 2 * np.pi / 65.0 / 512
+    turns = np.exp(1j * np.outer(65.0 * times, np.arange(22)))
+    periodic = (turns @ point.coefficients).real
+    better = with_all(problem, exact, 0.005)
+    assert off(better.at_times(BOTH, times), periodic) < 0.01
+
+
+def test_flutter_beside_a_forced_vibration_is_what_a_march_by_hand_comes_to() -> None:
+    stuck = STIFFNESS + SPRING * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    squares, shapes = np.linalg.eigh(stuck)
+    damping = shapes @ np.diag([3.0, -2.0]) @ shapes.T  # the upper mode is fed
+    problem = two_tones(rubbing_pair(damping), tone(6.0, 0.0), NONE, 3)
+    forced = forced_motion(problem, 135.0)
+    begin = beginnings(problem, forced, [float(np.sqrt(squares[1]))])[0]
+    first = next(over_amplitude(begin))
+    # so small a second tone slips nowhere: it grows as the mode does
+    assert first.ratio == pytest.approx(-1.0 / np.sqrt(squares[1]), rel=1e-6)
+    motion = second_tone(begin)
+    assert motion is not None
+
+    def solve(wider, start, path):  # type: ignore[no-untyped-def]
+        return solve_free(wider, start, motion.omegas)
+
+    motion = with_enough(problem, motion, 15, 0.01, solve)[1]
+    times, judge = by_hand(damping, [(135.0, (6.0, 0.0))], 5.0, 3e-4)
+    late = times > 4.0
+    seen = np.hanning(late.sum()) @ (judge[late, 1] * np.exp(-1j * motion.omegas[1] * times[late]))
+    phase = float(np.angle(seen / motion.coefficients[motion.indices.index((0, 1)), 1]))
+    assert off(motion.at_times(BOTH, times[late], phase), judge[late]) < 0.015
+    assert motion.omegas[1] < np.sqrt(squares[1])
+
+
+def test_modulation_beyond_a_neimark_sacker_point_is_what_scipy_integrates() -> None:
+    """A cubic oscillator with an absorber: between two such points its forced motion is unstable."""
+    mass, force = np.diag([1.0, 0.05]), 0.15
+    stiffness = np.array([[1.0454, -0.0454], [-0.0454, 0.0454]])
+    damping = np.array([[0.0148, -0.0128], [-0.0128, 0.0128]])
+    operator = np.zeros((6, 2))
+    operator[0], operator[3] = (1.0, 0.0), (1.0, -1.0)
+    laws = ss.CubicSpring(cubic_t=1.0), ss.CubicSpring(cubic_t=0.0042)
+    structure = replace(lumped(mass, stiffness), damping=damping)
+    system = ss.System(structure, ss.Interface(("own", "absorber"), laws, operator), BOTH)
+    omega = 1.1532
+    sweep = ss.Sweep(omega_range=(omega, 1.00001 * omega), low=7, high=7, selection="always_low", frequencies=2, peak_points=0)  # fmt: skip
+    forced = ss.response.forced_problem(system, tone(force, 0.0), sweep)
+    point = ss.response.accepted_points(list(ss.forced_response(system, tone(force, 0.0), sweep)))[0]  # fmt: skip
+    found = stability(forced, point)
+    assert found.verdict == "unstable"
+    guesses = distinct(tones_of_multipliers(found.floquet.multipliers, point.omega, 3), point.omega)
+    problem = two_tones(system, tone(force, 0.0), NONE, 4)
+    periodic = forced_motion(problem, point.omega, point.coefficients)
+    begin = beginnings(problem, periodic, guesses)[0]
+    angle = np.angle(found.floquet.multipliers[np.argmax(np.abs(found.floquet.multipliers))])
+    apart = abs(begin.omegas[1] - point.omega)
+    assert apart == pytest.approx(abs(angle) / (2 * np.pi) * point.omega, rel=1e-6)
+    motion = second_tone(begin)
+    assert motion is not None
+
+    def solve(wider, start, path):  # type: ignore[no-untyped-def]
+        return solve_free(wider, start, motion.omegas)
+
+    motion = with_enough(problem, motion, 11, 0.01, solve)[1]
+
+    def rates(t: float, y: np.ndarray) -> np.ndarray:
+        q, v = y[:2], y[2:]
+        cubic = 0.0042 * (q[0] - q[1]) ** 3
+        push = np.array([force * np.cos(point.omega * t) - q[0] ** 3 - cubic, cubic])
+        return np.append(v, (push - damping @ v - stiffness @ q) / np.diag(mass))
+
+    period, turns, last = 2 * np.pi / point.omega, 240, 100
+    times = np.arange((turns - last) * 32, turns * 32) * period / 32
+    judge = solve_ivp(rates, (0.0, turns * period), np.zeros(4), rtol=1e-6, atol=1e-8, t_eval=times).y[:2].T  # fmt: skip
+    amplitude = 0.5 * np.ptp(judge.reshape(last, 32, 2), axis=1)
+    shown = envelope(motion, BOTH)
+    assert shown.largest == pytest.approx(amplitude.max(axis=0), rel=0.015)
+    assert shown.least == pytest.approx(amplitude.min(axis=0), rel=0.03)
+    assert shown.rms == pytest.approx(judge.std(axis=0), rel=0.01)
+
+
+def test_two_equal_frequencies_are_refused() -> None:
+    problem = two_tones(rubbing_pair(DAMPING), tone(10.0, 0.0), tone(0.0, 8.0), 3)
+    with pytest.raises(InputError, match="two different ones"):
+        problem.solve((140.0, 140.0))
