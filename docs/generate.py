@@ -41,6 +41,7 @@ PACKAGES = [
     "stickslip.harmonic",
     "stickslip.solve",
     "stickslip.response",
+    "stickslip.response.residual_tractions",
     "stickslip.response.self_excited",
 ]
 

@@ -34,6 +34,8 @@ class Jenkins:
         Stiffness along w, N/m.
     k_n
         Stiffness of the linear normal spring, N/m.
+    slider
+        Tangential gaps (t, w) at which the springs are unstretched before t = 0, m; None: zero.
 
     Raises
     ------
@@ -45,6 +47,7 @@ class Jenkins:
     limit: float = slip_limit()
     k_w: float = axial_stiffness(default=0.0)
     k_n: float = normal_stiffness(default=0.0)
+    slider: tuple[float, float] | None = None
 
     kernel: ClassVar[Any] = element_step
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
@@ -64,8 +67,8 @@ class Jenkins:
         return self.parameters()[None]
 
     def initial_state(self) -> FloatArray:
-        """Return the (2,) slider positions before t = 0, m: springs unstretched at zero displacement."""
-        return slider_start(None)
+        """Return the (2,) slider positions before t = 0, m."""
+        return slider_start(None, self.slider)
 
     def stuck_stiffness(self) -> FloatArray:
         """Return the (3,) stiffnesses t, w, n of the contact that does not slip, N/m."""

@@ -1,0 +1,162 @@
+"""Which contacts have springs whose start the equations leave open, and an interface on which each of them has a start of its own.
+
+A spring with a slider that never moves keeps what it began with. The start is the place of the slider, ``slider`` of a law: the force
+depends on the gap less that place alone, so that shifted gaps give the forces of every start.
+"""
+
+from dataclasses import dataclass, fields, is_dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import scipy.sparse
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.contact.element import K_N, K_T, K_W, PRELOAD
+from stickslip.contact.interface import Interface
+from stickslip.contact.law import UNCOUPLED_TANGENTS, ContactLaw
+from stickslip.contact.laws.bonded import Bonded
+from stickslip.contact.laws.bouc_wen import BoucWen
+from stickslip.contact.laws.dahl import Dahl
+from stickslip.contact.laws.iwan import Iwan
+from stickslip.contact.laws.jenkins import Jenkins
+from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
+from stickslip.errors import input_error
+
+FORGETS = (BoucWen, Dahl)  # a mean force relaxes over many cycles: the steady one is unique
+
+
+@dataclass(frozen=True, eq=False)
+class Starts:
+    """The springs of an interface that have a start.
+
+    Attributes
+    ----------
+    interface
+        Every law with no start of its own (unstretched at zero displacement), an Iwan element as its Jenkins elements side by side.
+    given
+        The same with the starts that the model gives.
+    first
+        (n_contacts + 1,) contact c of the model is contacts first[c] to before first[c + 1] of `interface`.
+    stiffness
+        (n, 2) of each spring along t and w, N/m; zero where there is no spring that has a start.
+    planar
+        (n,) whether the force is limited as a vector in the plane.
+    friction, constant
+        (n,) a friction limit is ``friction N + constant``, N the normal force.
+    """
+
+    interface: Interface
+    given: Interface
+    first: IntArray
+    stiffness: FloatArray
+    planar: np.ndarray
+    friction: FloatArray
+    constant: FloatArray
+
+    def limits(self, normal: FloatArray) -> FloatArray:
+        """Return the friction limits, N, under normal forces (n, ...) that push where they are positive."""
+        shape = (-1,) + (1,) * (normal.ndim - 1)
+        pushed = self.friction.reshape(shape) * np.maximum(normal, 0.0)
+        return np.asarray(pushed + self.constant.reshape(shape))
+
+    def law(self, contact: int, slider: FloatArray) -> ContactLaw:
+        """Return the law of a contact of `interface` that starts from a slider (2,), m."""
+        own: Any = self.interface.laws[contact]
+        if not np.any(self.stiffness[contact]):
+            return own  # type: ignore[no-any-return]
+        return replace(own, slider=(float(slider[0]), float(slider[1])))  # type: ignore[no-any-return]
+
+    def started(self, sliders: FloatArray) -> Interface:
+        """Return the interface whose springs start from sliders (n, 2), m."""
+        laws = tuple(self.law(c, s) for c, s in enumerate(sliders))
+        return replace(self.interface, laws=laws)
+
+
+def starts_of(interface: Interface) -> Starts:
+    """Return the springs of an interface that have a start.
+
+    Raises
+    ------
+    InputError
+        If a contact is rigid, or a law of one's own remembers something and does not say where its springs start.
+    """
+    given: list[ContactLaw] = []
+    of_contact = [0]
+    for name, law in zip(interface.names, interface.laws, strict=True):
+        given += _parts(name, law)
+        of_contact.append(len(given))
+    laws = [_without_start(law) for law in given]
+    first = np.array(of_contact, dtype=np.int64)
+    each = np.repeat(np.arange(interface.n_contacts), np.diff(first))
+    names = tuple(
+        interface.names[c] if b - a == 1 else f"{interface.names[c]}[{k}]"
+        for c, (a, b) in enumerate(pairwise(of_contact))
+        for k in range(b - a)
+    )
+    rows = (3 * each[:, None] + np.arange(3)).reshape(-1)
+    operator = scipy.sparse.csr_array(interface.gap_operator)[rows]
+    weights = None if interface.weights is None else interface.weights[each]
+    has = [hasattr(law, "slider") for law in laws]
+    stiffness = np.array(
+        [law.stuck_stiffness()[:2] if own else np.zeros(2) for law, own in zip(laws, has, strict=True)]
+    ).reshape(-1, 2)  # fmt: skip
+    return Starts(
+        Interface(names, tuple(laws), operator, weights),
+        Interface(names, tuple(given), operator, weights),
+        first,
+        stiffness,
+        np.array([own and law.pairs > UNCOUPLED_TANGENTS for law, own in zip(laws, has, strict=True)], dtype=bool),
+        np.array([getattr(law, "mu", 0.0) if own else 0.0 for law, own in zip(laws, has, strict=True)]),
+        np.array([getattr(law, "limit", 0.0) if own else 0.0 for law, own in zip(laws, has, strict=True)]),
+    )  # fmt: skip
+
+
+def _parts(name: str, law: ContactLaw) -> list[ContactLaw]:
+    """Return the laws side by side that a law is."""
+    if isinstance(law, Iwan):
+        return [_of_element(row) for row in law.elements() if np.any(row[[K_T, K_W, K_N]])]
+    if isinstance(law, RigidCoulomb):
+        raise input_error(
+            f"contact {name}",
+            "is rigid: its force is no function of its gap, and has no spring that starts somewhere",
+            "Give it a stiffness, such as elastic_coulomb has.",
+        )
+    known = _fields(law)
+    if "slider" in known and not known & {"mu", "limit"}:
+        raise input_error(
+            f"contact {name}",
+            f"is {type(law).__name__}, which has a slider and neither a field mu nor a field limit",
+            "Name the friction coefficient mu, or the constant limit limit: it bounds what the spring may be stretched by.",
+        )
+    remembers = law.initial_state().size and not isinstance(law, (Bonded, *FORGETS))
+    if "slider" not in known and remembers and _holds(law):
+        raise input_error(
+            f"contact {name}",
+            f"is {type(law).__name__}, which remembers something and does not say where its springs start",
+            "Give the law a field slider = (t, w), from which its springs are unstretched, and a field mu or limit.",
+        )
+    return [law]
+
+
+def _fields(law: Any) -> set[str]:
+    return {entry.name for entry in fields(law)} if is_dataclass(law) else set()
+
+
+def _without_start(law: Any) -> ContactLaw:
+    """Return a law whose springs are unstretched at zero displacement."""
+    none: dict[str, None] = {n: None for n in ("slider", "residual_traction") if n in _fields(law)}
+    return replace(law, **none) if none else law  # type: ignore[no-any-return]
+
+
+def _holds(law: ContactLaw) -> bool:
+    """Whether a law pulls along its tangents when stuck: a law with normal springs alone keeps no traction."""
+    return bool(np.any(law.stuck_stiffness()[:2] > 0.0))
+
+
+def _of_element(row: FloatArray) -> ContactLaw:
+    """Return an elementary contact of constant limit as a law."""
+    k_t, k_w, k_n = (float(row[k]) for k in (K_T, K_W, K_N))
+    if np.isinf(row[PRELOAD]):
+        return Bonded(k_t=k_t, k_w=k_w, k_n=k_n)
+    return Jenkins(k_t=k_t, k_w=k_w, k_n=k_n, limit=float(row[PRELOAD]))

@@ -1,0 +1,271 @@
+"""Bounds of a vibration over all residual tractions, at frequencies and at the resonance."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import scipy.optimize
+
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.contact.starts import Starts, starts_of
+from stickslip.errors import SingularError, input_error
+from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.peak import Driven, driven_by
+from stickslip.response.ladder import without_branch
+from stickslip.response.parameter import Discretisation
+from stickslip.response.residual_tractions.problem import TractionProblem, TractionState
+from stickslip.response.residual_tractions.search import Extremes, TractionSearch, extremes
+from stickslip.response.system import System
+from stickslip.solve.newton_method import newton
+
+PEAK_WIDTH = 1e-5  # relative width of the bracket of a resonance
+PEAK_TRIALS = 14  # frequencies that are tried in it
+EQUAL = 1e-6  # relative difference of two bounds that are one
+
+End = Literal["least", "most"]
+
+
+@dataclass(frozen=True, eq=False)
+class Bound:
+    """A motion with an extreme amplitude.
+
+    Attributes
+    ----------
+    amplitude
+        Norm of the output over the harmonics that the load drives, m.
+    coefficients
+        (H+1, n) displacement of all dofs, m.
+    sliders
+        (n_springs, 2) where the springs of `TractionBounds.springs` started, m.
+    multipliers
+        (n_springs, 2) tractions along t and w at t = 0 as shares of the friction limit there; NaN where a spring does not stick all the time.
+    """
+
+    amplitude: float
+    coefficients: ComplexArray
+    sliders: FloatArray
+    multipliers: FloatArray
+
+    @property
+    def stuck(self) -> int:
+        """Number of springs that stick all the time, and so keep a traction."""
+        return int(np.count_nonzero(np.isfinite(self.multipliers)))
+
+
+@dataclass(frozen=True, eq=False)
+class TractionBounds:
+    """What residual tractions leave open at a frequency.
+
+    Attributes
+    ----------
+    omega
+        Frequency, rad/s.
+    reference
+        The motion from the model's own start.
+    least, most
+        Those of the smallest and the largest amplitude.
+    springs
+        Names of the contacts to which the rows of sliders belong.
+    solves, failures
+        Motions that were solved for, and starts from which none was found.
+    """
+
+    omega: float
+    reference: Bound
+    least: Bound
+    most: Bound
+    springs: tuple[str, ...]
+    solves: int
+    failures: int
+
+    @property
+    def unique(self) -> bool:
+        """Whether both bounds are one."""
+        return self.most.amplitude - self.least.amplitude <= EQUAL * self.most.amplitude
+
+
+@dataclass(frozen=True, eq=False)
+class _Setup:
+    system: System
+    problem: TractionProblem
+    given: HarmonicBalance
+
+    def reference(self, omega: float, near: Sequence[FloatArray]) -> TractionState:
+        """Solve from the model's own start."""
+        solution = without_branch(
+            self.system, self.given, self.problem.newton, omega, near, most=not near
+        )
+        if not solution.status.converged:
+            raise SingularError(
+                f"residual tractions: no motion at {omega:.6g} rad/s: {solution.status.advice}"
+            )
+        self.problem.spent.solves += 1
+        starts = self.problem.starts
+        given = TractionState(self.problem, omega, _own_sliders(starts), solution.x)
+        if all(getattr(law, "residual_traction", None) is None for law in starts.given.laws):
+            return given
+        # a share of the limit says where sliders rest only once the motion is known
+        period = self.given.contacts(solution.x, omega)
+        force = period.force[:, :2, 0] / starts.interface.factors[:, None]
+        rests = period.gap[:, :2, 0] - force / np.maximum(starts.stiffness, 1e-300)
+        sliders = np.where(starts.stiffness > 0.0, rests, 0.0)
+        return self.problem.solved(sliders, omega, (given,)) or given
+
+
+def _own_sliders(starts: Starts) -> FloatArray:
+    return np.array([getattr(law, "slider", None) or (0.0, 0.0) for law in starts.given.laws]).reshape(-1, 2)  # fmt: skip
+
+
+def traction_bounds(
+    system: System,
+    load: HarmonicLoad,
+    omegas: Sequence[float],
+    output: int = 0,
+    discretisation: Discretisation | None = None,
+    search: TractionSearch | None = None,
+) -> Iterator[TractionBounds]:
+    """Find the smallest and the largest amplitude of an output over all residual tractions of contacts that stick.
+
+    Parameters
+    ----------
+    system
+        Structure, contacts and outputs.
+    load
+        Static and harmonic forces on all dofs, N.
+    omegas
+        Frequencies, rad/s, in an order in which neighbours help each other.
+    output
+        Which of the outputs of `system`.
+    discretisation
+        Harmonics, samples, solver.
+    search
+        How hard extremes are looked for.
+
+    Yields
+    ------
+    TractionBounds
+        Of each frequency.
+
+    Raises
+    ------
+    InputError
+        If a contact is rigid or a law does not say where its springs start, or a frequency or the output is none.
+    SingularError
+        If no motion is found at a frequency from the model's own start.
+    """
+    setup = _setup(system, load, omegas, output, discretisation)
+    how = search or TractionSearch()
+    last: Extremes | None = None
+    for omega in omegas:
+        last = _at(setup, omega, how, last)
+        yield _bounds(setup, last)
+
+
+def resonance_bounds(
+    system: System,
+    load: HarmonicLoad,
+    known: Sequence[TractionBounds],
+    end: End,
+    output: int = 0,
+    discretisation: Discretisation | None = None,
+    search: TractionSearch | None = None,
+) -> TractionBounds:
+    """Find the highest point of a bound between frequencies at which it is known: the bound of the resonance amplitude.
+
+    Whatever tractions there are at each frequency, and whether or not they change from one to the next, the resonance is at least as
+    high as the highest point of the smallest amplitudes and at most as high as that of the largest ones.
+
+    Parameters
+    ----------
+    system, load, output, discretisation, search
+        As of `traction_bounds`.
+    known
+        Its bounds at three or more frequencies that grow.
+    end
+        ``least`` or ``most``: which bound.
+    """
+    heights = [getattr(b, end).amplitude for b in known]
+    top = int(np.argmax(heights))
+    if top in (0, len(known) - 1):
+        return known[top]
+    setup = _setup(system, load, [b.omega for b in known], output, discretisation)
+    how = search or TractionSearch()
+    beside = [_again(setup, known[k]) for k in (top, top - 1, top + 1)]
+    found: dict[float, Extremes] = {}
+
+    def depth(omega: float) -> float:
+        found[omega] = _at(setup, omega, replace(how, starts=0), *beside)
+        return -float(getattr(found[omega], end).amplitude)
+
+    limits = known[top - 1].omega, known[top + 1].omega
+    scipy.optimize.minimize_scalar(
+        depth, bounds=limits, method="bounded",
+        options={"xatol": PEAK_WIDTH * known[top].omega, "maxiter": PEAK_TRIALS},
+    )  # fmt: skip
+    best = max(found.values(), key=lambda e: float(getattr(e, end).amplitude))
+    better = getattr(best, end).amplitude > heights[top]
+    return _bounds(setup, best) if better else known[top]
+
+
+def _setup(
+    system: System,
+    load: HarmonicLoad,
+    omegas: Sequence[float],
+    output: int,
+    discretisation: Discretisation | None,
+) -> _Setup:
+    how = discretisation or Discretisation()
+    if not (len(omegas) and all(0.0 < w < np.inf for w in omegas)):
+        raise input_error("omegas", f"are {list(omegas)[:3]}", "Give frequencies above zero, rad/s.")  # fmt: skip
+    if not 0 <= output < system.outputs.size:
+        have = system.outputs.size
+        raise input_error("output", f"is {output}, of {have} outputs", f"Give 0 to {have - 1}.")
+    starts = starts_of(system.interface)
+    dof = int(system.outputs[output])
+    linear = system.condensed(load, how.order, np.array([dof]))
+    free, given = (
+        harmonic_balance(linear, interface, how.order, how.samples, how.evaluator)
+        for interface in (starts.interface, starts.given)
+    )
+    driven = Driven(int(np.searchsorted(linear.retained, dof)), driven_by(load)[0])
+    return _Setup(
+        replace(system, interface=starts.given),
+        TractionProblem(free, starts, driven, how.newton),
+        given,
+    )
+
+
+def _at(setup: _Setup, omega: float, search: TractionSearch, *beside: Extremes | None) -> Extremes:
+    near = [b for b in beside if b is not None]
+    reference = setup.reference(omega, [b.reference.x for b in near])
+    more = [s.inside() for b in near for s in (b.least, b.most)]
+    return extremes(reference, search, more)
+
+
+def _again(setup: _Setup, bounds: TractionBounds) -> Extremes:
+    """Return known bounds as states of the problem."""
+    balance = setup.problem.balance
+
+    def state(bound: Bound) -> TractionState:
+        x = balance.unknowns(bound.coefficients[:, balance.linear.retained])
+        found = newton(lambda v: setup.problem.at(bound.sliders).linearise(v, bounds.omega), x, setup.problem.newton)  # fmt: skip
+        return TractionState(setup.problem, bounds.omega, bound.sliders, found.x)
+
+    return Extremes(state(bounds.reference), state(bounds.least), state(bounds.most))
+
+
+def _bounds(setup: _Setup, found: Extremes) -> TractionBounds:
+    spent, names = setup.problem.spent, setup.problem.starts.interface.names
+    reference, least, most = map(_bound, (found.reference, found.least, found.most))
+    omega = found.reference.omega
+    made = TractionBounds(omega, reference, least, most, names, spent.solves, spent.failures)
+    spent.solves = spent.failures = 0
+    return made
+
+
+def _bound(state: TractionState) -> Bound:
+    room = state.room
+    rests = np.where(room.sticks, room.slider, state.sliders)
+    return Bound(state.amplitude, state.coefficients, rests, room.multiplier)

@@ -1,0 +1,227 @@
+"""The periodic motion as a function of where the sliders of its contacts start, and the gradient of an amplitude by them.
+
+The sliders s enter through the gaps alone, ``r(x, s) = Z x + Bᵀ T(B x - s) - F``, so that ``∂r/∂s`` is minus the column of the contact
+derivatives that belongs to the mean gap. One adjoint system gives the gradient by all starts, ``dA/ds = -(∂r/∂s)ᵀ J⁻ᵀ ∂A/∂x``. Springs
+that slip, open, or were dragged to where they stick have forgotten their start: their column is zero.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.contact.law import PAIRS
+from stickslip.contact.starts import Starts
+from stickslip.harmonic.aft import ContactPeriod
+from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.peak import Driven
+from stickslip.response.residual_tractions.discs import farthest_in_discs, in_all_discs
+from stickslip.solve.linear import factorised
+from stickslip.solve.newton_method import Newton, newton
+
+HALVINGS = 4  # of the way between two starts where Newton does not come from one to the other
+INSIDE = 1e-6  # of the room of a spring: how far from its walls a slider is put for a gradient
+RESTS = 1e-7  # of the largest stretch: movement of a slider over a period that counts as none
+
+
+@dataclass(frozen=True, eq=False)
+class Room:
+    """Where the sliders of a motion may rest without being moved.
+
+    Attributes
+    ----------
+    sticks
+        (n, 2) whether a spring sticks all the time, so that it keeps its start.
+    slider
+        (n, 2) where it rests; zero for others, m.
+    middle, half
+        (n, 2) middle and half width of the interval in which the slider may rest, m; of a planar contact a place deep in all its discs
+        and how deep it is.
+    multiplier
+        (n, 2) traction at t = 0 as a share of the friction limit there; NaN for springs that do not stick.
+    centres, limits
+        (n, 2, samples) tangential gaps, m, and (n, samples) friction limits, N.
+    """
+
+    sticks: np.ndarray
+    slider: FloatArray
+    middle: FloatArray
+    half: FloatArray
+    multiplier: FloatArray
+    centres: FloatArray
+    limits: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class TractionState:
+    """A periodic motion that was reached from a start.
+
+    Attributes
+    ----------
+    problem
+        What it solves.
+    omega
+        Frequency, rad/s.
+    sliders
+        (n, 2) where the springs started, m.
+    x
+        Scaled unknowns.
+    """
+
+    problem: "TractionProblem"
+    omega: float
+    sliders: FloatArray
+    x: FloatArray
+
+    @property
+    def amplitude(self) -> float:
+        """Norm of the output over the harmonics that the load drives, m."""
+        return float(np.linalg.norm(self.problem.driven.motion(self.problem.balance, self.x)))
+
+    @property
+    def coefficients(self) -> ComplexArray:
+        """(H+1, n) displacement of all dofs, m."""
+        balance = self.problem.balance
+        return balance.linear.recover(self.omega, balance.coefficients(self.x))
+
+    @cached_property
+    def room(self) -> Room:
+        """Where the sliders rest and might rest."""
+        balance = self.problem.at(self.sliders)
+        return room_of(self.problem.starts, balance.contacts(self.x, self.omega))
+
+    def inside(self) -> FloatArray:
+        """Return the sliders (n, 2) with those at a wall put a little inside, where their spring can be pulled either way."""
+        room = self.room
+        off = room.slider - room.middle
+        most = (1.0 - INSIDE) * room.half
+        within = np.clip(off, -most, most)
+        planar = self.problem.starts.planar[:, None] & (room.half > 0.0)
+        inner = room.middle + np.where(planar, (1.0 - INSIDE) * off, within)
+        return np.where(room.sticks, inner, self.sliders)
+
+    def farthest(self, slope: FloatArray) -> FloatArray:
+        """Return the place (n, 2) of each slider at which it rests still and ``slope · s`` is largest, m; unmoved where the slope is zero."""
+        room, starts = self.room, self.problem.starts
+        end = room.middle + np.sign(slope) * room.half
+        for c in np.flatnonzero(starts.planar & np.any(slope != 0.0, axis=1)):
+            if np.all(room.half[c] > 0.0):
+                k = np.maximum(starts.stiffness[c], 1e-300)
+                end[c] = farthest_in_discs(room.middle[c] * k, room.centres[c] * k[:, None], room.limits[c], slope[c] / k) / k  # fmt: skip
+        return np.where(room.sticks & (slope != 0.0), end, room.slider)
+
+    def gradient(self) -> tuple[FloatArray, float]:
+        """Return (n, 2) the derivatives of ``ln A`` by the sliders, 1/m, and that by ``ln ω``."""
+        problem, balance = self.problem, self.problem.at(self.sliders)
+        period = balance.forces(self.x, self.omega)
+        at = balance.linearise(self.x, self.omega, period)
+        inverse = factorised(problem.newton.linear, at.jac)
+        right = problem.driven.gradient(balance, self.x)
+        adjoint = None if inverse is None else inverse(right, transposed=True)
+        if adjoint is None:
+            return np.zeros(self.sliders.shape), 0.0
+        gaps = balance.rows.gaps(adjoint.reshape(balance.n_rows, balance.linear.n))
+        seen = gaps.reshape(balance.n_rows, -1, 3)
+        out = np.zeros((seen.shape[1], 3))
+        for k, (a, b) in enumerate(PAIRS[: period.blocks.shape[1]]):
+            out[:, b] += np.einsum("pc,cp->c", seen[:, :, a], period.blocks[:, k, :, 0])
+        by_slider = np.where(problem.starts.stiffness > 0.0, out[:, :2] / balance.force_scale, 0.0)
+        return by_slider, -self.omega * float(adjoint @ at.jac_p)
+
+
+@dataclass(slots=True)
+class Spent:
+    """What a search has cost so far."""
+
+    solves: int = 0
+    failures: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class TractionProblem:
+    """A periodic problem, the springs of its contacts that have a start, and the amplitude that is asked for.
+
+    Parameters
+    ----------
+    balance
+        Of `starts.interface`, whose springs have no start of their own.
+    starts
+        The springs.
+    driven
+        The output among the retained coordinates, in the harmonics that the load drives.
+    newton
+        Corrector.
+    spent
+        Counts of what was solved.
+    """
+
+    balance: HarmonicBalance
+    starts: Starts
+    driven: Driven
+    newton: Newton
+    spent: Spent = field(default_factory=Spent)
+
+    def at(self, sliders: FloatArray) -> HarmonicBalance:
+        """Return the periodic problem whose springs start from `sliders` (n, 2)."""
+        moved = np.zeros((len(sliders), 3))
+        moved[:, :2] = np.where(self.starts.stiffness > 0.0, sliders, 0.0)
+        return replace(self.balance, compiled=replace(self.balance.compiled, sliders=moved))
+
+    def solved(
+        self, sliders: FloatArray, omega: float, near: Iterable[TractionState]
+    ) -> TractionState | None:
+        """Return the motion from a start, from the first of the motions `near` that leads there; None if none does."""
+        for begin in near:
+            found = self._from(sliders, omega, begin, HALVINGS)
+            if found is not None:
+                return found
+        self.spent.failures += 1
+        return None
+
+    def _from(
+        self, sliders: FloatArray, omega: float, begin: TractionState, halvings: int
+    ) -> TractionState | None:
+        balance = self.at(sliders)
+        self.spent.solves += 1
+        solution = newton(partial(balance.linearise, omega=omega), begin.x, self.newton)
+        if solution.status.converged:
+            return TractionState(self, omega, sliders, solution.x)
+        if halvings == 0:
+            return None
+        half = 0.5 * (begin.sliders + sliders)
+        between = self._from(half, 0.5 * (begin.omega + omega), begin, halvings - 1)
+        return None if between is None else self._from(sliders, omega, between, halvings - 1)
+
+
+def room_of(starts: Starts, period: ContactPeriod) -> Room:
+    """Return where the sliders of a motion rest and might rest, from its contacts over a period of samples."""
+    factors = starts.interface.factors
+    gap, force = period.gap[:, :2], period.force / factors[:, None, None]
+    stiffness = np.maximum(starts.stiffness, 1e-300)[:, :, None]
+    springs = starts.stiffness > 0.0
+    limit = starts.limits(-force[:, 2])
+    reach = limit[:, None, :] / stiffness
+    sliders = gap - force[:, :2] / stiffness
+    slider = sliders[:, :, 0]
+    # a slider that was dragged until it is only just touched rests but for rounding, whatever state a sample is said to be in
+    sticks = springs & (np.ptp(sliders, axis=2) <= RESTS * np.max(reach, axis=2))
+    sticks[starts.planar] &= np.all(sticks[starts.planar] | ~springs[starts.planar], axis=1)[:, None]  # fmt: skip
+    low, high = np.max(gap - reach, axis=2), np.min(gap + reach, axis=2)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    for c in np.flatnonzero(starts.planar & sticks.any(axis=1)):
+        k = stiffness[c, :, 0]
+        place, depth = in_all_discs(gap[c] * k[:, None], limit[c])
+        middle[c], half[c] = place / k, depth / k
+    share = force[:, :2, 0] / np.maximum(limit[:, None, 0], 1e-300)
+    kept = sticks & (half > 0.0)
+    return Room(
+        sticks,
+        np.where(sticks, slider, 0.0),
+        np.where(kept, middle, slider),
+        np.where(kept, half, 0.0),
+        np.where(sticks, share, np.nan),
+        gap,
+        limit,
+    )
