@@ -86,6 +86,12 @@ def contact2d(*, complete: bool) -> list[dict[str, float]]:
     return [{key: float(value) for key, value in row.items()} for row in csv.DictReader(lines[1:])]
 
 
+def chain_mode() -> FloatArray:
+    """Read the nonlinear mode of the chain: log10 a, a, omega, xi, zeta, and two amplitudes of the tip."""
+    path = folder("tmdsimpy", complete=True) / "chain_small_epmc_mode1.csv"
+    return np.loadtxt(path, delimiter=",", skiprows=2)
+
+
 def contact2d_balance() -> HarmonicBalance:
     """One node on a contact with variable normal load; y presses, so that our normal gap is -y."""
     stiffness = np.array([[1200.0, 300.0], [300.0, 3000.0]])

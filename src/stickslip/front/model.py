@@ -27,6 +27,7 @@ from stickslip.units import RPM
 _SHARED = {  # tables that analyses take beside their own
     "forced_response": ("harmonics", "solver", "limits"),
     "limit_cycle": ("solver",),
+    "nonlinear_mode": ("solver",),
     "run_up": ("harmonics", "solver", "limits"),
 }
 _OF_THE_MODEL = ("alert_over",)  # keys of them that a model has itself
@@ -111,6 +112,10 @@ class Model(Assembly):
         """
         checks = frozenset({"verify"} if verify else ())
         return self._answer("limit_cycle", keys, folder, checks)
+
+    def nonlinear_mode(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+        """Follow modes over their amplitude; keys such as ``modes=[1, 2], amplitude_mm=(1e-3, 1.0), points=40``."""
+        return self._answer("nonlinear_mode", keys, folder)
 
     def run_up(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
         """Follow the response over speed along engine orders; keys such as ``speeds_rpm=(3000, 9000), engine_orders=[4, 6], high=3``."""

@@ -32,6 +32,7 @@ from stickslip.report.sections import (
     forced_response,
     limit_cycle,
     modes,
+    nonlinear_mode,
     run_up,
     safe,
 )
@@ -41,6 +42,7 @@ from stickslip.study.keep.netcdf import alike, one_case
 
 SECTIONS: tuple[Section, ...] = (
     forced_response.SECTION,
+    nonlinear_mode.SECTION,
     limit_cycle.SECTION,
     modes.SECTION,
     campbell.SECTION,
@@ -136,7 +138,8 @@ def plots(tree: xr.DataTree) -> dict[str, go.Figure]:
         parts = [part for block in section.blocks for part in block.parts]
         for view in _views(section, data):
             found += [shown for part in parts for shown in _as_list(part(view))]
-    found.append(model.picture(_nodes(tree)))
+    nodes = _nodes(tree)
+    found += [nonlinear_mode.over_responses(nodes), model.picture(nodes)]
     return {plot.key: plot.figure for plot in found if isinstance(plot, Plot)}
 
 
@@ -157,7 +160,10 @@ def report_html(tree: xr.DataTree) -> str:
             bodies = [numbered.html(block.parts, view) for view in views]
             if any(bodies):
                 chapters.append(chapter(block.key, block.title, _by_case(section, data, bodies)))
-    body = numbered.html(model.PARTS, _nodes(tree))
+    nodes = _nodes(tree)
+    body = numbered.html((nonlinear_mode.over_responses,), nodes)
+    chapters += [chapter("backbones", "Responses and modes", body)] if body else []
+    body = numbered.html(model.PARTS, nodes)
     chapters += [chapter("model", "Model", body)] if body else []
     chapters.append(chapter("provenance", "Provenance", _provenance(tree)))
     root = Node(tree.to_dataset())

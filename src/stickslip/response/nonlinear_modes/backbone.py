@@ -4,7 +4,7 @@ The extended periodic motion concept (Krack, Journal of Sound and Vibration 340 
 amplitude is periodic, and ``ξ / 2ω`` is the damping ratio that it has without the added term. A conservative mode is one for which ξ comes out as zero.
 """
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +24,7 @@ from stickslip.solve.status import Status
 
 BEGINS = 0.5  # of the amplitude at which slip begins
 ENDS = 300.0  # times that amplitude
+TIMES = 12  # as many points as were asked for, at most: lift-off may fold a curve hundreds of times
 LOST = 3  # points in a row that are not found, after which a curve is at its end
 
 
@@ -173,8 +174,8 @@ def nonlinear_mode(
     route = Route(first=first, last=last, points=along.points, leaves=False)
     found = _followed(curve, route, to_gross_slip=along.to_gross_slip)
     made = tuple(mode_point(curve, f) for f in found)
-    stopped = along.to_gross_slip and found[-1].p != route.last
-    return Backbone(system, load, mode, dof, made, _end(made, stopped=stopped))
+    end = _end(made, found[-1], route.last, stops=along.to_gross_slip)
+    return Backbone(system, load, mode, dof, made, end)
 
 
 def mode_point(curve: ModeCurve, found: Followed) -> ModePoint:
@@ -219,28 +220,26 @@ def _followed(curve: ModeCurve, route: Route, *, to_gross_slip: bool) -> list[Fo
             continue
         if len(branch) > LOST and not any(f.converged for f in branch[-LOST:]):
             break
+        if len(branch) > TIMES * route.points:
+            break
         if to_gross_slip and one.converged and curve.slips_grossly(one):
             break
     return branch
 
 
-def _end(points: Iterable[ModePoint], *, stopped: bool) -> str:
-    """Say how a curve ended."""
-    known = list(points)
-    solved = [p for p in known if p.converged]
+def _end(points: Sequence[ModePoint], found: Followed, last: float, *, stops: bool) -> str:
+    """Say how a curve ended, whose last point was `found`."""
+    solved = [p for p in points if p.converged]
     if not solved:
         return "no motion found at the first amplitude"
     end = solved[-1]
-    gross = next((p.amplitude for p in solved if p.slipping == 1.0), None)
-    if known[-1] is end:
-        if stopped:
+    slips = next((p.amplitude for p in solved if p.slipping == 1.0), None)
+    if points[-1] is end and (found.p == last or (stops and end.slipping == 1.0)):
+        if found.p != last:
             return f"gross slip at {end.amplitude:.4g} m"
-        slips = "" if gross is None else f", gross slip from {gross:.4g} m on"
-        return f"amplitude reached{slips}"
-    opened = (
-        f", contacts open for {100 * end.open_for:.0f} % of the period"
-        if end.open_for > 0.0
-        else ""
-    )
-    word = "lift-off ends it" if end.open_for > 0.0 else "lost"
-    return f"{word} at {end.amplitude:.4g} m{opened}"
+        return f"amplitude reached{'' if slips is None else f', gross slip from {slips:.4g} m on'}"
+    told = f"{end.amplitude:.4g} m after {len(points)} points"
+    if end.open_for > 0.0:
+        opened = f"contacts open for up to {100 * end.open_for:.0f} % of the period"
+        return f"lift-off ends it at {told}: {opened}"
+    return f"lost at {told}"

@@ -8,17 +8,18 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.bordered import PeriodicProblem
-from stickslip.response.branch import Curve, Followed, Judged, steps_through
+from stickslip.response.branch import Curve, Followed, Judged
 from stickslip.response.equilibrium import preload
 from stickslip.response.nonlinear_modes.measure import by_energy
 from stickslip.response.self_excited.contacts import contacts_of
-from stickslip.response.self_excited.curve import LARGEST, PATIENT
+from stickslip.response.self_excited.curve import PATIENT
 from stickslip.response.self_excited.problem import SelfExcited
 from stickslip.solve.branch import Following, Latest
 from stickslip.solve.continuation import Point, StepControl
 from stickslip.solve.linear import factorised
 from stickslip.solve.newton_method import Solution, first_converged, newton
 
+LARGEST = 0.1  # change of the shape in a step: with 0.25 a mode of a chain went past two of its four folds
 MORE = 2  # times the harmonics, and one, from one level to the next
 SAFETY = 1.25
 AGREE = 0.5  # share of the tolerance by which neighbouring levels may differ
@@ -59,7 +60,7 @@ class ModeCurve(Curve):
         while every[-1].balance.order < most:
             every.append(problem.with_order(min(MORE * every[-1].balance.order + 1, most)))
         length = abs(float(np.log(span[1] / span[0])))
-        control = replace(steps_through(length, points), largest=LARGEST)
+        control = StepControl(scale=length / (points * LARGEST), first=0.05, largest=LARGEST)
         return cls(tuple(every), control, tolerance)
 
     @property

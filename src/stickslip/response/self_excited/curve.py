@@ -90,22 +90,25 @@ def slip_amplitude(problem: SelfExcited) -> float:
     for _ in range(MOST_DOUBLINGS if np.isfinite(amplitude) else 0):
         assert known is not None
         if known.leaves(amplitude):
-            again = _Sticking.at(problem, equation, 2.0 * amplitude, [known.grown(2.0 * amplitude)])
+            again = known.beyond(2.0 * amplitude)
             if again is None:
-                below = 0.5 * amplitude
-                while amplitude > ONSET * below:
-                    middle = float(np.sqrt(below * amplitude))
-                    below, amplitude = (
-                        (below, middle) if known.leaves(middle) else (middle, amplitude)
-                    )
-                return amplitude
+                return _onset(known, 0.5 * amplitude, 2.0 * amplitude)
             known = again
         amplitude *= 2.0
     raise input_error(
-        "limit_cycle",
-        f"no contact slips or opens in mode {problem.mode.number}, however large its amplitude",
-        "Nothing bounds the motion: look at the linear stability alone.",
+        f"mode {problem.mode.number}",
+        "no contact slips or opens, however large its amplitude",
+        "Nothing bounds the motion: look at the linear stability alone, or give a range of amplitudes.",
     )
+
+
+def _onset(known: "_Sticking", below: float, amplitude: float) -> float:
+    """Return the amplitude at which slip begins between two, to a percent."""
+    while amplitude > ONSET * below:
+        middle = float(np.sqrt(below * amplitude))
+        slips = known.leaves(middle) and known.beyond(middle) is None
+        below, amplitude = (below, middle) if slips else (middle, amplitude)
+    return amplitude
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +141,10 @@ class _Sticking:
         out = self.y.copy()
         out[: self.problem.balance.linear.n] *= self.amplitude / amplitude
         return out
+
+    def beyond(self, amplitude: float) -> "_Sticking | None":
+        """Return the motion at a larger amplitude, about another mean, if its contacts do not change their states either."""
+        return self.at(self.problem, self.equation, amplitude, [self.grown(amplitude)])
 
     def leaves(self, amplitude: float) -> bool:
         """Whether a contact leaves its state before an amplitude."""

@@ -214,13 +214,13 @@ def self_excited_motions(
     """
     if system.interface.rigid:
         raise input_error(
-            "limit_cycle",
+            f"mode {mode.number}",
             "a contact is rigid",
             "Give the contacts a stiffness, as elastic_coulomb.",
         )
     if any(np.any(f) for f in load.harmonics.values()):
         raise input_error(
-            "limit_cycle",
+            f"mode {mode.number}",
             "a harmonic load acts: the motion would have two frequencies",
             "Leave it out; the stability of the forced response says whether it is kept.",
         )
@@ -228,7 +228,7 @@ def self_excited_motions(
     share = abs(mode.shape[dof]) / float(np.max(moving))
     if share < STILL:
         raise input_error(
-            "limit_cycle",
+            f"mode {mode.number}",
             f"{system.structure.dofs.labels[dof]} hardly moves in mode {mode.number} ({share:.2g} of the largest)",
             "Report the motion of a point that the mode moves.",
         )

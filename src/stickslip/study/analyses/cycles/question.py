@@ -107,7 +107,7 @@ def question_of(case: Case, model: Model) -> Question:
         If a wave number is none of the wheel, or the model cannot be assembled.
     """
     asked: LimitCycleTable = case.settings.limit_cycle
-    _refuse_waves(asked, model)
+    refuse_waves("limit_cycle", asked.wave_numbers, model)
     most = max(asked.harmonics, asked.most_harmonics)
     still = model.undriven
     wheel = still.sectors > 1 and still.mistuning is None
@@ -153,20 +153,20 @@ def _refuse_modes(asked: LimitCycleTable, modes: Sequence[Sequence[StuckMode]]) 
         )
 
 
-def _refuse_waves(asked: LimitCycleTable, model: Model) -> None:
-    wanted = asked.wave_numbers
+def refuse_waves(analysis: str, wanted: Sequence[int] | None, model: Model) -> None:
+    """Refuse wave numbers of a model that is no tuned wheel, and those that it does not have."""
     if wanted is None:
         return
     if model.sectors == 1 or model.mistuning is not None:
         raise input_error(
-            "limit_cycle.wave_numbers",
+            f"{analysis}.wave_numbers",
             "are those of a tuned wheel, and the model is none",
             "Leave them out.",
         )
     beyond = [k for k in wanted if k >= model.sectors]
     if beyond:
         raise input_error(
-            "limit_cycle.wave_numbers",
+            f"{analysis}.wave_numbers",
             f"holds {beyond[0]}, and {model.sectors} sectors have the waves 0 to {model.sectors - 1}",
             f"A backward wave of d nodal diameters is d, a forward one {model.sectors} - d.",
         )

@@ -1,0 +1,81 @@
+"""What is told of nonlinear modes: verdicts, and what the terminal prints."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.analyses.cycles.words import branch_name
+from stickslip.study.analyses.verdict import Verdict
+from stickslip.study.keep.netcdf import alike, one_case
+
+LIFTS = "lift-off"
+
+
+def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
+    """Return what is to be thought of a case from its variables."""
+    branches = case["mode"].size if "mode" in case else 0
+    return [v for i in range(branches) for v in _of_branch(label, case, i)]
+
+
+def _of_branch(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdict]:
+    name = branch_name(case, i)
+    problem, end = str(case["problem"].values[i]), str(case["end"].values[i])
+    if problem:
+        return [Verdict("doubtful", label, None, f"{name}: {problem.removesuffix('.')}")]
+    found = []
+    if end.startswith(LIFTS):
+        why = f"{name}: {end}"
+        found.append(Verdict("trusted", label, None, why, "Beyond it contacts hold nothing together that vibrates periodically in this mode."))  # fmt: skip
+    elif not end.startswith(("amplitude reached", "gross slip")):
+        found.append(Verdict("doubtful", label, None, f"{name}: {end}", "Give it more points, or more harmonics."))  # fmt: skip
+    status = case["status"].values[i]
+    gaps = int(np.count_nonzero(status > 0))
+    solved = np.flatnonzero(status == 0)
+    if solved.size and np.any(status[: solved[-1]] > 0):
+        why = f"{name}: it was lost and taken up again further on; {gaps} of its points are no motions"
+        found.append(Verdict("doubtful", label, None, why, "What lies beyond may be another mode."))
+    known = np.where(status == 0, case["change"].values[i], np.nan)
+    few = int(np.count_nonzero(np.isinf(known)))
+    if few:
+        why = f"{name}: what more harmonics would change is not known at {few} of its points"
+        found.append(Verdict("doubtful", label, None, why, "Raise nonlinear_mode.most_harmonics."))
+    return found
+
+
+def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
+    """Return what the terminal prints: the modes of each case."""
+    found = []
+    groups = alike(data)
+    for group in groups:
+        case = one_case(data, group[0])
+        labels = [str(data["case_label"].values[i]) for i in group if len(groups) > 1]
+        head = f"{'; '.join(labels)}: " if labels else ""
+        if "mode" in case:
+            found.append(_table(case, head))
+    return tuple(found)
+
+
+def _table(case: xr.Dataset, head: str) -> TextTable:
+    rows = []
+    for i in range(case.sizes["branch"]):
+        hertz = case["frequency_hz"].values[i] if "frequency_hz" in case else np.zeros(0)
+        known = hertz[np.isfinite(hertz)]
+        rows.append(
+            (
+                branch_name(case, i),
+                f"{float(case['mode_frequency_hz'][i]):.6g}",
+                f"{known.min():.6g} to {known.max():.6g}" if known.size else "-",
+                f"{100 * float(case['mode_damping_ratio'][i]):+.4g}",
+                _number(100 * float(case["largest_damping_ratio"][i])),
+                _number(1e3 * float(case["largest_damping_amplitude"][i])),
+                str(case["problem"][i].values) or str(case["end"][i].values),
+            )
+        )
+    columns = ("mode", "Hz, stuck", "Hz", "damping %, stuck", "most damping %", "at mm", "end")
+    return TextTable(f"{head}Nonlinear modes over the amplitude of {case.attrs.get('output', '')}", columns, tuple(rows))  # fmt: skip
+
+
+def _number(value: float) -> str:
+    return f"{value:.5g}" if np.isfinite(value) else "-"

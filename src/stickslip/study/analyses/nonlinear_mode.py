@@ -1,0 +1,67 @@
+"""Nonlinear modes: frequency and damping ratio over amplitude and energy."""
+
+import json
+from collections.abc import Iterator, Sequence
+
+import xarray as xr
+
+from stickslip.assembly.model import Model
+from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
+from stickslip.study.analyses.backbones.dataset import dataset
+from stickslip.study.analyses.backbones.question import NAME, Question, question_of
+from stickslip.study.analyses.backbones.records import ModeBranch
+from stickslip.study.analyses.backbones.solve import solve
+from stickslip.study.analyses.backbones.table import NonlinearModeTable
+from stickslip.study.analyses.backbones.words import tables
+from stickslip.study.analyses.cycles.question import ONE
+from stickslip.study.analyses.verdict import Verdict, stored
+from stickslip.units import HZ
+
+
+class NonlinearModeAnalysis:
+    """The analysis; see `Analysis` for what its methods promise."""
+
+    name = NAME
+    table = NonlinearModeTable
+    record = ModeBranch
+    linear = False
+    checks = ()
+
+    def key(self, case: Case) -> str:
+        """Return the tables that the records depend on."""
+        own = (case.settings.nonlinear_mode, case.settings.solver)
+        return json.dumps([table.model_dump(mode="json") for table in own], sort_keys=True)
+
+    def inputs(self, case: Case, model: Model) -> Question:
+        """Return the assembled model and what is asked of it."""
+        return question_of(case, model)
+
+    def solve(
+        self, inputs: Question, done: Sequence[ModeBranch], notes: Notes
+    ) -> Iterator[ModeBranch]:
+        """Yield the modes."""
+        return solve(inputs, done, notes)
+
+    def dataset(self, solved: Sequence[Solved]) -> xr.Dataset:
+        """Return all cases."""
+        return dataset(solved)
+
+    def check(self, case: Case, model: Model) -> tuple[str, ...]:
+        """Say which modes are followed."""
+        question = self.inputs(case, model)
+        each = [(wave, mode) for wave in question.waves for mode in question.followed(wave)]
+        return tuple(
+            f"{NAME}: {'' if wave == ONE else f'wave {wave}, '}mode {mode.number}, {mode.omega / HZ:.4g} Hz, damping ratio {100 * mode.ratio:+.3g} %"
+            for wave, mode in each
+        )
+
+    def verdicts(self, data: xr.Dataset) -> tuple[Verdict, ...]:
+        """Return what was found when the dataset was made."""
+        return stored(data.attrs)
+
+    def summary(self, data: xr.Dataset) -> tuple[TextTable, ...]:
+        """Return what the terminal prints."""
+        return tables(data)
+
+
+NONLINEAR_MODE = NonlinearModeAnalysis()

@@ -1,0 +1,196 @@
+"""Nonlinear modes: published tables, conservative modes by quadrature, folds, energy, decay in time, the study and its page."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from evidence.models.lumped import griffin, small_chain
+from evidence.validation import case_nonlinear_modes
+from stickslip.contact.interface import Interface
+from stickslip.contact.laws.cubic_spring import CubicSpring
+from stickslip.contact.laws.unilateral_spring import UnilateralSpring
+from stickslip.errors import InputError
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.model.matrices import lumped
+from stickslip.report.page import plots
+from stickslip.response.at_rest import holding
+from stickslip.response.nonlinear_modes import Backbone, ModeSweep, nonlinear_mode
+from stickslip.response.parameter import Discretisation
+from stickslip.response.self_excited.curve import slip_amplitude
+from stickslip.response.self_excited.modes import stuck_modes
+from stickslip.response.self_excited.problem import self_excited_motions
+from stickslip.response.system import System
+from stickslip.study.keep.netcdf import one_case
+from stickslip.study.models.study import read_study
+from stickslip.study.run import run_study
+
+
+def one_mass(law: object, row: int, stiffness: float = 1.0) -> tuple[System, HarmonicLoad]:
+    gap = np.zeros((3, 1))
+    gap[row, 0] = 1.0
+    contacts = Interface(("c",), (law,), gap)  # type: ignore[arg-type]
+    return System(lumped(np.eye(1), stiffness * np.eye(1)), contacts, np.array([0])), HarmonicLoad(np.zeros(1))  # fmt: skip
+
+
+def followed(system: System, load: HarmonicLoad, how: Discretisation, sweep: ModeSweep) -> Backbone:
+    mode = stuck_modes(system, 1, holding(system, load.static))[0]
+    return nonlinear_mode(system, load, mode, int(system.outputs[0]), how, sweep)
+
+
+def period(potential, low: float, high: float) -> float:
+    """Return the period of one mass of 1 kg between two turning points by quadrature."""
+    energy = potential(high)
+
+    def integrand(angle: float) -> float:
+        x = 0.5 * (high + low) + 0.5 * (high - low) * np.sin(angle)
+        return 0.5 * (high - low) * np.cos(angle) / np.sqrt(2.0 * (energy - potential(x)))
+
+    return 2.0 * quad(integrand, -np.pi / 2, np.pi / 2, epsabs=1e-12, limit=400)[0]
+
+
+def test_the_table_of_one_mass_on_a_friction_spring():
+    records = case_nonlinear_modes.one_mass()
+    assert len(records) == 30
+    assert all(record["holds"] for record in records)
+
+
+def test_rows_of_the_rubbing_beam_with_21_harmonics(monkeypatch):
+    monkeypatch.setattr(case_nonlinear_modes, "BEGINNINGS", 2)
+    records = case_nonlinear_modes.rub(21, 2048, case_nonlinear_modes.MANY[2:], reduced=True)
+    for record in records[::2]:
+        assert record["ours"] == pytest.approx(record["reference"], rel=3e-7)
+
+
+def test_a_conservative_mode_needs_no_dummy_load():
+    """A mass on a cubic spring: the frequency is that of an elliptic integral, and there is no damping."""
+    system, load = one_mass(CubicSpring(cubic_t=0.5), 0)
+    found = followed(system, load, Discretisation(order=15, samples=256), ModeSweep(span=(1e-3, 3.0), points=10))  # fmt: skip
+    assert found.end == "amplitude reached"
+    for point in found.points:
+        top = float(np.sum(point.coefficients[:, 0]).real)
+        exact = period(lambda x: 0.5 * x**2 + 0.125 * x**4, -top, top)
+        assert point.omega == pytest.approx(2.0 * np.pi / exact, rel=1e-9)
+        assert abs(point.ratio) < 1e-10
+        assert point.modal_amplitude == pytest.approx(point.amplitude, rel=1e-12)
+    # energy: of a linear spring the whole, here less than that since the spring hardens
+    assert found.points[0].energy == pytest.approx(0.5 * found.points[0].amplitude ** 2, rel=1e-4)
+
+
+def test_a_one_sided_spring_has_a_mean_and_the_frequency_of_two_arcs():
+    """A stop half way: to one side an arc about zero, beyond the gap one about where both springs are in balance."""
+    gap, k = 0.4, 3.0
+    system, load = one_mass(UnilateralSpring(k_n=k, initial_gap=gap), 2)
+    found = followed(system, load, Discretisation(order=41, samples=1024), ModeSweep(span=(0.1, 1.2), points=8))  # fmt: skip
+    time = np.linspace(0.0, 2.0 * np.pi, 20001)
+    for point in found.points:
+        if point.amplitude < gap:
+            assert point.omega == pytest.approx(1.0, rel=1e-9)
+            continue
+        x = np.real(np.exp(1j * np.outer(time, np.arange(42))) @ point.coefficients[:, 0])
+        far = float(x.max())  # a normal gap that closes is negative
+        centre, fast = k * gap / (1.0 + k), np.sqrt(1.0 + k)
+        beyond = np.arctan(fast * np.sqrt(far**2 - gap**2) / fast**2 / (gap - centre))
+        exact = 2.0 * (np.pi - np.arccos(gap / far)) + 2.0 * beyond / fast
+        assert point.omega == pytest.approx(2.0 * np.pi / exact, rel=1e-6)
+        assert point.open_for > 0.3
+    assert abs(found.points[-1].coefficients[0, 0]) > 0.1
+
+
+def test_slip_begins_where_the_motion_slips_and_not_where_a_slider_shakes_down():
+    """A static force beyond the limit leaves the slider on it; about another mean the mass sticks up to twice the limit over the spring."""
+    system, _ = griffin(0.1)
+    load = HarmonicLoad(np.array([1.0]))
+    mode = stuck_modes(system, 1, holding(system, load.static))[0]
+    problem = self_excited_motions(system, load, mode, 0, Discretisation(order=3))
+    assert slip_amplitude(problem) == pytest.approx(0.2, rel=0.03)
+
+
+def test_harmonics_are_raised_until_frequency_and_damping_stay():
+    system, load = griffin(0.1)
+    load = HarmonicLoad(load.static)
+    sweep = ModeSweep(span=(0.15, 1.0), points=8, most_harmonics=31, tolerance=1e-4)
+    raised = followed(system, load, Discretisation(order=1), sweep)
+    orders = {p.order for p in raised.points}
+    assert min(orders) == 1
+    assert max(orders) > 3
+    many = followed(system, load, Discretisation(order=61, samples=1024), replace(sweep, most_harmonics=0, points=60))  # fmt: skip
+    a, w, z = np.array([(p.amplitude, p.omega, p.ratio) for p in many.points]).T
+    for point in raised.points:
+        assert point.omega == pytest.approx(np.interp(point.amplitude, a, w), rel=1e-3)
+        assert point.ratio == pytest.approx(np.interp(point.amplitude, a, z), rel=6e-3)
+
+
+def test_all_four_folds_of_a_mode_in_resonance_with_another_are_followed():
+    system, load = small_chain(), HarmonicLoad(np.zeros(20))
+    mode = stuck_modes(system, 1)[0]
+    sweep = ModeSweep(span=(0.12 * abs(mode.shape[19]), 4.0 * abs(mode.shape[19])), points=15)
+    how = Discretisation(order=5, samples=256, evaluator="intervals")
+    found = nonlinear_mode(system, load, mode, 19, how, sweep)
+    log = np.log10([p.modal_amplitude for p in found.solutions])
+    turned = log[1:-1][np.diff(np.sign(np.diff(log))) != 0]
+    # folds of an independent program
+    assert turned == pytest.approx([-0.7325, -0.8143, -0.5227, -0.5708], abs=0.03)
+    # gross slip: every slider has slipped
+    assert found.solutions[-1].slipping == 1.0
+    assert "gross slip from" in found.end
+
+
+def test_a_mode_ends_at_gross_slip_where_that_is_asked():
+    system, load = griffin(0.1)
+    found = followed(system, HarmonicLoad(load.static), Discretisation(order=3), ModeSweep(to_gross_slip=True))  # fmt: skip
+    assert found.end.startswith("gross slip at 0.2")
+    assert [p.slipping for p in found.points[-2:]] == [0.0, 1.0]
+
+
+STUDY = """
+schema_version = 2
+[part.blade]
+shape = "lumped"
+masses_kg = [1.0]
+springs_n_per_m = [["ground", 1, 1.0]]
+dashpots_n_s_per_m = [["ground", 1, 0.02]]
+[contact.damper]
+between = ["blade.m1", "ground"]
+law = "jenkins"
+tangential_stiffness_n_per_m = 0.5
+slip_limit_n = 0.1
+[load.shaker]
+on = "blade.m1"
+force_n = 0.1
+[forced_response]
+frequency_hz = [0.15, 0.2]
+points = 15
+stability = "off"
+[nonlinear_mode]
+amplitude_mm = [100.0, 2000.0]
+points = 10
+"""
+
+
+def test_the_mode_from_a_study_its_words_and_its_backbone_over_the_response(tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(STUDY, encoding="utf-8")
+    outcome = run_study(read_study(path))
+    case = one_case(outcome.tree["nonlinear_mode"].to_dataset(), 0)
+    assert case["mode_frequency_hz"].values == pytest.approx(np.sqrt(1.5) / (2 * np.pi), rel=1e-9)
+    assert 0.2 < float(case["gross_slip_amplitude"][0]) < 0.3
+    assert float(case["largest_damping_ratio"][0]) == pytest.approx(0.0738, rel=0.01)
+    told = outcome.summaries["nonlinear_mode"][0]
+    assert "gross slip from" in told.rows[0][-1]
+    figures = plots(outcome.tree)
+    assert {"nonlinear_mode_frequency", "nonlinear_mode_damping", "nonlinear_mode_energy", "backbones"} <= set(figures)  # fmt: skip
+    response, backbone = figures["backbones"].data
+    top = int(np.nanargmax(response.y))
+    order = np.argsort(backbone.y)
+    at_peak = np.interp(response.y[top], np.array(backbone.y)[order], np.array(backbone.x)[order])
+    assert response.x[top] == pytest.approx(at_peak, rel=0.01)
+
+
+def test_what_has_no_such_mode_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(STUDY.replace("points = 10", "modes = [2]"), encoding="utf-8")
+    with pytest.raises(InputError, match="has no such mode"):
+        run_study(read_study(path))
