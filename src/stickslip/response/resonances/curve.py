@@ -1,0 +1,125 @@
+"""The curve of a resonance over a design parameter, by arc length: round the folds at which a peak is born or joins another one."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.errors import input_error
+from stickslip.harmonic.parameters import ParameterLinearisation
+from stickslip.harmonic.peak import EVALUATIONS, PeakProblem
+from stickslip.response.branch import Followed, Judged, OneLevel, Route, steps_through
+from stickslip.response.follow import follow
+from stickslip.response.resonances.first import Resonance
+from stickslip.response.resonances.point import PeakPoint, peak_point
+from stickslip.response.resonances.tracker import Tracker, trackers
+from stickslip.solve.branch import Following, Latest
+from stickslip.solve.continuation import Point
+from stickslip.solve.newton_method import Solution
+
+MOST = 10  # multiples of the smallest number of points at which a curve ends
+
+
+def peak_curve(
+    resonance: Resonance, span: tuple[float, float], points: int = 30, peak: int = 0
+) -> Iterator[PeakPoint]:
+    """Follow the curve of a resonance peak over a design parameter by arc length, round its folds.
+
+    Parameters
+    ----------
+    resonance
+        Of what, and by which condition; by variable phase the phase follows the maximum from point to point.
+    span
+        First and last value of the parameter; the last may be the smaller one.
+    points
+        Smallest number of points from one to the other; more are taken where the peak changes fast.
+    peak
+        Number of the peak, 0 for the highest at the first value.
+
+    Yields
+    ------
+    PeakPoint
+        Points in the order of the curve, until it leaves the span: at its last value, or, beyond a fold, at its first one. Where it cannot be
+        followed, a point that did not converge, and a new beginning a little further on.
+
+    Raises
+    ------
+    InputError
+        If the span is empty, the number of points is not positive, or there are not so many peaks.
+    """
+    first, last = span
+    if not (np.isfinite(first) and np.isfinite(last) and first != last):
+        raise input_error("span", f"goes from {first} to {last}", "Give two different values.")
+    if points < 1:
+        raise input_error("points", f"must be positive, got {points}", "Give 30, say.")
+    found = trackers(resonance, first, peak + 1)
+    if peak >= len(found):
+        raise input_error(
+            "peak",
+            f"is {peak}, of {len(found)} in the range",
+            f"Give 0 to {len(found) - 1}, or a wider range.",
+        )
+    tracker = found[peak]
+    equation = _Equation(tracker.problem)
+    size = tracker.known[-1][1].size
+    weights = np.ones(size)
+    weights[: tracker.problem.family(first).linear.n] = 0.0
+    control = steps_through(abs(last - first), points)
+    way = Following(newton=resonance.how.newton, control=control, weights=weights)
+
+    def begin(value: float, near: Sequence[FloatArray], _most: bool) -> Solution:
+        if near:
+            tracker.known = [(value, near[-1])]
+        return tracker.reached(value)
+
+    route = Route(first=first, last=last, points=points, leaves=False)
+    curve = _PeakCurve(equation, way, begin, equation)
+    count = 0
+    for made in follow(curve, route):
+        if made.kind != "point":
+            continue
+        if route.before(made.p, first) or (count := count + 1) > MOST * points:
+            return
+        yield _told(equation, tracker, made)
+
+
+@dataclass(eq=False)
+class _Equation:
+    """The equation of the peak, turned from point to point so that it stays regular at folds of the response beside the peak."""
+
+    problem: PeakProblem
+    evaluations: int = 0
+
+    def linearise(self, y: FloatArray, p: float) -> ParameterLinearisation:
+        """Evaluate everything at (y, p)."""
+        self.evaluations += EVALUATIONS[self.problem.by]
+        return self.problem.linearise(y, p)
+
+    def turn(self, y: FloatArray, p: float) -> None:
+        """Align the equation with the response at a peak; by variable phase, ask for the phase of the maximum from here on."""
+        # with the row that it has: the sense of the response stays what it was
+        self.problem = self.problem.aligned(self.problem.bordered.state(y, p))
+        if self.problem.by == "variable_phase":
+            self.problem = self.problem.of_the_top(self.problem.state(y, p))
+        self.evaluations += 2 + EVALUATIONS["horizontal_tangent"]
+
+
+@dataclass(frozen=True, eq=False)
+class _PeakCurve(OneLevel):
+    """The curve, which turns its equation at each point."""
+
+    turning: _Equation
+
+    def judge(self, level: int, point: Point, latest: Latest) -> Judged:
+        """Turn the equation; nothing is judged."""
+        self.turning.turn(point.x, point.p)
+        return Judged()
+
+
+def _told(equation: _Equation, tracker: Tracker, made: Followed) -> PeakPoint:
+    tracker.problem = equation.problem
+    spent, equation.evaluations = equation.evaluations + tracker.evaluations, 0
+    tracker.evaluations = 0
+    solution = made.point.solution
+    return peak_point(equation.problem, tracker.force, made.p, solution, spent, tracker.number)
