@@ -12,8 +12,9 @@ from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.matrices import lumped
 from stickslip.response.parameter import Discretisation
+from stickslip.response.resonances.curve import peak_curve
 from stickslip.response.resonances.first import Resonance, maxima
-from stickslip.response.resonances.tracking import follow_peaks
+from stickslip.response.resonances.tracking import follow_peaks, later_peaks
 from stickslip.response.system import System
 
 HOW = Discretisation(order=3)
@@ -117,3 +118,40 @@ def test_harmonics_that_peak_are_checked(change, message):
     system, load = two_masses()
     with pytest.raises(InputError, match=message):
         list(follow_peaks(Resonance(system, load, "limit", (0.6, 2.2), how=HOW, **change), [0.2]))
+
+
+def test_a_curve_goes_round_the_fold_at_which_a_peak_ends():
+    # softening, one harmonic: force = 2 ζ ω a with ω² = 1 + ¾ c a²; it is largest at a² = -2 / (3 c), and beyond a maximum has become a minimum
+    system, load = oscillator(-0.5, 0.02, 0.02)
+    how = Discretisation(order=1)
+    most = 0.04 * np.sqrt(4.0 / 3.0) / np.sqrt(2.0) / 0.02
+    for by, error in (("phase_quadrature", 1e-5), ("horizontal_tangent", 1e-3)):
+        resonance = Resonance(system, load, "excitation", (0.5, 1.3), by, 0, how)
+        found = list(peak_curve(resonance, (0.5, 2.0), 20))
+        assert all(p.converged for p in found)
+        level = np.array([p.value for p in found])
+        turned = int(np.argmax(level))
+        assert level[turned] == pytest.approx(most, rel=error)
+        assert 0.5 <= level[-1] < 0.55
+        assert all(np.diff([p.amplitude for p in found]) > 0.0)
+        if by == "phase_quadrature":
+            omega = np.array([p.omega for p in found])
+            height = np.array([p.amplitude for p in found])
+            assert omega**2 == pytest.approx(1.0 - 0.375 * height**2, rel=1e-8)
+        else:
+            kinds = [p.is_maximum for p in found]
+            assert all(kinds[:turned])
+            assert not any(kinds[turned + 2 :])
+
+
+def test_peaks_that_are_there_at_the_last_value_alone_are_followed_back():
+    system, load = two_masses()
+    resonance = Resonance(system, load, "limit", (0.6, 2.2), how=HOW)
+    values = [0.2, 0.16, 0.12]
+    both = list(follow_peaks(resonance, values, 2))
+    first = [p for p in both if p.peak == 0]
+    later = list(later_peaks(resonance, values, first, 3))
+    assert [(p.peak, p.value) for p in later] == [(1, 0.12), (1, 0.16), (1, 0.2)]
+    known = [p.amplitude for p in both if p.peak == 1]
+    assert [p.amplitude for p in later] == pytest.approx(known[::-1], rel=1e-9)
+    assert list(later_peaks(resonance, values, both, 3)) == []

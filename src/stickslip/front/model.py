@@ -1,6 +1,6 @@
 """A model that answers questions itself, without any file."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -28,6 +28,7 @@ _SHARED = {  # tables that analyses take beside their own
     "forced_response": ("harmonics", "solver", "limits"),
     "limit_cycle": ("solver",),
     "nonlinear_mode": ("solver",),
+    "resonance": ("solver",),
     "run_up": ("harmonics", "solver", "limits"),
 }
 _OF_THE_MODEL = ("alert_over",)  # keys of them that a model has itself
@@ -116,6 +117,32 @@ class Model(Assembly):
     def nonlinear_mode(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
         """Follow modes over their amplitude; keys such as ``modes=[1, 2], amplitude_mm=(1e-3, 1.0), points=40``."""
         return self._answer("nonlinear_mode", keys, folder)
+    def resonance(
+        self,
+        of: Callable[[float], Assembly] | None = None,
+        *,
+        folder: str | Path | None = None,
+        **keys: Any,
+    ) -> Result:
+        """Follow resonance peaks over a design parameter.
+
+        Parameters
+        ----------
+        of
+            The model of each value of the parameter. Left out: `parameter` is a factor on the loads, ``"excitation"`` or ``"static_load"``, or a field of the
+            contact laws, as ``"mu"``.
+        folder
+            Where to write ``result.nc``; left out: the result stays in memory.
+        keys
+            Of the table [resonance], such as ``frequency_hz=(80, 160), parameter="excitation", values=[1, 2, 5]``.
+
+        Raises
+        ------
+        InputError
+            If a key is none, or the model does not allow the answer.
+        """
+        at = None if of is None else lambda _, value: of(value)
+        return self._answer("resonance", {"parameter": "value", **keys}, folder, at=at)
 
     def run_up(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
         """Follow the response over speed along engine orders; keys such as ``speeds_rpm=(3000, 9000), engine_orders=[4, 6], high=3``."""
@@ -127,9 +154,10 @@ class Model(Assembly):
         keys: Mapping[str, Any],
         folder: str | Path | None,
         checks: frozenset[str] = frozenset(),
+        at: Callable[[str, float], Assembly] | None = None,
     ) -> Result:
         settings = SimpleNamespace(**_tables(name, keys))
-        case = Case(0, "", {}, settings, lambda: self, "", Path.cwd(), checks)
+        case = Case(0, "", {}, settings, lambda: self, "", Path.cwd(), checks, at=at)
         with by_default(), one_loaded_blas_thread():
             outcome = answer(
                 named(name), [case], f"{name.replace('_', ' ').capitalize()} of a model"

@@ -33,6 +33,7 @@ from stickslip.report.sections import (
     limit_cycle,
     modes,
     nonlinear_mode,
+    resonance,
     run_up,
     safe,
 )
@@ -44,6 +45,7 @@ SECTIONS: tuple[Section, ...] = (
     forced_response.SECTION,
     nonlinear_mode.SECTION,
     limit_cycle.SECTION,
+    resonance.SECTION,
     modes.SECTION,
     campbell.SECTION,
     flutter.SECTION,

@@ -20,6 +20,7 @@ from .resonances.curve import peak_curve as peak_curve
 from .resonances.first import Resonance as Resonance
 from .resonances.point import PeakPoint as PeakPoint
 from .resonances.tracking import follow_peaks as follow_peaks
+from .resonances.tracking import later_peaks as later_peaks
 from .resonances.tracking import smallest_peak as smallest_peak
 from .resonances.tracking import track_peak as track_peak
 from .rigid import RigidPoint as RigidPoint

@@ -163,7 +163,7 @@ def first_peaks(resonance: Resonance, value: float) -> tuple[list[Start], int]:
     if not points or int(np.argmax(heights)) in (0, len(points) - 1):
         raise input_error(
             "omega_range",
-            f"holds no peak at the first value: of {len(points)} solutions the first or the last is the highest",
+            f"holds no peak at {value:g}: of {len(points)} solutions the first or the last is the highest",
             "Widen it, or choose another output.",
         )
     starts = []

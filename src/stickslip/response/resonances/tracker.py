@@ -41,17 +41,29 @@ class Tracker:
         """Find the peak at a value of the parameter, from those known."""
         solution = self.reached(value)
         if solution.status.converged:
-            state = self.problem.state(solution.x, value)
-            self.evaluations += 2 + EVALUATIONS["horizontal_tangent"]
-            self.problem = self.problem.aligned(state)
-            if self.problem.by == "variable_phase":
-                self.tops = [*self.tops[-1:], (value, self.problem.of_the_top(state).phase)]
+            self._turn(solution.x, value)
         spent, self.evaluations = self.evaluations, 0
         return peak_point(self.problem, self.force, value, solution, spent, self.number)
 
+    def take(self, point: PeakPoint) -> None:
+        """Go on from a peak that was found before."""
+        balance = self.problem.family(point.value)
+        motion = balance.unknowns(point.coefficients[:, balance.linear.retained])
+        y = np.append(motion, np.log(point.omega / self.problem.omega_scale))
+        self.known = [*self.known[-1:], (point.value, y)]
+        self._turn(y, point.value)
+
+    def _turn(self, y: FloatArray, value: float) -> None:
+        """Align the equation with the response at a peak, and keep the phase of the maximum beside it."""
+        state = self.problem.state(y, value)
+        self.evaluations += 2 + EVALUATIONS["horizontal_tangent"]
+        self.problem = self.problem.aligned(state)
+        if self.problem.by == "variable_phase":
+            self.tops = [*self.tops[-1:], (value, self.problem.of_the_top(state).phase)]
+
     def reached(self, value: float, halvings: int = HALVINGS) -> Solution:
         """Solve from the predicted peak; through the values between, or in a bracket, if that fails."""
-        self._turn(value)
+        self._ask(value)
         solution, last = self._solved(value), self.known[-1][0]
         if not solution.status.converged and halvings > 0 and last != value:
             between = self.reached(0.5 * (last + value), halvings - 1)
@@ -67,7 +79,7 @@ class Tracker:
             self.known = [*self.known[-1:], (value, solution.x)]
         return solution
 
-    def _turn(self, value: float) -> None:
+    def _ask(self, value: float) -> None:
         """Ask for the phase that the last maxima lead to, on a line through two of them."""
         if self.problem.by != "variable_phase":
             return

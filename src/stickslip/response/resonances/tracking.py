@@ -16,8 +16,10 @@ from stickslip.harmonic.peak import Peak
 from stickslip.response.parameter import Discretisation, Parameter
 from stickslip.response.resonances.first import Resonance
 from stickslip.response.resonances.point import PeakPoint
-from stickslip.response.resonances.tracker import trackers
+from stickslip.response.resonances.tracker import Tracker, trackers
 from stickslip.response.system import System
+
+APART = 1e-5  # relative distance of the frequencies of two peaks that are not the same
 
 
 def track_peak(
@@ -70,7 +72,10 @@ def track_peak(
 
 
 def follow_peaks(
-    resonance: Resonance, values: Sequence[float] | FloatArray, most: int = 3
+    resonance: Resonance,
+    values: Sequence[float] | FloatArray,
+    most: int = 3,
+    done: Sequence[PeakPoint] = (),
 ) -> Iterator[PeakPoint]:
     """Follow several resonance peaks through the values of a design parameter, each from its own last one.
 
@@ -82,11 +87,13 @@ def follow_peaks(
         Values of the parameter, in the order in which they are to be visited.
     most
         Number of peaks, the highest of the first value; fewer where it has fewer.
+    done
+        What an interrupted run has yielded; it is not computed again.
 
     Yields
     ------
     PeakPoint
-        One a value and peak, all peaks of a value before the next. Where two run into each other both go on as the same.
+        Not in `done`, one a value and peak, all peaks of a value before the next. Where two run into each other both go on as the same.
 
     Raises
     ------
@@ -94,9 +101,53 @@ def follow_peaks(
         If there are no values, or the range holds no peak at the first.
     """
     followed = trackers(resonance, float(values[0]) if len(values) else np.nan, most)
-    for value in values:
+    yield from _through(followed, values, done)
+
+
+def _through(
+    followed: Sequence[Tracker], values: Sequence[float] | FloatArray, done: Sequence[PeakPoint]
+) -> Iterator[PeakPoint]:
+    known = {(p.value, p.peak): p for p in done}
+    for value in map(float, values):
         for tracker in followed:
-            yield tracker.point(float(value))
+            stored = known.get((value, tracker.number))
+            if stored is None:
+                yield tracker.point(value)
+            elif stored.converged:
+                tracker.take(stored)
+
+
+def later_peaks(
+    resonance: Resonance,
+    values: Sequence[float] | FloatArray,
+    known: Sequence[PeakPoint],
+    most: int = 3,
+    done: Sequence[PeakPoint] = (),
+) -> Iterator[PeakPoint]:
+    """Follow backwards the peaks that the last value has and that those which were followed from the first one do not lead to.
+
+    Parameters
+    ----------
+    resonance, values, most, done
+        As in `follow_peaks`.
+    known
+        What that has yielded.
+
+    Yields
+    ------
+    PeakPoint
+        From the last value to the first, numbered after the known ones.
+    """
+    last = float(values[-1])
+    there = [p.omega for p in known if p.value == last and p.converged]
+    number = 1 + max((p.peak for p in known), default=-1)
+    found: list[Tracker] = []
+    for tracker in trackers(resonance, last, most):
+        omega = tracker.problem.omega(tracker.reached(last).x)
+        if all(abs(omega - other) > APART * other for other in there):
+            tracker.number = number + len(found)
+            found.append(tracker)
+    yield from _through(found, list(values)[::-1], done)
 
 
 def smallest_peak(

@@ -8,5 +8,6 @@ ANALYSES = {
     "campbell": "stickslip.study.analyses.campbell:CAMPBELL",
     "flutter": "stickslip.study.analyses.flutter:FLUTTER",
     "safe": "stickslip.study.analyses.safe:SAFE",
+    "resonance": "stickslip.study.analyses.resonance:RESONANCE",
     "run_up": "stickslip.study.analyses.run_up:RUN_UP",
 }

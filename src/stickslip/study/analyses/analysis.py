@@ -41,6 +41,8 @@ class Case:
         Keeps what is expensive of the model: for `Model.assembled`.
     digest_at_rest
         As `digest`, without harmonic loads and outputs.
+    at
+        Makes the model with another value of a key, picklable; None where no key can be changed.
     """
 
     index: int
@@ -53,6 +55,7 @@ class Case:
     checks: frozenset[str] = frozenset()
     store: Store = in_memory
     digest_at_rest: str = ""
+    at: "Callable[[str, float], Model] | None" = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from stickslip.assembly.model import Model
-from stickslip.errors import InputError, together
+from stickslip.errors import InputError, input_error, together
 from stickslip.study.analyses.analysis import Case
 from stickslip.study.file.study import StudyFile, TablesOfCase, read_file, validated
 from stickslip.study.file.tables import OF_THE_MODEL, Tables, asked_of
@@ -111,7 +111,47 @@ class Study:
             digest=whole,
             home=self.file.home,
             digest_at_rest=at_rest,
+            at=OtherModel(self.path, with_values(self.file.raw, case.values), self.memo),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class OtherModel:
+    """The model of a case with another value of a key; picklable.
+
+    Parameters
+    ----------
+    path
+        The file.
+    raw
+        Its content with the varied keys of the case in place.
+    memo
+        Parts that are built; a copy in another process begins without them.
+    """
+
+    path: Path
+    raw: Mapping[str, Any]
+    memo: Memo = field(default_factory=dict, repr=False)
+
+    def __call__(self, key: str, value: float) -> Model:
+        """Return the model.
+
+        Raises
+        ------
+        InputError
+            If there is no such key, or its value is refused.
+        """
+        raw = {**self.raw, "vary": {key: [value]}}
+        try:
+            file = StudyFile(self.path, "", raw, validated(self.path, raw))
+            return _checked(Study(file, self.memo)).model()
+        except InputError as error:
+            told = str(error).replace(f"{self.path}: ", "").removeprefix(f"vary.{key}: ")
+            remedy = "Name a key of the model as [vary] does, and values that it takes."
+            raise input_error("parameter", f"{key} = {value:g} is refused: {told.rstrip('.?')}", remedy) from None  # fmt: skip
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"path": self.path, "raw": self.raw, "memo": {}}
 
 
 def read_study(path: Path) -> Study:

@@ -1,0 +1,145 @@
+"""Resonance peaks over a design parameter: the analysis ``resonance``."""
+
+import json
+from collections.abc import Iterator, Sequence
+
+import xarray as xr
+
+from stickslip.assembly.model import Model
+from stickslip.errors import InputError
+from stickslip.response.resonances.curve import peak_curve
+from stickslip.response.resonances.point import PeakPoint
+from stickslip.response.resonances.tracking import follow_peaks, later_peaks, smallest_peak
+from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
+from stickslip.study.analyses.resonances.dataset import dataset
+from stickslip.study.analyses.resonances.envelope import heights, valley
+from stickslip.study.analyses.resonances.question import Question, question_of
+from stickslip.study.analyses.resonances.table import ResonanceTable
+from stickslip.study.analyses.resonances.words import tables
+from stickslip.study.analyses.verdict import Verdict, doubt, stored, to_json
+from stickslip.study.keep.progress import LOG, advance
+from stickslip.units import HZ
+
+MODEL, FIRST, SMALLEST, LAST = "model", "first", "smallest", "last"  # notes
+
+
+class ResonanceAnalysis:
+    """The analysis; see `Analysis` for what its methods promise."""
+
+    name = "resonance"
+    table = ResonanceTable
+    record = PeakPoint
+    linear = False
+    checks: tuple[str, ...] = ()
+
+    def key(self, case: Case) -> str:
+        """Return the tables that the points of a case depend on beside the model."""
+        own = (case.settings.resonance, case.settings.solver)
+        return json.dumps([table.model_dump(mode="json") for table in own], sort_keys=True)
+
+    def inputs(self, case: Case, model: Model) -> Question:
+        """Return what is followed; refuse what cannot be."""
+        question = question_of(case, model)
+        LOG.info(f"resonance: peaks of {question.output} over {question.asked.parameter}")
+        return question
+
+    def solve(
+        self, inputs: Question, done: Sequence[PeakPoint], notes: Notes
+    ) -> Iterator[PeakPoint]:
+        """Yield the peaks that are not done."""
+        if notes.get(LAST) is not None:
+            return
+        asked = inputs.asked
+        notes.put(
+            MODEL,
+            {
+                "verdicts": to_json(map(doubt, inputs.warnings)),
+                "output": inputs.output,
+                **inputs.facts,
+            },
+        )
+        every = list(done)
+        try:
+            for point in _told(self._points(inputs, done), inputs):
+                every.append(point)
+                yield point
+        except InputError as error:  # no peak in the range
+            notes.put(LAST, {"problem": error.problem})
+            return
+        # what was followed back from the last value before an interruption is none of the first ones
+        first = notes.get(FIRST)
+        known = [p for p in every if first is None or p.peak < first["peaks"]]
+        notes.put(FIRST, {"peaks": 1 + max((p.peak for p in known), default=-1)})
+        problem = ""
+        if asked.values is not None and len(asked.values) > 1:
+            try:
+                later = later_peaks(inputs.resonance, asked.values, known, asked.peaks, done)
+                for point in _told(later, inputs):
+                    every.append(point)
+                    yield point
+            except InputError as error:
+                problem = error.problem
+            between = valley(every, heights(every, asked.values), asked.values)
+            notes.put(SMALLEST, {} if between is None else _smallest(inputs, between))
+        notes.put(LAST, {"problem": problem})
+
+    def _points(self, inputs: Question, done: Sequence[PeakPoint]) -> Iterator[PeakPoint]:
+        asked, resonance = inputs.asked, inputs.resonance
+        if asked.values is not None:
+            yield from follow_peaks(resonance, asked.values, asked.peaks, done)
+            return
+        # a curve by arc length is followed again to where it was left: it has no state but its points
+        for peak in range(asked.peaks):
+            known = sum(p.peak == peak for p in done)
+            try:
+                for i, point in enumerate(peak_curve(resonance, asked.ends, asked.points, peak)):
+                    if i >= known:
+                        yield point
+            except InputError:
+                if peak == 0:
+                    raise
+                return  # there are no more
+
+    def dataset(self, solved: Sequence[Solved]) -> xr.Dataset:
+        """Return the peaks of all cases."""
+        return dataset(solved)
+
+    def verdicts(self, data: xr.Dataset) -> tuple[Verdict, ...]:
+        """Return what is to be thought of each case."""
+        return stored(data.attrs)
+
+    def check(self, case: Case, model: Model) -> tuple[str, ...]:
+        """Say what is followed, and how many peaks there will be at most."""
+        asked = question_of(case, model).asked
+        count = len(asked.values) if asked.values else asked.points
+        return (f"resonance: {count} values of {asked.parameter}, up to {asked.peaks} peaks each, by {asked.by}",)  # fmt: skip
+
+    def summary(self, data: xr.Dataset) -> tuple[TextTable, ...]:
+        """Return what the terminal prints."""
+        return tables(data)
+
+
+def _told(points: Iterator[PeakPoint], inputs: Question) -> Iterator[PeakPoint]:
+    first, last = inputs.asked.ends
+    for point in points:
+        share = abs((point.value - first) / (last - first)) if last != first else 1.0
+        state = "" if point.converged else f", {point.status.advice}"
+        advance(
+            0.9 * min(share, 1.0),
+            f"peak {point.peak + 1} at {point.value:.5g}: {point.omega / HZ:.4f} Hz, {1e3 * point.amplitude:.5g} mm{state}",
+        )
+        yield point
+
+
+def _smallest(inputs: Question, between: tuple[float, float]) -> dict[str, float]:
+    """Return the lowest place of the highest peak between two values; nothing where that is not found."""
+    r = inputs.resonance
+    try:
+        best = smallest_peak(r.system, r.load, r.parameter, between, r.omega_range, r.output, r.how)
+    except InputError as error:
+        LOG.info(f"the lowest peak was not found: {error}")
+        return {}
+    return {"value": best.value, "amplitude": best.amplitude, "omega": best.omega}
+
+
+RESONANCE = ResonanceAnalysis()

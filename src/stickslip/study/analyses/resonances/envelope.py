@@ -1,0 +1,87 @@
+"""Which of several peaks is the highest, where another one overtakes it, and where the highest is lowest."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.response.resonances.point import PeakPoint
+
+
+@dataclass(frozen=True)
+class Overtaking:
+    """Where another peak becomes the highest, along the values as they were visited.
+
+    Parameters
+    ----------
+    value
+        Of the parameter, between two visited ones on straight lines.
+    before, after
+        Numbers of the peaks.
+    amplitude
+        There, m.
+    """
+
+    value: float
+    before: int
+    after: int
+    amplitude: float
+
+
+def heights(points: Sequence[PeakPoint], values: Sequence[float]) -> FloatArray:
+    """Return (peaks, values) amplitudes of the maxima at the visited values; NaN where there is none."""
+    known = {(p.peak, p.value): p.amplitude for p in points if p.converged and p.is_maximum}
+    count = 1 + max((p.peak for p in points), default=-1)
+    return np.array([[known.get((i, v), np.nan) for v in values] for i in range(count)])
+
+
+def highest(amplitude: FloatArray) -> IntArray:
+    """Return the number of the highest peak at each value, -1 where there is none."""
+    filled = np.where(np.isfinite(amplitude), amplitude, -np.inf)
+    return np.where(np.any(np.isfinite(amplitude), axis=0), np.argmax(filled, axis=0), -1)
+
+
+def overtakings(amplitude: FloatArray, values: Sequence[float]) -> list[Overtaking]:
+    """Return where another peak becomes the highest.
+
+    Parameters
+    ----------
+    amplitude
+        (peaks, values) in m.
+    values
+        As they were visited.
+    """
+    top = highest(amplitude)
+    found = []
+    for i, j in pairwise(map(int, np.flatnonzero(top >= 0))):
+        a, b = int(top[i]), int(top[j])
+        if a == b:
+            continue
+        # two peaks that are one from some value on do not overtake each other
+        gap = amplitude[a, [i, j]] - amplitude[b, [i, j]]
+        share = gap[0] / (gap[0] - gap[1]) if np.all(np.isfinite(gap)) and gap[0] != gap[1] else 1.0
+        value = values[i] + share * (values[j] - values[i])
+        there = amplitude[b, j] if share == 1.0 else amplitude[b, i] + share * (amplitude[b, j] - amplitude[b, i])  # fmt: skip
+        found.append(Overtaking(float(value), a, b, float(there)))
+    return found
+
+
+def valley(
+    points: Sequence[PeakPoint], amplitude: FloatArray, values: Sequence[float]
+) -> tuple[float, float] | None:
+    """Return two visited values between which the highest peak is lowest and one and the same peak, whose slope changes its sign; None without."""
+    top = highest(amplitude)
+    if not np.any(top >= 0):
+        return None
+    envelope = np.where(top >= 0, np.nanmax(np.where(np.isnan(amplitude), -np.inf, amplitude), axis=0), np.inf)  # fmt: skip
+    lowest = int(np.argmin(envelope))
+    slopes = {(p.peak, p.value): p.slope for p in points if p.converged}
+    for i, j in ((lowest - 1, lowest), (lowest, lowest + 1)):
+        if i < 0 or j >= len(values) or top[i] != top[j]:
+            continue
+        falls, rises = (slopes[int(top[k]), values[k]] * (values[j] - values[i]) for k in (i, j))
+        if falls < 0.0 < rises:
+            return values[i], values[j]
+    return None

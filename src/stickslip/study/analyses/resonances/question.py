@@ -1,0 +1,129 @@
+"""What a job of the resonances is given, picklable, and what it is solved with."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, get_args
+
+from stickslip.assembly.model import Model
+from stickslip.assembly.reduced import Store
+from stickslip.contact.compiled import Evaluator
+from stickslip.errors import InputError, input_error
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.parameter import Discretisation, LoadName, Parameter
+from stickslip.response.resonances.first import Resonance
+from stickslip.response.self_excited.problem import SAMPLES_A_HARMONIC
+from stickslip.response.system import System
+from stickslip.study.analyses.analysis import Case
+from stickslip.study.analyses.facts import facts_of
+from stickslip.study.analyses.forced.question import peak_first
+from stickslip.study.analyses.resonances.table import ResonanceTable
+from stickslip.study.file.tables import OF_THE_MODEL
+from stickslip.units import HZ, RPM
+
+SAMPLES = 256
+VALUE = "value"  # of a function in Python
+FACTORS = get_args(LoadName)  # on loads, which are no keys
+
+
+@dataclass(frozen=True, eq=False)
+class OfKey:
+    """The system of each value of a key; what a resonance takes as its parameter.
+
+    Parameters
+    ----------
+    at
+        Makes the model.
+    key
+        The key.
+    harmonics
+        For which there are to be matrices.
+    store
+        Keeps what is expensive.
+    """
+
+    at: Callable[[str, float], Model]
+    key: str
+    harmonics: int
+    store: Store
+
+    def __call__(self, value: float) -> tuple[System, HarmonicLoad]:
+        """Return system and load, the output whose peak counts first."""
+        model = peak_first(self.at(self.key, value).assembled(self.harmonics, self.store))
+        return model.system, model.load
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """The resonances of one case.
+
+    Parameters
+    ----------
+    label
+        Of the case.
+    asked
+        The table.
+    resonance
+        What is followed.
+    output
+        Name of the output.
+    facts
+        What the result says of the model.
+    warnings
+        Of the model.
+    """
+
+    label: str
+    asked: ResonanceTable
+    resonance: Resonance
+    output: str
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+
+def question_of(case: Case, model: Model) -> Question:
+    """Return what a job solves; whatever can be refused is, before anything long is computed.
+
+    Raises
+    ------
+    InputError
+        If the parameter is none, the model at its first or last value is refused, a contact is rigid, or no load drives a harmonic.
+    """
+    asked: ResonanceTable = case.settings.resonance
+    assembled = peak_first(model.assembled(asked.harmonics, case.store))
+    if assembled.system.interface.rigid:
+        raise input_error(
+            "resonance",
+            "a contact is rigid: its force is no function of the gap",
+            "Give the contacts a stiffness, such as elastic_coulomb.",
+        )
+    evaluator: Evaluator = case.settings.solver.evaluator
+    samples = max(SAMPLES, SAMPLES_A_HARMONIC * asked.harmonics)
+    how = Discretisation(order=asked.harmonics, samples=samples, evaluator=evaluator)
+    lowest, highest = (HZ * f for f in asked.frequency_hz)
+    resonance = Resonance(
+        assembled.system, assembled.load, _parameter(case, asked), (lowest, highest), asked.by, 0, how, asked.harmonic
+    )  # fmt: skip
+    try:
+        for value in asked.ends:
+            resonance.problem(value)
+    except InputError as error:
+        raise error.inside("resonance") from None
+    facts = facts_of(model, model.speed / RPM)
+    return Question(
+        case.label, asked, resonance, assembled.output_labels[0], facts, tuple(assembled.warnings)
+    )
+
+
+def _parameter(case: Case, asked: ResonanceTable) -> Parameter:
+    """Return what varies: a name that the solver knows, or the model of each value."""
+    name = asked.parameter
+    if case.at is None or name in FACTORS or ("." not in name and name != VALUE):
+        return name
+    if name.partition(".")[0] not in {*OF_THE_MODEL, VALUE}:
+        known = ", ".join(sorted(OF_THE_MODEL))
+        raise input_error(
+            "resonance.parameter",
+            f"is {name}, which is no key of the model",
+            f"Give one of the tables {known}, or {', '.join(FACTORS)}.",
+        )
+    return OfKey(case.at, name, asked.harmonics, case.store)

@@ -1,0 +1,167 @@
+"""[resonance] of a study: benchmark numbers, several peaks and overtaking, folds, resuming, Python, the page."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stickslip.assembly.model import Model as Assembly
+from stickslip.errors import InputError
+from stickslip.front.study import Study
+from stickslip.report.sections.resonance import Peaks, amplitudes, peak_table
+from stickslip.study.analyses.resonance import RESONANCE
+from stickslip.study.keep.netcdf import one_case
+from stickslip.study.models.study import read_study
+from stickslip.study.outcome import Outcome
+from stickslip.study.run import run_study
+
+B3 = """
+schema_version = 2
+[part.blade]
+shape = "lumped"
+masses_kg = [1.0]
+springs_n_per_m = [["ground", 1, 1.0]]
+dashpots_n_s_per_m = [["ground", 1, 0.02]]
+[contact.damper]
+between = ["blade.m1", "ground"]
+law = "jenkins"
+tangential_stiffness_n_per_m = 0.5
+slip_limit_n = 0.2
+[load.shaker]
+on = "blade.m1"
+force_n = 0.1
+[resonance]
+frequency_hz = [0.127, 0.223]
+parameter = "contact.damper.slip_limit_n"
+values = [0.3, 0.2, 0.12, 0.06]
+harmonics = 1
+"""
+
+
+def answered(text: str, folder: Path, workers: int = 1) -> Outcome:
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "study.toml"
+    path.write_text(text, encoding="utf-8")
+    return run_study(read_study(path), workers=workers)
+
+
+def test_the_optimum_of_the_benchmark_from_a_study(tmp_path: Path) -> None:
+    outcome = answered(B3, tmp_path)
+    case = one_case(outcome.tree["resonance"].to_dataset(), 0)
+    # literature benchmark B3, to its printed digits
+    assert case.attrs["smallest_value"] == pytest.approx(0.138956, abs=5e-7)
+    assert case.attrs["smallest_amplitude"] == pytest.approx(0.5509002, abs=5e-8)
+    assert case["value"].values.tolist() == [[0.3, 0.2, 0.12, 0.06]]
+
+
+def test_the_example_of_two_peaks_tells_where_one_overtakes_the_other(tmp_path: Path) -> None:
+    text = (Path(__file__).parent.parent / "examples" / "two_peaks" / "study.toml").read_text("utf-8")  # fmt: skip
+    few = text[: text.index("values = ")] + "values = [100, 70, 60, 40, 25, 20]\npeaks = 2\n"
+    outcome = answered(few, tmp_path, workers=2)
+    data = outcome.tree["resonance"].to_dataset()
+    case = one_case(data, 0)
+    assert case["overtaking_after"].values.tolist() == [1, 0]
+    assert case["overtaking_value"].values == pytest.approx([67.0, 24.85], rel=0.02)
+    assert case.attrs["smallest_amplitude"] == pytest.approx(1.772e-3, rel=0.01)
+    words = [v.why for v in outcome.verdicts]
+    assert words[0].startswith("peak 2 overtakes peak 1 at 67")
+    # a sweep of the forced response at one limit has the same two tops
+    sweep = few[: few.index("[resonance]")].replace("slip_limit_n = 100.0", "slip_limit_n = 40.0")
+    sweep += '[forced_response]\nfrequency_hz = [20.0, 60.0]\npoints = 200\n[harmonics]\nhigh = 5\nlow = 5\nselection = "always_low"\n'
+    node = answered(sweep, tmp_path / "sweep").tree["forced_response"].to_dataset()
+    amplitude = np.sort(node["amplitude"].values.ravel()[np.isfinite(node["amplitude"].values.ravel())])  # fmt: skip
+    assert amplitude[-1] == pytest.approx(float(np.nanmax(case["amplitude"].values[:, 3])), rel=1e-5)  # fmt: skip
+    view = Peaks(case)
+    assert "Overtaken: peak 1 by peak 2 at 67" in amplitudes(view).caption
+    assert "mm" in peak_table(view)
+
+
+def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    text = B3.replace("slip_limit_n = 0.2", "slip_limit_n = 0.25")
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    study = read_study(tmp_path / "study.toml")
+    (case,) = study.cases()
+    inputs = RESONANCE.inputs(case, case.build())
+    whole = list(RESONANCE.solve(inputs, [], Kept()))
+    rest = list(RESONANCE.solve(inputs, whole[:2], Kept()))
+    assert [p.value for p in rest] == [p.value for p in whole[2:]]
+    assert [p.amplitude for p in rest] == pytest.approx([p.amplitude for p in whole[2:]], rel=1e-10)  # fmt: skip
+
+
+class Kept(dict[str, Any]):
+    """Notes in memory."""
+
+    def put(self, name: str, values: Mapping[str, Any]) -> None:
+        self[name] = dict(values)
+
+
+def test_a_curve_by_arc_length_goes_round_its_fold(tmp_path: Path) -> None:
+    # softening: in quadrature, with one harmonic, force = 2 ζ a √(1 - ¾ c a²), largest at a² = 2/(3 c)
+    text = B3[: B3.index("[contact.damper]")] + """
+[contact.softening]
+between = ["blade.m1", "ground"]
+law = "cubic_spring"
+cubic_tangential_n_per_m3 = -0.5
+[load.shaker]
+on = "blade.m1"
+force_n = 0.01
+[resonance]
+frequency_hz = [0.12, 0.2]
+parameter = "excitation"
+span = [0.5, 2.0]
+points = 12
+harmonics = 1
+by = "phase_quadrature"
+"""  # fmt: skip
+    outcome = answered(text, tmp_path)
+    case = one_case(outcome.tree["resonance"].to_dataset(), 0)
+    level, amplitude = case["value"].values[0], case["amplitude"].values[0]
+    known = level[np.isfinite(amplitude)], amplitude[np.isfinite(amplitude)]
+    omega = np.sqrt(1.0 - 0.375 * known[1] ** 2)
+    assert 0.02 * omega * known[1] == pytest.approx(0.01 * known[0], rel=1e-8)
+    turned = np.argmax(known[0])
+    assert 0 < turned < known[0].size - 1
+    assert known[0][turned] == pytest.approx(2.0 * np.sqrt(4.0 / 3.0) / np.sqrt(2.0), rel=1e-3)
+    assert known[1][-1] > known[1][turned]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("damper.slip_limit_n\"", "damper.slip_limt_n\""), "parameter: contact.damper.slip_limt_n = 0.3 is refused: there is no key 'slip_limt_n'. Did you mean"),
+        (('"contact.damper.slip_limit_n"', '"resonance.peaks"'), "resonance.parameter: is resonance.peaks, which is no key of the model"),
+        (("[0.3, 0.2", "[-0.3, 0.2"), "slip_limit_n = -0.3 is refused: must be greater than or equal to 0"),
+        (("values = [0.3, 0.2, 0.12, 0.06]", ""), "resonance.values: values and span are both missing"),
+        (("harmonics = 1", "harmonics = 1\nharmonic = 3"), "resonance.harmonic: is 3, above harmonics = 1"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_followed_is_refused_by_its_key(
+    change: tuple[str, str], message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=message):
+        answered(B3.replace(*change), tmp_path)
+
+
+def test_a_range_without_a_peak_is_told(tmp_path: Path) -> None:
+    outcome = answered(B3.replace("[0.127, 0.223]", "[0.3, 0.4]"), tmp_path)
+    (told,) = outcome.verdicts
+    assert told.level == "wrong"
+    assert told.remedy == "Widen resonance.frequency_hz."
+
+
+def test_python_asks_the_same(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text(B3, encoding="utf-8")
+    model = Study.from_file(tmp_path / "study.toml").model()
+    keys = {"frequency_hz": (0.127, 0.223), "values": [0.3, 0.2], "harmonics": 1}
+    by_field = model.resonance(parameter="limit", **keys).data["resonance"]
+
+    def of(limit: float) -> Assembly:
+        contact = model.contacts["damper"]
+        return replace(model, contacts={"damper": replace(contact, law=replace(contact.law, limit=limit))})  # fmt: skip
+
+    by_function = model.resonance(of, **keys).data["resonance"]
+    for name in ("amplitude", "frequency_hz", "energy"):
+        assert by_function[name].values == pytest.approx(by_field[name].values, rel=1e-9)
