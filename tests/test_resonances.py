@@ -13,7 +13,7 @@ from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.matrices import lumped
 from stickslip.response.parameter import Discretisation
 from stickslip.response.resonances.curve import peak_curve
-from stickslip.response.resonances.first import Resonance, maxima
+from stickslip.response.resonances.first import PeakSearch, maxima
 from stickslip.response.resonances.tracking import follow_peaks, later_peaks
 from stickslip.response.system import System
 
@@ -49,8 +49,8 @@ def test_variable_phase_is_the_maximum_where_quadrature_is_not():
     values = [0.2, 0.18, 0.16, 0.14, 0.12]
 
     def peaks(by):
-        resonance = Resonance(system, load, "limit", (0.6, 2.2), by, 0, HOW)
-        return list(follow_peaks(resonance, values, 1))
+        search = PeakSearch(system, load, "limit", (0.6, 2.2), by, 0, HOW)
+        return list(follow_peaks(search, values, 1))
 
     top, lag, quarter = map(peaks, ("horizontal_tangent", "variable_phase", "phase_quadrature"))
     for a, b, c in zip(top, lag, quarter, strict=True):
@@ -65,7 +65,7 @@ def test_variable_phase_is_the_maximum_where_quadrature_is_not():
 
 def test_energy_is_what_dashpot_and_friction_take():
     system, load = two_masses()
-    (one,) = follow_peaks(Resonance(system, load, "limit", (0.6, 2.2), how=HOW), [0.15], 1)
+    (one,) = follow_peaks(PeakSearch(system, load, "limit", (0.6, 2.2), how=HOW), [0.15], 1)
     damping = system.plain_structure.damping
     x = one.coefficients
     dashpot = sum(
@@ -77,14 +77,14 @@ def test_energy_is_what_dashpot_and_friction_take():
 
 def test_peaks_of_several_modes_are_followed_at_once():
     system, load = two_masses()
-    resonance = Resonance(system, load, "limit", (0.6, 2.2), how=HOW)
-    found = list(follow_peaks(resonance, [0.2, 0.15], 3))
+    search = PeakSearch(system, load, "limit", (0.6, 2.2), how=HOW)
+    found = list(follow_peaks(search, [0.2, 0.15], 3))
     assert [(p.peak, p.value) for p in found] == [(0, 0.2), (1, 0.2), (0, 0.15), (1, 0.15)]
     assert all(p.converged and p.is_maximum for p in found)
     assert found[0].amplitude > found[1].amplitude
     assert found[1].omega > 1.5 * found[0].omega
     # each of them is the only one of its own range
-    (alone,) = follow_peaks(replace(resonance, omega_range=(1.3, 2.2)), [0.15], 3)
+    (alone,) = follow_peaks(replace(search, omega_range=(1.3, 2.2)), [0.15], 3)
     assert alone.omega == pytest.approx(found[3].omega, rel=1e-9)
     assert alone.amplitude == pytest.approx(found[3].amplitude, rel=1e-9)
 
@@ -94,8 +94,8 @@ def test_backbone_of_a_duffing_oscillator_is_its_closed_form():
     system, load = oscillator(0.5, 0.02, 0.02)
     how = Discretisation(order=1)
     levels = [0.5, 1.0, 2.0, 3.0]
-    resonance = Resonance(system, load, "excitation", (0.7, 1.6), "phase_quadrature", 0, how)
-    for p in follow_peaks(resonance, levels, 1):
+    search = PeakSearch(system, load, "excitation", (0.7, 1.6), "phase_quadrature", 0, how)
+    for p in follow_peaks(search, levels, 1):
         assert p.omega**2 == pytest.approx(1.0 + 0.75 * 0.5 * p.amplitude**2, rel=1e-9)
         assert 0.04 * p.omega * p.amplitude == pytest.approx(0.02 * p.value, rel=1e-9)
         assert p.energy == pytest.approx(np.pi * 0.02 * p.value * p.amplitude, rel=1e-9)
@@ -117,7 +117,7 @@ def test_maxima_that_stand_out_are_those_of_a_branch():
 def test_harmonics_that_peak_are_checked(change, message):
     system, load = two_masses()
     with pytest.raises(InputError, match=message):
-        list(follow_peaks(Resonance(system, load, "limit", (0.6, 2.2), how=HOW, **change), [0.2]))
+        list(follow_peaks(PeakSearch(system, load, "limit", (0.6, 2.2), how=HOW, **change), [0.2]))
 
 
 def test_a_curve_goes_round_the_fold_at_which_a_peak_ends():
@@ -126,8 +126,8 @@ def test_a_curve_goes_round_the_fold_at_which_a_peak_ends():
     how = Discretisation(order=1)
     most = 0.04 * np.sqrt(4.0 / 3.0) / np.sqrt(2.0) / 0.02
     for by, error in (("phase_quadrature", 1e-5), ("horizontal_tangent", 1e-3)):
-        resonance = Resonance(system, load, "excitation", (0.5, 1.3), by, 0, how)
-        found = list(peak_curve(resonance, (0.5, 2.0), 20))
+        search = PeakSearch(system, load, "excitation", (0.5, 1.3), by, 0, how)
+        found = list(peak_curve(search, (0.5, 2.0), 20))
         assert all(p.converged for p in found)
         level = np.array([p.value for p in found])
         turned = int(np.argmax(level))
@@ -146,12 +146,12 @@ def test_a_curve_goes_round_the_fold_at_which_a_peak_ends():
 
 def test_peaks_that_are_there_at_the_last_value_alone_are_followed_back():
     system, load = two_masses()
-    resonance = Resonance(system, load, "limit", (0.6, 2.2), how=HOW)
+    search = PeakSearch(system, load, "limit", (0.6, 2.2), how=HOW)
     values = [0.2, 0.16, 0.12]
-    both = list(follow_peaks(resonance, values, 2))
+    both = list(follow_peaks(search, values, 2))
     first = [p for p in both if p.peak == 0]
-    later = list(later_peaks(resonance, values, first, 3))
+    later = list(later_peaks(search, values, first, 3))
     assert [(p.peak, p.value) for p in later] == [(1, 0.12), (1, 0.16), (1, 0.2)]
     known = [p.amplitude for p in both if p.peak == 1]
     assert [p.amplitude for p in later] == pytest.approx(known[::-1], rel=1e-9)
-    assert list(later_peaks(resonance, values, both, 3)) == []
+    assert list(later_peaks(search, values, both, 3)) == []

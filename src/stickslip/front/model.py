@@ -117,6 +117,7 @@ class Model(Assembly):
     def nonlinear_mode(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
         """Follow modes over their amplitude; keys such as ``modes=[1, 2], amplitude_mm=(1e-3, 1.0), points=40``."""
         return self._answer("nonlinear_mode", keys, folder)
+
     def resonance(
         self,
         of: Callable[[float], Assembly] | None = None,

@@ -17,7 +17,7 @@ from .recovery import Signals as Signals
 from .recovery import fields as fields
 from .recovery import signals as signals
 from .resonances.curve import peak_curve as peak_curve
-from .resonances.first import Resonance as Resonance
+from .resonances.first import PeakSearch as PeakSearch
 from .resonances.point import PeakPoint as PeakPoint
 from .resonances.tracking import follow_peaks as follow_peaks
 from .resonances.tracking import later_peaks as later_peaks

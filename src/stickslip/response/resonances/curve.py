@@ -11,7 +11,7 @@ from stickslip.harmonic.parameters import ParameterLinearisation
 from stickslip.harmonic.peak import EVALUATIONS, PeakProblem
 from stickslip.response.branch import Followed, Judged, OneLevel, Route, steps_through
 from stickslip.response.follow import follow
-from stickslip.response.resonances.first import Resonance
+from stickslip.response.resonances.first import PeakSearch
 from stickslip.response.resonances.point import PeakPoint, peak_point
 from stickslip.response.resonances.tracker import Tracker, trackers
 from stickslip.solve.branch import Following, Latest
@@ -22,13 +22,13 @@ MOST = 10  # multiples of the smallest number of points at which a curve ends
 
 
 def peak_curve(
-    resonance: Resonance, span: tuple[float, float], points: int = 30, peak: int = 0
+    search: PeakSearch, span: tuple[float, float], points: int = 30, peak: int = 0
 ) -> Iterator[PeakPoint]:
     """Follow the curve of a resonance peak over a design parameter by arc length, round its folds.
 
     Parameters
     ----------
-    resonance
+    search
         Of what, and by which condition; by variable phase the phase follows the maximum from point to point.
     span
         First and last value of the parameter; the last may be the smaller one.
@@ -53,7 +53,7 @@ def peak_curve(
         raise input_error("span", f"goes from {first} to {last}", "Give two different values.")
     if points < 1:
         raise input_error("points", f"must be positive, got {points}", "Give 30, say.")
-    found = trackers(resonance, first, peak + 1)
+    found = trackers(search, first, peak + 1)
     if peak >= len(found):
         raise input_error(
             "peak",
@@ -66,7 +66,7 @@ def peak_curve(
     weights = np.ones(size)
     weights[: tracker.problem.family(first).linear.n] = 0.0
     control = steps_through(abs(last - first), points)
-    way = Following(newton=resonance.how.newton, control=control, weights=weights)
+    way = Following(newton=search.how.newton, control=control, weights=weights)
 
     def begin(value: float, near: Sequence[FloatArray], _most: bool) -> Solution:
         if near:

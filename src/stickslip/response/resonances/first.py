@@ -28,7 +28,7 @@ STANDS_OUT = 1.01  # a maximum over the higher one of the minima on its sides
 
 
 @dataclass(frozen=True, eq=False)
-class Resonance:
+class PeakSearch:
     """Which resonance is followed, and by what condition.
 
     Parameters
@@ -138,7 +138,7 @@ class Start:
     height: float
 
 
-def first_peaks(resonance: Resonance, value: float) -> tuple[list[Start], int]:
+def first_peaks(search: PeakSearch, value: float) -> tuple[list[Start], int]:
     """Return the peaks of the response at a value of the parameter, the highest first, and what evaluations the sweep took.
 
     Raises
@@ -148,10 +148,10 @@ def first_peaks(resonance: Resonance, value: float) -> tuple[list[Start], int]:
     """
     if not np.isfinite(value):
         raise input_error("values", "are empty or not finite", "Give numbers.")
-    problem, how = resonance.problem(value), resonance.how
+    problem, how = search.problem(value), search.how
     balance = problem.family(value)
-    changed = system_at(resonance.system, resonance.parameter, value, balance)
-    found = plain_sweep(changed, balance, resonance.omega_range, SWEEP_POINTS, how.newton)
+    changed = system_at(search.system, search.parameter, value, balance)
+    found = plain_sweep(changed, balance, search.omega_range, SWEEP_POINTS, how.newton)
     points = [f.point for f in found if f.converged]
     few = replace(
         how.newton,

@@ -9,7 +9,7 @@ import scipy.optimize
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.parameters import ParameterLinearisation
 from stickslip.harmonic.peak import EVALUATIONS, PeakProblem
-from stickslip.response.resonances.first import Resonance, Start, first_peaks
+from stickslip.response.resonances.first import PeakSearch, Start, first_peaks
 from stickslip.response.resonances.point import PeakPoint, peak_point
 from stickslip.solve.newton_method import Newton, Solution, charged, newton
 from stickslip.solve.status import Status
@@ -159,14 +159,14 @@ def _sign_change(rate: Callable[[float], float], at: float, step: float) -> floa
     raise ArithmeticError("no maximum")
 
 
-def trackers(resonance: Resonance, value: float, most: int) -> list[Tracker]:
+def trackers(search: PeakSearch, value: float, most: int) -> list[Tracker]:
     """Return the highest peaks at a value of the parameter, at most so many, ready to be followed; the first one has paid for the sweep."""
-    starts, spent = first_peaks(resonance, value)
+    starts, spent = first_peaks(search, value)
     made: list[Tracker] = []
     for start in starts:
         if len(made) == most:
             break
-        one = _tracker(resonance, start)
+        one = _tracker(search, start)
         if made and not _is_another(one, made):
             continue
         one.number = len(made)
@@ -175,7 +175,7 @@ def trackers(resonance: Resonance, value: float, most: int) -> list[Tracker]:
     return made
 
 
-def _tracker(resonance: Resonance, start: Start) -> Tracker:
+def _tracker(search: PeakSearch, start: Start) -> Tracker:
     """Return the tracker of one peak; the phase of the variable one is that at the maximum, which is found first."""
     force = start.problem.phase
     known = [(start.value, start.y)]

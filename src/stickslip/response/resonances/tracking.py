@@ -14,7 +14,7 @@ from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.peak import Peak
 from stickslip.response.parameter import Discretisation, Parameter
-from stickslip.response.resonances.first import Resonance
+from stickslip.response.resonances.first import PeakSearch
 from stickslip.response.resonances.point import PeakPoint
 from stickslip.response.resonances.tracker import Tracker, trackers
 from stickslip.response.system import System
@@ -48,8 +48,8 @@ def track_peak(
         Frequencies between which the first peak is searched for by a sweep, rad/s.
     by
         ``horizontal_tangent``: the largest amplitude; ``phase_quadrature``: the output lags the force by 90°, which is close to it for
-        a lightly damped resonance, and cheaper; ``variable_phase``: the motion, weighted with the forces, lags them by what it did at the
-        largest amplitude beside the last peak, which serves several forces and modes and harmonics that are not driven.
+        a lightly damped resonance, and cheaper; ``variable_phase``: the output has the phase of the
+        largest amplitude beside the last peak, which serves several forces and modes, and harmonics that are not driven.
     output
         Position among the outputs of the dof whose amplitude peaks.
     discretisation
@@ -67,12 +67,12 @@ def track_peak(
         peak at the first value.
     """
     how = discretisation or Discretisation()
-    one = Resonance(system, load, parameter, omega_range, by, output, how)
+    one = PeakSearch(system, load, parameter, omega_range, by, output, how)
     yield from follow_peaks(one, values, 1)
 
 
 def follow_peaks(
-    resonance: Resonance,
+    search: PeakSearch,
     values: Sequence[float] | FloatArray,
     most: int = 3,
     done: Sequence[PeakPoint] = (),
@@ -81,7 +81,7 @@ def follow_peaks(
 
     Parameters
     ----------
-    resonance
+    search
         Of what, and by which condition.
     values
         Values of the parameter, in the order in which they are to be visited.
@@ -100,7 +100,7 @@ def follow_peaks(
     InputError
         If there are no values, or the range holds no peak at the first.
     """
-    followed = trackers(resonance, float(values[0]) if len(values) else np.nan, most)
+    followed = trackers(search, float(values[0]) if len(values) else np.nan, most)
     yield from _through(followed, values, done)
 
 
@@ -118,7 +118,7 @@ def _through(
 
 
 def later_peaks(
-    resonance: Resonance,
+    search: PeakSearch,
     values: Sequence[float] | FloatArray,
     known: Sequence[PeakPoint],
     most: int = 3,
@@ -128,7 +128,7 @@ def later_peaks(
 
     Parameters
     ----------
-    resonance, values, most, done
+    search, values, most, done
         As in `follow_peaks`.
     known
         What that has yielded.
@@ -142,7 +142,7 @@ def later_peaks(
     there = [p.omega for p in known if p.value == last and p.converged]
     number = 1 + max((p.peak for p in known), default=-1)
     found: list[Tracker] = []
-    for tracker in trackers(resonance, last, most):
+    for tracker in trackers(search, last, most):
         omega = tracker.problem.omega(tracker.reached(last).x)
         if all(abs(omega - other) > APART * other for other in there):
             tracker.number = number + len(found)
@@ -174,7 +174,7 @@ def smallest_peak(
         If the peak is not found at an end, or its amplitude has a slope of the same sign at both.
     """
     how = discretisation or Discretisation()
-    asked = Resonance(system, load, parameter, omega_range, "horizontal_tangent", output, how)
+    asked = PeakSearch(system, load, parameter, omega_range, "horizontal_tangent", output, how)
     (tracker,) = trackers(asked, float(span[0]), 1)
     ends = [tracker.point(value) for value in span]
     for end in (e for e in ends if not e.status.converged):

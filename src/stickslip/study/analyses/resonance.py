@@ -73,7 +73,7 @@ class ResonanceAnalysis:
         problem = ""
         if asked.values is not None and len(asked.values) > 1:
             try:
-                later = later_peaks(inputs.resonance, asked.values, known, asked.peaks, done)
+                later = later_peaks(inputs.search, asked.values, known, asked.peaks, done)
                 for point in _told(later, inputs):
                     every.append(point)
                     yield point
@@ -84,15 +84,15 @@ class ResonanceAnalysis:
         notes.put(LAST, {"problem": problem})
 
     def _points(self, inputs: Question, done: Sequence[PeakPoint]) -> Iterator[PeakPoint]:
-        asked, resonance = inputs.asked, inputs.resonance
+        asked, search = inputs.asked, inputs.search
         if asked.values is not None:
-            yield from follow_peaks(resonance, asked.values, asked.peaks, done)
+            yield from follow_peaks(search, asked.values, asked.peaks, done)
             return
         # a curve by arc length is followed again to where it was left: it has no state but its points
         for peak in range(asked.peaks):
             known = sum(p.peak == peak for p in done)
             try:
-                for i, point in enumerate(peak_curve(resonance, asked.ends, asked.points, peak)):
+                for i, point in enumerate(peak_curve(search, asked.ends, asked.points, peak)):
                     if i >= known:
                         yield point
             except InputError:
@@ -133,7 +133,7 @@ def _told(points: Iterator[PeakPoint], inputs: Question) -> Iterator[PeakPoint]:
 
 def _smallest(inputs: Question, between: tuple[float, float]) -> dict[str, float]:
     """Return the lowest place of the highest peak between two values; nothing where that is not found."""
-    r = inputs.resonance
+    r = inputs.search
     try:
         best = smallest_peak(r.system, r.load, r.parameter, between, r.omega_range, r.output, r.how)
     except InputError as error:

@@ -10,7 +10,7 @@ from stickslip.contact.compiled import Evaluator
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.parameter import Discretisation, LoadName, Parameter
-from stickslip.response.resonances.first import Resonance
+from stickslip.response.resonances.first import PeakSearch
 from stickslip.response.self_excited.problem import SAMPLES_A_HARMONIC
 from stickslip.response.system import System
 from stickslip.study.analyses.analysis import Case
@@ -62,7 +62,7 @@ class Question:
         Of the case.
     asked
         The table.
-    resonance
+    search
         What is followed.
     output
         Name of the output.
@@ -74,7 +74,7 @@ class Question:
 
     label: str
     asked: ResonanceTable
-    resonance: Resonance
+    search: PeakSearch
     output: str
     facts: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
@@ -100,17 +100,17 @@ def question_of(case: Case, model: Model) -> Question:
     samples = max(SAMPLES, SAMPLES_A_HARMONIC * asked.harmonics)
     how = Discretisation(order=asked.harmonics, samples=samples, evaluator=evaluator)
     lowest, highest = (HZ * f for f in asked.frequency_hz)
-    resonance = Resonance(
+    search = PeakSearch(
         assembled.system, assembled.load, _parameter(case, asked), (lowest, highest), asked.by, 0, how, asked.harmonic
     )  # fmt: skip
     try:
         for value in asked.ends:
-            resonance.problem(value)
+            search.problem(value)
     except InputError as error:
         raise error.inside("resonance") from None
     facts = facts_of(model, model.speed / RPM)
     return Question(
-        case.label, asked, resonance, assembled.output_labels[0], facts, tuple(assembled.warnings)
+        case.label, asked, search, assembled.output_labels[0], facts, tuple(assembled.warnings)
     )
 
 
