@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from evidence.judges.free_decay import free_decay
 from evidence.models.lumped import griffin, small_chain
 from evidence.validation import case_nonlinear_modes
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.cubic_spring import CubicSpring
+from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -143,6 +145,61 @@ def test_a_mode_ends_at_gross_slip_where_that_is_asked():
     found = followed(system, HarmonicLoad(load.static), Discretisation(order=3), ModeSweep(to_gross_slip=True))  # fmt: skip
     assert found.end.startswith("gross slip at 0.2")
     assert [p.slipping for p in found.points[-2:]] == [0.0, 1.0]
+
+
+def test_both_concepts_agree_as_the_square_of_the_damping():
+    def worst(stiffness: float) -> float:
+        gap = np.zeros((3, 1))
+        gap[0, 0] = 1.0
+        friction = Interface(("d",), (Jenkins(k_t=stiffness, limit=0.2 * stiffness),), gap)
+        system = System(lumped(np.eye(1), np.eye(1)), friction, np.array([0]))
+        each = [
+            followed(system, HarmonicLoad(np.zeros(1)), Discretisation(order=5), ModeSweep(span=(0.1, 2.0), points=4, concept=concept))
+            for concept in ("periodic", "decaying")
+        ]  # fmt: skip
+        (w, z), (v, y) = (np.array([(p.omega, p.ratio) for p in e.solutions]).T for e in each)  # fmt: skip
+        assert (w[0], z[0]) == pytest.approx((v[0], y[0]), abs=1e-12)
+        assert z.max() > 0.05 * stiffness
+        last = abs(w[-1] / v[-1] - 1.0)
+        assert abs(z[-1] / y[-1] - 1.0) < 0.1 * stiffness
+        return last
+
+    assert worst(0.02) < 0.02 * worst(0.2)
+
+
+def test_a_decaying_motion_is_that_of_the_eigenvalue_however_it_is_damped():
+    """Two masses, one of them damped strongly: no damping in proportion to the mass makes that a steady motion, but it decays as the eigenvalue says."""
+    gap = np.zeros((3, 2))
+    gap[0, 0] = 1.0
+    stiffness, damping = np.array([[2.0, -1.0], [-1.0, 1.0]]), np.diag([0.0, 0.5])
+    system = System(lumped(np.eye(2), stiffness, damping), Interface(("d",), (Jenkins(k_t=0.5, limit=0.1),), gap), np.array([1]))  # fmt: skip
+    stuck = stiffness + np.diag([0.5, 0.0])
+    values = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-stuck, -damping]]))
+    slowest = min(values[values.imag > 0], key=abs)
+    sweep = ModeSweep(span=(1e-3, 2e-3), points=2, concept="decaying")
+    point = followed(system, HarmonicLoad(np.zeros(2)), Discretisation(order=3), sweep).points[-1]
+    assert point.omega == pytest.approx(abs(slowest), rel=1e-10)
+    assert point.ratio == pytest.approx(-slowest.real / abs(slowest), rel=1e-9)
+    steady = followed(system, HarmonicLoad(np.zeros(2)), Discretisation(order=3), replace(sweep, concept="periodic")).points[-1]  # fmt: skip
+    assert abs(steady.ratio / point.ratio - 1.0) > 1e-3
+
+
+def test_a_free_motion_decays_as_the_mode_says():
+    """In time, by a program of its own: period after period of a mass that rubs lightly."""
+    stiffness, slips = 0.0125, 0.2
+    limits = np.array([slips * stiffness])
+    decay = free_decay(np.eye(1), np.zeros((1, 1)), np.array([stiffness]), limits, np.array([1.5]), 25, 400)  # fmt: skip
+    gap = np.zeros((3, 1))
+    gap[0, 0] = 1.0
+    friction = Interface(("d",), (Jenkins(k_t=stiffness, limit=limits[0]),), gap)
+    system = System(lumped(np.eye(1), np.eye(1)), friction, np.array([0]))
+    for concept in ("periodic", "decaying"):
+        sweep = ModeSweep(span=(0.3, 2.0), points=60, concept=concept)
+        found = followed(system, HarmonicLoad(np.zeros(1)), Discretisation(order=5), sweep)
+        a, w, z = np.array([(p.amplitude, p.omega, p.ratio) for p in found.solutions]).T
+        assert decay.omega == pytest.approx(np.interp(decay.amplitude, a, w), rel=1e-5)
+        assert decay.ratio == pytest.approx(np.interp(decay.amplitude, a, z), rel=2e-3)
+    assert decay.amplitude[-1] < 0.9 * decay.amplitude[0]
 
 
 STUDY = """

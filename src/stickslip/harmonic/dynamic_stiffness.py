@@ -253,7 +253,7 @@ def _dynamic(
     k, c, m = blocks
     stiffness: ComplexArray = np.asarray(k + 1j * s * c - s**2 * m)
     if loss is not None:
-        stiffness += 1j * (s > 0.0) * loss
+        stiffness += 1j * (s != 0.0) * loss
     slope: ComplexArray = np.asarray(1j * c - 2.0 * s * m)
     return stiffness, slope
 

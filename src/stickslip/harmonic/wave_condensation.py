@@ -77,7 +77,7 @@ class SolvedWave:
         """Return the wave at ``s = hω`` in rad/s."""
         k, c, m, loss = self.matrices
         D, G = k, 1j * c - 2 * s * m
-        if s > 0:
+        if s != 0:
             D = k + 1j * (s * c + loss) - s**2 * m
         if self.feedback is not None:
             P = self.feedback.patterns
@@ -178,7 +178,7 @@ class _ModalAt:
         """``v / d``, ``v² / d`` with ``v = p (κ + p)`` and ``d`` of the interior, and their derivatives by s."""
         wave, p = self.wave, 1j * self.s
         v, v_slope = p * (wave.ratio + p), wave.ratio + 2 * p
-        d = 1 + p * wave.damping + p**2 * wave.mass + 1j * (self.s > 0) * wave.loss
+        d = 1 + p * wave.damping + p**2 * wave.mass + 1j * (self.s != 0) * wave.loss
         d_slope = wave.damping + 2 * p * wave.mass
         per = v / d
         per_slope = (v_slope - per * d_slope) / d
@@ -190,7 +190,7 @@ class _ModalAt:
         k, c, m, loss = wave.nn
         scaled = wave.across * self._weights[1]
         return np.asarray(
-            k + 1j * (s * c + (s > 0) * loss) - s**2 * m - scaled @ wave.across.conj().T
+            k + 1j * (s * c + (s != 0) * loss) - s**2 * m - scaled @ wave.across.conj().T
         )
 
     def slope(self, q: Array) -> ComplexArray:
@@ -208,7 +208,7 @@ class _ModalAt:
 
     def inside(self, q: Array, far: Array) -> ComplexArray:
         wave, p = self.wave, 1j * self.s
-        d = 1 + p * wave.damping + p**2 * wave.mass + 1j * (self.s > 0) * wave.loss
+        d = 1 + p * wave.damping + p**2 * wave.mass + 1j * (self.s != 0) * wave.loss
         per = self._weights[0]
         if q.ndim > 1:
             d, per = d[:, None], per[:, None]

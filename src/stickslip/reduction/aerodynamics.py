@@ -379,10 +379,10 @@ class Feedback:
         """Return the (m, m) G at ω in rad/s; of coefficients of one frequency their frozen form, also where a motion grows or decays."""
         return self.influence.force(self.phase_angle, omega, self.reference)
 
-    def beyond_frozen(self, omega: float) -> tuple[ComplexArray, ComplexArray]:
-        """Return what G at ω has beyond the frozen form, (m, m), and the derivative by ω."""
+    def beyond_frozen(self, omega: complex) -> tuple[ComplexArray, ComplexArray]:
+        """Return what G at ω has beyond the frozen form, (m, m), and the derivative by ω; a table knows the real part alone."""
         stiff, damp = self.influence.frozen(self.phase_angle, self.reference)
-        slope = self.influence.slope_of_wave(self.phase_angle, omega)
+        slope = self.influence.slope_of_wave(self.phase_angle, omega.real)
         return self.force(omega) - stiff - 1j * omega * damp, slope - 1j * damp
 
     def _outer(self, inner: ComplexArray) -> Matrix:

@@ -6,6 +6,7 @@ amplitude is periodic, and ``ξ / 2ω`` is the damping ratio that it has without
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from stickslip.response.self_excited.problem import self_excited_motions
 from stickslip.response.system import System
 from stickslip.solve.status import Status
 
+Concept = Literal["periodic", "decaying"]
 BEGINS = 0.5  # of the amplitude at which slip begins
 ENDS = 300.0  # times that amplitude
 TIMES = 12  # as many points as were asked for, at most: lift-off may fold a curve hundreds of times
@@ -37,9 +39,10 @@ class ModePoint:
     amplitude
         Of the followed coordinate in the first harmonic, m.
     omega
-        rad/s.
+        rad/s; of a decaying motion |λ|.
     ratio
-        Damping ratio ``ξ / 2ω``, linear damping included: that at which the motion decays where nothing feeds it.
+        Damping ratio ``ξ / 2ω``, linear damping included: that at which the motion decays where nothing feeds it; of a decaying motion
+        ``-Re λ / |λ|``.
     coefficients
         (H+1, n) displacement of all dofs at that amplitude, m, static term included.
     modal_amplitude
@@ -125,6 +128,9 @@ class ModeSweep:
         Relative.
     to_gross_slip
         Whether the curve ends where every contact that can slip has slipped or opened.
+    concept
+        What motions it is made of: ``periodic`` ones that a level of damping keeps going (Krack 2015), or those that are ``decaying`` as
+        they are, ``e^{λt}`` and its powers (Laxalde & Thouverez 2009).
     """
 
     span: tuple[float, float] | None = None
@@ -132,6 +138,7 @@ class ModeSweep:
     most_harmonics: int = 0
     tolerance: float = 1e-3
     to_gross_slip: bool = False
+    concept: Concept = "periodic"
 
 
 def nonlinear_mode(
@@ -169,7 +176,14 @@ def nonlinear_mode(
     if span is None:
         slips = slip_amplitude(problem)
         span = (BEGINS * slips, ENDS * slips)
-    curve = ModeCurve.of(problem, span, along.points, along.most_harmonics, along.tolerance)
+    curve = ModeCurve.of(
+        problem,
+        span,
+        along.points,
+        along.most_harmonics,
+        along.tolerance,
+        decaying=along.concept == "decaying",
+    )
     first, last = (float(np.log(a)) for a in span)
     route = Route(first=first, last=last, points=along.points, leaves=False)
     found = _followed(curve, route, to_gross_slip=along.to_gross_slip)
@@ -182,16 +196,16 @@ def mode_point(curve: ModeCurve, found: Followed) -> ModePoint:
     """Return what a point of the curve tells."""
     problem, y = curve.problems[found.level], found.point.x
     scale = float(np.exp(found.p))
-    omega, order = problem.omega(y), problem.balance.order
-    motion = scale * problem.relative(y)
-    full = problem.damped(float(y[-1])).linear.recover(omega, motion)
+    order = problem.balance.order
+    omega, ratio = curve.frequency_and_damping(found.level, y)
+    full = curve.linear(found.level, y).recover(problem.omega(y), scale * problem.relative(y))
     energies = [_product(problem.system, h, full[h]) for h in range(1, order + 1)]
     squares = (omega * np.arange(1, order + 1)) ** 2
     contacts = contacts_of(problem, y, scale) if found.converged else Contacts(np.nan, np.nan)
     return ModePoint(
         float(abs(full[1, problem.dof])),
         omega,
-        problem.ratio(y),
+        ratio,
         full,
         float(np.sqrt(energies[0])),
         0.5 * float(squares @ np.array(energies)),

@@ -8,6 +8,7 @@ import numpy as np
 
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.bordered import PeriodicProblem
+from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.response.branch import Curve, Followed, Judged
 from stickslip.response.equilibrium import preload
 from stickslip.response.nonlinear_modes.measure import by_energy
@@ -40,11 +41,14 @@ class ModeCurve(Curve):
         Steps.
     tolerance
         Relative change of frequency or damping ratio beyond which harmonics are raised.
+    decaying
+        Whether motions are those that decay as they are, at the complex frequency λ, not steady ones that a level of damping keeps going.
     """
 
     problems: tuple[SelfExcited, ...]
     control: StepControl
     tolerance: float
+    decaying: bool = False
 
     @classmethod
     def of(
@@ -54,6 +58,8 @@ class ModeCurve(Curve):
         points: int,
         most: int = 0,
         tolerance: float = 1e-3,
+        *,
+        decaying: bool = False,
     ) -> "ModeCurve":
         """Return the curve of a mode with its harmonics, and levels of more up to `most`."""
         every = [problem]
@@ -61,7 +67,7 @@ class ModeCurve(Curve):
             every.append(problem.with_order(min(MORE * every[-1].balance.order + 1, most)))
         length = abs(float(np.log(span[1] / span[0])))
         control = StepControl(scale=length / (points * LARGEST), first=0.05, largest=LARGEST)
-        return cls(tuple(every), control, tolerance)
+        return cls(tuple(every), control, tolerance, decaying)
 
     @property
     def levels(self) -> int:
@@ -71,7 +77,26 @@ class ModeCurve(Curve):
     @cached_property
     def equations(self) -> tuple[PeriodicProblem, ...]:
         """The equation of each level."""
-        return tuple(p.over_amplitude(held=by_energy(p)) for p in self.problems)
+        return tuple(
+            p.over_amplitude(
+                p.decaying if self.decaying else None, held=by_energy(p), linear_alone=True
+            )
+            for p in self.problems
+        )
+
+    def linear(self, level: int, y: FloatArray) -> DynamicStiffness:
+        """Return what vibrates as a motion feels it."""
+        own = self.problems[level]
+        return (own.decaying if self.decaying else own.damped)(float(y[-1])).linear
+
+    def frequency_and_damping(self, level: int, y: FloatArray) -> tuple[float, float]:
+        """Return frequency, rad/s, and damping ratio of a motion; of one that decays |λ| and -Re λ / |λ|."""
+        own = self.problems[level]
+        omega, ratio = own.omega(y), own.ratio(y)
+        if not self.decaying:
+            return omega, ratio
+        stretch = float(np.hypot(1.0, ratio))
+        return omega * stretch, ratio / stretch
 
     @cached_property
     def static(self) -> FloatArray:
@@ -143,7 +168,7 @@ class ModeCurve(Curve):
 
     def height(self, found: Followed) -> float:
         """Return the damping ratio."""
-        return self.problems[found.level].ratio(found.point.x)
+        return self.frequency_and_damping(found.level, found.point.x)[1]
 
     def slips_grossly(self, found: Followed) -> bool:
         """Whether every contact that can slip has slipped or opened in a motion."""
@@ -156,7 +181,6 @@ class ModeCurve(Curve):
 
     def _change(self, level: int, one: FloatArray, other: FloatArray) -> float:
         """Return the relative difference of two motions in frequency or damping ratio, the larger one."""
-        own = self.problems[level]
-        ratios = own.ratio(one), own.ratio(other)
-        size = max(abs(ratios[0]), abs(ratios[1]), FAINT_RATIO)
-        return max(abs(float(np.expm1(other[-2] - one[-2]))), abs(ratios[1] - ratios[0]) / size)
+        (slow, few), (fast, many) = (self.frequency_and_damping(level, y) for y in (one, other))
+        size = max(abs(few), abs(many), FAINT_RATIO)
+        return max(abs(fast / slow - 1.0), abs(many - few) / size)

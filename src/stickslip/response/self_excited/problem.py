@@ -19,6 +19,7 @@ from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.bordered import Condition, PeriodicProblem, Setting, State
+from stickslip.harmonic.decaying import DecayingStiffness
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.parameters import BalanceAt
 from stickslip.operators import times
@@ -106,24 +107,31 @@ class SelfExcited:
         rate = -level * self.mode.omega
         return replace(self.balance, linear=self.balance.linear.with_mass_damping(rate))
 
+    def decaying(self, level: float) -> HarmonicBalance:
+        """Return the balance at 1 m of motions that decay by themselves, at the rate of half a level of damping."""
+        rate = 0.5 * level * self.mode.omega
+        return replace(self.balance, linear=DecayingStiffness(self.balance.linear, rate))
+
     def over_amplitude(
         self,
         family: BalanceAt | None = None,
         scale: float = 1.0,
         held: tuple[Condition, ...] | None = None,
+        *,
+        linear_alone: bool = False,
     ) -> PeriodicProblem:
         """Return the equation whose parameter is ``ln a`` and whose last unknown is a level, over `scale`; None: that of damping.
 
-        What is `held`, size and phase of the motion over `a`, is that of the coordinate unless other conditions are given.
+        What is `held`, size and phase of the motion over `a`, is that of the coordinate unless other conditions are given. A level that changes
+        nothing but linear forces (`linear_alone`), as damping, costs no evaluation of contacts.
         """
         members = family or self.damped
 
         def setting(extra: FloatArray, p: float) -> Setting:
             made = self._setting(members(scale * float(extra[1])), float(extra[0]), p)
-            return replace(made, linear_alone=family is None)
+            return replace(made, linear_alone=linear_alone or family is None)
 
-        whole = self._bordered(setting, held)
-        return replace(whole, by_parameter=_by_size) if family is None else whole
+        return replace(self._bordered(setting, held), by_parameter=_by_size)
 
     def limit_cycle(self) -> PeriodicProblem:
         """Return the equation of a motion of given damping, whose last unknown is ``ln a`` and whose parameter is its level: that of a limit cycle is zero."""

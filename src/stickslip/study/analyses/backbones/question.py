@@ -89,6 +89,7 @@ class Question:
             most_harmonics=asked.most_harmonics,
             tolerance=0.01 * asked.accuracy_percent,
             to_gross_slip=asked.to_gross_slip,
+            concept=asked.concept,
         )
 
 

@@ -4,6 +4,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
+from stickslip.response.nonlinear_modes.backbone import Concept
 from stickslip.study.file.harmonics import HIGHEST
 from stickslip.study.file.section import Positive, Section, once, rising_pair
 
@@ -48,6 +49,11 @@ class NonlinearModeTable(Section):
     to_gross_slip: bool = Field(
         False,
         description="whether a mode ends where every contact that can slip has slipped or opened",
+    )
+    concept: Concept = Field(
+        "periodic",
+        description="what motions a mode is made of: periodic ones that a damping in proportion to the mass keeps going (Krack 2015), or those that are "
+        "decaying as they are (Laxalde and Thouverez 2009); both agree where damping is small",
     )
 
     @model_validator(mode="after")

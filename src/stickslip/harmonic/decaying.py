@@ -1,0 +1,145 @@
+"""What vibrates, as a motion feels it that decays: ``D(s) = K + s C + s² M`` at ``s = hλ`` with ``λ = -β + iω``.
+
+A motion ``Re sum_h X_h e^{hλt}`` is the power series of one that decays as ``e^{λt}`` (Laxalde & Thouverez, Journal of Sound and Vibration 322 (2009)
+1009-1025). Its condensation is that of a steady motion at the complex frequency ``ω + iβ``; the mean feels the static stiffness.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.harmonic.dynamic_stiffness import Condensed
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.fourier import to_complex, to_real
+from stickslip.harmonic.linear import DynamicStiffness
+from stickslip.harmonic.spectral import Blocks
+from stickslip.harmonic.support import Harmonics
+
+
+@dataclass(frozen=True, eq=False)
+class DecayingStiffness:
+    """A condensed structure at frequencies ``ω + iβ``.
+
+    Parameters
+    ----------
+    steady
+        The same for steady motions.
+    rate
+        β, 1/s; negative where the motion grows.
+    """
+
+    steady: DynamicStiffness
+    rate: float
+
+    @property
+    def n(self) -> int:
+        """Number of retained coordinates."""
+        return self.steady.n
+
+    @property
+    def retained(self) -> IntArray:
+        """Retained dofs."""
+        return self.steady.retained
+
+    @property
+    def nn(self) -> Blocks:
+        """Stiffness, damping and mass on the retained coordinates; for scales."""
+        return self.steady.nn
+
+    @property
+    def load(self) -> HarmonicLoad:
+        """Load on all dofs, N."""
+        return self.steady.load
+
+    @property
+    def most(self) -> int | None:
+        """Highest harmonic for which there are matrices; None: any."""
+        return self.steady.most
+
+    def load_at(self, omega: float) -> HarmonicLoad:
+        """Return the load at a frequency, N."""
+        return self.steady.load_at(omega)
+
+    def with_load(self, load: HarmonicLoad) -> "DecayingStiffness":
+        """Return the same structure under another load."""
+        return replace(self, steady=self.steady.with_load(load))
+
+    def with_mass_damping(self, rate: float) -> "DecayingStiffness":
+        """Return the same structure with `rate` (1/s) times its mass added to its damping."""
+        return replace(self, steady=self.steady.with_mass_damping(rate))
+
+    def condensed(self, omega: float, order: int) -> Condensed:
+        """Return stiffness, load and their ω-derivatives for harmonics 0..`order` at `omega` (rad/s)."""
+        return self.steady.condensed(self._at(omega), order)
+
+    def products(self, omega: float, harmonics: Harmonics) -> "DecayingProducts":
+        """Return the same by its products, at `omega` (rad/s) and for the `harmonics` of a support."""
+        return DecayingProducts(self.condensed(omega, harmonics[-1]), harmonics)
+
+    def recover(self, omega: float, q: ComplexArray) -> ComplexArray:
+        """Return the (H+1, n_all) coefficients of every dof from those of the retained ones (H+1, n)."""
+        return self.steady.recover(self._at(omega), q)
+
+    def recover_change(self, omega: float, dq: ComplexArray) -> ComplexArray:
+        """Return the change of every dof (H+1, n_all) that a change `dq` of the retained coordinates causes."""
+        return self.steady.recover_change(self._at(omega), dq)
+
+    def output_rows(self, omega: float, harmonic: int, dofs: IntArray) -> ComplexArray:
+        """Return the (k, n) matrix that makes of a change of the retained coordinates in one harmonic that of `dofs` (k,)."""
+        return self.steady.output_rows(self._at(omega), harmonic, dofs)
+
+    def strain_energy(self, omega: float, q: ComplexArray) -> FloatArray:
+        """Return the (H+1,) strain energy of the whole structure in each harmonic, mean over the period, J."""
+        return self.steady.strain_energy(self._at(omega), q)
+
+    def _at(self, omega: float) -> float:
+        # all that is asked of it is analytic in the frequency
+        return complex(omega, self.rate)  # type: ignore[return-value]
+
+
+@dataclass(frozen=True, eq=False)
+class DecayingProducts:
+    """A condensed structure at a complex frequency, by its products; see `Products`."""
+
+    condensed: Condensed
+    harmonics: Harmonics
+
+    @property
+    def n(self) -> int:
+        """Number of retained coordinates."""
+        return int(self.condensed.load.shape[1])
+
+    @property
+    def load(self) -> FloatArray:
+        """(m, n) load, N."""
+        return to_real(self.condensed.load[list(self.harmonics)])
+
+    @property
+    def load_slope(self) -> FloatArray:
+        """(m, n) its derivative by ω."""
+        return to_real(self.condensed.load_derivative[list(self.harmonics)])
+
+    def same(self, other: object) -> bool:
+        """Whether `other` has the same dynamic stiffness; loads may differ."""
+        return isinstance(other, DecayingProducts) and other.condensed is self.condensed
+
+    def product(self, rows: FloatArray) -> FloatArray:
+        """Return the rows of ``Z q`` for the `rows` of q."""
+        return self._times(self.condensed.stiffness, rows)
+
+    def transposed_product(self, rows: FloatArray) -> FloatArray:
+        """Return the rows of the product with the transpose of the real form of Z."""
+        return self._times(self.condensed.stiffness.conj().transpose(0, 2, 1), rows)
+
+    def product_and_slope(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return ``Z q`` and ``∂Z/∂ω q``."""
+        return self.product(rows), self._times(self.condensed.derivative, rows)
+
+    def block(self, harmonic: int) -> ComplexArray:
+        """Return ``Z_h``, (n, n) complex in Fortran order, to be changed at will."""
+        return np.array(self.condensed.stiffness[harmonic], order="F")
+
+    def _times(self, matrices: ComplexArray, rows: FloatArray) -> FloatArray:
+        product = matrices[list(self.harmonics)] @ to_complex(rows)[:, :, None]
+        return to_real(product[..., 0])
