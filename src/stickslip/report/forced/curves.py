@@ -9,6 +9,7 @@ from plotly.subplots import make_subplots
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.support import named
 from stickslip.report.cases import ShownCase, first_number
+from stickslip.report.forced.bifurcations import mark_bifurcations
 from stickslip.report.forced.measured import measured_of
 from stickslip.report.forced.working import shade_working_range
 from stickslip.report.plot import ALARM, GRID, MUTED, Plot, key_marker, log_ticks, styled
@@ -167,15 +168,16 @@ def frequency_response(response: Response) -> Plot | None:
             figure.add_trace(key_marker(word, symbol, "key"))
     if not response.converged.all():
         figure.add_trace(_failures(response))
+    x, name, unit = abscissa(response)
+    marked = mark_bifurcations(figure, response, float(np.nanmean(x / response.hz)))
     styled(figure, 540)
     buttons = _scale_buttons(logarithmic=True)
     figure.update_layout(updatemenus=buttons, showlegend=len(figure.data) > 1)
-    _, name, unit = abscissa(response)
     figure.update_xaxes(title_text=f"{name} ({unit})")
     ticks = log_ticks(response.accepted * scale.factor)
     figure.update_yaxes(title_text=f"{response.quantity} ({scale.unit})", type="log", **ticks)
     title = "Frequency response of all cases" if len(response.cases) > 1 else "Frequency response"
-    return Plot("response", title, _caption(response), figure)
+    return Plot("response", title, _caption(response) + marked, figure)
 
 
 def _low_caption(response: Response, cases: list[ShownCase], low: FloatArray) -> str:

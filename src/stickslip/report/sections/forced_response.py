@@ -1,6 +1,7 @@
 """Forced responses on the page."""
 
 from stickslip.report.forced import tables
+from stickslip.report.forced.bifurcations import bifurcations
 from stickslip.report.forced.bodies import bodies, energy
 from stickslip.report.forced.choice import choice
 from stickslip.report.forced.contact import chooser, hysteresis_t, hysteresis_w, state_map
@@ -51,7 +52,13 @@ SECTION: Section = Section(
         Block(
             "checks",
             "Checks",
-            (stability, tables.more_harmonics, tables.time_integration, tables.retention),
+            (
+                stability,
+                bifurcations,
+                tables.more_harmonics,
+                tables.time_integration,
+                tables.retention,
+            ),
         ),
     ),
     cards=cards,

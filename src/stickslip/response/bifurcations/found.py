@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from stickslip.response.forced.problem import ForcedPoint
+from stickslip.response.stability.multipliers import Stability
 from stickslip.units import HZ
 
 BifurcationKind = Literal[
@@ -108,18 +109,28 @@ class Bifurcations:
         First and last frequency of each step in which nothing could be seen, rad/s, and why.
     examined
         Number of motions whose multipliers were asked for.
+    stabilities
+        What is known of the stability of each point of the branch; None where it was not asked for, or nothing is known.
     """
 
     found: tuple[Bifurcation, ...]
     unseen: tuple[tuple[float, float, str], ...]
     examined: int
+    stabilities: tuple[Stability | None, ...] = ()
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What was found, where nobody looked, and what it took."""
+        """What was found, and `limits`."""
         told = [b.sentence for b in self.found] or ["no bifurcation was met on the branch"]
-        told += [
+        return (*told, *self.limits)
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """Where nobody looked, and what looking took."""
+        told = [
             f"between {a / HZ:.6g} and {b / HZ:.6g} Hz bifurcations are not seen: {why}"
             for a, b, why in self.unseen
         ]
-        return (*told, f"multipliers of {self.examined} motions were asked for")
+        if self.examined:
+            told.append(f"multipliers of {self.examined} motions were asked for")
+        return tuple(told)

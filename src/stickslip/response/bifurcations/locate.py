@@ -81,7 +81,8 @@ def bifurcations(
         branch.pop()
     for run in _runs(branch):
         walk.through(branch, run)
-    return Bifurcations(tuple(walk.ordered()), tuple(walk.unseen), walk.examined)
+    known = [walk.seen.get(id(point), (point, None))[1] for point in points]
+    return Bifurcations(tuple(walk.ordered()), tuple(walk.unseen), walk.examined, tuple(known))
 
 
 def _runs(branch: Sequence[ForcedPoint]) -> Iterator[range]:
@@ -133,9 +134,9 @@ class _Walk:
     def ordered(self) -> list[Bifurcation]:
         """Return the bifurcations along the branch, a fold's multiplier not being counted twice."""
         own = sorted(self.crossings, key=lambda c: (c.found.place, c.share))
-        folds = [c for c in own if c.found.kind == "fold"]
         taken: set[int] = set()
-        for fold in folds:
+        counted: dict[int, Bifurcation] = {}
+        for fold in (c for c in own if c.found.kind == "fold"):
             near = [
                 c
                 for c in own
@@ -147,8 +148,12 @@ class _Walk:
             ]
             if near:
                 way = fold.found.place[0] + fold.share
-                taken.add(id(min(near, key=lambda c: abs(c.found.place[0] + c.share - way))))
-        return [c.found for c in own if id(c) not in taken]
+                its = min(near, key=lambda c: abs(c.found.place[0] + c.share - way))
+                taken.add(id(its))
+                counted[id(fold)] = replace(
+                    fold.found, before=its.found.before, after=its.found.after
+                )
+        return [counted.get(id(c), c.found) for c in own if id(c) not in taken]
 
     def _lost(self, first: float, last: float, why: str) -> None:
         self.unseen.append((first, last, why))

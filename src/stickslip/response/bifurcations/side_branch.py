@@ -64,12 +64,24 @@ class SideBranch:
         """(points,) amplitudes over the harmonics that the load drives, m."""
         return np.array([self.problem.amplitude(p) for p in self.points])
 
+    def amplitude(self, point: ForcedPoint, output: int) -> float:
+        """Return the amplitude of an output over the harmonics that the load drives, m; of a wheel that of the sector where it is largest."""
+        where = [self.problem.amplitude_of(point.omega, point.coefficients, o) for o in self._of_all(output)]  # fmt: skip
+        return float(max(where))
+
     def subharmonic(self, point: ForcedPoint, output: int = 0) -> float:
-        """Return the amplitude of an output over all harmonics that are no multiples of the load's frequency, m."""
+        """Return the amplitude of an output over all harmonics that are no multiples of the load's frequency, m; of a wheel the largest."""
         motion = self.problem.low.linear.recover(point.omega, point.coefficients)
-        row = motion[:, self.problem.system.outputs[output]].copy()
-        row[:: self.periods] = 0.0
-        return float(np.linalg.norm(row))
+        rows = motion[:, self.problem.system.outputs[self._of_all(output)]]
+        rows[:: self.periods] = 0.0
+        return float(np.linalg.norm(rows, axis=0).max())
+
+    def _of_all(self, output: int) -> list[int]:
+        """Return the positions of an output in all sectors."""
+        if self.sector_of is None:
+            return [output]
+        each = self.problem.system.outputs.size // (int(self.sector_of.max()) + 1)
+        return list(range(output, self.problem.system.outputs.size, each))
 
     def localisation(self, point: ForcedPoint) -> float:
         """Return the share of the vibration, by squares, that the sector with the largest one has; of what is no wheel that of a coordinate."""

@@ -15,6 +15,12 @@ from stickslip.harmonic.support import named
 from stickslip.response.equilibrium import bonded_start
 from stickslip.response.forced.response import ForcedPoint, Sweep, forced_response
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
+from stickslip.study.analyses.forced.bifurcating import (
+    bifurcations_line,
+    followed,
+    located,
+    of_bifurcations,
+)
 from stickslip.study.analyses.forced.blades import of_blades
 from stickslip.study.analyses.forced.comparison import Check
 from stickslip.study.analyses.forced.dataset import put_together
@@ -64,7 +70,16 @@ from stickslip.units import HZ
 NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
 COMPILED = 5.0  # seconds of the first evaluation: below, it was found compiled
 BLADES = "blades"  # of a wheel whose sectors differ
-NOTES = ("model", "response", BLADES, STABLE, IN_TIME, HARMONICS)  # what makes up the dataset
+BIFURCATIONS = "bifurcations"
+NOTES = (
+    "model",
+    "response",
+    BLADES,
+    STABLE,
+    BIFURCATIONS,
+    IN_TIME,
+    HARMONICS,
+)  # what makes up the dataset
 
 
 class ForcedResponseAnalysis:
@@ -106,6 +121,8 @@ class ForcedResponseAnalysis:
         if inputs.model.blades is not None and notes.get(BLADES) is None:
             notes.put(BLADES, of_blades(inputs, response))
         _judge(inputs, response, notes)
+        if inputs.bifurcations != "off" and notes.get(BIFURCATIONS) is None:
+            notes.put(BIFURCATIONS, _bifurcations(inputs, response))
         if HARMONICS in inputs.checks:
             _check_harmonics(inputs, response, notes)
         if failure is not None:
@@ -130,6 +147,7 @@ class ForcedResponseAnalysis:
             *question.orders_lines,
             *(f"harmonics: {line}" for line in chooser.lines(passages)),
             cost_line(question),
+            *bifurcations_line(question),
             *inside(question),
             *(
                 f"WARNING: {text}"
@@ -197,6 +215,17 @@ def _judge(question: Question, response: Response, notes: Notes) -> None:
     for one in told:
         LOG.info(f"stability: {question.said(one.sentence)}")
     notes.put(STABLE, of_examined(told))
+
+
+def _bifurcations(question: Question, response: Response) -> Values:
+    """Locate the bifurcations of the response, and follow what leaves there."""
+    found = located(question, response)
+    for line in found.sentences:
+        LOG.info(f"bifurcations: {question.said(line)}")
+    sides = followed(question, found)
+    for begin, side in sides:
+        LOG.info(f"from {begin.omega / HZ:.6g} Hz: {question.said(side.sentence)}")
+    return of_bifurcations(question, response, found, sides)
 
 
 def _examined(question: Question, response: Response, notes: Notes) -> list[Examined]:

@@ -273,6 +273,14 @@ class Curve:
             for point in sorted(near, key=lambda i: i != self.peak)[:1]:
                 yield point, said
 
+    def rows(self, word: str) -> Iterator[dict[str, Any]]:
+        """Yield what is told of the case along the dimension `word`, whose variables begin with it."""
+        if f"{word}_case" not in self.data:
+            return
+        own = [n for n, v in self.data.data_vars.items() if v.dims == (word,)]
+        for k in np.flatnonzero(self.data[f"{word}_case"].values == self.case):
+            yield {str(n): self.data[n].values[k] for n in own}
+
     @cached_property
     def attained(self) -> BoolArray:
         """(n,) whether a time integration settled to the same amplitude."""

@@ -27,8 +27,18 @@ ROWS = {
     "check": ("verify_case", "verify_frequency_hz"),
     "examined": ("stability_case", "stability_frequency_hz"),
     "tuned_point": ("tuned_case", "tuned_frequency_hz"),
+    "bifurcation": ("bifurcation_case", "bifurcation_frequency_hz"),
+    "side_branch": ("side_branch_case", "side_branch_frequency_hz"),
+    "side_point": ("side_point_case", "side_point_frequency_hz"),
 }
-SOME = ("check", "examined", "tuned_point")  # dimensions of what some cases may lack
+SOME = (
+    "check",
+    "examined",
+    "tuned_point",
+    "bifurcation",
+    "side_branch",
+    "side_point",
+)  # dimensions of what some cases may lack
 COUNTED = (
     "harmonic",
     "sample",

@@ -58,6 +58,8 @@ class Question:
         Whether it is the first case, which says what all have in common.
     examine
         Of which points the stability is examined: ``peak``, ``all`` or ``off``.
+    bifurcations
+        Which bifurcations are located along the branch: ``off``, ``folds``, ``all``, or ``branches``: all, and what leaves there is followed.
     """
 
     label: str
@@ -69,6 +71,7 @@ class Question:
     checks: frozenset[str] = frozenset()
     first: bool = True
     examine: Literal["peak", "off", "all"] = "peak"
+    bifurcations: Literal["off", "folds", "all", "branches"] = "off"
 
     @property
     def over_speed(self) -> bool:
@@ -152,7 +155,9 @@ def question_of(case: Case, model: Model) -> Question:
     if IN_TIME in case.checks:
         harmonics = max(harmonics, model.sectors // 2)  # those that all waves of a wheel need
     assembled = model.assembled(harmonics, case.store)
-    if settings.forced_response.stability != "off" and examines_every_wave(assembled.system):
+    asked = settings.forced_response
+    examined = asked.stability != "off" or asked.bifurcations in ("all", "branches")
+    if examined and examines_every_wave(assembled.system):
         assembled = model.assembled(harmonics, case.store, every_wave=True)
     if IN_TIME in case.checks:
         _require_sectors(model, assembled)
@@ -175,6 +180,7 @@ def question_of(case: Case, model: Model) -> Question:
         checks=case.checks,
         first=case.index == 0,
         examine=settings.forced_response.stability,
+        bifurcations=settings.forced_response.bifurcations,
     )
 
 

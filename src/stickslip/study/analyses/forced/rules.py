@@ -15,6 +15,11 @@ from stickslip.study.analyses.verdict import Level, from_json
 
 LARGE_SHIFT = 0.01  # relative change of the peak with a tenth of the retention stiffness
 STUCK = 1e-18  # m/N: no structure is so stiff; what moves less sticks to rigid contacts or is held
+UNSTABLE = 1  # flag of motion_stability
+LEAVING = dict.fromkeys(
+    ("period doubling", "branch point"),
+    'forced_response.bifurcations = "branches" follows what leaves there.',
+)
 IN_TIME = "--verify integrates in time at the peak"
 IN_TIME_TELLS = (
     "; an integration in time (--verify) tells more"  # what a verdict says as its remedy
@@ -193,6 +198,24 @@ def stability(case: Curve) -> Iterator[Finding]:
             yield Finding("doubtful", why, remedy, (point,))
 
 
+def bifurcated(case: Curve) -> Iterator[Finding]:
+    """Tell where the branch loses its stability, and take no motion for one that a machine keeps whose multipliers show that a disturbance grows."""
+    told = {point for point, _ in case.examined("stability_verdict")}
+    for i in np.flatnonzero(case.floats("motion_stability") == UNSTABLE):
+        if int(i) not in told and case.converged[i]:
+            why = "a machine does not stay there: multipliers lie outside the unit circle"
+            remedy = 'See the table of bifurcations: bifurcations = "branches" follows what leaves the response.'
+            yield Finding("wrong", why, remedy, (int(i),), float(case.amplitude[i]))
+    left = {float(said["side_branch_frequency_hz"]) for said in case.rows("side_branch")}
+    for said in case.rows("bifurcation"):
+        if said["bifurcation_kind"] == "fold":  # the rule of folds tells of these
+            continue
+        remedy = LEAVING.get(str(said["bifurcation_kind"]), "")
+        if float(said["bifurcation_frequency_hz"]) in left:
+            remedy = "The branch that leaves there is drawn with the response."
+        yield Finding("trusted", str(said["bifurcation_sentence"]), remedy)
+
+
 def without_place(sentence: str) -> str:
     """Return the sentence of a check without the frequency at its head, which a verdict names itself, and without its full stop."""
     head, found, rest = sentence.partition(" Hz: ")
@@ -267,6 +290,7 @@ RULES: tuple[Rule, ...] = (
     unsolved,
     in_time,
     stability,
+    bifurcated,
     audited,
     few_harmonics,
     twice_the_harmonics,

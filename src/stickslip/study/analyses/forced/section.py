@@ -61,7 +61,11 @@ class ForcedResponse(Section):
         description="whether a disturbance dies, by Floquet multipliers. peak: at the peak of each case and at up to four doubtful "
         "points, the nearest to it; all: at every point; off: nowhere",
     )
-
+    bifurcations: Literal["off", "folds", "all", "branches"] = Field(
+        "off",
+        description="bifurcations located along the branch. folds: where it turns back; all: period doublings, Neimark-Sacker bifurcations "
+        "and branch points, too, by the multipliers at every point; branches: all, and the periodic motions that leave there are followed",
+    )
     static_friction_share: float | None = Field(
         None,
         gt=0,

@@ -48,6 +48,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
         _lines(_choice_title(data), choices(data)),
         _lines("Against twice as many harmonics", _sentences(data, "reference_sentence", labels)),
         _lines("Is it stable?", _along(data, "stability", labels)),
+        _lines("Bifurcations", bifurcation_lines(data, labels)),
         _lines("Against time integration", _along(data, "verify", labels)),
     ]
     return tuple(table for table in found if table.rows or table.lines)
@@ -167,6 +168,20 @@ def _row(case: xr.Dataset, label: str) -> tuple[str, ...]:
         *(str(int(case[name])) for name in COUNTS),
         f"{sum(float(case[name]) for name in SECONDS):.2f}",
     )
+
+
+def bifurcation_lines(data: xr.Dataset, labels: list[str]) -> tuple[str, ...]:
+    """Return what was found of bifurcations and of branches that leave there, and where nobody looked; nothing where none were asked for."""
+    if "bifurcations_limits" not in data:
+        return ()
+    found = _along(data, "bifurcation", labels) or ("no bifurcation was met on the branch",)
+    return (*found, *beside_bifurcations(data, labels))
+
+
+def beside_bifurcations(data: xr.Dataset, labels: list[str]) -> tuple[str, ...]:
+    """Return what became of the branches that leave at bifurcations, and where nobody looked for these."""
+    limits = _sentences(data, "bifurcations_limits", labels)
+    return (*_along(data, "side_branch", labels), *limits)
 
 
 def _lines(title: str, lines: tuple[str, ...]) -> TextTable:
