@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
-from stickslip.harmonic.bordered import Condition, State
+from stickslip.harmonic.bordered import State
 from stickslip.response.self_excited.problem import SelfExcited
 
 
@@ -55,7 +55,7 @@ class Phase:
         return _row(state, slope)
 
 
-def by_energy(problem: SelfExcited) -> tuple[Condition, Condition]:
+def by_energy(problem: SelfExcited) -> tuple[Size, Phase]:
     """Return size and phase of the motions of a mode by the mass of all that moves; of the linear mode, size one is an amplitude of one of its coordinate.
 
     The mass is condensed at the frequency of the linear mode.

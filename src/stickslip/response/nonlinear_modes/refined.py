@@ -1,0 +1,147 @@
+"""More points of a backbone where those between which it is interpolated do not tell enough: damping begins with a corner where slip does."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.branch import Followed, Judged
+from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint, mode_point
+from stickslip.response.nonlinear_modes.levels import ModeCurve
+from stickslip.response.nonlinear_modes.measure import Size, by_energy
+from stickslip.response.nonlinear_modes.oscillator import FEWEST, modal_oscillator
+from stickslip.response.parameter import Discretisation
+from stickslip.response.self_excited.problem import self_excited_motions
+from stickslip.solve.branch import Point
+from stickslip.solve.newton_method import newton
+
+FAINT_RATIO = 1e-4  # damping ratios below are compared with this one
+DOUBT = 4.0  # times the tolerance by which a point is off what those twice as far apart foretell
+SHORTEST = 1e-3  # of ln a: points are not set closer
+
+
+def refined(
+    backbone: Backbone,
+    load: HarmonicLoad,
+    how: Discretisation | None = None,
+    tolerance: float = 5e-3,
+    most: int = 80,
+) -> Backbone:
+    """Return a backbone with points added until interpolation between them foretells damping and modal force.
+
+    Parameters
+    ----------
+    backbone
+        As `nonlinear_mode` found it.
+    load
+        What drives it.
+    how
+        Samples and solver; harmonics are as many as the backbone has at most.
+    tolerance
+        Relative, of what is foretold in the middle of two points.
+    most
+        Points added at most, where the curve is the least known first.
+    """
+    known = list(backbone.solutions)
+    if len(known) < FEWEST:
+        return backbone
+    own = _Solver.of(backbone, how or Discretisation())
+    wanted = _doubted(backbone, load, known, tolerance)
+    added = 0
+    while wanted and added < most:
+        _, before, after = wanted.pop()
+        here = own.between(before, after)
+        if here is None or not here.converged:
+            continue
+        foretold = _numbers(backbone, load, known, here.modal_amplitude, known.index(before))
+        known.insert(known.index(before) + 1, here)
+        added += 1
+        off = _distance(foretold, _own_numbers(backbone, load, here))
+        if off > tolerance:
+            wanted += [(off, a, b) for a, b in ((before, here), (here, after)) if _far(a, b)]
+            wanted.sort(key=lambda one: one[0])
+    return replace(backbone, points=tuple(known))
+
+
+@dataclass(frozen=True, eq=False)
+class _Solver:
+    """The equation of the mode, with one set of harmonics."""
+
+    curve: ModeCurve
+    size: Size
+
+    @classmethod
+    def of(cls, backbone: Backbone, how: Discretisation) -> "_Solver":
+        own = self_excited_motions(
+            backbone.system, backbone.load, backbone.mode, backbone.dof, how
+        ).with_order(max(p.order for p in backbone.points))
+        return cls(ModeCurve.of(own, (1.0, np.e), 1), by_energy(own)[0])
+
+    def between(self, before: ModePoint, after: ModePoint) -> ModePoint | None:
+        """Return the motion of a size between those of two points."""
+        own, equation = self.curve.problems[0], self.curve.problem(0)
+        sizes = [self._size(p) for p in (before, after)]
+        motions = [self._retained(p) / s for p, s in zip((before, after), sizes, strict=True)]
+        omega = float(np.sqrt(before.omega * after.omega))
+        level = own.level(0.5 * (before.ratio + after.ratio), omega)
+        mean: ComplexArray = np.asarray(0.5 * (motions[0] + motions[1]))
+        start = own.unknowns(mean, omega, level)
+        p = float(np.log(sizes[0] * sizes[1])) / 2
+        found = newton(lambda y: equation.linearise(y, p), start, own.how.newton)
+        point = Point(found.x, p, np.zeros(found.x.size + 1), 0.0, found, 0.0)
+        return mode_point(self.curve, Followed("found", 0, 0, point, Judged(), 0.0))
+
+    def _retained(self, point: ModePoint) -> ComplexArray:
+        balance = self.curve.problems[0].balance
+        out = np.zeros((balance.order + 1, balance.linear.n), dtype=complex)
+        out[: point.order + 1] = point.coefficients[:, balance.linear.retained]
+        return out
+
+    def _size(self, point: ModePoint) -> float:
+        x = self._retained(point)[1:]
+        return float(np.sqrt(np.vdot(x, x @ self.size.weight.T).real))
+
+
+def _doubted(
+    backbone: Backbone, load: HarmonicLoad, known: Sequence[ModePoint], tolerance: float
+) -> list[tuple[float, ModePoint, ModePoint]]:
+    """Return neighbours about which something is in doubt, those that are most at the end: where one point is not foretold by the others."""
+    off = np.zeros(len(known))
+    for i in range(1, len(known) - 1):
+        others = [*known[:i], *known[i + 1 :]]
+        foretold = _numbers(backbone, load, others, known[i].modal_amplitude, i - 1)
+        off[i] = _distance(foretold, _own_numbers(backbone, load, known[i]))
+    found = [
+        (max(off[i], off[i + 1]), known[i], known[i + 1])
+        for i in range(len(known) - 1)
+        if max(off[i], off[i + 1]) > DOUBT * tolerance and _far(known[i], known[i + 1])
+    ]
+    return sorted(found, key=lambda one: one[0])
+
+
+def _numbers(
+    backbone: Backbone, load: HarmonicLoad, known: Sequence[ModePoint], amplitude: float, first: int
+) -> FloatArray:
+    """Return frequency, damping ratio and modal force at an amplitude after the point `first`, interpolated between known points."""
+    own = modal_oscillator(replace(backbone, points=tuple(known)), load)
+    logs = np.log([known[first].modal_amplitude, amplitude])
+    before = float(np.sum(np.abs(np.diff(np.log([p.modal_amplitude for p in known[: first + 1]])))))
+    here = own.at(np.array([own.begins + before + abs(logs[1] - logs[0])]))
+    return np.array([here.omega[0], here.ratio[0], abs(here.force[0])])
+
+
+def _own_numbers(backbone: Backbone, load: HarmonicLoad, point: ModePoint) -> FloatArray:
+    force = abs(np.vdot(point.coefficients[1], load.harmonics[1])) / point.modal_amplitude
+    return np.array([point.omega, point.ratio, force])
+
+
+def _distance(foretold: FloatArray, found: FloatArray) -> float:
+    """Return the relative difference of two sets of numbers, the largest."""
+    size = np.maximum(np.abs(found), [0.0, FAINT_RATIO, 0.0])
+    return float(np.max(np.abs(foretold - found) / np.maximum(size, 1e-300)))
+
+
+def _far(one: ModePoint, other: ModePoint) -> bool:
+    return abs(float(np.log(one.modal_amplitude / other.modal_amplitude))) > SHORTEST
