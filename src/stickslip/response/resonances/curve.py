@@ -12,7 +12,7 @@ from stickslip.harmonic.peak import EVALUATIONS, PeakProblem
 from stickslip.response.branch import Followed, Judged, OneLevel, Route, steps_through
 from stickslip.response.follow import follow
 from stickslip.response.resonances.first import PeakSearch
-from stickslip.response.resonances.point import PeakPoint, peak_point
+from stickslip.response.resonances.point import PeakPoint
 from stickslip.response.resonances.tracker import Tracker, trackers
 from stickslip.solve.branch import Following, Latest
 from stickslip.solve.continuation import Point
@@ -122,4 +122,4 @@ def _told(equation: _Equation, tracker: Tracker, made: Followed) -> PeakPoint:
     spent, equation.evaluations = equation.evaluations + tracker.evaluations, 0
     tracker.evaluations = 0
     solution = made.point.solution
-    return peak_point(equation.problem, tracker.force, made.p, solution, spent, tracker.number)
+    return tracker.told(equation.problem, made.p, solution, spent)

@@ -9,10 +9,12 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import check_choice, input_error
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.linear import one_structure
 from stickslip.harmonic.parameters import BalanceAt
 from stickslip.harmonic.peak import Driven, Peak, PeakProblem, driven_by
 from stickslip.response.ladder import plain_sweep
 from stickslip.response.parameter import Discretisation, Parameter, parameter_family, system_at
+from stickslip.response.resonances.subharmonic import motions_of_several_periods
 from stickslip.response.system import System
 from stickslip.solve.continuation import Point
 from stickslip.solve.krylov import to_tolerance
@@ -37,6 +39,9 @@ class PeakSearch:
         As in `track_peak`, `how` its discretisation.
     harmonic
         Whose amplitude peaks, as that of a superharmonic resonance; None: those that the load drives.
+    periods
+        Of the load after which the motion repeats itself: 2 or more are subharmonic resonances. Harmonics, energies and phases are then
+        those of the lower frequency, and the lowest harmonic peaks unless another one is named; frequencies are those of the load.
 
     Raises
     ------
@@ -52,6 +57,7 @@ class PeakSearch:
     output: int = 0
     how: Discretisation = field(default_factory=Discretisation)
     harmonic: int | None = None
+    periods: int = 1
 
     def __post_init__(self) -> None:
         check_choice("by", self.by, get_args(Peak))
@@ -74,6 +80,26 @@ class PeakSearch:
                 "Give one of them, or take more harmonics.",
             )
 
+        if self.periods < 1 or self.periods > self.how.order:
+            raise input_error(
+                "periods",
+                f"is {self.periods}, of {self.how.order} harmonics",
+                "Give 1 or more, and at least as many harmonics: the load is in that one.",
+            )
+        if self.periods > 1:
+            one_structure(self.system.structure, "a subharmonic resonance")
+
+    @property
+    def peaking(self) -> int | None:
+        """The harmonic whose amplitude peaks; None for those that the load drives."""
+        return 1 if self.harmonic is None and self.periods > 1 else self.harmonic
+
+    @property
+    def lower_range(self) -> tuple[float, float]:
+        """The range of the frequency of the first harmonic, rad/s."""
+        begin, end = self.omega_range
+        return begin / self.periods, end / self.periods
+
     @property
     def dof(self) -> int:
         """Whose amplitude peaks."""
@@ -86,7 +112,7 @@ class PeakSearch:
             self.load,
             self.parameter,
             first,
-            lambda s, f: self.how.balance(s, f, np.array([self.dof])),
+            lambda s, f: self.how.balance(s, f.over_periods(self.periods), np.array([self.dof])),
         )
 
     def problem(self, first: float) -> PeakProblem:
@@ -94,22 +120,22 @@ class PeakSearch:
         family = self.family(first)
         balance = family(first)
         harmonics, phase = driven_by(balance.linear.load)
-        if self.harmonic is not None:
-            times = self.harmonic / harmonics[0]
+        if self.peaking is not None:
+            times = self.peaking / harmonics[0]
             if self.by == "phase_quadrature" and times % 2 != 1:
                 raise input_error(
                     "by",
-                    f"is phase_quadrature for harmonic {self.harmonic} under a load in harmonic {harmonics[0]}",
+                    f"is phase_quadrature for harmonic {self.peaking} under a load in harmonic {harmonics[0]}",
                     "Only odd multiples of the load's harmonic peak in quadrature with it: take horizontal_tangent or variable_phase.",
                 )
-            own = balance.linear.load.harmonics.get(self.harmonic)
+            own = balance.linear.load.harmonics.get(self.peaking)
             # the phase that a shift of the origin of time gives this harmonic; of a driven one that of its own force
             phase = phase * times if own is None else float(np.angle(own[np.argmax(np.abs(own))]))
-            harmonics = (self.harmonic,)
+            harmonics = (self.peaking,)
         position = int(np.searchsorted(balance.linear.retained, self.dof))
         invert = partial(factorised, to_tolerance(self.how.newton.linear, EXACT))
         driven = Driven(position, harmonics)
-        scale = self.omega_range[1]
+        scale = self.lower_range[1]
         return PeakProblem(family, self.by, driven, phase, scale, invert)
 
 
@@ -151,8 +177,13 @@ def first_peaks(search: PeakSearch, value: float) -> tuple[list[Start], int]:
     problem, how = search.problem(value), search.how
     balance = problem.family(value)
     changed = system_at(search.system, search.parameter, value, balance)
-    found = plain_sweep(changed, balance, search.omega_range, SWEEP_POINTS, how.newton)
-    points = [f.point for f in found if f.converged]
+    if search.periods > 1:
+        points = motions_of_several_periods(
+            changed, balance, search.lower_range, search.periods, SWEEP_POINTS, how.newton
+        )
+    else:
+        found = plain_sweep(changed, balance, search.omega_range, SWEEP_POINTS, how.newton)
+        points = [f.point for f in found if f.converged]
     few = replace(
         how.newton,
         max_iterations=min(STEPS, how.newton.max_iterations),

@@ -20,7 +20,7 @@ class PeakPoint:
     value
         Of the parameter.
     omega
-        Frequency of the peak, rad/s.
+        Frequency of the peak, rad/s; of a subharmonic resonance that of the load.
     amplitude
         Amplitude of the output in the harmonic that the load drives, m; with several, the norm over them; or in the harmonic asked for.
     phase
@@ -31,7 +31,7 @@ class PeakPoint:
     curvature
         ``d² ln(amplitude) / d(ln ω)²`` of the response: negative at a maximum.
     energy
-        That the harmonic load puts in per period, J: what is dissipated.
+        That the harmonic load puts in per period of the first harmonic, J: what is dissipated.
     friction
         Part of it that the contacts take, J.
     below

@@ -30,6 +30,7 @@ class Tracker:
     newton: Newton
     known: list[tuple[float, FloatArray]]
     force: float  # phase of the load in the first harmonic that peaks, rad
+    periods: int = 1  # of the load in one of the motion
     evaluations: int = 0
     number: int = 0
     corner: bool = False  # whether the last peak sits on a corner of the response
@@ -43,13 +44,18 @@ class Tracker:
         if solution.status.converged:
             self._turn(solution.x, value)
         spent, self.evaluations = self.evaluations, 0
-        return peak_point(self.problem, self.force, value, solution, spent, self.number)
+        return self.told(self.problem, value, solution, spent)
+
+    def told(self, problem: PeakProblem, value: float, solution: Solution, spent: int) -> PeakPoint:
+        """Return what is told of a solution of the equation."""
+        point = peak_point(problem, self.force, value, solution, spent, self.number)
+        return replace(point, omega=self.periods * point.omega)
 
     def take(self, point: PeakPoint) -> None:
         """Go on from a peak that was found before."""
         balance = self.problem.family(point.value)
         motion = balance.unknowns(point.coefficients[:, balance.linear.retained])
-        y = np.append(motion, np.log(point.omega / self.problem.omega_scale))
+        y = np.append(motion, np.log(point.omega / self.periods / self.problem.omega_scale))
         self.known = [*self.known[-1:], (point.value, y)]
         self._turn(y, point.value)
 
@@ -180,7 +186,7 @@ def _tracker(search: PeakSearch, start: Start) -> Tracker:
     force = start.problem.phase
     known = [(start.value, start.y)]
     if start.problem.by != "variable_phase":
-        return Tracker(start.problem, start.newton, known, force)
+        return Tracker(start.problem, start.newton, known, force, search.periods)
     exact = Tracker(replace(start.problem, by="horizontal_tangent"), start.newton, known, force)
     top = exact.point(start.value)
     y = exact.known[-1][1]
@@ -188,7 +194,7 @@ def _tracker(search: PeakSearch, start: Start) -> Tracker:
     problem = problem.of_the_top(problem.state(y, start.value))
     tops = [(start.value, problem.phase)]
     known = [(start.value, y)]
-    return Tracker(problem, start.newton, known, force, top.evaluations, tops=tops)
+    return Tracker(problem, start.newton, known, force, search.periods, top.evaluations, tops=tops)
 
 
 def _is_another(one: Tracker, made: list[Tracker]) -> bool:

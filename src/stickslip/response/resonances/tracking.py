@@ -143,7 +143,7 @@ def later_peaks(
     number = 1 + max((p.peak for p in known), default=-1)
     found: list[Tracker] = []
     for tracker in trackers(search, last, most):
-        omega = tracker.problem.omega(tracker.reached(last).x)
+        omega = search.periods * tracker.problem.omega(tracker.reached(last).x)
         if all(abs(omega - other) > APART * other for other in there):
             tracker.number = number + len(found)
             found.append(tracker)

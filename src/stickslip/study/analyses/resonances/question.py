@@ -101,7 +101,7 @@ def question_of(case: Case, model: Model) -> Question:
     how = Discretisation(order=asked.harmonics, samples=samples, evaluator=evaluator)
     lowest, highest = (HZ * f for f in asked.frequency_hz)
     search = PeakSearch(
-        assembled.system, assembled.load, _parameter(case, asked), (lowest, highest), asked.by, 0, how, asked.harmonic
+        assembled.system, assembled.load, _parameter(case, asked), (lowest, highest), asked.by, 0, how, asked.harmonic, asked.periods
     )  # fmt: skip
     try:
         for value in asked.ends:

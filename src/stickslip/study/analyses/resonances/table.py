@@ -49,6 +49,12 @@ class ResonanceTable(Section):
         le=HIGHEST,
         description="harmonic whose amplitude peaks, such as 3 of a superharmonic resonance; left out: what the loads drive",
     )
+    periods: int = Field(
+        1,
+        ge=1,
+        le=20,
+        description="periods of the loads after which the motion repeats itself, 1 to 20: 2 or more are subharmonic resonances, whose lowest harmonic peaks",
+    )
     harmonics: int = Field(
         5, ge=1, le=HIGHEST, description=f"harmonics that are kept, 1 to {HIGHEST}"
     )
@@ -66,6 +72,12 @@ class ResonanceTable(Section):
                 f"is {self.harmonic}, above harmonics = {self.harmonics}",
                 "Raise harmonics.",
                 "harmonic",
+            )
+        if self.periods > self.harmonics:
+            raise custom_error(
+                f"is {self.periods}, above harmonics = {self.harmonics}",
+                "Raise harmonics: the loads are in that one.",
+                "periods",
             )
         return self
 
