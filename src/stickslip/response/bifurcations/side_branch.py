@@ -93,12 +93,12 @@ class SideBranch:
     @property
     def sentence(self) -> str:
         """What it is, in words."""
-        kind = f"period of {self.periods} periods of the load" if self.periods > 1 else "less symmetry"  # fmt: skip
+        kind = f"with a period of {self.periods} periods of the load" if self.periods > 1 else "of less symmetry"  # fmt: skip
         if not self.points:
-            return f"no branch with a {kind} was found: {self.end}"
+            return f"no branch {kind} was found: {self.end}"
         ends = self.omegas / HZ
         return (
-            f"branch with a {kind}, {len(self.points)} points between {ends.min():.6g} and {ends.max():.6g} Hz, "
+            f"branch {kind}, {len(self.points)} points between {ends.min():.6g} and {ends.max():.6g} Hz, "
             f"amplitude up to {self.amplitudes.max():.4g} m; {self.end}"
         )
 
