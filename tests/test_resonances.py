@@ -19,6 +19,9 @@ from stickslip.response.parameter import Discretisation
 from stickslip.response.resonances.curve import peak_curve
 from stickslip.response.resonances.first import PeakSearch, maxima
 from stickslip.response.resonances.tracking import follow_peaks, later_peaks
+from stickslip.response.self_excited.curve import at_amplitude
+from stickslip.response.self_excited.modes import stuck_modes
+from stickslip.response.self_excited.problem import self_excited_motions
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton, newton
 
@@ -241,3 +244,36 @@ def test_a_range_without_subharmonic_motions_is_told():
     search = PeakSearch(system, load, "excitation", (2.8, 4.0), how=HOW, periods=3)
     with pytest.raises(InputError, match="no motion of 3 periods that was found from 324 starts"):
         list(follow_peaks(search, [1.0], 1))
+
+
+@pytest.mark.parametrize(
+    ("driven", "level", "frequency", "by_energy", "by_force"),
+    [(0, 0.7, 0.0348, 0.97, 2.46), (1, 0.5, -0.0074, 1.02, None), (1, 1.1, -0.0056, 1.01, None)],
+)
+def test_quadrature_is_no_mode_where_one_force_cannot_balance_friction(
+    driven, level, frequency, by_energy, by_force
+):
+    # the table of docs/theory/tracking.md
+    k = np.array([[2.0, -1.0], [-1.0, 1.0]])
+    gap = np.zeros((3, 2))
+    gap[0, 1] = 1.0
+    contacts = Interface(("c",), (Jenkins(k_t=1.0, limit=1.0),), gap)
+    system = System(lumped(np.eye(2), k, 0.01 * k), contacts, np.array([0]))
+    force = np.eye(2)[driven]
+    load = HarmonicLoad(np.zeros(2), {1: force.astype(complex)})
+    how = Discretisation(order=5)
+    stuck = stuck_modes(system, 2)[0]
+    around = (0.4, 1.15 * stuck.omega)
+    search = PeakSearch(system, load, "excitation", around, "phase_quadrature", 0, how)
+    point = list(follow_peaks(search, [0.4, level], 1))[-1]
+    motions = self_excited_motions(system, HarmonicLoad(np.zeros(2)), stuck, 0, how)
+    mode = at_amplitude(motions, point.amplitude)
+    assert point.converged and mode.converged  # noqa: PT018
+    assert point.omega / mode.omega - 1.0 == pytest.approx(frequency, abs=5e-5)
+    h = np.arange(6)
+    kinetic = 0.5 * float(np.sum((h * point.omega) ** 2 * np.sum(np.abs(point.coefficients) ** 2, axis=1)))  # fmt: skip
+    assert point.energy / (4 * np.pi * kinetic) / mode.level == pytest.approx(by_energy, abs=5e-3)
+    if by_force is not None:
+        shape = stuck.shape.real / np.linalg.norm(stuck.shape.real)
+        read = level * shape[driven] * shape[0] / (2 * point.omega**2 * point.amplitude)
+        assert read / mode.level == pytest.approx(by_force, abs=5e-3)
