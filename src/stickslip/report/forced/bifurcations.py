@@ -9,7 +9,7 @@ from stickslip.report.cases import ShownCase
 from stickslip.report.plot import MUTED, key_marker
 from stickslip.report.quantities import NONE, counted, fixed, number, quantity
 from stickslip.report.response import Response
-from stickslip.study.analyses.forced.summary import beside_bifurcations, bifurcation_lines
+from stickslip.study.analyses.forced.summary import beside_bifurcations
 
 SYMBOLS = {
     "fold": "triangle-left",
@@ -92,8 +92,7 @@ def bifurcations(response: Response) -> str | None:
     if not response.has("bifurcations_limits"):
         return None
     labels = [c.label for c in response.cases]
-    told = beside_bifurcations if response.has("bifurcation_case") else bifurcation_lines
-    lines = "".join(f"<li>{escape(line)}</li>" for line in told(response.data, labels))
+    lines = "".join(f"<li>{escape(line)}</li>" for line in beside_bifurcations(response.data, labels))  # fmt: skip
     text = "<h3>Bifurcations</h3><p>Where multipliers of the motion cross the unit circle along the branch, or it turns back.</p>"
     if not response.has("bifurcation_case"):
         return f"{text}<ul>{lines}</ul>"

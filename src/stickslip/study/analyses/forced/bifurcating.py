@@ -88,7 +88,8 @@ def limits(question: Question, found: Bifurcations) -> tuple[str, ...]:
     more = [f"branches of {len(followed_alone)} more bifurcations were not followed"] * bool(
         followed_alone and question.bifurcations == "branches"
     )
-    return (*alone, *found.limits, *more)
+    none = ["no bifurcation was met on the branch"] * (not found.found)
+    return (*none, *alone, *found.limits, *more)
 
 
 def bifurcations_line(question: Question) -> tuple[str, ...]:

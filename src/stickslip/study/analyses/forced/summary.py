@@ -174,8 +174,7 @@ def bifurcation_lines(data: xr.Dataset, labels: list[str]) -> tuple[str, ...]:
     """Return what was found of bifurcations and of branches that leave there, and where nobody looked; nothing where none were asked for."""
     if "bifurcations_limits" not in data:
         return ()
-    found = _along(data, "bifurcation", labels) or ("no bifurcation was met on the branch",)
-    return (*found, *beside_bifurcations(data, labels))
+    return (*_along(data, "bifurcation", labels), *beside_bifurcations(data, labels))
 
 
 def beside_bifurcations(data: xr.Dataset, labels: list[str]) -> tuple[str, ...]:
