@@ -22,7 +22,7 @@ ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
-install: $(INSTALLED)  ## make .venv and install the locked versions
+install: $(INSTALLED)  ## make .venv, install the locked versions and compile the contact laws
 
 $(INSTALLED): requirements.lock pyproject.toml
 	@test -n "$(PYTHON)" || { echo "No Python found. Install Python 3.11 or name it: make PYTHON=/path/to/python3.11"; exit 1; }
@@ -32,6 +32,7 @@ $(INSTALLED): requirements.lock pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@$(BIN)/python .ci/system_libraries.py
+	@$(BIN)/stickslip compile
 	@touch $@
 
 run: $(INSTALLED)  ## solve the example of two blades and a damper, and write its report

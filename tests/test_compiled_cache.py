@@ -1,6 +1,7 @@
 """The cache of compiled functions: what another version of the code left there does no harm."""
 
 import importlib
+import subprocess
 import sys
 import time
 
@@ -75,3 +76,31 @@ def test_what_takes_long_to_compile_is_said_once(patience, monkeypatch, caplog):
         time.sleep(0.05)
     said = [r for r in caplog.records if r.getMessage() == compiling.LINE]
     assert len(said) == (patience == 0.0)
+
+
+ASKED = """
+import numba
+from stickslip.contact import event_integrals, events, interface, intervals, march, path, product
+from stickslip.contact.planar import course, period, rows
+from stickslip.response import ahead
+from stickslip.response.time import start, time_step
+
+for task in ahead.TASKS.values():
+    task()
+used = [
+    event_integrals._integrate_events, events.contact_events, interface.add_contact_jacobian, interface.add_forces, interface.add_gaps,
+    intervals.contact_period, product.contact_product, product.multiply_blocks, product.sweep, course.run, rows.follow_rows,
+]
+made = [march.period_march, path._walk, period._compiled, start._march, time_step.run_steps]
+if numba.get_num_threads() > 1:
+    used += [events.contact_events_threads, intervals.contact_period_threads]
+    made += [period._threads]
+print(*(f.py_func.__qualname__ for f in used if not f.overloads), *(f.__qualname__ for f in made if not f.cache_info().currsize))
+"""
+
+
+def test_every_function_that_is_called_from_python_is_compiled_ahead():
+    missed = subprocess.run(
+        [sys.executable, "-c", ASKED], capture_output=True, text=True, check=True
+    )
+    assert not missed.stdout.split(), missed.stdout

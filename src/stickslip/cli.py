@@ -251,6 +251,18 @@ def fit(
         _print_lines("Files", [str(target)])
 
 
+@app.command(name="compile")
+def compile_() -> None:
+    """Compile contact laws and time steps, once an installation; otherwise the first runs do, for a minute or two."""
+    with _errors_as_text():
+        from stickslip.response.ahead import compile_ahead
+        from stickslip.study.keep.threads import one_blas_thread
+
+        one_blas_thread()
+        for done in compile_ahead(os.cpu_count() or 1):
+            _say(f"compiled: {done}")
+
+
 @app.command()
 def schema() -> None:
     """Print the JSON Schema of study files."""
