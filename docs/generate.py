@@ -24,6 +24,7 @@ PARTS_OF_THE_PAGE = {
         "forced_response",
         "limit_cycle",
         "resonance",
+        "residual_tractions",
         "modes",
         "campbell",
         "flutter",

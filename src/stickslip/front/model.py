@@ -29,6 +29,7 @@ _SHARED = {  # tables that analyses take beside their own
     "limit_cycle": ("solver",),
     "nonlinear_mode": ("solver",),
     "resonance": ("solver",),
+    "residual_tractions": ("solver",),
     "run_up": ("harmonics", "solver", "limits"),
 }
 _OF_THE_MODEL = ("alert_over",)  # keys of them that a model has itself
@@ -144,6 +145,10 @@ class Model(Assembly):
         """
         at = None if of is None else lambda _, value: of(value)
         return self._answer("resonance", {"parameter": "value", **keys}, folder, at=at)
+
+    def residual_tractions(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+        """Bound the response over the tractions that sticking contacts may have kept; keys such as ``frequency_hz=(150, 170), points=25``."""
+        return self._answer("residual_tractions", keys, folder)
 
     def run_up(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
         """Follow the response over speed along engine orders; keys such as ``speeds_rpm=(3000, 9000), engine_orders=[4, 6], high=3``."""

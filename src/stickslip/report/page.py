@@ -13,6 +13,7 @@ from stickslip.errors import input_error
 from stickslip.report import model
 from stickslip.report.cases import cases_of, varied
 from stickslip.report.forced.contact import case_buttons
+from stickslip.report.forced.tractions import with_bands
 from stickslip.report.frame import (
     cards_html,
     chapter,
@@ -33,6 +34,7 @@ from stickslip.report.sections import (
     limit_cycle,
     modes,
     nonlinear_mode,
+    residual_tractions,
     resonance,
     run_up,
     safe,
@@ -46,6 +48,7 @@ SECTIONS: tuple[Section, ...] = (
     nonlinear_mode.SECTION,
     limit_cycle.SECTION,
     resonance.SECTION,
+    residual_tractions.SECTION,
     modes.SECTION,
     campbell.SECTION,
     flutter.SECTION,
@@ -58,6 +61,7 @@ def _shown(tree: xr.DataTree) -> Iterator[tuple[Section, xr.Dataset]]:
     """Return the sections whose analysis is in the result, with its dataset."""
     for section in SECTIONS:
         data = analysis(tree, section.name) if section.name in tree.children else xr.Dataset()
+        data = with_bands(data, tree) if section.name == forced_response.SECTION.name else data
         if all(name in data for name in section.needs) and data.sizes.get("case"):
             yield section, data
 

@@ -11,6 +11,7 @@ from stickslip.harmonic.support import named
 from stickslip.report.cases import ShownCase, first_number
 from stickslip.report.forced.bifurcations import mark_bifurcations
 from stickslip.report.forced.measured import measured_of
+from stickslip.report.forced.tractions import draw_bands, draw_peak_bands
 from stickslip.report.forced.working import shade_working_range
 from stickslip.report.plot import ALARM, GRID, MUTED, Plot, key_marker, log_ticks, styled
 from stickslip.report.quantities import counted, joined, number, percent, scale_for
@@ -158,7 +159,9 @@ def frequency_response(response: Response) -> Plot | None:
     if not np.isfinite(response.accepted).any():
         return None
     scale = response.scale
-    figure = go.Figure([_curve(response, case) for case in response.cases])
+    figure = go.Figure()
+    banded = draw_bands(figure, response)
+    figure.add_traces([_curve(response, case) for case in response.cases])
     if response.decides:
         low, more = response.low_name, response.more_name
         figure.add_trace(key_marker(f"H = {low}", "circle", "key", "points"))
@@ -177,7 +180,7 @@ def frequency_response(response: Response) -> Plot | None:
     ticks = log_ticks(response.accepted * scale.factor)
     figure.update_yaxes(title_text=f"{response.quantity} ({scale.unit})", type="log", **ticks)
     title = "Frequency response of all cases" if len(response.cases) > 1 else "Frequency response"
-    return Plot("response", title, _caption(response) + marked, figure)
+    return Plot("response", title, _caption(response) + marked + banded, figure)
 
 
 def _low_caption(response: Response, cases: list[ShownCase], low: FloatArray) -> str:
@@ -271,6 +274,7 @@ def optimisation(response: Response) -> Plot | None:
     peak = {c: response.peak_response(c) for c in cases}
     scale = scale_for(np.array(list(peak.values())), response.unit)
     figure, families = make_subplots(1, 2, horizontal_spacing=0.12), _families(cases, key)
+    banded = [draw_peak_bands(figure, response, own, scale.factor) for own in families.values()]
     for name, family in families.items():
         edge = {"width": 1, "color": "white"}
         mark = {"size": 10, "color": [c.colour for c in family], "line": edge}
@@ -299,5 +303,6 @@ def optimisation(response: Response) -> Plot | None:
     )
     figure.update_yaxes(title_text="peak frequency (Hz)", col=2)
     caption = _optimum_caption(response, cases) + (measured.caption(cases) if measured else "")
+    caption += next(filter(None, banded), "")
     caption += shade_working_range(figure, response, logarithmic=bool(wide))
     return Plot("optimisation", "Optimisation curves", caption, figure)

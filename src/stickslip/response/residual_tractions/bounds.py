@@ -20,8 +20,8 @@ from stickslip.response.residual_tractions.search import Extremes, TractionSearc
 from stickslip.response.system import System
 from stickslip.solve.newton_method import newton
 
-PEAK_WIDTH = 1e-5  # relative width of the bracket of a resonance
-PEAK_TRIALS = 14  # frequencies that are tried in it
+PEAK_WIDTH = 3e-5  # relative width of the bracket of a resonance
+PEAK_TRIALS = 12  # frequencies that are tried in it
 EQUAL = 1e-6  # relative difference of two bounds that are one
 
 End = Literal["least", "most"]
@@ -81,6 +81,11 @@ class TractionBounds:
     failures: int
 
     @property
+    def converged(self) -> bool:
+        """Whether a motion was found; else all its numbers are NaN."""
+        return bool(np.isfinite(self.reference.amplitude))
+
+    @property
     def unique(self) -> bool:
         """Whether both bounds are one."""
         return self.most.amplitude - self.least.amplitude <= EQUAL * self.most.amplitude
@@ -125,6 +130,7 @@ def traction_bounds(
     output: int = 0,
     discretisation: Discretisation | None = None,
     search: TractionSearch | None = None,
+    near: TractionBounds | None = None,
 ) -> Iterator[TractionBounds]:
     """Find the smallest and the largest amplitude of an output over all residual tractions of contacts that stick.
 
@@ -142,24 +148,28 @@ def traction_bounds(
         Harmonics, samples, solver.
     search
         How hard extremes are looked for.
+    near
+        Bounds at a frequency before the first one, from which an interrupted search goes on.
 
     Yields
     ------
     TractionBounds
-        Of each frequency.
+        Of each frequency; where no motion is found from the model's own start, one that is not `converged`.
 
     Raises
     ------
     InputError
         If a contact is rigid or a law does not say where its springs start, or a frequency or the output is none.
-    SingularError
-        If no motion is found at a frequency from the model's own start.
     """
     setup = _setup(system, load, omegas, output, discretisation)
     how = search or TractionSearch()
-    last: Extremes | None = None
+    last = _again(setup, near) if near is not None and near.converged else None
     for omega in omegas:
-        last = _at(setup, omega, how, last)
+        try:
+            last = _at(setup, omega, how, last)
+        except SingularError:
+            yield _lost(setup, omega)
+            continue
         yield _bounds(setup, last)
 
 
@@ -182,10 +192,23 @@ def resonance_bounds(
     system, load, output, discretisation, search
         As of `traction_bounds`.
     known
-        Its bounds at three or more frequencies that grow.
+        Its bounds at frequencies that grow.
     end
         ``least`` or ``most``: which bound.
+
+    Returns
+    -------
+    TractionBounds
+        At the highest point; the highest of `known` where that is the first or the last one.
+
+    Raises
+    ------
+    InputError
+        If nothing is known.
     """
+    known = [b for b in known if b.converged]
+    if not known:
+        raise input_error("known", "holds no bounds that converged", "Give those of `traction_bounds`.")  # fmt: skip
     heights = [getattr(b, end).amplitude for b in known]
     top = int(np.argmax(heights))
     if top in (0, len(known) - 1):
@@ -196,7 +219,7 @@ def resonance_bounds(
     found: dict[float, Extremes] = {}
 
     def depth(omega: float) -> float:
-        found[omega] = _at(setup, omega, replace(how, starts=0), *beside)
+        found[omega] = _at(setup, omega, None, *beside)
         return -float(getattr(found[omega], end).amplitude)
 
     limits = known[top - 1].omega, known[top + 1].omega
@@ -205,8 +228,9 @@ def resonance_bounds(
         options={"xatol": PEAK_WIDTH * known[top].omega, "maxiter": PEAK_TRIALS},
     )  # fmt: skip
     best = max(found.values(), key=lambda e: float(getattr(e, end).amplitude))
-    better = getattr(best, end).amplitude > heights[top]
-    return _bounds(setup, best) if better else known[top]
+    if getattr(best, end).amplitude <= heights[top]:
+        return known[top]
+    return _bounds(setup, _at(setup, best.reference.omega, how, best))
 
 
 def _setup(
@@ -237,7 +261,9 @@ def _setup(
     )
 
 
-def _at(setup: _Setup, omega: float, search: TractionSearch, *beside: Extremes | None) -> Extremes:
+def _at(
+    setup: _Setup, omega: float, search: TractionSearch | None, *beside: Extremes | None
+) -> Extremes:
     near = [b for b in beside if b is not None]
     reference = setup.reference(omega, [b.reference.x for b in near])
     more = [s.inside() for b in near for s in (b.least, b.most)]
@@ -261,6 +287,17 @@ def _bounds(setup: _Setup, found: Extremes) -> TractionBounds:
     reference, least, most = map(_bound, (found.reference, found.least, found.most))
     omega = found.reference.omega
     made = TractionBounds(omega, reference, least, most, names, spent.solves, spent.failures)
+    spent.solves = spent.failures = 0
+    return made
+
+
+def _lost(setup: _Setup, omega: float) -> TractionBounds:
+    problem = setup.problem
+    shape = problem.balance.order + 1, setup.system.structure.n
+    springs = problem.starts.stiffness.shape
+    none = Bound(np.nan, np.full(shape, np.nan + 0j), np.zeros(springs), np.full(springs, np.nan))
+    names, spent = problem.starts.interface.names, problem.spent
+    made = TractionBounds(omega, none, none, none, names, spent.solves, spent.failures)
     spent.solves = spent.failures = 0
     return made
 

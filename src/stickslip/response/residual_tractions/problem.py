@@ -22,7 +22,7 @@ from stickslip.solve.linear import factorised
 from stickslip.solve.newton_method import Newton, newton
 
 HALVINGS = 4  # of the way between two starts where Newton does not come from one to the other
-INSIDE = 1e-6  # of the room of a spring: how far from its walls a slider is put for a gradient
+INSIDE = 1e-7  # of the room of a spring: how far from its walls a slider is put for a gradient
 RESTS = 1e-7  # of the largest stretch: movement of a slider over a period that counts as none
 
 

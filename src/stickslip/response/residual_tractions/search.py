@@ -18,7 +18,7 @@ from stickslip.units import check_quantities, quantity
 GAIN = 1e-7  # relative change of the amplitude that counts as one
 BEYOND = 4.0  # half widths behind the end of an interval, to where a step aims
 PLANAR = 2.0  # times the way to the end, to where it aims in a planar contact
-LENGTHS = (1.0, 0.5, 0.25, 0.125, 0.03125, 0.0078125)  # of the way there
+LENGTHS = (1.0, 0.5, 0.2, 0.05, 0.01)  # of the way there
 CLIMBED = 8  # starts from which either extreme is climbed to, the best ones
 MOST_STEPS = 30  # of one ascent
 ALL_CORNERS = 4  # springs up to which every corner is a start
@@ -54,7 +54,7 @@ class Extremes:
 
 
 def extremes(
-    reference: TractionState, search: TractionSearch, more: Iterable[FloatArray] = ()
+    reference: TractionState, search: TractionSearch | None, more: Iterable[FloatArray] = ()
 ) -> Extremes:
     """Return the extremes at the frequency of a reference motion.
 
@@ -63,14 +63,15 @@ def extremes(
     reference
         The motion from the model's own start.
     search
-        How hard to look.
+        How hard to look; None: from `more` alone.
     more
         Further starts, sliders (n, 2) in m, such as the extremes of a neighbouring frequency.
     """
     problem = reference.problem
     seen: list[TractionState] = []
     given = [(sliders, None) for sliders in (reference.sliders, *more)]
-    for sliders, shares in [*given, *_starts(reference, search)]:
+    own = () if search is None else _starts(reference, search)
+    for sliders, shares in [*given, *own]:
         begun = problem.solved(sliders, reference.omega, (reference, *seen))
         if (
             begun is not None and shares is not None

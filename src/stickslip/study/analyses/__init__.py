@@ -4,6 +4,7 @@ ANALYSES = {
     "forced_response": "stickslip.study.analyses.forced_response:FORCED_RESPONSE",
     "limit_cycle": "stickslip.study.analyses.limit_cycle:LIMIT_CYCLE",
     "nonlinear_mode": "stickslip.study.analyses.nonlinear_mode:NONLINEAR_MODE",
+    "residual_tractions": "stickslip.study.analyses.residual_tractions:RESIDUAL_TRACTIONS",
     "modes": "stickslip.study.analyses.modes:MODES",
     "campbell": "stickslip.study.analyses.campbell:CAMPBELL",
     "flutter": "stickslip.study.analyses.flutter:FLUTTER",

@@ -1,0 +1,100 @@
+"""Residual tractions: the band that they leave open over frequency, and of the resonance."""
+
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+import plotly.graph_objects as go
+
+from stickslip.report.node import Node
+from stickslip.report.plot import COLOURS, INK, Plot, log_ticks, styled
+from stickslip.report.quantities import NONE, number, percent, quantity, scale_for
+from stickslip.report.section import Block, Card, Section
+from stickslip.report.tables import html_table
+
+_NAMES = ("own start", "smallest", "largest")
+
+
+@dataclass(frozen=True, eq=False)
+class Tractions(Node):
+    """One case."""
+
+
+def band(view: Tractions) -> Plot | None:
+    """Show the smallest and the largest amplitude at each frequency."""
+    if not view.has("frequency_hz"):
+        return None
+    hertz = view.floats("frequency_hz")
+    own, least, most = (view.floats(f"{name}_amplitude") for name in ("reference", "least", "most"))
+    scale = scale_for(np.concatenate([least, most]), "m")
+    figure = go.Figure()
+    edge = {"mode": "lines", "line": {"color": COLOURS[0], "width": 1}}
+    hover = f"%{{y:.4g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>"
+    figure.add_scatter(x=hertz, y=scale.factor * least, name="smallest", hovertemplate=hover, **edge)  # fmt: skip
+    figure.add_scatter(
+        x=hertz, y=scale.factor * most, name="largest", fill="tonexty", fillcolor="rgba(0,114,178,0.25)",
+        hovertemplate=hover, **edge,
+    )  # fmt: skip
+    figure.add_scatter(
+        x=hertz, y=scale.factor * own, name="own start", mode="lines+markers", marker={"size": 5},
+        line={"color": INK, "width": 1.4}, hovertemplate=hover,
+    )  # fmt: skip
+    if view.has("resonance_amplitude"):
+        figure.add_scatter(
+            x=view.floats("resonance_hz")[1:], y=scale.factor * view.floats("resonance_amplitude")[1:], name="bounds of the resonance",
+            mode="markers", marker={"symbol": "diamond", "size": 10, "color": COLOURS[1]}, hovertemplate=hover,
+        )  # fmt: skip
+    styled(figure, 480)
+    figure.update_xaxes(title_text="frequency (Hz)")
+    ticks = log_ticks(scale.factor * np.concatenate([least, most]))
+    figure.update_yaxes(title_text=f"amplitude ({scale.unit})", type="log", **ticks)
+    return Plot(f"residual_tractions{view.key}", "What residual tractions leave open", _caption(view), figure)  # fmt: skip
+
+
+def _caption(view: Tractions) -> str:
+    least, most = (view.floats(f"{name}_amplitude") for name in ("least", "most"))
+    width = most / least - 1
+    text = (
+        f"Amplitude of {escape(view.text('output'))}, H = {int(view.scalar('harmonics', 0))}: a contact that sticks keeps a traction from before, "
+        "and every one within the friction cone is a steady motion. "
+    )
+    if not np.isfinite(width).any() or np.nanmax(width) < 1e-6:
+        return text + "Here both bounds are equal at all frequencies: the answer is unique."
+    at = int(np.nanargmax(width))
+    hertz = number(float(view.floats("frequency_hz")[at]), 5)
+    return text + f"The band is widest at {hertz} Hz, {percent(100 * float(width[at]))}. Bounds are found motions; the true band is at least as wide."  # fmt: skip
+
+
+def resonances(view: Tractions) -> str | None:
+    """Return the bounds of the resonance, and what time integration says of them."""
+    if not view.has("resonance_amplitude"):
+        return None
+    height, hertz = view.floats("resonance_amplitude"), view.floats("resonance_hz")
+    rows = []
+    for k, name in enumerate(_NAMES):
+        again = time = NONE
+        told = ""
+        if k and view.has("confirmed"):
+            again, time = (
+                quantity(float(view.floats(f"{what}_amplitude")[k - 1]), "m")
+                for what in ("resolved", "time")
+            )
+            told = "confirmed" if view.integers("confirmed")[k - 1] else "left in time"
+        off = percent(100 * float(height[k] / height[0] - 1)) if k else ""
+        rows.append([name, quantity(float(height[k]), "m"), off, number(float(hertz[k]), 6), again, time, told])  # fmt: skip
+    head = ["resonance", "amplitude", "against own start", "at (Hz)", "solved again", "in time", ""]
+    return "<h3>Bounds of the resonance</h3>" + html_table(head, rows)
+
+
+def _cards(view: Tractions) -> list[Card]:
+    if not view.has("resonance_amplitude"):
+        return []
+    own, least, most = (float(h) for h in view.floats("resonance_amplitude"))
+    text = f"{percent(100 * (least / own - 1))} to {percent(100 * (most / own - 1))}"
+    return [Card(text, "resonance by residual tractions", f"own start {quantity(own, 'm')}")]
+
+
+_BLOCK = Block("residual_tractions", "Residual tractions", (band, resonances))
+SECTION: Section = Section(
+    "residual_tractions", ("frequency_hz",), Tractions, (_BLOCK,), by_case=True, cards=_cards
+)

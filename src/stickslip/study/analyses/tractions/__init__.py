@@ -1,0 +1,1 @@
+"""Bounds over residual tractions: table, question, records, dataset and words."""

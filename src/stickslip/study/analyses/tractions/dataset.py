@@ -1,0 +1,105 @@
+"""The node ``/residual_tractions`` of a result."""
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stickslip.study.analyses.analysis import Solved
+from stickslip.study.analyses.tractions.records import Stage, TractionRecord
+from stickslip.study.analyses.tractions.words import case_verdicts
+from stickslip.study.analyses.verdict import ATTRIBUTE, of_all_cases, to_json
+from stickslip.study.analyses.waves.about import told
+from stickslip.study.keep.netcdf import stacked, variable
+from stickslip.units import HZ
+
+Variables = dict[str, xr.Variable]
+ABOUT = {
+    "output": ("", "1", "output whose amplitude is bounded"),
+    "excitation_n": ("", "N", "amplitude of the harmonic force"),
+    "harmonics": ("", "1", "highest harmonic of the motions"),
+    "frequency_hz": ("traction_point", "Hz", "frequency"),
+    "reference_amplitude": ("traction_point", "m", "amplitude from the model's own start"),
+    "least_amplitude": ("traction_point", "m", "smallest amplitude over all residual tractions"),
+    "most_amplitude": ("traction_point", "m", "largest amplitude over all residual tractions"),
+    "stuck_springs": ("traction_point bound", "1", "tangential springs that stick all the time: own start, smallest, largest amplitude"),
+    "solves": ("traction_point", "1", "motions that were solved for"),
+    "failures": ("traction_point", "1", "starts from which no motion was found"),
+    "resonance_hz": ("bound", "Hz", "where the curve of each bound is highest: own start, smallest, largest amplitude"),
+    "resonance_amplitude": ("bound", "m", "its height there"),
+    "resonance_inside": ("bound", "1", "1 where that is within the range, 0 at its ends"),
+    "spring": ("traction_spring", "1", "contact of each spring that has a start"),
+    "multiplier": ("bound traction_spring tangent", "1", "traction at t = 0 over the friction limit there, at the resonance of each bound; NaN: it does not stick"),
+    "resolved_amplitude": ("end", "m", "smallest and largest resonance solved again, forces marched over samples"),
+    "time_amplitude": ("end", "m", "smallest and largest resonance followed in time from their tractions"),
+    "time_status": ("end", "1", "how that ended; empty where it was not followed"),
+    "confirmed": ("end", "1", "1 where both agree with the bound"),
+}  # fmt: skip
+
+
+def dataset(solved: Sequence[Solved]) -> xr.Dataset:
+    """Return the bounds of all cases."""
+    cases = [_of_case(one) for one in solved]
+    labels = [one.case.label for one in solved]
+    found = [v for label, own in zip(labels, cases, strict=True) for v in case_verdicts(label, own)]  # fmt: skip
+    failed = sum(
+        int(np.count_nonzero(np.isnan(own["reference_amplitude"].values)))
+        for own in cases
+        if "reference_amplitude" in own
+    )
+    attributes = {ATTRIBUTE: to_json(of_all_cases(found, labels)), "failed": failed}
+    return xr.Dataset(stacked(cases), attrs=attributes)
+
+
+def _of_case(solved: Solved) -> Variables:
+    records: Sequence[TractionRecord] = solved.records
+    model = solved.notes.get("model", {})
+    values: dict[str, Any] = {
+        name: model[name] for name in ("output", "excitation_n", "harmonics") if name in model
+    }
+    points = [r for r in records if r.stage == "point"]
+    if points:
+        values |= _of_points(points)
+    by_stage = {r.stage: r for r in records}
+    if points and {"least", "most"} <= set(by_stage):
+        values |= _of_resonance(points, by_stage)
+    if "confirmed" in solved.notes:
+        values |= dict(solved.notes["confirmed"])
+    known = {name: value for name, value in values.items() if np.size(value) > 0}
+    facts = {name: value for name, value in model.items() if name not in ABOUT}
+    return told(facts) | {
+        name: variable(ABOUT[name][0], value, *ABOUT[name][1:]) for name, value in known.items()
+    }
+
+
+def _of_points(points: Sequence[TractionRecord]) -> dict[str, Any]:
+    amplitude = np.array([r.amplitude for r in points])
+    stuck = np.array([np.isfinite(r.multipliers).sum(axis=(1, 2)) for r in points])
+    return {
+        "frequency_hz": np.array([r.omega for r in points]) / HZ,
+        "reference_amplitude": amplitude[:, 0],
+        "least_amplitude": amplitude[:, 1],
+        "most_amplitude": amplitude[:, 2],
+        "stuck_springs": stuck,
+        "solves": np.array([r.solves for r in points]),
+        "failures": np.array([r.failures for r in points]),
+    }
+
+
+def _of_resonance(
+    points: Sequence[TractionRecord], by_stage: Mapping[Stage, TractionRecord]
+) -> dict[str, Any]:
+    known = [r for r in points if np.isfinite(r.amplitude[0])]
+    every = [*known, by_stage["least"], by_stage["most"]]
+    own = max(every, key=lambda r: float(r.amplitude[0]))
+    tops = [own, by_stage["least"], by_stage["most"]]
+    ends = known[0].omega, known[-1].omega
+    return {
+        "resonance_hz": np.array([r.omega for r in tops]) / HZ,
+        "resonance_amplitude": np.array([r.amplitude[k] for k, r in enumerate(tops)]),
+        "resonance_inside": np.array([int(r.omega not in ends) for r in tops]),
+        "spring": np.array(json.loads(own.springs), dtype=str),
+        "multiplier": np.array([r.multipliers[k] for k, r in enumerate(tops)]),
+    }

@@ -1,0 +1,112 @@
+"""What is told of bounds over residual tractions: verdicts, and what the terminal prints."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.analyses.verdict import Verdict
+from stickslip.study.keep.netcdf import one_case
+
+SMALL = 1e-3  # relative width below which residual tractions change nothing that counts
+LARGE = 1e-2  # above which the user is warned
+ENDS = ("smallest", "largest")
+
+
+def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
+    """Return what is to be thought of a case from its variables."""
+    if "resonance_amplitude" not in case:
+        return []
+    height, hertz = case["resonance_amplitude"].values, case["resonance_hz"].values
+    found = [_of_width(label, case, height, hertz)]
+    if not np.all(case["resonance_inside"].values):
+        why = "a bound is highest at the end of residual_tractions.frequency_hz, which is no resonance"
+        found.append(Verdict("doubtful", label, None, why, "Widen the range."))
+    failures = int(case["failures"].values.sum())
+    if failures:
+        count = int(case["solves"].values.sum())
+        why = f"from {failures} starts of tractions no motion was found ({count} were), so that the bounds may be wider"
+        found.append(Verdict("trusted", label, None, why, "Look at the figure: a bound that jumps back there is one that was missed."))  # fmt: skip
+    return [*found, *_of_ends(label, case)]
+
+
+def _of_width(
+    label: str, case: Mapping[str, xr.Variable], height: np.ndarray, hertz: np.ndarray
+) -> Verdict:
+    own, least, most = (float(h) for h in height)
+    if most - least <= SMALL * most:
+        because = (
+            "no contact sticks all the time"
+            if not np.isfinite(case["multiplier"].values).any()
+            else "what sticks does not change it"
+        )
+        elsewhere = _widest(case)
+        also = f"; elsewhere in the range {elsewhere}" if elsewhere else ""
+        why = f"residual tractions leave the resonance as it is, {1e3 * own:.4g} mm at {hertz[0]:.5g} Hz: {because}{also}"
+        return Verdict("trusted", label, None, why)
+    why = (
+        f"the resonance is {1e3 * own:.4g} mm from the model's own start, and by residual tractions alone anywhere from {1e3 * least:.4g} mm at "
+        f"{hertz[1]:.5g} Hz to {1e3 * most:.4g} mm at {hertz[2]:.5g} Hz ({100 * (least / own - 1):+.2g} % to {100 * (most / own - 1):+.2g} %): so far "
+        "the answer of forced_response may be off because of them"
+    )
+    return Verdict(
+        "trusted", label, None, why, "Design with the largest.", warns=most > (1.0 + LARGE) * least
+    )
+
+
+def _widest(case: Mapping[str, xr.Variable]) -> str:
+    """Say where the bounds are farthest apart; nothing where they are one everywhere."""
+    least, most = (case[f"{end}_amplitude"].values for end in ("least", "most"))
+    width = np.nan_to_num(most / least)
+    at = int(np.argmax(width))
+    if width[at] - 1.0 <= SMALL:
+        return ""
+    hertz = float(case["frequency_hz"].values[at])
+    return f"they leave up to {100 * (width[at] - 1):.2g} % open, at {hertz:.5g} Hz"
+
+
+def _of_ends(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
+    if "confirmed" not in case:
+        return []
+    found = []
+    height, hertz = case["resonance_amplitude"].values[1:], case["resonance_hz"].values[1:]
+    for k, end in enumerate(ENDS):
+        if case["confirmed"].values[k]:
+            continue
+        again, time = (float(case[f"{name}_amplitude"].values[k]) for name in ("resolved", "time"))
+        if not abs(again / height[k] - 1.0) <= SMALL:
+            why = f"the {end} resonance was not found again where forces are marched over samples"
+            found.append(Verdict("doubtful", label, float(hertz[k]), why, "Take more harmonics."))
+            continue
+        went = f"goes to {1e3 * time:.4g} mm" if np.isfinite(time) else "diverges"
+        why = (
+            f"the {end} resonance, {1e3 * height[k]:.4g} mm, is a periodic motion that a machine leaves: in time, begun with its tractions, it "
+            f"{went}"
+        )
+        found.append(Verdict("trusted", label, float(hertz[k]), why, "The bound holds; it may be wider than what can be attained."))  # fmt: skip
+    return found
+
+
+def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
+    """Return what the terminal prints."""
+    if "resonance_amplitude" not in data:
+        return ()
+    head = ("case", "own start mm", "at Hz", "smallest mm", "at Hz", "largest mm", "at Hz", "in time", "motions")  # fmt: skip
+    labels = [str(x) for x in data["case_label"].values]
+    rows = []
+    for i, label in enumerate(labels):
+        case = one_case(data, i)
+        if "resonance_amplitude" not in case:
+            continue
+        height, hertz = case["resonance_amplitude"].values, case["resonance_hz"].values
+        each = [text for h, f in zip(height, hertz, strict=True) for text in (f"{1e3 * h:.5g}", f"{f:.3f}")]  # fmt: skip
+        rows.append((label, *each, _in_time(case), str(int(case["solves"].sum()))))
+    return (TextTable("Resonance over all residual tractions", head, tuple(rows)),)
+
+
+def _in_time(case: xr.Dataset) -> str:
+    if "confirmed" not in case:
+        return "not followed"
+    words = ["confirmed" if ok else "left" for ok in case["confirmed"].values]
+    return words[0] if words[0] == words[1] else f"smallest {words[0]}, largest {words[1]}"

@@ -1,0 +1,104 @@
+"""[residual_tractions] of a study: four masses with a stop that the last one touches, its page, resuming, Python."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_v2 import EXAMPLES, changed
+
+import stickslip as ss
+from stickslip.errors import InputError
+from stickslip.report.page import plots
+from stickslip.study.analyses.residual_tractions import RESIDUAL_TRACTIONS
+from stickslip.study.keep.journal import JobJournal
+from stickslip.study.keep.netcdf import one_case
+from stickslip.study.models.study import read_study
+from stickslip.study.run import run_study
+
+KEYS = {
+    "vary.load.shaker.force_n": "[2.0, 3.0, 5.0]",
+    "forced_response.frequency_hz": "[11.0, 15.0]",
+    "forced_response.points": "8",
+    "forced_response.peak_points": "3",
+    "forced_response.stability": '"off"',
+    "harmonics.high": "3",
+}
+TABLE = """
+[residual_tractions]
+frequency_hz = [11.0, 15.0]
+points = 5
+harmonics = 3
+starts = 0
+"""
+
+
+def written(folder: Path, table: str = TABLE) -> Path:
+    text = (EXAMPLES / "four_masses" / "study.toml").read_text(encoding="utf-8")
+    text = text.replace("gap_m = 1e-3", "gap_m = 1e-4").replace("[output]", table + "\n[output]").replace("[forced_response]", "[harmonics]\n[forced_response]")  # fmt: skip
+    path = folder / "study.toml"
+    path.write_text(changed(text, KEYS), encoding="utf-8")
+    return path
+
+
+def test_bounds_of_all_cases_and_the_bands_on_the_page(tmp_path: Path) -> None:
+    outcome = run_study(read_study(written(tmp_path)))
+    data = outcome.tree["residual_tractions"].to_dataset()
+    least, own, most = (data[f"{n}_amplitude"].values for n in ("least", "reference", "most"))
+    assert np.all((least <= own) & (own <= most))
+    assert np.all(
+        np.nanmax(most / least, axis=1) > 1.003
+    )  # the band is open somewhere in each case
+    # 3 N: the resonance itself; its ends are motions in time, too
+    case = one_case(data, 1)
+    low, high = case["resonance_amplitude"].values[1:]
+    assert 1.001 < high / low < 1.02
+    assert np.all(case["confirmed"].values == 1)
+    assert case["time_amplitude"].values == pytest.approx([low, high], rel=0.02)
+    told = [v for v in outcome.verdicts if "residual tractions" in v.why]
+    assert len(told) == 3
+    assert "answer of forced_response may be off" in told[1].why
+    assert not told[1].warns
+    figures = plots(outcome.tree)
+    names = [trace.name for trace in figures["response"].data]
+    assert names.count("residual tractions") == 3
+    filled = next(t for t in figures["response"].data if t.fill)
+    assert len(filled.x) == 5
+    assert filled.y == pytest.approx(1e6 * most[0] / 2.0, rel=1e-9)  # µm/N
+    bands = [t for t in figures["optimisation"].data if t.fill]
+    assert bands[0].x == pytest.approx([2.0, 3.0, 5.0])
+    assert "residual_tractions" in figures
+    assert [t.title for t in outcome.summaries["residual_tractions"]] == ["Resonance over all residual tractions"]  # fmt: skip
+
+
+def test_an_interrupted_search_goes_on_and_python_gives_the_same(tmp_path: Path) -> None:
+    case = read_study(written(tmp_path)).cases()[1]
+    model = case.build()
+    front = ss.Model(
+        **{f: getattr(model, f) for f in ("parts", "contacts", "loads", "outputs", "peak_output")}
+    )
+    result = front.residual_tractions(
+        frequency_hz=(11.0, 15.0), points=5, harmonics=3, starts=0, in_time=False
+    )
+    own = one_case(result.data["residual_tractions"].to_dataset(), 0)
+    question = RESIDUAL_TRACTIONS.inputs(case, model)
+    with JobJournal(tmp_path / "a.part", RESIDUAL_TRACTIONS.record) as journal:
+        records = list(RESIDUAL_TRACTIONS.solve(question, (), journal))
+        assert [r.stage for r in records] == ["point"] * 5 + ["least", "most"]
+        later = list(RESIDUAL_TRACTIONS.solve(question, records[:2], journal))
+        assert [r.amplitude for r in later] == [pytest.approx(r.amplitude, rel=1e-6) for r in records[2:]]  # fmt: skip
+        assert list(RESIDUAL_TRACTIONS.solve(question, records, journal)) == []
+    found = np.array([r.amplitude[2] for r in records[:5]])
+    assert found == pytest.approx(own["most_amplitude"].values, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ("harmonics = 3", "harmonics = 0", r"residual_tractions\.harmonics"),
+        ("[11.0, 15.0]", "[15.0, 11.0]", "lower before the higher"),
+        ("starts = 0", "start = 0", "start"),
+    ],
+)
+def test_bad_keys_are_refused(tmp_path: Path, old: str, new: str, why: str) -> None:
+    with pytest.raises(InputError, match=why):
+        read_study(written(tmp_path, TABLE.replace(old, new)))
