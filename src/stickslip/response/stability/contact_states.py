@@ -10,9 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
-from stickslip.contact.compiled import CompiledContacts
+from stickslip.contact.compiled import CompiledContacts, compile_contacts
 from stickslip.contact.element import K_N, MU, RESIDUAL, UNILATERAL
-from stickslip.contact.event_integrals import Events
+from stickslip.contact.event_integrals import Events, room_for_events
+from stickslip.contact.events import exact_period
+from stickslip.contact.interface import Interface
 from stickslip.contact.law import SLIP, STICK, ContactLaw, PiecewiseLinear
 from stickslip.contact.laws.coupled_coulomb import CoupledCoulomb
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
@@ -94,6 +96,27 @@ def is_located(law: ContactLaw) -> bool:
     """Whether all transitions of a law can be located: planar contacts without friction have none but those of their normal springs."""
     frictionless = isinstance(law, CoupledCoulomb) and law.mu == 0.0 and law.k_n > 0.0
     return isinstance(law, PiecewiseLinear) or frictionless
+
+
+def located_states(interface: Interface, gap_coefficients: FloatArray) -> ContactStates | None:
+    """Return the states over a period of what can be located of contacts; None where rounding made more transitions than there can be.
+
+    Parameters
+    ----------
+    interface
+        The contacts.
+    gap_coefficients
+        (2H+1, 3 n_contacts) real Fourier coefficients of their gaps, m.
+    """
+    laws = [located_part(law) for law in interface.laws]
+    own = np.array([c for c, law in enumerate(laws) if law is not None], dtype=np.int64)
+    compiled = compile_contacts([laws[c] for c in own], interface.factors[own], "events")
+    events = room_for_events((len(gap_coefficients) - 1) // 2, len(compiled.elements))
+    gaps = gap_coefficients.reshape(len(gap_coefficients), -1, 3)[:, own]
+    gaps = compiled.from_sliders(gaps.reshape(len(gaps), -1))
+    none = np.zeros((own.size, 3, 0))
+    exact_period(gaps, compiled.elements, compiled.first, none, kept=events)
+    return contact_states(events, compiled, own, interface.n_contacts) if events.whole else None
 
 
 def contact_states(

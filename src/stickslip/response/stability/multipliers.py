@@ -6,20 +6,17 @@ from typing import Literal
 import numpy as np
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from stickslip.contact.compiled import compile_contacts
-from stickslip.contact.event_integrals import room_for_events
-from stickslip.contact.events import exact_period
 from stickslip.contact.interface import Interface
-from stickslip.contact.law import ContactLaw, PiecewiseLinear
+from stickslip.contact.law import ContactLaw
 from stickslip.errors import input_error
 from stickslip.harmonic.linear import LinearSide, one_structure
 from stickslip.model.structure import Structure
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
 from stickslip.response.stability.contact_states import (
     ContactStates,
-    contact_states,
     is_located,
     located_part,
+    located_states,
 )
 from stickslip.response.stability.kicks import sample_times, sampled_monodromy
 from stickslip.response.stability.missing_harmonics import corrected
@@ -231,8 +228,8 @@ def motion_stability(
 
 def stability_in_time(own: InTime, omega: float) -> Stability:
     """Return the stability of a motion of what is marched in time; see `motion_stability`."""
-    modes, laws = _prepared(own.structure, own.contacts, omega)
-    contacts = _located(own.contacts, laws, own.gaps)
+    modes = _prepared(own.structure, own.contacts, omega)
+    contacts = located_states(own.contacts, own.gaps)
     if contacts is None:
         return _unknown(modes.n)
     located = np.array([is_located(law) for law in own.contacts.laws], dtype=bool)
@@ -249,8 +246,8 @@ def period_matrix(own: InTime, omega: float) -> tuple[ModalStates, FloatArray, i
     that of the finest samples.
     """
     interface = own.contacts
-    modes, laws = _prepared(own.structure, interface, omega)
-    contacts = _located(interface, laws, own.gaps)
+    modes = _prepared(own.structure, interface, omega)
+    contacts = located_states(interface, own.gaps)
     if contacts is None:
         return None
     sampled = np.flatnonzero([not is_located(law) for law in interface.laws])
@@ -279,16 +276,15 @@ def _powers(matrix: FloatArray, shares: int) -> ComplexArray:
 
 def _prepared(
     structure: Structure, interface: Interface, omega: float
-) -> tuple[ModalStates, list[PiecewiseLinear | None]]:
-    """Return the modal states, and of each law what has transitions that can be located."""
+) -> ModalStates:
+    """Return the modal states."""
     if interface.rigid:
         raise input_error(
             "stability",
             "a contact is rigid: its states have no multipliers that follow from forces as functions of gaps",
             "Give the contacts a stiffness, as elastic_coulomb.",
         )
-    modes = modal_states(structure, interface.gap_operator, interface.stuck_stiffness(), omega)
-    return modes, [located_part(law) for law in interface.laws]
+    return modal_states(structure, interface.gap_operator, interface.stuck_stiffness(), omega)
 
 
 def _samples(
@@ -298,20 +294,6 @@ def _samples(
     samples = max(SAMPLES, SAMPLES_PER_HARMONIC * ((len(gap_coefficients) - 1) // 2))
     polynomials = gap_coefficients.reshape(len(gap_coefficients), -1, 3)[:, own]
     return sample_times(contacts, samples, halves), polynomials
-
-
-def _located(
-    interface: Interface, laws: list[PiecewiseLinear | None], gap_coefficients: FloatArray
-) -> ContactStates | None:
-    """Return the states of the contacts whose transitions can be located; None where rounding made more of these than there can be."""
-    own = np.array([c for c, law in enumerate(laws) if law is not None], dtype=np.int64)
-    compiled = compile_contacts([laws[c] for c in own], interface.factors[own], "events")
-    events = room_for_events((len(gap_coefficients) - 1) // 2, len(compiled.elements))
-    gaps = gap_coefficients.reshape(len(gap_coefficients), -1, 3)[:, own]
-    gaps = compiled.from_sliders(gaps.reshape(len(gaps), -1))
-    none = np.zeros((own.size, 3, 0))
-    exact_period(gaps, compiled.elements, compiled.first, none, kept=events)
-    return contact_states(events, compiled, own, interface.n_contacts) if events.whole else None
 
 
 def _judged(

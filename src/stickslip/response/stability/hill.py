@@ -1,0 +1,214 @@
+"""Stability of a motion by Hill's method that is exact for friction: of a wheel against every wave, one sector at a time."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.errors import input_error
+from stickslip.harmonic.fourier import to_real
+from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
+from stickslip.response.stability.contact_states import (
+    ContactStates,
+    is_located,
+    located_states,
+)
+from stickslip.response.stability.contact_tangent import contact_tangents
+from stickslip.response.stability.hill_exponents import Exponents, exponents, segments_of
+from stickslip.response.stability.hill_modes import HillSide
+from stickslip.response.stability.hill_segment import Hill
+from stickslip.response.stability.missing_harmonics import corrected
+from stickslip.response.stability.multipliers import Stability
+from stickslip.response.stability.waves import WaveDisturbance
+from stickslip.response.system import System
+from stickslip.response.time.floquet import Floquet
+
+FACTOR, MORE = 2, 3  # disturbances have FACTOR times the harmonics of the motion and MORE,
+LEAST, MOST = 8, 20  # at least and at most these,
+ROWS = 1300  # and no more than make matrices of so many rows,
+FEWEST = 5  # but these
+COMPARED = 3  # waves of a wheel whose exponents are compared with those of the motion as it was solved
+
+
+@dataclass(frozen=True, eq=False)
+class HillStability:
+    """What becomes of small disturbances of a motion, by Hill's method.
+
+    Parameters
+    ----------
+    stability
+        Verdict, and the multipliers near the unit circle and outside.
+    disturbance
+        That whose multiplier decides; None where there is none near the unit circle.
+    missing
+        Multipliers outside the unit circle that are there by the turns of the determinant and were not found; None where they
+        could not be counted.
+    """
+
+    stability: Stability
+    disturbance: WaveDisturbance | None
+    missing: int | None
+
+
+def hill_stability(problem: ForcedProblem, point: ForcedPoint) -> HillStability:
+    """Return the stability of a solved point of a forced response, a tuned wheel's against every wave.
+
+    As in `stability`, the multipliers are those of the motion with more harmonics, and what these change is part of their errors. Structural damping
+    and aerodynamic coefficients that follow the frequency act as in the balance.
+
+    Raises
+    ------
+    InputError
+        If the point did not converge, a law's transitions are not located, or a tuned wheel has not all its waves.
+    """
+    if not point.converged:
+        raise input_error(
+            "hill_stability: point",
+            f"did not converge at {point.omega:g} rad/s ({point.status.advice})",
+            "Ask for the stability of solutions only.",
+        )
+    system, more = problem.system.at(point.omega), corrected(problem, point)
+    better, times = (point, np.inf) if more is None else more
+    hill, states = _of_point(system, problem, better)
+    if hill is None or states is None:
+        return _unknown()
+    found = exponents(hill)
+    change = np.full(found.values.size, np.inf)
+    if better is point and more is not None:
+        change[:] = 0.0
+    elif more is not None:
+        solved, _ = _of_point(system, problem, point)
+        change = change if solved is None else times * _changes(found, solved)
+    return _judged(found, change, states, hill)
+
+
+def hill_exponents(
+    system: System, gaps: ComplexArray, omega: float, order: int | None = None
+) -> Exponents:
+    """Return the Floquet exponents near the imaginary axis and right of it of a motion as it is given.
+
+    Parameters
+    ----------
+    system
+        A structure, or a tuned wheel that has every wave.
+    gaps
+        (H+1, 3 n_contacts) complex coefficients of the gaps, of a wheel those of sector 0, m.
+    omega
+        Of the motion, rad/s.
+    order
+        Highest harmonic of the disturbances that is solved; those beyond act to first order. None: by that of the motion.
+
+    Raises
+    ------
+    InputError
+        If a contact is rigid, a law's transitions are not located, rounding makes more of these than there can be, or a tuned wheel
+        has not all its waves.
+    """
+    hill, _ = _prepared(system, gaps, omega, order)
+    if hill is None:
+        raise input_error(
+            "hill_exponents",
+            "rounding makes more transitions than gaps of these harmonics can have",
+            "Give a motion of fewer harmonics.",
+        )
+    return exponents(hill)
+
+
+def _of_point(
+    system: System, problem: ForcedProblem, point: ForcedPoint
+) -> tuple[Hill | None, ContactStates | None]:
+    gaps = point.coefficients @ problem.low.interface.gap_operator.T
+    return _prepared(system, gaps, point.omega, None)
+
+
+def _prepared(
+    system: System, gaps: ComplexArray, omega: float, order: int | None
+) -> tuple[Hill | None, ContactStates | None]:
+    """Return Hill's problem of a motion and the states of its contacts; None where these are not known."""
+    side, interface = system.structure, system.interface
+    if isinstance(side, TunedWheel) and not side.has_every_wave:
+        raise input_error(
+            "hill_stability",
+            "the wheel has not all its waves, each of which a disturbance may be",
+            "Assemble it with every_wave=True.",
+        )
+    if interface.rigid or not all(is_located(law) for law in interface.laws):
+        raise input_error(
+            "hill_stability",
+            "a contact is rigid, or its law changes its state at times that are not located",
+            "Take a piecewise linear law, as elastic_coulomb; the multipliers of `stability` know the others, but for rigid ones.",
+        )
+    states = located_states(interface, to_real(gaps))
+    if states is None:
+        return None, None
+    springs, ports, tangents = contact_tangents(states)
+    if order is None:
+        order = min(max(FACTOR * (len(gaps) - 1) + MORE, LEAST), MOST)
+        order = max(min(order, (ROWS // max(ports.size, 1) - 1) // 2), FEWEST)
+    return Hill(HillSide(system, springs, ports, omega, {}), tangents, order), states
+
+
+def _changes(found: Exponents, solved: Hill) -> FloatArray:
+    """Return how far each multiplier of a motion is from that of the motion as it was solved.
+
+    Of a wheel waves are compared until a few have been; the others count as far away as the farthest of these.
+    """
+    waves = solved.side.waves
+    if waves == 1:
+        other = exponents(solved, segments_of(solved))
+        return _distances(found, other)
+    first = list(dict.fromkeys(min(int(w), waves - int(w)) % waves for w in found.waves))[:COMPARED]
+    other = exponents(solved, [s for s in segments_of(solved) if s.wave in first])
+    known = np.isin(np.minimum(found.waves, waves - found.waves) % waves, first)
+    change = np.zeros(found.values.size)
+    some = Exponents(found.values[known], found.errors[known], found.waves[known], found.harmonics[known], None)  # fmt: skip
+    change[known] = _distances(some, other)
+    size = np.abs(found.multipliers)
+    if np.any(~known):
+        change[~known] = np.max(change[known] / size[known], initial=0.0) * size[~known]
+    return change
+
+
+def _distances(found: Exponents, other: Exponents) -> FloatArray:
+    """Return the distance of each multiplier from the nearest of the same wave among others."""
+    own, theirs = found.multipliers, other.multipliers
+    out = np.abs(own)  # one that was not there has come from far left
+    for i, wave in enumerate(found.waves):
+        same = np.abs(theirs[other.waves == wave] - own[i])
+        out[i] = np.min(same, initial=out[i])
+    return np.asarray(out)
+
+
+def _judged(
+    found: Exponents, change: FloatArray, states: ContactStates, hill: Hill
+) -> HillStability:
+    values = found.multipliers
+    errors = change + 2.0 * np.pi * np.abs(values) * found.errors
+    if found.missing is None or found.missing:
+        errors = np.full_like(errors, np.inf)
+        if not values.size:
+            values, errors = np.array([np.nan + 0j]), np.array([np.inf])
+    own = Stability(
+        Floquet(values), errors, states.resting, states.grazing, states.transitions
+    )
+    if not found.values.size:
+        return HillStability(own, None, found.missing)
+    size = own.multiplier
+    at = int(np.argmin(np.abs(np.abs(values) - size))) if np.isfinite(size) else 0
+    return HillStability(own, _disturbance(found, at, hill.side), found.missing)
+
+
+def _disturbance(found: Exponents, at: int, side: HillSide) -> WaveDisturbance:
+    """Return which disturbance an exponent belongs to: its strongest harmonic, as a wave with a positive frequency."""
+    value, harmonic = found.values[at], int(found.harmonics[at])
+    frequency = float(value.imag) + harmonic
+    wave = side.wave_of(int(found.waves[at]), harmonic)
+    wave = wave if frequency >= 0.0 else -wave % side.waves
+    multiplier = complex(found.multipliers[at])
+    return WaveDisturbance(multiplier, wave, float("nan"), abs(frequency) * side.omega)
+
+
+def _unknown() -> HillStability:
+    none = Stability(Floquet(np.array([np.nan + 0j])), np.array([np.inf]), 0, 0, 0)
+    return HillStability(replace(none), None, None)

@@ -1,0 +1,184 @@
+"""All Floquet exponents near the imaginary axis and right of it, by Hill's method that is exact for friction."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.response.stability.hill_segment import HALF, Hill, Segment
+from stickslip.response.stability.hill_zeros import Matrix, Zeros, turning, zeros_near
+
+WIDE, HIGH = 0.3, 0.32  # half axes of the ellipse about a segment
+EDGE = 5e-3  # beyond the ends of a segment that exponents may lie
+ON_AXIS = 1.6e-7  # real part up to which an exponent is on the imaginary axis
+PATH = 65  # values of a determinant along a segment
+STEPS = (0.4, 0.8, 1.2, 1.6, 2.0, 2.5, 3.0)  # real parts of segments where exponents are missing
+TWIN = 1e-5  # distance of an exponent that two segments have found
+WHOLE = 0.25  # farther from a whole number the turns of a determinant are no count
+
+
+@dataclass(frozen=True, eq=False)
+class Exponents:
+    """Exponents σ = λ/ω of the disturbances of a motion, that which grows most first.
+
+    Attributes
+    ----------
+    values
+        (e,) with imaginary parts from -1/2 to 1/2.
+    errors
+        (e,) what the harmonics beyond those that are solved change in them, to first order.
+    waves, harmonics
+        (e,) wave numbers of the disturbances, and the harmonic in which they vibrate most.
+    missing
+        How many more lie right of the imaginary axis than were found; None where they could not be counted.
+    """
+
+    values: ComplexArray
+    errors: FloatArray
+    waves: IntArray
+    harmonics: IntArray
+    missing: int | None
+
+    @property
+    def multipliers(self) -> ComplexArray:
+        """(e,) ``e^{2πσ}``."""
+        return np.asarray(np.exp(2.0 * np.pi * self.values))
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Exponents about a segment of a wave."""
+
+    wave: int
+    values: ComplexArray
+    errors: FloatArray
+    harmonics: IntArray
+
+
+def exponents(hill: Hill, segments: Sequence[Segment] = ()) -> Exponents:
+    """Return the exponents of all disturbances of a motion near the imaginary axis, and all right of it; or those about some segments.
+
+    Of a wheel each wave has a problem of its own. Disturbances are real: those of wave -k are the conjugates of those of wave k.
+    """
+    if segments:
+        return _gathered([_zeros(segment) for segment in segments], hill, None)
+    axis = segments_of(hill)
+    parts = [_zeros(segment) for segment in axis]
+    growing = _counted(axis)
+    for growth in STEPS if growing is not None else ():
+        if _growing(parts, hill) >= (growing or 0):
+            break
+        parts += [_zeros(replace(segment, growth=growth)) for segment in axis]
+    missing = None if growing is None else max(0, growing - _growing(parts, hill))
+    return _gathered(parts, hill, missing)
+
+
+def segments_of(hill: Hill) -> list[Segment]:
+    """Return the segments of the imaginary axis that stand for all disturbances."""
+    waves, found = hill.side.waves, []
+    for wave in range(waves // 2 + 1):
+        lows = (0.0,) if 2 * wave in (0, waves) else (-HALF, 0.0)
+        found += [Segment(hill, wave, low) for low in lows]
+    return found
+
+
+def _counted(axis: Sequence[Segment]) -> int | None:
+    """Return how many exponents lie right of the imaginary axis, by the turns of the determinant along it; None where these are not known."""
+    each = [_turns(segment) for segment in axis]
+    turns, alone = 2.0 * sum(t for t, _ in each), 2 * sum(n for _, n in each)
+    if np.isnan(turns) or abs(turns - round(turns)) > WHOLE:
+        return None
+    return alone - round(turns)
+
+
+def _turns(segment: Segment) -> tuple[float, int]:
+    """Return how often the determinant turns along a segment, and how many exponents springs in place of the contacts have right of it."""
+    whole, alone = _matrix(segment, "whole"), _matrix(segment, "alone")
+    path = ON_AXIS + 1j * np.linspace(segment.low, segment.high, PATH)
+    without = _raw(segment, "alone").values
+    phases = np.array([node.phase for node in segment.nodes])
+    steps = np.angle(np.exp(1j * np.diff(phases)))
+    eliminated = float(steps.sum()) if np.all(np.abs(steps) < 2.0) else float("nan")
+    known = _raw(segment, "whole").values
+    turns = turning(whole, known, path) - turning(alone, without, path) + eliminated
+    inside = (without.imag > segment.low - EDGE) & (without.imag < segment.high + EDGE)
+    growing = int(np.count_nonzero((without.real > ON_AXIS) & inside))
+    return turns / (2.0 * np.pi), growing
+
+
+def _zeros(segment: Segment) -> Part:
+    """Return the exponents about a segment, their errors, and the harmonics in which they vibrate most."""
+    found = _raw(segment, "whole")
+    inside = (found.values.imag >= segment.low - EDGE) & (found.values.imag <= segment.high + EDGE)
+    values = found.values[inside]
+    beyond = _matrix(segment, "beyond")(values)
+    left, right = found.left[inside], found.right[inside]
+    parts = np.einsum("ki,kij,kj->k", left.conj(), beyond, right)
+    errors = np.abs(parts / found.slopes[inside])
+    harmonic = np.repeat(segment.hill.core, [own.size for own in segment.slow])
+    most = harmonic[np.argmax(np.abs(right), axis=1)] if values.size else np.zeros(0, dtype=int)
+    return Part(segment.wave, values, errors, most)
+
+
+def _raw(segment: Segment, name: str) -> Zeros:
+    centre = complex(segment.growth, segment.low + 0.5 * HALF)
+    return zeros_near(_matrix(segment, name), _slope(segment, name), centre, WIDE, HIGH)
+
+
+def _matrix(segment: Segment, name: str) -> Matrix:
+    """Return the polynomial through the small matrices of a segment."""
+    nodes = np.array([getattr(node, name) for node in segment.nodes])
+
+    def matrix(sigma: ComplexArray) -> ComplexArray:
+        return np.asarray(np.tensordot(segment.weights(sigma), nodes, axes=1))
+
+    return matrix
+
+
+def _slope(segment: Segment, name: str) -> Matrix:
+    """Return its derivative, by central differences along the real axis."""
+    matrix, step = _matrix(segment, name), 1e-5
+
+    def slope(sigma: ComplexArray) -> ComplexArray:
+        return np.asarray((matrix(sigma + step) - matrix(sigma - step)) / (2.0 * step))
+
+    return slope
+
+
+def _growing(parts: list[Part], hill: Hill) -> int:
+    """Return the number of exponents right of the imaginary axis that are known, with the conjugates."""
+    return int(np.count_nonzero(_gathered(parts, hill, None).values.real > ON_AXIS))
+
+
+def _gathered(parts: list[Part], hill: Hill, missing: int | None) -> Exponents:
+    """Return all exponents with their conjugates, each once, that which grows most first."""
+    waves = hill.side.waves
+    segment = np.concatenate([np.full(p.values.size, i) for i, p in enumerate(parts)])
+    wave = np.concatenate([np.full(p.values.size, p.wave) for p in parts])
+    values = np.concatenate([p.values for p in parts])
+    errors = np.concatenate([p.errors for p in parts])
+    harmonics = np.concatenate([p.harmonics for p in parts])
+    kept: list[int] = []
+    for i in np.argsort(-values.real, kind="stable"):
+        others = np.array([j for j in kept if segment[j] != segment[i]], dtype=np.int64)
+        same = (wave[others] == wave[i]) & (np.abs(values[others] - values[i]) < TWIN)
+        for turn in (-1, 1):  # the same disturbance, its harmonics counted from another one
+            twin = np.abs(values[others] - values[i] - 1j * turn) < EDGE
+            same |= twin & (wave[others] == hill.side.wave_of(int(wave[i]), -turn))
+        if not np.any(same):
+            kept.append(int(i))
+    own = np.array(kept, dtype=np.int64)
+    # of a wave that is its own conjugate an exponent at an end stands for itself, or its conjugate has been found, too
+    at_end = np.minimum(np.abs(values[own].imag), np.abs(np.abs(values[own].imag) - HALF)) < EDGE
+    paired = own[~(((-wave[own]) % waves == wave[own]) & at_end)]
+    both, sign = np.append(own, paired), np.repeat([1, -1], [own.size, paired.size])
+    order = np.argsort(-values[both].real, kind="stable")
+    both, sign = both[order], sign[order]
+    return Exponents(
+        values[both].real + 1j * sign * values[both].imag,
+        errors[both],
+        (sign * wave[both]) % waves,
+        sign * harmonics[both],
+        missing,
+    )

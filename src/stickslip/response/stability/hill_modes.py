@@ -1,0 +1,211 @@
+"""What vibrates between contacts, for a disturbance with an exponent: the dynamic stiffness of each harmonic in modes of its own.
+
+The modes are those with springs in place of the contacts that stand for their mean. Damping may couple them, damping by loss factors and
+aerodynamic forces may add to them: all that a harmonic balance knows acts here as it does there.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.model.structure import Structure
+from stickslip.reduction.aerodynamics import Feedback
+from stickslip.reduction.nodal import own_motions
+from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.system import System
+
+RAISED = 8  # times that the mass is weighted four times as much, until it makes the stiffness definite
+COUPLED = 1e-10  # of the largest entry: what couples modes less does not
+
+
+@dataclass(frozen=True, eq=False)
+class HillModes:
+    """The modes ``u = Φ q`` of what one harmonic vibrates as, ``Φᴴ(K + α M)Φ = 1``, all over the frequency of the motion.
+
+    Attributes
+    ----------
+    stiffness, mass
+        (n,) of each mode, the mass times ω².
+    damping
+        (n, n) times ω; or (n,) where the modes are not coupled.
+    rest
+        (n, n) stiffness that is not Hermitian; or (n,).
+    loss
+        (n, n) or (n,) stiffness that acts a quarter of a period ahead.
+    ports
+        (m, n) gaps at the ports of the contacts.
+    omega
+        rad/s.
+    feedback
+        Aerodynamic force of a table of frequencies on the modes, of which the matrices hold the frozen form; None for none.
+    """
+
+    stiffness: FloatArray
+    mass: FloatArray
+    damping: Matrix
+    rest: Matrix
+    loss: Matrix
+    ports: Matrix
+    omega: float
+    feedback: Feedback | None
+
+    @property
+    def coupled(self) -> bool:
+        """Whether the dynamic stiffness is no diagonal matrix."""
+        return self.damping.ndim == 2 or self.feedback is not None
+
+    @property
+    def ratios(self) -> FloatArray:
+        """(n,) frequencies of the modes over that of the motion; infinite without mass."""
+        with np.errstate(divide="ignore"):
+            return np.sqrt(np.abs(self.stiffness) / self.mass)
+
+    def dynamic(self, z: complex, sign: float) -> ComplexArray:
+        """Return the (n, n) dynamic stiffness at ``z = σ + ih``, or its diagonal (n,); `sign` is that of the frequency."""
+        own = self.stiffness + z * z * self.mass
+        more = z * self.damping + self.rest + 1j * sign * self.loss
+        if self.damping.ndim == 1:
+            full: ComplexArray = np.asarray(own + more)
+            if self.feedback is None:
+                return full
+            more, own = np.diag(full), np.zeros(own.size)
+        out = np.array(more, dtype=complex)
+        out.flat[:: len(own) + 1] += own
+        if self.feedback is not None:
+            out -= self._air(z)
+        return out
+
+    def _air(self, z: complex) -> ComplexArray:
+        """Return what a table of frequencies adds to the frozen force, at the frequency of the disturbance."""
+        force: Feedback = self.feedback  # type: ignore[assignment]  # asked for where there is one
+        s = self.omega * z.imag
+        stiff, damp = force.influence.frozen(force.phase_angle, force.reference)
+        if s >= 0.0:
+            table = force.influence.of_wave(force.phase_angle, s)
+        else:
+            table = force.influence.of_wave(-force.phase_angle, -s).conj()
+        P = force.patterns
+        return np.asarray(P @ (table - stiff - self.omega * z * damp) @ P.conj().T)
+
+
+def hill_modes(
+    structure: Structure,
+    gap_operator: Matrix,
+    springs: FloatArray,
+    ports: IntArray,
+    omega: float,
+    feedback: Feedback | None,
+) -> HillModes:
+    """Decompose what a harmonic vibrates as.
+
+    Parameters
+    ----------
+    structure
+        Its matrices may be complex and unsymmetric; coordinates may be without mass.
+    gap_operator
+        (3 n_contacts, n).
+    springs
+        (3 n_contacts,) that stand for the contacts, N/m.
+    ports
+        Rows of the gap operator where contacts differ from them.
+    omega
+        Of the motion, rad/s.
+    feedback
+        Aerodynamic force, of which the structure holds the frozen form; None for none.
+    """
+    m, c, k, rows = (
+        _dense(a) for a in (structure.mass, structure.damping, structure.stiffness, gap_operator)
+    )
+    k = k + rows.T @ (springs[:, None] * rows)
+    loss = np.zeros_like(k) if structure.loss is None else _dense(structure.loss)
+    even, mass = 0.5 * (k + k.conj().T), 0.5 * (m + m.conj().T)
+    shift = omega**2
+    for _ in range(RAISED):
+        try:
+            values, basis = scipy.linalg.eigh(mass, even + shift * mass)
+            break
+        except np.linalg.LinAlgError:
+            shift *= 4.0
+    else:
+        raise np.linalg.LinAlgError("the stiffness of a harmonic is not bounded by its mass")
+    values = np.maximum(values, 0.0)
+    parts = [basis.conj().T @ a @ basis for a in (omega * c, k - even, loss)]
+    if all(_diagonal(a) for a in parts):
+        parts = [np.diagonal(a).copy() for a in parts]
+    own = None
+    if feedback is not None and feedback.influence.depends_on_frequency:
+        inside = replace(feedback.influence, beyond="nearest")
+        own = replace(feedback, patterns=basis.conj().T @ feedback.patterns, influence=inside)
+    return HillModes(
+        1.0 - shift * values, omega**2 * values, *parts, rows[ports] @ basis, omega, own
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class HillSide:
+    """What vibrates, as a disturbance of a motion sees it: harmonic h of a disturbance of wave k' is the wave ``k' + h m``.
+
+    Attributes
+    ----------
+    system
+        One structure, or a tuned wheel that has every wave.
+    springs, ports
+        From `contact_tangents`.
+    omega
+        Of the motion, rad/s.
+    """
+
+    system: System
+    springs: FloatArray
+    ports: IntArray
+    omega: float
+    known: dict[int, HillModes]
+
+    @property
+    def waves(self) -> int:
+        """Number of waves that a disturbance may have."""
+        side = self.system.structure
+        return side.sectors if isinstance(side, TunedWheel) else 1
+
+    def wave_of(self, wave: int, harmonic: int) -> int:
+        """Return the wave number of a harmonic of a disturbance of a wave."""
+        side = self.system.structure
+        if not isinstance(side, TunedWheel):
+            return 0
+        return (wave + harmonic * side.engine_order) % side.sectors
+
+    def modes(self, wave: int, harmonic: int) -> HillModes:
+        """Return what a harmonic of a disturbance of a wave vibrates as."""
+        number = self.wave_of(wave, harmonic)
+        if number not in self.known:
+            self.known[number] = self._made(number)
+        return self.known[number]
+
+    def _made(self, number: int) -> HillModes:
+        side, gaps = self.system.structure, self.system.interface.gap_operator
+        if not isinstance(side, TunedWheel):
+            structure, force = side.of_harmonic(1), side.feedback_of(1)
+            return hill_modes(structure, gaps, self.springs, self.ports, self.omega, force)
+        wave, force = side.waves[number], side.feedback.get(number)
+        if side.multipliers.size:
+            way = own_motions(wave, side.multipliers)
+            n = way.shape[1]
+            k, c, m = (_dense(a)[:n, :n] for a in (wave.stiffness, wave.damping, wave.mass))
+            loss = None if wave.loss is None else _dense(wave.loss)[:n, :n]
+            wave = Structure(m, c, k, wave.dofs.take(np.arange(n)), loss=loss)
+            gaps = _dense(gaps) @ way
+            force = None if force is None else replace(force, patterns=force.patterns[:n])
+        return hill_modes(wave, gaps, self.springs, self.ports, self.omega, force)
+
+
+def _diagonal(matrix: Matrix) -> bool:
+    size = np.max(np.abs(matrix), initial=0.0)
+    off = np.max(np.abs(matrix - np.diag(np.diagonal(matrix))), initial=0.0)
+    return bool(off <= COUPLED * size)
+
+
+def _dense(matrix: Matrix) -> Matrix:
+    return np.asarray(matrix.toarray() if scipy.sparse.issparse(matrix) else matrix)

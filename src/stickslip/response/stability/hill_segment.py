@@ -1,0 +1,226 @@
+"""Hill's problem between two frequencies of the disturbance, as a small matrix of the modes that can ring there.
+
+A disturbance ``e^{στ} Σ_h u_h e^{ihτ}`` of a wave satisfies ``Z_h(σ + ih) q_h + B_hᴴ f_h = 0``, with gaps ``g_h = B_h q_h`` and contact forces
+``f = D(σ) g``. Modes whose frequency is far from that of a harmonic are eliminated with the contacts: what is left of the others is a matrix
+S(σ) that has no poles near the segment, and a polynomial through a few σ is exact to many digits. Harmonics of the contacts beyond those
+that are solved act through their first passage, ``-D R D`` with the receptance R at the ports.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.response.stability.contact_tangent import ContactTangent
+from stickslip.response.stability.hill_modes import HillModes, HillSide
+
+NODES = 8  # of the polynomial through a segment of half a frequency
+AWAY = 0.75  # frequencies of the motion from a segment, beyond which a mode does not ring
+TAIL = 3  # times the harmonics that are solved: up to which those beyond act
+HALF = 0.5  # frequency of the motion: length of a segment
+
+
+@dataclass(frozen=True, eq=False)
+class Hill:
+    """A motion as its disturbances see it.
+
+    Attributes
+    ----------
+    side
+        What vibrates.
+    tangents
+        The contacts that change.
+    order
+        Highest harmonic of disturbances that is solved.
+    """
+
+    side: HillSide
+    tangents: Sequence[ContactTangent]
+    order: int
+
+    @property
+    def core(self) -> IntArray:
+        """Harmonics that are solved."""
+        return np.arange(-self.order, self.order + 1)
+
+    @property
+    def tail(self) -> IntArray:
+        """Harmonics beyond."""
+        beyond = np.arange(self.order + 1, TAIL * self.order + 1)
+        return np.concatenate([-beyond[::-1], beyond])
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """The small matrices at one exponent.
+
+    Attributes
+    ----------
+    whole
+        (s, s) with the contacts.
+    beyond
+        (s, s) part of it that harmonics beyond those solved have.
+    alone
+        (s, s) with springs in place of the contacts.
+    phase
+        Argument of the determinant of what was eliminated, over that without contacts.
+    """
+
+    whole: ComplexArray
+    beyond: ComplexArray
+    alone: ComplexArray
+    phase: float
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """Exponents ``x + iy`` with y between `low` and ``low + 1/2``, of the disturbances of a wave."""
+
+    hill: Hill
+    wave: int
+    low: float
+    growth: float = 0.0
+
+    @property
+    def high(self) -> float:
+        """Its upper end."""
+        return self.low + HALF
+
+    @cached_property
+    def slow(self) -> list[IntArray]:
+        """The modes of each harmonic that can ring."""
+        found = []
+        for h in self.hill.core:
+            ratios = self.hill.side.modes(self.wave, int(h)).ratios
+            ends = sorted((abs(h + self.low), abs(h + self.high)))
+            inside = (ratios > ends[0] - AWAY) & (ratios < ends[1] + AWAY)
+            found.append(np.flatnonzero(inside))
+        return found
+
+    @cached_property
+    def heights(self) -> FloatArray:
+        """(NODES,) imaginary parts of the nodes, from end to end."""
+        x = np.cos(np.pi * np.arange(NODES)[::-1] / (NODES - 1))
+        return self.low + 0.5 * HALF * (1.0 + x)
+
+    @cached_property
+    def nodes(self) -> list[Node]:
+        """The matrices at the nodes."""
+        return [self.node(complex(self.growth, y)) for y in self.heights]
+
+    def weights(self, sigma: ComplexArray) -> ComplexArray:
+        """Return the (k, NODES) shares of the nodes in the polynomial at exponents (k,)."""
+        x = self.growth + 1j * self.heights
+        bary = (-1.0) ** np.arange(NODES)
+        bary[[0, -1]] *= 0.5
+        apart = sigma[:, None] - x
+        exact = np.abs(apart) < 1e-13
+        share = bary / np.where(exact, 1.0, apart)
+        share = np.where(exact.any(axis=1, keepdims=True), exact, share)
+        return np.asarray(share / share.sum(axis=1, keepdims=True))
+
+    def node(self, sigma: complex) -> Node:
+        """Eliminate the modes that do not ring, and the contacts, at an exponent."""
+        core, tail = self.hill.core, self.hill.tail
+        parts = [self._part(sigma, int(h), own) for h, own in zip(core, self.slow, strict=True)]
+        alone = scipy.linalg.block_diag(*(p.alone for p in parts))
+        if not self.hill.tangents:
+            return Node(alone, np.zeros_like(alone), alone, 0.0)
+        k, m = core.size, self.hill.side.ports.size
+        receptance = np.array([p.receptance for p in parts])
+        ports = scipy.linalg.block_diag(*(p.ports for p in parts))
+        forces = scipy.linalg.block_diag(*(p.forces for p in parts))
+        own = [t.matrix(sigma, core, core) for t in self.hill.tangents]
+        system = np.zeros((k, m, k, m), dtype=complex)
+        for t, d in zip(self.hill.tangents, own, strict=True):
+            q = t.ports
+            block = receptance[:, :, q] @ d.reshape(k, q.size, k * q.size)
+            system[:, :, :, q] = block.reshape(k, m, k, q.size)
+        system = system.reshape(k * m, k * m)
+        system.flat[:: k * m + 1] += 1.0
+        factors = scipy.linalg.lu_factor(system, overwrite_a=True, check_finite=False)
+        gaps = scipy.linalg.lu_solve(factors, ports, check_finite=False)
+        felt = self._felt(own, gaps, k, k)
+        whole = alone + forces @ felt
+        beyond = self._beyond(sigma, core, tail, gaps)
+        # what changed forces do to the gaps, and these to the forces
+        moved = scipy.linalg.lu_solve(
+            factors, (receptance @ beyond.reshape(k, m, -1)).reshape(k * m, -1), check_finite=False
+        )
+        change = forces @ (beyond - self._felt(own, moved, k, k))
+        turns = np.angle(np.diagonal(factors[0])).sum()
+        swaps = np.pi * np.count_nonzero(factors[1] != np.arange(k * m))
+        return Node(whole + change, change, alone, float(turns + swaps))
+
+    def _beyond(
+        self, sigma: complex, core: IntArray, tail: IntArray, gaps: ComplexArray
+    ) -> ComplexArray:
+        """Return the change of the forces (k m, s) by harmonics beyond those that are solved."""
+        k, m = core.size, self.hill.side.ports.size
+        there = [t.matrix(sigma, tail, core) for t in self.hill.tangents]
+        back = [t.matrix(sigma, core, tail) for t in self.hill.tangents]
+        forces = self._felt(there, gaps, k, tail.size).reshape(tail.size, m, -1)
+        answer = np.empty_like(forces)
+        for i, h in enumerate(tail):
+            modes = self.hill.side.modes(self.wave, int(h))
+            answer[i] = -_receptance(modes, sigma + 1j * h) @ forces[i]
+        return self._felt(back, answer.reshape(tail.size * m, -1), tail.size, k)
+
+    def _felt(
+        self, matrices: Sequence[ComplexArray], gaps: ComplexArray, before: int, after: int
+    ) -> ComplexArray:
+        """Return the forces (after m, s) by the gaps (before m, s), contact by contact."""
+        m = self.hill.side.ports.size
+        given = gaps.reshape(before, m, -1)
+        out = np.zeros((after, m, given.shape[2]), dtype=complex)
+        for t, d in zip(self.hill.tangents, matrices, strict=True):
+            q = t.ports
+            found = d @ given[:, q].reshape(before * q.size, -1)
+            out[:, q] = found.reshape(after, q.size, -1)
+        return out.reshape(after * m, -1)
+
+    def _part(self, sigma: complex, harmonic: int, slow: IntArray) -> "_Part":
+        modes = self.hill.side.modes(self.wave, harmonic)
+        middle = harmonic + self.low + 0.5 * HALF
+        return _part(modes, slow, sigma + 1j * harmonic, float(np.sign(middle)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """One harmonic without the modes that do not ring."""
+
+    alone: ComplexArray  # (s, s) of those that do
+    ports: ComplexArray  # (m, s) gaps by them
+    forces: ComplexArray  # (s, m) what contact forces do to them
+    receptance: ComplexArray  # (m, m) of the others
+
+
+def _part(modes: HillModes, slow: IntArray, z: complex, sign: float) -> _Part:
+    Z, B = modes.dynamic(z, sign), modes.ports
+    rest = np.setdiff1d(np.arange(B.shape[1]), slow)
+    B_s, B_r = B[:, slow], B[:, rest]
+    if Z.ndim == 1:
+        answer = B_r.conj().T / Z[rest, None]
+        return _Part(np.diag(Z[slow]), B_s + 0j, B_s.conj().T + 0j, B_r @ answer)
+    right = np.hstack([B_r.conj().T, Z[np.ix_(rest, slow)]])
+    solved = np.linalg.solve(Z[np.ix_(rest, rest)], right)
+    answer, follows = solved[:, : len(B)], solved[:, len(B) :]
+    across = Z[np.ix_(slow, rest)]
+    return _Part(
+        Z[np.ix_(slow, slow)] - across @ follows,
+        B_s - B_r @ follows,
+        B_s.conj().T - across @ answer,
+        B_r @ answer,
+    )
+
+
+def _receptance(modes: HillModes, z: complex) -> ComplexArray:
+    """Return the (m, m) receptance at the ports far above the frequency of the motion, where damping couples no modes."""
+    damping, rest = (
+        np.diagonal(a) if a.ndim == 2 else a for a in (modes.damping, modes.rest)
+    )
+    Z = modes.stiffness + z * z * modes.mass + z * damping + rest
+    return np.asarray((modes.ports / Z) @ modes.ports.conj().T)
