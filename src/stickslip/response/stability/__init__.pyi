@@ -1,5 +1,8 @@
 """Public names of `stickslip.response.stability`, written once."""
 
+from .hill import HillStability as HillStability
+from .hill import hill_exponents as hill_exponents
+from .hill import hill_stability as hill_stability
 from .multipliers import Stability as Stability
 from .multipliers import motion_stability as motion_stability
 from .multipliers import stability as stability

@@ -28,7 +28,15 @@ FACTOR, MORE = 2, 3  # disturbances have FACTOR times the harmonics of the motio
 LEAST, MOST = 8, 20  # at least and at most these,
 ROWS = 1300  # and no more than make matrices of so many rows,
 FEWEST = 5  # but these
-COMPARED = 3  # waves of a wheel whose exponents are compared with those of the motion as it was solved
+MUCH = 700  # rows up to which their number is doubled where those beyond matter
+CHEAP = 400  # rows up to which harmonics are added until every mode rings in one
+SMALL = 300  # rows up to which all waves of a wheel are compared with those of the motion as it was solved; else
+DECIDING, CLOSE = (
+    -0.03,
+    3e-3,
+)  # real part of exponents that decide; what harmonics beyond may change in these
+COMPARED = 3  # of them, those that grow most,
+NEAR = 0.5  # and the others count with the largest change of multipliers beyond this share of the largest one
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +81,7 @@ def hill_stability(problem: ForcedProblem, point: ForcedPoint) -> HillStability:
     hill, states = _of_point(system, problem, better)
     if hill is None or states is None:
         return _unknown()
-    found = exponents(hill)
+    hill, found = _refined(hill)
     change = np.full(found.values.size, np.inf)
     if better is point and more is not None:
         change[:] = 0.0
@@ -112,7 +120,19 @@ def hill_exponents(
             "rounding makes more transitions than gaps of these harmonics can have",
             "Give a motion of fewer harmonics.",
         )
-    return exponents(hill)
+    return exponents(hill) if order is not None else _refined(hill)[1]
+
+
+def _refined(hill: Hill) -> tuple[Hill, Exponents]:
+    """Return the exponents with so many harmonics that those beyond hardly change what decides, as far as that can be had."""
+    found = exponents(hill)
+    while True:
+        deciding = np.max(found.errors[found.values.real > DECIDING], initial=0.0)
+        more = replace(hill, order=2 * hill.order)
+        known = found.missing is not None and deciding < CLOSE
+        if known or more.rows > MUCH:
+            return hill, found
+        hill, found = more, exponents(more)
 
 
 def _of_point(
@@ -143,40 +163,43 @@ def _prepared(
     if states is None:
         return None, None
     springs, ports, tangents = contact_tangents(states)
-    if order is None:
-        order = min(max(FACTOR * (len(gaps) - 1) + MORE, LEAST), MOST)
-        order = max(min(order, (ROWS // max(ports.size, 1) - 1) // 2), FEWEST)
-    return Hill(HillSide(system, springs, ports, omega, {}), tangents, order), states
+    own = HillSide(system, springs, ports, omega, {})
+    return Hill(own, tangents, _order(own, len(gaps) - 1) if order is None else order), states
+
+
+def _order(side: HillSide, motion: int) -> int:
+    """Return how many harmonics are solved: so many that each mode rings in one of them, if that is cheap."""
+    ports = max(side.ports.size, 1)
+    ratios = side.modes(0, 0).ratios
+    highest = int(np.ceil(np.max(ratios[np.isfinite(ratios)], initial=0.0))) + 1
+    least = min(max(FACTOR * motion + MORE, LEAST), MOST)
+    if highest > least and (2 * highest + 1) * ports <= CHEAP:
+        return highest
+    return max(min(least, (ROWS // ports - 1) // 2), FEWEST)
 
 
 def _changes(found: Exponents, solved: Hill) -> FloatArray:
-    """Return how far each multiplier of a motion is from that of the motion as it was solved.
-
-    Of a wheel waves are compared until a few have been; the others count as far away as the farthest of these.
-    """
+    """Return how far each multiplier of a motion is from that of the motion as it was solved, of a large wheel by a few waves."""
     waves = solved.side.waves
-    if waves == 1:
-        other = exponents(solved, segments_of(solved))
-        return _distances(found, other)
-    first = list(dict.fromkeys(min(int(w), waves - int(w)) % waves for w in found.waves))[:COMPARED]
+    if waves <= COMPARED or solved.rows <= SMALL:
+        return _distances(found, exponents(solved, segments_of(solved)), solved)
+    standing = np.minimum(found.waves, waves - found.waves) % waves
+    first = list(dict.fromkeys(standing.tolist()))[:COMPARED]
     other = exponents(solved, [s for s in segments_of(solved) if s.wave in first])
-    known = np.isin(np.minimum(found.waves, waves - found.waves) % waves, first)
-    change = np.zeros(found.values.size)
-    some = Exponents(found.values[known], found.errors[known], found.waves[known], found.harmonics[known], None)  # fmt: skip
-    change[known] = _distances(some, other)
-    size = np.abs(found.multipliers)
-    if np.any(~known):
-        change[~known] = np.max(change[known] / size[known], initial=0.0) * size[~known]
-    return change
+    known, size = np.isin(standing, first), np.abs(found.multipliers)
+    change = np.where(known, _distances(found, other, solved), 0.0)
+    near = known & (size > NEAR * np.max(size))
+    most = np.max(change[near] / size[near], initial=0.0)
+    return np.asarray(np.where(known, change, most * size))
 
 
-def _distances(found: Exponents, other: Exponents) -> FloatArray:
-    """Return the distance of each multiplier from the nearest of the same wave among others."""
+def _distances(found: Exponents, other: Exponents, hill: Hill) -> FloatArray:
+    """Return the distance of each multiplier from the nearest of the same wave among others, whichever harmonic that is counted from."""
     own, theirs = found.multipliers, other.multipliers
     out = np.abs(own)  # one that was not there has come from far left
     for i, wave in enumerate(found.waves):
-        same = np.abs(theirs[other.waves == wave] - own[i])
-        out[i] = np.min(same, initial=out[i])
+        waves = [hill.side.wave_of(int(wave), turn) for turn in (-1, 0, 1)]
+        out[i] = np.min(np.abs(theirs[np.isin(other.waves, waves)] - own[i]), initial=out[i])
     return np.asarray(out)
 
 
@@ -189,9 +212,7 @@ def _judged(
         errors = np.full_like(errors, np.inf)
         if not values.size:
             values, errors = np.array([np.nan + 0j]), np.array([np.inf])
-    own = Stability(
-        Floquet(values), errors, states.resting, states.grazing, states.transitions
-    )
+    own = Stability(Floquet(values), errors, states.resting, states.grazing, states.transitions)
     if not found.values.size:
         return HillStability(own, None, found.missing)
     size = own.multiplier

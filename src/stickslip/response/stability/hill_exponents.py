@@ -6,10 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
-from stickslip.response.stability.hill_segment import HALF, Hill, Segment
+from stickslip.response.stability.hill_segment import HALF, Hill, Segment, fitted
 from stickslip.response.stability.hill_zeros import Matrix, Zeros, turning, zeros_near
 
 WIDE, HIGH = 0.3, 0.32  # half axes of the ellipse about a segment
+LEFT, SURE = (
+    -0.12,
+    0.04,
+)  # beside a segment: left of which exponents are not sought, and right of which they are solved again
+ROUNDS, STEP, CLOSE, FAR = 8, 1e-6, 1e-8, 0.1  # of Newton's method on the matrix itself
 EDGE = 5e-3  # beyond the ends of a segment that exponents may lie
 ON_AXIS = 1.6e-7  # real part up to which an exponent is on the imaginary axis
 PATH = 65  # values of a determinant along a segment
@@ -62,8 +67,8 @@ def exponents(hill: Hill, segments: Sequence[Segment] = ()) -> Exponents:
     Of a wheel each wave has a problem of its own. Disturbances are real: those of wave -k are the conjugates of those of wave k.
     """
     if segments:
-        return _gathered([_zeros(segment) for segment in segments], hill, None)
-    axis = segments_of(hill)
+        return _gathered([_zeros(fitted(segment)) for segment in segments], hill, None)
+    axis = [fitted(segment) for segment in segments_of(hill)]
     parts = [_zeros(segment) for segment in axis]
     growing = _counted(axis)
     for growth in STEPS if growing is not None else ():
@@ -85,6 +90,8 @@ def segments_of(hill: Hill) -> list[Segment]:
 
 def _counted(axis: Sequence[Segment]) -> int | None:
     """Return how many exponents lie right of the imaginary axis, by the turns of the determinant along it; None where these are not known."""
+    if not all(segment.smooth for segment in axis):
+        return None
     each = [_turns(segment) for segment in axis]
     turns, alone = 2.0 * sum(t for t, _ in each), 2 * sum(n for _, n in each)
     if np.isnan(turns) or abs(turns - round(turns)) > WHOLE:
@@ -102,23 +109,59 @@ def _turns(segment: Segment) -> tuple[float, int]:
     eliminated = float(steps.sum()) if np.all(np.abs(steps) < 2.0) else float("nan")
     known = _raw(segment, "whole").values
     turns = turning(whole, known, path) - turning(alone, without, path) + eliminated
-    inside = (without.imag > segment.low - EDGE) & (without.imag < segment.high + EDGE)
+    inside = (without.imag >= segment.low) & (without.imag < segment.high)
     growing = int(np.count_nonzero((without.real > ON_AXIS) & inside))
     return turns / (2.0 * np.pi), growing
 
 
 def _zeros(segment: Segment) -> Part:
-    """Return the exponents about a segment, their errors, and the harmonics in which they vibrate most."""
+    """Return the exponents about a segment, their errors, and the harmonics in which they vibrate most.
+
+    Far from the segment the polynomial has zeros that the matrix has not: those right of it are solved again with the matrix itself.
+    """
     found = _raw(segment, "whole")
+    beside = found.values.real - segment.growth
     inside = (found.values.imag >= segment.low - EDGE) & (found.values.imag <= segment.high + EDGE)
-    values = found.values[inside]
-    beyond = _matrix(segment, "beyond")(values)
-    left, right = found.left[inside], found.right[inside]
-    parts = np.einsum("ki,kij,kj->k", left.conj(), beyond, right)
-    errors = np.abs(parts / found.slopes[inside])
+    values, errors, most = [], [], []
     harmonic = np.repeat(segment.hill.core, [own.size for own in segment.slow])
-    most = harmonic[np.argmax(np.abs(right), axis=1)] if values.size else np.zeros(0, dtype=int)
-    return Part(segment.wave, values, errors, most)
+    beyond = _matrix(segment, "beyond")(found.values) / found.scale
+    for i in np.flatnonzero(inside & (beside > LEFT)):
+        value, right, left = found.values[i], found.right[i], found.left[i]
+        change, slope = beyond[i], found.slopes[i]
+        if beside[i] > SURE or segment.growth:
+            again = _solved(segment, complex(value), found.scale)
+            if again is None:
+                continue
+            value, right, left, change, slope = again
+        values.append(value)
+        errors.append(abs(np.vdot(left, change @ right) / slope))
+        most.append(harmonic[np.argmax(np.abs(right))])
+    return Part(
+        segment.wave,
+        np.array(values, dtype=complex),
+        np.array(errors, dtype=float),
+        np.array(most, dtype=np.int64),
+    )
+
+
+def _solved(
+    segment: Segment, sigma: complex, scale: FloatArray
+) -> tuple[complex, ComplexArray, ComplexArray, ComplexArray, complex] | None:
+    """Return an exponent by Newton's method on the matrix itself, with its vectors, the part of harmonics beyond and the slope; None where there is none."""
+    start = sigma
+    for _ in range(ROUNDS):
+        here, beside = segment.node(sigma), segment.node(sigma + STEP)
+        whole = here.whole / scale
+        u, _, vh = np.linalg.svd(whole)
+        right, left = vh[-1].conj(), u[:, -1]
+        slope = np.vdot(left, (beside.whole / scale - whole) @ right) / STEP
+        change = -np.vdot(left, whole @ right) / slope
+        sigma += change
+        if abs(sigma - start) > FAR:
+            return None
+        if abs(change) < CLOSE:
+            return sigma, right, left, here.beyond / scale, complex(slope)
+    return None
 
 
 def _raw(segment: Segment, name: str) -> Zeros:

@@ -17,7 +17,9 @@ from stickslip.reduction.nodal import own_motions
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.system import System
 
-RAISED = 8  # times that the mass is weighted four times as much, until it makes the stiffness definite
+RAISED = (
+    8  # times that the mass is weighted four times as much, until it makes the stiffness definite
+)
 COUPLED = 1e-10  # of the largest entry: what couples modes less does not
 
 
@@ -139,8 +141,9 @@ def hill_modes(
     if feedback is not None and feedback.influence.depends_on_frequency:
         inside = replace(feedback.influence, beyond="nearest")
         own = replace(feedback, patterns=basis.conj().T @ feedback.patterns, influence=inside)
+    damping, rest, lossy = parts
     return HillModes(
-        1.0 - shift * values, omega**2 * values, *parts, rows[ports] @ basis, omega, own
+        1.0 - shift * values, omega**2 * values, damping, rest, lossy, rows[ports] @ basis, omega, own
     )  # fmt: skip
 
 

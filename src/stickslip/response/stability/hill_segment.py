@@ -7,19 +7,25 @@ that are solved act through their first passage, ``-D R D`` with the receptance 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import scipy.linalg
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.response.stability.contact_tangent import ContactTangent
 from stickslip.response.stability.hill_modes import HillModes, HillSide
 
 NODES = 8  # of the polynomial through a segment of half a frequency
-AWAY = 0.75  # frequencies of the motion from a segment, beyond which a mode does not ring
-TAIL = 3  # times the harmonics that are solved: up to which those beyond act
+AWAY = 0.75  # frequencies of the motion from a segment, beyond which a mode does not ring; or so many times as far:
+FARTHER = (1.0, 2.0, 4.0, 8.0)
+SMOOTH = 1e-4  # of its largest term: the last one of a polynomial that is near the matrix
+MOST_RINGING = 400  # modes of all harmonics together
+TAIL, MOST_TAIL = (
+    3,
+    60,
+)  # times the harmonics that are solved: up to which those beyond act, and so many at most
 HALF = 0.5  # frequency of the motion: length of a segment
 
 
@@ -42,6 +48,11 @@ class Hill:
     order: int
 
     @property
+    def rows(self) -> int:
+        """Number of gaps in all harmonics that are solved: rows of the matrices that are factorised."""
+        return (2 * self.order + 1) * int(self.side.ports.size)
+
+    @property
     def core(self) -> IntArray:
         """Harmonics that are solved."""
         return np.arange(-self.order, self.order + 1)
@@ -49,7 +60,8 @@ class Hill:
     @property
     def tail(self) -> IntArray:
         """Harmonics beyond."""
-        beyond = np.arange(self.order + 1, TAIL * self.order + 1)
+        last = min(TAIL * self.order, self.order + MOST_TAIL)
+        beyond = np.arange(self.order + 1, last + 1)
         return np.concatenate([-beyond[::-1], beyond])
 
 
@@ -83,6 +95,7 @@ class Segment:
     wave: int
     low: float
     growth: float = 0.0
+    away: float = AWAY
 
     @property
     def high(self) -> float:
@@ -96,7 +109,7 @@ class Segment:
         for h in self.hill.core:
             ratios = self.hill.side.modes(self.wave, int(h)).ratios
             ends = sorted((abs(h + self.low), abs(h + self.high)))
-            inside = (ratios > ends[0] - AWAY) & (ratios < ends[1] + AWAY)
+            inside = (ratios > ends[0] - self.away) & (ratios < ends[1] + self.away)
             found.append(np.flatnonzero(inside))
         return found
 
@@ -105,6 +118,19 @@ class Segment:
         """(NODES,) imaginary parts of the nodes, from end to end."""
         x = np.cos(np.pi * np.arange(NODES)[::-1] / (NODES - 1))
         return self.low + 0.5 * HALF * (1.0 + x)
+
+    @cached_property
+    def smooth(self) -> bool:
+        """Whether the polynomial is near the matrix everywhere between the nodes."""
+        values = np.array([node.whole for node in self.nodes])
+        if not values.size:
+            return True
+        k = np.arange(NODES)
+        terms = np.cos(np.pi * np.outer(k[-2:], k) / (NODES - 1)) * 2.0 / (NODES - 1)
+        terms[:, [0, -1]] *= 0.5
+        scale = np.max(np.abs(values), axis=(0, 2))[:, None]
+        last = np.tensordot(terms, values[::-1], axes=1) / scale
+        return bool(np.max(np.abs(last)) < SMOOTH)
 
     @cached_property
     def nodes(self) -> list[Node]:
@@ -134,12 +160,12 @@ class Segment:
         ports = scipy.linalg.block_diag(*(p.ports for p in parts))
         forces = scipy.linalg.block_diag(*(p.forces for p in parts))
         own = [t.matrix(sigma, core, core) for t in self.hill.tangents]
-        system = np.zeros((k, m, k, m), dtype=complex)
+        blocks = np.zeros((k, m, k, m), dtype=complex)
         for t, d in zip(self.hill.tangents, own, strict=True):
             q = t.ports
             block = receptance[:, :, q] @ d.reshape(k, q.size, k * q.size)
-            system[:, :, :, q] = block.reshape(k, m, k, q.size)
-        system = system.reshape(k * m, k * m)
+            blocks[:, :, :, q] = block.reshape(k, m, k, q.size)
+        system = blocks.reshape(k * m, k * m)
         system.flat[:: k * m + 1] += 1.0
         factors = scipy.linalg.lu_factor(system, overwrite_a=True, check_finite=False)
         gaps = scipy.linalg.lu_solve(factors, ports, check_finite=False)
@@ -166,7 +192,10 @@ class Segment:
         answer = np.empty_like(forces)
         for i, h in enumerate(tail):
             modes = self.hill.side.modes(self.wave, int(h))
-            answer[i] = -_receptance(modes, sigma + 1j * h) @ forces[i]
+            away = (
+                np.abs(modes.ratios - abs(h + self.low + 0.5 * HALF)) > AWAY + 0.5 * HALF
+            )  # one that rings there is left out
+            answer[i] = -_receptance(modes, sigma + 1j * h, away) @ forces[i]
         return self._felt(back, answer.reshape(tail.size * m, -1), tail.size, k)
 
     def _felt(
@@ -186,6 +215,18 @@ class Segment:
         modes = self.hill.side.modes(self.wave, harmonic)
         middle = harmonic + self.low + 0.5 * HALF
         return _part(modes, slow, sigma + 1j * harmonic, float(np.sign(middle)))
+
+
+def fitted(segment: Segment) -> Segment:
+    """Return a segment with so many modes kept that what is left has no poles near it, as far as that can be had."""
+    for factor in FARTHER:
+        trial = replace(segment, away=factor * AWAY)
+        if sum(own.size for own in trial.slow) > MOST_RINGING:
+            break
+        segment = trial
+        if segment.smooth:
+            break
+    return segment
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,10 +258,9 @@ def _part(modes: HillModes, slow: IntArray, z: complex, sign: float) -> _Part:
     )
 
 
-def _receptance(modes: HillModes, z: complex) -> ComplexArray:
-    """Return the (m, m) receptance at the ports far above the frequency of the motion, where damping couples no modes."""
-    damping, rest = (
-        np.diagonal(a) if a.ndim == 2 else a for a in (modes.damping, modes.rest)
-    )
+def _receptance(modes: HillModes, z: complex, away: BoolArray) -> ComplexArray:
+    """Return the (m, m) receptance at the ports of modes that are `away` from ringing, without the damping that couples them."""
+    damping, rest = (np.diagonal(a) if a.ndim == 2 else a for a in (modes.damping, modes.rest))
     Z = modes.stiffness + z * z * modes.mass + z * damping + rest
-    return np.asarray((modes.ports / Z) @ modes.ports.conj().T)
+    ports = modes.ports[:, away]
+    return np.asarray((ports / Z[away]) @ ports.conj().T)

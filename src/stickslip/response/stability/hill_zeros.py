@@ -8,14 +8,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray
+from stickslip.arrays import ComplexArray, FloatArray
 
 POINTS = 64  # of a contour
 RANK = 1e-10  # singular value of the first moment, over the largest, that is none
 ROUNDS = 6  # of Newton's method
-CLOSE = 1e-10  # change of a zero that ends it
+CLOSE = 1e-9  # change of a zero that ends it
+NUDGE = 1e-9  # beside a zero, where the matrix can be solved
+OUTSIDE = 1.5  # squared size of the ellipse beyond which the integral shows nothing
 FAR = 0.05  # a zero that Newton's method moves farther was none
-LARGEST_TURN = 2.0  # rad between two values of a determinant, beyond which its turns are not counted
+LARGEST_TURN = (
+    2.0  # rad between two values of a determinant, beyond which its turns are not counted
+)
 
 Matrix = Callable[[ComplexArray], ComplexArray]  # (k,) exponents -> (k, s, s)
 
@@ -29,15 +33,18 @@ class Zeros:
     values
         (z,) exponents.
     right, left
-        (z, s) vectors with ``S v = 0`` and ``wᴴ S = 0``.
+        (z, s) vectors with ``S v = 0`` and ``wᴴ S = 0``, the rows of S being divided by `scale`.
     slopes
         (z,) ``wᴴ S' v``.
+    scale
+        (s, 1) of the rows.
     """
 
     values: ComplexArray
     right: ComplexArray
     left: ComplexArray
     slopes: ComplexArray
+    scale: FloatArray
 
 
 def zeros_near(matrix: Matrix, slope: Matrix, centre: complex, wide: float, high: float) -> Zeros:
@@ -57,44 +64,59 @@ def zeros_near(matrix: Matrix, slope: Matrix, centre: complex, wide: float, high
     s = values.shape[1]
     none = np.zeros((0, s), dtype=complex)
     if not s:
-        return Zeros(np.zeros(0, dtype=complex), none, none, np.zeros(0, dtype=complex))
-    scale = np.max(np.abs(values), axis=(0, 2))  # rows are of very different size
-    inverse = np.linalg.inv(values / scale[:, None])
+        nothing = np.zeros(0, dtype=complex)
+        return Zeros(nothing, none, none, nothing, np.ones((s, 1)))
+    scale = np.max(np.abs(values), axis=(0, 2))[:, None]  # rows are of very different size
+    inverse = np.linalg.inv(values / scale)
     first = np.tensordot(step, inverse, axes=1)
     second = np.tensordot(step * around, inverse, axes=1)
     u, singular, vh = np.linalg.svd(first)
     rank = int(np.count_nonzero(singular > RANK * singular[0]))
     u, vh = u[:, :rank], vh[:rank]
     small = (u.conj().T @ second @ vh.conj().T) / singular[:rank]
-    return polished(matrix, slope, centre + np.linalg.eigvals(small))
+    starts, vectors = np.linalg.eig(small)
+    beside = (starts.real / wide) ** 2 + (starts.imag / high) ** 2 < OUTSIDE
+    starts, vectors = centre + starts[beside], (u @ vectors)[:, beside].T
+    if not starts.size:
+        return Zeros(starts, none, none, starts, scale)
+    return _polished(
+        lambda x: matrix(x) / scale, lambda x: slope(x) / scale, starts, vectors, scale
+    )
 
 
-def polished(matrix: Matrix, slope: Matrix, starts: ComplexArray) -> Zeros:
-    """Return the zeros next to starts, those that Newton's method does not find being left out."""
-    now, kept = starts.astype(complex), np.ones(starts.size, dtype=bool)
-    if not now.size:
-        s = matrix(np.zeros(1, dtype=complex)).shape[1]
-        none = np.zeros((0, s), dtype=complex)
-        return Zeros(now, none, none, now)
+def _polished(
+    matrix: Matrix,
+    slope: Matrix,
+    starts: ComplexArray,
+    vectors: ComplexArray,
+    scale: FloatArray,
+) -> Zeros:
+    """Return the zeros next to starts by inverse iteration, those that it does not find being left out."""
+    now, right = starts.astype(complex), vectors
+    change = np.zeros_like(now)
     for _ in range(ROUNDS):
-        right, left = _null_vectors(matrix(now))
-        slopes = np.einsum("ki,kij,kj->k", left.conj(), slope(now), right)
-        rests = np.einsum("ki,kij,kj->k", left.conj(), matrix(now), right)
-        change = np.where(slopes != 0.0, -rests / np.where(slopes != 0.0, slopes, 1.0), 0.0)
+        # no zero itself, where nothing could be solved
+        near: ComplexArray = np.asarray(now + NUDGE)
+        moved = _times(slope(near), right)
+        following = np.linalg.solve(matrix(near), moved[:, :, None])[:, :, 0]
+        share = np.einsum("ki,ki->k", right.conj(), following)
+        change = NUDGE - 1.0 / np.where(share != 0.0, share, 1.0)
         change *= np.minimum(1.0, FAR / np.maximum(np.abs(change), FAR))
-        now = now + change
-    kept &= (np.abs(change) < CLOSE) & (np.abs(now - starts) < FAR)
-    right, left = _null_vectors(matrix(now))
-    slopes = np.einsum("ki,kij,kj->k", left.conj(), slope(now), right)
-    return Zeros(now[kept], right[kept], left[kept], slopes[kept])
+        now, right = now + change, following / np.linalg.norm(following, axis=1, keepdims=True)
+    kept = (np.abs(change) < CLOSE) & (np.abs(now - starts) < FAR)
+    now, right = now[kept], right[kept]
+    slopes = slope(now)
+    adjoint, left = matrix(now + NUDGE).conj().transpose(0, 2, 1), right
+    for _ in range(2):
+        moved = _times(slopes.conj().transpose(0, 2, 1), left)
+        left = np.linalg.solve(adjoint, moved[:, :, None])[:, :, 0]
+        left = left / np.linalg.norm(left, axis=1, keepdims=True)
+    along = np.einsum("ki,ki->k", left.conj(), _times(slopes, right))
+    return Zeros(now, right, left, along, scale)
 
 
-def _null_vectors(matrices: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-    """Return the right and left singular vectors (k, s) of the smallest singular value of matrices with scaled rows."""
-    rows = np.max(np.abs(matrices), axis=2, keepdims=True)
-    rows = np.where(rows > 0.0, rows, 1.0)
-    u, _, vh = np.linalg.svd(matrices / rows)
-    return vh[:, -1].conj(), u[:, :, -1] / rows[:, :, 0]
+def _times(matrices: ComplexArray, vectors: ComplexArray) -> ComplexArray:
+    return np.asarray((matrices @ vectors[:, :, None])[:, :, 0])
 
 
 def turning(matrix: Matrix, zeros: ComplexArray, path: ComplexArray) -> float:

@@ -274,9 +274,7 @@ def _powers(matrix: FloatArray, shares: int) -> ComplexArray:
     return np.asarray(floquet(matrix).multipliers ** shares)
 
 
-def _prepared(
-    structure: Structure, interface: Interface, omega: float
-) -> ModalStates:
+def _prepared(structure: Structure, interface: Interface, omega: float) -> ModalStates:
     """Return the modal states."""
     if interface.rigid:
         raise input_error(

@@ -1,0 +1,148 @@
+"""Floquet exponents by Hill's method: against the monodromy, of a wheel sector by sector, and where the monodromy refuses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.linalg
+from test_flutter_wheel import forced
+from test_stability import LAWS, random_gaps, random_structure, solved, stopped
+
+from stickslip.contact.interface import Interface
+from stickslip.contact.laws.dahl import Dahl
+from stickslip.contact.laws.jenkins import Jenkins
+from stickslip.errors import InputError
+from stickslip.harmonic.fourier import to_complex
+from stickslip.model.dofs import Dofs
+from stickslip.model.structure import Structure
+from stickslip.response.stability import (
+    hill_exponents,
+    hill_stability,
+    motion_stability,
+    stability,
+    wave_disturbances,
+)
+from stickslip.response.stability.contact_states import located_states
+from stickslip.response.stability.contact_tangent import contact_tangents
+from stickslip.response.system import System
+from stickslip.solve.status import Status
+
+
+def random_motion(law, seed):
+    rng = np.random.default_rng([seed, list(LAWS).index(law)])
+    structure = random_structure(rng, 3)
+    interface = Interface(
+        ("a", "b"), (LAWS[law](),) * 2, rng.standard_normal((6, 3)), np.array([0.7, 1.3])
+    )
+    return System(structure, interface, np.array([0])), random_gaps(rng, 2, 3)
+
+
+def apart(some, others, above):
+    """Return the largest distance of a multiplier beyond a modulus from the nearest one of others."""
+    large = [m for m in some if abs(m) > above]
+    assert large
+    return max(min(abs(m - n) for n in others) for m in large)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_multipliers_are_those_of_the_monodromy_and_none_is_missed(law):
+    for seed in (0, 2):
+        system, gaps = random_motion(law, seed)
+        expected = motion_stability(system.structure, system.interface, gaps, 0.8)
+        found = hill_exponents(system, to_complex(gaps), 0.8, 20)
+        theirs = expected.floquet.multipliers
+        assert found.missing == 0
+        assert apart(theirs, found.multipliers, 0.5) < 3e-4
+        assert apart(found.multipliers, theirs, 0.5) < 3e-4
+        # what is said of harmonics beyond is no less than what they change
+        said = 2 * np.pi * np.abs(found.multipliers) * found.errors
+        off = np.array([np.min(np.abs(theirs - m)) for m in found.multipliers])
+        assert np.all(off < said + 3e-6)
+
+
+def stiff_jenkins():
+    """One mass behind a Jenkins element nine times as stiff as its spring, gliding most of the time."""
+    one = Dofs(np.arange(1), ("x",), np.zeros((1, 3)))
+    structure = Structure(np.eye(1), np.array([[0.02]]), np.eye(1), one)
+    law = Jenkins(k_t=9.0, limit=1.0)
+    interface = Interface(("j",), (law,), np.array([[1.0], [0.0], [0.0]]))
+    gaps = np.zeros((3, 3), dtype=complex)
+    gaps[1, 0] = 0.6
+    return System(structure, interface, np.array([0])), gaps
+
+
+def test_the_tangent_at_zero_is_no_tangent_elsewhere():
+    """The periodic tangent of friction is exact at the exponent 0 alone: a stiff Jenkins element shows by how much it is off."""
+    system, gaps = stiff_jenkins()
+    real = np.stack([gaps[0].real, gaps[1].real, -gaps[1].imag])
+    real = np.concatenate([real, np.zeros((2, 3))])
+    exact = motion_stability(system.structure, system.interface, real, 1.3).floquet.multipliers
+    found = hill_exponents(system, to_complex(real), 1.3, 30)
+    assert apart(exact, found.multipliers, 0.3) < 1e-5
+    # Hill's matrix with the tangent at exponent 0, linear in the states
+    states = located_states(system.interface, real)
+    springs, _, (tangent,) = contact_tangents(states)
+    h = np.arange(-40, 41)
+    K = np.eye(h.size) * (1.0 + springs[0]) + tangent.matrix(0.0, h, h)
+    turn, one = 1j * np.diag(h), np.eye(h.size)
+    above = np.hstack([-turn, one])
+    below = np.hstack([-K / 1.3**2, -turn - 0.02 / 1.3 * one])
+    values = scipy.linalg.eigvals(np.vstack([above, below]))
+    values = values[np.abs(values.imag) <= 0.5]
+    frozen = np.exp(2 * np.pi * values[np.argsort(-values.real)[:2]])
+    assert apart(frozen, exact, 0.1) > 0.01
+
+
+@pytest.mark.parametrize("force", [0.3, 2.0, 6.0])
+def test_a_wheel_is_examined_wave_by_wave_one_sector_at_a_time(force):
+    problem, point, _ = forced(force)
+    gaps = point.coefficients @ problem.low.interface.gap_operator.T
+    every = wave_disturbances(problem.system, gaps, point.omega)
+    found = hill_exponents(problem.system, gaps, point.omega)
+    theirs = np.array([d.multiplier for d in every])
+    assert found.missing == 0
+    assert apart(theirs, found.multipliers, 0.6) < 3e-5
+    assert apart(found.multipliers, theirs, 0.6) < 3e-5
+    whole, own = stability(problem, point), hill_stability(problem, point)
+    assert own.stability.verdict == whole.verdict
+    assert own.stability.multiplier == pytest.approx(whole.multiplier, abs=2e-5)
+    if whole.verdict == "unstable":
+        assert own.disturbance.wave == 2
+        assert own.disturbance.omega == pytest.approx(every[0].omega, rel=1e-3)
+
+
+def test_verdicts_are_those_of_the_monodromy():
+    problem, points = stopped(3)
+    compared = 0
+    for point in points[2::3]:
+        expected, found = stability(problem, point), hill_stability(problem, point)
+        assert found.stability.verdict == expected.verdict
+        if np.isfinite(expected.multiplier_error):
+            assert found.stability.multiplier == pytest.approx(expected.multiplier, abs=3e-4)
+            compared += 1
+    assert compared > 3
+
+
+def test_structural_damping_has_exponents():
+    """Two masses on a spring with a loss factor, at rest in their contact: those of the linear structure, upper half of the strip."""
+    system, _ = random_motion("Jenkins", 0)
+    structure = replace(system.structure, damping=np.zeros((3, 3)), loss=0.05 * np.asarray(system.structure.stiffness))  # fmt: skip
+    stiff = replace(system.interface, laws=(Jenkins(k_t=1e-9, limit=1.0),) * 2)
+    lossy = System(structure, stiff, np.array([0]))
+    gaps = np.zeros((2, 6), dtype=complex)
+    with pytest.raises(InputError, match="structural damping"):
+        motion_stability(structure, stiff, np.zeros((3, 6)), 0.8)
+    found = hill_exponents(lossy, gaps, 0.8)
+    squares = scipy.linalg.eigh(structure.stiffness, structure.mass, eigvals_only=True)
+    exact = np.exp(2 * np.pi * 1j * np.sqrt(squares * (1 + 0.05j)) / 0.8)
+    assert apart(exact, found.multipliers, 0.5) < 1e-6
+
+
+def test_what_cannot_be_examined_is_refused():
+    problem, point = solved(0.1, 1.1, 1)
+    with pytest.raises(InputError, match="did not converge"):
+        hill_stability(problem, replace(point, status=Status.STALLED))
+    system, gaps = stiff_jenkins()
+    other = replace(system.interface, laws=(Dahl(k_t=1.0, limit=1.0),))
+    with pytest.raises(InputError, match="not located"):
+        hill_exponents(replace(system, interface=other), gaps, 1.0)
