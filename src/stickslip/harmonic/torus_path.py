@@ -19,6 +19,8 @@ Indices = tuple[tuple[int, int], ...]  # (0, 0) first, then one of each pair (j,
 
 TURNS_A_HARMONIC, LEAST_TURNS = 4, 24
 SAMPLES_A_HARMONIC, LEAST_SAMPLES = 8, 48  # a turn of the faster phase
+SLIP = 2e-3  # rad a turn by which the second phase may be off: ten times as much changes forces by some thousandths
+MOST_TURNS = 250
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ def half_plane(order: int) -> Indices:
 
 
 def closed_path(ratio: float, order: int, refine: float = 1.0) -> TorusPath:
-    """Return the path whose ratio of whole numbers is nearest to `ratio`, ω2 / ω1.
+    """Return the shortest path whose ratio of whole numbers stands for `ratio`, ω2 / ω1.
 
     Parameters
     ----------
@@ -90,7 +92,9 @@ def closed_path(ratio: float, order: int, refine: float = 1.0) -> TorusPath:
     choices = [
         (p, q) for p in range(1, 2 * least) for q in (max(1, round(ratio * p)),) if gcd(p, q) == 1
     ]
-    p, q = min(choices, key=lambda c: (round(abs(ratio - c[1] / c[0]), 12), c[0]))
+    off = [2.0 * np.pi * abs(ratio - q / p) for p, q in choices]
+    near = [i for i, slip in enumerate(off) if slip <= SLIP]
+    p, q = choices[near[0] if near else int(np.argmin(off))]
     a_turn = ceil(refine * max(SAMPLES_A_HARMONIC * order, LEAST_SAMPLES) * max(1.0, ratio))
     return TorusPath((p, q), ceil(least / p), p * a_turn)
 
