@@ -292,9 +292,8 @@ def test_peak_at_the_end_is_no_resonance() -> None:
 
 def test_points_without_a_solution_are_marked_and_not_filled_in() -> None:
     hopeless = Newton(max_iterations=1)
-    data = dataset(
-        solved(lifted(newton=hopeless, frequencies=2, omega_range=(0.3, 1.4), peak_points=0))
-    )
+    asked = lifted(newton=hopeless, frequencies=2, omega_range=(0.3, 1.4), peak_points=0)
+    data = dataset(solved(replace(asked, not_periodic_s=2.0)))
     lost = data.status.values != 0
     assert 0 < lost.sum() == int(data.points_failed[0]) == data.attrs["failed"]
     for name in ("amplitude", "gap", "contact_force", "output_displacement", "dissipated_energy"):
@@ -304,6 +303,11 @@ def test_points_without_a_solution_are_marked_and_not_filled_in() -> None:
     assert np.all(data.verdict.values[lost] == 2)
     assert np.all(data.verdict.values[~lost] < 2)
     assert int(data.case_verdict[0]) == 1
+    # what the motion is like there is told by time integration, and said to be that
+    hz = data.frequency_hz.values[lost]
+    assert np.isin(data.not_periodic_frequency_hz.values, hz).all()
+    assert data.not_periodic_largest.values[0, 0] >= data.not_periodic_least.values[0, 0] > 0.0
+    assert str(data.not_periodic_sentence.values[0]).split(": ")[1].startswith("no periodic motion")
 
 
 def drifting(retention: float) -> Question:

@@ -10,6 +10,7 @@ import stickslip as ss
 from stickslip.errors import InputError
 from stickslip.harmonic.torus_path import closed_path, half_plane, torus_basis
 from stickslip.model.matrices import lumped
+from stickslip.response.quasi_periodic.in_time import course, statistics
 from stickslip.response.quasi_periodic.motion import TorusMotion, envelope
 from stickslip.response.quasi_periodic.problem import TwoTones, two_tones, with_enough
 from stickslip.response.quasi_periodic.second_tone import (
@@ -21,6 +22,7 @@ from stickslip.response.quasi_periodic.second_tone import (
 )
 from stickslip.response.quasi_periodic.start import distinct, tones_of_multipliers
 from stickslip.response.stability import stability
+from stickslip.response.time.start import start_from_harmonics
 
 MASS = np.eye(2)
 STIFFNESS = np.array([[3e4, -1e4], [-1e4, 4e4]])
@@ -185,6 +187,17 @@ def test_flutter_beside_a_forced_vibration_is_what_a_march_by_hand_comes_to() ->
     phase = float(np.angle(seen / motion.coefficients[motion.indices.index((0, 1)), 1]))
     assert off(motion.at_times(BOTH, times[late], phase), judge[late]) < 0.015
     assert motion.omegas[1] < np.sqrt(squares[1])
+    # the same from time integration alone: envelope, root mean square, and the second frequency among the lines of the spectrum
+    system, load = problem.system, tone(6.0, 0.0)
+    start = start_from_harmonics(np.zeros((2, 2), dtype=complex), 135.0, system.interface.gap_operator, system.interface.laws)  # fmt: skip
+    found = statistics(course(system.structure, system.interface, load, 135.0, BOTH, start, steps=128, least=256, most=256))  # fmt: skip
+    assert found.settled
+    shown = envelope(motion, BOTH)
+    assert found.largest == pytest.approx(shown.largest, rel=0.02)
+    assert found.least == pytest.approx(shown.least, rel=0.02)
+    assert found.rms == pytest.approx(shown.rms, rel=0.01)
+    lines = 2 * np.pi * found.hertz[1, :2]
+    assert sorted(lines) == pytest.approx([135.0, motion.omegas[1]], rel=1e-3)
 
 
 def test_modulation_beyond_a_neimark_sacker_point_is_what_scipy_integrates() -> None:

@@ -9,6 +9,7 @@ from stickslip.report.forced.curves import frequency_response, low_order, optimi
 from stickslip.report.forced.errors import error_scatter, errors
 from stickslip.report.forced.harmonics import kept_harmonics
 from stickslip.report.forced.head import cards
+from stickslip.report.forced.not_periodic import amplitudes_in_time, statistics_in_time
 from stickslip.report.forced.orders import of_each_order
 from stickslip.report.forced.stability import stability
 from stickslip.report.forced.surface import surface_map
@@ -55,6 +56,8 @@ SECTION: Section = Section(
             (
                 stability,
                 bifurcations,
+                amplitudes_in_time,
+                statistics_in_time,
                 tables.more_harmonics,
                 tables.time_integration,
                 tables.retention,

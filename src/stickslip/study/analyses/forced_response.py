@@ -34,6 +34,11 @@ from stickslip.study.analyses.forced.known import (
     nothing_pressed,
 )
 from stickslip.study.analyses.forced.more_harmonics import check_harmonics
+from stickslip.study.analyses.forced.not_periodic import (
+    in_time_instead,
+    of_answers,
+    without_periodic,
+)
 from stickslip.study.analyses.forced.points import Accepted, Response, collect
 from stickslip.study.analyses.forced.pressures import pressure_lines
 from stickslip.study.analyses.forced.question import (
@@ -71,6 +76,7 @@ NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
 COMPILED = 5.0  # seconds of the first evaluation: below, it was found compiled
 BLADES = "blades"  # of a wheel whose sectors differ
 BIFURCATIONS = "bifurcations"
+NOT_PERIODIC = "not_periodic"
 NOTES = (
     "model",
     "response",
@@ -78,6 +84,7 @@ NOTES = (
     STABLE,
     BIFURCATIONS,
     IN_TIME,
+    NOT_PERIODIC,
     HARMONICS,
 )  # what makes up the dataset
 
@@ -215,6 +222,24 @@ def _judge(question: Question, response: Response, notes: Notes) -> None:
     for one in told:
         LOG.info(f"stability: {question.said(one.sentence)}")
     notes.put(STABLE, of_examined(told))
+    if question.not_periodic_s > 0.0:
+        _answer_in_time(question, response, told, notes)
+
+
+def _answer_in_time(
+    question: Question, response: Response, examined: Sequence[Examined], notes: Notes
+) -> None:
+    """March where no periodic motion stands for the response, once."""
+    if notes.get(NOT_PERIODIC) is not None:
+        return
+    answers = [
+        in_time_instead(question, response, omega, why, question.not_periodic_s)
+        for omega, why in without_periodic(question, response, examined)
+    ]
+    for one in answers:
+        LOG.info(f"not periodic: {question.said(one.sentence)}")
+    if answers:
+        notes.put(NOT_PERIODIC, of_answers(answers))
 
 
 def _bifurcations(question: Question, response: Response) -> Values:

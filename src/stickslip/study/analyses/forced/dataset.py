@@ -26,6 +26,7 @@ ROWS = {
     "alert_point": ("alert_case", "alert_frequency_hz"),
     "check": ("verify_case", "verify_frequency_hz"),
     "examined": ("stability_case", "stability_frequency_hz"),
+    "not_periodic": ("not_periodic_case", "not_periodic_frequency_hz"),
     "tuned_point": ("tuned_case", "tuned_frequency_hz"),
     "bifurcation": ("bifurcation_case", "bifurcation_frequency_hz"),
     "side_branch": ("side_branch_case", "side_branch_frequency_hz"),
@@ -34,6 +35,7 @@ ROWS = {
 SOME = (
     "check",
     "examined",
+    "not_periodic",
     "tuned_point",
     "bifurcation",
     "side_branch",

@@ -201,6 +201,30 @@ _OF = {
         "side_point_subharmonic": ("m", "its amplitude over all harmonics that are no multiples of the load's frequency"),
         "side_point_localisation": ("1", "share of the vibration, by squares, of the sector with the largest one"),
     },
+    "not_periodic": {
+        "not_periodic_case": ("1", "case of a motion in time where no balance stands for it"),
+        "not_periodic_frequency_hz": ("Hz", "its frequency of excitation"),
+        "not_periodic_spread": ("1", "relative difference between windows of it"),
+        "not_periodic_periods": ("1", "periods marched, of which the later half counts"),
+        "not_periodic_seconds": ("s", "time that took"),
+        "not_periodic_settled": ("1", "1 where its windows are alike"),
+        "not_periodic_repeats": ("1", "1 where every period is like the one before"),
+        "not_periodic_sentence": ("1", "what it is like, in words"),
+    },
+    "not_periodic output": {
+        "not_periodic_largest": ("m", "largest amplitude of a period, half of peak to peak"),
+        "not_periodic_least": ("m", "least amplitude of a period"),
+        "not_periodic_mean": ("m", "mean"),
+        "not_periodic_rms": ("m", "root mean square about the mean"),
+        "not_periodic_extreme": ("m", "largest distance from the mean"),
+    },
+    "not_periodic line": {
+        "not_periodic_line_hz": ("Hz", "frequencies of the largest peaks of the spectrum of the report output"),
+        "not_periodic_line_amplitude": ("m", "their amplitudes"),
+    },
+    "not_periodic turn": {
+        "not_periodic_amplitudes": ("m", "amplitude of the report output in the last periods"),
+    },
     "case mode": {
         "frequency_full_hz": ("Hz", "natural frequency, full model, contacts open"),
         "frequency_reduced_hz": ("Hz", "natural frequency, reduced model, contacts open"),

@@ -60,6 +60,8 @@ class Question:
         Of which points the stability is examined: ``peak``, ``all`` or ``off``.
     bifurcations
         Which bifurcations are located along the branch: ``off``, ``folds``, ``all``, or ``branches``: all, and what leaves there is followed.
+    not_periodic_s
+        Seconds of a march where no periodic motion stands for the response; 0: none.
     """
 
     label: str
@@ -72,6 +74,7 @@ class Question:
     first: bool = True
     examine: Literal["peak", "off", "all"] = "peak"
     bifurcations: Literal["off", "folds", "all", "branches"] = "off"
+    not_periodic_s: float = 0.0
 
     @property
     def over_speed(self) -> bool:
@@ -181,6 +184,11 @@ def question_of(case: Case, model: Model) -> Question:
         first=case.index == 0,
         examine=settings.forced_response.stability,
         bifurcations=settings.forced_response.bifurcations,
+        not_periodic_s=(
+            settings.forced_response.not_periodic_s
+            if settings.forced_response.not_periodic == "in_time"
+            else 0.0
+        ),
     )
 
 

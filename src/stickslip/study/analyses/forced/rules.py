@@ -245,6 +245,20 @@ def in_time(case: Curve) -> Iterator[Finding]:
             yield Finding("doubtful", why, remedy, (point,), abs(off))
 
 
+def not_periodic(case: Curve) -> Iterator[Finding]:
+    """Tell what a motion in time is like where no balance stands for it."""
+    for said in case.rows("not_periodic"):
+        hz, sentence = float(said["not_periodic_frequency_hz"]), str(said["not_periodic_sentence"])
+        why = f"at {hz:.2f} Hz {without_place(sentence)}"
+        settled = bool(said["not_periodic_settled"])
+        remedy = (
+            "That is time integration, no balance."
+            if settled
+            else "Give it more time: forced_response.not_periodic_s."
+        )
+        yield Finding("trusted" if settled else "doubtful", why, remedy)
+
+
 def at_the_end(case: Curve) -> Iterator[Finding]:
     """Doubt a largest amplitude that is no resonance, or none at all."""
     if case.peak < 0:
@@ -291,6 +305,7 @@ RULES: tuple[Rule, ...] = (
     in_time,
     stability,
     bifurcated,
+    not_periodic,
     audited,
     few_harmonics,
     twice_the_harmonics,

@@ -66,6 +66,15 @@ class ForcedResponse(Section):
         description="bifurcations located along the branch. folds: where it turns back; all: period doublings, Neimark-Sacker bifurcations "
         "and branch points, too, by the multipliers at every point; branches: all, and the periodic motions that leave there are followed",
     )
+
+    not_periodic: Literal["in_time", "off"] = Field(
+        "in_time",
+        description="where no periodic motion is found, or an unstable one: in_time: envelope, statistics and spectrum of the motion in time, at the "
+        "peak or the nearest such points to it; off: nothing",
+    )
+    not_periodic_s: Positive = Field(
+        5.0, description="seconds that each such motion may take, greater than zero"
+    )
     static_friction_share: float | None = Field(
         None,
         gt=0,

@@ -49,6 +49,9 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
         _lines("Against twice as many harmonics", _sentences(data, "reference_sentence", labels)),
         _lines("Is it stable?", _along(data, "stability", labels)),
         _lines("Bifurcations", bifurcation_lines(data, labels)),
+        _lines(
+            "In time, where no periodic motion stands for it", _along(data, "not_periodic", labels)
+        ),
         _lines("Against time integration", _along(data, "verify", labels)),
     ]
     return tuple(table for table in found if table.rows or table.lines)

@@ -1,0 +1,224 @@
+"""What is not periodic, in time: its envelope, its statistics and its spectrum, and whether these have settled.
+
+A motion that repeats itself never has no amplitude, but windows of it are alike once it has settled: the largest amplitude in a window, its mean
+and root mean square. The march is as long as that needs, or as a budget of time allows; of what it was, the later half counts.
+"""
+
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.contact.interface import Interface
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.linear import LinearSide
+from stickslip.response.time.marcher import prepared
+from stickslip.response.time.settling import overflowed
+from stickslip.response.time.start import TransientStart
+
+KEPT = 32  # samples of a period that are kept
+WINDOWS = 4  # of the later half, which are compared
+LEAST, MOST = 128, 2048  # periods
+ALIKE = 0.02  # relative spread between windows that counts as none
+PEAKS = 6  # of a spectrum that are told
+FAINT = 1e-3  # of the largest peak: what is below is not told
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A motion over many periods of a frequency that need not be its own.
+
+    Attributes
+    ----------
+    omega
+        That frequency, rad/s.
+    samples
+        (periods, KEPT, outputs) displacements, m.
+    largest, least
+        (periods, outputs) of all steps of a period, m.
+    mean, square
+        (periods, outputs) mean, and mean of the square, m and m².
+    final
+        State at the end.
+    overflowed
+        Whether it grew beyond all numbers; the periods end before.
+    seconds
+        That the march took.
+    """
+
+    omega: float
+    samples: FloatArray
+    largest: FloatArray
+    least: FloatArray
+    mean: FloatArray
+    square: FloatArray
+    final: TransientStart
+    overflowed: bool
+    seconds: float
+
+    @property
+    def periods(self) -> int:
+        """How many."""
+        return len(self.mean)
+
+    @property
+    def amplitude(self) -> FloatArray:
+        """(periods, outputs) half of peak to peak in each period, m."""
+        return np.asarray(0.5 * (self.largest - self.least))
+
+
+@dataclass(frozen=True, eq=False)
+class Statistics:
+    """What the later half of a course is like.
+
+    Attributes
+    ----------
+    largest, least
+        (outputs,) amplitude of a period, half of peak to peak: the largest and the least, m.
+    mean, rms
+        (outputs,) mean, and root mean square about it, m.
+    extreme
+        (outputs,) largest distance from the mean, m.
+    spread
+        Largest relative difference between windows of the same length, of the largest amplitude and of the root mean square.
+    hertz, peaks
+        (outputs, PEAKS) frequencies (Hz) and amplitudes (m) of the largest peaks of the spectrum, NaN where there are fewer.
+    periods
+        In the later half.
+    """
+
+    largest: FloatArray
+    least: FloatArray
+    mean: FloatArray
+    rms: FloatArray
+    extreme: FloatArray
+    spread: float
+    hertz: FloatArray
+    peaks: FloatArray
+    periods: int
+
+    @property
+    def settled(self) -> bool:
+        """Whether its windows are alike."""
+        return self.spread <= ALIKE
+
+
+def course(  # noqa: PLR0913
+    structure: LinearSide,
+    contacts: Interface,
+    load: HarmonicLoad,
+    omega: float,
+    outputs: IntArray,
+    start: TransientStart,
+    *,
+    steps: int = 512,
+    budget: float = 20.0,
+    least: int = LEAST,
+    most: int = MOST,
+) -> Course:
+    """March until windows of the later half are alike, or the budget is spent.
+
+    Parameters
+    ----------
+    structure, contacts, load
+        One structure, or all sectors of a wheel.
+    omega
+        rad/s; the load repeats itself with it.
+    outputs
+        Dofs that are told of.
+    start
+        State at t = 0.
+    steps
+        In a period.
+    budget
+        Seconds after which no more periods are begun.
+    least, most
+        Periods, in any case and at most.
+    """
+    steps = -(-steps // KEPT) * KEPT
+    marcher = prepared(
+        structure, contacts.gap_operator, contacts.laws, load, omega, steps, contacts.weights
+    )
+    state, record = marcher.begun(start), marcher.record()
+    rows = marcher.modes.basis[outputs].T
+    found: list[tuple[FloatArray, ...]] = []
+    began, lost, until = perf_counter(), False, least
+    while len(found) < most and perf_counter() - began < budget:
+        lost = marcher.march(state, record) < 0 or overflowed(state.x, record.motion)
+        if lost:
+            break
+        motion = record.motion @ rows
+        found.append((motion[steps // KEPT - 1 :: steps // KEPT], motion.max(axis=0), motion.min(axis=0), motion.mean(axis=0), np.mean(motion**2, axis=0)))  # fmt: skip
+        if len(found) == until:
+            if statistics(_course(omega, found, marcher.end(state), False, 0.0)).settled:
+                break
+            until = min(2 * until, most)
+    end = start if lost else marcher.end(state)
+    return _course(omega, found, end, lost, perf_counter() - began, rows.shape[1])
+
+
+def _course(
+    omega: float,
+    found: list[tuple[FloatArray, ...]],
+    final: TransientStart,
+    lost: bool,
+    seconds: float,
+    width: int = 0,
+) -> Course:
+    if not found:
+        none = np.zeros((0, width))
+        return Course(omega, np.zeros((0, KEPT, width)), none, none, none, none, final, lost, seconds)  # fmt: skip
+    samples, largest, least, mean, square = (np.array(own) for own in zip(*found, strict=True))
+    return Course(omega, samples, largest, least, mean, square, final, lost, seconds)
+
+
+def statistics(motion: Course) -> Statistics:
+    """Return what the later half of a course is like; NaN where there are too few periods to compare."""
+    outputs = motion.mean.shape[1]
+    half = motion.periods // 2
+    half -= half % WINDOWS
+    if half < WINDOWS or motion.overflowed:
+        nothing = np.full(outputs, np.nan)
+        none = np.full((outputs, PEAKS), np.nan)
+        return Statistics(nothing, nothing, nothing, nothing, nothing, np.inf, none, none, half)
+    amplitude, largest, least = (a[-half:] for a in (motion.amplitude, motion.largest, motion.least))  # fmt: skip
+    mean = motion.mean[-half:].mean(axis=0)
+    square = motion.square[-half:].mean(axis=0)
+    rms = np.sqrt(np.maximum(square - mean**2, 0.0))
+    windows = amplitude.reshape(WINDOWS, -1, outputs).max(axis=1)
+    own = motion.square[-half:].reshape(WINDOWS, -1, outputs).mean(axis=1)
+    sizes = np.sqrt(np.maximum(own - mean**2, 0.0))
+    spread = max(_spread(windows), _spread(sizes))
+    hertz, peaks = _spectrum(motion.samples[-half:].reshape(-1, outputs) - mean, motion.omega)
+    return Statistics(
+        amplitude.max(axis=0), amplitude.min(axis=0), mean, rms,
+        np.maximum(largest.max(axis=0) - mean, mean - least.min(axis=0)), spread, hertz, peaks, half,
+    )  # fmt: skip
+
+
+def _spread(windows: FloatArray) -> float:
+    """Return the largest difference between windows (WINDOWS, outputs), relative to the largest value of an output."""
+    size = np.max(np.abs(windows), axis=0)
+    moving = size > FAINT * float(np.max(size, initial=0.0))
+    return float(np.max(np.ptp(windows, axis=0)[moving] / size[moving], initial=0.0))
+
+
+def _spectrum(samples: FloatArray, omega: float) -> tuple[FloatArray, FloatArray]:
+    """Return frequencies (Hz) and amplitudes of the largest peaks of samples (n, outputs), `KEPT` a period."""
+    n, outputs = samples.shape
+    window = np.hanning(n)
+    lines = np.abs(np.fft.rfft(samples * window[:, None], axis=0)) * (2.0 / window.sum())
+    hertz, peaks = (np.full((outputs, PEAKS), np.nan) for _ in range(2))
+    step = omega / (2.0 * np.pi) * KEPT / n
+    for output in range(outputs):
+        own = lines[:, output]
+        tops = np.flatnonzero((own[1:-1] >= own[:-2]) & (own[1:-1] > own[2:])) + 1
+        tops = tops[np.argsort(own[tops])[::-1][:PEAKS]]
+        tops = tops[own[tops] > FAINT * own.max(initial=0.0)]
+        for place, top in enumerate(tops):
+            a, b, c = np.log(np.maximum(own[top - 1 : top + 2], 1e-300))
+            shift = 0.5 * (a - c) / (a - 2.0 * b + c) if a - 2.0 * b + c < 0.0 else 0.0
+            hertz[output, place] = (top + shift) * step
+            peaks[output, place] = float(np.exp(b - 0.25 * (a - c) * shift))
+    return hertz, peaks

@@ -1,0 +1,206 @@
+"""Where a response has no periodic motion, or none that a machine stays at: what the motion in time is like."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.errors import StickslipError
+from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.quasi_periodic.in_time import PEAKS, Course, course, statistics
+from stickslip.response.time.sectors import all_sectors, sectors_in_time
+from stickslip.response.time.start import TransientStart, rest, start_from_harmonics
+from stickslip.study.analyses.forced.in_time import GOLDEN, KICK
+from stickslip.study.analyses.forced.points import Accepted, Response
+from stickslip.study.analyses.forced.question import MOST_IN_TIME, Question
+from stickslip.study.analyses.forced.stable import Examined
+from stickslip.units import HZ
+
+MOST_POINTS = 2  # of a case, the peak first, then the nearest to it
+STEPS = 512
+TURNS = 128  # periods whose amplitudes are kept for the picture
+SAME = 1e-3  # relative difference of the amplitudes of all periods that counts as none
+MULTIPLE = 0.02  # of the frequency: a line of the spectrum that is farther from every multiple is another frequency
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a motion in time is like where no balance stands for it.
+
+    Parameters
+    ----------
+    omega
+        Where, rad/s.
+    why
+        Why it was marched.
+    largest, least, mean, rms, extreme
+        Of each output, see `Statistics`; NaN where nothing is known.
+    spread, periods, seconds
+        Between windows, in the later half; marched.
+    settled
+        Whether windows are alike.
+    periodic
+        Whether every period is like the one before: then a periodic motion exists, and it is another one than the balance's.
+    line_hz, line_amplitude
+        Peaks of the spectrum of the report output, Hz and m.
+    amplitudes
+        (TURNS,) of the report output in the last periods, m; NaN where there were fewer.
+    sentence
+        All this in words.
+    """
+
+    omega: float
+    why: str
+    largest: FloatArray
+    least: FloatArray
+    mean: FloatArray
+    rms: FloatArray
+    extreme: FloatArray
+    spread: float
+    periods: int
+    seconds: float
+    settled: bool
+    periodic: bool
+    line_hz: FloatArray
+    line_amplitude: FloatArray
+    amplitudes: FloatArray
+    sentence: str
+
+
+def without_periodic(
+    question: Question, response: Response, examined: Sequence[Examined]
+) -> list[tuple[float, str]]:
+    """Return the frequencies (rad/s) at which no balance stands for the motion, and why: the peak first, then the nearest to it."""
+    found = {
+        a.point.omega: "no periodic motion was found"
+        for a in response.accepted
+        if not a.point.converged
+    }
+    for one in examined:
+        if one.verdict == "unstable":
+            found[one.omega] = "the periodic motion is unstable"
+        elif one.verdict == "undecided" and not one.motion and not np.isfinite(one.error):
+            found[one.omega] = "no motion with more harmonics was found near the balance"
+    middle = sum(question.sweep.omega_range) / 2 if response.top is None else response.top.point.omega  # fmt: skip
+    nearest = sorted(found, key=lambda omega: abs(omega - middle))
+    return [(omega, found[omega]) for omega in nearest[:MOST_POINTS]]
+
+
+def in_time_instead(
+    question: Question, response: Response, omega: float, why: str, budget: float
+) -> Answer:
+    """March at a frequency and say what the motion is like.
+
+    Parameters
+    ----------
+    question, response
+        The model, and its finished response.
+    omega
+        rad/s.
+    why
+        Why it is asked for.
+    budget
+        Seconds.
+    """
+    count = question.problem.system.outputs.size
+    size = sectors_in_time(question.model.system) * question.model.system.structure.n
+    if size > MOST_IN_TIME:
+        return _nothing(omega, why, count, f"not integrated: {size} coordinates are more than {MOST_IN_TIME}")  # fmt: skip
+    try:
+        found = _marched(question, response, omega, budget)
+    except (StickslipError, FloatingPointError, np.linalg.LinAlgError) as error:
+        return _nothing(omega, why, count, f"not integrated: {error}")
+    return _told(question, response, omega, why, found)
+
+
+def _marched(question: Question, response: Response, omega: float, budget: float) -> Course:
+    system, load = question.problem.system, question.model.load
+    structure, contacts = system.structure, system.interface
+    known = [a for a in response.accepted if a.point.converged]
+    near: Accepted | None = min(known, key=lambda a: abs(a.point.omega - omega), default=None)
+    motion = None
+    if near is not None:
+        own = near.point
+        motion = question.problem.low.linear.recover(own.omega, own.coefficients)
+    if isinstance(structure, TunedWheel):
+        whole = all_sectors(system, load, every=structure.has_every_wave)
+        motion = None if motion is None else whole.spread(motion)
+        structure, contacts, load = whole.structure, whole.contacts, whole.load
+    start = rest(structure.n, contacts.laws)
+    if motion is not None:
+        start = start_from_harmonics(motion, omega, contacts.gap_operator, contacts.laws)
+        start = _disturbed(start, omega * np.abs(motion[1:]).sum(axis=0))
+    return course(structure, contacts, load, omega, system.outputs, start, steps=STEPS, budget=budget)  # fmt: skip
+
+
+def _disturbed(start: TransientStart, speeds: FloatArray) -> TransientStart:
+    shares = KICK * np.cos(GOLDEN * np.arange(speeds.size))
+    return replace(start, velocity=start.velocity + shares * speeds)
+
+
+def _told(question: Question, response: Response, omega: float, why: str, found: Course) -> Answer:
+    """Return an answer in numbers and words."""
+    if found.overflowed or found.periods < 2:
+        count = question.problem.system.outputs.size
+        said = f"in time it grew beyond all numbers in {found.periods} periods" if found.overflowed else "the time was too short for two periods"  # fmt: skip
+        return _nothing(omega, why, count, said)
+    of, own = statistics(found), response.output
+    last = found.amplitude[-TURNS:, own]
+    amplitudes = np.full(TURNS, np.nan)
+    amplitudes[: last.size] = last
+    alike = bool(np.all(of.largest - of.least <= SAME * of.largest.max(initial=0.0)))
+    lines = of.hertz[own]
+    strange = [f"{hz:.2f} Hz" for hz in lines if _off(hz, omega / HZ)]
+    label = question.model.output_labels[own]
+    head = f"{omega / HZ:.3f} Hz: {why}; in time"
+    counted = f"over {of.periods} periods after {found.periods - of.periods}"
+    if alike and of.settled:
+        body = f"it settles to another periodic motion, {label} {1e3 * of.largest[own]:.4g} mm {counted}"
+    else:
+        body = (
+            f"its amplitude goes from {1e3 * of.least[own]:.4g} to {1e3 * of.largest[own]:.4g} mm ({label}, half of peak to peak in a period), "
+            f"root mean square {1e3 * of.rms[own]:.4g} mm, {counted}"
+        )
+        body += f"; besides multiples of the frequency {', '.join(strange)}" if strange else ""
+        body += _settledness(of.spread, of.settled)
+    return Answer(
+        omega, why, of.largest, of.least, of.mean, of.rms, of.extreme, of.spread, found.periods, found.seconds,
+        of.settled, alike and of.settled, lines, of.peaks[own], amplitudes, f"{head} {body}",
+    )  # fmt: skip
+
+
+def _settledness(spread: float, settled: bool) -> str:
+    if settled:
+        return f"; four windows differ by {100 * spread:.2g} %"
+    return f"; not settled: four windows differ by {100 * spread:.2g} %, more time (forced_response.not_periodic_s) tells more"
+
+
+def _off(hertz: float, own: float) -> bool:
+    """Whether a line of the spectrum is no multiple of the frequency."""
+    ratio = hertz / own
+    return bool(np.isfinite(ratio)) and abs(ratio - round(ratio)) > MULTIPLE
+
+
+def _nothing(omega: float, why: str, count: int, said: str) -> Answer:
+    none, lines = np.full(count, np.nan), np.full(PEAKS, np.nan)
+    return Answer(
+        omega, why, none, none, none, none, none, np.nan, 0, 0.0, False, False, lines, lines,
+        np.full(TURNS, np.nan), f"{omega / HZ:.3f} Hz: {why}; {said}",
+    )  # fmt: skip
+
+
+def of_answers(answers: Sequence[Answer]) -> dict[str, object]:
+    """Return the values of the dataset."""
+    named = (
+        "largest", "least", "mean", "rms", "extreme", "spread", "periods", "seconds", "line_hz", "line_amplitude", "amplitudes",
+    )  # fmt: skip
+    found: dict[str, object] = {
+        f"not_periodic_{name}": np.array([getattr(a, name) for a in answers]) for name in named
+    }
+    return found | {
+        "not_periodic_frequency_hz": np.array([a.omega / HZ for a in answers]),
+        "not_periodic_settled": np.array([a.settled for a in answers], dtype=np.int64),
+        "not_periodic_repeats": np.array([a.periodic for a in answers], dtype=np.int64),
+        "not_periodic_sentence": np.array([a.sentence for a in answers], dtype=str),
+    }
