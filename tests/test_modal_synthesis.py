@@ -22,9 +22,9 @@ from stickslip.response.nonlinear_modes.backbone import (
 )
 from stickslip.response.nonlinear_modes.design import is_homogeneous, peak_curve
 from stickslip.response.nonlinear_modes.isolated import isolation, other_modes, with_others
-from stickslip.response.nonlinear_modes.oscillator import ModalOscillator, modal_oscillator
+from stickslip.response.nonlinear_modes.more_points import refined
+from stickslip.response.nonlinear_modes.one_mass import ModalOscillator, modal_oscillator
 from stickslip.response.nonlinear_modes.passage import Swept, passage_through_resonance
-from stickslip.response.nonlinear_modes.refined import refined
 from stickslip.response.nonlinear_modes.synthesis import (
     free_motions,
     motions_at,

@@ -27,6 +27,7 @@ from stickslip.units import RPM
 _SHARED = {  # tables that analyses take beside their own
     "forced_response": ("harmonics", "solver", "limits"),
     "limit_cycle": ("solver",),
+    "modal_synthesis": ("solver",),
     "nonlinear_mode": ("solver",),
     "resonance": ("solver",),
     "residual_tractions": ("solver",),
@@ -149,6 +150,10 @@ class Model(Assembly):
     def residual_tractions(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
         """Bound the response over the tractions that sticking contacts may have kept; keys such as ``frequency_hz=(150, 170), points=25``."""
         return self._answer("residual_tractions", keys, folder)
+
+    def modal_synthesis(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+        """Find forced responses at many levels from one nonlinear mode; keys such as ``levels=[0.5, 1, 2], mode=1, direct=True``."""
+        return self._answer("modal_synthesis", keys, folder)
 
     def run_up(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
         """Follow the response over speed along engine orders; keys such as ``speeds_rpm=(3000, 9000), engine_orders=[4, 6], high=3``."""

@@ -32,6 +32,7 @@ from stickslip.report.sections import (
     flutter,
     forced_response,
     limit_cycle,
+    modal_synthesis,
     modes,
     nonlinear_mode,
     residual_tractions,
@@ -46,6 +47,7 @@ from stickslip.study.keep.netcdf import alike, one_case
 SECTIONS: tuple[Section, ...] = (
     forced_response.SECTION,
     nonlinear_mode.SECTION,
+    modal_synthesis.SECTION,
     limit_cycle.SECTION,
     resonance.SECTION,
     residual_tractions.SECTION,

@@ -12,12 +12,12 @@ from .isolated import OtherModes as OtherModes
 from .isolated import isolation as isolation
 from .isolated import other_modes as other_modes
 from .isolated import with_others as with_others
-from .oscillator import ModalOscillator as ModalOscillator
-from .oscillator import modal_oscillator as modal_oscillator
+from .more_points import refined as refined
+from .one_mass import ModalOscillator as ModalOscillator
+from .one_mass import modal_oscillator as modal_oscillator
 from .passage import Passage as Passage
 from .passage import Swept as Swept
 from .passage import passage_through_resonance as passage_through_resonance
-from .refined import refined as refined
 from .synthesis import Resonance as Resonance
 from .synthesis import Synthesised as Synthesised
 from .synthesis import free_motions as free_motions

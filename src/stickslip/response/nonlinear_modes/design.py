@@ -6,7 +6,7 @@ import numpy as np
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
-from stickslip.response.nonlinear_modes.oscillator import ModalOscillator
+from stickslip.response.nonlinear_modes.one_mass import ModalOscillator
 from stickslip.response.parameter import Discretisation
 
 TWICE = 2.0
@@ -49,10 +49,9 @@ class PeakCurve:
 
 def peak_curve(oscillator: ModalOscillator, dof: int) -> PeakCurve:
     """Return the resonances of all levels, without solving for any of them: each place of the backbone needs one level."""
-    place = oscillator.table()
-    place = place[place >= oscillator.begins]
+    after = oscillator.table >= oscillator.begins
+    place, level = oscillator.table[after], oscillator.needed_in_table[after]
     here = oscillator.at(place)
-    level = oscillator.needed(place)
     motion = oscillator.displacement(place, np.array([dof]))[:, 1, 0]
     return PeakCurve(place, level, here.resonance(), np.abs(motion), np.gradient(level) > 0.0)
 

@@ -22,8 +22,8 @@ from stickslip.model.structure import Structure
 from stickslip.reduction.basis import in_basis, in_coordinates
 from stickslip.reduction.nodal import own_motions
 from stickslip.response.at_rest import holding
-from stickslip.response.nonlinear_modes.oscillator import ModalOscillator
-from stickslip.response.nonlinear_modes.synthesis import Resonance, Synthesised
+from stickslip.response.nonlinear_modes.one_mass import ModalOscillator
+from stickslip.response.nonlinear_modes.synthesis import Resonance, Synthesised, at_resonance
 
 WHOLE = 300  # coordinates up to which all motions count
 LOWEST = 80  # of more, so many modes and the static answer to the force
@@ -134,7 +134,7 @@ def left_over(oscillator: ModalOscillator, found: Synthesised) -> ComplexArray:
     """
     structure = oscillator.backbone.system.structure.of_harmonic(1)
     here = oscillator.at(found.place)
-    motion = oscillator.displacement(found.place)[:, 1] * np.exp(1j * found.phase)[:, None]
+    motion = oscillator.first(found.place) * np.exp(1j * found.phase)[:, None]
     inertia, dashpots = ((m @ motion.T).T for m in (structure.mass, structure.damping))
     off = (found.omega - here.omega)[:, None]
     plain = (here.omega**2 - found.omega**2 + 2j * here.ratio * here.omega**2)[:, None]
@@ -154,16 +154,13 @@ def isolation(others: OtherModes, resonance: Resonance, dof: int) -> Isolation:
         The output that counts.
     """
     own = others.oscillator
-    place, omega = np.array([resonance.place]), np.array([resonance.omega])
-    here = own.at(place)
-    motion = own.displacement(place)[0]
-    phase = np.angle(here.force / here.stiffness(omega))
-    no, yes = np.zeros(1, dtype=np.int64), np.ones(1, dtype=bool)
-    found = Synthesised(resonance.level, place, omega, here.amplitude, phase, no, yes)
+    found = at_resonance(own, resonance)
+    here = own.at(found.place)
+    motion = own.displacement(found.place)[0]
     system = own.backbone.system
     gaps = _dense(system.interface.gap_operator)
     rows = np.vstack([np.eye(1, system.structure.n, dof), gaps])
-    beside = others.answer(omega, left_over(own, found), rows)[0]
+    beside = others.answer(found.omega, left_over(own, found), rows)[0]
     moves = rows @ motion[1]
     distance = others.distance(resonance.omega)
     return Isolation(
@@ -199,7 +196,7 @@ def is_linear(oscillator: ModalOscillator, place: float, factor: float = 1.0) ->
 def with_others(others: OtherModes, found: Synthesised, dofs: IntArray) -> ComplexArray:
     """Return (p, k) first harmonics of dofs with what the other modes add, in the phase of the load, m."""
     own = others.oscillator
-    motion = own.displacement(found.place, dofs)[:, 1] * np.exp(1j * found.phase)[:, None]
+    motion = own.first(found.place)[:, dofs] * np.exp(1j * found.phase)[:, None]
     rows = np.zeros((dofs.size, own.backbone.system.structure.n))
     rows[np.arange(dofs.size), dofs] = 1.0
     return np.asarray(motion + others.answer(found.omega, left_over(own, found), rows))

@@ -1,6 +1,6 @@
 """Transient passage through a resonance: the slowly varying amplitude of a nonlinear mode under a force whose frequency is swept.
 
-The modal amplitude is complex, ``A = a exp(iθ)``, against a force of phase φ with ``dφ/dt = Ω(t)``. The modal stiffness of `oscillator` is a
+The modal amplitude is complex, ``A = a exp(iθ)``, against a force of phase φ with ``dφ/dt = Ω(t)``. The modal stiffness of `one_mass` is a
 product ``(iΩ - λ) (iΩ + d + λ)``, d the dashpots and λ an eigenvalue, near ``-ζω + iω``, that depends on the amplitude. The equation of motion is
 nearly the same product with ``d/dt + iΩ`` in place of ``iΩ``. Its second factor turns twice as fast as the motion, and follows the force without
 delay. What remains is
@@ -17,7 +17,7 @@ import scipy.integrate
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import input_error
-from stickslip.response.nonlinear_modes.oscillator import ModalOscillator
+from stickslip.response.nonlinear_modes.one_mass import ModalOscillator
 from stickslip.response.nonlinear_modes.synthesis import checked_level, motions_at
 
 CELLS = 4096  # of the table of the oscillator over ln a
@@ -42,7 +42,7 @@ class Swept:
 
     ends: tuple[float, float]
     rate: float
-    tolerance: float = 1e-7
+    tolerance: float = 1e-6
 
     def __post_init__(self) -> None:
         positive = min(self.rate, self.tolerance, *self.ends) > 0.0

@@ -1,7 +1,7 @@
 """Nonlinear modal synthesis: the forced response at any level from one backbone, without solving the equations of motion again.
 
 At each amplitude of the backbone the frequencies at which a force of a level keeps it are the roots of a polynomial of fourth degree in Ω (see
-`oscillator`): one below and one above the resonance. Where the amplitude needs more than the level at every frequency there is none, so that the
+`one_mass`): one below and one above the resonance. Where the amplitude needs more than the level at every frequency there is none, so that the
 places at which the least level needed crosses the level are the peaks, and several stretches of the backbone below it are several
 curves: the first is that on which the machine comes up from small amplitudes, the others are detached.
 """
@@ -14,7 +14,7 @@ import scipy.optimize
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import input_error
-from stickslip.response.nonlinear_modes.oscillator import ModalOscillator
+from stickslip.response.nonlinear_modes.one_mass import ModalOscillator
 
 POINTS = 161  # of the amplitudes of a curve, each with a frequency on either side
 REAL = 1e-6  # relative imaginary part of a root that counts as none: where two meet, rounding has its square root
@@ -88,8 +88,8 @@ def resonances(oscillator: ModalOscillator, level: float) -> list[Resonance]:
     level
         Factor on the harmonic load, above zero.
     """
-    table = oscillator.table()
-    excess = np.log(oscillator.needed(table) / checked_level(level))
+    table = oscillator.table
+    excess = np.log(oscillator.needed_in_table / checked_level(level))
     found = []
     for i in np.flatnonzero(np.sign(excess[:-1]) * np.sign(excess[1:]) <= 0.0):
         if excess[i] == excess[i + 1] or excess[i + 1] == 0.0:
@@ -133,9 +133,18 @@ def synthesise(oscillator: ModalOscillator, level: float, points: int = POINTS) 
     return Synthesised(level, place, omega, here.amplitude, phase, curve.astype(np.int64), stable)
 
 
+def at_resonance(oscillator: ModalOscillator, found: Resonance) -> Synthesised:
+    """Return a resonance as a response of one point."""
+    place, omega = np.array([found.place]), np.array([found.omega])
+    here = oscillator.at(place)
+    phase = np.angle(here.force / here.stiffness(omega))
+    no, stable = np.zeros(1, dtype=np.int64), _stable(oscillator, place, omega)
+    return Synthesised(found.level, place, omega, here.amplitude, phase, no, stable)
+
+
 def motions_at(oscillator: ModalOscillator, level: float, omega: float) -> FloatArray:
     """Return the places of the steady motions at a frequency, rad/s, in the order of the backbone."""
-    table = oscillator.table()
+    table = oscillator.table
 
     def more(place: FloatArray) -> FloatArray:
         here = oscillator.at(place)
@@ -153,7 +162,7 @@ def motions_at(oscillator: ModalOscillator, level: float, omega: float) -> Float
 
 def free_motions(oscillator: ModalOscillator) -> FloatArray:
     """Return the places of limit cycles: zeros of the damping, which with aerodynamic forces may be negative."""
-    table = oscillator.table()
+    table = oscillator.table
     ratio = oscillator.at(table).ratio
     at = np.flatnonzero(ratio[:-1] * ratio[1:] < 0.0)
     found = [
@@ -175,7 +184,6 @@ def _curve(
     closes_above: bool,
 ) -> tuple[FloatArray, FloatArray]:
     """Return places and frequencies of a stretch of the backbone: up on the lower side of the resonance, and down on the upper one."""
-    own = oscillator.table()
     # both sides meet like a root, so that places stand close where they do
     share = np.linspace(0.0, 1.0, points)
     if closes_below and closes_above:
@@ -186,7 +194,7 @@ def _curve(
         share = share**2
     place = first + (last - first) * share
     corners = oscillator.place[(oscillator.place > first) & (oscillator.place < last)]
-    place = np.union1d(place, corners) if own.size else place
+    place = np.union1d(place, corners)
     below, above = _sides(oscillator, level, place)
     if closes_above:
         below[-1] = above[-1] = oscillator.at(place[-1:]).resonance()[0]

@@ -5,6 +5,7 @@ ANALYSES = {
     "limit_cycle": "stickslip.study.analyses.limit_cycle:LIMIT_CYCLE",
     "nonlinear_mode": "stickslip.study.analyses.nonlinear_mode:NONLINEAR_MODE",
     "residual_tractions": "stickslip.study.analyses.residual_tractions:RESIDUAL_TRACTIONS",
+    "modal_synthesis": "stickslip.study.analyses.modal_synthesis:MODAL_SYNTHESIS",
     "modes": "stickslip.study.analyses.modes:MODES",
     "campbell": "stickslip.study.analyses.campbell:CAMPBELL",
     "flutter": "stickslip.study.analyses.flutter:FLUTTER",

@@ -11,7 +11,7 @@ from stickslip.response.branch import Followed, Judged
 from stickslip.response.nonlinear_modes.backbone import Backbone, ModePoint, mode_point
 from stickslip.response.nonlinear_modes.levels import ModeCurve
 from stickslip.response.nonlinear_modes.measure import Size, by_energy
-from stickslip.response.nonlinear_modes.oscillator import FEWEST, modal_oscillator
+from stickslip.response.nonlinear_modes.one_mass import FEWEST, modal_oscillator
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.problem import self_excited_motions
 from stickslip.solve.branch import Point

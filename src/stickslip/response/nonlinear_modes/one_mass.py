@@ -12,6 +12,7 @@ Processing 42 (2014) 71-87, which has it for all damping.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -135,10 +136,26 @@ class ModalOscillator:
         with np.errstate(divide="ignore"):
             return np.asarray(own / np.abs(here.force))
 
+    @cached_property
     def table(self) -> FloatArray:
-        """Return places with the points of the backbone among them, and enough between for whatever varies."""
+        """Places with the points of the backbone among them, and enough between for whatever varies."""
         gaps = np.linspace(self.place[:-1], self.place[1:], INSIDE, endpoint=False)
         return np.append(gaps.T.reshape(-1), self.place[-1])
+
+    @cached_property
+    def needed_in_table(self) -> FloatArray:
+        """What the places of the table need."""
+        return self.needed(self.table)
+
+    @cached_property
+    def _first(self) -> PchipInterpolator:
+        shape = self.motion[:, 1] / self.at(self.place).amplitude[:, None]
+        return PchipInterpolator(self.place, np.stack([shape.real, shape.imag]), axis=1)
+
+    def first(self, place: FloatArray) -> ComplexArray:
+        """Return (p, n) first harmonics of all dofs at places, m, in the phase of the backbone."""
+        parts = self._first(place)
+        return np.asarray((parts[0] + 1j * parts[1]) * self.at(place).amplitude[:, None])
 
     def displacement(self, place: FloatArray, dofs: IntArray | None = None) -> ComplexArray:
         """Return (p, H+1, k) displacements of dofs at places, m, in the phase of the backbone; None: all dofs."""

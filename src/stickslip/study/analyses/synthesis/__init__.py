@@ -1,0 +1,1 @@
+"""Forced responses of one nonlinear mode: the rooms of the analysis `modal_synthesis`."""

@@ -1,0 +1,145 @@
+"""The node ``/modal_synthesis`` of a result."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stickslip.arrays import FloatArray
+from stickslip.study.analyses.analysis import Solved
+from stickslip.study.analyses.synthesis.records import SynthesisLevel
+from stickslip.study.analyses.synthesis.words import case_verdicts
+from stickslip.study.analyses.verdict import ATTRIBUTE, of_all_cases, to_json
+from stickslip.study.analyses.waves.about import told
+from stickslip.study.keep.netcdf import stacked, variable
+from stickslip.units import HZ
+
+ABOUT = {
+    "output": ("", "1", "output whose amplitude is told"),
+    "mode": ("", "1", "number of the mode, by frequency with contacts stuck"),
+    "mode_frequency_hz": ("", "Hz", "its frequency with contacts stuck"),
+    "mode_damping_ratio": ("", "1", "its damping ratio with contacts stuck"),
+    "homogeneous": ("", "1", "1 where all contact forces double with all displacements: static and vibration loads then scale together"),
+    "mode_seconds": ("", "s", "time of the processor for the nonlinear mode"),
+    "backbone_amplitude": ("place", "m", "amplitude of the output along the nonlinear mode"),
+    "backbone_frequency_hz": ("place", "Hz", "its frequency"),
+    "backbone_damping_ratio": ("place", "1", "its damping ratio"),
+    "resonance_level": ("place", "1", "level of the loads that has its peak there"),
+    "resonance_frequency_hz": ("place", "Hz", "frequency of that peak"),
+    "cycle_amplitude": ("cycle", "m", "amplitudes at which the damping is zero: limit cycles"),
+    "level": ("level", "1", "factor on the harmonic loads"),
+    "answer": ("level", "1", "trusted, doubtful, refused or beyond"),
+    "why": ("level", "1", "what that rests on"),
+    "peak_amplitude": ("level", "m", "largest amplitude of the output in the first harmonic"),
+    "peak_frequency_hz": ("level", "Hz", "its frequency"),
+    "foreign": ("level", "1", "relative error of the peak that the other modes make, about"),
+    "others_in_output": ("level", "1", "motion of the other modes over that of the mode, at the output"),
+    "others_in_gaps": ("level", "1", "the same in the gaps of the contacts"),
+    "next_frequency": ("level", "1", "relative distance of the next frequency"),
+    "overlap": ("level", "1", "damping ratio over that distance"),
+    "growth": ("level", "1", "relative growth of the peak with the level: 1 where nothing slips"),
+    "higher_harmonics": ("level", "1", "higher harmonics over the first, at the output"),
+    "resolved": ("level", "1", "relative change of the peak if every second point of the nonlinear mode is left out"),
+    "detached": ("level", "1", "number of curves that do not hang together with small amplitudes"),
+    "seconds": ("level", "s", "time of the processor for the response"),
+    "frequency_hz": ("level point", "Hz", "frequency of the response"),
+    "amplitude": ("level point", "m", "amplitude of the output in the first harmonic"),
+    "curve": ("level point", "1", "0: hangs together with small amplitudes; others are detached"),
+    "stable": ("level point", "1", "1 where slow changes of this mode die out"),
+    "direct_frequency_hz": ("level direct_point", "Hz", "frequency of the direct solution"),
+    "direct_amplitude": ("level direct_point", "m", "amplitude of the output in the first harmonic, solved directly"),
+    "direct_peak_amplitude": ("level", "m", "peak of the direct solution"),
+    "direct_peak_frequency_hz": ("level", "Hz", "its frequency"),
+    "direct_error": ("level", "1", "synthesised peak over the direct one, less one"),
+    "direct_seconds": ("level", "s", "time of the processor for the direct solution"),
+    "passage_hz_per_s": ("rate", "Hz/s", "rates of the passages"),
+    "passage_frequency_hz": ("level rate moment", "Hz", "frequency of the load during a passage"),
+    "passage_amplitude": ("level rate moment", "m", "amplitude of the output then"),
+    "passage_peak_amplitude": ("level rate", "m", "its largest"),
+    "passage_finished": ("level rate", "1", "1 where a passage came to its end"),
+    "passage_change": ("level rate", "1", "relative change of the amplitude in a radian of the vibration, while it is above half its peak"),
+}  # fmt: skip
+PLAIN = {
+    "level": "level", "answer": "answer", "why": "why", "peak_amplitude": "peak", "foreign": "foreign", "others_in_output": "output",
+    "others_in_gaps": "gaps", "next_frequency": "distance", "overlap": "overlap", "growth": "growth", "higher_harmonics": "harmonics",
+    "resolved": "resolved", "detached": "detached", "seconds": "seconds",
+}  # fmt: skip
+
+
+def dataset(solved: Sequence[Solved]) -> xr.Dataset:
+    """Return the responses of all cases."""
+    cases = [_of_case(one) for one in solved]
+    labels = [one.case.label for one in solved]
+    doubts = [v for label, own in zip(labels, cases, strict=True) for v in case_verdicts(label, own)]  # fmt: skip
+    attributes = {ATTRIBUTE: to_json(of_all_cases(doubts, labels)), "failed": 0}
+    return xr.Dataset(stacked(cases), attrs=attributes)
+
+
+def _of_case(solved: Solved) -> dict[str, xr.Variable]:
+    levels: Sequence[SynthesisLevel] = solved.records
+    model = solved.notes.get("model", {})
+    values: dict[str, Any] = {"output": str(model.get("output", ""))}
+    if "design" in solved.notes:
+        own = solved.notes["design"]
+        values |= {
+            "mode": int(own["mode"]),
+            "mode_frequency_hz": float(own["mode_omega"]) / HZ,
+            "mode_damping_ratio": float(own["mode_ratio"]),
+            "homogeneous": int(own["homogeneous"]),
+            "mode_seconds": float(own["seconds"]),
+            "backbone_amplitude": own["amplitude"],
+            "backbone_frequency_hz": own["omega"] / HZ,
+            "backbone_damping_ratio": own["ratio"],
+            "resonance_level": own["level"],
+            "resonance_frequency_hz": own["peak_omega"] / HZ,
+            "cycle_amplitude": own["cycles"],
+        }
+    if levels:
+        values |= _of_levels(levels, np.asarray(solved.case.settings.modal_synthesis.passage_hz_per_s))  # fmt: skip
+    known = {name: value for name, value in values.items() if np.size(value) > 0}
+    return told(model) | {
+        name: variable(ABOUT[name][0], value, *ABOUT[name][1:]) for name, value in known.items()
+    }
+
+
+def _of_levels(levels: Sequence[SynthesisLevel], rates: FloatArray) -> dict[str, Any]:
+    def each(name: str) -> Any:
+        return np.array([getattr(one, name) for one in levels])
+
+    values = {name: each(own) for name, own in PLAIN.items()} | {
+        "peak_frequency_hz": each("peak_omega") / HZ,
+        "frequency_hz": _rows(levels, "omega") / HZ,
+        "amplitude": _rows(levels, "amplitude"),
+        "curve": _rows(levels, "curve", -1.0).astype(np.int64),
+        "stable": _rows(levels, "stable", -1.0).astype(np.int64),
+    }
+    if any(one.direct_omega.size for one in levels):
+        values |= {
+            "direct_frequency_hz": _rows(levels, "direct_omega") / HZ,
+            "direct_amplitude": _rows(levels, "direct_amplitude"),
+            "direct_peak_amplitude": each("direct_peak"),
+            "direct_peak_frequency_hz": each("direct_peak_omega") / HZ,
+            "direct_error": each("peak") / each("direct_peak") - 1.0,
+            "direct_seconds": each("direct_seconds"),
+        }
+    if rates.size:
+        amplitude = each("passage_amplitude")
+        values |= {
+            "passage_hz_per_s": rates,
+            "passage_frequency_hz": each("passage_omega") / HZ,
+            "passage_amplitude": amplitude,
+            "passage_peak_amplitude": np.max(np.where(np.isfinite(amplitude), amplitude, -np.inf), axis=2),
+            "passage_finished": each("passage_finished"),
+            "passage_change": each("passage_change"),
+        }  # fmt: skip
+        values["passage_peak_amplitude"][~np.isfinite(values["passage_peak_amplitude"])] = np.nan
+    return values
+
+
+def _rows(levels: Sequence[SynthesisLevel], name: str, missing: float = np.nan) -> FloatArray:
+    out = np.full((len(levels), max(getattr(one, name).size for one in levels)), missing)
+    for row, one in zip(out, levels, strict=True):
+        own = getattr(one, name)
+        row[: own.size] = own
+    return out

@@ -1,0 +1,129 @@
+"""What a job solves: the model with its loads, and the mode that answers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from stickslip.assembly.assembled import Assembled
+from stickslip.assembly.model import Model
+from stickslip.contact.compiled import Evaluator
+from stickslip.errors import input_error
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.at_rest import pressed_by
+from stickslip.response.nonlinear_modes.backbone import ModeSweep
+from stickslip.response.parameter import Discretisation
+from stickslip.response.self_excited.modes import StuckMode, stuck_modes
+from stickslip.response.self_excited.problem import SAMPLES_A_HARMONIC
+from stickslip.study.analyses.analysis import Case
+from stickslip.study.analyses.cycles.question import SAMPLES
+from stickslip.study.analyses.facts import facts_of
+from stickslip.study.analyses.forced.question import peak_first
+from stickslip.study.analyses.synthesis.table import ModalSynthesisTable
+from stickslip.units import RPM
+
+NAME = "modal_synthesis"
+FACTOR = 2  # times the highest harmonic: what direct solutions are held against
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """A case of the analysis.
+
+    Parameters
+    ----------
+    label
+        Of the case.
+    model
+        Assembled; the first output is the one whose amplitude is told.
+    asked
+        The table.
+    evaluator
+        Of the contact forces.
+    facts
+        What results say of the model.
+    """
+
+    label: str
+    model: Assembled
+    asked: ModalSynthesisTable
+    evaluator: Evaluator
+    facts: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def dof(self) -> int:
+        """The coordinate of the first output."""
+        return int(np.asarray(self.model.system.outputs)[0])
+
+    @property
+    def rest(self) -> HarmonicLoad:
+        """The static load alone."""
+        return HarmonicLoad(self.model.load.static)
+
+    @property
+    def mode(self) -> StuckMode | None:
+        """The mode that answers; None where there is no such mode."""
+        holds = pressed_by(self.model.system.springs.laws, self.model.static_force)
+        every = stuck_modes(self.model.system, self.asked.mode, holds)
+        return next((m for m in every if m.number == self.asked.mode), None)
+
+    @property
+    def discretisation(self) -> Discretisation:
+        """Of the nonlinear mode, with the fewest harmonics."""
+        order = self.asked.harmonics
+        samples = max(SAMPLES, SAMPLES_A_HARMONIC * order)
+        return Discretisation(order=order, samples=samples, evaluator=self.evaluator)
+
+    @property
+    def sweep(self) -> ModeSweep:
+        """Over which amplitudes the nonlinear mode is followed."""
+        asked, given = self.asked, self.asked.amplitude_mm
+        return ModeSweep(
+            span=None if given is None else (1e-3 * given[0], 1e-3 * given[1]),
+            points=asked.points,
+            most_harmonics=asked.most_harmonics,
+            tolerance=0.01 * asked.accuracy_percent,
+        )
+
+
+def question_of(case: Case, model: Model) -> Question:
+    """Return what a job solves.
+
+    Raises
+    ------
+    InputError
+        If no load or one of a higher harmonic drives the model, a contact is rigid, there is no such mode, or the model cannot be assembled.
+    """
+    asked: ModalSynthesisTable = case.settings.modal_synthesis
+    driven = {name: harmonic for name, harmonic in model.driven.items() if harmonic > 0}
+    if not driven:
+        raise input_error(NAME, "no load vibrates", "Give a load with harmonic = 1.")
+    for name, harmonic in driven.items():
+        if harmonic != 1:
+            raise input_error(
+                f"load.{name}.harmonic",
+                f"is {harmonic}, and the mode of [{NAME}] answers to harmonic 1",
+                "Leave the load out, or ask for the forced response.",
+            )
+    most = FACTOR * max(asked.harmonics, asked.most_harmonics)
+    assembled = peak_first(model.assembled(most, case.store))
+    if assembled.system.interface.rigid:
+        raise input_error(
+            NAME,
+            "a contact is rigid: its force is no function of its gap",
+            "Give the contacts a stiffness, such as elastic_coulomb.",
+        )
+    facts = facts_of(model, model.speed / RPM)
+    question = Question(case.label, assembled, asked, case.settings.solver.evaluator, facts)
+    mode = question.mode
+    if mode is None:
+        raise input_error(
+            f"{NAME}.mode",
+            f"is {asked.mode}, and the model has no such mode that vibrates",
+            "Modes count from 1 by frequency with contacts stuck; [modes] lists them.",
+        )
+    force = assembled.system.structure.feedback_of(1)
+    if force is not None and force.influence.refuses:
+        force.influence.require(mode.omega, most * mode.omega, f"a nonlinear mode with up to {most} harmonics (most_harmonics)")  # fmt: skip
+    return question

@@ -1,0 +1,72 @@
+"""What is found at one level of the loads, as it is kept in the journal of a job."""
+
+from dataclasses import dataclass
+
+from stickslip.arrays import FloatArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class SynthesisLevel:
+    """The response at a level.
+
+    Parameters
+    ----------
+    level
+        Factor on the harmonic loads.
+    answer
+        ``trusted``, ``doubtful``, ``refused`` (other modes take part: nothing is shown), or ``beyond`` (the nonlinear mode ends below the peak).
+    why
+        What that rests on, in words.
+    peak, peak_omega
+        Largest amplitude of the output in the first harmonic, m, and its frequency, rad/s; NaN where there is none to be shown.
+    foreign, output, gaps, distance, overlap, growth, harmonics
+        See `Isolation`, at the peak.
+    linear
+        1 where nothing slips.
+    resolved
+        Relative change of the peak if every second point of the nonlinear mode is left out.
+    detached
+        Number of curves that do not hang together with small amplitudes.
+    omega, amplitude, curve, stable
+        (p,) of the response: rad/s, m, number of its curve, 1 where it is stable in this mode.
+    direct_omega, direct_amplitude
+        (q,) of the direct solution, in the order of its branch; empty where it was not asked for.
+    direct_peak, direct_peak_omega
+        Its peak; NaN where there is none.
+    seconds, direct_seconds
+        What either took, s of the processor.
+    passage_omega, passage_amplitude
+        (rates, moments) frequency, rad/s, and amplitude of the output, m, while the frequency is swept; NaN where it did not begin.
+    passage_finished, passage_change
+        (rates,) 1 where a passage came to its end, and the relative change of the amplitude in a radian.
+    """
+
+    level: float
+    answer: str
+    why: str
+    peak: float
+    peak_omega: float
+    foreign: float
+    output: float
+    gaps: float
+    distance: float
+    overlap: float
+    growth: float
+    harmonics: float
+    linear: int
+    resolved: float
+    detached: int
+    omega: FloatArray
+    amplitude: FloatArray
+    curve: IntArray
+    stable: IntArray
+    direct_omega: FloatArray
+    direct_amplitude: FloatArray
+    direct_peak: float
+    direct_peak_omega: float
+    seconds: float
+    direct_seconds: float
+    passage_omega: FloatArray
+    passage_amplitude: FloatArray
+    passage_finished: IntArray
+    passage_change: FloatArray

@@ -1,0 +1,227 @@
+"""Synthesises the response at each level, judges whether the mode is alone, and solves directly where that is asked for."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.errors import SingularError, StickslipError
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.forced.accepted import accepted_points
+from stickslip.response.forced.problem import forced_problem
+from stickslip.response.forced.response import forced_response
+from stickslip.response.forced.sweep import Sweep
+from stickslip.response.nonlinear_modes.design import is_homogeneous, peak_curve
+from stickslip.response.nonlinear_modes.isolated import (
+    Isolation,
+    OtherModes,
+    isolation,
+    other_modes,
+    with_others,
+)
+from stickslip.response.nonlinear_modes.one_mass import ModalOscillator, modal_oscillator
+from stickslip.response.nonlinear_modes.passage import Swept, passage_through_resonance
+from stickslip.response.nonlinear_modes.synthesis import (
+    Resonance,
+    at_resonance,
+    free_motions,
+    resonances,
+    synthesise,
+)
+from stickslip.study.analyses.analysis import Notes
+from stickslip.study.analyses.synthesis.backbone_note import backbone_of
+from stickslip.study.analyses.synthesis.question import Question
+from stickslip.study.analyses.synthesis.records import SynthesisLevel
+from stickslip.study.keep.progress import LOG, advance
+from stickslip.units import HZ
+
+TRUSTED, DOUBTFUL = 0.02, 0.05  # relative error that other modes may make of the peak
+COARSE = 0.08  # change of the peak by every second point of the backbone: four times what all points leave
+HARMONICS = 0.2  # higher harmonics over the first, beyond which the first alone is no measure
+AROUND = 12.0  # half-widths of the widest peak that are shown on either side
+NARROWEST, WIDEST = 0.02, 0.2  # relative, of that
+MOMENTS = 600  # that are kept of a passage
+NOTHING = np.zeros(0)
+NOBODY = Isolation(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, linear=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Synthesis:
+    """What all levels share."""
+
+    question: Question
+    oscillator: ModalOscillator
+    others: OtherModes
+    coarser: ModalOscillator
+    ends: tuple[float, float]
+
+
+def solve(
+    question: Question, done: Sequence[SynthesisLevel], notes: Notes
+) -> Iterator[SynthesisLevel]:
+    """Yield the levels that are not done."""
+    began = process_time()
+    notes.put("model", dict(question.facts) | {"output": question.model.output_labels[0]})
+    mode = question.mode
+    if mode is None:
+        raise SingularError("the mode is none of the model")
+    backbone = backbone_of(question, mode, notes)
+    own = modal_oscillator(backbone, question.model.load)
+    if notes.get("design") is None:
+        notes.put("design", _design(own, question) | {"seconds": process_time() - began, "mode": mode.number, "mode_omega": mode.omega, "mode_ratio": mode.ratio})  # fmt: skip
+    shared = Synthesis(question, own, other_modes(own), own.coarser(), _ends(question, own))
+    for i, level in enumerate(question.asked.levels):
+        if i < len(done):
+            continue
+        record = _level(shared, level)
+        LOG.info(f"{question.label}: level {level:g}: {record.answer}, {record.why}")
+        advance((i + 1) / len(question.asked.levels), f"level {level:g}")
+        yield record
+
+
+def judged(alone: Isolation, resolved: float) -> tuple[str, str]:
+    """Return what is to be thought of a peak, and why."""
+    percent = 100 * alone.foreign
+    motion = f"the other modes move by {100 * max(alone.output, alone.gaps):.2g} % of the mode"
+    near = f"the next frequency is {100 * alone.distance:.2g} % away"
+    if not np.isfinite(alone.distance):
+        near = "there is no other frequency"
+    if alone.linear:
+        return "trusted", "nothing slips: the other modes are added, and the response is exact"
+    if alone.foreign > DOUBTFUL:
+        return "refused", f"{motion}, {near}: the peak would be off by about {percent:.2g} %"
+    if alone.foreign > TRUSTED:
+        return "doubtful", f"{motion}, {near}: the peak may be off by about {percent:.2g} %"
+    if resolved > COARSE:
+        return "doubtful", f"the nonlinear mode has too few points here: without every second one the peak moves by {100 * resolved:.2g} %"  # fmt: skip
+    if alone.harmonics > HARMONICS:
+        return "doubtful", f"higher harmonics have {100 * alone.harmonics:.2g} % of the first, and the load works on that alone"  # fmt: skip
+    return "trusted", f"{motion}, {near}"
+
+
+def _level(shared: Synthesis, level: float) -> SynthesisLevel:
+    began = process_time()
+    own, question = shared.oscillator, shared.question
+    tops = [r for r in resonances(own, level) if r.top]
+    peaks = [abs(_first(shared, r)) for r in tops]
+    at = int(np.argmax(peaks)) if peaks else -1
+    curve = synthesise(own, level)
+    alone = isolation(shared.others, tops[at], question.dof) if peaks else NOBODY
+    resolved = _resolved(shared, tops[at]) if peaks else np.nan
+    answer, why = "beyond", "the nonlinear mode ends before it needs so much of the load"
+    if peaks and float(curve.place.max()) < own.ends[1]:
+        answer, why = judged(alone, resolved)
+    shown = answer in ("trusted", "doubtful")
+    inside = (curve.omega >= shared.ends[0]) & (curve.omega <= shared.ends[1]) & shown
+    amplitude = np.abs(with_others(shared.others, curve, np.array([question.dof]))[:, 0])
+    spent = process_time() - began
+    passages = _passages(shared, level, shown=shown)
+    began = process_time()
+    direct = _direct(shared, level) if question.asked.direct else (NOTHING, NOTHING)
+    top = int(np.nanargmax(direct[1])) if np.any(np.isfinite(direct[1])) else -1
+    return SynthesisLevel(
+        level=level,
+        answer=answer,
+        why=why,
+        peak=float(peaks[at]) if shown else np.nan,
+        peak_omega=tops[at].omega if shown else np.nan,
+        foreign=alone.foreign,
+        output=alone.output,
+        gaps=alone.gaps,
+        distance=alone.distance,
+        overlap=alone.overlap,
+        growth=alone.growth,
+        harmonics=alone.harmonics,
+        linear=int(alone.linear),
+        resolved=resolved,
+        detached=int(curve.curve.max(initial=0)) if shown else 0,
+        omega=curve.omega[inside],
+        amplitude=amplitude[inside],
+        curve=curve.curve[inside],
+        stable=curve.stable[inside].astype(np.int64),
+        direct_omega=direct[0],
+        direct_amplitude=direct[1],
+        direct_peak=float(direct[1][top]) if top >= 0 else np.nan,
+        direct_peak_omega=float(direct[0][top]) if top >= 0 else np.nan,
+        seconds=spent,
+        direct_seconds=process_time() - began if question.asked.direct else 0.0,
+        passage_omega=passages[0],
+        passage_amplitude=passages[1],
+        passage_finished=passages[2],
+        passage_change=passages[3],
+    )
+
+
+def _first(shared: Synthesis, resonance: Resonance) -> complex:
+    """Return the first harmonic of the output at a resonance, the other modes added, m."""
+    curve = at_resonance(shared.oscillator, resonance)
+    return complex(with_others(shared.others, curve, np.array([shared.question.dof]))[0, 0])
+
+
+def _resolved(shared: Synthesis, found: Resonance) -> float:
+    """Return the relative change of a peak by every second point of the backbone."""
+    other = [r.amplitude for r in resonances(shared.coarser, found.level) if r.top]
+    return min((abs(a / found.amplitude - 1.0) for a in other), default=np.inf)
+
+
+def _ends(question: Question, own: ModalOscillator) -> tuple[float, float]:
+    """Return the range of frequencies that is shown, rad/s."""
+    given = question.asked.frequency_hz
+    if given is not None:
+        return given[0] * HZ, given[1] * HZ
+    tops = [r for level in question.asked.levels for r in resonances(own, level)]
+    omega = np.array([own.backbone.mode.omega, *(r.omega for r in tops)])
+    here = own.at(np.array([own.ends[0], *(r.place for r in tops)]))
+    widest = float(np.clip(AROUND * np.max(np.abs(here.ratio)), NARROWEST, WIDEST))
+    return float(omega.min() * (1.0 - widest)), float(omega.max() * (1.0 + widest))
+
+
+def _direct(shared: Synthesis, level: float) -> tuple[FloatArray, FloatArray]:
+    """Return frequencies, rad/s, and amplitudes of the output, m, as a forced response finds them."""
+    question = shared.question
+    known = question.model.load
+    load = HarmonicLoad(known.static, {h: level * f for h, f in known.harmonics.items()})
+    how = question.discretisation
+    sweep = Sweep(omega_range=shared.ends, cap=max(question.asked.most_harmonics, 1), samples=how.samples, evaluator=how.evaluator)  # fmt: skip
+    problem = forced_problem(question.model.system, load, sweep)
+    points = accepted_points(list(forced_response(question.model.system, load, sweep)))
+    linear = problem.high.linear
+    amplitude = [
+        abs(linear.recover(p.omega, p.coefficients)[1, question.dof]) if p.converged else np.nan
+        for p in points
+    ]
+    return np.array([p.omega for p in points]), np.array(amplitude)
+
+
+def _passages(shared: Synthesis, level: float, *, shown: bool) -> tuple[Any, Any, Any, Any]:
+    """Return what the record holds of all passages at a level."""
+    rates = shared.question.asked.passage_hz_per_s
+    omega, amplitude = np.full((2, len(rates), MOMENTS), np.nan)
+    finished, change = np.zeros(len(rates), dtype=np.int64), np.full(len(rates), np.nan)
+    low, high = shared.ends
+    ends = (high, low) if shared.question.asked.passage_down else (low, high)
+    dof = np.array([shared.question.dof])
+    for i, rate in enumerate(rates if shown else []):
+        try:
+            found = passage_through_resonance(shared.oscillator, level, Swept(ends=ends, rate=rate * HZ))  # fmt: skip
+        except StickslipError as error:
+            LOG.info(f"level {level:g} at {rate:g} Hz/s: {error}")
+            continue
+        kept = np.unique(np.append(np.linspace(0, found.time.size - 1, MOMENTS - 1).astype(int), int(np.argmax(found.amplitude))))  # fmt: skip
+        size = np.abs(shared.oscillator.displacement(found.place[kept], dof)[:, 1, 0])
+        omega[i, : kept.size], amplitude[i, : kept.size] = found.omega[kept], size
+        finished[i], change[i] = found.finished, found.change
+    return omega, amplitude, finished, change
+
+
+def _design(own: ModalOscillator, question: Question) -> dict[str, Any]:
+    curve = peak_curve(own, question.dof)
+    here = own.at(curve.place)
+    return {
+        "level": curve.level, "amplitude": curve.amplitude, "omega": here.omega, "ratio": here.ratio, "peak_omega": curve.omega,
+        "cycles": np.abs(own.displacement(free_motions(own), np.array([question.dof]))[:, 1, 0]),
+        "homogeneous": int(is_homogeneous(own, question.discretisation)),
+    }  # fmt: skip

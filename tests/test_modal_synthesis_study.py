@@ -1,0 +1,111 @@
+"""[modal_synthesis] in a study: levels against direct solutions, verdicts, the page, going on after an interruption."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.errors import InputError
+from stickslip.report.page import plots
+from stickslip.study.analyses.synthesis import solve as solving
+from stickslip.study.keep.netcdf import one_case
+from stickslip.study.models.study import read_study
+from stickslip.study.run import run_study
+
+STUDY = """
+schema_version = 2
+[part.blade]
+shape = "lumped"
+masses_kg = [1.0]
+springs_n_per_m = [["ground", 1, 1.0]]
+dashpots_n_s_per_m = [["ground", 1, 0.02]]
+[contact.damper]
+between = ["blade.m1", "ground"]
+law = "jenkins"
+tangential_stiffness_n_per_m = 0.5
+slip_limit_n = 0.1
+[load.shaker]
+on = "blade.m1"
+force_n = 0.1
+[modal_synthesis]
+levels = [0.02, 0.5, 1.0, 2.0]
+harmonics = 3
+most_harmonics = 3
+amplitude_mm = [100.0, 20000.0]
+"""
+# of two masses on a weak spring: a neighbour that is near
+NEAR = STUDY.replace("masses_kg = [1.0]", "masses_kg = [1.0, 1.0]").replace(
+    'springs_n_per_m = [["ground", 1, 1.0]]',
+    'springs_n_per_m = [["ground", 1, 1.0], ["ground", 2, 1.0], [1, 2, 0.03]]',
+).replace('[["ground", 1, 0.02]]', '[["ground", 1, 0.01], ["ground", 2, 0.01]]').replace('on = "blade.m1"\nforce_n = 0.1', 'on = "blade.m2"\nforce_n = 0.02').replace("tangential_stiffness_n_per_m = 0.5", "tangential_stiffness_n_per_m = 0.2")  # fmt: skip
+
+
+def study_of(tmp_path: Path, text: str):
+    path = tmp_path / "study.toml"
+    path.write_text(text, encoding="utf-8")
+    return read_study(path)
+
+
+def test_levels_of_b3_from_its_mode_with_direct_solutions_beside_them(tmp_path):
+    text = STUDY.replace("[0.02, 0.5, 1.0, 2.0]", "[0.5, 1.0]")
+    text += "direct = true\npassage_hz_per_s = [2e-5]\n"
+    outcome = run_study(study_of(tmp_path, text))
+    case = one_case(outcome.tree["modal_synthesis"].to_dataset(), 0)
+    assert set(case["answer"].values) == {"trusted"}
+    # B3 at fc = 0.2 and 0.1 by similarity, one harmonic: 0.6038447 / 2, 0.6260618
+    assert case["peak_amplitude"].values == pytest.approx([0.30192, 0.62606], rel=0.01)
+    assert np.all(np.abs(case["direct_error"].values) < 0.01)
+    assert np.all(case["direct_seconds"].values > case["seconds"].values)
+    assert np.all(case["passage_finished"].values == 1)
+    assert np.all(case["passage_peak_amplitude"].values[:, 0] < 1.001 * case["peak_amplitude"].values)  # fmt: skip
+    assert not [v for v in outcome.verdicts if v.rank]
+    figures = plots(outcome.tree)
+    assert {"modal_synthesis", "modal_synthesis_peaks", "modal_synthesis_passage"} <= set(figures)
+    told = outcome.summaries["modal_synthesis"][0]
+    assert told.rows[0][4] == "trusted"
+
+
+def test_a_level_at_which_the_mode_is_not_alone_is_refused_and_not_shown(tmp_path):
+    model = ss.Study.from_file(study_of(tmp_path, NEAR).path).model()
+    result = model.modal_synthesis(levels=[0.5, 3.0], harmonics=5, most_harmonics=5, folder=tmp_path / "out")  # fmt: skip
+    case = one_case(result.data["modal_synthesis"].to_dataset(), 0)
+    assert list(case["answer"].values) == ["trusted", "refused"]
+    assert np.isnan(case["peak_amplitude"].values[1])
+    assert np.all(np.isnan(case["amplitude"].values[1]))
+    assert [v.level for v in result.verdicts] == ["trusted", "doubtful"]
+    assert "refused" in result.verdicts[1].why
+    page = result.report(tmp_path / "report.html").read_text()
+    assert "1 level not shown" in page
+    nothing = model.modal_synthesis(levels=[3.0], harmonics=5, most_harmonics=5)
+    assert nothing.verdicts[-1].level == "wrong"
+    assert "nothing is left" in nothing.verdicts[-1].why
+
+
+def test_an_interrupted_run_goes_on_with_the_mode_that_it_has(tmp_path, monkeypatch):
+    study = study_of(tmp_path, STUDY)
+    own, calls = solving._level, []
+
+    def stopped(shared, level):
+        calls.append(level)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return own(shared, level)
+
+    monkeypatch.setattr(solving, "_level", stopped)
+    with pytest.raises(BaseException, match="goes on from there"):
+        run_study(study)
+    monkeypatch.setattr("stickslip.study.analyses.synthesis.backbone_note.nonlinear_mode", None)
+    run_study(study)
+    assert calls == [0.02, 0.5, 1.0, 1.0, 2.0]
+
+
+def test_what_it_has_no_form_for_is_refused_before_anything_is_computed(tmp_path):
+    for change, what in (
+        (("[modal_synthesis]", "[modal_synthesis]\nmode = 2"), "no such mode"),
+        (("force_n = 0.1", "force_n = 0.1\nharmonic = 2"), "answers to harmonic 1"),
+        (("force_n = 0.1", "force_n = 0.1\nharmonic = 0"), "no load vibrates"),
+        (("levels = [0.02, 0.5", "levels = [0.5, 0.5"), "twice"),
+    ):
+        with pytest.raises(InputError, match=what):
+            run_study(study_of(tmp_path, STUDY.replace(*change)))
