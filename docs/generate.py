@@ -56,6 +56,7 @@ def write_all(folder: Path) -> None:
     (folder / "keys_laws.md").write_text(laws(), encoding="utf-8")
     (folder / "variables.md").write_text(variables(), encoding="utf-8")
     (folder / "variables_of_cycles.md").write_text(variables_of_cycles(), encoding="utf-8")
+    (folder / "variables_of_tractions.md").write_text(variables_of_tractions(), encoding="utf-8")
     (folder / "variables_of_models.md").write_text(variables_of_models(), encoding="utf-8")
     (folder / "validation.md").write_text(validation(), encoding="utf-8")
     (folder / "api.md").write_text(api(), encoding="utf-8")
@@ -230,6 +231,17 @@ def variables() -> str:
 def variables_of_cycles() -> str:
     """Return the variables of limit cycles."""
     from stickslip.study.analyses.cycles.dataset import ABOUT
+
+    rows = [
+        f"| `{name}` | {', '.join(['case', *dims.split()])} | {_escaped(about)} | {_unit(units)} |"
+        for name, (dims, units, about) in ABOUT.items()
+    ]
+    return "\n".join(["| variable | dimensions | meaning | unit |", "|---|---|---|---|", *rows, ""])
+
+
+def variables_of_tractions() -> str:
+    """Return the variables of bounds over residual tractions."""
+    from stickslip.study.analyses.tractions.dataset import ABOUT
 
     rows = [
         f"| `{name}` | {', '.join(['case', *dims.split()])} | {_escaped(about)} | {_unit(units)} |"
