@@ -207,7 +207,15 @@ def subharmonic_branch(
         return replace(
             made, points=(), end="the start leads to the motion of the load's own period"
         )
-    way = _Way(own, balance, following, points)
+    along, end = both_ways(own, balance, following, first, points)
+    return replace(made, points=tuple(along), end=end)
+
+
+def both_ways(
+    problem: ForcedProblem, balance: Balance, following: Following, first: Point, points: int
+) -> tuple[list[ForcedPoint], str]:
+    """Follow a branch from one of its points to both sides; return at most so many points in their order, and why they end."""
+    way = _Way(problem, balance, following, points)
     upward, end = way.followed(first, way.closes(first))
     ends = [end]
     downward: list[Point] = []
@@ -215,8 +223,7 @@ def subharmonic_branch(
         left = replace(way, points=points - len(upward) + 1)
         downward, other = left.followed(reversed_point(first), None)
         ends.insert(0, other)
-    along = [*downward[:0:-1], *upward]
-    return replace(made, points=tuple(map(way.point, along)), end="; ".join(ends))
+    return [way.point(p) for p in (*downward[:0:-1], *upward)], "; ".join(ends)
 
 
 CLOSES = "it closes in itself"

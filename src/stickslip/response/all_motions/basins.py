@@ -1,0 +1,134 @@
+"""Where motions go in time from random states: shares of starts that end on each, with what a sample of them can tell."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import beta
+
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.harmonic.linear import one_structure
+from stickslip.model.modes import normal_modes
+from stickslip.response.forced.problem import ForcedProblem
+from stickslip.response.time.start import TransientStart, rest
+from stickslip.response.time.transient import TimeStepping, TransientResult, integrate
+
+CONFIDENCE = 0.95
+PERIODIC = -1  # a motion that repeats, for which no solution was found
+APERIODIC = -2  # it does not repeat with the period of the load
+ALIKE = 0.03  # relative distance of the harmonics in time from those of a solution within which it is that one
+
+
+@dataclass(frozen=True, eq=False)
+class Basins:
+    """Where the starts at one frequency end.
+
+    Parameters
+    ----------
+    omega
+        rad/s.
+    ends
+        (starts,) number of the motion at this frequency that each ends on; `APERIODIC`: on none that repeats with the load's period, or
+        on none within the periods allowed; `PERIODIC`: on one that repeats, for which no solution was found.
+    """
+
+    omega: float
+    ends: tuple[int, ...]
+
+    def count(self, motion: int) -> int:
+        """Return how many starts end on a motion."""
+        return self.ends.count(motion)
+
+    def share(self, motion: int) -> float:
+        """Return the share of the starts that ends on a motion; NaN without starts."""
+        return self.count(motion) / len(self.ends) if self.ends else np.nan
+
+    def interval(self, motion: int) -> tuple[float, float]:
+        """Return between which shares the basin of a motion lies with 95 % confidence, of starts drawn in the same way."""
+        return share_interval(self.count(motion), len(self.ends))
+
+
+def share_interval(count: int, starts: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
+    """Return the binomial interval of Clopper and Pearson (1934) for `count` of so many `starts`; (0, 1) without any."""
+    rest_of = 0.5 * (1.0 - confidence)
+    low = float(beta.ppf(rest_of, count, starts - count + 1)) if count > 0 else 0.0
+    high = float(beta.ppf(1.0 - rest_of, count + 1, starts - count)) if count < starts else 1.0
+    return low, high
+
+
+@dataclass(frozen=True, eq=False)
+class StartSampler:
+    """Random states: the mean of a motion, and displacement and velocity of the lowest modes, each pair uniform in a disc.
+
+    Parameters
+    ----------
+    problem
+        What vibrates.
+    omega
+        Frequency of the load, rad/s.
+    mean
+        (n,) static displacement that all begin about, m.
+    shapes, omegas, radius
+        (n, modes), (modes,) in rad/s and (modes,): mass-normalised modes with contacts stuck, and the largest modal amplitude of each.
+    """
+
+    problem: ForcedProblem
+    omega: float
+    mean: FloatArray
+    shapes: FloatArray
+    omegas: FloatArray
+    radius: FloatArray
+
+    def draw(self, seed: tuple[int, ...]) -> TransientStart:
+        """Return the state of a seed; sliders as a contact has them that never moved."""
+        rng = np.random.default_rng(seed)
+        size = self.radius * np.sqrt(rng.uniform(size=self.radius.size))
+        turn = rng.uniform(0.0, 2.0 * np.pi, self.radius.size)
+        laws = self.problem.system.interface.laws
+        begun = rest(self.mean.size, laws)
+        moved = self.mean + self.shapes @ (size * np.cos(turn))
+        return TransientStart(
+            moved, self.shapes @ (self.omegas * size * np.sin(turn)), begun.states
+        )
+
+
+def sampler(
+    problem: ForcedProblem, omega: float, motions: list[ComplexArray], modes: int, spread: float
+) -> StartSampler:
+    """Return what draws states about motions, (H+1, n) complex amplitudes of all coordinates, up to `spread` times the largest of each mode."""
+    structure = one_structure(problem.system.stuck_structure(), "all motions")
+    own = normal_modes(structure, min(modes, structure.n))
+    shapes = np.asarray(own.shapes).real
+    omegas = np.where(own.squares > 0.0, np.sqrt(np.abs(own.squares)), omega)
+    project = shapes.T @ structure.mass
+    sizes = [np.sum(np.abs(project @ motion[1:].T), axis=1) for motion in motions]
+    mean = np.mean([motion[0].real for motion in motions], axis=0)
+    radius = spread * np.max(sizes, axis=0)
+    floor = 1e-3 * float(np.max(radius * omegas)) / omegas
+    return StartSampler(problem, omega, mean, shapes, omegas, np.maximum(radius, floor))
+
+
+def in_time(own: StartSampler, start: TransientStart, stepping: TimeStepping) -> TransientResult:
+    """Integrate from a state until the motion repeats; harmonics of the retained coordinates, then of the outputs, are reported."""
+    system, linear = own.problem.system, own.problem.low.linear
+    contacts = system.interface
+    watched = np.concatenate([linear.retained, system.outputs])
+    return integrate(
+        one_structure(system.structure, "all motions"),
+        contacts.gap_operator,
+        contacts.laws,
+        linear.load,
+        own.omega,
+        watched,
+        start,
+        stepping,
+        weights=contacts.weights,
+    )
+
+
+def drawn(own: StartSampler, seed: int, place: int) -> Iterator[TransientStart]:
+    """Yield states without end, the same for a seed and the place of the frequency."""
+    number = 0
+    while True:
+        yield own.draw((seed, place, number))
+        number += 1

@@ -1,0 +1,118 @@
+"""Newton's method on a residual that known solutions are divided out of (Farrell, Birkisson & Funke 2015)."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import FloatArray
+from stickslip.errors import input_error
+from stickslip.operators import array_of
+from stickslip.solve.iterate import Evaluation
+from stickslip.solve.newton_method import Newton, Solution, charged, newton
+
+SAME = 1e-4  # distance, relative to the size of the vibrations, within which two solutions are one
+
+
+@dataclass(frozen=True, eq=False)
+class _Deflated:
+    """An evaluation whose residual is multiplied by ``Π (1/‖x - x_i‖² + 1)``."""
+
+    residual: FloatArray
+    jac: FloatArray
+    seconds_contact: float
+
+
+@dataclass(frozen=True, eq=False)
+class Distance:
+    """How far two states are apart, in units of the size of the vibration: 1 is another one, not a neighbour.
+
+    Parameters
+    ----------
+    weights
+        (size,) share of each unknown: none of the static ones.
+    size
+        Of the vibrations that are compared.
+    """
+
+    weights: FloatArray
+    size: float
+
+    def between(self, a: FloatArray, b: FloatArray) -> float:
+        """Return the distance."""
+        return float(np.linalg.norm(self.weights * (a - b))) / self.size
+
+    def same(self, a: FloatArray, b: FloatArray) -> bool:
+        """Whether two solutions are one."""
+        near = min(float(np.linalg.norm(self.weights * v)) / self.size for v in (a, b))
+        return self.between(a, b) <= SAME * min(1.0, max(near, SAME))
+
+
+def distance_among(weights: FloatArray, known: Sequence[FloatArray]) -> Distance:
+    """Return how states near the `known` ones are compared: in units of the smallest of these."""
+    sizes = [float(np.linalg.norm(weights * x)) for x in known]
+    return Distance(weights, min((s for s in sizes if s > 0.0), default=1.0))
+
+
+def deflated_newton(
+    evaluate: Callable[[FloatArray], Evaluation],
+    start: FloatArray,
+    known: Sequence[FloatArray],
+    distance: Distance,
+    options: Newton,
+) -> Solution:
+    """Solve ``residual(x) = 0`` for a solution that is none of the known ones.
+
+    The residual r becomes ``m r``, ``m = Π (1/d_i² + 1)`` with the distance d_i from each known solution: it has no zero there, and far
+    away it is r itself. Its Jacobian is ``m J + r ∇mᵀ``. The solution is solved once more without m.
+
+    Parameters
+    ----------
+    evaluate
+        Residual and Jacobian.
+    start
+        (size,) where to begin; none of the known solutions.
+    known
+        (size,) each, solutions to stay away from.
+    distance
+        How distances are measured.
+    options
+        Tolerance and iterations.
+
+    Returns
+    -------
+    Solution
+        Converged only if it is a solution and none of the known ones.
+    """
+    weights = distance.weights / distance.size
+
+    def deflated(x: FloatArray) -> _Deflated:
+        at = evaluate(x)
+        factor, slope = 1.0, np.zeros(x.size)
+        for other in known:
+            apart = weights * (x - other)
+            square = float(apart @ apart)
+            if square == 0.0:
+                return _Deflated(np.full(x.size, np.nan), np.eye(x.size), at.seconds_contact)
+            own = 1.0 / square + 1.0
+            slope -= 2.0 * weights * apart / (square**2 * own)
+            factor *= own
+        own_jac = array_of(at.jac)
+        if own_jac is None:
+            raise input_error(
+                "deflated_newton",
+                "takes a Jacobian that can be an array",
+                "Search a smaller model, or with fewer harmonics.",
+            )
+        jac = factor * (own_jac + np.outer(at.residual, slope))
+        return _Deflated(factor * at.residual, jac, at.seconds_contact)
+
+    found = newton(deflated, start, options)
+    if not found.status.converged:
+        return found
+    return charged_with(newton(evaluate, found.x, options), found)
+
+
+def charged_with(last: Solution, before: Solution) -> Solution:
+    """Return a solution with the cost of the one that led to it."""
+    return charged(last, [before, last])

@@ -1,0 +1,201 @@
+"""What a search for all motions finds: branches, the motions at each frequency that was searched, and their basins."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.response.all_motions.basins import Basins
+from stickslip.response.bifurcations.side_branch import CLOSES
+from stickslip.response.forced.problem import ForcedProblem
+
+Origin = Literal["sweep", "deflation", "time"]
+Kind = Literal["branch", "searched", "starts", "motions"]
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """A part of a search, arrays and numbers only, so that it can be written down and given back.
+
+    Attributes
+    ----------
+    kind
+        ``branch``: a branch that was followed; ``searched``: deflation at a frequency is over; ``starts``: so are the starts in time there;
+        ``motions``: the motions at a frequency, each once.
+    place
+        Number of the frequency; -1 for the sweep.
+    origin
+        How a branch was found: by the ``sweep``, by ``deflation``, or in ``time``.
+    end
+        Why a branch ends, in words; for starts whether the budget ended them.
+    omega
+        (k,) rad/s: along the branch, of the motions, of the starts.
+    coefficients
+        (k, H+1, n_retained) amplitudes of the retained coordinates, m; of starts those at their end, NaN where no period repeats.
+    branch
+        (k,) of motions the number of their branch; of starts the number of their motion or what `Basins` says; else empty.
+    multiplier, error
+        (k,) of motions: modulus of the multiplier that decides and its error; NaN where it was not examined.
+    words
+        Of motions, ``stable``, ``unstable``, ``undecided`` or ``not examined``, separated by ``;``.
+    tries
+        Deflated solves, or starts.
+    seconds
+        What it took.
+    """
+
+    kind: Kind
+    place: int
+    origin: Origin
+    end: str
+    omega: FloatArray
+    coefficients: ComplexArray
+    branch: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    multiplier: FloatArray = field(default_factory=lambda: np.zeros(0))
+    error: FloatArray = field(default_factory=lambda: np.zeros(0))
+    words: str = ""
+    tries: int = 0
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class MotionBranch:
+    """A branch of motions.
+
+    Attributes
+    ----------
+    origin
+        How it was found.
+    end
+        Why it ends, in words.
+    omega, amplitude
+        (points,) rad/s, and of the first output over the harmonics that the load drives, m.
+    coefficients
+        (points, H+1, n_retained), m.
+    """
+
+    origin: Origin
+    end: str
+    omega: FloatArray
+    amplitude: FloatArray
+    coefficients: ComplexArray
+
+    @property
+    def isola(self) -> bool:
+        """Whether it closes in itself, and no sweep meets it."""
+        return self.origin != "sweep" and self.end == CLOSES
+
+    @property
+    def peak(self) -> float:
+        """Its largest amplitude, m."""
+        return float(np.max(self.amplitude, initial=0.0))
+
+    @property
+    def peak_omega(self) -> float:
+        """Frequency there, rad/s; NaN without a point."""
+        return float(self.omega[np.argmax(self.amplitude)]) if self.omega.size else np.nan
+
+
+@dataclass(frozen=True, eq=False)
+class MotionAt:
+    """A motion at a frequency that was searched.
+
+    Attributes
+    ----------
+    branch
+        Number of its branch.
+    amplitude
+        Of the first output over the harmonics that the load drives, m.
+    coefficients
+        (H+1, n_retained), m.
+    stability
+        ``stable``, ``unstable``, ``undecided`` or ``not examined``.
+    multiplier, error
+        Modulus of the multiplier that decides, and its error.
+    """
+
+    branch: int
+    amplitude: float
+    coefficients: ComplexArray
+    stability: str
+    multiplier: float
+    error: float
+
+
+@dataclass(frozen=True, eq=False)
+class AtFrequency:
+    """What was found at a frequency: motions in the order of their branches, and where starts end."""
+
+    omega: float
+    motions: tuple[MotionAt, ...]
+    basins: Basins
+
+
+@dataclass(frozen=True, eq=False)
+class AllMotions:
+    """What a search found; nothing proves that there is no other motion.
+
+    Attributes
+    ----------
+    branches
+        The first one is that of the sweep.
+    at
+        The frequencies that were searched.
+    tries, starts
+        Deflated solves, and starts in time.
+    seconds
+        What the search took.
+    spent
+        Whether the budget ended it before all was tried that was asked for.
+    """
+
+    branches: tuple[MotionBranch, ...]
+    at: tuple[AtFrequency, ...]
+    tries: int
+    starts: int
+    seconds: float
+    spent: bool
+
+    @property
+    def isolas(self) -> tuple[MotionBranch, ...]:
+        """Branches that close in themselves, and that no sweep meets."""
+        return tuple(b for b in self.branches if b.isola)
+
+
+def gathered(problem: ForcedProblem, stages: list[Stage]) -> AllMotions:
+    """Return what the stages of a search tell together."""
+    branches = [
+        MotionBranch(s.origin, s.end, s.omega, _amplitudes(problem, s), s.coefficients)
+        for s in stages
+        if s.kind == "branch"
+    ]
+    starts = {s.place: s for s in stages if s.kind == "starts"}
+    at = []
+    for stage in sorted((s for s in stages if s.kind == "motions"), key=lambda s: s.place):
+        amplitude = _amplitudes(problem, stage)
+        words = stage.words.split(";")
+        motions = tuple(
+            MotionAt(int(stage.branch[i]), float(amplitude[i]), stage.coefficients[i], words[i], float(stage.multiplier[i]), float(stage.error[i]))
+            for i in range(amplitude.size)
+        )  # fmt: skip
+        own = starts.get(stage.place)
+        ends = () if own is None else tuple(int(e) for e in own.branch)
+        omega = float(stage.omega[0]) if stage.omega.size else np.nan
+        at.append(AtFrequency(omega, motions, Basins(omega, ends)))
+    return AllMotions(
+        tuple(branches),
+        tuple(at),
+        sum(s.tries for s in stages if s.kind == "searched"),
+        sum(s.tries for s in stages if s.kind == "starts"),
+        sum(s.seconds for s in stages),
+        any(s.end == SPENT for s in stages),
+    )
+
+
+SPENT = "the budget is spent"
+
+
+def _amplitudes(problem: ForcedProblem, stage: Stage) -> FloatArray:
+    pairs = zip(stage.omega, stage.coefficients, strict=True)
+    return np.array([problem.amplitude_of(float(w), q) for w, q in pairs])

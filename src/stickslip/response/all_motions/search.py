@@ -1,0 +1,369 @@
+"""The search: a sweep, deflation at a set of frequencies, random states in time, and each motion that is new followed as a branch."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from time import perf_counter
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.errors import input_error
+from stickslip.harmonic.balance import HarmonicBalance
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.support import harmonics_of
+from stickslip.reduction.speed_line import SpeedLine
+from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.all_motions.basins import (
+    ALIKE,
+    APERIODIC,
+    PERIODIC,
+    drawn,
+    in_time,
+    sampler,
+)
+from stickslip.response.all_motions.deflation import Distance, deflated_newton, distance_among
+from stickslip.response.all_motions.found import SPENT, AllMotions, Origin, Stage, gathered
+from stickslip.response.bifurcations.side_branch import both_ways
+from stickslip.response.branch import following_vibration, steps_through, vibration_weights
+from stickslip.response.equilibrium import bonded_start
+from stickslip.response.forced.problem import (
+    ForcedPoint,
+    ForcedProblem,
+    forced_point,
+    forced_problem,
+    with_stiffness,
+)
+from stickslip.response.forced.sweep import Sweep
+from stickslip.response.ladder import plain_sweep
+from stickslip.response.stability.multipliers import stability
+from stickslip.response.system import System
+from stickslip.response.time.transient import TimeStepping
+from stickslip.solve.continuation import start_point
+from stickslip.solve.newton_method import Newton, newton
+
+ITERATIONS = 60  # of a deflated solve
+SHARE = 0.5  # of the budget, after which deflation leaves the rest to time
+SCALES = (0.25, 4.0)  # of known motions, as starts
+GUESSES = (0.5, 2.0, -1.0)
+LONGEST = 6  # times the points of a sweep that a branch may have
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionSearch:
+    """How all motions are looked for.
+
+    Parameters
+    ----------
+    omega_range
+        Range of the sweep and of the branches, rad/s.
+    at
+        Frequencies that are searched, rad/s; none: `frequencies` of them in the middle of equal parts of the range.
+    frequencies
+        Their number.
+    harmonics
+        Highest harmonic; it stays as it is.
+    samples
+        Of a period, where contacts are evaluated on samples.
+    points
+        Smallest number of points of the sweep.
+    tries
+        Deflated solves at a frequency since the last that found a motion.
+    starts
+        Random states at each frequency.
+    modes
+        Lowest modes, contacts stuck, in which states are drawn.
+    spread
+        Largest modal amplitude of a state, in units of the largest of the motions that are known.
+    periods
+        After which a start that repeats nothing is given up.
+    steps
+        Steps in a period.
+    seconds
+        Budget: no solve and no start begins after it, and deflation leaves half of it to the starts.
+    seed
+        Of the random states.
+    """
+
+    omega_range: tuple[float, float]
+    at: tuple[float, ...] = ()
+    frequencies: int = 5
+    harmonics: int = 7
+    samples: int = 256
+    points: int = 40
+    tries: int = 12
+    starts: int = 20
+    modes: int = 2
+    spread: float = 1.5
+    periods: int = 1000
+    steps: int = 512
+    seconds: float = 120.0
+    seed: int = 0
+    newton: Newton = field(default_factory=Newton)
+
+    def __post_init__(self) -> None:
+        for name in ("frequencies", "harmonics", "points", "modes", "steps", "periods"):
+            if getattr(self, name) < 1:
+                raise input_error(f"MotionSearch.{name}", f"is {getattr(self, name)}", "Give a count from 1 on.")  # fmt: skip
+        if not (self.seconds > 0.0 and self.spread > 0.0):
+            raise input_error("MotionSearch", f"seconds = {self.seconds}, spread = {self.spread}", "Both are above zero.")  # fmt: skip
+        low, high = self.omega_range
+        if not all(low <= omega <= high for omega in self.at):
+            raise input_error("MotionSearch.at", f"leaves the range {low:g} to {high:g} rad/s", "Widen omega_range.")  # fmt: skip
+
+    @property
+    def places(self) -> tuple[float, ...]:
+        """Frequencies that are searched, rad/s."""
+        low, high = self.omega_range
+        middle = (np.arange(self.frequencies) + 0.5) / self.frequencies
+        return self.at or tuple((low + (high - low) * middle).tolist())
+
+
+def search_problem(system: System, load: HarmonicLoad, search: MotionSearch) -> ForcedProblem:
+    """Return the forced response that is searched; refuse a rigid contact."""
+    if system.interface.rigid:
+        raise input_error(
+            "all motions",
+            "a contact is rigid: its force is no function of the gap",
+            "Give the contacts a stiffness, as elastic_coulomb.",
+        )
+    order = search.harmonics
+    sweep = Sweep(
+        omega_range=search.omega_range, low=order, high=order, selection="always_low", points=search.points,
+        samples=max(search.samples, 8 * order), newton=search.newton,
+    )  # fmt: skip
+    return forced_problem(system, load, sweep)
+
+
+def all_motions(system: System, load: HarmonicLoad, search: MotionSearch) -> AllMotions:
+    """Search for all periodic motions under a load, with its period.
+
+    Parameters
+    ----------
+    system, load
+        What vibrates, and what drives it.
+    search
+        Where, how long, and with what.
+
+    Raises
+    ------
+    InputError
+        If a contact is rigid.
+    """
+    problem = search_problem(system, load, search)
+    return gathered(problem, list(search_stages(problem, search)))
+
+
+def search_stages(
+    problem: ForcedProblem, search: MotionSearch, done: Sequence[Stage] = ()
+) -> Iterator[Stage]:
+    """Yield the stages of a search that are not in `done`, in their order; a budget counts what `done` took."""
+    yield from _Search(problem, search, list(done)).run()
+
+
+@dataclass(eq=False)
+class _Search:
+    problem: ForcedProblem
+    search: MotionSearch
+    stages: list[Stage]
+
+    def __post_init__(self) -> None:
+        whole = with_stiffness(self.problem.balance(harmonics_of(self.search.harmonics)))
+        # a deflated Jacobian has a full row more: it is an array
+        self.balance: HarmonicBalance = replace(whole, jacobian="dense")
+        self.weights = vibration_weights(self.balance)
+        self.before = sum(s.seconds for s in self.stages)
+        self.began = perf_counter()
+        self.mark = self.began
+
+    def run(self) -> Iterator[Stage]:
+        """Go through all that was asked for."""
+        if not self._branches():
+            yield self._kept(self._swept())
+        for place, omega in enumerate(self.search.places):
+            if not self._has("searched", place):
+                yield from self._deflated(place, omega)
+        for place, omega in enumerate(self.search.places):
+            if not self._has("starts", place):
+                yield from self._started(place, omega)
+        for place, omega in enumerate(self.search.places):
+            if not self._has("motions", place):
+                yield self._kept(self._motions(place, omega))
+
+    # --- what there is ------------------------------------------------------------------------
+
+    def _has(self, kind: str, place: int) -> bool:
+        return any(s.kind == kind and s.place == place for s in self.stages)
+
+    def _branches(self) -> list[Stage]:
+        return [s for s in self.stages if s.kind == "branch"]
+
+    def _kept(self, stage: Stage) -> Stage:
+        now = perf_counter()
+        stage = replace(stage, seconds=now - self.mark)
+        self.mark = now
+        self.stages.append(stage)
+        return stage
+
+    def _spent(self, share: float = 1.0) -> bool:
+        return self.before + perf_counter() - self.began > share * self.search.seconds
+
+    def _at(self, omega: float) -> list[tuple[int, FloatArray]]:
+        """Return the solutions at a frequency, each once, with the number of the branch that holds it."""
+        found: list[tuple[int, FloatArray]] = []
+        for number, stage in enumerate(self._branches()):
+            for a, b in pairwise(range(stage.omega.size)):
+                one, other = stage.omega[a], stage.omega[b]
+                if one == other or (one - omega) * (other - omega) > 0.0:
+                    continue
+                share = (omega - one) / (other - one)
+                x, y = (self.balance.unknowns(stage.coefficients[i]) for i in (a, b))
+                solved = newton(lambda v: self.balance.linearise(v, omega), x + share * (y - x), self.search.newton)  # fmt: skip
+                if solved.status.converged and not self._known(solved.x, [z for _, z in found]):
+                    found.append((number, solved.x))
+        return found
+
+    def _distance(self, known: Sequence[FloatArray]) -> Distance:
+        return distance_among(self.weights, known)
+
+    def _known(self, x: FloatArray, known: Sequence[FloatArray]) -> bool:
+        distance = self._distance([x, *known])
+        return any(distance.same(x, other) for other in known)
+
+    # --- branches -----------------------------------------------------------------------------
+
+    def _swept(self) -> Stage:
+        search = self.search
+        made = plain_sweep(self.problem.system, self.balance, search.omega_range, search.points, search.newton)  # fmt: skip
+        points = [forced_point(self.balance, f.point.solution, "point", f.index, f.p, 0.0) for f in made if f.converged]  # fmt: skip
+        lost = len(made) - len(points)
+        end = f"{lost} points were not found" if lost else "it reaches the end of the range"
+        return self._stage("branch", -1, "sweep", points, end)
+
+    def _branch(self, place: int, origin: Origin, x: FloatArray, omega: float) -> Stage:
+        """Follow a motion as a branch."""
+        search = self.search
+        low, high = search.omega_range
+        following = following_vibration(self.balance, steps_through(high - low, search.points), search.newton)  # fmt: skip
+        first = start_point(self.balance, x, omega, following)
+        most = LONGEST * search.points
+        points, end = both_ways(self.problem, self.balance, following, first, most)
+        return self._stage("branch", place, origin, points, end)
+
+    def _stage(
+        self, kind: str, place: int, origin: Origin, points: Sequence[ForcedPoint], end: str
+    ) -> Stage:
+        rows = np.array([p.coefficients for p in points])
+        none = np.zeros((0, self.search.harmonics + 1, self.balance.linear.n), dtype=complex)
+        omega = np.array([p.omega for p in points])
+        return Stage(kind, place, origin, end, omega, rows if points else none)  # type: ignore[arg-type]
+
+    def _taken(self, place: int, origin: Origin, x: FloatArray, omega: float) -> Iterator[Stage]:
+        """Follow a motion that is new, unless a branch that was followed leads to it."""
+        yield self._kept(self._branch(place, origin, x, omega))
+
+    # --- deflation ----------------------------------------------------------------------------
+
+    def _deflated(self, place: int, omega: float) -> Iterator[Stage]:
+        """Search a frequency until as many starts as asked for find nothing new."""
+        failed = tries = 0
+        rng = np.random.default_rng((self.search.seed, place))
+        options = replace(self.search.newton, max_iterations=ITERATIONS)
+        known = [x for _, x in self._at(omega)]
+        starts = self._guesses(omega, known, rng)
+        while failed < self.search.tries and not self._spent(SHARE):
+            tries += 1
+            start = next(starts)
+            found = deflated_newton(
+                lambda x: self.balance.linearise(x, omega), start, known, self._distance(known or [start]), options
+            )  # fmt: skip
+            if not found.status.converged or self._known(found.x, known):
+                failed += 1
+                continue
+            failed = 0
+            yield from self._taken(place, "deflation", found.x, omega)
+            known = [x for _, x in self._at(omega)]
+            if not self._known(found.x, known):
+                known.append(found.x)
+            starts = self._guesses(omega, known, rng)
+        end = SPENT if failed < self.search.tries else ""
+        yield self._kept(replace(self._stage("searched", place, "deflation", (), end), tries=tries))
+
+    def _guesses(
+        self, omega: float, known: Sequence[FloatArray], rng: np.random.Generator
+    ) -> Iterator[FloatArray]:
+        """Yield starts without end: the stuck vibration, known motions scaled, then scaled and shifted in phase at random."""
+        stuck = bonded_start(self.balance, omega, self.problem.system)
+        yield stuck
+        still = np.where(self.weights == 0.0, 1.0, 0.0)
+        for x in known:
+            for factor in GUESSES:
+                yield np.where(still > 0, x, factor * x)
+        low, high = np.log(SCALES)
+        every = [*known, stuck]
+        turns = np.arange(self.search.harmonics + 1)
+        while True:
+            q = self.balance.coefficients(every[int(rng.integers(len(every)))])
+            size = np.exp(rng.uniform(low, high))
+            moved = q * size * np.exp(1j * turns * rng.uniform(0.0, 2.0 * np.pi))[:, None]
+            moved[0] = q[0]
+            yield self.balance.unknowns(moved)
+
+    # --- time ---------------------------------------------------------------------------------
+
+    def _started(self, place: int, omega: float) -> Iterator[Stage]:
+        """Integrate from random states, follow what they end on and is new, and count where they end."""
+        structure, search = self.problem.system.structure, self.search
+        wheel = isinstance(structure, TunedWheel | SpeedLine)
+        solutions = [x for _, x in self._at(omega)]
+        if wheel or not solutions or not search.starts:
+            why = "sectors of a wheel are not started in time" if wheel else ""
+            yield self._kept(self._stage("starts", place, "time", (), why))
+            return
+        stepping = TimeStepping(steps_per_period=search.steps, max_periods=search.periods, harmonics=search.harmonics, tolerance=1e-4)  # fmt: skip
+        linear = self.problem.low.linear
+        motions = [linear.recover(omega, self.balance.coefficients(x)) for x in solutions]
+        own = sampler(self.problem, omega, motions, search.modes, search.spread)
+        ends: list[ComplexArray] = []
+        states = drawn(own, search.seed, place)
+        while len(ends) < search.starts and not self._spent():
+            found = in_time(own, next(states), stepping)
+            rows = found.harmonics[:, : self.balance.linear.n]
+            ends.append(rows if found.settled else np.full_like(rows, np.nan))
+            if found.settled and self._nearest(rows, solutions) < 0:
+                solved = newton(lambda v: self.balance.linearise(v, omega), self.balance.unknowns(rows), search.newton)  # fmt: skip
+                new = solved.status.converged and not self._known(solved.x, solutions)
+                if new and self._apart(rows, solved.x) <= ALIKE:
+                    yield from self._taken(place, "time", solved.x, omega)
+                    solutions = [x for _, x in self._at(omega)]
+        made = self._stage("starts", place, "time", (), "" if len(ends) == search.starts else SPENT)
+        numbers = [APERIODIC if np.isnan(e).any() else self._nearest(e, solutions) for e in ends]
+        yield self._kept(replace(made, branch=np.array(numbers, dtype=np.int64), tries=len(ends)))
+
+    def _apart(self, rows: ComplexArray, x: FloatArray) -> float:
+        """Return how far a motion in time is from a solution, relative to the vibration."""
+        known = self.balance.coefficients(x)[1:]
+        return float(np.linalg.norm(rows[1:] - known) / max(np.linalg.norm(known), np.finfo(float).tiny))  # fmt: skip
+
+    def _nearest(self, rows: ComplexArray, solutions: Sequence[FloatArray]) -> int:
+        """Return the number of the solution that a motion in time is, `PERIODIC` where it is none."""
+        apart = [self._apart(rows, x) for x in solutions]
+        best = int(np.argmin(apart)) if apart else 0
+        return best if apart and apart[best] <= ALIKE else PERIODIC
+
+    # --- what is there in the end -------------------------------------------------------------
+
+    def _motions(self, place: int, omega: float) -> Stage:
+        """Return the motions at a frequency with their stability, in the order in which starts are counted."""
+        found = self._at(omega)
+        solved = [newton(lambda v: self.balance.linearise(v, omega), x, self.search.newton) for _, x in found]  # fmt: skip
+        points = [forced_point(self.balance, s, "point", i, omega, 0.0) for i, s in enumerate(solved)]  # fmt: skip
+        wheel = isinstance(self.problem.system.structure, TunedWheel | SpeedLine)
+        judged = [None if wheel else stability(self.problem, p) for p in points]
+        return replace(
+            self._stage("motions", place, "sweep", points, ""),
+            branch=np.array([number for number, _ in found], dtype=np.int64),
+            multiplier=np.array([np.nan if j is None else j.multiplier for j in judged]),
+            error=np.array([np.nan if j is None else j.multiplier_error for j in judged]),
+            words=";".join("not examined" if j is None else j.verdict for j in judged),
+        )

@@ -1,0 +1,251 @@
+"""All motions: deflation, isolas, starts in time and their basins, against closed forms and SciPy."""
+
+import numpy as np
+import pytest
+from models import table
+from scipy.integrate import solve_ivp
+from scipy.stats import binom
+
+from stickslip.contact.interface import Interface
+from stickslip.contact.laws.cubic_spring import CubicSpring
+from stickslip.contact.laws.polynomial_spring import PolynomialSpring
+from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
+from stickslip.contact.laws.unilateral_spring import UnilateralSpring
+from stickslip.errors import InputError
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.model.structure import Structure
+from stickslip.response.all_motions import MotionSearch, all_motions, share_interval
+from stickslip.response.all_motions.search import search_problem, search_stages
+from stickslip.response.system import System
+
+
+def one_mass(law, c: float, force: float, direction: int = 0) -> tuple[System, HarmonicLoad]:
+    """m = k = 1 with a contact to ground."""
+    one = np.ones((1, 1))
+    gap = np.zeros((3, 1))
+    gap[direction] = 1.0
+    structure = Structure(one, c * one, one.copy(), table(("x",)))
+    system = System(structure, Interface(("c",), (law,), gap), np.array([0]))
+    return system, HarmonicLoad(np.zeros(1), {1: np.array([force + 0j])})
+
+
+# ---- Duffing ---------------------------------------------------------------------------------------------------------------
+
+C, CUBIC, FORCE, OMEGA = 0.05, 1.0, 0.1, 1.3
+
+
+def duffing_amplitudes(omega: float) -> np.ndarray:
+    """Amplitudes of one harmonic: ((1 - ω² + 3/4 κ s)² + c²ω²) s = F², s = a²."""
+    d = 1.0 - omega**2
+    s = np.roots([(0.75 * CUBIC) ** 2, 1.5 * CUBIC * d, d**2 + (C * omega) ** 2, -(FORCE**2)])
+    real = s[np.abs(s.imag) < 1e-9].real
+    return np.sort(np.sqrt(real[real > 0.0]))
+
+
+def duffing() -> tuple[System, HarmonicLoad]:
+    return one_mass(CubicSpring(cubic_t=CUBIC, k_t=1e-12), C, FORCE)
+
+
+@pytest.fixture(scope="module")
+def found():
+    system, load = duffing()
+    search = MotionSearch(
+        omega_range=(0.6, 1.7), at=(OMEGA,), harmonics=1, points=30, starts=24, steps=128, periods=300
+    )  # fmt: skip
+    return all_motions(system, load, search)
+
+
+def test_duffing_has_the_three_motions_of_the_closed_form(found):
+    own = sorted(m.amplitude for m in found.at[0].motions)
+    np.testing.assert_allclose(own, duffing_amplitudes(OMEGA), rtol=1e-8)
+    by_size = sorted(found.at[0].motions, key=lambda m: m.amplitude)
+    assert by_size[1].stability == "unstable"
+    # what harmonics left out would change may keep one from being judged, never make it unstable
+    assert {by_size[0].stability, by_size[2].stability} <= {"stable", "undecided"}
+    assert [b.origin for b in found.branches] == ["sweep"], "the sweep meets all three"
+
+
+def test_starts_end_where_integration_by_scipy_does(found):
+    """The shares of two hundred starts of SciPy's own, drawn in the same disc, lie within what both samples leave open."""
+    at = found.at[0]
+    stable = [i for i, m in enumerate(at.motions) if m.stability != "unstable"]
+    assert sum(at.basins.count(i) for i in stable) == len(at.basins.ends) == 24
+    assert all(at.basins.count(i) > 0 for i in stable)
+    high = max(stable, key=lambda i: at.motions[i].amplitude)
+    rng = np.random.default_rng(5)
+    n = 120
+    # the disc of the search: 1.5 times the largest motion
+    size = 1.5 * max(m.amplitude for m in at.motions) * np.sqrt(rng.uniform(size=n))
+    turn = rng.uniform(0.0, 2.0 * np.pi, n)
+    begin = np.concatenate([size * np.cos(turn), size * np.sin(turn)])
+    period = 2.0 * np.pi / OMEGA
+
+    def rate(t, y):
+        x, v = y[:n], y[n:]
+        return np.concatenate([v, FORCE * np.cos(OMEGA * t) - C * v - x - CUBIC * x**3])
+
+    times = np.linspace(40, 41, 33) * period
+    late = solve_ivp(rate, (0.0, 41 * period), begin, rtol=1e-6, atol=1e-6, t_eval=times).y[:n]
+    amplitude = np.max(np.abs(late), axis=1)
+    middle = sorted(m.amplitude for m in at.motions)[1]
+    ended_high = int(np.sum(amplitude > middle))
+    low, top = share_interval(ended_high, n)
+    own_low, own_top = at.basins.interval(high)
+    assert max(low, own_low) <= min(top, own_top)
+    assert 0 < ended_high < n
+
+
+@pytest.mark.parametrize(("count", "starts"), [(0, 20), (7, 20), (20, 20)])
+def test_the_interval_holds_what_is_not_improbable(count, starts):
+    low, high = share_interval(count, starts)
+    assert low <= count / starts <= high
+    if count > 0:
+        assert binom.sf(count - 1, starts, low) == pytest.approx(0.025, abs=1e-9)
+    if count < starts:
+        assert binom.cdf(count, starts, high) == pytest.approx(0.025, abs=1e-9)
+
+
+# ---- an isola in closed form -----------------------------------------------------------------------------------------------
+
+SOFT, HARD, WEAK, PUSH = -2.0, 1.0, 0.05, 0.02
+
+
+def stiffness(s):
+    """Of the first harmonic, over s = a²: softening, then hardening."""
+    return 1.0 + 0.75 * SOFT * s + 0.625 * HARD * s**2
+
+
+def isola() -> tuple[float, float]:
+    """Smallest and largest amplitude of the isola: c² a² (K - c²/4) = F² at both."""
+    c2 = WEAK**2
+    roots = np.roots([0.625 * HARD, 0.75 * SOFT, 1.0 - c2 / 4.0, -(PUSH**2) / c2])
+    s = np.sort(roots[np.abs(roots.imag) < 1e-12].real)
+    assert s.size == 3
+    return float(np.sqrt(s[1])), float(np.sqrt(s[2]))
+
+
+def test_deflation_finds_the_isola_of_the_closed_form_and_follows_it_round():
+    system, load = one_mass(PolynomialSpring(along_t=(0.0, 0.0, SOFT, 0.0, HARD)), WEAK, PUSH)
+    low, high = isola()
+    omega = float(np.sqrt(stiffness(high**2) - WEAK**2 / 2.0))
+    search = MotionSearch(
+        omega_range=(0.1, 1.3), at=(omega,), harmonics=1, samples=32, points=40, tries=20, starts=0
+    )
+    result = all_motions(system, load, search)
+    assert len(result.isolas) == 1
+    ring = result.isolas[0]
+    assert ring.origin == "deflation"
+    # every point solves (K - ω²)² + c²ω² = F²/a²
+    s = ring.amplitude**2
+    left = (stiffness(s) - ring.omega**2) ** 2 + (WEAK * ring.omega) ** 2
+    np.testing.assert_allclose(left * s, PUSH**2, rtol=1e-8)
+    assert ring.amplitude.max() == pytest.approx(high, rel=2e-3)
+    assert ring.amplitude.max() <= high * (1.0 + 1e-9)
+    assert ring.amplitude.min() == pytest.approx(low, rel=2e-2)
+    assert ring.peak > result.branches[0].peak, "the isola is higher than what a sweep shows"
+    assert not result.spent
+
+
+# ---- a stop ----------------------------------------------------------------------------------------------------------------
+
+STOP, CLEARANCE, DAMPING, DRIVE, FAST = 3.0, 1.0, 0.04, 0.1, 1.15
+
+
+def stop() -> tuple[System, HarmonicLoad]:
+    return one_mass(UnilateralSpring(k_n=STOP, initial_gap=CLEARANCE), DAMPING, DRIVE, direction=2)
+
+
+def impacting(y0, periods):
+    period = 2.0 * np.pi / FAST
+
+    def rate(t, y):
+        # the contact closes where the displacement along n has come to -clearance
+        push = STOP * max(0.0, -y[0] - CLEARANCE)
+        return [y[1], DRIVE * np.cos(FAST * t) - DAMPING * y[1] - y[0] + push]
+
+    times = np.linspace(periods - 1, periods, 65) * period
+    y = solve_ivp(
+        rate, (0.0, periods * period), y0, rtol=1e-8, atol=1e-10, t_eval=times, max_step=period / 40
+    ).y[0]
+    return 2.0 * abs(np.mean(y[:-1] * np.exp(-1j * FAST * times[:-1])))
+
+
+def test_a_mass_beside_a_stop_moves_without_and_with_impacts():
+    system, load = stop()
+    search = MotionSearch(
+        omega_range=(0.8, 1.5),
+        at=(FAST,),
+        harmonics=9,
+        points=30,
+        tries=6,
+        starts=16,
+        steps=256,
+        periods=300,
+    )
+    at = all_motions(system, load, search).at[0]
+    stable = sorted((m for m in at.motions if m.stability == "stable"), key=lambda m: m.amplitude)
+    assert len(stable) == 2
+    free = DRIVE / abs(1.0 - FAST**2 + 1j * DAMPING * FAST)
+    assert free < CLEARANCE
+    assert stable[0].amplitude == pytest.approx(free, rel=1e-9), "without impacts it is linear"
+    motion = stable[1].coefficients[:, 0]
+    begin = [
+        float(np.sum(motion.real)),
+        float(np.sum((1j * FAST * np.arange(motion.size) * motion).real)),
+    ]
+    assert impacting(begin, 60) == pytest.approx(stable[1].amplitude, rel=2e-3)
+    assert min(at.basins.count(at.motions.index(m)) for m in stable) > 0
+
+
+# ---- budget, resumption, bad input -----------------------------------------------------------------------------------------
+
+
+def test_a_budget_that_is_spent_is_said_and_nothing_begins_after_it():
+    system, load = duffing()
+    result = all_motions(
+        system, load, MotionSearch(omega_range=(0.6, 1.7), harmonics=1, points=20, seconds=1e-9)
+    )
+    assert result.spent
+    assert result.tries == result.starts == 0
+    assert len(result.at) == 5
+
+
+def test_an_interrupted_search_goes_on_to_the_same_stages():
+    system, load = duffing()
+    search = MotionSearch(
+        omega_range=(0.6, 1.7),
+        frequencies=1,
+        harmonics=1,
+        points=20,
+        tries=2,
+        starts=2,
+        steps=64,
+        periods=60,
+    )
+    problem = search_problem(system, load, search)
+    whole = list(search_stages(problem, search))
+    for stop_at in (1, len(whole) - 1):
+        again = [*whole[:stop_at], *search_stages(problem, search, whole[:stop_at])]
+        assert [s.kind for s in again] == [s.kind for s in whole]
+        for one, other in zip(whole, again, strict=True):
+            np.testing.assert_array_equal(one.coefficients, other.coefficients)
+            np.testing.assert_array_equal(one.branch, other.branch)
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"at": (9.0,)}, "MotionSearch.at"),
+        ({"seconds": 0.0}, "seconds"),
+        ({"points": 0}, "MotionSearch.points"),
+    ],
+)
+def test_bad_searches_are_refused(keys, said):
+    with pytest.raises(InputError, match=said):
+        MotionSearch(omega_range=(0.5, 2.0), **keys)
+
+
+def test_rigid_contacts_are_refused():
+    system, load = one_mass(RigidCoulomb(mu=0.3, preload=1.0), C, FORCE)
+    with pytest.raises(InputError, match="a contact is rigid"):
+        all_motions(system, load, MotionSearch(omega_range=(0.5, 2.0)))
