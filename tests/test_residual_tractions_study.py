@@ -44,7 +44,8 @@ def test_bounds_of_all_cases_and_the_bands_on_the_page(tmp_path: Path) -> None:
     outcome = run_study(read_study(written(tmp_path)))
     data = outcome.tree["residual_tractions"].to_dataset()
     least, own, most = (data[f"{n}_amplitude"].values for n in ("least", "reference", "most"))
-    assert np.all((least <= own) & (own <= most))
+    solved = np.isfinite(own)
+    assert np.all((least <= own)[solved] & (own <= most)[solved])
     assert np.all(
         np.nanmax(most / least, axis=1) > 1.003
     )  # the band is open somewhere in each case
@@ -62,8 +63,8 @@ def test_bounds_of_all_cases_and_the_bands_on_the_page(tmp_path: Path) -> None:
     names = [trace.name for trace in figures["response"].data]
     assert names.count("residual tractions") == 3
     filled = next(t for t in figures["response"].data if t.fill)
-    assert len(filled.x) == 5
-    assert filled.y == pytest.approx(1e6 * most[0] / 2.0, rel=1e-9)  # µm/N
+    assert len(filled.x) > 5  # the resonances are part of the curves
+    assert filled.y == pytest.approx(1e6 * most[0][np.isfinite(most[0])] / 2.0, rel=1e-9)  # µm/N
     bands = [t for t in figures["optimisation"].data if t.fill]
     assert bands[0].x == pytest.approx([2.0, 3.0, 5.0])
     assert "residual_tractions" in figures
@@ -80,6 +81,7 @@ def test_an_interrupted_search_goes_on_and_python_gives_the_same(tmp_path: Path)
         frequency_hz=(11.0, 15.0), points=5, harmonics=3, starts=0, in_time=False
     )
     own = one_case(result.data["residual_tractions"].to_dataset(), 0)
+    at = np.searchsorted(own["frequency_hz"].values, np.linspace(11.0, 15.0, 5) - 1e-9)
     question = RESIDUAL_TRACTIONS.inputs(case, model)
     with JobJournal(tmp_path / "a.part", RESIDUAL_TRACTIONS.record) as journal:
         records = list(RESIDUAL_TRACTIONS.solve(question, (), journal))
@@ -88,7 +90,7 @@ def test_an_interrupted_search_goes_on_and_python_gives_the_same(tmp_path: Path)
         assert [r.amplitude for r in later] == [pytest.approx(r.amplitude, rel=1e-6) for r in records[2:]]  # fmt: skip
         assert list(RESIDUAL_TRACTIONS.solve(question, records, journal)) == []
     found = np.array([r.amplitude[2] for r in records[:5]])
-    assert found == pytest.approx(own["most_amplitude"].values, rel=1e-9)
+    assert found == pytest.approx(own["most_amplitude"].values[at], rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -63,10 +63,14 @@ def draw_bands(figure: go.Figure, response: Response) -> str:
         shared = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "legendgroup": "tractions"}  # fmt: skip
         figure.add_scatter(x=hertz[known], y=least[known] * scale, showlegend=False, **shared)
         figure.add_scatter(
-            x=hertz[known], y=most[known] * scale, fill="tonexty", fillcolor=case.colour, opacity=_OPACITY,
+            x=hertz[known], y=most[known] * scale, fill="tonexty", fillcolor=_faint(case.colour),
             name="residual tractions", showlegend=case is response.cases[0], **shared,
         )  # fmt: skip
     return f" Band: what residual tractions leave open, with H = {_harmonics(response)}."
+
+
+def _faint(colour: str) -> str:
+    return colour.replace("rgb(", "rgba(").replace(")", f",{_OPACITY})")
 
 
 def _harmonics(response: Response) -> int:

@@ -79,7 +79,9 @@ def resonances(view: Tractions) -> str | None:
                 quantity(float(view.floats(f"{what}_amplitude")[k - 1]), "m")
                 for what in ("resolved", "time")
             )
-            told = "confirmed" if view.integers("confirmed")[k - 1] else "left in time"
+            followed = view.labels_of("time_status")[k - 1]
+            ends = ("left in time", "confirmed") if followed else ("not found again", "confirmed, not in time")  # fmt: skip
+            told = ends[view.integers("confirmed")[k - 1]]
         off = percent(100 * float(height[k] / height[0] - 1)) if k else ""
         rows.append([name, quantity(float(height[k]), "m"), off, number(float(hertz[k]), 6), again, time, told])  # fmt: skip
     head = ["resonance", "amplitude", "against own start", "at (Hz)", "solved again", "in time", ""]

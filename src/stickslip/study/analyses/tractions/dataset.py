@@ -61,7 +61,9 @@ def _of_case(solved: Solved) -> Variables:
     }
     points = [r for r in records if r.stage == "point"]
     if points:
-        values |= _of_points(points)
+        # the resonances belong to the curves, or these would pass below them
+        every = {r.omega: r for r in (*points, *(r for r in records if r.stage != "point"))}
+        values |= _of_points([every[omega] for omega in sorted(every)])
     by_stage = {r.stage: r for r in records}
     if points and {"least", "most"} <= set(by_stage):
         values |= _of_resonance(points, by_stage)

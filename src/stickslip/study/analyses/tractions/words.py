@@ -108,5 +108,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
 def _in_time(case: xr.Dataset) -> str:
     if "confirmed" not in case:
         return "not followed"
+    if not any(str(word) for word in case["time_status"].values):
+        return "not followed"
     words = ["confirmed" if ok else "left" for ok in case["confirmed"].values]
     return words[0] if words[0] == words[1] else f"smallest {words[0]}, largest {words[1]}"
