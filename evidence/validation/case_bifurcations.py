@@ -1,4 +1,4 @@
-"""Folds, Neimark-Sacker bifurcations and period doublings located on branches, against shooting with SciPy, which shares no code.
+"""Folds, Neimark-Sacker bifurcations and lost symmetry located on branches, against shooting with SciPy, which shares no code.
 
 The absorber is the nonlinear tuned vibration absorber on a Duffing oscillator of G. Habib, T. Detroux, R. Viguié and G. Kerschen (arXiv
 1604.03868), mass ratio 5 %, by their rule for its stiffness, damping and cubic coefficient. The bifurcations that they print were not at
@@ -14,11 +14,14 @@ import scipy.optimize
 import stickslip as ss
 from evidence.validation.compare import Record, record
 from stickslip.arrays import ComplexArray, FloatArray
-from stickslip.response.bifurcations import Bifurcation, bifurcations
+from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.bifurcations import Bifurcation, bifurcations, side_branches
 
 SOURCE = "shooting with SciPy, DOP853"
 MASS_RATIO, FORCE = 0.05, 0.11
 NEAR = 2e-4  # relative distance within which the root is looked for
+SECTORS, COUPLING, DRIVE = 4, 0.03, 0.008
+CLOSE = 1e-5  # of states, with the harmonics 1, 3 and 5
 SMALLEST = 2e-6  # relative error that shooting is good to
 
 
@@ -49,23 +52,45 @@ def located() -> tuple[Bifurcation, ...]:
     return bifurcations(problem, points).found
 
 
-def flow(omega: float, state: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the state of the absorber's equations after a period and its derivative."""
+Equations = tuple[FloatArray, FloatArray, FloatArray, Callable[[FloatArray], tuple[FloatArray, FloatArray]], FloatArray]  # fmt: skip
+
+
+def absorber_equations() -> Equations:
+    """Return masses, damping, stiffness, the cubic forces with their derivative, and the load."""
     mass, damping, stiffness, cubic = absorber()
 
-    def rate(t: float, y: FloatArray) -> FloatArray:
-        x, v, apart = y[:2], y[2:4], y[0] - y[1]
-        force = np.array([cubic[0] * x[0] ** 3 + cubic[1] * apart**3, -cubic[1] * apart**3])
-        load = np.array([FORCE * np.cos(omega * t), 0.0])
+    def force(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        apart = x[0] - x[1]
         slope = 3 * cubic[1] * apart**2 * np.array([[1.0, -1.0], [-1.0, 1.0]])
         slope[0, 0] += 3 * cubic[0] * x[0] ** 2
-        matrix = np.block([[np.zeros((2, 2)), np.eye(2)], [-(stiffness + slope) / mass[:, None], -damping / mass[:, None]]])  # fmt: skip
-        motion = np.append(v, (load - damping @ v - stiffness @ x - force) / mass)
-        return np.append(motion, matrix @ y[4:].reshape(4, 4))
+        return np.array([cubic[0] * x[0] ** 3 + cubic[1] * apart**3, -cubic[1] * apart**3]), slope
 
-    y = np.append(state, np.eye(4))
-    end = scipy.integrate.solve_ivp(rate, (0.0, 2 * np.pi / omega), y, "DOP853", rtol=1e-11, atol=1e-13).y[:, -1]  # fmt: skip
-    return end[:4], end[4:].reshape(4, 4)
+    return mass, damping, stiffness, force, np.array([FORCE, 0.0])
+
+
+def ring_equations() -> Equations:
+    """Return the same of four masses in a ring with cubic springs to the ground, neighbours driven against each other."""
+    turn = np.roll(np.eye(SECTORS), 1, axis=0)
+    stiffness = np.eye(SECTORS) + COUPLING * (2 * np.eye(SECTORS) - turn - turn.T)
+    load = DRIVE * (-1.0) ** np.arange(SECTORS)
+    return np.ones(SECTORS), 0.02 * np.eye(SECTORS), stiffness, lambda x: (x**3, np.diag(3 * x**2)), load  # fmt: skip
+
+
+def flow(equations: Equations, omega: float, state: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the state after a period and its derivative."""
+    mass, damping, stiffness, force, load = equations
+    n = mass.size
+
+    def rate(t: float, y: FloatArray) -> FloatArray:
+        x, v = y[:n], y[n : 2 * n]
+        own, slope = force(x)
+        matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-(stiffness + slope) / mass[:, None], -damping / mass[:, None]]])  # fmt: skip
+        motion = np.append(v, (load * np.cos(omega * t) - damping @ v - stiffness @ x - own) / mass)
+        return np.append(motion, matrix @ y[2 * n :].reshape(2 * n, 2 * n))
+
+    y = np.append(state, np.eye(2 * n))
+    end = scipy.integrate.solve_ivp(rate, (0.0, 2 * np.pi / omega), y, "DOP853", rtol=1e-10, atol=1e-12).y[:, -1]  # fmt: skip
+    return end[: 2 * n], end[2 * n :].reshape(2 * n, 2 * n)
 
 
 def state_of(coefficients: ComplexArray, omega: float) -> FloatArray:
@@ -74,47 +99,85 @@ def state_of(coefficients: ComplexArray, omega: float) -> FloatArray:
     return np.concatenate([coefficients.real.sum(axis=0), (1j * h * omega * coefficients).real.sum(axis=0)])  # fmt: skip
 
 
-def shot(omega: float, state: FloatArray) -> tuple[FloatArray, FloatArray]:
+def shot(equations: Equations, omega: float, state: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the periodic motion near a state, by Newton's method, and its monodromy."""
     for _ in range(20):
-        after, matrix = flow(omega, state)
-        change = np.linalg.solve(matrix - np.eye(4), state - after)
+        after, matrix = flow(equations, omega, state)
+        change = np.linalg.solve(matrix - np.eye(state.size), state - after)
         state = state + change
-        if np.abs(change).max() < 1e-10:
+        if np.abs(change).max() < 1e-9:
             break
     return state, matrix
 
 
-def torus(found: Bifurcation) -> float:
-    """Return the frequency near a Neimark-Sacker bifurcation at which the pair of multipliers has the modulus 1."""
-    state = state_of(found.point.coefficients, found.omega)
+def crossing(equations: Equations, omega: float, state: FloatArray) -> float:
+    """Return the frequency near a given one at which the largest multiplier has the modulus 1."""
 
     def above(omega: float) -> float:
-        values = np.linalg.eigvals(shot(omega, state)[1])
-        return float(np.abs(values[np.argmax(np.abs(values.imag))]) - 1.0)
+        return float(np.abs(np.linalg.eigvals(shot(equations, omega, state)[1])).max() - 1.0)
 
-    ends = (1 - NEAR) * found.omega, (1 + NEAR) * found.omega
-    return float(scipy.optimize.brentq(above, *ends, xtol=1e-9))
+    return float(scipy.optimize.brentq(above, (1 - NEAR) * omega, (1 + NEAR) * omega, xtol=1e-8))
 
 
-def fold(found: Bifurcation) -> float:
+def fold(equations: Equations, omega: float, state: FloatArray) -> float:
     """Return the frequency of a periodic motion with a multiplier 1."""
 
     def residual(y: FloatArray) -> FloatArray:
-        after, matrix = flow(float(y[4]), y[:4])
-        return np.append(after - y[:4], np.linalg.det(matrix - np.eye(4)))
+        after, matrix = flow(equations, float(y[-1]), y[:-1])
+        return np.append(after - y[:-1], np.linalg.det(matrix - np.eye(len(matrix))))
 
-    start = np.append(state_of(found.point.coefficients, found.omega), found.omega)
-    return float(scipy.optimize.fsolve(residual, start, xtol=1e-12)[4])
+    return float(scipy.optimize.fsolve(residual, np.append(state, omega), xtol=1e-12)[-1])
+
+
+def ring() -> tuple[ss.response.ForcedProblem, Bifurcation]:
+    """Return the response of that ring as a tuned wheel, and where it loses its symmetry first."""
+
+    def of_wave(k: int) -> ss.Structure:
+        stiffness = 1.0 + 2 * COUPLING * (1 - np.cos(2 * np.pi * k / SECTORS))
+        return ss.model.lumped(np.ones(1), np.array([[stiffness]]), np.array([[0.02]]), ("mass",))
+
+    wheel = TunedWheel({k: of_wave(k) for k in range(SECTORS)}, SECTORS, SECTORS // 2, 12)
+    gaps = np.array([[1.0], [0.0], [0.0]])
+    springs = ss.Interface(("ground",), (ss.CubicSpring(cubic_t=1.0),), gaps)
+    system = ss.System(wheel, springs, np.array([0]))
+    load = ss.HarmonicLoad(np.zeros(1), {1: np.array([DRIVE + 0j])})
+    odd = [1, 3, 5]
+    sweep = ss.Sweep(omega_range=(1.0, 1.06), low=odd, high=odd, selection="always_high", points=8)
+    problem = ss.response.forced_problem(system, load, sweep)
+    points = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))
+    found = bifurcations(problem, points).found
+    return problem, next(b for b in found if b.kind == "branch point")
+
+
+def of_ring() -> list[Record]:
+    """Compare where the ring loses its symmetry, and a motion of the branch on which one sector takes most of the vibration."""
+    case = f"ring of {SECTORS} cubic masses, {DRIVE} N"
+    equations = ring_equations()
+    problem, lost = ring()
+    against = (-1.0) ** np.arange(SECTORS)
+    alike = lost.point.coefficients * against[None, :] ** np.arange(len(lost.point.coefficients))[:, None]  # fmt: skip
+    root = crossing(equations, lost.omega, state_of(alike, lost.omega))
+    records = [record(case, "symmetry lost, frequency in rad/s", lost.omega, root, max(lost.omega_error / lost.omega, SMALLEST), SOURCE)]  # fmt: skip
+    for branch in side_branches(problem, lost, points=30):
+        point = max(branch.points, key=branch.localisation)
+        start = state_of(point.coefficients, point.omega)
+        state, _ = shot(equations, point.omega, start)
+        share = f"{100 * branch.localisation(point):.0f} % in one sector"
+        off = float(np.abs(state - start).max() / np.abs(state).max())
+        records.append(record(case, f"state at t = 0 of a localised motion, {share}, relative", 1.0 + off, 1.0, CLOSE, SOURCE))  # fmt: skip
+    return records
 
 
 def run() -> list[Record]:
-    """Compare the frequency of each bifurcation, within the error that is told of it."""
+    """Compare the frequency of each bifurcation, within the error that is told of it; and localised motions of a ring."""
     case = f"absorber on a Duffing oscillator, {FORCE} N"
-    judges: dict[str, Callable[[Bifurcation], float]] = {"Neimark-Sacker": torus, "fold": fold}
+    equations = absorber_equations()
+    judges = {"Neimark-Sacker": crossing, "fold": fold}
     records = []
     for one in located():
         told = max(one.omega_error / one.omega, SMALLEST)
         name = f"{one.kind} near {one.omega:.4f}, frequency in rad/s"
-        records.append(record(case, name, one.omega, judges[one.kind](one), told, SOURCE))
-    return records
+        state = state_of(one.point.coefficients, one.omega)
+        root = judges[one.kind](equations, one.omega, state)
+        records.append(record(case, name, one.omega, root, told, SOURCE))
+    return records + of_ring()

@@ -86,13 +86,12 @@ class Bifurcation:
         value = f"{m.real:.5g}" if abs(m.imag) < 1e-6 else f"{m.real:.5g} ± {abs(m.imag):.5g}i"
         known = f", multiplier {value}{' (modulus' + off + ')' if off else ''}" if np.isfinite(m) else ""  # fmt: skip
         beat = f", second frequency {self.beat / HZ:.5g} Hz" if self.beat else ""
-        doubt = (
-            ""
-            if self.certain
-            else "; more harmonics may move it to another step of the branch, or away"
-        )
+        head, doubt = "", ""
+        if not self.certain:
+            head = "perhaps a "
+            doubt = "; by the error of its multiplier it may lie in another step of the branch, or nowhere"
         return (
-            f"{self.kind} at {self.omega / HZ:.6g}{error} Hz: {LEADS_TO[self.kind]}; "
+            f"{head}{self.kind} at {self.omega / HZ:.6g}{error} Hz: {LEADS_TO[self.kind]}; "
             f"amplitude {self.amplitude:.4g} m{known}{beat}{doubt}"
         )
 

@@ -46,22 +46,23 @@ def open_directions(
     return np.asarray(smallest.T / scale)
 
 
-def localised(
+def candidates(
     directions: FloatArray, balance: HarmonicBalance, group: IntArray | None
-) -> list[FloatArray]:  # fmt: skip
-    """Return combinations of several directions: where the first coordinate, or sector, moves most, and where it moves least.
+) -> list[FloatArray]:
+    """Return the directions in which branches are looked for: each both ways, and combinations of several.
 
     Where a wheel loses its symmetry by waves of both directions at once, two directions are open and every combination solves the linear
-    equations. Those symmetric about a sector belong to branches.
+    equations. Those symmetric about a sector, or about the middle between two, belong to branches: where the first sector (of what is no
+    wheel, the first coordinate) moves most, where it moves least, and halfway between.
     """
-    if len(directions) < 2:
-        return list(directions)
-    n = balance.linear.n
-    own = np.arange(n) == 0 if group is None else group == group[0]
-    columns = np.append(np.tile(own, balance.n_rows), False)
-    part = directions[:, columns]
-    vectors = np.linalg.eigh(part @ part.T)[1]
-    return [vectors[:, -1] @ directions, vectors[:, 0] @ directions]
+    found = list(directions)
+    if len(directions) > 1:
+        own = np.arange(balance.linear.n) == 0 if group is None else group == group[0]
+        part = directions[:, np.append(np.tile(own, balance.n_rows), False)]
+        vectors = np.linalg.eigh(part @ part.T)[1]
+        most, least = vectors[:, -1] @ directions, vectors[:, 0] @ directions
+        found = [most, least, most + least]
+    return [sign * direction for direction in found for sign in (1.0, -1.0)]
 
 
 def first_point(

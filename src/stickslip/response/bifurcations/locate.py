@@ -30,6 +30,10 @@ JUMP = (
 NO_CORNER = "no solution with the harmonics of both ends is found at one of them"
 GAP = "the branch has a gap there, and goes on elsewhere"
 UNKNOWN = "no multipliers are known at one of its ends"
+ROUGH = (
+    0.1  # error of a multiplier beyond which a crossing that it may not make at all tells nothing
+)
+ROUGHLY = "multipliers seem to cross the unit circle, and more harmonics change them by more than 0.1: solve with more of these"
 SPENT = "the multipliers of as many motions were asked for as was allowed"
 
 
@@ -95,6 +99,9 @@ def _runs(branch: Sequence[ForcedPoint]) -> Iterator[range]:
     yield range(begin, len(branch))
 
 
+_Seen = tuple[Point, Spectrum]
+
+
 @dataclass(frozen=True, eq=False)
 class _Crossing:
     """A bifurcation, and where along its step it lies."""
@@ -156,6 +163,12 @@ class _Walk:
         return [counted.get(id(c), c.found) for c in own if id(c) not in taken]
 
     def _lost(self, first: float, last: float, why: str) -> None:
+        """Put down where nothing is seen; steps that follow each other for the same reason are one."""
+        if self.unseen and self.unseen[-1][2] == why:
+            begin, end, _ = self.unseen[-1]
+            if np.isclose(first, end, rtol=1e-9) or begin <= first <= last <= end:
+                self.unseen[-1] = (begin, max(end, last) if end >= begin else last, why)
+                return
         self.unseen.append((first, last, why))
 
     def _look(self, point: ForcedPoint) -> Stability | None:
@@ -240,7 +253,29 @@ class _Walk:
         if first.outside == last.outside or step.length <= 10.0 * self.tolerance:
             return
         k = min(first.outside, last.outside)
-        known: list[tuple[Point, Spectrum]] = [(step.before, first), (step.after, last)]
+        found = self._root(step, k, first, last, neutral)
+        if isinstance(found, str):
+            self._lost(step.before.p, step.after.p, found)
+            return
+        at, low, high = found
+        if not step.connected(low[0], high[0], self.tolerance):
+            self._lost(low[0].p, high[0].p, GAP)
+        else:
+            made = self._described(step, place, k, (first, last), (low, high), at)
+            if made.certain or made.multiplier_error <= ROUGH:
+                self.crossings.append(_Crossing(whole.along(at), made))
+            else:
+                self._lost(step.before.p, step.after.p, ROUGHLY)
+        self._within(whole, step.between(step.before, low[0]), place, first, low[1], neutral)
+        self._within(whole, step.between(high[0], step.after), place, high[1], last, neutral)
+
+    def _root(
+        self, step: Stretch, k: int, first: Spectrum, last: Spectrum, neutral: int
+    ) -> tuple[Point, _Seen, _Seen] | str:
+        """Return where the modulus of a place passes the circle, and its neighbours on both sides; or why nothing is seen."""
+        if first.rough(k, ROUGH) and last.rough(k, ROUGH):
+            return ROUGHLY
+        known: list[_Seen] = [(step.before, first), (step.after, last)]
 
         def value(point: Point) -> float:
             for had, own in known:
@@ -249,29 +284,20 @@ class _Walk:
             found = self._look(step.forced(point))
             if found is None:
                 raise _NoMultipliersError
-            own = spectrum(found, neutral)
-            known.append((point, own))
-            return own.excess(k)
+            known.append((point, spectrum(found, neutral)))
+            return known[-1][1].excess(k)
 
         try:
             at = step.where(value, self.tolerance)
         except _NoMultipliersError:
-            self._lost(step.before.p, step.after.p, SPENT if self.examined >= self.most else UNKNOWN)  # fmt: skip
-            return
+            return SPENT if self.examined >= self.most else UNKNOWN
         if not at.solution.status.converged:
-            self._lost(step.before.p, step.after.p, GAP)
-            return
-        here = step.along(at)
-        side = np.sign(first.excess(k))
-        low = max((n for n in known if step.along(n[0]) <= here and np.sign(n[1].excess(k)) == side), key=lambda n: step.along(n[0]))  # fmt: skip
-        high = min((n for n in known if step.along(n[0]) >= here and np.sign(n[1].excess(k)) != side), key=lambda n: step.along(n[0]))  # fmt: skip
-        if not step.connected(low[0], high[0], self.tolerance):
-            self._lost(low[0].p, high[0].p, GAP)
-        else:
-            made = self._described(step, place, k, (first, last), (low, high), at)
-            self.crossings.append(_Crossing(whole.along(at), made))
-        self._within(whole, step.between(step.before, low[0]), place, first, low[1], neutral)
-        self._within(whole, step.between(high[0], step.after), place, high[1], last, neutral)
+            return GAP
+        here, side = step.along(at), np.sign(first.excess(k))
+        ways = [(step.along(point), np.sign(own.excess(k)) == side, (point, own)) for point, own in known]  # fmt: skip
+        low = max((w for w in ways if w[1] and w[0] <= here), key=lambda w: w[0])
+        high = min((w for w in ways if not w[1] and w[0] >= here), key=lambda w: w[0])
+        return at, low[2], high[2]
 
     def _described(
         self,
@@ -279,7 +305,7 @@ class _Walk:
         place: int,
         k: int,
         ends: tuple[Spectrum, Spectrum],
-        sides: tuple[tuple[Point, Spectrum], tuple[Point, Spectrum]],
+        sides: tuple[_Seen, _Seen],
         at: Point,
     ) -> Bifurcation:
         """Return what crosses between two neighbours of a located point."""

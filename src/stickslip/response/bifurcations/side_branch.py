@@ -10,7 +10,7 @@ from stickslip.errors import input_error
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.bifurcations.found import Bifurcation
 from stickslip.response.bifurcations.larger import every_sector, in_periods, over_periods
-from stickslip.response.bifurcations.leave import first_point, localised, open_directions
+from stickslip.response.bifurcations.leave import candidates, first_point, open_directions
 from stickslip.response.forced.problem import (
     Balance,
     ForcedPoint,
@@ -144,18 +144,17 @@ def side_branches(
     way = _Way(own, balance, following, points)
     made: list[SideBranch] = []
     begun: list[Point] = []
-    for direction in localised(open_ways, balance, group):
+    for direction in candidates(open_ways, balance, group):
         first = first_point(balance, main, direction, following, way.ends[1])
-        if first is not None and _same(balance, first, begun, group):
-            continue
-        if first is None:
-            end = "no solution lies beside the bifurcation in the direction that its equations leave open"
-            made.append(SideBranch(own, periods, (), end, group))
+        if first is None or _same(balance, first, begun, group):
             continue
         begun.append(first)
         found, end = way.followed(first, _Apart(balance, following, main, first))
         made.append(SideBranch(own, periods, tuple(map(way.point, found)), end, group))
-    return made
+    nothing = (
+        "no solution lies beside the bifurcation in the directions that its equations leave open"
+    )
+    return made or [SideBranch(own, periods, (), nothing, group)]
 
 
 def subharmonic_branch(

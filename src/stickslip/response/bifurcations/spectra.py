@@ -45,6 +45,10 @@ class Spectrum:
             return True
         return bool(self.errors[k] < abs(self.excess(k)))
 
+    def rough(self, k: int, error: float) -> bool:
+        """Whether the k-th multiplier may be on either side of the circle and is off by more than an `error`."""
+        return k < self.values.size and not self.known(k) and bool(self.errors[k] > error)
+
     def of_place(self, k: int) -> tuple[complex, float]:
         """Return the k-th multiplier and its error; zero where there are fewer."""
         if k >= self.values.size:
