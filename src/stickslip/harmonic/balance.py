@@ -1,5 +1,6 @@
 """Harmonic balance: residual and Jacobian of ``r(q, ω) = Z q + B λ(Bᵀ q) - F`` in scaled unknowns."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from time import perf_counter
@@ -7,7 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.contact.compiled import CompiledContacts, Evaluator
 from stickslip.contact.event_integrals import Events
 from stickslip.contact.interface import Interface, SparseRows, add_contact_jacobian, sparse_rows
@@ -197,6 +198,20 @@ class HarmonicBalance:
             product = own.operators[0] @ to_complex(q)[:, :, None] - own.loads[0]
             force = to_real(product[..., 0])
         return force.reshape(-1) / self.force_scale
+
+    def by_mass_damping(
+        self, x: FloatArray, omega: float, mass: Callable[[int], Matrix]
+    ) -> FloatArray:
+        """Return the (size,) derivative of the scaled residual by a rate, 1/s, of damping in proportion to the `mass` of each harmonic.
+
+        The motion is spread over all dofs, and the force of their mass is condensed as a load is.
+        """
+        spread = self.linear.recover_change(omega, self.coefficients(x))
+        moving = (h for h in self.harmonics if h > 0)
+        force = {h: -1j * h * omega * (mass(h) @ spread[h]) for h in moving}
+        load = HarmonicLoad(np.zeros(spread.shape[1]), force)
+        condensed = self.linear.with_load(load).products(omega, self.harmonics).load
+        return -condensed.reshape(-1) / self.force_scale
 
     def _by_matrices(
         self, x: FloatArray, omega: float, period: ContactPeriod

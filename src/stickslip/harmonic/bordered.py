@@ -34,12 +34,15 @@ class Setting:
         (m,) derivative of `omega` by the extra unknowns; those for which it is zero change the balance.
     linear_alone
         Whether they change nothing of it but its linear forces.
+    by_level
+        Derivative (size,) of the balance by the extra unknown that is no frequency, as a function of the state, where it is known.
     """
 
     balance: HarmonicBalance
     omega: float
     slopes: FloatArray
     linear_alone: bool = False
+    by_level: "Callable[[State], FloatArray] | None" = None
 
 
 Invert = Callable[[Jacobian], Inverse | None]
@@ -109,10 +112,15 @@ class State:
     def columns(self) -> FloatArray:
         """(size, m) derivatives of the balance by the extra unknowns: exact by the frequency, else central differences."""
         own = [
-            slope * self.at.jac_p if slope != 0.0 else self.by_extra(place, State.changed_residual)
+            slope * self.at.jac_p if slope != 0.0 else self._by_level(place)
             for place, slope in enumerate(self.setting.slopes)
         ]
         return np.stack(own, axis=1)
+
+    def _by_level(self, place: int) -> FloatArray:
+        """Return the derivative of the balance by an extra unknown that is no frequency."""
+        known = self.setting.by_level
+        return self.by_extra(place, State.changed_residual) if known is None else known(self)
 
     def changed_residual(self) -> FloatArray:
         """Return the residual of the balance, without what extra unknowns do not change."""

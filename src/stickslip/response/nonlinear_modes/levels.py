@@ -21,6 +21,7 @@ from stickslip.solve.linear import factorised
 from stickslip.solve.newton_method import Solution, first_converged, newton
 
 LARGEST = 0.1  # change of the shape in a step: with 0.25 a mode of a chain went past two of its four folds
+CORRECTIONS = 8  # Newton steps to a point: beyond a corner a shorter step takes fewer
 MORE = 2  # times the harmonics, and one, from one level to the next
 SAFETY = 1.25
 AGREE = 0.5  # share of the tolerance by which neighbouring levels may differ
@@ -113,7 +114,8 @@ class ModeCurve(Curve):
         own = self.problems[level]
         weights = np.ones(own.balance.size + 2)
         weights[: own.balance.linear.n] = 0.0
-        return Following(newton=own.how.newton, control=self.control, weights=weights)
+        few = replace(own.how.newton, max_iterations=CORRECTIONS)
+        return Following(newton=few, control=self.control, weights=weights)
 
     def fresh(self, level: int, p: float, near: Sequence[Followed], most: bool) -> Solution:
         """Solve at an amplitude from motions nearby, or from the linear mode about the static state."""

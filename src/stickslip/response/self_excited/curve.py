@@ -27,6 +27,7 @@ MOST_DOUBLINGS = 80
 SLIPS = 1e-6  # of the elastic force of the mode: what a contact adds that leaves its state
 ONSET = 1.01  # to which the amplitude is found at which slip begins
 LARGEST = 0.25
+QUICK = 10  # Newton steps from a motion that sticks to one that sticks about another mean
 PATIENT = Newton(max_iterations=60, globalisation="levenberg_marquardt")
 
 
@@ -130,10 +131,19 @@ class _Sticking:
         near: Sequence[FloatArray],
     ) -> "_Sticking | None":
         """Return the motion at an amplitude, from others that may be near; None if there is none."""
-        found = _solved(problem, equation, float(np.log(amplitude)), near)
+        p = float(np.log(amplitude))
+        found = (
+            newton(
+                lambda y: equation.linearise(y, p),
+                near[0],
+                replace(problem.how.newton, max_iterations=QUICK),
+            )
+            if near
+            else _solved(problem, equation, p, near)
+        )
         if not found.status.converged or contacts_of(problem, found.x, amplitude).slipping > 0.0:
             return None
-        left = equation.residual(found.x, float(np.log(amplitude)))
+        left = equation.residual(found.x, p)
         return cls(problem, equation, amplitude, found.x, NOISE * float(np.max(np.abs(left))))
 
     def grown(self, amplitude: float) -> FloatArray:

@@ -129,9 +129,18 @@ class SelfExcited:
 
         def setting(extra: FloatArray, p: float) -> Setting:
             made = self._setting(members(scale * float(extra[1])), float(extra[0]), p)
-            return replace(made, linear_alone=linear_alone or family is None)
+            known = self._by_damping if family is None and scale == 1.0 else None
+            return replace(made, linear_alone=linear_alone, by_level=known)
 
         return replace(self._bordered(setting, held), by_parameter=_by_size)
+
+    def _by_damping(self, state: State) -> FloatArray:
+        """Return the derivative of the balance by the level of damping."""
+        side, setting = self.system.structure, state.setting
+        slope = setting.balance.by_mass_damping(
+            state.x, setting.omega, lambda h: side.of_harmonic(h).mass
+        )
+        return -self.mode.omega * slope
 
     def limit_cycle(self) -> PeriodicProblem:
         """Return the equation of a motion of given damping, whose last unknown is ``ln a`` and whose parameter is its level: that of a limit cycle is zero."""
