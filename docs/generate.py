@@ -23,6 +23,7 @@ PARTS_OF_THE_PAGE = {
     "analyses": (
         "forced_response",
         "limit_cycle",
+        "nonlinear_mode",
         "resonance",
         "residual_tractions",
         "modes",

@@ -1,6 +1,6 @@
 """Backbones: frequency and damping ratio of a mode over its amplitude, from where nothing slips on.
 
-The extended periodic motion concept (Krack, Journal of Sound and Vibration 340 (2015) 70-86): with ``C - ξ M`` in place of the damping C the motion of every
+The extended periodic motion concept (Krack, Computers & Structures 154 (2015) 59-71): with ``C - ξ M`` in place of the damping C the motion of every
 amplitude is periodic, and ``ξ / 2ω`` is the damping ratio that it has without the added term. A conservative mode is one for which ξ comes out as zero.
 """
 

@@ -4,7 +4,7 @@ The balance has a given amplitude ``a`` of one coordinate in its first harmonic,
 zero, since time may begin anywhere. The unknowns beside the motion are ``ln ω`` and a *level*:
 
 - a damping of so many times the mass, which the motion needs to go on. Where it is zero the motion is a limit cycle (with positive damping
-  of the model it is negative: the extended periodic motion concept of Krack, Journal of Sound and Vibration 340 (2015) 70-86);
+  of the model it is negative: the extended periodic motion concept of Krack, Computers & Structures 154 (2015) 59-71);
 - any parameter of the model: a contact parameter, or a factor on the aerodynamic forces;
 - the amplitude itself, for the model as it is: the limit cycle.
 """
