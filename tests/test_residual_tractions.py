@@ -8,6 +8,7 @@ import pytest
 from evidence.models.lumped import blades_and_damper, lumped, system
 from evidence.validation.case_b8_residual_traction import TABLE, y2
 from stickslip import CoupledCoulomb, Interface, Iwan, Jenkins, RigidCoulomb, UnilateralSpring
+from stickslip.contact.element import element, element_step
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.parameter import Discretisation
@@ -167,6 +168,37 @@ def test_other_laws(law, rows):
     for end in (bounds.least, bounds.most):
         assert np.nanmax(np.abs(end.multipliers)) <= 1.0 + 1e-9
         assert confirmed(made, load, omega, end, 0, how, TimeStepping(steps_per_period=256)).agrees
+
+
+@dataclass(frozen=True, kw_only=True)
+class Own:
+    """A law of one's own, a Jenkins element: it says where its spring starts and what limits it."""
+
+    k_t: float
+    limit: float
+    slider: tuple[float, float] | None = None
+
+    kernel = element_step
+    pairs = 5
+
+    def parameters(self):
+        return element(k_t=self.k_t, mu=1.0, preload=self.limit, unilateral=False)
+
+    def initial_state(self):
+        return np.array(self.slider or (0.0, 0.0))
+
+    def stuck_stiffness(self):
+        return np.array([self.k_t, 0.0, 0.0])
+
+
+def test_a_law_of_ones_own_that_is_marched():
+    found = []
+    for law in (Own(k_t=1e4, limit=6.0), Jenkins(k_t=1e4, limit=6.0)):
+        made, load = stopped(law)
+        (bounds,) = traction_bounds(made, load, [130.0], 0, Discretisation(order=3), TractionSearch(starts=0))  # fmt: skip
+        found.append([end.amplitude for end in (bounds.least, bounds.reference, bounds.most)])
+    assert found[0] == pytest.approx(found[1], rel=1e-3)  # one on 256 samples, the other at events
+    assert found[1][2] > 1.02 * found[1][0]
 
 
 @dataclass(frozen=True)

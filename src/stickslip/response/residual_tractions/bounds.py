@@ -21,7 +21,7 @@ from stickslip.response.system import System
 from stickslip.solve.newton_method import newton
 
 PEAK_WIDTH = 3e-5  # relative width of the bracket of a resonance
-PEAK_TRIALS = 12  # frequencies that are tried in it
+PEAK_TRIALS = 9  # frequencies that are tried in it
 EQUAL = 1e-6  # relative difference of two bounds that are one
 
 End = Literal["least", "most"]
