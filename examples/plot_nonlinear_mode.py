@@ -41,7 +41,7 @@ for force in (0.02, 0.05, 0.1):
     load = ss.HarmonicLoad(np.zeros(1), {1: np.array([force + 0j])})
     swept = ss.Sweep(omega_range=(0.9, 1.4), low=[1, 3, 5], high=[1, 3, 5], selection="always_high")
     problem = ss.response.forced_problem(system, load, swept)
-    points = [p for p in ss.response.accepted_points(list(ss.forced_response(system, load, swept)))]
+    points = list(ss.response.accepted_points(list(ss.forced_response(system, load, swept))))
     points.sort(key=lambda p: p.omega)
     left.plot([p.omega for p in points], [problem.amplitude(p) for p in points], label=f"{force} N")
     peak = max(points, key=problem.amplitude)
