@@ -31,6 +31,7 @@ _SHARED = {  # tables that analyses take beside their own
     "nonlinear_mode": ("solver",),
     "resonance": ("solver",),
     "residual_tractions": ("solver",),
+    "all_motions": ("solver",),
     "run_up": ("harmonics", "solver", "limits"),
 }
 _OF_THE_MODEL = ("alert_over",)  # keys of them that a model has itself
@@ -154,6 +155,10 @@ class Model(Assembly):
     def modal_synthesis(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
         """Find forced responses at many levels from one nonlinear mode; keys such as ``levels=[0.5, 1, 2], mode=1, direct=True``."""
         return self._answer("modal_synthesis", keys, folder)
+
+    def all_motions(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+        """Search for motions that a sweep does not meet; keys such as ``frequency_hz=(80, 160), frequencies=5, starts=20, budget_s=60.0``."""
+        return self._answer("all_motions", keys, folder)
 
     def run_up(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
         """Follow the response over speed along engine orders; keys such as ``speeds_rpm=(3000, 9000), engine_orders=[4, 6], high=3``."""

@@ -28,6 +28,7 @@ from stickslip.report.quantities import NONE, fixed, quantity
 from stickslip.report.result import analysis, open_result, versions
 from stickslip.report.section import Card, Part, Section, Shown
 from stickslip.report.sections import (
+    all_motions,
     campbell,
     flutter,
     forced_response,
@@ -50,6 +51,7 @@ SECTIONS: tuple[Section, ...] = (
     modal_synthesis.SECTION,
     limit_cycle.SECTION,
     resonance.SECTION,
+    all_motions.SECTION,
     residual_tractions.SECTION,
     modes.SECTION,
     campbell.SECTION,

@@ -8,6 +8,7 @@ from time import perf_counter
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
+from stickslip.contact.compiled import Evaluator
 from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -83,6 +84,10 @@ class MotionSearch:
         Budget: no solve and no start begins after it, and deflation leaves half of it to the starts.
     seed
         Of the random states.
+    evaluator
+        How piecewise-linear laws are evaluated.
+    newton
+        Corrector.
     """
 
     omega_range: tuple[float, float]
@@ -99,6 +104,7 @@ class MotionSearch:
     steps: int = 512
     seconds: float = 120.0
     seed: int = 0
+    evaluator: Evaluator = "events"
     newton: Newton = field(default_factory=Newton)
 
     def __post_init__(self) -> None:
@@ -130,7 +136,7 @@ def search_problem(system: System, load: HarmonicLoad, search: MotionSearch) -> 
     order = search.harmonics
     sweep = Sweep(
         omega_range=search.omega_range, low=order, high=order, selection="always_low", points=search.points,
-        samples=max(search.samples, 8 * order), newton=search.newton,
+        samples=max(search.samples, 8 * order), evaluator=search.evaluator, newton=search.newton,
     )  # fmt: skip
     return forced_problem(system, load, sweep)
 

@@ -11,5 +11,6 @@ ANALYSES = {
     "flutter": "stickslip.study.analyses.flutter:FLUTTER",
     "safe": "stickslip.study.analyses.safe:SAFE",
     "resonance": "stickslip.study.analyses.resonance:RESONANCE",
+    "all_motions": "stickslip.study.analyses.all_motions:ALL_MOTIONS",
     "run_up": "stickslip.study.analyses.run_up:RUN_UP",
 }

@@ -1,0 +1,116 @@
+"""The node ``/all_motions`` of a result."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stickslip.response.all_motions.basins import APERIODIC, PERIODIC
+from stickslip.response.all_motions.found import AllMotions, AtFrequency
+from stickslip.study.analyses.analysis import Solved
+from stickslip.study.analyses.motions.words import case_verdicts
+from stickslip.study.analyses.verdict import ATTRIBUTE, of_all_cases, to_json
+from stickslip.study.analyses.waves.about import told
+from stickslip.study.keep.netcdf import stacked, variable
+from stickslip.units import HZ
+
+Variables = dict[str, xr.Variable]
+
+
+def dataset(solved: Sequence[Solved]) -> xr.Dataset:
+    """Return what was found in all cases."""
+    labels = [one.case.label for one in solved]
+    cases = [_of_case(one) for one in solved]
+    verdicts = [v for one, own in zip(solved, cases, strict=True) for v in case_verdicts(one.case.label, own)]  # fmt: skip
+    attributes = {ATTRIBUTE: to_json(of_all_cases(verdicts, labels)), "failed": 0}
+    return xr.Dataset(stacked(cases), attrs=attributes)
+
+
+def _of_case(solved: Solved) -> Variables:
+    """Return the variables of a case: those of its last note, which is written when the search is over."""
+    model = solved.notes.get("model", {})
+    found = solved.notes.get("found", {})
+    variables = told(model) | {
+        "output": variable("", str(model.get("output", "")), "1", "output whose amplitude is given")
+    }
+    return variables | {name: variable(dims, found[name], *about) for name, (dims, *about) in ABOUT.items() if name in found}  # fmt: skip
+
+
+ABOUT = {
+    "frequency_hz": ("branch point", "Hz", "frequency along each branch"),
+    "amplitude": ("branch point", "m", "amplitude of the output over the harmonics that the load drives"),
+    "origin": ("branch", "1", "how a branch was found: sweep, deflation or time"),
+    "end": ("branch", "1", "why it ends"),
+    "isola": ("branch", "1", "1: it closes in itself, and no sweep meets it"),
+    "peak_amplitude": ("branch", "m", "its largest amplitude"),
+    "peak_hz": ("branch", "Hz", "frequency there"),
+    "searched_hz": ("searched", "Hz", "frequencies that were searched"),
+    "starts": ("searched", "1", "random states that were integrated in time"),
+    "aperiodic": ("searched", "1", "those that end on no motion of the load's period, or on none in the periods allowed"),
+    "unsolved": ("searched", "1", "those that end on a periodic motion which is no solution with the harmonics kept"),
+    "motion_branch": ("searched motion", "1", "branch of each motion; -1 where there are no more"),
+    "motion_amplitude": ("searched motion", "m", "its amplitude"),
+    "motion_stability": ("searched motion", "1", "stable, unstable, undecided or not examined"),
+    "motion_multiplier": ("searched motion", "1", "modulus of the multiplier that decides"),
+    "motion_multiplier_error": ("searched motion", "1", "its error"),
+    "motion_count": ("searched motion", "1", "starts that end on it; -1 where there is no motion"),
+    "motion_share": ("searched motion", "1", "share of the starts that ends on it"),
+    "motion_share_low": ("searched motion", "1", "lower end of its 95 % interval (Clopper and Pearson)"),
+    "motion_share_high": ("searched motion", "1", "upper end"),
+    "tries": ("", "1", "deflated solves"),
+    "seconds": ("", "s", "what the search took"),
+    "budget_s": ("", "s", "budget"),
+    "spent": ("", "1", "1: the budget ended the search before all was tried that was asked for"),
+}  # fmt: skip
+
+
+def noted(found: AllMotions, budget: float) -> dict[str, Any]:
+    """Return what was found as named arrays."""
+    most = max((b.omega.size for b in found.branches), default=0)
+    lines = {name: np.full((len(found.branches), most), np.nan) for name in ("frequency_hz", "amplitude")}  # fmt: skip
+    for i, branch in enumerate(found.branches):
+        lines["frequency_hz"][i, : branch.omega.size] = branch.omega / HZ
+        lines["amplitude"][i, : branch.omega.size] = branch.amplitude
+    own = found.branches
+    return {
+        **lines,
+        "origin": np.array([b.origin for b in own], dtype=str),
+        "end": np.array([b.end for b in own], dtype=str),
+        "isola": np.array([int(b.isola) for b in own]),
+        "peak_amplitude": np.array([b.peak for b in own]),
+        "peak_hz": np.array([b.peak_omega / HZ for b in own]),
+        **_at(found.at),
+        "tries": found.tries,
+        "seconds": found.seconds,
+        "budget_s": budget,
+        "spent": int(found.spent),
+    }
+
+
+def _at(places: Sequence[AtFrequency]) -> Mapping[str, Any]:
+    """Return what was found at the frequencies that were searched."""
+    shape = (len(places), max((len(at.motions) for at in places), default=0))
+    numbers = ("amplitude", "multiplier", "multiplier_error", "share", "share_low", "share_high")
+    out: dict[str, Any] = {f"motion_{n}": np.full(shape, np.nan) for n in numbers}
+    out |= {"motion_branch": np.full(shape, -1), "motion_count": np.full(shape, -1)}
+    words = [[""] * shape[1] for _ in places]
+    for i, at in enumerate(places):
+        for k, motion in enumerate(at.motions):
+            words[i][k] = motion.stability
+            low, high = at.basins.interval(k)
+            told_of = {
+                "branch": motion.branch, "amplitude": motion.amplitude, "multiplier": motion.multiplier,
+                "multiplier_error": motion.error, "count": at.basins.count(k), "share": at.basins.share(k),
+                "share_low": low, "share_high": high,
+            }  # fmt: skip
+            for name, value in told_of.items():
+                out[f"motion_{name}"][i, k] = value
+    return {
+        **out,
+        "motion_stability": np.array(words, dtype=str).reshape(shape),
+        "searched_hz": np.array([at.omega / HZ for at in places]),
+        "starts": np.array([len(at.basins.ends) for at in places]),
+        "aperiodic": np.array([at.basins.count(APERIODIC) for at in places]),
+        "unsolved": np.array([at.basins.count(PERIODIC) for at in places]),
+    }

@@ -1,0 +1,86 @@
+"""What a search for all motions is given, picklable, and what it is solved with."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from stickslip.assembly.assembled import Assembled
+from stickslip.assembly.model import Model
+from stickslip.errors import InputError, input_error
+from stickslip.response.all_motions.search import MotionSearch, search_problem
+from stickslip.response.forced.problem import ForcedProblem
+from stickslip.study.analyses.analysis import Case
+from stickslip.study.analyses.facts import facts_of
+from stickslip.study.analyses.forced.question import peak_first
+from stickslip.study.analyses.motions.table import AllMotionsTable
+from stickslip.units import HZ, RPM
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """The search of one case.
+
+    Parameters
+    ----------
+    label
+        Of the case.
+    model
+        Assembled; its first output is the one whose amplitude is told.
+    search
+        How.
+    facts
+        What the result says of the model.
+    """
+
+    label: str
+    model: Assembled
+    search: MotionSearch
+    facts: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def problem(self) -> ForcedProblem:
+        """What is solved."""
+        return search_problem(self.model.system, self.model.load, self.search)
+
+
+def question_of(case: Case, model: Model) -> Question:
+    """Return what a job solves; whatever can be refused is, before anything long is computed.
+
+    Raises
+    ------
+    InputError
+        If a contact is rigid, no load vibrates, or the loads drive a harmonic that is not kept.
+    """
+    asked: AllMotionsTable = case.settings.all_motions
+    assembled = peak_first(model.assembled(2 * asked.harmonics, case.store))
+    if not any(np.any(f) for f in assembled.load.harmonics.values()):
+        raise input_error(
+            "all_motions",
+            "no load vibrates: nothing has a period",
+            "Add a load with a harmonic, or ask for [limit_cycle].",
+        )
+    low, high = asked.frequency_hz
+    search = MotionSearch(
+        omega_range=(HZ * low, HZ * high),
+        at=tuple(HZ * f for f in asked.at_hz or ()),
+        frequencies=asked.frequencies,
+        harmonics=asked.harmonics,
+        points=asked.points,
+        tries=asked.tries,
+        starts=asked.starts,
+        modes=asked.modes,
+        spread=asked.spread,
+        periods=asked.periods,
+        steps=asked.steps,
+        seconds=asked.budget_s,
+        seed=asked.seed,
+        evaluator=case.settings.solver.evaluator,
+    )
+    question = Question(case.label, assembled, search, facts_of(model, model.speed / RPM))
+    try:
+        _ = question.problem
+    except InputError as error:
+        raise error.inside("all_motions") from None
+    return question

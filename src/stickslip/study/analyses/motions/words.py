@@ -1,0 +1,121 @@
+"""What is told of all motions: verdicts, and what the terminal prints."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.analyses.verdict import Verdict
+from stickslip.study.keep.netcdf import alike, one_case
+
+HIGHER = 1.001  # times the swept peak, from where a branch is said to reach higher
+
+
+def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
+    """Return what is to be thought of a case from its variables."""
+    if "origin" not in case:
+        return [Verdict("wrong", label, None, "the search was not finished", "Run it again.")]
+    found = [*_higher(label, case), *_basins(label, case)]
+    seconds, budget = float(case["seconds"].values), float(case["budget_s"].values)
+    tries, starts = int(case["tries"].values), int(np.sum(case["starts"].values))
+    work = f"{tries} deflated solves and {starts} starts in time in {seconds:.3g} s"
+    if int(case["spent"].values):
+        why = f"the budget of {budget:.4g} s ended the search: {work}"
+        found.append(Verdict("doubtful", label, None, why, "Raise all_motions.budget_s."))
+    unsolved = int(np.sum(case["unsolved"].values))
+    if unsolved:
+        why = f"{unsolved} starts end on a periodic motion that is no solution with the harmonics kept"
+        found.append(Verdict("doubtful", label, None, why, "Raise all_motions.harmonics."))
+    if not any(v.rank for v in found):
+        count = len(case["origin"].values)
+        isolas = int(np.sum(case["isola"].values))
+        why = f"{_counted(count, 'branch', 'branches')}, {_counted(isolas, 'isola', 'isolas')} among them, by {work}; no search proves that there is no other motion"
+        found.append(Verdict("trusted", label, None, why))
+    return found
+
+
+def _higher(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
+    """Return the branches that reach higher than the one of the sweep."""
+    origin, peak, hertz = (case[k].values for k in ("origin", "peak_amplitude", "peak_hz"))
+    swept = float(np.max(peak[origin == "sweep"], initial=0.0))
+    found = []
+    for i in np.flatnonzero((origin != "sweep") & (peak > HIGHER * swept)):
+        kind = "an isola" if case["isola"].values[i] else "a branch that no sweep meets"
+        why = f"{kind} reaches {1e3 * peak[i]:.4g} mm at {hertz[i]:.6g} Hz, {peak[i] / swept:.3g} times the peak of the sweep"
+        remedy = "A disturbance can throw the machine there: count on the larger amplitude."
+        found.append(Verdict("trusted", label, None, why, remedy, warns=True))
+    return found
+
+
+def _basins(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
+    """Return where most starts end on no motion of the sweep's branch, or on none that repeats."""
+    found = []
+    origin, hertz = case["origin"].values, case["searched_hz"].values
+    branch, share = case["motion_branch"].values, case["motion_share"].values
+    for i, starts in enumerate(case["starts"].values):
+        if not starts:
+            continue
+        aperiodic = int(case["aperiodic"].values[i])
+        if aperiodic > 0:
+            why = f"{aperiodic} of {starts} starts end on no motion of the load's period within the periods allowed"
+            found.append(Verdict("trusted", label, float(hertz[i]), why, "Raise all_motions.periods, or ask for [forced_response] with bifurcations.", warns=True))  # fmt: skip
+        if not np.any(np.isfinite(share[i])):
+            continue
+        most = int(np.nanargmax(share[i]))
+        low = 100 * case["motion_share_low"].values[i, most]
+        high = 100 * case["motion_share_high"].values[i, most]
+        if origin[branch[i, most]] != "sweep":
+            why = (
+                f"most starts end on a branch that no sweep meets: {100 * share[i, most]:.3g} % ({low:.3g} to {high:.3g} %), amplitude "
+                f"{1e3 * case['motion_amplitude'].values[i, most]:.4g} mm"
+            )
+            found.append(Verdict("trusted", label, float(hertz[i]), why, "The branch of the sweep is not what the machine is most likely to do.", warns=True))  # fmt: skip
+    return found
+
+
+def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
+    """Return what the terminal prints: the motions at the frequencies that were searched."""
+    found = []
+    groups = alike(data)
+    for group in groups:
+        case = one_case(data, group[0])
+        if "origin" not in case:
+            continue
+        labels = [str(data["case_label"].values[i]) for i in group if len(groups) > 1]
+        found.append(_table(case, f"{'; '.join(labels)}: " if labels else ""))
+    return tuple(found)
+
+
+def _table(case: xr.Dataset, head: str) -> TextTable:
+    rows = []
+    branch = case["motion_branch"].values if "motion_branch" in case else np.zeros((0, 0), int)
+    for i, own in enumerate(branch):
+        for k in np.flatnonzero(own >= 0):
+            of = {n: case[f"motion_{n}"].values[i, k] for n in ("amplitude", "stability", "count", "share", "share_low", "share_high")}  # fmt: skip
+            starts = int(case["starts"].values[i])
+            share = f"{100 * of['share']:.3g} ({100 * of['share_low']:.2g} to {100 * of['share_high']:.2g})"
+            rows.append(
+                (
+                    f"{case['searched_hz'].values[i]:.6g}",
+                    f"{own[k] + 1}, {case['origin'].values[own[k]]}",
+                    f"{1e3 * of['amplitude']:.6g}",
+                    str(of["stability"]),
+                    share if starts else "-",
+                )
+            )
+    title = f"{head}Motions of {case.attrs.get('output', '')}"
+    lines = [
+        f"Branch {i + 1} ({case['origin'].values[i]}): up to {1e3 * peak:.6g} mm at {case['peak_hz'].values[i]:.6g} Hz; {case['end'].values[i]}"
+        for i, peak in enumerate(case["peak_amplitude"].values)
+    ]
+    budget = (
+        f"{float(case.attrs['seconds']):.3g} s of a budget of {float(case.attrs['budget_s']):.4g} s"
+    )
+    lines.append(f"{int(case.attrs['tries'])} deflated solves; {budget}.")
+    columns = ("Hz", "branch", "amplitude mm", "stability", "starts that end on it, %")
+    return TextTable(title, columns, tuple(rows), tuple(lines))
+
+
+def _counted(count: int, one: str, several: str) -> str:
+    return f"{count} {one if count == 1 else several}"

@@ -1,0 +1,113 @@
+"""[all_motions] of a study: an isola named in verdicts and on the page, resuming, Python, bad input."""
+
+import numpy as np
+import pytest
+
+from stickslip.errors import InputError
+from stickslip.front.study import Study
+from stickslip.report.sections.all_motions import Motions, basin_table, branch_table, branches
+from stickslip.study.keep.netcdf import one_case
+from stickslip.study.models.study import read_study
+from stickslip.study.run import run_study
+from stickslip.units import HZ
+
+# softening, then hardening: an isola above the resonance, see test_all_motions.py
+STUDY = """
+schema_version = 2
+[part.mass]
+shape = "lumped"
+masses_kg = [1.0]
+springs_n_per_m = [["ground", 1, 1.0]]
+dashpots_n_s_per_m = [["ground", 1, 0.05]]
+[contact.spring]
+between = ["mass.m1", "ground"]
+law = "polynomial_spring"
+along_t = [0.0, 0.0, -2.0, 0.0, 1.0]
+[load.shaker]
+on = "mass.m1"
+force_n = 0.02
+[all_motions]
+frequency_hz = [0.016, 0.2]
+at_hz = [0.055]
+harmonics = 1
+tries = 25
+starts = 12
+steps = 64
+periods = 200
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    home = tmp_path_factory.mktemp("all_motions")
+    (home / "study.toml").write_text(STUDY, encoding="utf-8")
+    return home
+
+
+@pytest.fixture(scope="module")
+def result(folder):
+    return Study.from_file(folder / "study.toml").run()
+
+
+def test_a_study_names_the_isola_that_reaches_higher(result):
+    case = one_case(result.data["all_motions"].to_dataset(), 0)
+    assert case["origin"].values.tolist()[0] == "sweep"
+    assert int(np.sum(case["isola"].values)) == 1
+    assert any("an isola reaches" in v.why and v.warns for v in result.verdicts)
+    words = set(case["motion_stability"].values.reshape(-1)) - {""}
+    assert words <= {"stable", "unstable", "undecided"}
+    counts = case["motion_count"].values[0]
+    assert (
+        counts[counts >= 0].sum() + case["aperiodic"].values[0] + case["unsolved"].values[0] == 12
+    )
+    low, share, high = (case[f"motion_{n}"].values[0] for n in ("share_low", "share", "share_high"))
+    assert np.all(low <= share)
+    assert np.all(share <= high)
+
+
+def test_the_page_draws_all_branches_and_tells_the_basins(result, folder):
+    view = Motions(one_case(result.data["all_motions"].to_dataset(), 0))
+    figure = branches(view).figure
+    assert sum(t.mode == "lines" for t in figure.data) == len(view.names)
+    assert "isola" in branch_table(view)
+    assert "of 12" in basin_table(view)
+    page = result.report(folder / "page.html").read_text(encoding="utf-8")
+    assert "All motions that were found" in page
+
+
+def test_a_finished_run_searches_nothing_again_and_gives_the_same(result, folder):
+    again = run_study(read_study(folder / "study.toml"))
+    one, other = (tree["all_motions"].to_dataset() for tree in (result.data, again.tree))
+    np.testing.assert_array_equal(one["amplitude"].values, other["amplitude"].values)
+    assert one["seconds"].values == other["seconds"].values
+
+
+def test_python_gives_the_motions_of_a_study(folder):
+    model = Study.from_file(folder / "study.toml").model()
+    found = model.all_motions(
+        frequency_hz=(0.016, 0.2), at_hz=[0.055], harmonics=1, tries=3, starts=0
+    )
+    data = found.data["all_motions"]
+    hertz = data["searched_hz"].values.reshape(-1)
+    assert hertz == pytest.approx([0.055])
+    # one mass, one harmonic: ((K - ω²)² + c²ω²) a² = F² at every motion
+    a = data["motion_amplitude"].values.reshape(-1)
+    s, omega = a[np.isfinite(a)] ** 2, 0.055 * HZ
+    k = 1.0 - 1.5 * s + 0.625 * s**2
+    np.testing.assert_allclose(((k - omega**2) ** 2 + (0.05 * omega) ** 2) * s, 0.02**2, rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("at_hz = [0.5]", "all_motions.at_hz"),
+        ("steps = 4", "all_motions.steps"),
+        ("budget_s = 0.0", "all_motions.budget_s"),
+    ],
+)
+def test_bad_tables_are_refused_by_key(tmp_path, line, said):
+    key = line.split(" = ", maxsplit=1)[0]
+    kept = [own for own in STUDY.splitlines() if not own.startswith(key)]
+    (tmp_path / "study.toml").write_text("\n".join([*kept, line]), encoding="utf-8")
+    with pytest.raises(InputError, match=said):
+        read_study(tmp_path / "study.toml")
