@@ -157,13 +157,16 @@ class ModalOscillator:
         parts = self._first(place)
         return np.asarray((parts[0] + 1j * parts[1]) * self.at(place).amplitude[:, None])
 
+    @cached_property
+    def _all(self) -> PchipInterpolator:
+        # what vibrates grows with the amplitude, and the mean does not
+        size = self.at(self.place).amplitude[:, None, None]
+        relative = np.concatenate([self.motion[:, :1], self.motion[:, 1:] / size], axis=1)
+        return PchipInterpolator(self.place, np.stack([relative.real, relative.imag]), axis=1)
+
     def displacement(self, place: FloatArray, dofs: IntArray | None = None) -> ComplexArray:
         """Return (p, H+1, k) displacements of dofs at places, m, in the phase of the backbone; None: all dofs."""
-        own = self.motion if dofs is None else self.motion[:, :, dofs]
-        size = self.at(self.place).amplitude[:, None, None]
-        # what vibrates grows with the amplitude, and the mean does not
-        relative = np.concatenate([own[:, :1], own[:, 1:] / size], axis=1)
-        parts = PchipInterpolator(self.place, np.stack([relative.real, relative.imag]), axis=1)(place)  # fmt: skip
+        parts = self._all(place) if dofs is None else self._all(place)[..., dofs]
         found = parts[0] + 1j * parts[1]
         found[:, 1:] *= self.at(place).amplitude[:, None, None]
         return np.asarray(found)

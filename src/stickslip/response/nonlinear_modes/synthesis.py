@@ -19,7 +19,7 @@ from stickslip.response.nonlinear_modes.one_mass import ModalOscillator
 POINTS = 161  # of the amplitudes of a curve, each with a frequency on either side
 REAL = 1e-6  # relative imaginary part of a root that counts as none: where two meet, rounding has its square root
 DIFFERENCE = 1e-5  # of the place, over which derivatives are taken
-AT_A_CORNER = 1e-9  # of the place, in finding a peak
+CLOSE = 1e-9  # of the place, in finding a peak
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +42,8 @@ class Synthesised:
         0: that which comes from small amplitudes; 1 and so on: detached ones.
     stable
         Whether slow changes of amplitude and phase of this mode die out.
+    resonances
+        Where the sides of its curves meet.
     """
 
     level: float
@@ -51,6 +53,12 @@ class Synthesised:
     phase: FloatArray
     curve: IntArray
     stable: BoolArray
+    resonances: "tuple[Resonance, ...]" = ()
+
+    @property
+    def peaks(self) -> "tuple[Resonance, ...]":
+        """The resonances that are peaks."""
+        return tuple(r for r in self.resonances if r.top)
 
 
 @dataclass(frozen=True)
@@ -98,7 +106,7 @@ def resonances(oscillator: ModalOscillator, level: float) -> list[Resonance]:
         def more(place: float) -> float:
             return float(np.log(oscillator.needed(np.array([place]))[0] / level))
 
-        place = float(scipy.optimize.brentq(more, table[i], table[i + 1], xtol=AT_A_CORNER))
+        place = float(scipy.optimize.brentq(more, table[i], table[i + 1], xtol=CLOSE))
         here = oscillator.at(np.array([place]))
         omega = float(here.resonance()[0])
         found.append(Resonance(level, place, omega, float(here.amplitude[0]), bool(excess[i] < 0.0)))  # fmt: skip
@@ -117,7 +125,8 @@ def synthesise(oscillator: ModalOscillator, level: float, points: int = POINTS) 
     points
         Amplitudes of a curve, each with a frequency on either side of the resonance.
     """
-    meets = [r.place for r in resonances(oscillator, level)]
+    found = resonances(oscillator, level)
+    meets = [r.place for r in found]
     first, last = oscillator.ends
     parts: list[tuple[FloatArray, FloatArray]] = []
     for a, b in pairwise([first, *meets, last]):
@@ -130,16 +139,18 @@ def synthesise(oscillator: ModalOscillator, level: float, points: int = POINTS) 
     here = oscillator.at(place)
     phase = np.angle(here.force / here.stiffness(omega)) if parts else np.zeros(0)
     stable = _stable(oscillator, place, omega)
-    return Synthesised(level, place, omega, here.amplitude, phase, curve.astype(np.int64), stable)
+    return Synthesised(
+        level, place, omega, here.amplitude, phase, curve.astype(np.int64), stable, tuple(found)
+    )
 
 
 def at_resonance(oscillator: ModalOscillator, found: Resonance) -> Synthesised:
-    """Return a resonance as a response of one point."""
+    """Return a resonance as a response of one point, stable where it is a peak."""
     place, omega = np.array([found.place]), np.array([found.omega])
     here = oscillator.at(place)
     phase = np.angle(here.force / here.stiffness(omega))
-    no, stable = np.zeros(1, dtype=np.int64), _stable(oscillator, place, omega)
-    return Synthesised(found.level, place, omega, here.amplitude, phase, no, stable)
+    no, stable = np.zeros(1, dtype=np.int64), np.array([found.top])
+    return Synthesised(found.level, place, omega, here.amplitude, phase, no, stable, (found,))
 
 
 def motions_at(oscillator: ModalOscillator, level: float, omega: float) -> FloatArray:

@@ -105,10 +105,10 @@ def judged(alone: Isolation, resolved: float) -> tuple[str, str]:
 def _level(shared: Synthesis, level: float) -> SynthesisLevel:
     began = process_time()
     own, question = shared.oscillator, shared.question
-    tops = [r for r in resonances(own, level) if r.top]
+    curve = synthesise(own, level)
+    tops = curve.peaks
     peaks = [abs(_first(shared, r)) for r in tops]
     at = int(np.argmax(peaks)) if peaks else -1
-    curve = synthesise(own, level)
     alone = isolation(shared.others, tops[at], question.dof) if peaks else NOBODY
     resolved = _resolved(shared, tops[at]) if peaks else np.nan
     answer, why = "beyond", "the nonlinear mode ends before it needs so much of the load"
