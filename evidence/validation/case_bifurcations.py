@@ -2,7 +2,9 @@
 
 The absorber is the nonlinear tuned vibration absorber on a Duffing oscillator of G. Habib, T. Detroux, R. Viguié and G. Kerschen (arXiv
 1604.03868), mass ratio 5 %, by their rule for its stiffness, damping and cubic coefficient. The bifurcations that they print were not at
-hand: the reference is the flow of the equations by SciPy's DOP853 with its derivative, whose multipliers are 1 in modulus there.
+hand: the reference is the flow of the equations by SciPy's DOP853 with its derivative, whose multipliers are 1 in modulus there. The oscillator with two wells, x'' + 0.3 x' - x +
+x^3 = g cos 1.2 t, is the textbook's way to chaos (D. W. Jordan and P. Smith, Nonlinear Ordinary Differential Equations): period 1 at g =
+0.20, 2 at 0.28, 4 at 0.29.
 """
 
 from collections.abc import Callable
@@ -22,6 +24,7 @@ MASS_RATIO, FORCE = 0.05, 0.11
 NEAR = 2e-4  # relative distance within which the root is looked for
 SECTORS, COUPLING, DRIVE = 4, 0.03, 0.008
 CLOSE = 1e-5  # of states, with the harmonics 1, 3 and 5
+WELL_OMEGA, SETTLED = 1.2, 400  # rad/s; periods
 SMALLEST = 2e-6  # relative error that shooting is good to
 
 
@@ -168,6 +171,52 @@ def of_ring() -> list[Record]:
     return records
 
 
+def doublings(force: float) -> list[float]:
+    """Return the frequencies of the load at which the motion in one well doubles its period, and then again."""
+    structure = ss.model.lumped(np.ones(1), np.ones((1, 1)), np.array([[0.3]]), ("mass",))
+    well = ss.PolynomialSpring(
+        along_t=(1.0, 3.0, 1.0)
+    )  # with the structure's spring: -x + x^3 about x = 1
+    spring = ss.Interface(("well",), (well,), np.array([[1.0], [0.0], [0.0]]))
+    system = ss.System(structure, spring, np.array([0]))
+    load = ss.HarmonicLoad(np.zeros(1), {1: np.array([force + 0j])})
+    sweep = ss.Sweep(
+        omega_range=(1.1, 1.5), low=8, high=8, selection="always_high", points=12, direction="down"
+    )
+    problem = ss.response.forced_problem(system, load, sweep)
+    points = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))
+    found: list[float] = []
+    for once in bifurcations(problem, points).found:
+        (branch,) = side_branches(problem, once)
+        again = bifurcations(branch.problem, branch.points).found
+        found += [once.omega, *(branch.periods * b.omega for b in again)]
+    return found
+
+
+def periods_in_time(force: float) -> int:
+    """Return after how many periods of the load the motion in a well repeats itself, by integration."""
+
+    def rate(t: float, y: FloatArray) -> FloatArray:
+        x, v = y
+        return np.array([v, force * np.cos(WELL_OMEGA * t) - 0.3 * v + x - x**3])
+
+    at = 2 * np.pi / WELL_OMEGA * np.arange(SETTLED + 17)
+    course = scipy.integrate.solve_ivp(rate, (0.0, at[-1]), [1.0, 0.0], "DOP853", rtol=1e-9, atol=1e-11, t_eval=at).y[0, SETTLED:]  # fmt: skip
+    return next(p for p in (1, 2, 4, 8, 0) if p == 0 or np.abs(course[p:] - course[:-p]).max() < 1e-4)  # fmt: skip
+
+
+def of_wells() -> list[Record]:
+    """Compare after how many periods a motion in one well repeats itself."""
+    case = f"oscillator with two wells, {WELL_OMEGA} rad/s"
+    records = []
+    for force, printed in ((0.20, 1), (0.28, 2), (0.29, 4)):
+        passed = sum(omega > WELL_OMEGA for omega in doublings(force))
+        for reference, source in ((printed, "Jordan and Smith"), (periods_in_time(force), "SciPy")):
+            name = f"periods at {force} N, by the doublings located"
+            records.append(record(case, name, 2.0**passed, reference, 0.0, source))
+    return records
+
+
 def run() -> list[Record]:
     """Compare the frequency of each bifurcation, within the error that is told of it; and localised motions of a ring."""
     case = f"absorber on a Duffing oscillator, {FORCE} N"
@@ -180,4 +229,4 @@ def run() -> list[Record]:
         state = state_of(one.point.coefficients, one.omega)
         root = judges[one.kind](equations, one.omega, state)
         records.append(record(case, name, one.omega, root, told, SOURCE))
-    return records + of_ring()
+    return records + of_ring() + of_wells()
