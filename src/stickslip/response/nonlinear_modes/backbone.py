@@ -185,10 +185,12 @@ def nonlinear_mode(
         decaying=along.concept == "decaying",
     )
     first, last = (float(np.log(a)) for a in span)
-    route = Route(first=first, last=last, points=along.points, leaves=False)
+    route = Route(first=first, last=last, points=along.points)
     found = _followed(curve, route, to_gross_slip=along.to_gross_slip)
     made = tuple(mode_point(curve, f) for f in found)
     end = _end(made, found[-1], route.last, stops=along.to_gross_slip)
+    anew = sum(f.converged and f.point.step == curve.control.first for f in found[1:])
+    end += f"; taken up again {anew} time{'s' * (anew > 1)} where it led nowhere" if anew else ""
     return Backbone(system, load, mode, dof, made, end)
 
 

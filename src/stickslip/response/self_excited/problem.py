@@ -28,7 +28,7 @@ from stickslip.response.self_excited.modes import StuckMode
 from stickslip.response.system import System
 from stickslip.solve.linear import factorised
 
-WANDERED = 1.0  # |ln(ω / ω_0)| at which a corrector has lost the mode
+WANDERED = 3.0  # |ln(ω / ω_0)| at which a corrector has lost the mode
 FARTHEST = 100.0  # |ln a| beyond which there are no motions
 STILL = 1e-6  # of the largest amplitude of a mode: a coordinate that moves less is none of it
 SAMPLES_A_HARMONIC = 16

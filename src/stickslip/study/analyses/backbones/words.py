@@ -10,7 +10,7 @@ from stickslip.study.analyses.cycles.words import branch_name
 from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.keep.netcdf import alike, one_case
 
-LIFTS = "lift-off"
+LIFTS, AGAIN = "lift-off", "taken up again"  # in the words of `Backbone.end`
 
 
 def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
@@ -33,7 +33,8 @@ def _of_branch(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verd
     status = case["status"].values[i]
     gaps = int(np.count_nonzero(status > 0))
     solved = np.flatnonzero(status == 0)
-    if solved.size and np.any(status[: solved[-1]] > 0):
+    lost = solved.size > 0 and bool(np.any(status[: solved[-1]] > 0))
+    if lost or AGAIN in end:
         why = f"{name}: it was lost and taken up again further on; {gaps} of its points are no motions"
         found.append(Verdict("doubtful", label, None, why, "What lies beyond may be another mode."))
     known = np.where(status == 0, case["change"].values[i], np.nan)
