@@ -10,6 +10,11 @@ from typer.testing import CliRunner
 
 from stickslip.cli import app
 from stickslip.errors import InputError
+from stickslip.response.forced.response import forced_response
+from stickslip.study.analyses.forced import bifurcating
+from stickslip.study.analyses.forced.bifurcating import located
+from stickslip.study.analyses.forced.points import collect
+from stickslip.study.analyses.forced_response import FORCED_RESPONSE
 from stickslip.study.models.study import read_study
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "impacting_mass" / "study.toml"
@@ -64,3 +69,28 @@ def test_check_names_the_cost(tmp_path):
     shutil.copy(EXAMPLE, tmp_path)
     said = CliRunner().invoke(app, ["check", str(tmp_path / EXAMPLE.name)]).output
     assert "bifurcations: multipliers along the branch, of at most 300 motions" in " ".join(said.split())  # fmt: skip
+
+
+class Kept(dict):
+    """Notes without a file."""
+
+    def put(self, name, values):
+        self[name] = dict(values)
+
+
+def test_an_interrupted_search_asks_for_no_multipliers_again(monkeypatch):
+    (case,) = read_study(EXAMPLE).cases()
+    asked = FORCED_RESPONSE.inputs(case, case.build())
+    sweep = asked.sweep
+    points = list(forced_response(asked.model.system, asked.model.load, sweep))
+    response = collect(asked.problem, points, asked.model.peak_output)
+    notes = Kept()
+    first = located(asked, response, notes)
+
+    def refused(problem, point):
+        raise AssertionError
+
+    monkeypatch.setattr(bifurcating, "stability", refused)
+    again = located(asked, response, notes)
+    assert [b.sentence for b in again.found] == [b.sentence for b in first.found]
+    assert again.examined == first.examined > 20

@@ -129,7 +129,7 @@ class ForcedResponseAnalysis:
             notes.put(BLADES, of_blades(inputs, response))
         _judge(inputs, response, notes)
         if inputs.bifurcations != "off" and notes.get(BIFURCATIONS) is None:
-            notes.put(BIFURCATIONS, _bifurcations(inputs, response))
+            notes.put(BIFURCATIONS, _bifurcations(inputs, response, notes))
         if HARMONICS in inputs.checks:
             _check_harmonics(inputs, response, notes)
         if failure is not None:
@@ -242,9 +242,9 @@ def _answer_in_time(
         notes.put(NOT_PERIODIC, of_answers(answers))
 
 
-def _bifurcations(question: Question, response: Response) -> Values:
+def _bifurcations(question: Question, response: Response, notes: Notes) -> Values:
     """Locate the bifurcations of the response, and follow what leaves there."""
-    found = located(question, response)
+    found = located(question, response, notes)
     for line in found.sentences:
         LOG.info(f"bifurcations: {question.said(line)}")
     sides = followed(question, found)

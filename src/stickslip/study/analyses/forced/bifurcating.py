@@ -1,6 +1,7 @@
 """The bifurcations of a response, and the branches that leave there: what a job puts down of them."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -8,7 +9,10 @@ from stickslip.errors import StickslipError
 from stickslip.response.bifurcations.found import Bifurcation, Bifurcations
 from stickslip.response.bifurcations.locate import MOST, bifurcations
 from stickslip.response.bifurcations.side_branch import POINTS, SideBranch, side_branches
-from stickslip.response.stability import Stability
+from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
+from stickslip.response.stability import Stability, stability
+from stickslip.response.time.floquet import Floquet
+from stickslip.study.analyses.analysis import Notes
 from stickslip.study.analyses.forced.curve import branch_length
 from stickslip.study.analyses.forced.examination import FLOPS, examination_work
 from stickslip.study.analyses.forced.points import Response
@@ -17,13 +21,41 @@ from stickslip.study.analyses.forced.stable import unexaminable
 from stickslip.study.analyses.forced.values import Values, texts
 from stickslip.units import HZ
 
+COUNTS = ("resting", "grazing", "transitions")  # of a stability
 LEAVES = ("period doubling", "branch point")  # kinds from which a periodic branch is followed
 MOST_FOLLOWED = 6  # bifurcations of a case from which branches are followed
 BY_VERDICT = {"stable": 0, "unstable": 1, "undecided": 2}
 NOT_EXAMINED = 3
 
 
-def located(question: Question, response: Response) -> Bifurcations:
+@dataclass(eq=False)
+class Remembered:
+    """Multipliers in the order in which they are asked for; what an interrupted run has asked for is not done again."""
+
+    notes: Notes
+    count: int = 0
+
+    def __call__(self, problem: ForcedProblem, point: ForcedPoint) -> Stability:
+        """Return what becomes of disturbances of a motion."""
+        self.count += 1
+        name = f"bifurcations.{self.count}"
+        known = self.notes.get(name)
+        if known is None or known["omega"] != point.omega:
+            found = stability(problem, point)
+            values = found.floquet.multipliers
+            known = {
+                "omega": point.omega,
+                "re": values.real,
+                "im": values.imag,
+                "errors": found.errors,
+            }
+            self.notes.put(name, known | {word: getattr(found, word) for word in COUNTS})
+            return found
+        floquet = Floquet(np.asarray(known["re"]) + 1j * np.asarray(known["im"]))
+        return Stability(floquet, np.asarray(known["errors"]), *(int(known[w]) for w in COUNTS))
+
+
+def located(question: Question, response: Response, notes: Notes) -> Bifurcations:
     """Return the bifurcations along the branch of a response: all that were asked for, folds alone where nothing can be examined."""
     every = response.accepted
     along = branch_length(np.array([a.point.stage == "peak" for a in every], dtype=float))
@@ -31,7 +63,7 @@ def located(question: Question, response: Response) -> Bifurcations:
     if question.bifurcations == "folds" or unexaminable(question):
         return bifurcations(question.problem, branch, examine=None)
     try:
-        return bifurcations(question.problem, branch)
+        return bifurcations(question.problem, branch, examine=Remembered(notes))
     except StickslipError:  # as the examination of the peak has told
         return bifurcations(question.problem, branch, examine=None)
 
