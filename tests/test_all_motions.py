@@ -50,7 +50,7 @@ def duffing() -> tuple[System, HarmonicLoad]:
 def found():
     system, load = duffing()
     search = MotionSearch(
-        omega_range=(0.6, 1.7), at=(OMEGA,), harmonics=1, points=30, starts=24, steps=128, periods=300
+        omega_range=(0.6, 1.7), at=(OMEGA,), harmonics=1, points=30, starts=24, steps=128, most_periods=300
     )  # fmt: skip
     return all_motions(system, load, search)
 
@@ -146,6 +146,50 @@ def test_deflation_finds_the_isola_of_the_closed_form_and_follows_it_round():
     assert not result.spent
 
 
+# ---- motions of a third of the frequency: nothing leads to them from the response -----------------------------------------------
+
+THIRD_C, THIRD_F = 0.002, 0.6
+
+
+def thirds(omega: float) -> np.ndarray:
+    """Amplitudes a of x = A cos(ωt + φ) + a cos(ωt/3) with harmonics ω/3 and ω alone, from both balances by roots over a².
+
+    Of ω/3: (1 - ω²/9 + κ(3/4 a² + 3/2 A²))² + (cω/3)² = (3/4 κ a A)²; of ω: the force that is left has the size F.
+    """
+    found = []
+    a = np.linspace(0.05, 3.0, 20_000)
+    # at each a the first equation gives A² by a quadratic; the second must then hold
+    w3 = omega / 3.0
+    d = 1.0 - w3**2 + 0.75 * a**2
+    damp = THIRD_C * w3
+    # (d + 1.5 B)² + damp² = (9/16) a² B with B = A²
+    b, c0 = 3.0 * d - 0.5625 * a**2, d**2 + damp**2
+    root = b**2 - 9.0 * c0
+    for sign in (1.0, -1.0):
+        big = (-b + sign * np.sqrt(np.maximum(root, 0.0))) / 4.5
+        size = np.sqrt(np.maximum(big, 0.0))
+        # both components turn into one equation for the phase ψ of A against a: 3/4 a A e^{iψ} = -(d + 1.5 B + i damp)
+        turn = -(d + 1.5 * big + 1j * damp) / np.maximum(0.75 * a * size, 1e-300)
+        rest = (
+            1.0 - omega**2 + 0.75 * big + 1.5 * a**2 + 1j * THIRD_C * omega
+        ) * size * turn + 0.25 * a**3
+        miss = np.where((root > 0.0) & (big > 0.0), np.abs(rest) - THIRD_F, np.nan)
+        there = np.flatnonzero(miss[:-1] * miss[1:] < 0.0)
+        found += [a[i] - miss[i] * (a[i + 1] - a[i]) / (miss[i + 1] - miss[i]) for i in there]
+    return np.sort(found)
+
+
+def test_motions_of_a_third_of_the_frequency_are_an_isola_and_those_of_two_harmonics():
+    omega = 4.2
+    system, load = one_mass(CubicSpring(cubic_t=1.0, k_t=1e-12), THIRD_C, THIRD_F)
+    search = MotionSearch(
+        omega_range=(3.6, 4.6), at=(omega,), periods=3, harmonics=1, points=20, tries=25, starts=0
+    )
+    found = all_motions(system, load, search).at[0]
+    own = np.sort([abs(m.coefficients[1, 0]) for m in found.motions if m.branch > 0])
+    np.testing.assert_allclose(own, thirds(omega), rtol=1e-4)
+
+
 # ---- a stop ----------------------------------------------------------------------------------------------------------------
 
 STOP, CLEARANCE, DAMPING, DRIVE, FAST = 3.0, 1.0, 0.04, 0.1, 1.15
@@ -180,7 +224,7 @@ def test_a_mass_beside_a_stop_moves_without_and_with_impacts():
         tries=6,
         starts=16,
         steps=256,
-        periods=300,
+        most_periods=300,
     )
     at = all_motions(system, load, search).at[0]
     stable = sorted((m for m in at.motions if m.stability == "stable"), key=lambda m: m.amplitude)
@@ -220,7 +264,7 @@ def test_an_interrupted_search_goes_on_to_the_same_stages():
         tries=2,
         starts=2,
         steps=64,
-        periods=60,
+        most_periods=60,
     )
     problem = search_problem(system, load, search)
     whole = list(search_stages(problem, search))

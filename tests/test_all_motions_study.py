@@ -33,7 +33,7 @@ harmonics = 1
 tries = 25
 starts = 12
 steps = 64
-periods = 200
+most_periods = 200
 """
 
 

@@ -30,7 +30,7 @@ class Stage:
     end
         Why a branch ends, in words; for starts whether the budget ended them.
     omega
-        (k,) rad/s: along the branch, of the motions, of the starts.
+        (k,) rad/s, of the period of the motion: along the branch, of the motions, of the starts.
     coefficients
         (k, H+1, n_retained) amplitudes of the retained coordinates, m; of starts those at their end, NaN where no period repeats.
     branch
@@ -70,7 +70,7 @@ class MotionBranch:
     end
         Why it ends, in words.
     omega, amplitude
-        (points,) rad/s, and of the first output over the harmonics that the load drives, m.
+        (points,) rad/s, and of the first output over the harmonics that the load drives, m; of motions of several periods over all.
     coefficients
         (points, H+1, n_retained), m.
     """
@@ -106,7 +106,7 @@ class MotionAt:
     branch
         Number of its branch.
     amplitude
-        Of the first output over the harmonics that the load drives, m.
+        Of the first output over the harmonics that the load drives, m; of motions of several periods over all.
     coefficients
         (H+1, n_retained), m.
     stability
@@ -163,17 +163,19 @@ class AllMotions:
         return tuple(b for b in self.branches if b.isola)
 
 
-def gathered(problem: ForcedProblem, stages: list[Stage]) -> AllMotions:
-    """Return what the stages of a search tell together."""
+def gathered(problem: ForcedProblem, stages: list[Stage], periods: int = 1) -> AllMotions:
+    """Return what the stages of a search tell together; frequencies are those of the load, of `periods` periods in one of the motion."""
     branches = [
-        MotionBranch(s.origin, s.end, s.omega, _amplitudes(problem, s), s.coefficients)
+        MotionBranch(
+            s.origin, s.end, periods * s.omega, _amplitudes(problem, s, periods), s.coefficients
+        )
         for s in stages
         if s.kind == "branch"
     ]
     starts = {s.place: s for s in stages if s.kind == "starts"}
     at = []
     for stage in sorted((s for s in stages if s.kind == "motions"), key=lambda s: s.place):
-        amplitude = _amplitudes(problem, stage)
+        amplitude = _amplitudes(problem, stage, periods)
         words = stage.words.split(";")
         motions = tuple(
             MotionAt(int(stage.branch[i]), float(amplitude[i]), stage.coefficients[i], words[i], float(stage.multiplier[i]), float(stage.error[i]))
@@ -181,7 +183,7 @@ def gathered(problem: ForcedProblem, stages: list[Stage]) -> AllMotions:
         )  # fmt: skip
         own = starts.get(stage.place)
         ends = () if own is None else tuple(int(e) for e in own.branch)
-        omega = float(stage.omega[0]) if stage.omega.size else np.nan
+        omega = periods * float(stage.omega[0]) if stage.omega.size else np.nan
         at.append(AtFrequency(omega, motions, Basins(omega, ends)))
     return AllMotions(
         tuple(branches),
@@ -196,6 +198,10 @@ def gathered(problem: ForcedProblem, stages: list[Stage]) -> AllMotions:
 SPENT = "the budget is spent"
 
 
-def _amplitudes(problem: ForcedProblem, stage: Stage) -> FloatArray:
+def _amplitudes(problem: ForcedProblem, stage: Stage, periods: int) -> FloatArray:
+    """Return the amplitudes of the first output; of motions of several periods over all harmonics."""
     pairs = zip(stage.omega, stage.coefficients, strict=True)
-    return np.array([problem.amplitude_of(float(w), q) for w, q in pairs])
+    if periods == 1:
+        return np.array([problem.amplitude_of(float(w), q) for w, q in pairs])
+    first, linear = problem.system.outputs[0], problem.low.linear
+    return np.array([np.linalg.norm(linear.recover(float(w), q)[1:, first]) for w, q in pairs])

@@ -25,6 +25,7 @@ from stickslip.response.all_motions.basins import (
 )
 from stickslip.response.all_motions.deflation import Distance, deflated_newton, distance_among
 from stickslip.response.all_motions.found import SPENT, AllMotions, Origin, Stage, gathered
+from stickslip.response.bifurcations.larger import over_periods
 from stickslip.response.bifurcations.side_branch import both_ways
 from stickslip.response.branch import following_vibration, steps_through, vibration_weights
 from stickslip.response.equilibrium import bonded_start
@@ -46,6 +47,10 @@ from stickslip.solve.newton_method import Newton, newton
 ITERATIONS = 60  # of a deflated solve
 SHARE = 0.5  # of the budget, after which deflation leaves the rest to time
 SCALES = (0.25, 4.0)  # of known motions, as starts
+OTHER, LARGER = (
+    0.5,
+    2.5,
+)  # share of the starts with another harmonic, and by which power of the largest scale it may be larger
 GUESSES = (0.5, 2.0, -1.0)
 LONGEST = 6  # times the points of a sweep that a branch may have
 
@@ -62,8 +67,10 @@ class MotionSearch:
         Frequencies that are searched, rad/s; none: `frequencies` of them in the middle of equal parts of the range.
     frequencies
         Their number.
+    periods
+        Periods of the load in one of the motion: 3 to search motions of ω/3, too.
     harmonics
-        Highest harmonic; it stays as it is.
+        Highest harmonic of the load's frequency; it stays as it is.
     samples
         Of a period, where contacts are evaluated on samples.
     points
@@ -76,7 +83,7 @@ class MotionSearch:
         Lowest modes, contacts stuck, in which states are drawn.
     spread
         Largest modal amplitude of a state, in units of the largest of the motions that are known.
-    periods
+    most_periods
         After which a start that repeats nothing is given up.
     steps
         Steps in a period.
@@ -93,6 +100,7 @@ class MotionSearch:
     omega_range: tuple[float, float]
     at: tuple[float, ...] = ()
     frequencies: int = 5
+    periods: int = 1
     harmonics: int = 7
     samples: int = 256
     points: int = 40
@@ -100,7 +108,7 @@ class MotionSearch:
     starts: int = 20
     modes: int = 2
     spread: float = 1.5
-    periods: int = 1000
+    most_periods: int = 1000
     steps: int = 512
     seconds: float = 120.0
     seed: int = 0
@@ -108,7 +116,15 @@ class MotionSearch:
     newton: Newton = field(default_factory=Newton)
 
     def __post_init__(self) -> None:
-        for name in ("frequencies", "harmonics", "points", "modes", "steps", "periods"):
+        for name in (
+            "frequencies",
+            "periods",
+            "harmonics",
+            "points",
+            "modes",
+            "steps",
+            "most_periods",
+        ):
             if getattr(self, name) < 1:
                 raise input_error(f"MotionSearch.{name}", f"is {getattr(self, name)}", "Give a count from 1 on.")  # fmt: skip
         if not (self.seconds > 0.0 and self.spread > 0.0):
@@ -138,7 +154,8 @@ def search_problem(system: System, load: HarmonicLoad, search: MotionSearch) -> 
         omega_range=search.omega_range, low=order, high=order, selection="always_low", points=search.points,
         samples=max(search.samples, 8 * order), evaluator=search.evaluator, newton=search.newton,
     )  # fmt: skip
-    return forced_problem(system, load, sweep)
+    problem = forced_problem(system, load, sweep)
+    return problem if search.periods == 1 else over_periods(problem, search.periods, order)
 
 
 def all_motions(system: System, load: HarmonicLoad, search: MotionSearch) -> AllMotions:
@@ -157,7 +174,7 @@ def all_motions(system: System, load: HarmonicLoad, search: MotionSearch) -> All
         If a contact is rigid.
     """
     problem = search_problem(system, load, search)
-    return gathered(problem, list(search_stages(problem, search)))
+    return gathered(problem, list(search_stages(problem, search)), search.periods)
 
 
 def search_stages(
@@ -174,7 +191,9 @@ class _Search:
     stages: list[Stage]
 
     def __post_init__(self) -> None:
-        whole = with_stiffness(self.problem.balance(harmonics_of(self.search.harmonics)))
+        self.order = self.search.periods * self.search.harmonics
+        self.places = [omega / self.search.periods for omega in self.search.places]
+        whole = with_stiffness(self.problem.balance(harmonics_of(self.order)))
         # a deflated Jacobian has a full row more: it is an array
         self.balance: HarmonicBalance = replace(whole, jacobian="dense")
         self.weights = vibration_weights(self.balance)
@@ -186,13 +205,13 @@ class _Search:
         """Go through all that was asked for."""
         if not self._branches():
             yield self._kept(self._swept())
-        for place, omega in enumerate(self.search.places):
+        for place, omega in enumerate(self.places):
             if not self._has("searched", place):
                 yield from self._deflated(place, omega)
-        for place, omega in enumerate(self.search.places):
+        for place, omega in enumerate(self.places):
             if not self._has("starts", place):
                 yield from self._started(place, omega)
-        for place, omega in enumerate(self.search.places):
+        for place, omega in enumerate(self.places):
             if not self._has("motions", place):
                 yield self._kept(self._motions(place, omega))
 
@@ -232,15 +251,29 @@ class _Search:
     def _distance(self, known: Sequence[FloatArray]) -> Distance:
         return distance_among(self.weights, known)
 
+    def _shifted(self, known: Sequence[FloatArray]) -> list[FloatArray]:
+        """Return solutions as they begin with each period of the load: a subharmonic motion is several, which are one."""
+        count, turns = self.search.periods, np.arange(self.order + 1)
+        if count == 1:
+            return list(known)
+        shifts = [np.exp(2j * np.pi * k / count * turns)[:, None] for k in range(count)]
+        every = [self.balance.unknowns(self.balance.coefficients(x) * s) for x in known for s in shifts]  # fmt: skip
+        apart: list[FloatArray] = []
+        distance = self._distance(known) if known else None
+        for x in every:
+            if distance is None or not any(distance.same(x, other) for other in apart):
+                apart.append(x)
+        return apart
+
     def _known(self, x: FloatArray, known: Sequence[FloatArray]) -> bool:
         distance = self._distance([x, *known])
-        return any(distance.same(x, other) for other in known)
+        return any(distance.same(x, other) for other in self._shifted(known))
 
     # --- branches -----------------------------------------------------------------------------
 
     def _swept(self) -> Stage:
         search = self.search
-        made = plain_sweep(self.problem.system, self.balance, search.omega_range, search.points, search.newton)  # fmt: skip
+        made = plain_sweep(self.problem.system, self.balance, self.problem.sweep.omega_range, search.points, search.newton)  # fmt: skip
         points = [forced_point(self.balance, f.point.solution, "point", f.index, f.p, 0.0) for f in made if f.converged]  # fmt: skip
         lost = len(made) - len(points)
         end = f"{lost} points were not found" if lost else "it reaches the end of the range"
@@ -249,7 +282,7 @@ class _Search:
     def _branch(self, place: int, origin: Origin, x: FloatArray, omega: float) -> Stage:
         """Follow a motion as a branch."""
         search = self.search
-        low, high = search.omega_range
+        low, high = self.problem.sweep.omega_range
         following = following_vibration(self.balance, steps_through(high - low, search.points), search.newton)  # fmt: skip
         first = start_point(self.balance, x, omega, following)
         most = LONGEST * search.points
@@ -260,7 +293,7 @@ class _Search:
         self, kind: str, place: int, origin: Origin, points: Sequence[ForcedPoint], end: str
     ) -> Stage:
         rows = np.array([p.coefficients for p in points])
-        none = np.zeros((0, self.search.harmonics + 1, self.balance.linear.n), dtype=complex)
+        none = np.zeros((0, self.order + 1, self.balance.linear.n), dtype=complex)
         omega = np.array([p.omega for p in points])
         return Stage(kind, place, origin, end, omega, rows if points else none)  # type: ignore[arg-type]
 
@@ -281,7 +314,7 @@ class _Search:
             tries += 1
             start = next(starts)
             found = deflated_newton(
-                lambda x: self.balance.linearise(x, omega), start, known, self._distance(known or [start]), options
+                lambda x: self.balance.linearise(x, omega), start, self._shifted(known), self._distance(known or [start]), options
             )  # fmt: skip
             if not found.status.converged or self._known(found.x, known):
                 failed += 1
@@ -307,12 +340,19 @@ class _Search:
                 yield np.where(still > 0, x, factor * x)
         low, high = np.log(SCALES)
         every = [*known, stuck]
-        turns = np.arange(self.search.harmonics + 1)
+        turns = np.arange(self.order + 1)
         while True:
             q = self.balance.coefficients(every[int(rng.integers(len(every)))])
-            size = np.exp(rng.uniform(low, high))
-            moved = q * size * np.exp(1j * turns * rng.uniform(0.0, 2.0 * np.pi))[:, None]
+            turned = np.exp(1j * turns * rng.uniform(0.0, 2.0 * np.pi))[:, None]
+            moved = q * np.exp(rng.uniform(low, high)) * turned
             moved[0] = q[0]
+            if (
+                rng.uniform() < OTHER
+            ):  # harmonics that no known motion has are found from none of them
+                largest = q[1 + int(np.argmax(np.linalg.norm(q[1:], axis=1)))]
+                h = 1 + int(rng.integers(self.order))
+                size = np.exp(rng.uniform(low, LARGER * high) + 2j * np.pi * rng.uniform())
+                moved[h] += size * largest
             yield self.balance.unknowns(moved)
 
     # --- time ---------------------------------------------------------------------------------
@@ -326,7 +366,7 @@ class _Search:
             why = "sectors of a wheel are not started in time" if wheel else ""
             yield self._kept(self._stage("starts", place, "time", (), why))
             return
-        stepping = TimeStepping(steps_per_period=search.steps, max_periods=search.periods, harmonics=search.harmonics, tolerance=1e-4)  # fmt: skip
+        stepping = TimeStepping(steps_per_period=search.steps, max_periods=search.most_periods, harmonics=self.order, tolerance=1e-4)  # fmt: skip
         linear = self.problem.low.linear
         motions = [linear.recover(omega, self.balance.coefficients(x)) for x in solutions]
         own = sampler(self.problem, omega, motions, search.modes, search.spread)
@@ -348,8 +388,9 @@ class _Search:
 
     def _apart(self, rows: ComplexArray, x: FloatArray) -> float:
         """Return how far a motion in time is from a solution, relative to the vibration."""
-        known = self.balance.coefficients(x)[1:]
-        return float(np.linalg.norm(rows[1:] - known) / max(np.linalg.norm(known), np.finfo(float).tiny))  # fmt: skip
+        every = [self.balance.coefficients(y)[1:] for y in self._shifted([x])]
+        size = max(float(np.linalg.norm(every[0])), np.finfo(float).tiny)
+        return min(float(np.linalg.norm(rows[1:] - known)) for known in every) / size
 
     def _nearest(self, rows: ComplexArray, solutions: Sequence[FloatArray]) -> int:
         """Return the number of the solution that a motion in time is, `PERIODIC` where it is none."""

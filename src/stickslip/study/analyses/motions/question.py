@@ -73,6 +73,7 @@ def question_of(case: Case, model: Model) -> Question:
         modes=asked.modes,
         spread=asked.spread,
         periods=asked.periods,
+        most_periods=asked.most_periods,
         steps=asked.steps,
         seconds=asked.budget_s,
         seed=asked.seed,

@@ -54,6 +54,12 @@ class AllMotionsTable(Section):
         description="largest modal amplitude of a random state, in units of the largest of the motions that are known",
     )
     periods: int = Field(
+        1,
+        ge=1,
+        le=20,
+        description="periods of the loads in one of the motion, 1 to 20: 3 to search motions of a third of the frequency, too",
+    )
+    most_periods: int = Field(
         1000,
         ge=10,
         le=1_000_000,

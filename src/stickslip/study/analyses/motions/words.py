@@ -59,7 +59,7 @@ def _basins(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
         aperiodic = int(case["aperiodic"].values[i])
         if aperiodic > 0:
             why = f"{aperiodic} of {starts} starts end on no motion of the load's period within the periods allowed"
-            found.append(Verdict("trusted", label, float(hertz[i]), why, "Raise all_motions.periods, or ask for [forced_response] with bifurcations.", warns=True))  # fmt: skip
+            found.append(Verdict("trusted", label, float(hertz[i]), why, "Ask for all_motions.periods = 2 or 3, or raise all_motions.most_periods.", warns=True))  # fmt: skip
         if not np.any(np.isfinite(share[i])):
             continue
         most = int(np.nanargmax(share[i]))
