@@ -11,6 +11,7 @@ from flutter_wheel import MODE, MOVED, ONE_UNSTABLE, SECTORS, TWO_UNSTABLE, flut
 import stickslip as ss
 from stickslip.errors import InputError
 from stickslip.reduction.aerodynamics import InfluenceCoefficients
+from stickslip.response.nonlinear_modes import ModeSweep, nonlinear_mode
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.curve import (
     damping_over_amplitude,
@@ -162,3 +163,29 @@ def test_of_a_wheel_without_all_its_waves_nothing_is_said() -> None:
     few = replace(wheel, waves={k: s for k, s in wheel.waves.items() if k % 2 == 0})
     with pytest.raises(InputError, match="has no wave"):
         stability(replace(problem, system=replace(problem.system, structure=replace(few, engine_order=2))), point)  # fmt: skip
+
+
+@pytest.mark.parametrize("concept", ["periodic", "decaying"])
+def test_nonlinear_modes_of_each_wave_begin_with_its_damping_in_the_flow_and_cross_zero_at_its_limit_cycle(concept) -> None:  # fmt: skip
+    begun = []
+    for k in (2, 4):
+        system, load = flutter_wheel(k, 3, ONE_UNSTABLE)
+        mode = stuck_modes(system, MODE)[-1]
+        problem = self_excited_motions(system, load, mode, MOVED, Discretisation(order=3))
+        slips = slip_amplitude(problem)
+        last = 15.0 if concept == "periodic" else 0.8
+        sweep = ModeSweep(span=(0.6 * slips, last * slips), points=6, concept=concept)
+        found = nonlinear_mode(system, load, mode, MOVED, Discretisation(order=3), sweep)
+        assert found.end.startswith("amplitude reached")
+        begun.append(found.points[0].ratio)
+        # a decaying linear motion is that of the eigenvalue, a steady one to the square of the damping
+        assert found.points[0].ratio == pytest.approx(mode.ratio, rel=1e-8 if concept == "decaying" else 1e-3)  # fmt: skip
+        assert found.points[0].omega == pytest.approx(mode.omega, rel=1e-4)
+        if k == 2 and concept == "periodic":
+            assert "gross slip from" in found.end
+            a, z = np.array([(p.amplitude, p.ratio) for p in found.solutions]).T
+            at = int(np.flatnonzero((z[:-1] < 0.0) & (z[1:] >= 0.0))[0])
+            curve = damping_over_amplitude(problem, (0.5 * a[at], 2.0 * a[at + 1]), 5)
+            cycle = limit_cycles(problem, curve)[0]
+            assert a[at] < cycle.amplitude < a[at + 1]
+    assert begun[0] < 0.0 < begun[1]
