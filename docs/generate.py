@@ -22,6 +22,7 @@ PARTS_OF_THE_PAGE = {
     "output": ("output", "measured"),
     "analyses": (
         "forced_response",
+        "quasi_periodic",
         "limit_cycle",
         "nonlinear_mode",
         "resonance",

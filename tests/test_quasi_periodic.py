@@ -13,14 +13,14 @@ from stickslip.model.matrices import lumped
 from stickslip.response.quasi_periodic.in_time import course, statistics
 from stickslip.response.quasi_periodic.motion import TorusMotion, envelope
 from stickslip.response.quasi_periodic.problem import TwoTones, two_tones, with_enough
-from stickslip.response.quasi_periodic.second_tone import (
+from stickslip.response.quasi_periodic.start import distinct, tones_of_multipliers
+from stickslip.response.quasi_periodic.tone import (
     beginnings,
     forced_motion,
     over_amplitude,
     second_tone,
     solve_free,
 )
-from stickslip.response.quasi_periodic.start import distinct, tones_of_multipliers
 from stickslip.response.stability import stability
 from stickslip.response.time.start import start_from_harmonics
 

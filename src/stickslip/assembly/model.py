@@ -14,7 +14,7 @@ from stickslip.assembly.contact import Contact, Join
 from stickslip.assembly.coordinates import Coordinates, coordinates
 from stickslip.assembly.facing import refuse_joined
 from stickslip.assembly.forces import beyond_sectors, doubtful_fields, engine_order, far_outputs
-from stickslip.assembly.load import Load, Output
+from stickslip.assembly.load import Load, Output, refuse_second
 from stickslip.assembly.loose import without_bodies
 from stickslip.assembly.mistuning import Mistuning
 from stickslip.assembly.pairs import Pairs, pair_contacts
@@ -391,6 +391,7 @@ class Model:
 
         keep = in_memory if store is None else store
         model = self if wave_number is None else self.undriven
+        refuse_second(model.loads)
         if self.mistuning is not None:
             return assemble_mistuned(model, harmonics, keep)
         return assemble(model, harmonics, keep, wave_number, every_wave=every_wave)

@@ -160,6 +160,14 @@ class Model(Assembly):
         """Search for motions that a sweep does not meet; keys such as ``frequency_hz=(80, 160), frequencies=5, starts=20, budget_s=60.0``."""
         return self._answer("all_motions", keys, folder)
 
+    def quasi_periodic(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
+        """Compute motions with two frequencies; keys such as ``frequencies_hz=[150.0, 160.0], second_hz=212.0, accuracy_percent=0.5``.
+
+        A load with a frequency of its own (`Load.omega`, `Load.omega_ratio`) gives the second one; without any a second tone that
+        grows by itself is looked for.
+        """
+        return self._answer("quasi_periodic", keys, folder)
+
     def run_up(self, *, folder: str | Path | None = None, **keys: Any) -> Result:
         """Follow the response over speed along engine orders; keys such as ``speeds_rpm=(3000, 9000), engine_orders=[4, 6], high=3``."""
         return self._answer("run_up", keys, folder)

@@ -2,6 +2,7 @@
 
 ANALYSES = {
     "forced_response": "stickslip.study.analyses.forced_response:FORCED_RESPONSE",
+    "quasi_periodic": "stickslip.study.analyses.quasi_periodic:QUASI_PERIODIC",
     "limit_cycle": "stickslip.study.analyses.limit_cycle:LIMIT_CYCLE",
     "nonlinear_mode": "stickslip.study.analyses.nonlinear_mode:NONLINEAR_MODE",
     "residual_tractions": "stickslip.study.analyses.residual_tractions:RESIDUAL_TRACTIONS",

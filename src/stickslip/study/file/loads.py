@@ -86,8 +86,21 @@ class LoadTable(Section):
         description="on a wheel: number of periods of the force around the circumference; left out: not a wheel",
     )
 
+    frequency_hz: Annotated[float, Field(gt=0, le=1e9)] | None = Field(
+        None,
+        description="frequency of its own that it acts with, in Hz, for [quasi_periodic]; left out: that of the response",
+    )
+    frequency_ratio: Annotated[float, Field(gt=0, le=1e6)] | None = Field(
+        None, description="the same as a multiple of the frequency of the other loads"
+    )
+
     @model_validator(mode="after")
     def _agrees(self) -> Self:
+        if self.frequency_hz is not None and self.frequency_ratio is not None:
+            raise custom_error("cannot stand beside frequency_hz", "Give one of them.", "frequency_ratio")  # fmt: skip
+        for key in ("frequency_hz", "frequency_ratio"):
+            if getattr(self, key) is not None and self.harmonic == 0:
+                raise custom_error("is given for a static force", "Leave it out.", key)
         given = [k for k in ("force_n", "ratio_of", "pressure") if getattr(self, k) is not None]
         if len(given) != 1:
             found = " and ".join(given) or "none of them"

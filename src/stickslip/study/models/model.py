@@ -18,7 +18,7 @@ from stickslip.study.models.files import alike
 from stickslip.study.models.mistuning import mistuning_of, spare_parts
 from stickslip.study.models.parts import Memo, Workshop
 from stickslip.study.models.pressure import read_pressure
-from stickslip.units import DEG, RPM
+from stickslip.units import DEG, HZ, RPM
 
 DOF = re.compile(r"node\d+(\.r?[xyz])?|r?[xyz]|dof\d+")
 NORMAL_ALONE = ("unilateral_spring",)  # laws without tangential forces
@@ -145,6 +145,8 @@ def _load(tables: Tables, parts: Mapping[str, Part], table: LoadTable, home: Pat
         harmonic=table.harmonic,
         phase=table.phase_deg * DEG,
         engine_order=table.engine_order,
+        omega=None if table.frequency_hz is None else HZ * table.frequency_hz,
+        omega_ratio=table.frequency_ratio,
         field=field,
     )
 

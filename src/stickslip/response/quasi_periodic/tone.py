@@ -26,6 +26,7 @@ FEW = 3  # Newton steps after which the next step is longer
 FARTHEST = 300.0  # times the forced motion, where the curve ends
 HALVINGS = 8  # of the interval in which a level is zero
 WANDERED = 0.3  # |ln(ω2 / guess)| at which the second tone is lost
+PATHS = 4  # times the path is chosen anew after the frequency that was found
 STILL = 1e-6  # of the motion: a second tone that is smaller is none
 
 
@@ -256,12 +257,13 @@ def solve_free(
     used = path or problem.path(omegas[1] / omegas[0])
     solution = newton(evaluate, y, problem.newton)
     spent = solution.iterations
-    if solution.status.converged:
+    for _ in range(PATHS):
         better = path or problem.path(omegas[1] * float(np.exp(solution.x[-1])) / omegas[0])
-        if better != used:
-            used = better
-            solution = newton(evaluate, solution.x, problem.newton)
-            spent += solution.iterations
+        if not solution.status.converged or better == used:
+            break
+        used = better
+        solution = newton(evaluate, solution.x, problem.newton)
+        spent += solution.iterations
     solution = replace(solution, iterations=spent)
     now = omegas[0], omegas[1] * float(np.exp(np.clip(solution.x[-1], -WANDERED, WANDERED)))
     motion = problem.motion(solution.x[:-1], now, solution, used)

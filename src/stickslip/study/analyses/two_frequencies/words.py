@@ -1,0 +1,92 @@
+"""What is told of motions with two frequencies: verdicts, and what the terminal prints."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.analyses.verdict import Verdict
+from stickslip.study.keep.netcdf import alike, one_case
+
+LARGE = 0.02  # left out, or off from time integration, above which a motion is doubtful
+SLIP = 5e-3  # rad a turn, the same
+
+
+def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
+    """Return what is to be thought of a case from its variables."""
+    points = case["kind"].size if "kind" in case else 0
+    found = [v for i in range(points) for v in _of_point(label, case, i)]
+    if points and not found:
+        worst = np.nanmax(np.append(case["left_out"].values, np.nan_to_num(0.0)))
+        why = f"{points} motions, combined frequencies left out would move the contacts by at most {100 * worst:.2g} %"
+        how = "compared with time integration" if "time_off" in case else "whether disturbances die was not examined: quasi_periodic.in_time marches from them"  # fmt: skip
+        found.append(Verdict("trusted", label, None, f"{why}; {how}"))
+    return found
+
+
+def _of_point(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdict]:
+    def number(name: str) -> float:
+        return float(case[name].values[i])
+
+    hz, kind, why = number("first_hz"), str(case["kind"].values[i]), str(case["why"].values[i])
+    if kind == "not found":
+        remedy = "Give quasi_periodic.second_hz, more harmonics, or nearer frequencies_hz."
+        return [Verdict("wrong", label, hz, f"no motion was found: {why.removesuffix('.')}", remedy)]  # fmt: skip
+    if kind == "no second tone":
+        return [Verdict("trusted", label, hz, f"there is no second tone: {why}")]
+    found = []
+    if number("left_out") > LARGE:
+        left = f"combined frequencies left out would move the contacts by {100 * number('left_out'):.2g} %"
+        found.append(Verdict("doubtful", label, hz, left, "Raise quasi_periodic.most_harmonics."))
+    if number("slip") > SLIP:
+        off = f"contacts were marched at a ratio by which the second phase is off by {number('slip'):.2g} rad a turn"
+        found.append(Verdict("doubtful", label, hz, off, "Take frequencies whose ratio is nearer to one of small numbers."))  # fmt: skip
+    away = number("time_off") if "time_off" in case else np.nan
+    if away > LARGE:
+        told = f"time integration is {100 * away:.2g} % off"
+        found.append(Verdict("doubtful", label, hz, told, "Lower quasi_periodic.accuracy_percent, or look for another motion."))  # fmt: skip
+    if "time_largest" in case and not np.isfinite(away):
+        ends = [(float(case[n].values[i, 0]), float(case[f"time_{n}"].values[i, 0])) for n in ("largest", "least")]  # fmt: skip
+        size = ends[0][0]
+        apart = max(abs(b - t) for b, t in ends) / size
+        if apart > 2 * LARGE:
+            told = f"in time the amplitude goes from {1e3 * ends[1][1]:.4g} to {1e3 * ends[0][1]:.4g} mm, the balance has {1e3 * ends[1][0]:.4g} to {1e3 * size:.4g} mm"
+            found.append(Verdict("doubtful", label, hz, told, "The motion may be left, or not be settled in time."))  # fmt: skip
+    return found
+
+
+def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
+    """Return what the terminal prints: the motions of each case."""
+    found = []
+    groups = alike(data)
+    for group in groups:
+        case = one_case(data, group[0])
+        labels = [str(data["case_label"].values[i]) for i in group if len(groups) > 1]
+        head = f"{'; '.join(labels)}: " if labels else ""
+        if "kind" in case:
+            found.append(_table(case, head))
+    return tuple(found)
+
+
+def _table(case: xr.Dataset, head: str) -> TextTable:
+    rows = [
+        (
+            _text(float(case["first_hz"][i])),
+            _text(float(case["second_hz"][i])),
+            str(case["kind"][i].values),
+            _text(1e3 * float(case["least"][i, 0])),
+            _text(1e3 * float(case["largest"][i, 0])),
+            _text(1e3 * float(case["rms"][i, 0])),
+            str(int(case["combined"][i])),
+            _text(100 * float(case["left_out"][i])),
+        )
+        for i in range(case.sizes["point"])
+    ]
+    columns = ("first Hz", "second Hz", "", "least mm", "largest mm", "rms mm", "combined", "left out %")  # fmt: skip
+    name = str(case["output_name"].values[0])
+    return TextTable(f"{head}Motions with two frequencies, amplitude of {name}", columns, tuple(rows))  # fmt: skip
+
+
+def _text(value: float) -> str:
+    return f"{value:.5g}" if np.isfinite(value) else "-"
