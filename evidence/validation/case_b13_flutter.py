@@ -41,6 +41,8 @@ MANY = (  # the same, harmonics up to 21
 )
 LARGEST, AT = "0.1429382", 2.137483 * 2 * LIMIT
 EXACT = Newton(tolerance=1e-13)
+PLAIN = Discretisation(order=1, newton=EXACT)
+SAMPLED = Discretisation(order=21, samples=4096, evaluator="intervals", newton=EXACT)
 STEPS = 4096  # of a period in time
 
 
@@ -81,9 +83,7 @@ def in_time(cycle: LimitCycle, c: float) -> tuple[float, float]:
 def run() -> list[Record]:
     """Compare the table, the largest negative damping, multipliers and motions in time."""
     records = []
-    plain = Discretisation(order=1, newton=EXACT)
-    sampled = Discretisation(order=21, samples=4096, evaluator="intervals", newton=EXACT)
-    for rows, how in ((ONE, plain), (MANY, sampled)):
+    for rows, how in ((ONE, PLAIN), (MANY, SAMPLED)):
         for c, *printed in rows:
             problem = motions(c, how)
             small, large = limit_cycles(problem, curve(problem))
@@ -93,11 +93,11 @@ def run() -> list[Record]:
                 digits(CASE, f"c = {c:g}, H = {how.order}: {name}", own, theirs, SOURCE)
                 for name, own, theirs in zip(names, ours, printed, strict=True)
             ]
-    problem = motions(-0.1, plain)
+    problem = motions(-0.1, PLAIN)
     first = limit_cycles(problem, curve(problem))[0]
     at_top = parameter_over_amplitude(problem, oscillator, -0.1, first.unknowns, (first.amplitude, AT), 10)[-1]  # fmt: skip
     records.append(digits(CASE, "largest negative damping, H = 1", -at_top.level, LARGEST, SOURCE))
-    beyond = motions(-1.0001 * float(LARGEST), plain)
+    beyond = motions(-1.0001 * float(LARGEST), PLAIN)
     records.append(bound(CASE, "limit cycles beyond it", float(len(limit_cycles(beyond, curve(beyond)))), 0.5, SOURCE))  # fmt: skip
     few = Discretisation(order=5, samples=512)
     for c in (-0.01, -0.05, -0.1, -0.14):

@@ -1,4 +1,4 @@
-"""B4 and B10: nonlinear modes of one mass on a friction spring and of a beam that rubs, at the printed amplitudes.
+"""B4, B10 and B13: nonlinear modes of one mass on a friction spring and of a beam that rubs, at the printed amplitudes.
 
 The printed modal amplitude is that of the first harmonic with the whole mass; it is met by the secant method on the amplitude that is followed.
 Where the source sums samples of a period it does not say when the period begins, on which its digits depend: 4e-4 of the damping ratio just
@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from evidence.models.lumped import griffin
+from evidence.validation import case_b13_flutter
 from evidence.validation.compare import Record, bound, digits
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.jenkins import Jenkins
@@ -35,7 +36,7 @@ from stickslip.solve.newton_method import Newton
 from stickslip.units import HZ
 
 EXACT = Newton(tolerance=1e-12)
-B4, B10 = "literature benchmark B4", "literature benchmark B10"
+B4, B10, B13 = (f"literature benchmark B{n}" for n in (4, 10, 13))
 ONE_MASS = (  # A / xc, then w and zeta at one harmonic, at 21, and the third one over xc
     (1.0, "1.2247448714", "0.0081649658", "1.2247448714", "0.0081649658", "0"),
     (1.25, "1.1953287226", "0.0440106353", "1.19575580", "0.04348765", "0.003673"),
@@ -134,6 +135,26 @@ def one_mass() -> list[Record]:
     return records
 
 
+def without_damping() -> list[Record]:
+    """Compare B13: at the printed amplitudes of its limit cycles the mode has no damping, and the printed frequency."""
+    records = []
+    for rows, how in (
+        (case_b13_flutter.ONE, case_b13_flutter.PLAIN),
+        (case_b13_flutter.MANY, case_b13_flutter.SAMPLED),
+    ):
+        for c, *printed in rows:
+            system, _ = case_b13_flutter.oscillator(c)
+            mode = stuck_modes(system, 1)[0]
+            for amplitude, omega in (printed[:2], printed[2:]):
+                found = at_modal_amplitudes(system, mode, 0, how, [float(amplitude)])[0]
+                place = f"c = {c:g}, A = {amplitude}, H = {how.order}"
+                records.append(digits("B13 mode", f"{place}: w", found.omega, omega, B13))
+                # half a unit of the last digit of the amplitude, over which the damping ratio changes by less than 0.3 a unit of ln A
+                off = 0.5 * 10.0 ** -len(amplitude.partition(".")[2]) / float(amplitude)
+                records.append(bound("B13 mode", f"{place}: damping ratio", found.ratio, off, B13))
+    return records
+
+
 def rubbing_beam(*, reduced: bool) -> tuple[System, np.ndarray]:
     """Return the beam of B10 with its friction spring, and the row that makes the tip's deflection of its coordinates."""
     section = Beam(
@@ -200,6 +221,7 @@ def run() -> list[Record]:
     """Compare both tables."""
     return [
         *one_mass(),
+        *without_damping(),
         *linear(),
         *rub(7, 256, RUBBING, reduced=True),
         *rub(21, 2048, MANY, reduced=True),
