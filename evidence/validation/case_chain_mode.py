@@ -20,6 +20,7 @@ SOURCE = "tmdsimpy, commit 17d5fc3"
 CASE = "chain of 20 masses, mode 1"
 HOW = Discretisation(order=5, samples=256, evaluator="intervals")
 FINE = 600  # points, so that chords between them are no part of the distance
+CHORD = 1.5e-3  # what a chord beside a corner of the curve is off, of the ranges; half of the rows lie thirty times nearer
 PLAIN = 30
 
 
@@ -61,7 +62,7 @@ def run() -> list[Record]:
     plain, _ = ours(PLAIN)
     theirs = folds(rows[:, 0])
     records = [
-        bound(CASE, f"largest distance of {len(rows)} rows", float(away.max()), 1e-3, SOURCE),
+        bound(CASE, f"largest distance of {len(rows)} rows", float(away.max()), CHORD, SOURCE),
         bound(CASE, "median distance", float(np.median(away)), 5e-5, SOURCE),
         record(CASE, f"folds with {PLAIN} points asked for", len(folds(plain[:, 0])), len(theirs), 0.0, SOURCE),
     ]  # fmt: skip
