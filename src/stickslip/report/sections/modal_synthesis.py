@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 from stickslip.arrays import FloatArray
 from stickslip.report.node import Node
 from stickslip.report.plot import INK, MUTED, Plot, colour, log_ticks, styled
-from stickslip.report.quantities import NONE, counted, number, percent, quantity, scale_for
+from stickslip.report.quantities import NONE, counted, joined, number, percent, quantity, scale_for
 from stickslip.report.section import Block, Card, Section
 from stickslip.report.tables import shortened
 
@@ -153,21 +153,29 @@ def table(view: Synthesised) -> str:
     if not view.has("level"):
         return ""
     direct = view.has("direct_error")
-    head = ["level", "peak", "at (Hz)", "answer", "why", "other modes"]
-    head += ["direct peak", "error"] if direct else []
+    head = ["level", "peak", "at (Hz)", "answer", "other modes"]
+    head += ["direct peak", "error", "why"] if direct else ["why"]
     rows = []
     for i, answer in enumerate(view.answers):
         peak, hertz, foreign = (float(view.floats(n)[i]) for n in ("peak_amplitude", "peak_frequency_hz", "foreign"))  # fmt: skip
         row = [
             number(float(view.levels[i])), quantity(peak, "m", 5), number(hertz, 7) if np.isfinite(hertz) else NONE,
-            f"<b>{answer}</b>" if answer != "trusted" else answer, escape(view.labels_of("why")[i]),
+            f"<b>{answer}</b>" if answer != "trusted" else answer,
             percent(foreign) if np.isfinite(foreign) else NONE,
         ]  # fmt: skip
         if direct:
             error = float(view.floats("direct_error")[i])
             row += [quantity(float(view.floats("direct_peak_amplitude")[i]), "m", 5), f"{number(100 * error, 2)} %" if np.isfinite(error) else NONE]  # fmt: skip
-        rows.append(row)
-    return f"<h3>Levels</h3>{shortened(head, rows, 'levels')}"
+        rows.append([*row, escape(view.labels_of("why")[i])])
+    return f"<h3>Levels</h3>{shortened(head, rows, 'levels')}{_cycles(view)}"
+
+
+def _cycles(view: Synthesised) -> str:
+    """Return the amplitudes at which the mode goes on without any load."""
+    if not view.has("cycle_amplitude"):
+        return ""
+    each = joined([quantity(float(a), "m", 4) for a in view.floats("cycle_amplitude")])
+    return f"<p>The damping of the mode is zero at {each}: limit cycles, which <code>[limit_cycle]</code> examines.</p>"
 
 
 def _cards(view: Synthesised) -> list[Card]:

@@ -77,7 +77,8 @@ def solve(
         if i < len(done):
             continue
         record = _level(shared, level)
-        LOG.info(f"{question.label}: level {level:g}: {record.answer}, {record.why}")
+        label = f"{question.label}: " if question.label else ""
+        LOG.info(f"{label}level {level:g}: {record.answer}, {record.why}")
         advance((i + 1) / len(question.asked.levels), f"level {level:g}")
         yield record
 
@@ -88,7 +89,7 @@ def judged(alone: Isolation, resolved: float) -> tuple[str, str]:
     motion = f"the other modes move by {100 * max(alone.output, alone.gaps):.2g} % of the mode"
     near = f"the next frequency is {100 * alone.distance:.2g} % away"
     if not np.isfinite(alone.distance):
-        near = "there is no other frequency"
+        motion, near = "there is no other mode", "nothing is near"
     if alone.linear:
         return "trusted", "nothing slips: the other modes are added, and the response is exact"
     if alone.foreign > DOUBTFUL:
@@ -99,7 +100,7 @@ def judged(alone: Isolation, resolved: float) -> tuple[str, str]:
         return "doubtful", f"the nonlinear mode has too few points here: without every second one the peak moves by {100 * resolved:.2g} %"  # fmt: skip
     if alone.harmonics > HARMONICS:
         return "doubtful", f"higher harmonics have {100 * alone.harmonics:.2g} % of the first, and the load works on that alone"  # fmt: skip
-    return "trusted", f"{motion}, {near}"
+    return "trusted", motion if not np.isfinite(alone.distance) else f"{motion}, {near}"
 
 
 def _level(shared: Synthesis, level: float) -> SynthesisLevel:
