@@ -7,8 +7,10 @@ import pytest
 from small_v2 import EXAMPLES, changed
 
 import stickslip as ss
+from stickslip.assembly.model import Model
 from stickslip.errors import InputError
 from stickslip.report.page import plots
+from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.residual_tractions import RESIDUAL_TRACTIONS
 from stickslip.study.keep.journal import JobJournal
 from stickslip.study.keep.netcdf import one_case
@@ -92,6 +94,21 @@ def test_an_interrupted_search_goes_on_and_python_gives_the_same(tmp_path: Path)
         assert list(RESIDUAL_TRACTIONS.solve(question, records, journal)) == []
     found = np.array([r.amplitude[2] for r in records[:3]])
     assert found == pytest.approx(own["most_amplitude"].values[at], rel=1e-9)
+
+
+def test_what_would_take_too_long_is_refused(tmp_path: Path) -> None:
+    path = written(tmp_path, TABLE + "[limits]\nwork_s = 0.1\n")
+    case = read_study(path).cases()[0]
+    with pytest.raises(InputError, match=r"a case of residual_tractions \(4 frequencies"):
+        RESIDUAL_TRACTIONS.inputs(case, case.build())
+    told = RESIDUAL_TRACTIONS.check(*_fine(tmp_path / "fine"))
+    assert told[0].startswith("residual_tractions: 2 tangential springs")
+
+
+def _fine(folder: Path) -> tuple[Case, Model]:
+    folder.mkdir()
+    case = read_study(written(folder)).cases()[0]
+    return case, case.build()
 
 
 @pytest.mark.parametrize(

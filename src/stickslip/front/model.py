@@ -30,7 +30,7 @@ _SHARED = {  # tables that analyses take beside their own
     "modal_synthesis": ("solver",),
     "nonlinear_mode": ("solver",),
     "resonance": ("solver",),
-    "residual_tractions": ("solver",),
+    "residual_tractions": ("solver", "limits"),
     "all_motions": ("solver",),
     "run_up": ("harmonics", "solver", "limits"),
 }

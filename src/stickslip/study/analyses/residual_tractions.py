@@ -18,8 +18,10 @@ from stickslip.response.residual_tractions.confirming import Confirmation, confi
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
 from stickslip.study.analyses.tractions.dataset import dataset
 from stickslip.study.analyses.tractions.question import (
+    MOTIONS,
     Question,
     ResidualTractionsTable,
+    cost_of,
     question_of,
 )
 from stickslip.study.analyses.tractions.records import TractionRecord, of_record, to_record
@@ -83,8 +85,11 @@ class ResidualTractions:
         question = self.inputs(case, model)
         starts = starts_of(question.model.system.interface)
         springs = int(np.count_nonzero(starts.stiffness > 0.0))
+        cost = cost_of(model, question.asked)
+        counted = f"{springs} tangential springs that may keep a traction, {question.asked.points} frequencies"
+        seconds = f"{cost.least_seconds:.1g} to {cost.most_seconds:.2g} s"
         return (
-            f"residual_tractions: {springs} tangential springs that may keep a traction, {question.asked.points} frequencies, some 20 to 200 motions each",
+            f"residual_tractions: {counted}, some {MOTIONS[0]} to {MOTIONS[1]} motions each, {seconds}",
         )
 
     def verdicts(self, data: xr.Dataset) -> tuple[Verdict, ...]:

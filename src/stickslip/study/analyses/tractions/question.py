@@ -1,7 +1,7 @@
 """The table [residual_tractions] of a study file, and what a job solves."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import numpy as np
@@ -13,15 +13,23 @@ from stickslip.assembly.model import Model
 from stickslip.contact.compiled import Evaluator
 from stickslip.contact.starts import starts_of
 from stickslip.errors import InputError, input_error
+from stickslip.response.forced.sweep import Sweep
 from stickslip.response.parameter import Discretisation
 from stickslip.response.residual_tractions.search import TractionSearch
 from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.facts import facts_of
+from stickslip.study.analyses.forced.estimate import Estimate, estimate
 from stickslip.study.analyses.forced.question import peak_first
 from stickslip.study.file.harmonics import HIGHEST
 from stickslip.study.file.section import Positive, Section, rising_pair
+from stickslip.study.models.cost import above
 from stickslip.units import HZ, RPM
 
+MOTIONS = (
+    20,
+    100,
+)  # solved at a frequency: where hardly a spring keeps a traction, and where many do
+STEPS = 0.5  # Newton steps that one of them takes, over those of a point of a response
 SAMPLES = 256
 SAMPLES_A_HARMONIC = 16
 
@@ -102,13 +110,30 @@ class Question:
         return TractionSearch(starts=self.asked.starts, seed=self.asked.seed)
 
 
+def cost_of(model: Model, asked: ResidualTractionsTable) -> Estimate:
+    """Return what a case is estimated to cost."""
+    first, last = asked.frequency_hz
+    sweep = Sweep(
+        omega_range=(HZ * first, HZ * last), low=max(asked.harmonics, 1), high=max(asked.harmonics, 1),
+        selection="always_high", frequencies=asked.points, points=asked.points, peak_points=0,
+    )  # fmt: skip
+    once = estimate(model, sweep)
+    least, most = MOTIONS
+    return replace(
+        once,
+        least_seconds=STEPS * least * once.least_seconds,
+        most_seconds=STEPS * most * once.most_seconds,
+    )
+
+
 def question_of(case: Case, model: Model) -> Question:
     """Return what a job solves.
 
     Raises
     ------
     InputError
-        If a contact has no springs that start somewhere, a load drives more harmonics than are kept, or none.
+        If a contact has no springs that start somewhere, a load drives more harmonics than are kept, or none, or the estimated cost
+        exceeds the study's limits.
     """
     asked: ResidualTractionsTable = case.settings.residual_tractions
     driven = sorted(set(model.driven.values()))
@@ -122,6 +147,10 @@ def question_of(case: Case, model: Model) -> Question:
             f"is {asked.harmonics}, and a load drives harmonic {driven[-1]}",
             f"Give {driven[-1]} or more.",
         )
+    cost = cost_of(model, asked)
+    what = f"a case of residual_tractions ({asked.points} frequencies, {cost.unknowns} unknowns, up to {MOTIONS[1]} motions each) is estimated"
+    if (refusal := above(case.settings.limits, what, cost.memory_gb, cost.seconds)) is not None:
+        raise refusal
     assembled = peak_first(model.assembled(asked.harmonics, case.store))
     try:
         starts_of(assembled.system.interface)
