@@ -8,6 +8,7 @@ import pytest
 import scipy.integrate
 
 import stickslip as ss
+from evidence.validation.case_bifurcations import absorber
 from stickslip.errors import InputError
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.bifurcations import bifurcations, side_branches, subharmonic_branch
@@ -187,7 +188,8 @@ def test_a_wheel_loses_its_symmetry_where_a_localised_branch_leaves():
     assert np.abs(after - state).max() < 3e-3 * np.abs(state).max()
 
 
-def test_a_subharmonic_motion_closes_after_three_periods():
+def cubic_mass(omega_range, *, force, highest, points):
+    """Return the forced response of a damped mass on a spring with a cubic part."""
     structure = ss.model.lumped(
         np.ones(1), np.ones((1, 1)), damping=np.array([[0.02]]), names=("mass",)
     )
@@ -195,9 +197,15 @@ def test_a_subharmonic_motion_closes_after_three_periods():
         ("spring",), (ss.CubicSpring(cubic_t=1.0),), np.array([[1.0], [0.0], [0.0]])
     )
     system = ss.System(structure, spring, outputs=structure.sets["mass"])
-    load = ss.HarmonicLoad(np.zeros(1), {1: np.array([3.0 + 0j])})
-    sweep = ss.Sweep(omega_range=(3.0, 4.5), low=5, high=5, selection="always_high", points=20)
-    problem = ss.response.forced_problem(system, load, sweep)
+    load = ss.HarmonicLoad(np.zeros(1), {1: np.array([force + 0j])})
+    sweep = ss.Sweep(
+        omega_range=omega_range, low=highest, high=highest, selection="always_high", points=points
+    )
+    return ss.response.forced_problem(system, load, sweep)
+
+
+def test_a_subharmonic_motion_closes_after_three_periods():
+    problem = cubic_mass((3.0, 4.5), force=3.0, highest=5, points=20)
     omega = 3.6
     guess = np.zeros((4, 1), dtype=complex)
     guess[1], guess[3] = np.sqrt(((omega / 3) ** 2 - 1) / 0.75), 3.0 / (1 - omega**2)
@@ -220,3 +228,46 @@ def test_nothing_leaves_a_fold_or_a_torus():
     for kind in ("fold", "Neimark-Sacker"):
         with pytest.raises(InputError, match=kind):
             side_branches(problem, replace(all_of_it.found[0], kind=kind))
+
+
+def test_folds_of_one_harmonic_lie_where_the_closed_form_has_them():
+    force = 0.02
+    problem = cubic_mass((0.8, 1.6), force=force, highest=1, points=30)
+    load = problem.low.linear.load
+    points = ss.response.accepted_points(
+        list(ss.forced_response(problem.system, load, problem.sweep))
+    )
+    found = bifurcations(problem, points, examine=None)
+    # ((1 + 3/4 A^2 - w^2)^2 + (c w)^2) A^2 = F^2 is quadratic in w^2; its larger root over A turns twice
+    size = np.linspace(0.05, 0.99, 400_001)
+    spring = 1 + 0.75 * size**2
+    middle = spring - 0.5 * 0.02**2
+    square = middle**2 - spring**2 + (force / size) ** 2
+    omega = np.sqrt(middle[square > 0] + np.sqrt(square[square > 0]))
+    lowest = int(np.argmin(omega))
+    true = [omega[lowest], omega[lowest:].max()]
+    assert [b.kind for b in found.found] == ["fold", "fold"]
+    assert sorted(b.omega for b in found.found) == pytest.approx(true, abs=1e-6)
+    assert found.examined == 0
+
+
+def test_a_torus_of_an_absorber_lies_where_shooting_has_it():
+    # the vibration absorber of that case, which finds 1.1092820 by SciPy
+    mass, damping, stiffness, cubic = absorber()
+    structure = ss.model.lumped(mass, stiffness, damping=damping, names=("primary", "absorber"))
+    gaps = np.zeros((6, 2))
+    gaps[0], gaps[3] = (1.0, 0.0), (1.0, -1.0)
+    springs = tuple(ss.CubicSpring(cubic_t=float(value)) for value in cubic)
+    system = ss.System(structure, ss.Interface(("ground", "link"), springs, gaps), np.array([0]))
+    load = ss.HarmonicLoad(np.zeros(2), {1: np.array([0.11, 0.0j])})
+    odd = [1, 3]
+    sweep = ss.Sweep(
+        omega_range=(1.08, 1.13), low=odd, high=odd, selection="always_high", points=2, peak_points=0
+    )  # fmt: skip
+    problem = ss.response.forced_problem(system, load, sweep)
+    points = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))
+    ends = [points[0], points[-1]]
+    (found,) = bifurcations(problem, ends).found
+    assert (found.kind, found.before, found.after) == ("Neimark-Sacker", 0, 2)
+    assert abs(found.omega - 1.1092820) <= max(found.omega_error, 1e-6) < 1e-3
+    assert 0.0 < found.beat < found.omega / 2
