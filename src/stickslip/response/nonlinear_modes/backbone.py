@@ -25,7 +25,10 @@ from stickslip.solve.status import Status
 
 Concept = Literal["periodic", "decaying"]
 BEGINS = 0.5  # of the amplitude at which slip begins
-ENDS = 300.0  # times that amplitude
+ENDS, GROSS = (
+    300.0,
+    1e5,
+)  # times that amplitude: where a curve ends, and where at the latest one to gross slip does
 TIMES = 12  # as many points as were asked for, at most: lift-off may fold a curve hundreds of times
 LOST = 3  # points in a row that are not found, after which a curve is at its end
 
@@ -118,7 +121,8 @@ class ModeSweep:
     ----------
     span
         First and last amplitude, m: of the coordinate as long as the motion has the shape of the linear mode, else of the motion of the
-        same kinetic energy over the square of its frequency. None: from half of that at which slip begins to 300 times that.
+        same kinetic energy over the square of its frequency. None: from half of that at which slip begins to 300 times
+        that, or on to gross slip.
     points
         Least number of points.
     most_harmonics
@@ -175,7 +179,7 @@ def nonlinear_mode(
     along, span = sweep or ModeSweep(), None if sweep is None else sweep.span
     if span is None:
         slips = slip_amplitude(problem)
-        span = (BEGINS * slips, ENDS * slips)
+        span = (BEGINS * slips, (GROSS if along.to_gross_slip else ENDS) * slips)
     curve = ModeCurve.of(
         problem,
         span,

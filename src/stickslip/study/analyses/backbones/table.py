@@ -30,7 +30,7 @@ class NonlinearModeTable(Section):
         min_length=2,
         max_length=2,
         description="the range [lowest, highest] of the amplitude of the peak output, as long as the motion has the shape of the linear mode; left "
-        "out: from where nothing slips to 300 times where slip begins",
+        "out: from where nothing slips to 300 times where slip begins, or on to gross slip",
     )
     points: int = Field(30, ge=5, le=1000, description="least number of points, 5 to 1000")
     harmonics: int = Field(
