@@ -1,28 +1,21 @@
-"""[quasi_periodic] of a study: two loads, a tone that nothing drives, resuming, the page, and what is refused."""
+"""[quasi_periodic] of a study: two loads, a tone that nothing drives, a wheel, resuming, the page, and what is refused."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from flutter_wheel import MODE, MOVED, ONE_UNSTABLE, flutter_wheel
 from small_v2 import EXAMPLES, changed
+from test_limit_cycle_study import SHROUDS, flow
 
 import stickslip as ss
 from stickslip.errors import InputError
 from stickslip.report.page import plots
-from stickslip.response.quasi_periodic.problem import two_tones, with_enough
-from stickslip.response.quasi_periodic.tone import (
-    beginnings,
-    forced_motion,
-    over_amplitude,
-    second_tone,
-    solve_free,
-)
 from stickslip.response.self_excited.in_time import march_periods, wave_history
-from stickslip.response.self_excited.modes import stuck_modes
 from stickslip.response.time.sectors import all_sectors
 from stickslip.response.time.start import start_from_harmonics
+from stickslip.study.analyses.quasi_periodic import QUASI_PERIODIC
+from stickslip.study.analyses.two_frequencies.solve import at_frequency
 from stickslip.study.models.study import read_study
 from stickslip.study.outcome import Outcome
 from stickslip.study.run import run_study
@@ -82,40 +75,47 @@ def test_a_tone_that_nothing_drives_from_python() -> None:
     assert still["largest"].values == pytest.approx(still["least"].values, rel=1e-6)
 
 
-def test_a_flutter_wave_beside_a_forced_wave_is_that_of_all_sectors_in_time() -> None:
-    system, load = flutter_wheel(1, 9, ONE_UNSTABLE, 0.3)
-    omega = 2 * np.pi * 619.5
-    none = ss.HarmonicLoad(np.zeros(system.structure.n))
-    problem = two_tones(system, load, none, 3, waves=(1, 2), more=np.array([MOVED]))
-    forced = forced_motion(problem, omega)
-    mode = stuck_modes(replace(system, structure=system.structure.travelling_as(2)), MODE)[-1]
-    begin = beginnings(problem, forced, [mode.omega])[0]
-    # small, it grows as the mode does, but for the frequency at which damping is counted
-    assert next(over_amplitude(begin)).ratio == pytest.approx(mode.ratio, rel=1e-4)
-    motion = second_tone(begin)
-    assert motion is not None
+WAKE = """
+[load.wake]
+on = "wheel.blade"
+force_n = 2.0
+engine_order = 1
+[quasi_periodic]
+frequencies_hz = [88.0]
+accuracy_percent = 0.3
+"""
 
-    def solve(wider, x, _path):  # type: ignore[no-untyped-def]
-        return solve_free(wider, x, motion.omegas)
 
-    motion = with_enough(problem, motion, 15, 0.01, solve)[1]
-    sizes = np.abs(motion.coefficients[:, MOVED])
-    waves = [sizes[motion.indices.index(index)] for index in ((1, 0), (0, 1))]
-    # the march begins near it: the forced motion disturbed grows into it in thousands of periods. What is left out counts more than its
-    # size, since the flutter wave is neither fed nor damped by much: 3 % of its amplitude here, 0.04 % with 25 harmonics and 0.04 % left out
-    whole = all_sectors(system, load, every=True)
-    still = np.zeros((2, system.structure.n), dtype=complex)
-    still[1] = motion.coefficients[motion.indices.index((1, 0))]
-    start = start_from_harmonics(whole.spread(still), omega, whole.contacts.gap_operator, whole.contacts.laws)  # fmt: skip
-    turn = np.exp(2j * np.pi * 2 * np.arange(6) / 6)
-    beside = np.kron(turn, motion.coefficients[motion.indices.index((0, 1))][:4])
-    start = replace(start, displacement=start.displacement + beside.real, velocity=start.velocity + (1j * motion.omegas[1] * beside).real)  # fmt: skip
-    tips = MOVED + 4 * np.arange(6)
-    history = wave_history(march_periods(whole.structure, whole.contacts, whole.load, omega, tips, start, 480, 128))  # fmt: skip
-    assert set(history.waves[:2]) == {1, 2}
-    assert history.amplitude[-1, 1] == pytest.approx(waves[0], rel=5e-3)
-    assert history.amplitude[-1, 2] == pytest.approx(waves[1], rel=0.04)
-    assert np.delete(history.amplitude[-1], [1, 2]).max() < 0.05 * min(waves)
+def test_a_flutter_wave_beside_a_forced_wave_is_that_of_all_sectors_in_time(tmp_path: Path) -> None:
+    """Blades that touch their neighbours: the wake drives wave 1, a fluid feeds wave 4."""
+    flow(tmp_path)
+    text = SHROUDS.split("[limit_cycle]")[0] + WAKE
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    (case,) = read_study(tmp_path / "study.toml").cases()
+    question = QUASI_PERIODIC.inputs(case, case.build())
+    assert question.waves == (1, 4)
+    found = at_frequency(question, 2 * np.pi * 88.0, None)
+    assert found.kind == "second tone"
+    index = [tuple(row) for row in found.indices]
+    waves = [float(np.hypot(*found.coefficients[index.index(i), 0])) for i in ((1, 0), (0, 1))]
+    # all sectors in time, from the motion of the balance as it is in each of them
+    whole = all_sectors(question.model.system, question.first, every=True)
+    own, omega = whole.structure.n // 5, found.first
+    kept = found.unknowns[..., 0] + 1j * found.unknowns[..., 1]
+    side = question.problem().balance.side
+    wide = side.recover(tuple(map(tuple, found.indices)), (omega, found.second), kept)[:, :own]
+    place, speed = (np.zeros((5, own), dtype=complex) for _ in range(2))
+    for (j, k), row in zip(found.indices, wide, strict=True):
+        turned = np.exp(2j * np.pi * (j + 4 * k) * np.arange(5) / 5)[:, None] * row
+        place += turned
+        speed += 1j * (j * omega + k * found.second) * turned
+    still = np.zeros((2, whole.structure.n), dtype=complex)
+    start = start_from_harmonics(still, omega, whole.contacts.gap_operator, whole.contacts.laws)
+    start = replace(start, displacement=place.real.ravel(), velocity=speed.real.ravel())
+    tips = question.model.system.outputs[0] + own * np.arange(5)
+    history = wave_history(march_periods(whole.structure, whole.contacts, whole.load, omega, tips, start, 320, 256))  # fmt: skip
+    assert history.amplitude[-1, [1, 4]] == pytest.approx(waves, rel=3e-3)
+    assert np.delete(history.amplitude[-1], [1, 4]).max() < 0.03 * min(waves)
 
 
 def test_what_cannot_be_answered_is_refused(tmp_path: Path) -> None:
