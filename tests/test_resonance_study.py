@@ -165,3 +165,12 @@ def test_python_asks_the_same(tmp_path: Path) -> None:
     by_function = model.resonance(of, **keys).data["resonance"]
     for name in ("amplitude", "frequency_hz", "energy"):
         assert by_function[name].values == pytest.approx(by_field[name].values, rel=1e-9)
+
+
+def test_curves_by_arc_length_overtake_each_other_too(tmp_path: Path) -> None:
+    text = (Path(__file__).parent.parent / "examples" / "two_peaks" / "study.toml").read_text("utf-8")  # fmt: skip
+    few = text[: text.index("values = ")] + "span = [100, 62]\npoints = 4\npeaks = 2\nharmonics = 3\n"  # fmt: skip
+    case = one_case(answered(few, tmp_path).tree["resonance"].to_dataset(), 0)
+    assert case["overtaking_after"].values.tolist() == [1]
+    assert case["overtaking_value"].values == pytest.approx([67.0], rel=0.03)
+    assert case.attrs["smallest_amplitude"] == pytest.approx(2.837e-3, rel=1e-3)

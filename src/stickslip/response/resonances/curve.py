@@ -1,12 +1,12 @@
 """The curve of a resonance over a design parameter, by arc length: round the folds at which a peak is born or joins another one."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.errors import input_error
+from stickslip.errors import InputError, input_error
 from stickslip.harmonic.parameters import ParameterLinearisation
 from stickslip.harmonic.peak import EVALUATIONS, PeakProblem
 from stickslip.response.branch import Followed, Judged, OneLevel, Route, steps_through
@@ -18,6 +18,9 @@ from stickslip.solve.branch import Following, Latest
 from stickslip.solve.continuation import Point
 from stickslip.solve.newton_method import Solution
 
+FEW = 12  # iterations of a corrector along the curve
+SHORTEST = 0.004  # step, in arc length, below which a curve is taken up further on
+BEYOND = 0.5  # of the span by which a corrector may go beyond it
 MOST = 10  # multiples of the smallest number of points at which a curve ends
 
 
@@ -61,12 +64,14 @@ def peak_curve(
             f"Give 0 to {len(found) - 1}, or a wider range.",
         )
     tracker = found[peak]
-    equation = _Equation(tracker.problem)
+    equation = _Equation(tracker.problem, span)
     size = tracker.known[-1][1].size
     weights = np.ones(size)
     weights[: tracker.problem.family(first).linear.n] = 0.0
-    control = steps_through(abs(last - first), points)
-    way = Following(newton=search.how.newton, control=control, weights=weights)
+    control = replace(steps_through(abs(last - first), points), smallest=SHORTEST)
+    # a corrector gives up soon: at a corner of the curve each trial has another value of the parameter, for which a model may have to be built
+    newton = replace(search.how.newton, globalisation="dogleg", max_iterations=FEW)
+    way = Following(newton=newton, control=control, weights=weights)
 
     def begin(value: float, near: Sequence[FloatArray], _most: bool) -> Solution:
         if near:
@@ -89,12 +94,23 @@ class _Equation:
     """The equation of the peak, turned from point to point so that it stays regular at folds of the response beside the peak."""
 
     problem: PeakProblem
+    span: tuple[float, float]
     evaluations: int = 0
 
     def linearise(self, y: FloatArray, p: float) -> ParameterLinearisation:
-        """Evaluate everything at (y, p)."""
+        """Evaluate everything at (y, p); infinite where a corrector goes far beyond the span, or to a value there that the model refuses."""
         self.evaluations += EVALUATIONS[self.problem.by]
-        return self.problem.linearise(y, p)
+        lowest, highest = sorted(self.span)
+        margin = BEYOND * (highest - lowest)
+        if lowest <= p <= highest:
+            return self.problem.linearise(y, p)
+        try:
+            if lowest - margin <= p <= highest + margin:
+                return self.problem.linearise(y, p)
+        except InputError:  # as a negative friction coefficient
+            pass
+        nothing = np.zeros(y.size)
+        return ParameterLinearisation(np.full(y.size, np.inf), np.eye(y.size), 0.0, lambda: nothing)
 
     def turn(self, y: FloatArray, p: float) -> None:
         """Align the equation with the response at a peak; by variable phase, ask for the phase of the maximum from here on."""

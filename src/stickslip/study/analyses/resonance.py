@@ -95,8 +95,8 @@ class ResonanceAnalysis:
                 for i, point in enumerate(peak_curve(search, asked.ends, asked.points, peak)):
                     if i >= known:
                         yield point
-            except InputError:
-                if peak == 0:
+            except InputError as error:
+                if peak == 0 or error.place != "peak":
                     raise
                 return  # there are no more
 

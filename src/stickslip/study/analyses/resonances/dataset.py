@@ -9,7 +9,7 @@ import xarray as xr
 from stickslip.arrays import FloatArray
 from stickslip.response.resonances.point import PeakPoint
 from stickslip.study.analyses.analysis import Solved
-from stickslip.study.analyses.resonances.envelope import heights, overtakings
+from stickslip.study.analyses.resonances.envelope import along_span, heights, overtakings
 from stickslip.study.analyses.resonances.words import case_verdicts
 from stickslip.study.analyses.verdict import ATTRIBUTE, of_all_cases, to_json
 from stickslip.study.analyses.waves.about import told
@@ -55,21 +55,22 @@ def _of_case(solved: Solved) -> Variables:
         return found
     curves = _curves(points, asked.values)
     found |= {name: variable("peak point", curves[name], *about) for name, about in CURVES.items()}
-    if asked.values is not None:
-        met = overtakings(heights(points, asked.values), asked.values)
+    values = asked.values
+    amplitude, places = (heights(points, values), values) if values else along_span(points)
+    if met := overtakings(amplitude, places):
         columns = {
             "value": ([m.value for m in met], "1", "where another peak becomes the highest"),
             "before": ([m.before for m in met], "1", "number of the peak that was"),
             "after": ([m.after for m in met], "1", "number of the peak that is from there on"),
             "amplitude": ([m.amplitude for m in met], "m", "amplitude of both there"),
         }
-        if met:
-            found |= {f"overtaking_{k}": variable("overtaking", *own) for k, own in columns.items()}
-    return found | _lowest(solved.notes.get("smallest", {}), found)
+        found |= {f"overtaking_{k}": variable("overtaking", *own) for k, own in columns.items()}
+    least = np.nanmin(np.fmax.reduce(amplitude, axis=0), initial=np.inf)
+    return found | _lowest(solved.notes.get("smallest", {}), found, float(least))
 
 
-def _lowest(noted: Mapping[str, Any], found: Variables) -> Variables:
-    """Return where the highest peak is lowest: in the valley of one peak, or where one overtakes another."""
+def _lowest(noted: Mapping[str, Any], found: Variables, least: float) -> Variables:
+    """Return where the highest peak is lowest: in the valley of one peak, or where one overtakes another; nothing if a visited value is lower than both."""
     places = []
     if "value" in noted:
         places.append(
@@ -80,7 +81,7 @@ def _lowest(noted: Mapping[str, Any], found: Variables) -> Variables:
             found["overtaking_amplitude"].values, found["overtaking_value"].values, strict=True
         )
         places += [(float(a), float(v), np.nan) for a, v in met]
-    if not places or not min(places)[0] <= _least(found):
+    if not places or not min(places)[0] <= least:
         return {}
     amplitude, value, hertz = min(places)
     return {
@@ -88,13 +89,6 @@ def _lowest(noted: Mapping[str, Any], found: Variables) -> Variables:
         "smallest_amplitude": variable("", amplitude, "m", "amplitude there"),
         "smallest_frequency_hz": variable("", hertz, "Hz", "frequency there; NaN where two peaks are equally high"),
     }  # fmt: skip
-
-
-def _least(found: Variables) -> float:
-    """Return the least of the highest amplitudes at the visited values."""
-    maxima = np.where(found["maximum"].values == 1, found["amplitude"].values, -np.inf)
-    highest = np.max(maxima, axis=0)
-    return float(np.min(highest[np.isfinite(highest)], initial=np.inf))
 
 
 def _curves(points: Sequence[PeakPoint], values: Sequence[float] | None) -> dict[str, FloatArray]:

@@ -37,6 +37,33 @@ def heights(points: Sequence[PeakPoint], values: Sequence[float]) -> FloatArray:
     return np.array([[known.get((i, v), np.nan) for v in values] for i in range(count)])
 
 
+def along_span(points: Sequence[PeakPoint]) -> tuple[FloatArray, list[float]]:
+    """Return the same of curves that were followed by arc length, on straight lines between their points, and all values; a curve counts up to its first fold."""
+    count = 1 + max((p.peak for p in points), default=-1)
+    curves = [_before_fold([p for p in points if p.peak == i]) for i in range(count)]
+    values = np.unique([p.value for own in curves for p in own])
+    amplitude = np.full((count, values.size), np.nan)
+    for row, own in zip(amplitude, curves, strict=True):
+        if len(own) > 1:
+            order = sorted(own, key=lambda p: p.value)
+            known = [p.value for p in order]
+            row[:] = np.interp(values, known, [p.amplitude for p in order], np.nan, np.nan)
+    falling = len(points) > 1 and points[1].value < points[0].value
+    return (amplitude[:, ::-1], values[::-1].tolist()) if falling else (amplitude, values.tolist())
+
+
+def _before_fold(curve: Sequence[PeakPoint]) -> list[PeakPoint]:
+    """Return the maxima of a curve as long as its value goes on in one direction."""
+    found: list[PeakPoint] = []
+    for point in curve:
+        if not (point.converged and point.is_maximum):
+            continue
+        if len(found) > 1 and (point.value - found[-1].value) * (found[1].value - found[0].value) <= 0.0:  # fmt: skip
+            break
+        found.append(point)
+    return found
+
+
 def highest(amplitude: FloatArray) -> IntArray:
     """Return the number of the highest peak at each value, -1 where there is none."""
     filled = np.where(np.isfinite(amplitude), amplitude, -np.inf)
@@ -59,11 +86,12 @@ def overtakings(amplitude: FloatArray, values: Sequence[float]) -> list[Overtaki
         a, b = int(top[i]), int(top[j])
         if a == b:
             continue
-        # two peaks that are one from some value on do not overtake each other
         gap = amplitude[a, [i, j]] - amplitude[b, [i, j]]
-        share = gap[0] / (gap[0] - gap[1]) if np.all(np.isfinite(gap)) and gap[0] != gap[1] else 1.0
+        if not np.all(np.isfinite(gap)) or gap[0] == gap[1]:
+            continue  # one of them is not known on both sides, or they are one peak
+        share = gap[0] / (gap[0] - gap[1])
         value = values[i] + share * (values[j] - values[i])
-        there = amplitude[b, j] if share == 1.0 else amplitude[b, i] + share * (amplitude[b, j] - amplitude[b, i])  # fmt: skip
+        there = amplitude[b, i] + share * (amplitude[b, j] - amplitude[b, i])
         found.append(Overtaking(float(value), a, b, float(there)))
     return found
 
