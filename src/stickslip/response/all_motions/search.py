@@ -1,15 +1,13 @@
 """The search: a sweep, deflation at a set of frequencies, random states in time, and each motion that is new followed as a branch."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from time import perf_counter
 
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray
-from stickslip.contact.compiled import Evaluator
-from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.support import harmonics_of
@@ -25,7 +23,7 @@ from stickslip.response.all_motions.basins import (
 )
 from stickslip.response.all_motions.deflation import Distance, deflated_newton, distance_among
 from stickslip.response.all_motions.found import SPENT, AllMotions, Origin, Stage, gathered
-from stickslip.response.bifurcations.larger import over_periods
+from stickslip.response.all_motions.options import MotionSearch, search_problem
 from stickslip.response.bifurcations.side_branch import both_ways
 from stickslip.response.branch import following_vibration, steps_through, vibration_weights
 from stickslip.response.equilibrium import bonded_start
@@ -33,16 +31,14 @@ from stickslip.response.forced.problem import (
     ForcedPoint,
     ForcedProblem,
     forced_point,
-    forced_problem,
     with_stiffness,
 )
-from stickslip.response.forced.sweep import Sweep
 from stickslip.response.ladder import plain_sweep
 from stickslip.response.stability.multipliers import stability
 from stickslip.response.system import System
 from stickslip.response.time.transient import TimeStepping
 from stickslip.solve.continuation import start_point
-from stickslip.solve.newton_method import Newton, newton
+from stickslip.solve.newton_method import newton
 
 ITERATIONS = 60  # of a deflated solve
 SHARE = 0.5  # of the budget, after which deflation leaves the rest to time
@@ -53,109 +49,6 @@ OTHER, LARGER = (
 )  # share of the starts with another harmonic, and by which power of the largest scale it may be larger
 GUESSES = (0.5, 2.0, -1.0)
 LONGEST = 6  # times the points of a sweep that a branch may have
-
-
-@dataclass(frozen=True, kw_only=True)
-class MotionSearch:
-    """How all motions are looked for.
-
-    Parameters
-    ----------
-    omega_range
-        Range of the sweep and of the branches, rad/s.
-    at
-        Frequencies that are searched, rad/s; none: `frequencies` of them in the middle of equal parts of the range.
-    frequencies
-        Their number.
-    periods
-        Periods of the load in one of the motion: 3 to search motions of ω/3, too.
-    harmonics
-        Highest harmonic of the load's frequency; it stays as it is.
-    samples
-        Of a period, where contacts are evaluated on samples.
-    points
-        Smallest number of points of the sweep.
-    tries
-        Deflated solves at a frequency since the last that found a motion.
-    starts
-        Random states at each frequency.
-    modes
-        Lowest modes, contacts stuck, in which states are drawn.
-    spread
-        Largest modal amplitude of a state, in units of the largest of the motions that are known.
-    most_periods
-        After which a start that repeats nothing is given up.
-    steps
-        Steps in a period.
-    seconds
-        Budget: no solve and no start begins after it, and deflation leaves half of it to the starts.
-    seed
-        Of the random states.
-    evaluator
-        How piecewise-linear laws are evaluated.
-    newton
-        Corrector.
-    """
-
-    omega_range: tuple[float, float]
-    at: tuple[float, ...] = ()
-    frequencies: int = 5
-    periods: int = 1
-    harmonics: int = 7
-    samples: int = 256
-    points: int = 40
-    tries: int = 12
-    starts: int = 20
-    modes: int = 2
-    spread: float = 1.5
-    most_periods: int = 1000
-    steps: int = 512
-    seconds: float = 120.0
-    seed: int = 0
-    evaluator: Evaluator = "events"
-    newton: Newton = field(default_factory=Newton)
-
-    def __post_init__(self) -> None:
-        for name in (
-            "frequencies",
-            "periods",
-            "harmonics",
-            "points",
-            "modes",
-            "steps",
-            "most_periods",
-        ):
-            if getattr(self, name) < 1:
-                raise input_error(f"MotionSearch.{name}", f"is {getattr(self, name)}", "Give a count from 1 on.")  # fmt: skip
-        if not (self.seconds > 0.0 and self.spread > 0.0):
-            raise input_error("MotionSearch", f"seconds = {self.seconds}, spread = {self.spread}", "Both are above zero.")  # fmt: skip
-        low, high = self.omega_range
-        if not all(low <= omega <= high for omega in self.at):
-            raise input_error("MotionSearch.at", f"leaves the range {low:g} to {high:g} rad/s", "Widen omega_range.")  # fmt: skip
-
-    @property
-    def places(self) -> tuple[float, ...]:
-        """Frequencies that are searched, rad/s."""
-        low, high = self.omega_range
-        middle = (np.arange(self.frequencies) + 0.5) / self.frequencies
-        return self.at or tuple((low + (high - low) * middle).tolist())
-
-
-def search_problem(system: System, load: HarmonicLoad, search: MotionSearch) -> ForcedProblem:
-    """Return the forced response that is searched; refuse a rigid contact."""
-    if system.interface.rigid:
-        raise input_error(
-            "all motions",
-            "a contact is rigid: its force is no function of the gap",
-            "Give the contacts a stiffness, as elastic_coulomb.",
-        )
-    order = search.harmonics
-    sweep = Sweep(
-        omega_range=search.omega_range, low=order, high=order, selection="always_low", points=search.points,
-        samples=max(search.samples, 8 * order), evaluator=search.evaluator, newton=search.newton,
-    )  # fmt: skip
-    problem = forced_problem(system, load, sweep)
-    return problem if search.periods == 1 else over_periods(problem, search.periods, order)
 
 
 def all_motions(system: System, load: HarmonicLoad, search: MotionSearch) -> AllMotions:

@@ -9,7 +9,7 @@ import numpy as np
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
 from stickslip.errors import InputError, input_error
-from stickslip.response.all_motions.search import MotionSearch, search_problem
+from stickslip.response.all_motions.options import MotionSearch, search_problem
 from stickslip.response.forced.problem import ForcedProblem
 from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.facts import facts_of

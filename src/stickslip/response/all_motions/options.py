@@ -1,0 +1,117 @@
+"""How all motions are looked for, and the equations of the search."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from stickslip.contact.compiled import Evaluator
+from stickslip.errors import input_error
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.response.bifurcations.larger import over_periods
+from stickslip.response.forced.problem import ForcedProblem, forced_problem
+from stickslip.response.forced.sweep import Sweep
+from stickslip.response.system import System
+from stickslip.solve.newton_method import Newton
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionSearch:
+    """How all motions are looked for.
+
+    Parameters
+    ----------
+    omega_range
+        Range of the sweep and of the branches, rad/s.
+    at
+        Frequencies that are searched, rad/s; none: `frequencies` of them in the middle of equal parts of the range.
+    frequencies
+        Their number.
+    periods
+        Periods of the load in one of the motion: 3 to search motions of ω/3, too.
+    harmonics
+        Highest harmonic of the load's frequency; it stays as it is.
+    samples
+        Of a period, where contacts are evaluated on samples.
+    points
+        Smallest number of points of the sweep.
+    tries
+        Deflated solves at a frequency since the last that found a motion.
+    starts
+        Random states at each frequency.
+    modes
+        Lowest modes, contacts stuck, in which states are drawn.
+    spread
+        Largest modal amplitude of a state, in units of the largest of the motions that are known.
+    most_periods
+        After which a start that repeats nothing is given up.
+    steps
+        Steps in a period.
+    seconds
+        Budget: no solve and no start begins after it, and deflation leaves half of it to the starts.
+    seed
+        Of the random states.
+    evaluator
+        How piecewise-linear laws are evaluated.
+    newton
+        Corrector.
+    """
+
+    omega_range: tuple[float, float]
+    at: tuple[float, ...] = ()
+    frequencies: int = 5
+    periods: int = 1
+    harmonics: int = 7
+    samples: int = 256
+    points: int = 40
+    tries: int = 12
+    starts: int = 20
+    modes: int = 2
+    spread: float = 1.5
+    most_periods: int = 1000
+    steps: int = 512
+    seconds: float = 120.0
+    seed: int = 0
+    evaluator: Evaluator = "events"
+    newton: Newton = field(default_factory=Newton)
+
+    def __post_init__(self) -> None:
+        for name in (
+            "frequencies",
+            "periods",
+            "harmonics",
+            "points",
+            "modes",
+            "steps",
+            "most_periods",
+        ):
+            if getattr(self, name) < 1:
+                raise input_error(f"MotionSearch.{name}", f"is {getattr(self, name)}", "Give a count from 1 on.")  # fmt: skip
+        if not (self.seconds > 0.0 and self.spread > 0.0):
+            raise input_error("MotionSearch", f"seconds = {self.seconds}, spread = {self.spread}", "Both are above zero.")  # fmt: skip
+        low, high = self.omega_range
+        if not all(low <= omega <= high for omega in self.at):
+            raise input_error("MotionSearch.at", f"leaves the range {low:g} to {high:g} rad/s", "Widen omega_range.")  # fmt: skip
+
+    @property
+    def places(self) -> tuple[float, ...]:
+        """Frequencies that are searched, rad/s."""
+        low, high = self.omega_range
+        middle = (np.arange(self.frequencies) + 0.5) / self.frequencies
+        return self.at or tuple((low + (high - low) * middle).tolist())
+
+
+def search_problem(system: System, load: HarmonicLoad, search: MotionSearch) -> ForcedProblem:
+    """Return the forced response that is searched; refuse a rigid contact."""
+    if system.interface.rigid:
+        raise input_error(
+            "all motions",
+            "a contact is rigid: its force is no function of the gap",
+            "Give the contacts a stiffness, as elastic_coulomb.",
+        )
+    order = search.harmonics
+    sweep = Sweep(
+        omega_range=search.omega_range, low=order, high=order, selection="always_low", points=search.points,
+        samples=max(search.samples, 8 * order), evaluator=search.evaluator, newton=search.newton,
+    )  # fmt: skip
+    problem = forced_problem(system, load, sweep)
+    return problem if search.periods == 1 else over_periods(problem, search.periods, order)
