@@ -14,10 +14,15 @@ from evidence.models.two_blades import two_blades
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.ladder import plain_sweep
 from stickslip.response.nonlinear_modes.backbone import ModeSweep, nonlinear_mode
-from stickslip.response.nonlinear_modes.isolated import isolation, other_modes, with_others
+from stickslip.response.nonlinear_modes.isolated import (
+    isolation,
+    other_modes,
+    peak_with_others,
+    with_others,
+)
 from stickslip.response.nonlinear_modes.more_points import refined
 from stickslip.response.nonlinear_modes.one_mass import ModalOscillator, modal_oscillator
-from stickslip.response.nonlinear_modes.synthesis import at_resonance, synthesise
+from stickslip.response.nonlinear_modes.synthesis import synthesise
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import stuck_modes
 from stickslip.study.analyses.synthesis.solve import DOUBTFUL, TRUSTED
@@ -40,8 +45,7 @@ def synthesised(own: ModalOscillator, dof: int) -> list[tuple[float, float]]:
         (top,) = curve.peaks
         alone = isolation(others, top, dof)
         with_others(others, curve, outputs)
-        peak = abs(with_others(others, at_resonance(own, top), outputs)[0, 0])
-        found.append((float(peak), alone.foreign))
+        found.append((peak_with_others(others, curve, top, dof)[0], alone.foreign))
     return found
 
 

@@ -18,10 +18,11 @@ from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.matrices import lumped
 from stickslip.response.nonlinear_modes.backbone import ModeSweep, nonlinear_mode
-from stickslip.response.nonlinear_modes.isolated import isolation, other_modes, with_others
+from stickslip.response.nonlinear_modes.isolated import isolation, other_modes, peak_with_others
 from stickslip.response.nonlinear_modes.more_points import refined
 from stickslip.response.nonlinear_modes.one_mass import modal_oscillator
-from stickslip.response.nonlinear_modes.synthesis import at_resonance, resonances
+from stickslip.response.nonlinear_modes.passage import Swept, passage_through_resonance
+from stickslip.response.nonlinear_modes.synthesis import resonances, synthesise
 from stickslip.response.parameter import Discretisation
 from stickslip.response.resonances.tracking import track_peak
 from stickslip.response.self_excited.modes import StuckMode, stuck_modes
@@ -35,6 +36,7 @@ LEVELS = np.array([0.7, 1.3, 2.0, 4.0, 8.0, 16.0])  # times that at which slip b
 SAME = 0.03  # relative distance of frequencies beyond which the tracked peak is another one
 SYSTEMS, SEED = 16, 1
 WITHIN = 0.02
+ENDS = (0.9, 1.15)  # rad/s
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ def compared(rng: np.random.Generator) -> list[Compared]:
             continue
         if abs(top.omega / solved.omega - 1.0) > SAME:
             continue
-        peak = abs(with_others(others, at_resonance(own, top), np.array([dof]))[0, 0])
+        peak, _ = peak_with_others(others, synthesise(own, top.level), top, dof)
         alone = isolation(others, top, dof)
         found.append(Compared(alone.foreign, float(peak / solved.amplitude - 1.0), alone.linear))
     return found
@@ -97,6 +99,45 @@ def many(systems: int, seed: int) -> list[Compared]:
     return [one for _ in range(systems) for one in compared(rng)]
 
 
+def swept() -> list[Record]:
+    """Compare passages of two coupled masses through their first resonance with small steps in time, which know no harmonics and no modes."""
+    gap = np.zeros((3, 2))
+    gap[0, 0] = 1.0
+    contacts = Interface(("c",), (Jenkins(k_t=0.2, limit=0.1),), gap)
+    structure = lumped(np.eye(2), np.array([[2.0, -1.0], [-1.0, 2.0]]), 0.01 * np.eye(2))
+    system = System(structure, contacts, np.array([1]))
+    load = HarmonicLoad(np.zeros(2), {1: np.array([0.0, 0.02 + 0j])})
+    followed = nonlinear_mode(system, HarmonicLoad(load.static), stuck_modes(system, 1)[0], 1, HOW, ModeSweep(points=30))  # fmt: skip
+    own = modal_oscillator(refined(followed, load, HOW), load)
+    turn = np.exp(1j * np.outer(np.arange(HOW.order + 1), np.linspace(0.0, 2 * np.pi, 65)))
+    found = []
+    for level in (1.0, 3.0, 8.0):
+        for seconds in (500.0, 2000.0):
+            passed = passage_through_resonance(own, level, Swept(ends=ENDS, rate=(ENDS[1] - ENDS[0]) / seconds))  # fmt: skip
+            motion = own.displacement(passed.place)[:, :, 1] @ turn
+            in_time = _in_small_steps(0.02 * level, seconds)
+            found.append(record(CASE, f"largest displacement, m, level {level:g} in {seconds:g} s", np.abs(motion.real).max(), in_time, WITHIN, "small steps in time"))  # fmt: skip
+    return found
+
+
+def _in_small_steps(force: float, seconds: float) -> float:
+    """Return the largest displacement of the second mass under a chirp."""
+    steps = int(seconds * max(ENDS) / (2 * np.pi) * 400)
+    dt = seconds / steps
+    time = np.arange(steps) * dt
+    pushes = force * np.cos(ENDS[0] * time + (ENDS[1] - ENDS[0]) / seconds * time**2 / 2)
+    first = second = first_speed = second_speed = friction = largest = 0.0
+    for push in pushes.tolist():
+        pull = first - 2.0 * second - 0.01 * second_speed + push
+        first_speed += dt * (second - 2.0 * first - 0.01 * first_speed - friction)
+        second_speed += dt * pull
+        first += dt * first_speed
+        second += dt * second_speed
+        friction = min(max(friction + 0.2 * dt * first_speed, -0.1), 0.1)
+        largest = max(largest, abs(second))
+    return largest
+
+
 def run() -> list[Record]:
     """Compare some chains."""
     found = many(SYSTEMS, SEED)
@@ -106,6 +147,7 @@ def run() -> list[Record]:
         bound(CASE, f"largest error of {len(trusted)} trusted peaks", max(trusted), WITHIN, SOURCE),
         bound(CASE, "the same where nothing slips", max(abs(c.error) for c in found if c.linear), 1e-3, SOURCE),
         record(CASE, "refused peaks that are off by more than 2 %", sum(e > WITHIN for e in refused), len(refused), 0.4, SOURCE),
+        *swept(),
     ]  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from .isolated import Isolation as Isolation
 from .isolated import OtherModes as OtherModes
 from .isolated import isolation as isolation
 from .isolated import other_modes as other_modes
+from .isolated import peak_with_others as peak_with_others
 from .isolated import with_others as with_others
 from .more_points import refined as refined
 from .one_mass import ModalOscillator as ModalOscillator

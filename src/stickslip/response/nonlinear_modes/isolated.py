@@ -28,6 +28,7 @@ from stickslip.response.nonlinear_modes.synthesis import Resonance, Synthesised,
 WHOLE = 300  # coordinates up to which all motions count
 LOWEST = 80  # of more, so many modes and the static answer to the force
 ACROSS = 0.02  # of ln a, over which the growth with the level is taken
+WIDTHS = 2.0  # half-widths of a peak within which the other modes may move it
 HELD = 0.2  # least share of the others that counts
 CHANGES = 1e-3  # relative change of frequency or damping from the linear mode that counts as slip
 
@@ -200,6 +201,33 @@ def with_others(others: OtherModes, found: Synthesised, dofs: IntArray) -> Compl
     rows = np.zeros((dofs.size, own.backbone.system.structure.n))
     rows[np.arange(dofs.size), dofs] = 1.0
     return np.asarray(motion + others.answer(found.omega, left_over(own, found), rows))
+
+
+def peak_with_others(
+    others: OtherModes, curve: Synthesised, found: Resonance, dof: int
+) -> tuple[float, float]:
+    """Return the largest amplitude of a dof, m, with what the other modes add, and its frequency, rad/s: they move a peak a little.
+
+    Parameters
+    ----------
+    others
+        The modes beside the followed one.
+    curve
+        The response of the level.
+    found
+        One of its peaks.
+    dof
+        The output.
+    """
+    own = others.oscillator.at(np.array([found.place]))
+    width = WIDTHS * abs(float(own.ratio[0])) * found.omega
+    near = np.abs(curve.omega - found.omega) <= width
+    top = at_resonance(others.oscillator, found)
+    place, omega = np.append(top.place, curve.place[near]), np.append(top.omega, curve.omega[near])
+    both = replace(top, place=place, omega=omega, phase=np.append(top.phase, curve.phase[near]))
+    size = np.abs(with_others(others, both, np.array([dof]))[:, 0])
+    at = int(np.argmax(size))
+    return float(size[at]), float(omega[at])
 
 
 def _share(one: ComplexArray, other: ComplexArray) -> float:

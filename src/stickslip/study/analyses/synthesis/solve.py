@@ -20,13 +20,13 @@ from stickslip.response.nonlinear_modes.isolated import (
     OtherModes,
     isolation,
     other_modes,
+    peak_with_others,
     with_others,
 )
 from stickslip.response.nonlinear_modes.one_mass import ModalOscillator, modal_oscillator
 from stickslip.response.nonlinear_modes.passage import Swept, passage_through_resonance
 from stickslip.response.nonlinear_modes.synthesis import (
     Resonance,
-    at_resonance,
     free_motions,
     resonances,
     synthesise,
@@ -108,8 +108,8 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
     own, question = shared.oscillator, shared.question
     curve = synthesise(own, level)
     tops = curve.peaks
-    peaks = [abs(_first(shared, r)) for r in tops]
-    at = int(np.argmax(peaks)) if peaks else -1
+    peaks = [peak_with_others(shared.others, curve, r, question.dof) for r in tops]
+    at = int(np.argmax([size for size, _ in peaks])) if peaks else -1
     alone = isolation(shared.others, tops[at], question.dof) if peaks else NOBODY
     resolved = _resolved(shared, tops[at]) if peaks else np.nan
     answer, why = "beyond", "the nonlinear mode ends before it needs so much of the load"
@@ -127,8 +127,8 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
         level=level,
         answer=answer,
         why=why,
-        peak=float(peaks[at]) if shown else np.nan,
-        peak_omega=tops[at].omega if shown else np.nan,
+        peak=peaks[at][0] if shown else np.nan,
+        peak_omega=peaks[at][1] if shown else np.nan,
         foreign=alone.foreign,
         output=alone.output,
         gaps=alone.gaps,
@@ -154,12 +154,6 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
         passage_finished=passages[2],
         passage_change=passages[3],
     )
-
-
-def _first(shared: Synthesis, resonance: Resonance) -> complex:
-    """Return the first harmonic of the output at a resonance, the other modes added, m."""
-    curve = at_resonance(shared.oscillator, resonance)
-    return complex(with_others(shared.others, curve, np.array([shared.question.dof]))[0, 0])
 
 
 def _resolved(shared: Synthesis, found: Resonance) -> float:
