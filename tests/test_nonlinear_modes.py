@@ -238,7 +238,7 @@ def test_the_mode_from_a_study_its_words_and_its_backbone_over_the_response(tmp_
     told = outcome.summaries["nonlinear_mode"][0]
     assert "gross slip from" in told.rows[0][-1]
     figures = plots(outcome.tree)
-    assert {"nonlinear_mode_frequency", "nonlinear_mode_damping", "nonlinear_mode_energy", "backbones"} <= set(figures)  # fmt: skip
+    assert {"nonlinear_mode_frequency", "nonlinear_mode_damping", "nonlinear_mode_energy", "nonlinear_mode_energy_damping", "backbones"} <= set(figures)  # fmt: skip
     response, backbone = figures["backbones"].data
     top = int(np.nanargmax(response.y))
     order = np.argsort(backbone.y)

@@ -22,6 +22,8 @@ _READING = (
     "The curve is that of the motion with its mean and its harmonics, in the order in which it was followed: it turns back where it folds."
 )
 
+_ENERGY = "The energy is twice the mean kinetic energy of all harmonics, of a wheel that of one sector; where all springs are linear it is the whole."
+
 
 @dataclass(frozen=True, eq=False)
 class Modes(Node):
@@ -60,14 +62,19 @@ def damping(view: Modes) -> Plot | None:
     return Plot(f"nonlinear_mode_damping{view.key}", "Damping over the amplitude", _READING, figure)
 
 
-def energies(view: Modes) -> Plot | None:
-    """Show the frequency over the energy."""
-    figure = _over(view, "energy", "frequency_hz", 1.0, "J")
-    if figure is None:
-        return None
-    figure.update_yaxes(title_text="frequency (Hz)")
-    caption = "The energy is twice the mean kinetic energy of all harmonics, of a wheel that of one sector; where all springs are linear it is the whole."
-    return Plot(f"nonlinear_mode_energy{view.key}", "Frequency over the energy", caption, figure)
+def energies(view: Modes) -> list[Plot]:
+    """Show frequency and damping ratio over the energy."""
+    found = []
+    for name, factor, title, key, caption in (
+        ("frequency_hz", 1.0, "frequency (Hz)", "energy", _ENERGY),
+        ("damping_ratio", 100.0, "damping ratio (%)", "energy_damping", "The same of the damping ratio."),
+    ):  # fmt: skip
+        figure = _over(view, "energy", name, factor, "J")
+        if figure is not None:
+            figure.update_yaxes(title_text=title)
+            heading = f"{title.split(' (')[0].capitalize()} over the energy"
+            found.append(Plot(f"nonlinear_mode_{key}{view.key}", heading, caption, figure))
+    return found
 
 
 def table(view: Modes) -> str:
