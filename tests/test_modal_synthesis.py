@@ -96,6 +96,7 @@ def test_a_followed_mode_gives_the_exact_response_to_a_thousandth():
         place = motions_at(own, 1.0, omega)
         motion = own.displacement(place, np.array([0]))
         assert abs(motion[0, 1, 0]) == pytest.approx(exact, rel=1.5e-3)
+        np.testing.assert_allclose(own.gaps(place)[:, :, 0], motion[:, :, 0])
     response = synthesise(own, 1.0)
     assert response.stable.all()
     assert response.amplitude.max() == pytest.approx(resonances(own, 1.0)[0].amplitude)

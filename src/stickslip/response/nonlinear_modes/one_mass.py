@@ -171,6 +171,13 @@ class ModalOscillator:
         found[:, 1:] *= self.at(place).amplitude[:, None, None]
         return np.asarray(found)
 
+    def gaps(self, place: FloatArray) -> ComplexArray:
+        """Return (p, H+1, 3 n_contacts) gaps t, w, n of all contacts at places, m, in the phase of the backbone."""
+        operator = self.backbone.system.interface.gap_operator
+        motion = self.displacement(place)
+        flat = motion.reshape(-1, motion.shape[2])
+        return np.asarray((operator @ flat.T).T.reshape(*motion.shape[:2], -1))
+
     def coarser(self) -> "ModalOscillator":
         """Return the oscillator by every second point of the backbone, to see what the others were good for."""
         points = self.backbone.points
