@@ -11,6 +11,7 @@ import xarray as xr
 from models import lifting, table
 from pydantic import ValidationError
 from small_v2 import write_four_masses
+from synthetic_result import tree_of
 
 from stickslip.assembly.assembled import Assembled, ContactTable, Frequencies
 from stickslip.assembly.contact import Contact
@@ -24,6 +25,7 @@ from stickslip.errors import InputError, SingularError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
+from stickslip.report.page import plots
 from stickslip.response.forced.response import (
     ForcedPoint,
     Sweep,
@@ -308,6 +310,8 @@ def test_points_without_a_solution_are_marked_and_not_filled_in() -> None:
     assert np.isin(data.not_periodic_frequency_hz.values, hz).all()
     assert data.not_periodic_largest.values[0, 0] >= data.not_periodic_least.values[0, 0] > 0.0
     assert str(data.not_periodic_sentence.values[0]).split(": ")[1].startswith("no periodic motion")
+    assert any("That is time integration" in str(v) for v in FORCED_RESPONSE.verdicts(data))
+    assert "not_periodic" in plots(tree_of(forced_response=data))
 
 
 def drifting(retention: float) -> Question:
