@@ -67,11 +67,11 @@ def _refined(
     problem: ForcedProblem, search: "_Search", known: list[ForcedPoint], most: int
 ) -> Iterator[ForcedPoint]:
     """Add points around the highest of `known` until its bracket is narrow, at most so many."""
+    heights = [problem.amplitude(p) for p in known] if most else []
     for _ in range(most):
         if not known:
             return
-        heights = [problem.amplitude(p) for p in known]
-        top = _highest(problem, known)
+        top = int(np.argmax(heights))
         seam = _on_seam(known, top)
         omega = known[top].omega if seam else _vertex(known, heights)
         if omega is None:
@@ -83,6 +83,7 @@ def _refined(
             return
         place = top if omega <= known[top].omega else top + 1
         known[place : place + seam] = [point]
+        heights[place : place + seam] = [problem.amplitude(point)]
 
 
 def _highest(problem: ForcedProblem, known: Sequence[ForcedPoint]) -> int:
