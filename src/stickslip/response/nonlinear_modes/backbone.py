@@ -62,6 +62,8 @@ class ModePoint:
         Largest share of the period for which a contact point is open.
     change
         Relative change of frequency or damping ratio, the larger one, that more harmonics are foretold to make; NaN where nobody looked.
+    sticking
+        Share of the contact points that can slip and stick all the time.
     """
 
     amplitude: float
@@ -75,6 +77,7 @@ class ModePoint:
     slipping: float = np.nan
     open_for: float = np.nan
     change: float = np.nan
+    sticking: float = np.nan
 
     @property
     def converged(self) -> bool:
@@ -207,7 +210,9 @@ def mode_point(curve: ModeCurve, found: Followed) -> ModePoint:
     full = curve.linear(found.level, y).recover(problem.omega(y), scale * problem.relative(y))
     energies = [_product(problem.system, h, full[h]) for h in range(1, order + 1)]
     squares = (omega * np.arange(1, order + 1)) ** 2
-    contacts = contacts_of(problem, y, scale) if found.converged else Contacts(np.nan, np.nan)
+    contacts = (
+        contacts_of(problem, y, scale) if found.converged else Contacts(np.nan, np.nan, np.nan)
+    )
     return ModePoint(
         float(abs(full[1, problem.dof])),
         omega,
@@ -220,6 +225,7 @@ def mode_point(curve: ModeCurve, found: Followed) -> ModePoint:
         contacts.slipping,
         contacts.open_for,
         found.judged.bound,
+        contacts.sticking,
     )
 
 
@@ -257,6 +263,8 @@ def _end(points: Sequence[ModePoint], found: Followed, last: float, *, stops: bo
     if points[-1] is end and (found.p == last or (stops and end.slipping == 1.0)):
         if found.p != last:
             return f"gross slip at {end.amplitude:.4g} m"
+        if slips is None and end.sticking == 0.0:
+            return f"amplitude reached, no contact sticks at {end.amplitude:.4g} m: those that do not slip stay open"
         return f"amplitude reached{'' if slips is None else f', gross slip from {slips:.4g} m on'}"
     told = f"{end.amplitude:.4g} m after {len(points)} points"
     if end.open_for > 0.0:

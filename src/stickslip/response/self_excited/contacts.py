@@ -20,11 +20,14 @@ class Contacts:
     ----------
     slipping
         Share of the contact points that can slip or open and do so, or close, at some time; NaN where none can.
+    sticking
+        Share of those that stick all the time.
     open_for
         Largest share of the period for which one is open.
     """
 
     slipping: float
+    sticking: float
     open_for: float
 
 
@@ -37,7 +40,9 @@ def contacts_of(problem: SelfExcited, y: FloatArray, amplitude: float) -> Contac
     moved = np.any(state == SLIP, axis=(1, 2)) | np.any(state != state[:, :, :1], axis=(1, 2))
     share = float(np.mean(moved[leaves])) if np.any(leaves) else np.nan
     opened = np.mean(np.any(state == OPEN, axis=1), axis=1)
-    return Contacts(share, float(np.max(opened, initial=0.0)))
+    stuck = np.all(state == STICK, axis=(1, 2))
+    sticks = float(np.mean(stuck[leaves])) if np.any(leaves) else np.nan
+    return Contacts(share, sticks, float(np.max(opened, initial=0.0)))
 
 
 def leaving(interface: Interface) -> BoolArray:
