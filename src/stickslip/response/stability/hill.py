@@ -58,6 +58,15 @@ class HillStability:
     disturbance: WaveDisturbance | None
     missing: int | None
 
+    @property
+    def reason(self) -> str:
+        """What the verdict rests on."""
+        if self.missing is None:
+            return "Hill's method did not count the multipliers outside the unit circle: its polynomial is too far from the contacts, or rounding made more transitions than there can be"
+        if self.missing:
+            return f"{self.missing} multipliers outside the unit circle were counted that Hill's method did not find"
+        return self.stability.reason
+
 
 def hill_stability(problem: ForcedProblem, point: ForcedPoint) -> HillStability:
     """Return the stability of a solved point of a forced response, a tuned wheel's against every wave.

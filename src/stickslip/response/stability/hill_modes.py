@@ -20,7 +20,7 @@ from stickslip.response.system import System
 RAISED = (
     8  # times that the mass is weighted four times as much, until it makes the stiffness definite
 )
-COUPLED = 1e-10  # of the largest entry: what couples modes less does not
+COUPLED = 1e-9  # of the largest entry: what couples modes less does not
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +31,11 @@ class HillModes:
     ----------
     stiffness, mass
         (n,) of each mode, the mass times ω².
-    damping
-        (n, n) times ω; or (n,) where the modes are not coupled.
-    rest
-        (n, n) stiffness that is not Hermitian; or (n,).
-    loss
-        (n, n) or (n,) stiffness that acts a quarter of a period ahead.
+    damping, rest, loss
+        (n, n) damping times ω, stiffness that is not Hermitian, and stiffness that acts a quarter of a period ahead; or all (n,) where the
+        modes are coupled by nothing else than `springs`.
+    springs
+        (r, n) with the damping ``-springsᴴ springs`` times ω: damping by a stiffness that the springs in place of the contacts are no part of.
     ports
         (m, n) gaps at the ports of the contacts.
     omega
@@ -50,14 +49,10 @@ class HillModes:
     damping: Matrix
     rest: Matrix
     loss: Matrix
+    springs: Matrix
     ports: Matrix
     omega: float
     feedback: Feedback | None
-
-    @property
-    def coupled(self) -> bool:
-        """Whether the dynamic stiffness is no diagonal matrix."""
-        return self.damping.ndim == 2 or self.feedback is not None
 
     @property
     def ratios(self) -> FloatArray:
@@ -65,20 +60,20 @@ class HillModes:
         with np.errstate(divide="ignore"):
             return np.sqrt(np.abs(self.stiffness) / self.mass)
 
-    def dynamic(self, z: complex, sign: float) -> ComplexArray:
-        """Return the (n, n) dynamic stiffness at ``z = σ + ih``, or its diagonal (n,); `sign` is that of the frequency."""
-        own = self.stiffness + z * z * self.mass
+    def diagonal(self, z: complex, sign: float) -> ComplexArray | None:
+        """Return the (n,) dynamic stiffness at ``z = σ + ih`` but for what `springs` take away; None where it is no diagonal matrix."""
+        if self.damping.ndim == 2 or self.feedback is not None:
+            return None
         more = z * self.damping + self.rest + 1j * sign * self.loss
-        if self.damping.ndim == 1:
-            full: ComplexArray = np.asarray(own + more)
-            if self.feedback is None:
-                return full
-            more, own = np.diag(full), np.zeros(own.size)
-        out = np.array(more, dtype=complex)
-        out.flat[:: len(own) + 1] += own
-        if self.feedback is not None:
-            out -= self._air(z)
-        return out
+        return np.asarray(self.stiffness + z * z * self.mass + more)
+
+    def dynamic(self, z: complex, sign: float) -> ComplexArray:
+        """Return the (n, n) dynamic stiffness at ``z = σ + ih``; `sign` is that of the frequency."""
+        out = z * self.damping + self.rest + 1j * sign * self.loss
+        out = np.diag(out) if out.ndim == 1 else out
+        out = out - z * (self.springs.conj().T @ self.springs)
+        out.flat[:: len(out) + 1] += self.stiffness + z * z * self.mass
+        return np.asarray(out if self.feedback is None else out - self._air(z))
 
     def _air(self, z: complex) -> ComplexArray:
         """Return what a table of frequencies adds to the frozen force, at the frequency of the disturbance."""
@@ -135,15 +130,21 @@ def hill_modes(
         raise np.linalg.LinAlgError("the stiffness of a harmonic is not bounded by its mass")
     values = np.maximum(values, 0.0)
     parts = [basis.conj().T @ a @ basis for a in (omega * c, k - even, loss)]
-    if all(_diagonal(a) for a in parts):
-        parts = [np.diagonal(a).copy() for a in parts]
+    held = np.sqrt(np.maximum(springs, 0.0))[:, None] * (rows @ basis)
+    share = _share_of_springs(parts[0], held)
+    held = np.sqrt(share) * held[springs > 0.0] if share > 0.0 else held[:0]
+    without = [parts[0] + held.conj().T @ held, *parts[1:]]
+    if all(_diagonal(a) for a in without):
+        parts = [np.diagonal(a).copy() for a in without]
+    else:
+        held = held[:0]
     own = None
     if feedback is not None and feedback.influence.depends_on_frequency:
         inside = replace(feedback.influence, beyond="nearest")
         own = replace(feedback, patterns=basis.conj().T @ feedback.patterns, influence=inside)
     damping, rest, lossy = parts
     return HillModes(
-        1.0 - shift * values, omega**2 * values, damping, rest, lossy, rows[ports] @ basis, omega, own
+        1.0 - shift * values, omega**2 * values, damping, rest, lossy, held, rows[ports] @ basis, omega, own
     )  # fmt: skip
 
 
@@ -202,6 +203,14 @@ class HillSide:
             gaps = _dense(gaps) @ way
             force = None if force is None else replace(force, patterns=force.patterns[:n])
         return hill_modes(wave, gaps, self.springs, self.ports, self.omega, force)
+
+
+def _share_of_springs(damping: Matrix, held: Matrix) -> float:
+    """Return how much of the stiffness of springs the damping lacks that couples modes, by least squares."""
+    springs = held.conj().T @ held
+    off = springs - np.diag(np.diagonal(springs))
+    size = float(np.vdot(off, off).real)
+    return -float(np.vdot(off, damping).real) / size if size > 0.0 else 0.0
 
 
 def _diagonal(matrix: Matrix) -> bool:

@@ -240,18 +240,27 @@ class _Part:
 
 
 def _part(modes: HillModes, slow: IntArray, z: complex, sign: float) -> _Part:
-    Z, B = modes.dynamic(z, sign), modes.ports
+    B, D, held = modes.ports, modes.diagonal(z, sign), modes.springs
     rest = np.setdiff1d(np.arange(B.shape[1]), slow)
     B_s, B_r = B[:, slow], B[:, rest]
-    if Z.ndim == 1:
-        answer = B_r.conj().T / Z[rest, None]
-        return _Part(np.diag(Z[slow]), B_s + 0j, B_s.conj().T + 0j, B_r @ answer)
-    right = np.hstack([B_r.conj().T, Z[np.ix_(rest, slow)]])
-    solved = np.linalg.solve(Z[np.ix_(rest, rest)], right)
+    if D is None:
+        Z = modes.dynamic(z, sign)
+        inner, across = Z[np.ix_(slow, slow)], Z[np.ix_(slow, rest)]
+        right = np.hstack([B_r.conj().T, Z[np.ix_(rest, slow)]])
+        solved = np.linalg.solve(Z[np.ix_(rest, rest)], right)
+    else:
+        # Z = D - z Yᴴ Y, the inverse of which is that of D and a small matrix
+        Y_s, Y_r = held[:, slow], held[:, rest]
+        inner = np.diag(D[slow]) - z * (Y_s.conj().T @ Y_s)
+        across = -z * (Y_s.conj().T @ Y_r)
+        right = np.hstack([B_r.conj().T, -z * (Y_r.conj().T @ Y_s)])
+        solved = right / D[rest, None]
+        scaled = Y_r.conj().T / D[rest, None]
+        small = np.eye(len(held)) - z * (Y_r @ scaled)
+        solved = solved + z * (scaled @ np.linalg.solve(small, Y_r @ solved))
     answer, follows = solved[:, : len(B)], solved[:, len(B) :]
-    across = Z[np.ix_(slow, rest)]
     return _Part(
-        Z[np.ix_(slow, slow)] - across @ follows,
+        inner - across @ follows,
         B_s - B_r @ follows,
         B_s.conj().T - across @ answer,
         B_r @ answer,
@@ -261,6 +270,7 @@ def _part(modes: HillModes, slow: IntArray, z: complex, sign: float) -> _Part:
 def _receptance(modes: HillModes, z: complex, away: BoolArray) -> ComplexArray:
     """Return the (m, m) receptance at the ports of modes that are `away` from ringing, without the damping that couples them."""
     damping, rest = (np.diagonal(a) if a.ndim == 2 else a for a in (modes.damping, modes.rest))
-    Z = modes.stiffness + z * z * modes.mass + z * damping + rest
+    own = damping - np.sum(np.abs(modes.springs) ** 2, axis=0)
+    Z = modes.stiffness + z * z * modes.mass + z * own + rest
     ports = modes.ports[:, away]
     return np.asarray((ports / Z[away]) @ ports.conj().T)
