@@ -17,7 +17,9 @@ from stickslip.model.dofs import numbered_dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.response import Sweep, forced_response
+from stickslip.response.stability import HillStability, Stability, WaveDisturbance
 from stickslip.response.system import System
+from stickslip.response.time.floquet import Floquet
 from stickslip.response.time.sectors import sectors_in_time
 from stickslip.study.analyses import forced_response as analysis
 from stickslip.study.analyses.forced import examination, stable
@@ -207,6 +209,7 @@ def test_a_tuned_wheel_is_examined_with_all_its_sectors_if_they_are_few(
 ) -> None:
     (case,) = read_study(write_shrouded_sector(tmp_path)).cases()
     monkeypatch.setattr(examination, "MOST_WHEEL", 0.0)
+    monkeypatch.setattr(examination, "MOST_HILL", 0.0)
     asked = FORCED_RESPONSE.inputs(case, case.build())
     any_point = response_of(rubbed()).accepted[0]
     found = examine(asked, any_point)
@@ -239,6 +242,7 @@ def test_a_large_wheel_is_not_examined_whatever_waves_it_has(
     """Harmonics 0 to 6 of engine order 5 lead to all waves of 12 sectors: the wheel is no smaller for it."""
     small = rubbed()
     point = response_of(small).accepted[0]
+    monkeypatch.setattr(examination, "MOST_HILL", 0.0)
     asked = on_a_wheel(small, n, contacts, every=every)
     wheel = asked.model.system
     assert wheel.structure.has_every_wave == every
@@ -248,6 +252,33 @@ def test_a_large_wheel_is_not_examined_whatever_waves_it_has(
     assert not examination.examines_every_wave(wheel)
     # a limit cycle has all waves in any case and may take a minute
     assert bool(examination.too_long(wheel, forced=False)) == (n > 30)
+
+
+def test_a_large_wheel_is_examined_by_hills_method_at_its_peak(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Twelve sectors of 200 coordinates: what `test_hill` finds of small wheels is asked for in place of all multipliers."""
+    small = rubbed()
+    response = response_of(small)
+    asked = on_a_wheel(small, 200, 20, every=True)
+    vars(asked)["problem"] = small.problem  # that of a wheel without gaps cannot be set up
+    monkeypatch.setattr(stable, "stability", lambda *_: pytest.fail("the monodromy was begun"))
+    outside = Floquet(np.array([1.2 + 0.0j]))
+    grown = Stability(outside, np.array([1e-3]), 0, 0, 4)
+    wave = WaveDisturbance(1.2 + 0.0j, 9, 1.0, 50.0 * HZ)
+    monkeypatch.setattr(stable, "hill_stability", lambda *_: HillStability(grown, wave, 0))
+    assert "one sector at a time (Hill's method)" in cost_line(asked)
+    assert to_examine(replace(asked, limit=1e-9), response) == [response.peak]
+    found = examine(asked, response.accepted[response.peak])
+    assert (found.verdict, found.multiplier) == ("unstable", 1.2)
+    assert found.sentence.endswith("in wave 9 (3 nodal diameters) near 50 Hz")
+    lost = replace(grown, errors=np.array([np.inf]))
+    monkeypatch.setattr(stable, "hill_stability", lambda *_: HillStability(lost, None, 2))
+    found = examine(asked, response.accepted[response.peak])
+    assert found.verdict == "undecided"
+    assert "2 multipliers outside the unit circle were counted" in found.sentence
+    some = on_a_wheel(small, 200, 20, every=False)
+    assert "one sector of a tuned wheel" in cost_line(some)
 
 
 def test_the_integration_of_a_wheel_counts_all_sectors_that_are_marched() -> None:

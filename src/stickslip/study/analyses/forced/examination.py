@@ -1,6 +1,9 @@
 """What an examination of the stability costs, and whether it is begun: all sectors of a wheel count, each of which may do something else."""
 
 from stickslip.reduction.tuned import TunedWheel
+from stickslip.response.stability.contact_states import is_located
+from stickslip.response.stability.hill import MOST, ROWS
+from stickslip.response.stability.hill_segment import NODES
 from stickslip.response.system import System
 from stickslip.response.time.sectors import different_sectors
 
@@ -11,6 +14,8 @@ MOST_WORK = 60 * FLOPS  # of one examination
 MOST_WHEEL = (
     4 * FLOPS
 )  # the same of a forced motion of a wheel, whose other waves are reduced for nothing else
+MOST_HILL = 300 * FLOPS  # of one examination by Hill's method, an upper bound: few contacts slip
+MOTIONS = 1.5  # of which one is the motion as it was solved, against few waves
 
 
 def examination_work(system: System) -> float:
@@ -56,9 +61,32 @@ def too_long(system: System, *, forced: bool) -> str:
     )
 
 
+def hill_work(system: System) -> float:
+    """Return the most operations that an examination of a wheel by Hill's method takes, one sector at a time, whatever contacts slip."""
+    side = system.structure
+    sectors = side.sectors if isinstance(side, TunedWheel) else 1
+    rows = min(ROWS, (2 * MOST + 1) * 3 * system.interface.n_contacts)
+    each = 8.0 * rows**3 / 3.0 + (2 * MOST + 1) * 4.0 * float(side.n) ** 3
+    return MOTIONS * 2.0 * sectors / 2.0 * NODES * each
+
+
+def by_hill(system: System) -> bool:
+    """Whether the forced motions of a tuned wheel are examined by Hill's method: where all its sectors together are too many coordinates."""
+    interface = system.interface
+    return (
+        isinstance(system.structure, TunedWheel)
+        and bool(too_long(system, forced=True))
+        and not interface.rigid
+        and all(is_located(law) for law in interface.laws)
+        and hill_work(system) <= MOST_HILL
+    )
+
+
 def examines_every_wave(system: System) -> bool:
-    """Whether a tuned wheel is so small that the stability of its forced motions is examined against every wave."""
-    return isinstance(system.structure, TunedWheel) and not too_long(system, forced=True)
+    """Whether the stability of the forced motions of a tuned wheel is examined against every wave."""
+    if not isinstance(system.structure, TunedWheel):
+        return False
+    return not too_long(system, forced=True) or by_hill(system)
 
 
 def _lasting(seconds: float) -> str:

@@ -7,13 +7,19 @@ import numpy as np
 
 from stickslip.errors import InputError, StickslipError
 from stickslip.reduction.tuned import TunedWheel
-from stickslip.response.stability import Stability, stability
-from stickslip.response.stability.waves import growing_wave, point_disturbances
+from stickslip.response.stability import Stability, hill_stability, stability
+from stickslip.response.stability.waves import (
+    WaveDisturbance,
+    growing_wave,
+    point_disturbances,
+)
 from stickslip.study.analyses.forced.comparison import Check
 from stickslip.study.analyses.forced.curve import branch_length
 from stickslip.study.analyses.forced.examination import (
     FLOPS,
+    by_hill,
     examination_work,
+    hill_work,
     too_long,
 )
 from stickslip.study.analyses.forced.in_time import seconds_in_time
@@ -81,7 +87,7 @@ def to_examine(question: Question, response: Response) -> list[int]:
     """
     if question.examine == "off" or response.top is None:
         return []
-    if unexaminable(question):
+    if why_not(question) or by_hill(question.model.system):
         return [response.peak]
     known = [i for i, a in enumerate(response.accepted) if a.point.converged]
     if question.examine == "all":
@@ -99,10 +105,12 @@ def to_examine(question: Question, response: Response) -> list[int]:
 def examine(question: Question, accepted: Accepted) -> Examined:
     """Return what the multipliers say of a point, or why they say nothing."""
     omega = accepted.point.omega
-    why = unexaminable(question)
+    why, hill = why_not(question), by_hill(question.model.system)
     if why:
         return Examined(omega, "not examined", np.nan, np.nan, why)
     try:
+        if hill:
+            return _by_hill(question, accepted)
         found = stability(question.problem, accepted.point)
         wave = _of_wave(question, accepted, found)
     except InputError as error:
@@ -113,15 +121,29 @@ def examine(question: Question, accepted: Accepted) -> Examined:
     return Examined(omega, found.verdict, found.multiplier, found.multiplier_error, said)
 
 
+def _by_hill(question: Question, accepted: Accepted) -> Examined:
+    """Return what Hill's method says of a point of a wheel, against every wave."""
+    hill = hill_stability(question.problem, accepted.point)
+    found, said = hill.stability, hill.reason
+    if hill.disturbance is not None and found.verdict != "stable":
+        said += _named(question, hill.disturbance)
+    omega = accepted.point.omega
+    return Examined(omega, found.verdict, found.multiplier, found.multiplier_error, said)
+
+
 def _of_wave(question: Question, accepted: Accepted, found: Stability) -> str:
     """Return which wave of a wheel the multiplier that decides belongs to; empty where disturbances die."""
     wheel = question.model.system.structure
     if not isinstance(wheel, TunedWheel) or found.verdict == "stable":
         return ""
     wave = growing_wave(point_disturbances(question.problem, accepted.point), found.multiplier)
-    if wave is None:
-        return ""
-    diameters = wave.nodal_diameter(wheel.sectors)
+    return "" if wave is None else _named(question, wave)
+
+
+def _named(question: Question, wave: WaveDisturbance) -> str:
+    """Return which wave a disturbance is."""
+    wheel = question.model.system.structure
+    diameters = wave.nodal_diameter(wheel.sectors) if isinstance(wheel, TunedWheel) else 0
     return f", in wave {wave.wave} ({diameters} nodal diameters) near {wave.omega / HZ:.5g} Hz"
 
 
@@ -148,8 +170,16 @@ def to_integrate(question: Question, response: Response, examined: list[Examined
     )
 
 
+def why_not(question: Question) -> str:
+    """Return why no point of a case is examined; empty where the multipliers, or Hill's method, can be had."""
+    system = question.model.system
+    if by_hill(system) and isinstance(system.structure, TunedWheel):
+        return "" if system.structure.has_every_wave else ONE_SECTOR
+    return unexaminable(question)
+
+
 def unexaminable(question: Question) -> str:
-    """Return why no point of a case has multipliers that could be had; empty where nothing is known against it."""
+    """Return why no point of a case has all its multipliers; empty where nothing is known against it."""
     system = question.model.system
     if system.interface.rigid:
         return "a contact is rigid: its force is no function of the gap"
@@ -163,9 +193,12 @@ def cost_line(question: Question) -> str:
     """Return what ``stickslip check`` says of the examination."""
     if question.examine == "off":
         return 'stability: not examined, forced_response.stability is "off"'
-    why = unexaminable(question)
+    why = why_not(question)
     if why:
         return f"stability: not examined, {why}"
+    if by_hill(question.model.system):
+        most = hill_work(question.model.system) / FLOPS
+        return f"stability: the peak of a case against every wave, one sector at a time (Hill's method), up to {most:.0f} s"
     points = (
         "every point"
         if question.examine == "all"
