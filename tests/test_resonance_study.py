@@ -174,3 +174,15 @@ def test_curves_by_arc_length_overtake_each_other_too(tmp_path: Path) -> None:
     assert case["overtaking_after"].values.tolist() == [1]
     assert case["overtaking_value"].values == pytest.approx([67.0], rel=0.03)
     assert case.attrs["smallest_amplitude"] == pytest.approx(2.837e-3, rel=1e-3)
+
+
+def test_too_few_harmonics_are_told(tmp_path: Path) -> None:
+    text = B3.replace('law = "jenkins"', 'law = "unilateral_spring"')
+    text = text.replace("tangential_stiffness_n_per_m = 0.5\nslip_limit_n = 0.2\n", "normal_stiffness_n_per_m = 3.0\n")  # fmt: skip
+    text = text.replace('"contact.damper.slip_limit_n"\nvalues = [0.3, 0.2, 0.12, 0.06]', '"excitation"\nvalues = [1.0]')  # fmt: skip
+    text = text.replace("[0.127, 0.223]", "[0.15, 0.3]")
+    (told,) = answered(text, tmp_path / "few").verdicts
+    assert "with 3 harmonics" in told.why
+    assert told.remedy == "Raise resonance.harmonics."
+    (trusted,) = answered(text.replace("harmonics = 1", "harmonics = 6"), tmp_path / "more").verdicts  # fmt: skip
+    assert trusted.level == "trusted"

@@ -206,3 +206,17 @@ def _is_another(one: Tracker, made: list[Tracker]) -> bool:
     others = [other.problem.omega(other.reached(value).x) for other in made]
     omega = one.problem.omega(found.x)
     return all(abs(omega - other) > SAME * other for other in others)
+
+
+def with_order(search: PeakSearch, point: PeakPoint, order: int, samples: int) -> PeakPoint:
+    """Return a peak as it is with harmonics up to `order` and so many samples, from the known one, by horizontal tangent."""
+    how = replace(search.how, order=order, samples=samples)
+    more = replace(search, how=how, by="horizontal_tangent")
+    problem = more.problem(point.value)
+    problem = replace(problem, omega_scale=point.omega / search.periods)
+    balance = problem.family(point.value)
+    y = np.append(balance.unknowns(point.coefficients[:, balance.linear.retained]), 0.0)
+    state = problem.state(y, point.value)
+    problem = problem.sharpened(state).aligned(state)
+    tracker = Tracker(problem, how.newton, [(point.value, y)], problem.phase, search.periods)
+    return tracker.point(point.value)

@@ -3,17 +3,20 @@
 import json
 from collections.abc import Iterator, Sequence
 
+import numpy as np
 import xarray as xr
 
 from stickslip.assembly.model import Model
 from stickslip.errors import InputError
 from stickslip.response.resonances.curve import peak_curve
 from stickslip.response.resonances.point import PeakPoint
+from stickslip.response.resonances.tracker import with_order
 from stickslip.response.resonances.tracking import follow_peaks, later_peaks, smallest_peak
+from stickslip.response.self_excited.problem import SAMPLES_A_HARMONIC
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
 from stickslip.study.analyses.resonances.dataset import dataset
 from stickslip.study.analyses.resonances.envelope import heights, valley
-from stickslip.study.analyses.resonances.question import Question, question_of
+from stickslip.study.analyses.resonances.question import SAMPLES, Question, more_than, question_of
 from stickslip.study.analyses.resonances.table import ResonanceTable
 from stickslip.study.analyses.resonances.words import tables
 from stickslip.study.analyses.verdict import Verdict, doubt, stored, to_json
@@ -21,6 +24,7 @@ from stickslip.study.keep.progress import LOG, advance
 from stickslip.units import HZ
 
 MODEL, FIRST, SMALLEST, LAST = "model", "first", "smallest", "last"  # notes
+HARMONICS = "harmonics"  # note: the highest peak with more of them
 
 
 class ResonanceAnalysis:
@@ -81,6 +85,7 @@ class ResonanceAnalysis:
                 problem = error.problem
             between = valley(every, heights(every, asked.values), asked.values)
             notes.put(SMALLEST, {} if between is None else _smallest(inputs, between))
+        notes.put(HARMONICS, _more_harmonics(inputs, every))
         notes.put(LAST, {"problem": problem})
 
     def _points(self, inputs: Question, done: Sequence[PeakPoint]) -> Iterator[PeakPoint]:
@@ -129,6 +134,21 @@ def _told(points: Iterator[PeakPoint], inputs: Question) -> Iterator[PeakPoint]:
             f"peak {point.peak + 1} at {point.value:.5g}: {point.omega / HZ:.4f} Hz, {1e3 * point.amplitude:.5g} mm{state}",
         )
         yield point
+
+
+def _more_harmonics(inputs: Question, points: Sequence[PeakPoint]) -> dict[str, float]:
+    """Return by how much twice the harmonics and one change the highest peak, relatively; NaN where it is not found with them."""
+    maxima = [p for p in points if p.converged and p.is_maximum]
+    if not maxima:
+        return {}
+    top = max(maxima, key=lambda p: p.amplitude)
+    order = more_than(inputs.asked.harmonics)
+    samples = max(SAMPLES, SAMPLES_A_HARMONIC * order)
+    more = with_order(inputs.search, top, order, samples)
+    # a peak by phase lies below the maximum, by what it says itself
+    there = top.amplitude * (1.0 + (top.below if np.isfinite(top.below) else 0.0))
+    change = more.amplitude / there - 1.0 if more.converged else np.nan
+    return {"change": change, "value": top.value, "peak": top.peak, "order": order}
 
 
 def _smallest(inputs: Question, between: tuple[float, float]) -> dict[str, float]:

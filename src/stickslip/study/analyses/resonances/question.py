@@ -80,6 +80,11 @@ class Question:
     warnings: tuple[str, ...] = ()
 
 
+def more_than(harmonics: int) -> int:
+    """Return the harmonics that the highest peak is held against: twice as many and the next one, since symmetric contacts answer in odd ones."""
+    return 2 * harmonics + 1
+
+
 def question_of(case: Case, model: Model) -> Question:
     """Return what a job solves; whatever can be refused is, before anything long is computed.
 
@@ -89,7 +94,7 @@ def question_of(case: Case, model: Model) -> Question:
         If the parameter is none, the model at its first or last value is refused, a contact is rigid, or no load drives a harmonic.
     """
     asked: ResonanceTable = case.settings.resonance
-    assembled = peak_first(model.assembled(asked.harmonics, case.store))
+    assembled = peak_first(model.assembled(more_than(asked.harmonics), case.store))
     if assembled.system.interface.rigid:
         raise input_error(
             "resonance",
@@ -126,4 +131,4 @@ def _parameter(case: Case, asked: ResonanceTable) -> Parameter:
             f"is {name}, which is no key of the model",
             f"Give one of the tables {known}, or {', '.join(FACTORS)}.",
         )
-    return OfKey(case.at, name, asked.harmonics, case.store)
+    return OfKey(case.at, name, more_than(asked.harmonics), case.store)

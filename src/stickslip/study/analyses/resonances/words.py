@@ -11,6 +11,7 @@ from stickslip.study.analyses.verdict import Verdict, from_json
 from stickslip.study.keep.netcdf import alike, one_case
 
 FAR_BELOW = 0.01  # of the maximum beside it: by phase, a peak that is none
+ENOUGH = 0.01  # change of the highest peak by twice the harmonics
 SPARSE = 12  # values that the terminal prints of each peak
 
 
@@ -26,6 +27,7 @@ def case_verdicts(
     kind, value = case["maximum"].values, case["value"].values
     found += _of_points(label, kind, value)
     found += _of_phase(label, case)
+    found += _of_harmonics(label, notes.get("harmonics", {}))
     if "overtaking_value" in case:
         found += _of_overtaking(label, case)
     if problem:
@@ -61,6 +63,20 @@ def _of_phase(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     worst = float(np.max(below[known]))
     why = f"by {case['by'].values} a peak lies {100 * worst:.2g} % below the largest amplitude beside it"
     return [Verdict("doubtful", label, None, why, 'Take by = "horizontal_tangent".')]
+
+
+def _of_harmonics(label: str, noted: Mapping[str, Any]) -> list[Verdict]:
+    if "change" not in noted:
+        return []
+    change, order = float(noted["change"]), int(noted["order"])
+    what = f"the highest peak, at {float(noted['value']):.4g},"
+    remedy = "Raise resonance.harmonics."
+    if not np.isfinite(change):
+        why = f"{what} was not found with {order} harmonics"
+        return [Verdict("doubtful", label, None, why, remedy)]
+    if abs(change) <= ENOUGH:
+        return []
+    return [Verdict("doubtful", label, None, f"{what} changes by {100 * change:+.2g} % with {order} harmonics", remedy)]  # fmt: skip
 
 
 def _of_overtaking(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
