@@ -10,6 +10,7 @@ import stickslip as ss
 from stickslip.errors import InputError
 from stickslip.harmonic.torus_path import closed_path, half_plane, torus_basis
 from stickslip.model.matrices import lumped
+from stickslip.response.quasi_periodic.find import swept
 from stickslip.response.quasi_periodic.in_time import course, statistics
 from stickslip.response.quasi_periodic.motion import TorusMotion, envelope
 from stickslip.response.quasi_periodic.problem import TwoTones, two_tones, with_enough
@@ -220,6 +221,10 @@ def test_modulation_beyond_a_neimark_sacker_point_is_what_scipy_integrates() -> 
     problem = two_tones(system, tone(force, 0.0), NONE, 4)
     periodic = forced_motion(problem, point.omega, point.coefficients)
     begin = beginnings(problem, periodic, guesses)[0]
+    # below it the forced motion lies on a branch that stuck contacts do not lead to; the branch from below does
+    low = 2 * np.pi * 0.1795
+    assert not forced_motion(problem, low).converged
+    assert forced_motion(problem, low, next(swept(problem, tone(force, 0.0), low))).converged
     angle = np.angle(found.floquet.multipliers[np.argmax(np.abs(found.floquet.multipliers))])
     apart = abs(begin.omegas[1] - point.omega)
     assert apart == pytest.approx(abs(angle) / (2 * np.pi) * point.omega, rel=1e-6)

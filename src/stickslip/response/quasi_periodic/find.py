@@ -1,10 +1,12 @@
 """Finds a second tone beside a forced motion: near modes that grow, and at the angles of multipliers."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
+from stickslip.arrays import ComplexArray
 from stickslip.errors import StickslipError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.forced.accepted import accepted_points
@@ -25,6 +27,10 @@ from stickslip.response.stability import stability
 ORDER = 7  # harmonics of the motion whose multipliers are looked at
 HIGHEST = 3  # harmonic beside which a frequency is looked for
 TRIED = 3  # frequencies
+WIDE, NEAR = (
+    0.3,
+    1e-3,
+)  # of a frequency: from how far a branch is followed to it, and how near its points may be
 NARROW = 1e-6  # half width of the range about a frequency that is solved alone
 
 
@@ -50,7 +56,12 @@ class Found:
     near: float
 
 
-def tone_beside(problem: TwoTones, omega: float, guesses: Sequence[float]) -> Found:
+def tone_beside(
+    problem: TwoTones,
+    omega: float,
+    guesses: Sequence[float],
+    starts: Iterable[ComplexArray] = (),
+) -> Found:
     """Return the motion whose second tone grows out of the forced motion at a frequency.
 
     Parameters
@@ -61,8 +72,14 @@ def tone_beside(problem: TwoTones, omega: float, guesses: Sequence[float]) -> Fo
         ω1, rad/s.
     guesses
         Frequencies near which the tone is looked for, rad/s.
+    starts
+        (H + 1, n_retained) coefficients from which the forced motion is tried, one after the other, where it is not found from stuck contacts, m.
     """
     forced = forced_motion(problem, omega)
+    for start in starts if not forced.converged else ():
+        forced = forced_motion(problem, omega, start)
+        if forced.converged:
+            break
     ratio = near = float("nan")
     if not forced.converged:
         return Found(None, forced, ratio, near)
@@ -77,6 +94,26 @@ def tone_beside(problem: TwoTones, omega: float, guesses: Sequence[float]) -> Fo
         if motion is not None:
             return Found(motion, forced, ratio, near)
     return Found(None, forced, ratio, near)
+
+
+def swept(problem: TwoTones, load: HarmonicLoad, omega: float) -> Iterator[ComplexArray]:
+    """Yield the forced motions of a single structure at a frequency that branches from below and from above lead to, (H + 1, n_retained), m."""
+    retained = problem.balance.side.first.retained
+    ways: tuple[tuple[float, Literal["up", "down"]], ...] = ((1 - WIDE, "up"), (1 + WIDE, "down"))
+    for far, direction in ways:
+        ends = sorted((far * omega, omega))
+        sweep = Sweep(
+            omega_range=(ends[0], ends[1]), low=ORDER, high=ORDER, selection="always_low", points=10, peak_points=0,
+            direction=direction,
+        )  # fmt: skip
+        try:
+            forced = forced_problem(problem.system, load, sweep)
+            points = accepted_points(list(forced_response(problem.system, load, sweep)))
+        except (StickslipError, FloatingPointError, np.linalg.LinAlgError):
+            continue
+        for point in points:
+            if point.converged and abs(point.omega / omega - 1.0) < NEAR:
+                yield forced.low.linear.recover(point.omega, point.coefficients)[:, retained]
 
 
 def growing_tones(problem: TwoTones, load: HarmonicLoad, omega: float) -> list[float]:

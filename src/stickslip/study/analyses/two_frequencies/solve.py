@@ -8,7 +8,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.errors import StickslipError
 from stickslip.harmonic.torus_path import Indices, TorusPath
-from stickslip.response.quasi_periodic.find import growing_tones, tone_beside
+from stickslip.response.quasi_periodic.find import growing_tones, swept, tone_beside
 from stickslip.response.quasi_periodic.motion import TorusMotion, envelope
 from stickslip.response.quasi_periodic.problem import TwoTones, with_enough
 from stickslip.response.quasi_periodic.tone import solve_free
@@ -102,7 +102,8 @@ def _of_tone(
             enough = _enough(question, near, motion, _free(motion))
             return *enough, kind, "followed from the frequency before"
     guesses = _guesses(question, problem, omega)
-    found = tone_beside(problem, omega, guesses)
+    starts = [] if question.waves is not None else swept(problem, question.first, omega)
+    found = tone_beside(problem, omega, guesses, starts)
     if found.motion is not None:
         enough = _enough(question, problem, found.motion, _free(found.motion))
         why = f"it grows out of the forced motion near {hertz(found.near)} with a damping ratio of {100 * found.ratio:.3g} %"
