@@ -256,25 +256,34 @@ def test_a_budget_that_is_spent_is_said_and_nothing_begins_after_it():
 
 
 def test_an_interrupted_search_goes_on_to_the_same_stages():
-    system, load = duffing()
+    system, load = one_mass(PolynomialSpring(along_t=(0.0, 0.0, SOFT, 0.0, HARD)), WEAK, PUSH)
     search = MotionSearch(
-        omega_range=(0.6, 1.7),
-        frequencies=1,
-        harmonics=1,
-        points=20,
-        tries=2,
-        starts=2,
-        steps=64,
-        most_periods=60,
-    )
+        omega_range=(0.1, 1.3), at=(0.34,), harmonics=1, samples=32, points=15, tries=6, starts=2, steps=64, most_periods=60
+    )  # fmt: skip
     problem = search_problem(system, load, search)
     whole = list(search_stages(problem, search))
-    for stop_at in (1, len(whole) - 1):
+    assert [s.kind for s in whole[:3]] == ["branch", "branch", "searched"]
+    for stop_at in (1, 2, len(whole) - 1):
         again = [*whole[:stop_at], *search_stages(problem, search, whole[:stop_at])]
         assert [s.kind for s in again] == [s.kind for s in whole]
         for one, other in zip(whole, again, strict=True):
             np.testing.assert_array_equal(one.coefficients, other.coefficients)
             np.testing.assert_array_equal(one.branch, other.branch)
+            assert one.tries == other.tries
+
+
+def test_what_cannot_be_marched_is_searched_and_said():
+    one = np.ones((1, 1))
+    gap = np.array([[1.0], [0.0], [0.0]])
+    lossy = Structure(one, 0.0 * one, one.copy(), table(("x",)), loss=0.05 * one)
+    law = CubicSpring(cubic_t=CUBIC, k_t=1e-12)
+    system = System(lossy, Interface(("c",), (law,), gap), np.array([0]))
+    load = HarmonicLoad(np.zeros(1), {1: np.array([FORCE + 0j])})
+    search = MotionSearch(omega_range=(0.8, 1.6), at=(OMEGA,), harmonics=1, points=15, tries=2)
+    found = all_motions(system, load, search)
+    assert "structural damping" in found.unmarched
+    assert found.starts == 0
+    assert {m.stability for m in found.at[0].motions} == {"not examined"}
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,10 @@ from scipy.stats import beta
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.linear import one_structure
 from stickslip.model.modes import normal_modes
+from stickslip.reduction.speed_line import SpeedLine
+from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.forced.problem import ForcedProblem
+from stickslip.response.system import System
 from stickslip.response.time.start import TransientStart, rest
 from stickslip.response.time.transient import TimeStepping, TransientResult, integrate
 
@@ -90,6 +93,17 @@ class StartSampler:
         return TransientStart(
             moved, self.shapes @ (self.omegas * size * np.sin(turn)), begun.states
         )
+
+
+def not_marched(system: System) -> str:
+    """Return why a system has no starts in time and no multipliers here; empty where it has."""
+    side = system.structure
+    if isinstance(side, TunedWheel | SpeedLine):
+        return "a tuned wheel is searched as a travelling wave, its sectors are not marched in time"
+    structure = side.of_harmonic(0)
+    if side.feedback_of(1) is not None or structure.is_complex:
+        return "what vibrates has no real matrices that are the same for all harmonics"
+    return "structural damping is defined for vibration at one frequency, not in time" if structure.loss is not None else ""  # fmt: skip
 
 
 def sampler(

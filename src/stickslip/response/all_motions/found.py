@@ -7,6 +7,7 @@ import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.response.all_motions.basins import Basins
+from stickslip.response.all_motions.options import MotionSearch
 from stickslip.response.bifurcations.side_branch import CLOSES
 from stickslip.response.forced.problem import ForcedProblem
 
@@ -40,7 +41,7 @@ class Stage:
     words
         Of motions, ``stable``, ``unstable``, ``undecided`` or ``not examined``, separated by ``;``.
     tries
-        Deflated solves, or starts.
+        Deflated solves, or starts, since the last stage.
     seconds
         What it took.
     """
@@ -148,6 +149,8 @@ class AllMotions:
         What the search took.
     spent
         Whether the budget ended it before all was tried that was asked for.
+    unmarched
+        Why nothing was started in time, nor its stability examined; empty where it was.
     """
 
     branches: tuple[MotionBranch, ...]
@@ -156,6 +159,7 @@ class AllMotions:
     starts: int
     seconds: float
     spent: bool
+    unmarched: str = ""
 
     @property
     def isolas(self) -> tuple[MotionBranch, ...]:
@@ -163,8 +167,9 @@ class AllMotions:
         return tuple(b for b in self.branches if b.isola)
 
 
-def gathered(problem: ForcedProblem, stages: list[Stage], periods: int = 1) -> AllMotions:
-    """Return what the stages of a search tell together; frequencies are those of the load, of `periods` periods in one of the motion."""
+def gathered(problem: ForcedProblem, stages: list[Stage], search: MotionSearch) -> AllMotions:
+    """Return what the stages of a search tell together; frequencies are those of the load."""
+    periods = search.periods
     branches = [
         MotionBranch(
             s.origin, s.end, periods * s.omega, _amplitudes(problem, s, periods), s.coefficients
@@ -183,15 +188,16 @@ def gathered(problem: ForcedProblem, stages: list[Stage], periods: int = 1) -> A
         )  # fmt: skip
         own = starts.get(stage.place)
         ends = () if own is None else tuple(int(e) for e in own.branch)
-        omega = periods * float(stage.omega[0]) if stage.omega.size else np.nan
+        omega = search.places[stage.place]
         at.append(AtFrequency(omega, motions, Basins(omega, ends)))
     return AllMotions(
         tuple(branches),
         tuple(at),
-        sum(s.tries for s in stages if s.kind == "searched"),
+        sum(s.tries for s in stages if s.kind != "starts"),
         sum(s.tries for s in stages if s.kind == "starts"),
         sum(s.seconds for s in stages),
         any(s.end == SPENT for s in stages),
+        next((s.end for s in starts.values() if s.end != SPENT), ""),
     )
 
 

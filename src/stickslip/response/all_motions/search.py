@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from time import perf_counter
 
 import numpy as np
@@ -11,14 +10,13 @@ from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.support import harmonics_of
-from stickslip.reduction.speed_line import SpeedLine
-from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.all_motions.basins import (
     ALIKE,
     APERIODIC,
     PERIODIC,
     drawn,
     in_time,
+    not_marched,
     sampler,
 )
 from stickslip.response.all_motions.deflation import Distance, deflated_newton, distance_among
@@ -38,7 +36,7 @@ from stickslip.response.stability.multipliers import stability
 from stickslip.response.system import System
 from stickslip.response.time.transient import TimeStepping
 from stickslip.solve.continuation import start_point
-from stickslip.solve.newton_method import newton
+from stickslip.solve.newton_method import Newton, newton
 
 ITERATIONS = 60  # of a deflated solve
 SHARE = 0.5  # of the budget, after which deflation leaves the rest to time
@@ -67,7 +65,7 @@ def all_motions(system: System, load: HarmonicLoad, search: MotionSearch) -> All
         If a contact is rigid.
     """
     problem = search_problem(system, load, search)
-    return gathered(problem, list(search_stages(problem, search)), search.periods)
+    return gathered(problem, list(search_stages(problem, search)), search)
 
 
 def search_stages(
@@ -130,16 +128,20 @@ class _Search:
         """Return the solutions at a frequency, each once, with the number of the branch that holds it."""
         found: list[tuple[int, FloatArray]] = []
         for number, stage in enumerate(self._branches()):
-            for a, b in pairwise(range(stage.omega.size)):
-                one, other = stage.omega[a], stage.omega[b]
-                if one == other or (one - omega) * (other - omega) > 0.0:
-                    continue
-                share = (omega - one) / (other - one)
-                x, y = (self.balance.unknowns(stage.coefficients[i]) for i in (a, b))
-                solved = newton(lambda v: self.balance.linearise(v, omega), x + share * (y - x), self.search.newton)  # fmt: skip
+            for guess in self._crossings(stage, omega):
+                solved = newton(lambda v: self.balance.linearise(v, omega), guess, self.search.newton)  # fmt: skip
                 if solved.status.converged and not self._known(solved.x, [z for _, z in found]):
                     found.append((number, solved.x))
         return found
+
+    def _crossings(self, stage: Stage, omega: float) -> Iterator[FloatArray]:
+        """Yield where a branch has a point at a frequency, and where it passes it."""
+        x = [self.balance.unknowns(q) for q in stage.coefficients]
+        off = stage.omega - omega
+        for a in np.flatnonzero(off == 0.0):
+            yield x[a]
+        for a in np.flatnonzero(off[:-1] * off[1:] < 0.0):
+            yield x[a] + off[a] / (off[a] - off[a + 1]) * (x[a + 1] - x[a])
 
     def _distance(self, known: Sequence[FloatArray]) -> Distance:
         return distance_among(self.weights, known)
@@ -190,36 +192,42 @@ class _Search:
         omega = np.array([p.omega for p in points])
         return Stage(kind, place, origin, end, omega, rows if points else none)  # type: ignore[arg-type]
 
-    def _taken(self, place: int, origin: Origin, x: FloatArray, omega: float) -> Iterator[Stage]:
-        """Follow a motion that is new, unless a branch that was followed leads to it."""
-        yield self._kept(self._branch(place, origin, x, omega))
-
     # --- deflation ----------------------------------------------------------------------------
 
     def _deflated(self, place: int, omega: float) -> Iterator[Stage]:
         """Search a frequency until as many starts as asked for find nothing new."""
-        failed = tries = 0
-        rng = np.random.default_rng((self.search.seed, place))
         options = replace(self.search.newton, max_iterations=ITERATIONS)
-        known = [x for _, x in self._at(omega)]
-        starts = self._guesses(omega, known, rng)
-        while failed < self.search.tries and not self._spent(SHARE):
-            tries += 1
+        while True:
+            # begun anew after each find, so that an interrupted search goes on as it would have
+            known = [x for _, x in self._at(omega)]
+            rng = np.random.default_rng((self.search.seed, place, len(self._branches())))
+            starts = self._guesses(omega, known, rng)
+            found, tries = self._another(omega, known, starts, options)
+            if found is None:
+                break
+            yield self._kept(replace(self._branch(place, "deflation", found, omega), tries=tries))
+        end = SPENT if tries < self.search.tries else ""
+        yield self._kept(replace(self._stage("searched", place, "deflation", (), end), tries=tries))
+
+    def _another(
+        self,
+        omega: float,
+        known: Sequence[FloatArray],
+        starts: Iterator[FloatArray],
+        options: Newton,
+    ) -> tuple[FloatArray | None, int]:
+        """Return a solution that is none of the known ones, None where as many starts as asked for find nothing, and the starts taken."""
+        apart = self._shifted(known)
+        for tries in range(self.search.tries):
+            if self._spent(SHARE):
+                return None, tries
             start = next(starts)
             found = deflated_newton(
-                lambda x: self.balance.linearise(x, omega), start, self._shifted(known), self._distance(known or [start]), options
+                lambda x: self.balance.linearise(x, omega), start, apart, self._distance(known or [start]), options
             )  # fmt: skip
-            if not found.status.converged or self._known(found.x, known):
-                failed += 1
-                continue
-            failed = 0
-            yield from self._taken(place, "deflation", found.x, omega)
-            known = [x for _, x in self._at(omega)]
-            if not self._known(found.x, known):
-                known.append(found.x)
-            starts = self._guesses(omega, known, rng)
-        end = SPENT if failed < self.search.tries else ""
-        yield self._kept(replace(self._stage("searched", place, "deflation", (), end), tries=tries))
+            if found.status.converged and not self._known(found.x, known):
+                return found.x, tries + 1
+        return None, self.search.tries
 
     def _guesses(
         self, omega: float, known: Sequence[FloatArray], rng: np.random.Generator
@@ -252,11 +260,10 @@ class _Search:
 
     def _started(self, place: int, omega: float) -> Iterator[Stage]:
         """Integrate from random states, follow what they end on and is new, and count where they end."""
-        structure, search = self.problem.system.structure, self.search
-        wheel = isinstance(structure, TunedWheel | SpeedLine)
+        search = self.search
+        why = not_marched(self.problem.system)
         solutions = [x for _, x in self._at(omega)]
-        if wheel or not solutions or not search.starts:
-            why = "sectors of a wheel are not started in time" if wheel else ""
+        if why or not solutions or not search.starts:
             yield self._kept(self._stage("starts", place, "time", (), why))
             return
         stepping = TimeStepping(steps_per_period=search.steps, max_periods=search.most_periods, harmonics=self.order, tolerance=1e-4)  # fmt: skip
@@ -273,7 +280,7 @@ class _Search:
                 solved = newton(lambda v: self.balance.linearise(v, omega), self.balance.unknowns(rows), search.newton)  # fmt: skip
                 new = solved.status.converged and not self._known(solved.x, solutions)
                 if new and self._apart(rows, solved.x) <= ALIKE:
-                    yield from self._taken(place, "time", solved.x, omega)
+                    yield self._kept(self._branch(place, "time", solved.x, omega))
                     solutions = [x for _, x in self._at(omega)]
         made = self._stage("starts", place, "time", (), "" if len(ends) == search.starts else SPENT)
         numbers = [APERIODIC if np.isnan(e).any() else self._nearest(e, solutions) for e in ends]
@@ -298,8 +305,8 @@ class _Search:
         found = self._at(omega)
         solved = [newton(lambda v: self.balance.linearise(v, omega), x, self.search.newton) for _, x in found]  # fmt: skip
         points = [forced_point(self.balance, s, "point", i, omega, 0.0) for i, s in enumerate(solved)]  # fmt: skip
-        wheel = isinstance(self.problem.system.structure, TunedWheel | SpeedLine)
-        judged = [None if wheel else stability(self.problem, p) for p in points]
+        unknown = not_marched(self.problem.system)
+        judged = [None if unknown else stability(self.problem, p) for p in points]
         return replace(
             self._stage("motions", place, "sweep", points, ""),
             branch=np.array([number for number, _ in found], dtype=np.int64),

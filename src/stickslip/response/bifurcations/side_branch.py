@@ -24,7 +24,9 @@ from stickslip.units import HZ
 
 POINTS = 80  # of a branch, at most
 ALIKE = 1e-3  # relative difference from the branch that was left below which a motion is one of it
-CLOSED = 0.5  # steps by which a branch may miss its first point where it closes
+CLOSED = (
+    0.5  # steps by which the line between two points may miss the first one where a branch closes
+)
 FEWEST = 6  # points before which it does not
 TURNS = 24  # points that lie within a share of the longest step where a corner holds a branch
 SHORT = 0.02  # that share
@@ -288,10 +290,13 @@ class _Way:
         def stop(before: Point, after: Point) -> str:
             count[0] += 1
             measure = measure_at(first.x, self.following)
-            step = measure.of(after.y - before.y)
-            near = measure.of(first.y - after.y) <= CLOSED * step
+            step, left = after.y - before.y, first.y - before.y
+            length = measure.of(step)
+            share = float(measure.row(step) @ left) / length**2
+            passed = 0.0 <= share <= 1.0
+            near = measure.of(left - share * step) <= CLOSED * length
             alike = measure.cosine(first.tangent, after.tangent) > 0.0
-            return CLOSES if count[0] >= FEWEST and near and alike else ""
+            return CLOSES if count[0] >= FEWEST and passed and near and alike else ""
 
         return stop
 

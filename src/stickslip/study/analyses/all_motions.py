@@ -52,9 +52,7 @@ class AllMotionsAnalysis:
             over = sum(s.kind != "branch" for s in stages)
             advance(0.95 * min(over / most, 1.0), _told(stage, inputs))
             yield stage
-        notes.put(
-            FOUND, noted(gathered(problem, stages, inputs.search.periods), inputs.search.seconds)
-        )
+        notes.put(FOUND, noted(gathered(problem, stages, inputs.search), inputs.search.seconds))
 
     def dataset(self, solved: Sequence[Solved]) -> xr.Dataset:
         """Return what was found in all cases."""

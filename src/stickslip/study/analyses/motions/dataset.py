@@ -61,6 +61,7 @@ ABOUT = {
     "tries": ("", "1", "deflated solves"),
     "seconds": ("", "s", "what the search took"),
     "budget_s": ("", "s", "budget"),
+    "unmarched": ("", "1", "why nothing was started in time; empty where it was"),
     "spent": ("", "1", "1: the budget ended the search before all was tried that was asked for"),
 }  # fmt: skip
 
@@ -85,6 +86,7 @@ def noted(found: AllMotions, budget: float) -> dict[str, Any]:
         "seconds": found.seconds,
         "budget_s": budget,
         "spent": int(found.spent),
+        "unmarched": found.unmarched,
     }
 
 

@@ -23,6 +23,10 @@ def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     if int(case["spent"].values):
         why = f"the budget of {budget:.4g} s ended the search: {work}"
         found.append(Verdict("doubtful", label, None, why, "Raise all_motions.budget_s."))
+    unmarched = str(case["unmarched"].values)
+    if unmarched:
+        why = f"what attracts is not known: {unmarched}"
+        found.append(Verdict("doubtful", label, None, why, "Read the branches as motions that may be unstable."))  # fmt: skip
     unsolved = int(np.sum(case["unsolved"].values))
     if unsolved:
         why = f"{unsolved} starts end on a periodic motion that is no solution with the harmonics kept"
@@ -39,7 +43,9 @@ def _higher(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     """Return the branches that reach higher than the one of the sweep."""
     origin, peak, hertz = (case[k].values for k in ("origin", "peak_amplitude", "peak_hz"))
     swept = float(np.max(peak[origin == "sweep"], initial=0.0))
-    found = []
+    found: list[Verdict] = []
+    if swept == 0.0:
+        return found
     for i in np.flatnonzero((origin != "sweep") & (peak > HIGHER * swept)):
         kind = "an isola" if case["isola"].values[i] else "a branch that no sweep meets"
         why = f"{kind} reaches {1e3 * peak[i]:.4g} mm at {hertz[i]:.6g} Hz, {peak[i] / swept:.3g} times the peak of the sweep"
