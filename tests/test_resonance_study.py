@@ -36,16 +36,16 @@ force_n = 0.1
 [resonance]
 frequency_hz = [0.127, 0.223]
 parameter = "contact.damper.slip_limit_n"
-values = [0.3, 0.2, 0.12, 0.06]
+values = [0.2, 0.12, 0.09]
 harmonics = 1
 """
 
 
-def answered(text: str, folder: Path, workers: int = 1) -> Outcome:
+def answered(text: str, folder: Path) -> Outcome:
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "study.toml"
     path.write_text(text, encoding="utf-8")
-    return run_study(read_study(path), workers=workers)
+    return run_study(read_study(path))
 
 
 def test_the_optimum_of_the_benchmark_from_a_study(tmp_path: Path) -> None:
@@ -54,26 +54,26 @@ def test_the_optimum_of_the_benchmark_from_a_study(tmp_path: Path) -> None:
     # literature benchmark B3, to its printed digits
     assert case.attrs["smallest_value"] == pytest.approx(0.138956, abs=5e-7)
     assert case.attrs["smallest_amplitude"] == pytest.approx(0.5509002, abs=5e-8)
-    assert case["value"].values.tolist() == [[0.3, 0.2, 0.12, 0.06]]
+    assert case["value"].values.tolist() == [[0.2, 0.12, 0.09]]
 
 
 def test_the_example_of_two_peaks_tells_where_one_overtakes_the_other(tmp_path: Path) -> None:
     text = (Path(__file__).parent.parent / "examples" / "two_peaks" / "study.toml").read_text("utf-8")  # fmt: skip
-    few = text[: text.index("values = ")] + "values = [100, 70, 60, 40, 25, 20]\npeaks = 2\n"
-    outcome = answered(few, tmp_path, workers=2)
+    few = text[: text.index("values = ")] + "values = [70, 60, 40, 25, 24]\npeaks = 2\n"
+    outcome = answered(few, tmp_path)
     data = outcome.tree["resonance"].to_dataset()
     case = one_case(data, 0)
     assert case["overtaking_after"].values.tolist() == [1, 0]
-    assert case["overtaking_value"].values == pytest.approx([67.0, 24.85], rel=0.02)
+    assert case["overtaking_value"].values == pytest.approx([67.0, 24.85], rel=0.01)
     assert case.attrs["smallest_amplitude"] == pytest.approx(1.772e-3, rel=0.01)
     words = [v.why for v in outcome.verdicts]
     assert words[0].startswith("peak 2 overtakes peak 1 at 67")
     # a sweep of the forced response at one limit has the same two tops
     sweep = few[: few.index("[resonance]")].replace("slip_limit_n = 100.0", "slip_limit_n = 40.0")
-    sweep += '[forced_response]\nfrequency_hz = [20.0, 60.0]\npoints = 200\n[harmonics]\nhigh = 5\nlow = 5\nselection = "always_low"\n'
+    sweep += '[forced_response]\nfrequency_hz = [20.0, 60.0]\npoints = 60\n[harmonics]\nhigh = 5\nlow = 5\nselection = "always_low"\n'
     node = answered(sweep, tmp_path / "sweep").tree["forced_response"].to_dataset()
     amplitude = np.sort(node["amplitude"].values.ravel()[np.isfinite(node["amplitude"].values.ravel())])  # fmt: skip
-    assert amplitude[-1] == pytest.approx(float(np.nanmax(case["amplitude"].values[:, 3])), rel=1e-5)  # fmt: skip
+    assert amplitude[-1] == pytest.approx(float(np.nanmax(case["amplitude"].values[:, 2])), rel=1e-5)  # fmt: skip
     view = Peaks(case)
     assert "Overtaken: peak 1 by peak 2 at 67" in amplitudes(view).caption
     assert "mm" in peak_table(view)
@@ -131,10 +131,10 @@ by = "phase_quadrature"
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (("damper.slip_limit_n\"", "damper.slip_limt_n\""), "parameter: contact.damper.slip_limt_n = 0.3 is refused: there is no key 'slip_limt_n'. Did you mean"),
+        (("damper.slip_limit_n\"", "damper.slip_limt_n\""), "parameter: contact.damper.slip_limt_n = 0.2 is refused: there is no key 'slip_limt_n'. Did you mean"),
         (('"contact.damper.slip_limit_n"', '"resonance.peaks"'), "resonance.parameter: is resonance.peaks, which is no key of the model"),
-        (("[0.3, 0.2", "[-0.3, 0.2"), "slip_limit_n = -0.3 is refused: must be greater than or equal to 0"),
-        (("values = [0.3, 0.2, 0.12, 0.06]", ""), "resonance.values: values and span are both missing"),
+        (("[0.2, 0.12", "[-0.3, 0.12"), "slip_limit_n = -0.3 is refused: must be greater than or equal to 0"),
+        (("values = [0.2, 0.12, 0.09]", ""), "resonance.values: values and span are both missing"),
         (("harmonics = 1", "harmonics = 1\nharmonic = 3"), "resonance.harmonic: is 3, above harmonics = 1"),
     ],
 )  # fmt: skip
@@ -179,7 +179,7 @@ def test_curves_by_arc_length_overtake_each_other_too(tmp_path: Path) -> None:
 def test_too_few_harmonics_are_told(tmp_path: Path) -> None:
     text = B3.replace('law = "jenkins"', 'law = "unilateral_spring"')
     text = text.replace("tangential_stiffness_n_per_m = 0.5\nslip_limit_n = 0.2\n", "normal_stiffness_n_per_m = 3.0\n")  # fmt: skip
-    text = text.replace('"contact.damper.slip_limit_n"\nvalues = [0.3, 0.2, 0.12, 0.06]', '"excitation"\nvalues = [1.0]')  # fmt: skip
+    text = text.replace('"contact.damper.slip_limit_n"\nvalues = [0.2, 0.12, 0.09]', '"excitation"\nvalues = [1.0]')  # fmt: skip
     text = text.replace("[0.127, 0.223]", "[0.15, 0.3]")
     (told,) = answered(text, tmp_path / "few").verdicts
     assert "with 3 harmonics" in told.why
