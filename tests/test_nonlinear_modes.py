@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.integrate import quad
 
 from evidence.judges.free_decay import free_decay
@@ -25,6 +26,7 @@ from stickslip.response.self_excited.curve import slip_amplitude
 from stickslip.response.self_excited.modes import stuck_modes
 from stickslip.response.self_excited.problem import self_excited_motions
 from stickslip.response.system import System
+from stickslip.study.analyses.backbones.words import case_verdicts
 from stickslip.study.keep.netcdf import one_case
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
@@ -251,3 +253,27 @@ def test_what_has_no_such_mode_is_refused(tmp_path: Path) -> None:
     path.write_text(STUDY.replace("points = 10", "modes = [2]"), encoding="utf-8")
     with pytest.raises(InputError, match="has no such mode"):
         run_study(read_study(path))
+
+
+def case_of(end: str, status: list[int], change: list[float], problem: str = "") -> dict[str, xr.Variable]:  # fmt: skip
+    words = {"end": end, "problem": problem, "mode": 1, "wave_number": -1, "accuracy": 1e-3}
+    case = {name: xr.Variable(("branch",), [value]) for name, value in words.items()}
+    along = {"status": status, "change": change}
+    return case | {name: xr.Variable(("branch", "point"), [own]) for name, own in along.items()}
+
+
+@pytest.mark.parametrize(
+    ("end", "status", "change", "level", "words"),
+    [
+        ("amplitude reached", [0, 0, -1], [1e-4, 1e-4, np.nan], None, ""),
+        ("amplitude reached", [0, 0], [1e-4, 2e-3], "doubtful", "1 of its 2 motions still change by up to 0.2 %"),
+        ("amplitude reached", [0, 0], [np.nan, np.nan], "doubtful", "one set of harmonics alone"),
+        ("amplitude reached", [0, 2, 0], [0.0, np.nan, 0.0], "doubtful", "1 of its points are no motions"),
+        ("lost at 1 m after 2 points", [0, 2], [0.0, np.nan], "doubtful", "mode 1: lost at 1 m"),
+        ("lift-off ends it at 1 m", [0, 2], [0.0, np.nan], "trusted", "lift-off ends it"),
+    ],
+)  # fmt: skip
+def test_what_is_to_be_thought_of_a_mode(end, status, change, level, words):
+    found = case_verdicts("", case_of(end, status, change))
+    assert [v.level for v in found] == ([] if level is None else [level])
+    assert all(words in v.why for v in found)

@@ -61,7 +61,8 @@ class ModePoint:
     open_for
         Largest share of the period for which a contact point is open.
     change
-        Relative change of frequency or damping ratio, the larger one, that more harmonics are foretold to make; NaN where nobody looked.
+        Relative change of frequency or damping ratio, the larger one, that more harmonics are foretold to make; with the
+        most harmonics that which fewer make; NaN with one set of harmonics.
     sticking
         Share of the contact points that can slip and stick all the time.
     """

@@ -147,7 +147,7 @@ class ModeCurve(Curve):
         if self.levels == 1:
             return Judged()
         if level + 1 == self.levels:
-            return Judged()
+            return self.at_the_cap(level, point)
         more = self.lifted(point.x, level, level + 1)
         at = self.problem(level + 1).linearise(more, point.p)
         inverse = factorised(self.problems[level + 1].how.newton.linear, at.jac)
@@ -155,6 +155,17 @@ class ModeCurve(Curve):
         if step is None:
             return Judged(np.inf)
         return Judged(SAFETY * self._change(level + 1, more, more + step))
+
+    def at_the_cap(self, level: int, point: Point) -> Judged:
+        """Bound the error where no level follows by the difference from the level before, which is larger as long as more harmonics change less."""
+        fewer = self.problem(level - 1)
+        start = self.lifted(point.x, level, level - 1)
+        found = newton(
+            lambda y: fewer.linearise(y, point.p), start, self.following(level - 1).newton
+        )
+        if not found.status.converged:
+            return Judged(np.inf)
+        return Judged(self._change(level, self.lifted(found.x, level - 1, level), point.x))
 
     def quiet(self, level: int, judged: Judged) -> bool:
         """Whether a bound is below the tolerance, or nobody can tell."""

@@ -24,6 +24,7 @@ ABOUT = {
     "mode": ("branch", "1", "number of the mode, by frequency with contacts stuck"),
     "mode_frequency_hz": ("branch", "Hz", "frequency with contacts stuck"),
     "mode_damping_ratio": ("branch", "1", "damping ratio with contacts stuck"),
+    "accuracy": ("branch", "1", "relative change by more harmonics that was asked for"),
     "end": ("branch", "1", "how the mode ends"),
     "problem": ("branch", "1", "why there is none"),
     "gross_slip_amplitude": ("branch", "m", "amplitude from which on all contacts slip or open at some time"),
@@ -38,7 +39,7 @@ ABOUT = {
     "status": ("branch point", "1", "how the solver ended: 0 is a solution"),
     "slipping": ("branch point", "1", "share of the contact points that slip or open at some time"),
     "open_for": ("branch point", "1", "largest share of the period for which a contact point is open"),
-    "change": ("branch point", "1", "relative change of frequency or damping ratio that more harmonics are foretold to make"),
+    "change": ("branch point", "1", "relative change of frequency or damping ratio that more harmonics are foretold to make; with the most harmonics that of fewer; NaN with one set alone"),
 }  # fmt: skip
 POINTS = {
     "amplitude": "amplitude", "damping_ratio": "motion_ratio", "modal_amplitude": "modal_amplitude", "energy": "energy",
@@ -91,6 +92,7 @@ def _of_branches(branches: Sequence[ModeBranch], sectors: int) -> dict[str, Any]
         "mode": each("mode"),
         "mode_frequency_hz": each("omega") / HZ,
         "mode_damping_ratio": each("ratio"),
+        "accuracy": each("tolerance"),
         "end": each("end"),
         "problem": each("problem"),
         "gross_slip_amplitude": np.array([a[g][0] if np.any(g) else np.nan for a, g in zip(amplitudes, gross, strict=True)]),

@@ -26,6 +26,8 @@ class ModeBranch:
     slipping, open_for, change
         (points,) share of contact points that slip or open, largest share of the period for which one is open, and relative change that
         more harmonics are foretold to make.
+    tolerance
+        Relative change of frequency or damping ratio that was asked for.
     end
         How the curve ended.
     problem
@@ -46,5 +48,6 @@ class ModeBranch:
     slipping: FloatArray
     open_for: FloatArray
     change: FloatArray
+    tolerance: float
     end: str
     problem: str = ""

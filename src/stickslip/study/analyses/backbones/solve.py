@@ -43,11 +43,11 @@ def follow_mode(question: Question, wave: int, mode: StuckMode) -> ModeBranch:
         )
     except StickslipError as error:
         found = Backbone(question.system(wave), question.model.load, mode, question.dof, (), "")
-        return _branch(wave, found, str(error))
-    return _branch(wave, found)
+        return _branch(wave, found, question.sweep.tolerance, str(error))
+    return _branch(wave, found, question.sweep.tolerance)
 
 
-def _branch(wave: int, found: Backbone, problem: str = "") -> ModeBranch:
+def _branch(wave: int, found: Backbone, tolerance: float, problem: str = "") -> ModeBranch:
     points = found.points
 
     def each(name: str) -> FloatArray:
@@ -57,7 +57,7 @@ def _branch(wave: int, found: Backbone, problem: str = "") -> ModeBranch:
         wave, found.mode.number, found.mode.omega, found.mode.ratio,
         each("amplitude"), each("omega"), each("ratio"), each("modal_amplitude"), each("energy"),
         np.array([p.order for p in points], dtype=np.int64), np.array([int(p.status) for p in points], dtype=np.int64),
-        each("slipping"), each("open_for"), each("change"), found.end, problem,
+        each("slipping"), each("open_for"), each("change"), tolerance, found.end, problem,
     )  # fmt: skip
 
 

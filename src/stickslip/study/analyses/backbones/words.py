@@ -23,7 +23,14 @@ def _of_branch(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verd
     name = branch_name(case, i)
     problem, end = str(case["problem"].values[i]), str(case["end"].values[i])
     if problem:
-        return [Verdict("doubtful", label, None, f"{name}: {problem.removesuffix('.')}")]
+        return [
+            Verdict(
+                "doubtful",
+                label,
+                None,
+                f"{name}: {problem.removesuffix('.').removeprefix(f'{name}: ')}",
+            )
+        ]
     found = []
     if end.startswith(LIFTS):
         why = f"{name}: {end}"
@@ -37,12 +44,23 @@ def _of_branch(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verd
     if lost or AGAIN in end:
         why = f"{name}: it was lost and taken up again further on; {gaps} of its points are no motions"
         found.append(Verdict("doubtful", label, None, why, "What lies beyond may be another mode."))
-    known = np.where(status == 0, case["change"].values[i], np.nan)
-    few = int(np.count_nonzero(np.isinf(known)))
-    if few:
-        why = f"{name}: what more harmonics would change is not known at {few} of its points"
-        found.append(Verdict("doubtful", label, None, why, "Raise nonlinear_mode.most_harmonics."))
-    return found
+    return found + _of_harmonics(label, name, case, i)
+
+
+def _of_harmonics(label: str, name: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdict]:
+    """Return what is to be thought of the harmonics of a mode."""
+    solved = case["status"].values[i] == 0
+    change, wanted = case["change"].values[i][solved], float(case["accuracy"].values[i])
+    if change.size and np.all(np.isnan(change)):
+        why = f"{name}: was solved with one set of harmonics alone"
+        return [Verdict("doubtful", label, None, why, "Raise nonlinear_mode.most_harmonics.")]
+    above = change[change > wanted]
+    if not above.size:
+        return []
+    most = float(above[np.isfinite(above)].max(initial=0.0))
+    by = f"by up to {100 * most:.2g} %" if most else "by an unknown amount"
+    why = f"{name}: frequency or damping ratio of {above.size} of its {change.size} motions still change {by} with the last harmonics"
+    return [Verdict("doubtful", label, None, why, "Raise nonlinear_mode.most_harmonics, or nonlinear_mode.accuracy_percent.")]  # fmt: skip
 
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
