@@ -71,11 +71,11 @@ def hill_work(system: System) -> float:
 
 
 def by_hill(system: System) -> bool:
-    """Whether the forced motions of a tuned wheel are examined by Hill's method: where all its sectors together are too many coordinates."""
-    interface = system.interface
+    """Whether forced motions are examined by Hill's method: those of a wheel that is too large for its multipliers, and with structural damping."""
+    interface, side = system.interface, system.structure
+    large = isinstance(side, TunedWheel) and bool(too_long(system, forced=True))
     return (
-        isinstance(system.structure, TunedWheel)
-        and bool(too_long(system, forced=True))
+        (large or side.of_harmonic(1).loss is not None)
         and not interface.rigid
         and all(is_located(law) for law in interface.laws)
         and hill_work(system) <= MOST_HILL

@@ -125,7 +125,8 @@ def _by_hill(question: Question, accepted: Accepted) -> Examined:
     """Return what Hill's method says of a point of a wheel, against every wave."""
     hill = hill_stability(question.problem, accepted.point)
     found, said = hill.stability, hill.reason
-    if hill.disturbance is not None and found.verdict != "stable":
+    wheel = isinstance(question.model.system.structure, TunedWheel)
+    if wheel and hill.disturbance is not None and found.verdict != "stable":
         said += _named(question, hill.disturbance)
     omega = accepted.point.omega
     return Examined(omega, found.verdict, found.multiplier, found.multiplier_error, said)
@@ -173,9 +174,10 @@ def to_integrate(question: Question, response: Response, examined: list[Examined
 def why_not(question: Question) -> str:
     """Return why no point of a case is examined; empty where the multipliers, or Hill's method, can be had."""
     system = question.model.system
-    if by_hill(system) and isinstance(system.structure, TunedWheel):
-        return "" if system.structure.has_every_wave else ONE_SECTOR
-    return unexaminable(question)
+    if not by_hill(system):
+        return unexaminable(question)
+    wheel = system.structure
+    return ONE_SECTOR if isinstance(wheel, TunedWheel) and not wheel.has_every_wave else ""
 
 
 def unexaminable(question: Question) -> str:
@@ -197,8 +199,11 @@ def cost_line(question: Question) -> str:
     if why:
         return f"stability: not examined, {why}"
     if by_hill(question.model.system):
-        most = hill_work(question.model.system) / FLOPS
-        return f"stability: the peak of a case against every wave, one sector at a time (Hill's method), up to {most:.0f} s"
+        system = question.model.system
+        wheel = isinstance(system.structure, TunedWheel)
+        waves = " against every wave, one sector at a time" if wheel else ""
+        most = max(1.0, hill_work(system) / FLOPS)
+        return f"stability: the peak of a case{waves} (Hill's method), up to {most:.0f} s"
     points = (
         "every point"
         if question.examine == "all"
