@@ -13,7 +13,7 @@ import numpy as np
 from stickslip.arrays import ComplexArray
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.branch import Followed, Route
-from stickslip.response.follow import follow
+from stickslip.response.follow import LEAPS, follow
 from stickslip.response.nonlinear_modes.levels import ModeCurve
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.contacts import Contacts, contacts_of
@@ -197,7 +197,7 @@ def nonlinear_mode(
     found = _followed(curve, route, to_gross_slip=along.to_gross_slip)
     made = tuple(mode_point(curve, f) for f in found)
     end = _end(made, found[-1], route.last, stops=along.to_gross_slip)
-    anew = sum(f.converged and f.point.step == curve.control.first for f in found[1:])
+    anew = _begun_anew(found, route, curve.control.first)
     end += f"; taken up again {anew} time{'s' * (anew > 1)} where it led nowhere" if anew else ""
     return Backbone(system, load, mode, dof, made, end)
 
@@ -252,6 +252,17 @@ def _followed(curve: ModeCurve, route: Route, *, to_gross_slip: bool) -> list[Fo
         if to_gross_slip and one.converged and curve.slips_grossly(one):
             break
     return branch
+
+
+def _begun_anew(found: Sequence[Followed], route: Route, first: float) -> int:
+    """Return how many points no branch led to: they lie a known share of the longest step ahead of all others, and go on with the first step."""
+    count, farthest = 0, found[0].p
+    for f in found[1:]:
+        ahead = (f.p - farthest) / route.gap
+        leapt = f.p == route.last or any(abs(ahead - share) < 1e-9 for share in LEAPS)
+        count += f.converged and leapt and f.point.step == first
+        farthest = max(farthest, f.p)
+    return count
 
 
 def _end(points: Sequence[ModePoint], found: Followed, last: float, *, stops: bool) -> str:
