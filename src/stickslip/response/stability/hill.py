@@ -96,7 +96,7 @@ def hill_stability(problem: ForcedProblem, point: ForcedPoint) -> HillStability:
     if better is point and more is not None:
         change[:] = 0.0
     elif more is not None:
-        solved, _ = _of_point(system, problem, point)
+        solved, _ = _of_point(system, problem, point, hill.order)  # with the same modes
         change = change if solved is None else times * _changes(found, solved)
     return _judged(found, change, states, hill)
 
@@ -146,10 +146,10 @@ def _refined(hill: Hill) -> tuple[Hill, Exponents]:
 
 
 def _of_point(
-    system: System, problem: ForcedProblem, point: ForcedPoint
+    system: System, problem: ForcedProblem, point: ForcedPoint, order: int | None = None
 ) -> tuple[Hill | None, ContactStates | None]:
     gaps = point.coefficients @ problem.low.interface.gap_operator.T
-    return _prepared(system, gaps, point.omega, None)
+    return _prepared(system, gaps, point.omega, order)
 
 
 def _prepared(
