@@ -101,8 +101,8 @@ class PeakSearch:
         return begin / self.periods, end / self.periods
 
     @property
-    def dof(self) -> int:
-        """Whose amplitude peaks."""
+    def peaking(self) -> int:
+        """The dof whose amplitude peaks."""
         return int(self.system.outputs[self.output])
 
     def family(self, first: float) -> BalanceAt:
@@ -112,7 +112,9 @@ class PeakSearch:
             self.load,
             self.parameter,
             first,
-            lambda s, f: self.how.balance(s, f.over_periods(self.periods), np.array([self.dof])),
+            lambda s, f: self.how.balance(
+                s, f.over_periods(self.periods), np.array([self.peaking])
+            ),
         )
 
     def problem(self, first: float) -> PeakProblem:
@@ -132,7 +134,7 @@ class PeakSearch:
             # the phase that a shift of the origin of time gives this harmonic; of a driven one that of its own force
             phase = phase * times if own is None else float(np.angle(own[np.argmax(np.abs(own))]))
             harmonics = (self.peaking,)
-        position = int(np.searchsorted(balance.linear.retained, self.dof))
+        position = int(np.searchsorted(balance.linear.retained, self.peaking))
         invert = partial(factorised, to_tolerance(self.how.newton.linear, EXACT))
         driven = Driven(position, harmonics)
         scale = self.lower_range[1]
