@@ -101,7 +101,7 @@ class PeakSearch:
         return begin / self.periods, end / self.periods
 
     @property
-    def peaking(self) -> int:
+    def peaking_dof(self) -> int:
         """The dof whose amplitude peaks."""
         return int(self.system.outputs[self.output])
 
@@ -113,7 +113,7 @@ class PeakSearch:
             self.parameter,
             first,
             lambda s, f: self.how.balance(
-                s, f.over_periods(self.periods), np.array([self.peaking])
+                s, f.over_periods(self.periods), np.array([self.peaking_dof])
             ),
         )
 
@@ -134,7 +134,7 @@ class PeakSearch:
             # the phase that a shift of the origin of time gives this harmonic; of a driven one that of its own force
             phase = phase * times if own is None else float(np.angle(own[np.argmax(np.abs(own))]))
             harmonics = (self.peaking,)
-        position = int(np.searchsorted(balance.linear.retained, self.peaking))
+        position = int(np.searchsorted(balance.linear.retained, self.peaking_dof))
         invert = partial(factorised, to_tolerance(self.how.newton.linear, EXACT))
         driven = Driven(position, harmonics)
         scale = self.lower_range[1]
