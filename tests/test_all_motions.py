@@ -147,6 +147,57 @@ def test_deflation_finds_the_isola_of_the_closed_form_and_follows_it_round():
     assert not result.spent
 
 
+# ---- an absorber ---------------------------------------------------------------------------------------------------------------
+
+TUNED = {
+    "knl2": 0.0042,
+    "k2": 0.0454,
+    "c2": 0.0128,
+    "m2": 0.05,
+    "c1": 0.002,
+}  # of Habib, Detroux and others
+
+
+def absorber(force: float) -> tuple[System, HarmonicLoad]:
+    """A Duffing oscillator with a nonlinear tuned absorber."""
+    k2, c2 = TUNED["k2"], TUNED["c2"]
+    damping = np.array([[TUNED["c1"] + c2, -c2], [-c2, c2]])
+    stiffness = np.array([[1.0 + k2, -k2], [-k2, k2]])
+    gap = np.zeros((6, 2))
+    gap[0, 0], gap[3, 0], gap[3, 1] = 1.0, -1.0, 1.0
+    laws = (CubicSpring(cubic_t=1.0, k_t=1e-12), CubicSpring(cubic_t=TUNED["knl2"], k_t=1e-12))
+    structure = Structure(np.diag([1.0, TUNED["m2"]]), damping, stiffness, table(("x", "y")))
+    system = System(structure, Interface(("main", "absorber"), laws, gap), np.array([0]))
+    return system, HarmonicLoad(np.zeros(2), {1: np.array([force + 0j, 0.0])})
+
+
+def absorber_amplitudes(omega: float, force: float) -> np.ndarray:
+    """Amplitudes of the main mass with one harmonic: at each relative amplitude z the force that it takes is known, and z is walked through."""
+    k2, c2, m2 = TUNED["k2"], TUNED["c2"], TUNED["m2"]
+    z = np.geomspace(1e-3, 60.0, 400_000)
+    pull = k2 + 0.75 * TUNED["knl2"] * z**2 + 1j * c2 * omega
+    x = z * (pull - m2 * omega**2) / (m2 * omega**2)
+    taken = (1.0 - omega**2 + 1j * TUNED["c1"] * omega + 0.75 * abs(x) ** 2) * x - pull * z
+    miss = np.abs(taken) - force
+    at = np.flatnonzero(miss[:-1] * miss[1:] < 0.0)
+    share = miss[at] / (miss[at] - miss[at + 1])
+    return np.sort(np.abs(x[at]) + share * (np.abs(x[at + 1]) - np.abs(x[at])))
+
+
+@pytest.mark.parametrize(("force", "isolas"), [(0.12, 0), (0.14, 1)])
+def test_the_detached_curve_of_an_absorber_is_found_where_there_is_one(force, isolas):
+    system, load = absorber(force)
+    omega = 1.9
+    search = MotionSearch(
+        omega_range=(0.8, 2.4), at=(omega,), harmonics=1, samples=32, points=25, tries=12, starts=0
+    )
+    found = all_motions(system, load, search)
+    own = np.sort([m.amplitude for m in found.at[0].motions])
+    np.testing.assert_allclose(own, absorber_amplitudes(omega, force), rtol=1e-6)
+    assert len(found.isolas) == isolas
+    assert all(b.peak > 2.5 * found.branches[0].peak for b in found.isolas)
+
+
 # ---- motions of a third of the frequency: nothing leads to them from the response -----------------------------------------------
 
 THIRD_C, THIRD_F = 0.002, 0.6
@@ -184,11 +235,17 @@ def test_motions_of_a_third_of_the_frequency_are_an_isola_and_those_of_two_harmo
     omega = 4.2
     system, load = one_mass(CubicSpring(cubic_t=1.0, k_t=1e-12), THIRD_C, THIRD_F)
     search = MotionSearch(
-        omega_range=(3.6, 4.6), at=(omega,), periods=3, harmonics=1, points=20, tries=25, starts=0
-    )
-    found = all_motions(system, load, search).at[0]
-    own = np.sort([abs(m.coefficients[1, 0]) for m in found.motions if m.branch > 0])
+        omega_range=(3.9, 4.4), at=(omega,), periods=3, harmonics=1, points=8, tries=18, starts=0, seed=1
+    )  # fmt: skip
+    found = all_motions(system, load, search).at[0].motions
+    sizes = [np.abs(m.coefficients[:, 0]) for m in found]
+    own = np.sort([q[1] for q in sizes if q[1] > 1e-6])
     np.testing.assert_allclose(own, thirds(omega), rtol=1e-4)
+    # the others have the period of the load: roots of the same cubic as above
+    d = 1.0 - omega**2
+    roots = np.roots([0.5625, 1.5 * d, d**2 + (THIRD_C * omega) ** 2, -(THIRD_F**2)]).real
+    for q in sizes:
+        assert q[1] > 1e-6 or np.min(np.abs(np.sqrt(roots) / q[3] - 1.0)) < 1e-6
 
 
 # ---- a stop ----------------------------------------------------------------------------------------------------------------
@@ -258,7 +315,7 @@ def test_a_budget_that_is_spent_is_said_and_nothing_begins_after_it():
 def test_an_interrupted_search_goes_on_to_the_same_stages():
     system, load = one_mass(PolynomialSpring(along_t=(0.0, 0.0, SOFT, 0.0, HARD)), WEAK, PUSH)
     search = MotionSearch(
-        omega_range=(0.1, 1.3), at=(0.34,), harmonics=1, samples=32, points=15, tries=6, starts=2, steps=64, most_periods=60
+        omega_range=(0.1, 1.3), at=(0.34,), harmonics=1, samples=32, points=15, tries=12, starts=2, steps=64, most_periods=60
     )  # fmt: skip
     problem = search_problem(system, load, search)
     whole = list(search_stages(problem, search))

@@ -40,11 +40,11 @@ from stickslip.solve.newton_method import Newton, newton
 
 ITERATIONS = 60  # of a deflated solve
 SHARE = 0.5  # of the budget, after which deflation leaves the rest to time
-SCALES = (0.25, 4.0)  # of known motions, as starts
-OTHER, LARGER = (
-    0.5,
-    2.5,
-)  # share of the starts with another harmonic, and by which power of the largest scale it may be larger
+SCALES = (
+    0.25,
+    64.0,
+)  # of known motions, as starts: what lies above a resonance that is left may be tens of times as large
+OTHER = 0.5  # share of the starts with another harmonic
 GUESSES = (0.5, 2.0, -1.0)
 LONGEST = 6  # times the points of a sweep that a branch may have
 
@@ -244,16 +244,17 @@ class _Search:
         turns = np.arange(self.order + 1)
         while True:
             q = self.balance.coefficients(every[int(rng.integers(len(every)))])
+            scale = np.exp(rng.uniform(low, high))
             turned = np.exp(1j * turns * rng.uniform(0.0, 2.0 * np.pi))[:, None]
-            moved = q * np.exp(rng.uniform(low, high)) * turned
-            moved[0] = q[0]
-            if (
+            other = (
                 rng.uniform() < OTHER
-            ):  # harmonics that no known motion has are found from none of them
+            )  # harmonics that no known motion has are found from none of them
+            moved = q * turned * (1.0 if other else scale)
+            moved[0] = q[0]
+            if other:
                 largest = q[1 + int(np.argmax(np.linalg.norm(q[1:], axis=1)))]
-                h = 1 + int(rng.integers(self.order))
-                size = np.exp(rng.uniform(low, LARGER * high) + 2j * np.pi * rng.uniform())
-                moved[h] += size * largest
+                phase = np.exp(2j * np.pi * rng.uniform())
+                moved[1 + int(rng.integers(self.order))] += scale * phase * largest
             yield self.balance.unknowns(moved)
 
     # --- time ---------------------------------------------------------------------------------
