@@ -37,7 +37,7 @@ DECIDING, CLOSE = (
     3e-3,
 )  # real part of exponents that decide; what harmonics beyond may change in these
 COMPARED = 3  # of them, those that grow most,
-NEAR = 0.5  # and the others count with the largest change of multipliers beyond this share of the largest one
+NEAR = 0.95  # and the others count with the largest change of those that are as near to the largest one, or farther from it
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,9 +198,11 @@ def _changes(found: Exponents, solved: Hill) -> FloatArray:
     other = exponents(solved, [s for s in segments_of(solved) if s.wave in first])
     known, size = np.isin(standing, first), np.abs(found.multipliers)
     change = np.where(known, _distances(found, other, solved), 0.0)
-    near = known & (size > NEAR * np.max(size))
-    most = np.max(change[near] / size[near], initial=0.0)
-    return np.asarray(np.where(known, change, most * size))
+    for alike in (size > NEAR * np.max(size), size <= NEAR * np.max(size)):
+        some = known & alike
+        most = np.max(change[some] / size[some], initial=0.0) if np.any(some) else 1.0
+        change = np.where(alike & ~known, most * size, change)
+    return np.asarray(change)
 
 
 def _distances(found: Exponents, other: Exponents, hill: Hill) -> FloatArray:
