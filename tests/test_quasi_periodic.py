@@ -12,7 +12,7 @@ from stickslip.harmonic.torus_path import closed_path, half_plane, torus_basis
 from stickslip.model.matrices import lumped
 from stickslip.response.quasi_periodic.find import swept
 from stickslip.response.quasi_periodic.in_time import course, statistics
-from stickslip.response.quasi_periodic.motion import TorusMotion, envelope
+from stickslip.response.quasi_periodic.motion import TorusMotion, change_of, envelope
 from stickslip.response.quasi_periodic.problem import TwoTones, two_tones, with_enough
 from stickslip.response.quasi_periodic.start import distinct, tones_of_multipliers
 from stickslip.response.quasi_periodic.tone import (
@@ -146,6 +146,23 @@ def test_derivatives_are_those_of_the_residual() -> None:
         (1e-2 * at.by_second, [residual(x, omegas[0], omegas[1] + s * 1e-2) for s in (1, -1)]),
     ):
         assert found == pytest.approx((ends[0] - ends[1]) / 2, abs=1e-5 * np.abs(found).max())
+
+
+@pytest.mark.parametrize("most", [1, 3])
+def test_what_lies_beyond_the_most_harmonics_is_left_out_too(most: int) -> None:
+    """A run that may take no more than it has must not say that nothing is left out."""
+    omegas = 140.0, 1.3152 * 140.0
+    problem = two_tones(rubbing_pair(DAMPING), tone(10.0, 0.0), tone(0.0, 8.0), most)
+
+    def solve(wider, start, path):  # type: ignore[no-untyped-def]
+        return wider.solve(omegas, start, path)
+
+    few = with_enough(problem, problem.solve(omegas), most, 0.01, solve)[1]
+    more = with_enough(problem, problem.solve(omegas), 9, 0.002, solve)[1]
+    assert {abs(j) + abs(k) for j, k in few.indices} == set(range(most + 1))
+    missing = change_of(few, more, BOTH)
+    assert missing > 0.004
+    assert 0.4 * missing < few.left_out < 4.0 * missing
 
 
 def test_frequencies_in_a_ratio_of_small_numbers_are_no_exception() -> None:

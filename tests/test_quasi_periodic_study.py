@@ -131,6 +131,16 @@ def test_what_cannot_be_answered_is_refused(tmp_path: Path) -> None:
         replace(model, loads={"own": second}).quasi_periodic(frequencies_hz=[21.0])
     with pytest.raises(InputError, match=r"Load\.omega"):
         ss.Load(on="pair.m1", newton=1.0, omega=1.0, omega_ratio=2.0)
+    same = replace(
+        model, loads={**model.loads, "own": replace(second, omega=None, omega_ratio=1.0)}
+    )
+    with pytest.raises(InputError, match=r"load\.own\.frequency_ratio.*is the first frequency"):
+        same.quasi_periodic(frequencies_hz=[21.0])
+    far = replace(model, loads={**model.loads, "own": replace(second, omega=1e8)})
+    with pytest.raises(InputError, match=r"load\.own\.frequency_hz.*times the first frequency"):
+        far.quasi_periodic(frequencies_hz=[21.0])
+    with pytest.raises(InputError, match=r"second_hz.*of a tone that nothing drives"):
+        both.quasi_periodic(frequencies_hz=[21.0], second_hz=30.0)
     wrong = changed(TWO_TONES, {"load.other_rotor.frequency_hz": "30.0"})
     with pytest.raises(
         InputError, match=r"load\.other_rotor\.frequency_ratio.*cannot stand beside"

@@ -45,7 +45,7 @@ class Found:
     forced
         The motion without it.
     ratio
-        Damping ratio of the second tone at small amplitudes, of the last that was looked at; NaN where none was.
+        Damping ratio of the second tone at small amplitudes, of the last that was looked at and grows if one does; NaN where none was.
     near
         The frequency near which that was, rad/s; NaN where none was.
     """
@@ -87,6 +87,8 @@ def tone_beside(
         first = next(over_amplitude(begin))
         if not first.converged:
             continue
+        if ratio < 0.0 and first.ratio >= 0.0:
+            continue  # one that grows has been seen: that another decays does not undo it
         ratio, near = first.ratio, first.omega
         if ratio >= 0.0:
             continue

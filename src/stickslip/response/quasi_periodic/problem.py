@@ -21,6 +21,7 @@ from stickslip.solve.newton_method import Newton, Solution, newton
 
 LEVELS = 8  # steps of the second load where Newton's method does not find the way at once
 MOST_RAISES = 6
+BEYOND = 4  # sums of harmonics above the largest, that are looked at but not taken
 SHARE = 0.5  # of the tolerance, below which together combined frequencies stay out
 
 
@@ -245,7 +246,7 @@ def with_enough(
     problem, motion
         What to begin with.
     most
-        Largest sum of harmonics that is looked at.
+        Largest sum of harmonics that is taken; what is left out is looked for up to `BEYOND` more.
     tolerance
         Root mean square, relative.
     solve
@@ -256,24 +257,22 @@ def with_enough(
     TwoTones, TorusMotion
         The last that converged, `left_out` telling what is left out.
     """
-    candidates = half_plane(most)
-    for _ in range(MOST_RAISES):
+    candidates = half_plane(most + BEYOND)
+    for raised in range(MOST_RAISES + 1):
         ratio = motion.omegas[1] / motion.omegas[0]
-        path = closed_path(ratio, most, 0.5)
+        path = closed_path(ratio, most + BEYOND, 0.5)
         size = np.sum(np.abs(problem.balance.coefficients(motion.x)[1:]) ** 2)
         own = set(problem.balance.indices[1:])
         more = tuple(i for i in candidates if i not in own)
         moved = problem.balance.left_out(motion.x, motion.omegas, path, more)
         square = np.sum(np.abs(moved) ** 2, axis=1) / size
         motion = replace(motion, left_out=float(np.sqrt(np.sum(square))))
-        if motion.left_out <= tolerance:
+        within = np.flatnonzero([abs(j) + abs(k) <= most for j, k in more])
+        if np.sum(square[within]) <= tolerance**2 or room(problem) < 1 or raised == MOST_RAISES:
             break
-        order = np.argsort(square, kind="stable")
+        order = within[np.argsort(square[within], kind="stable")]
         rest = np.cumsum(square[order])
-        added = order[rest > (SHARE * tolerance) ** 2]
-        added = added[::-1][: max(1, room(problem))]
-        if room(problem) < 1:
-            break
+        added = order[rest > (SHARE * tolerance) ** 2][::-1][: room(problem)]
         wider = problem.with_indices((*problem.balance.indices, *(more[i] for i in sorted(added))))
         start = wider.balance.from_other(problem.balance, motion.x)
         found = solve(wider, start, wider.path(ratio))

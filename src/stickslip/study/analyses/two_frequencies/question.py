@@ -24,6 +24,7 @@ from stickslip.units import HZ, RPM
 NAME = "quasi_periodic"
 APART = 1000  # harmonics of the second loads of a single structure while they are assembled with the first
 MODES = 12  # whose growth is looked at
+MOST_RATIO = 100.0  # of the second frequency to the first: contacts are sampled as finely as the faster one needs, over many turns of the slower
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +115,7 @@ def question_of(case: Case, model: Model) -> Question:
             "has another frequency of its own than load." + next(iter(second)),
             "There are two frequencies: give the same to all such loads.",
         )
+    _check_second(asked, second)
     wheel = model.sectors > 1 and model.mistuning is None
     if wheel and asked.in_time:
         raise input_error(f"{NAME}.in_time", "is for single structures", "Leave it out of a wheel.")
@@ -147,6 +149,33 @@ def question_of(case: Case, model: Model) -> Question:
         question = replace(question, waves=(orders[0] or 0, _wave(question)))
     question.problem()  # what cannot be solved is refused now
     return question
+
+
+def _check_second(asked: QuasiPeriodicTable, second: Mapping[str, Load]) -> None:
+    """Refuse second loads whose frequency is the first one or far above it, and a second tone beside them."""
+    for name, load in second.items():
+        given = "frequency_ratio" if load.omega is None else "frequency_hz"
+        each = [load.omega_ratio if load.omega is None else load.omega / (HZ * f) for f in asked.first_hz]  # fmt: skip
+        ratios = [r or 1.0 for r in each]
+        if all(r == 1.0 for r in ratios):
+            raise input_error(
+                f"load.{name}.{given}",
+                "is the first frequency, that of the other loads",
+                "Leave it out and ask [forced_response], or give another one.",
+            )
+        if max(ratios) > MOST_RATIO:
+            raise input_error(
+                f"load.{name}.{given}",
+                f"is {max(ratios):.4g} times the first frequency, more than {MOST_RATIO:g}",
+                "Give the slower loads a frequency of their own instead, or a nearer one.",
+            )
+    for key in ("second_hz", "second_wave") if second else ():
+        if getattr(asked, key) is not None:
+            raise input_error(
+                f"{NAME}.{key}",
+                f"is of a tone that nothing drives, and load.{next(iter(second))} has a frequency of its own",
+                "Leave one of them out.",
+            )
 
 
 def _wave(question: Question) -> int:
