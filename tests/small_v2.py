@@ -47,6 +47,7 @@ SECTOR_DECK = {
     "harmonics.selection": '"always_low"',
     "forced_response.frequencies": "4",
     "forced_response.peak_points": "0",
+    "forced_response.stability": '"off"',
 }
 
 SECTOR = """
@@ -114,6 +115,7 @@ modes = 2
 frequency_hz = [200.0, 260.0]
 points = 8
 peak_points = 2
+stability = "off"
 """
 
 

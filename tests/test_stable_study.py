@@ -207,7 +207,9 @@ def test_doubtful_points_near_the_peak_are_examined_too() -> None:
 def test_a_tuned_wheel_is_examined_with_all_its_sectors_if_they_are_few(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (case,) = read_study(write_shrouded_sector(tmp_path)).cases()
+    (case,) = read_study(
+        write_shrouded_sector(tmp_path, {"forced_response.stability": '"peak"'})
+    ).cases()
     monkeypatch.setattr(examination, "MOST_WHEEL", 0.0)
     monkeypatch.setattr(examination, "MOST_HILL", 0.0)
     asked = FORCED_RESPONSE.inputs(case, case.build())
