@@ -30,7 +30,7 @@ ROWS = 1300  # and no more than make matrices of so many rows,
 FEWEST = 5  # but these
 MUCH = 700  # rows up to which their number is doubled where those beyond matter
 CHEAP = 400  # rows up to which harmonics are added until every mode rings in one
-SMALL = 300  # rows up to which all waves of a wheel are compared with those of the motion as it was solved; else
+SMALL = 700  # rows up to which all waves of a wheel are compared with those of the motion as it was solved; else
 ABOVE = 3e-4  # of a multiplier: what modes may do that ring above all harmonics that are solved; measured: 9e-5
 DECIDING, CLOSE = (
     -0.03,

@@ -15,7 +15,7 @@ MOST_WHEEL = (
     4 * FLOPS
 )  # the same of a forced motion of a wheel, whose other waves are reduced for nothing else
 MOST_HILL = 300 * FLOPS  # of one examination by Hill's method, an upper bound: few contacts slip
-MOTIONS = 1.5  # of which one is the motion as it was solved, against few waves
+MOTIONS = 2.0  # that with more harmonics, and as it was solved
 
 
 def examination_work(system: System) -> float:
