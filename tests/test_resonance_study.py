@@ -57,6 +57,40 @@ def test_the_optimum_of_the_benchmark_from_a_study(tmp_path: Path) -> None:
     assert case["value"].values.tolist() == [[0.2, 0.12, 0.09]]
 
 
+TWO_IN_ONE = """
+schema_version = 2
+[part.pair]
+shape = "lumped"
+masses_kg = [1.0, 1.0]
+springs_n_per_m = [["ground", 1, 4e4], ["ground", 2, 4e4], [1, 2, 100.0]]
+dashpots_n_s_per_m = [["ground", 1, 3.0], ["ground", 2, 3.0]]
+[contact.damper]
+between = ["pair.m1", "pair.m2"]
+law = "jenkins"
+tangential_stiffness_n_per_m = 6e3
+slip_limit_n = 100.0
+[load.shaker]
+on = "pair.m1"
+force_n = 5.0
+[resonance]
+frequency_hz = [24.0, 48.0]
+parameter = "contact.damper.slip_limit_n"
+values = [8, 4, 2, 1]
+peaks = 2
+harmonics = 1
+"""
+
+
+def test_two_peaks_that_become_one_are_one_from_there_on(tmp_path: Path) -> None:
+    for values, second in (("[8, 4, 2, 1]", [8.0, 4.0]), ("[1, 2, 4, 8]", [4.0, 8.0])):
+        text = TWO_IN_ONE.replace("[8, 4, 2, 1]", values)
+        case = one_case(answered(text, tmp_path / values[1]).tree["resonance"].to_dataset(), 0)
+        first, other = (v[np.isfinite(v)].tolist() for v in case["value"].values)
+        assert sorted(first) == [1.0, 2.0, 4.0, 8.0]
+        assert other == second
+        assert "overtaking_value" not in case
+
+
 def test_the_example_of_two_peaks_tells_where_one_overtakes_the_other(tmp_path: Path) -> None:
     text = (Path(__file__).parent.parent / "examples" / "two_peaks" / "study.toml").read_text("utf-8")  # fmt: skip
     few = text[: text.index("values = ")] + "values = [70, 60, 40, 25, 24]\npeaks = 2\n"

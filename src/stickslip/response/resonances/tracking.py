@@ -93,7 +93,7 @@ def follow_peaks(
     Yields
     ------
     PeakPoint
-        Not in `done`, one a value and peak, all peaks of a value before the next. Where two run into each other both go on as the same.
+        Not in `done`, one a value and peak, all peaks of a value before the next. Where two become one, one of them ends: that which had the longer way to it.
 
     Raises
     ------
@@ -105,16 +105,47 @@ def follow_peaks(
 
 
 def _through(
-    followed: Sequence[Tracker], values: Sequence[float] | FloatArray, done: Sequence[PeakPoint]
+    followed: Sequence[Tracker],
+    values: Sequence[float] | FloatArray,
+    done: Sequence[PeakPoint],
+    others: Sequence[PeakPoint] = (),
 ) -> Iterator[PeakPoint]:
+    """Follow peaks through the values; one that has become another one, of these or of the `others`, ends."""
     known = {(p.value, p.peak): p for p in done}
+    going, last = list(followed), dict[int, PeakPoint]()
     for value in map(float, values):
-        for tracker in followed:
+        here: list[PeakPoint] = []
+        for tracker in going:
             stored = known.get((value, tracker.number))
-            if stored is None:
-                yield tracker.point(value)
-            elif stored.converged:
+            if stored is not None and stored.converged:
                 tracker.take(stored)
+            here.append(tracker.point(value) if stored is None else stored)
+        there = [p for p in others if p.value == value]
+        kept: list[PeakPoint] = []
+        # the one that had to go the least way is the one that goes on
+        for point in sorted(here, key=lambda p: _way(last.get(p.peak), p)):
+            if not any(_is_one(point, other) for other in (*there, *kept)):
+                kept.append(point)
+        numbers = {p.peak for p in kept}
+        going = [tracker for tracker in going if tracker.number in numbers]
+        for point in (p for p in here if p.peak in numbers):
+            if point.converged:
+                last[point.peak] = point
+            if (value, point.peak) not in known:
+                yield point
+
+
+def _is_one(one: PeakPoint, other: PeakPoint) -> bool:
+    """Whether two points of the same value are one peak."""
+    if not (one.converged and other.converged):
+        return False
+    near = abs(one.omega - other.omega) <= APART * other.omega
+    return near and abs(one.amplitude - other.amplitude) <= APART * other.amplitude
+
+
+def _way(before: PeakPoint | None, point: PeakPoint) -> float:
+    """Return how far the frequency of a peak has gone since its last value, relatively."""
+    return 0.0 if before is None else abs(point.omega / before.omega - 1.0)
 
 
 def later_peaks(
@@ -136,7 +167,7 @@ def later_peaks(
     Yields
     ------
     PeakPoint
-        From the last value to the first, numbered after the known ones.
+        From the last value to the first, numbered after the known ones. One that becomes a known one ends.
     """
     last = float(values[-1])
     there = [p.omega for p in known if p.value == last and p.converged]
@@ -147,7 +178,7 @@ def later_peaks(
         if all(abs(omega - other) > APART * other for other in there):
             tracker.number = number + len(found)
             found.append(tracker)
-    yield from _through(found, list(values)[::-1], done)
+    yield from _through(found, list(values)[::-1], done, known)
 
 
 def smallest_peak(
