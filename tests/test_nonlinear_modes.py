@@ -19,7 +19,7 @@ from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.matrices import lumped
 from stickslip.report.page import plots
-from stickslip.response.at_rest import holding
+from stickslip.response.at_rest import holding, opening
 from stickslip.response.nonlinear_modes import Backbone, ModeSweep, nonlinear_mode
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.curve import slip_amplitude
@@ -59,6 +59,20 @@ def test_the_table_of_one_mass_on_a_friction_spring():
     records = case_nonlinear_modes.one_mass()
     assert len(records) == 30
     assert all(record["holds"] for record in records)
+
+
+def test_a_model_without_dimensions_slips_beyond_one():
+    how, sweep = Discretisation(order=3), ModeSweep(points=8)
+    found = [
+        followed(*one_mass(Jenkins(k_t=0.5, limit=limit), 0), how, sweep) for limit in (1e-3, 10.0)
+    ]
+    small, large = (backbone.points for backbone in found)
+    top_small, top_large = (max(points, key=lambda p: p.ratio) for points in (small, large))
+    assert top_large.amplitude == pytest.approx(1e4 * top_small.amplitude, rel=0.3)
+    assert top_large.ratio == pytest.approx(top_small.ratio, rel=0.02)
+    assert large[-1].slipping == small[-1].slipping == 1.0
+    pressed = UnilateralSpring(k_n=1.0, preload=5.0)
+    assert opening((pressed, Jenkins(k_t=1.0, limit=5.0))).tolist() == [True, False]
 
 
 def test_rows_of_the_rubbing_beam_with_21_harmonics(monkeypatch):

@@ -11,7 +11,7 @@ from stickslip.harmonic.aft import contact_forces
 from stickslip.response.equilibrium import preload
 from stickslip.response.system import System
 
-FAR = 1.0  # m: no contact is closed there
+FAR = 1e6  # m: no contact is closed there, of a model without dimensions either
 
 
 def holding(system: System, static_load: FloatArray) -> BoolArray:

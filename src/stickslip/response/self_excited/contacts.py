@@ -9,7 +9,7 @@ from stickslip.contact.interface import Interface
 from stickslip.contact.law import OPEN, SLIP, STICK, ContactLaw
 from stickslip.response.self_excited.problem import SelfExcited
 
-FAR = 1.0  # m: whatever can slip has slipped there
+FAR = 1e6  # m: whatever can slip has slipped there, of a model without dimensions, too
 
 
 @dataclass(frozen=True, eq=False)
