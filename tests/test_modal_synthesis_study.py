@@ -80,6 +80,8 @@ def test_a_level_at_which_the_mode_is_not_alone_is_refused_and_not_shown(tmp_pat
     nothing = model.modal_synthesis(levels=[3.0], harmonics=5, most_harmonics=5)
     assert nothing.verdicts[-1].level == "wrong"
     assert "nothing is left" in nothing.verdicts[-1].why
+    below = model.modal_synthesis(levels=[1e-3], harmonics=3, most_harmonics=3, amplitude_mm=[2e4, 6e4], points=8)  # fmt: skip
+    assert "begins with more than the level reaches" in below.verdicts[0].why
 
 
 def test_an_interrupted_run_goes_on_with_the_mode_that_it_has(tmp_path, monkeypatch):

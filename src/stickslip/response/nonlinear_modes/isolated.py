@@ -55,7 +55,7 @@ class OtherModes:
     def answer(self, omega: FloatArray, force: ComplexArray, rows: Matrix) -> ComplexArray:
         """Return the (p, k) answer of the other modes to forces (p, n) at frequencies (p,), in the `rows` (k, n) of what is looked at."""
         taken = (force @ self.left.T) / (1j * omega[:, None] - self.poles)
-        here = self.oscillator.at(np.full(omega.shape, self.oscillator.ends[0]))
+        here = self.oscillator.at(np.array([self.oscillator.ends[0]]))
         shape = self.oscillator.motion[0, 1] / here.amplitude[0]
         own = (force @ shape.conj()) / here.stiffness(omega)
         return np.asarray(taken @ (rows @ self.right).T - own[:, None] * (rows @ shape))

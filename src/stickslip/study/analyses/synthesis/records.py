@@ -14,7 +14,7 @@ class SynthesisLevel:
     level
         Factor on the harmonic loads.
     answer
-        ``trusted``, ``doubtful``, ``refused`` (other modes take part: nothing is shown), or ``beyond`` (the nonlinear mode ends below the peak).
+        ``trusted``, ``doubtful``, ``refused`` (other modes take part: nothing is shown), or ``beyond`` (the nonlinear mode ends below the peak, or begins above it).
     why
         What that rests on, in words.
     peak, peak_omega

@@ -113,6 +113,8 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
     alone = isolation(shared.others, tops[at], question.dof) if peaks else NOBODY
     resolved = _resolved(shared, tops[at]) if peaks else np.nan
     answer, why = "beyond", "the nonlinear mode ends before it needs so much of the load"
+    if not curve.place.size:
+        why = "the nonlinear mode begins with more than the level reaches"
     if peaks and float(curve.place.max()) < own.ends[1]:
         answer, why = judged(alone, resolved)
     shown = answer in ("trusted", "doubtful")

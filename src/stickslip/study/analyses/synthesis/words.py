@@ -14,7 +14,7 @@ REMEDIES = {
     "trusted": "",
     "doubtful": "modal_synthesis.direct = true shows the error.",
     "refused": ASK,
-    "beyond": "Raise modal_synthesis.amplitude_mm, or ask for [forced_response] there.",
+    "beyond": "Widen modal_synthesis.amplitude_mm, or ask for [forced_response] there.",
 }
 FAST = 0.05  # relative change in a radian beyond which a passage is doubtful
 WRONG = 0.02  # of the peak, against the direct solution
