@@ -64,6 +64,20 @@ def rubbing(fed: float) -> ss.Model:
     )
 
 
+def test_a_motion_that_is_weakly_unstable_is_not_told_as_another_one() -> None:
+    shapes = np.linalg.eigh(np.array([[4e4, -2e4], [-2e4, 5e4]]))[1]
+    damping = shapes @ np.diag([3.0, -0.3]) @ shapes.T  # a multiplier of 1.007
+    pair = ss.model.lumped(np.eye(2), np.array([[3e4, -1e4], [-1e4, 4e4]]), damping, names=("m1", "m2"))  # fmt: skip
+    model = replace(rubbing(3.0), parts={"pair": ss.Part(structure=pair)})
+    hz = [21.4, 21.5]
+    short, long = (model.forced_response(hz, not_periodic_s=s)["forced_response"] for s in (0.05, 30.0))  # fmt: skip
+    assert "has not left the motion that it started on" in short["not_periodic_sentence"].values.item()  # fmt: skip
+    assert not short["not_periodic_settled"].item()
+    assert not short["not_periodic_repeats"].item()
+    assert long["not_periodic_settled"].item()
+    assert long["not_periodic_largest"].values.item() > 1.1 * long["not_periodic_least"].values.item()  # fmt: skip
+
+
 def test_a_tone_that_nothing_drives_from_python() -> None:
     data = rubbing(3.0).quasi_periodic(frequencies_hz=[21.5], in_time=True)["quasi_periodic"]  # fmt: skip
     assert data["kind"].values.item() == "second tone"

@@ -233,8 +233,8 @@ def _answer_in_time(
     if notes.get(NOT_PERIODIC) is not None:
         return
     answers = [
-        in_time_instead(question, response, omega, why, question.not_periodic_s)
-        for omega, why in without_periodic(question, response, examined)
+        in_time_instead(question, response, omega, why, question.not_periodic_s, multiplier)
+        for omega, why, multiplier in without_periodic(question, response, examined)
     ]
     for one in answers:
         LOG.info(f"not periodic: {question.said(one.sentence)}")

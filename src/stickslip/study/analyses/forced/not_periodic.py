@@ -5,10 +5,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.errors import StickslipError
 from stickslip.reduction.tuned import TunedWheel
-from stickslip.response.quasi_periodic.in_time import PEAKS, Course, course, statistics
+from stickslip.response.quasi_periodic.in_time import (
+    KEPT,
+    LEAST,
+    MOST,
+    PEAKS,
+    Course,
+    course,
+    statistics,
+)
 from stickslip.response.time.sectors import all_sectors, sectors_in_time
 from stickslip.response.time.start import TransientStart, rest, start_from_harmonics
 from stickslip.study.analyses.forced.in_time import GOLDEN, KICK
@@ -21,6 +29,12 @@ MOST_POINTS = 2  # of a case, the peak first, then the nearest to it
 STEPS = 512
 TURNS = 128  # periods whose amplitudes are kept for the picture
 SAME = 1e-3  # relative difference of the amplitudes of all periods that counts as none
+NEAR, AT = (
+    0.05,
+    0.01,
+)  # of its vibration: what is nearer to the balance may not have left it, and what has had the time to leave is still at it
+MARGIN = 1.5  # times the periods in which a kick grows to the size of the motion: the later half is compared
+MOST_PERIODS = 20_000
 MULTIPLE = 0.02  # of the frequency: a line of the spectrum that is farther from every multiple is another frequency
 
 
@@ -68,28 +82,45 @@ class Answer:
     sentence: str
 
 
+@dataclass(frozen=True)
+class _March:
+    """A course, how far its last period is from the balance it began on (NaN where it began elsewhere), and the periods that leaving takes."""
+
+    course: Course
+    away: float
+    needed: float
+
+    @property
+    def stayed(self) -> bool:
+        """Whether it is still the motion it began on, as far as can be told."""
+        return self.away < (NEAR if self.course.periods < self.needed else AT)
+
+
 def without_periodic(
     question: Question, response: Response, examined: Sequence[Examined]
-) -> list[tuple[float, str]]:
-    """Return the frequencies (rad/s) at which no balance stands for the motion, and why: the peak first, then the nearest to it."""
+) -> list[tuple[float, str, float]]:
+    """Return where no balance stands for the motion (rad/s), why, and the modulus of its multiplier: the peak first, then the nearest to it."""
     found = {
-        a.point.omega: "no periodic motion was found"
+        a.point.omega: ("no periodic motion was found", np.nan)
         for a in response.accepted
         if not a.point.converged
     }
     for one in examined:
         if one.verdict == "unstable":
-            found[one.omega] = "the periodic motion is unstable"
+            found[one.omega] = "the periodic motion is unstable", one.multiplier
         elif one.verdict == "undecided" and not one.motion and not np.isfinite(one.error):
-            found[one.omega] = "no motion with more harmonics was found near the balance"
+            found[one.omega] = (
+                "no motion with more harmonics was found near the balance",
+                one.multiplier,
+            )
     middle = sum(question.sweep.omega_range) / 2 if response.top is None else response.top.point.omega  # fmt: skip
     nearest = sorted(found, key=lambda omega: abs(omega - middle))
-    return [(omega, found[omega]) for omega in nearest[:MOST_POINTS]]
+    return [(omega, *found[omega]) for omega in nearest[:MOST_POINTS]]
 
 
 def in_time_instead(
-    question: Question, response: Response, omega: float, why: str, budget: float
-) -> Answer:
+    question: Question, response: Response, omega: float, why: str, budget: float, multiplier: float = np.nan
+) -> Answer:  # fmt: skip
     """March at a frequency and say what the motion is like.
 
     Parameters
@@ -102,19 +133,23 @@ def in_time_instead(
         Why it is asked for.
     budget
         Seconds.
+    multiplier
+        Modulus of that of the balance's motion, which says how long its disturbances take to grow; NaN where it is not known.
     """
     count = question.problem.system.outputs.size
     size = sectors_in_time(question.model.system) * question.model.system.structure.n
     if size > MOST_IN_TIME:
         return _nothing(omega, why, count, f"not integrated: {size} coordinates are more than {MOST_IN_TIME}")  # fmt: skip
     try:
-        found = _marched(question, response, omega, budget)
+        found = _marched(question, response, omega, budget, multiplier)
     except (StickslipError, FloatingPointError, np.linalg.LinAlgError) as error:
         return _nothing(omega, why, count, f"not integrated: {error}")
     return _told(question, response, omega, why, found)
 
 
-def _marched(question: Question, response: Response, omega: float, budget: float) -> Course:
+def _marched(
+    question: Question, response: Response, omega: float, budget: float, multiplier: float
+) -> _March:
     system, load = question.problem.system, question.model.load
     structure, contacts = system.structure, system.interface
     known = [a for a in response.accepted if a.point.converged]
@@ -131,7 +166,32 @@ def _marched(question: Question, response: Response, omega: float, budget: float
     if motion is not None:
         start = start_from_harmonics(motion, omega, contacts.gap_operator, contacts.laws)
         start = _disturbed(start, omega * np.abs(motion[1:]).sum(axis=0))
-    return course(structure, contacts, load, omega, system.outputs, start, steps=STEPS, budget=budget)  # fmt: skip
+    needed = _needed(multiplier)
+    least = LEAST if np.isinf(needed) else int(np.clip(needed, LEAST, MOST_PERIODS))
+    found = course(
+        structure, contacts, load, omega, system.outputs, start, steps=STEPS, budget=budget, least=least,
+        most=max(MOST, min(2 * least, MOST_PERIODS)),
+    )  # fmt: skip
+    away = np.nan
+    if near is not None and motion is not None and near.point.omega == omega:
+        away = _away(found, motion[:, system.outputs])
+    return _March(found, away, needed)
+
+
+def _needed(multiplier: float) -> float:
+    """Return in how many periods a kick is sure to have left the motion; infinite where no multiplier says that it grows."""
+    return MARGIN * np.log(1.0 / KICK) / np.log(multiplier) if multiplier > 1.0 else np.inf
+
+
+def _away(found: Course, motion: ComplexArray) -> float:
+    """Return how far the vibration in the last period is from that of coefficients (H + 1, outputs), relative to it."""
+    if not found.periods:
+        return np.nan
+    turns = 2.0 * np.pi * np.arange(1, KEPT + 1) / KEPT
+    own = (np.exp(1j * np.outer(turns, np.arange(1, len(motion)))) @ motion[1:]).real
+    last = found.samples[-1] - found.samples[-1].mean(axis=0)
+    size = float(np.linalg.norm(own))
+    return float(np.linalg.norm(last - own)) / size if size > 0.0 else np.nan
 
 
 def _disturbed(start: TransientStart, speeds: FloatArray) -> TransientStart:
@@ -139,8 +199,9 @@ def _disturbed(start: TransientStart, speeds: FloatArray) -> TransientStart:
     return replace(start, velocity=start.velocity + shares * speeds)
 
 
-def _told(question: Question, response: Response, omega: float, why: str, found: Course) -> Answer:
+def _told(question: Question, response: Response, omega: float, why: str, march: _March) -> Answer:
     """Return an answer in numbers and words."""
+    found = march.course
     if found.overflowed or found.periods < 2:
         count = question.problem.system.outputs.size
         said = f"in time it grew beyond all numbers in {found.periods} periods" if found.overflowed else "the time was too short for two periods"  # fmt: skip
@@ -155,7 +216,13 @@ def _told(question: Question, response: Response, omega: float, why: str, found:
     label = question.model.output_labels[own]
     head = f"{omega / HZ:.3f} Hz: {why}; in time"
     counted = f"over {of.periods} periods after {found.periods - of.periods}"
-    if alike and of.settled:
+    settled = of.settled and not (alike and march.stayed)
+    if alike and march.stayed:
+        body = (
+            f"it has not left the motion that it started on by more than {100 * march.away:.2g} %, {label} {1e3 * of.largest[own]:.4g} mm {counted}; "
+            + _patience(march)
+        )
+    elif alike and settled:
         body = f"it settles to another periodic motion, {label} {1e3 * of.largest[own]:.4g} mm {counted}"
     else:
         body = (
@@ -166,8 +233,16 @@ def _told(question: Question, response: Response, omega: float, why: str, found:
         body += _settledness(of.spread, of.settled)
     return Answer(
         omega, why, of.largest, of.least, of.mean, of.rms, of.extreme, of.spread, found.periods, found.seconds,
-        of.settled, alike and of.settled, lines, of.peaks[own], amplitudes, f"{head} {body}",
+        settled, alike and settled, lines, of.peaks[own], amplitudes, f"{head} {body}",
     )  # fmt: skip
+
+
+def _patience(march: _March) -> str:
+    if np.isinf(march.needed):
+        return "how fast a disturbance grows is not known: more time (forced_response.not_periodic_s) tells more"
+    if march.course.periods < march.needed:
+        return f"a disturbance needs {march.needed:.0f} periods, more time (forced_response.not_periodic_s) tells more"
+    return "a disturbance should have grown by now"
 
 
 def _settledness(spread: float, settled: bool) -> str:
