@@ -10,9 +10,11 @@ from test_stability import LAWS, random_gaps, random_structure, solved, stopped
 
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.dahl import Dahl
+from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.contact.laws.jenkins import Jenkins
+from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError
-from stickslip.harmonic.fourier import to_complex
+from stickslip.harmonic.fourier import to_complex, to_real
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.response.stability import (
@@ -109,6 +111,34 @@ def test_a_wheel_is_examined_wave_by_wave_one_sector_at_a_time(force):
     if whole.verdict == "unstable":
         assert own.disturbance.wave == 2
         assert own.disturbance.omega == pytest.approx(every[0].omega, rel=1e-3)
+
+
+def beside_a_stop(law, stiffness, damping, omega, gaps):
+    """One kilogram, its displacement being the normal gap and both tangential ones; Hill's exponents and the largest multiplier."""
+    one = Dofs(np.arange(1), ("x",), np.zeros((1, 3)))
+    structure = Structure(np.eye(1), np.array([[damping]]), np.array([[stiffness]]), one)
+    system = System(structure, Interface(("c",), (law,), np.ones((3, 1))), np.array([0]))
+    coefficients = np.array(gaps)[:, None] * np.ones(3)
+    whole = motion_stability(structure, system.interface, to_real(coefficients), omega)
+    size = np.max(np.abs(whole.floquet.multipliers))
+    return hill_exponents(system, coefficients, omega), size
+
+
+def test_harmonics_are_added_until_what_is_counted_is_found():
+    """A stop that is met for a part of the period: with the first harmonics taken one is counted outside the circle, and none is found."""
+    law = UnilateralSpring(k_n=88.145, initial_gap=0.45239)
+    found, size = beside_a_stop(law, 2.3929, 0.02236, 0.77454, [-0.311 + 0j, -0.8971 - 1.4188j])
+    assert size > 1.9
+    assert found.missing == 0
+    assert np.max(np.abs(found.multipliers)) == pytest.approx(size, rel=2e-2)
+
+
+def test_a_mode_above_all_harmonics_is_not_counted_as_stable():
+    """Three springs hold the mass where they are closed, and it rings above all harmonics; open it is driven away."""
+    law = ElasticCoulomb(k_t=3000.0, k_w=3000.0, k_n=8000.0, mu=0.4, preload=500.0)
+    found, size = beside_a_stop(law, -5.0, 0.0, 1.0, [0.05 + 0j, 0.4 + 0.3j, 0.1 - 0.05j])
+    assert size > 2.0
+    assert found.missing is None
 
 
 def test_verdicts_are_those_of_the_monodromy():

@@ -139,7 +139,7 @@ def _refined(hill: Hill) -> tuple[Hill, Exponents]:
     while True:
         deciding = np.max(found.errors[found.values.real > DECIDING], initial=0.0)
         more = replace(hill, order=2 * hill.order)
-        known = found.missing is not None and deciding < CLOSE
+        known = found.missing == 0 and deciding < CLOSE
         if known or more.rows > MUCH:
             return hill, found
         hill, found = more, exponents(more)

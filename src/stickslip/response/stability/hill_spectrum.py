@@ -20,7 +20,7 @@ ON_AXIS = 1.6e-7  # real part up to which an exponent is on the imaginary axis
 PATH = 65  # values of a determinant along a segment
 STEPS = (0.4, 0.8, 1.2, 1.6, 2.0, 2.5, 3.0)  # real parts of segments where exponents are missing
 TWIN = 1e-5  # distance of an exponent that two segments have found
-WHOLE = 0.25  # farther from a whole number the turns of a determinant are no count
+WHOLE = 0.05  # farther from a whole number the turns of a determinant are no count
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,13 +90,18 @@ def segments_of(hill: Hill) -> list[Segment]:
 
 def _counted(axis: Sequence[Segment]) -> int | None:
     """Return how many exponents lie right of the imaginary axis, by the turns of the determinant along it; None where these are not known."""
-    if not all(segment.smooth for segment in axis):
+    if not all(segment.smooth for segment in axis) or not _rings(axis):
         return None
     each = [_turns(segment) for segment in axis]
     turns, alone = 2.0 * sum(t for t, _ in each), 2 * sum(n for _, n in each)
     if np.isnan(turns) or abs(turns - round(turns)) > WHOLE:
         return None
     return alone - round(turns)
+
+
+def _rings(axis: Sequence[Segment]) -> bool:
+    """Return whether a mode rings in a harmonic that is solved; contacts that change a structure of none may lower one from above them all."""
+    return not axis[0].hill.tangents or any(own.size for segment in axis for own in segment.slow)
 
 
 def _turns(segment: Segment) -> tuple[float, int]:
