@@ -22,7 +22,7 @@ from stickslip.report.page import plots
 from stickslip.response.at_rest import holding, opening
 from stickslip.response.nonlinear_modes import Backbone, ModeSweep, nonlinear_mode
 from stickslip.response.parameter import Discretisation
-from stickslip.response.self_excited.curve import slip_amplitude
+from stickslip.response.self_excited.curve import at_amplitude, slip_amplitude
 from stickslip.response.self_excited.modes import stuck_modes
 from stickslip.response.self_excited.problem import self_excited_motions
 from stickslip.response.system import System
@@ -134,11 +134,12 @@ def test_harmonics_are_raised_until_frequency_and_damping_stay():
     orders = {p.order for p in raised.points}
     assert min(orders) == 1
     assert max(orders) > 3
-    many = followed(system, load, Discretisation(order=61, samples=1024), replace(sweep, most_harmonics=0, points=60))  # fmt: skip
-    a, w, z = np.array([(p.amplitude, p.omega, p.ratio) for p in many.points]).T
+    many = self_excited_motions(system, load, raised.mode, 0, Discretisation(order=61, samples=1024))  # fmt: skip
     for point in raised.points:
-        assert point.omega == pytest.approx(np.interp(point.amplitude, a, w), rel=1e-3)
-        assert point.ratio == pytest.approx(np.interp(point.amplitude, a, z), rel=6e-3)
+        exact = at_amplitude(many, point.amplitude)
+        assert exact.converged
+        assert point.omega == pytest.approx(exact.omega, rel=sweep.tolerance)
+        assert point.ratio == pytest.approx(exact.level, rel=sweep.tolerance)
 
 
 def test_all_four_folds_of_a_mode_in_resonance_with_another_are_followed():

@@ -3,7 +3,8 @@
 Compared by distance in the plane, amplitude against frequency and damping ratio, each over its range: between folds several motions have the same amplitude.
 """
 
-import itertools
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -12,26 +13,50 @@ from evidence.validation.compare import Record, bound, left_out, record
 from evidence.validation.reference_data import chain_mode, has_complete
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response.nonlinear_modes.backbone import ModeSweep, nonlinear_mode
+from stickslip.response.branch import Followed, Judged
+from stickslip.response.nonlinear_modes.backbone import (
+    Backbone,
+    ModePoint,
+    ModeSweep,
+    mode_point,
+    nonlinear_mode,
+)
+from stickslip.response.nonlinear_modes.levels import ModeCurve
+from stickslip.response.nonlinear_modes.measure import by_energy
 from stickslip.response.parameter import Discretisation
 from stickslip.response.self_excited.modes import stuck_modes
+from stickslip.response.self_excited.problem import SelfExcited, self_excited_motions
+from stickslip.solve.continuation import Point
+from stickslip.solve.newton_method import Solution, newton
+from stickslip.solve.status import Status
+from stickslip.solve.steps import across
 
 SOURCE = "tmdsimpy, commit 17d5fc3"
 CASE = "chain of 20 masses, mode 1"
 HOW = Discretisation(order=5, samples=256, evaluator="intervals")
-FINE = 600  # points, so that chords between them are no part of the distance
-CHORD = 1.5e-3  # what a chord beside a corner of the curve is off, of the ranges; half of the rows lie thirty times nearer
+FINE = 600  # points, from which motions beside the rows are solved
+CORRECTIONS = 8  # of what is solved, until it lies beside the row in the plane
+CLOSE = 1e-8  # of the ranges, along the curve
+LARGEST = 1e-3  # distance, in ranges
 PLAIN = 30
 
 
-def ours(points: int) -> tuple[FloatArray, str]:
-    """Return log10 of modal amplitude, frequency, damping ratio and tip amplitude along the mode, and how it ended."""
+def mode() -> SelfExcited:
+    """Return the mode, its amplitude that of the tip."""
     system, load = small_chain(), HarmonicLoad(np.zeros(20))
-    mode = stuck_modes(system, 1)[0]
-    sweep = ModeSweep(span=tuple(abs(mode.shape[19]) * np.array([1e-3, 12.0])), points=points)
-    found = nonlinear_mode(system, load, mode, 19, HOW, sweep)
-    each = [(np.log10(p.modal_amplitude), p.omega, p.ratio, p.amplitude) for p in found.solutions]
-    return np.array(each), found.end
+    return self_excited_motions(system, load, stuck_modes(system, 1)[0], 19, HOW)
+
+
+def ours(points: int) -> Backbone:
+    """Return the mode as it is followed."""
+    own = mode()
+    sweep = ModeSweep(span=tuple(abs(own.mode.shape[19]) * np.array([1e-3, 12.0])), points=points)
+    return nonlinear_mode(own.system, own.load, own.mode, 19, HOW, sweep)
+
+
+def plane(point: ModePoint) -> FloatArray:
+    """Return log10 of the modal amplitude, frequency and damping ratio."""
+    return np.array([np.log10(point.modal_amplitude), point.omega, point.ratio])
 
 
 def folds(log: FloatArray) -> FloatArray:
@@ -40,16 +65,79 @@ def folds(log: FloatArray) -> FloatArray:
     return np.asarray(log[1:-1][turned])
 
 
-def distances(rows: FloatArray, curve: FloatArray) -> FloatArray:
-    """Return how far each row is from a curve, in ranges of the rows."""
+def nearest(row: FloatArray, curve: FloatArray) -> tuple[int, float]:
+    """Return the segment of a curve that a row lies nearest to, and at which share of it."""
+    way = np.diff(curve, axis=0)
+    share = np.sum((row - curve[:-1]) * way, axis=1) / np.sum(way**2, axis=1)
+    share = np.clip(share, 0.0, 1.0)
+    away = np.linalg.norm(curve[:-1] + share[:, None] * way - row, axis=1)
+    segment = int(np.argmin(away))
+    return segment, float(share[segment])
+
+
+def distances(rows: FloatArray, found: Backbone) -> FloatArray:
+    """Return how far each row is from the motion of ours that is solved beside it, in ranges of the rows; infinite where none is found.
+
+    A chord of our curve tells where to begin and in which direction the row is looked at: the motion that is solved lies beside the row, across
+    that direction in the plane. The equations are those of the mode with one condition more, no row's amplitude being held, since at folds that decides nothing.
+    """
     size = np.ptp(rows, axis=0)
-    rows, curve = rows / size, curve / size
-    best = np.full(len(rows), np.inf)
-    for start, end in itertools.pairwise(curve):
-        way = end - start
-        share = np.clip(((rows - start) @ way) / (way @ way), 0.0, 1.0)
-        best = np.minimum(best, np.linalg.norm(rows - start - share[:, None] * way, axis=1))
-    return best
+    curve = np.array([plane(p) for p in found.solutions]) / size
+    beside = Beside.of(found)
+    return np.array([beside.distance(row, curve, size) for row in rows])
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """Solves motions beside points of the plane."""
+
+    curve: ModeCurve
+    known: tuple[tuple[FloatArray, float], ...]  # unknowns and ln of the size of the points
+
+    @classmethod
+    def of(cls, found: Backbone) -> "Beside":
+        """Return what solves beside a mode that was followed."""
+        own, known = mode(), []
+        weight = by_energy(own)[0].weight
+        for point in found.solutions:
+            motion = point.coefficients[:, own.balance.linear.retained]
+            a = float(np.sqrt(np.vdot(motion[1:], motion[1:] @ weight.T).real))
+            y = own.unknowns(motion / a, point.omega, own.level(point.ratio, point.omega))
+            known.append((y, float(np.log(a))))
+        return cls(ModeCurve.of(own, (1.0, np.e), 1), tuple(known))
+
+    def distance(self, row: FloatArray, curve: FloatArray, size: FloatArray) -> float:
+        """Return how far our motion beside a row is from it."""
+        at, share = nearest(row / size, curve)
+        way = curve[at + 1] - curve[at]
+        way /= np.linalg.norm(way)
+        (one, p), (other, q) = self.known[at : at + 2]
+        v = np.append(one, p) + share * (np.append(other, q) - np.append(one, p))
+        row_of = np.zeros(v.size)
+        own = self.curve.problems[0]
+        # of ln ω, the level and ln a, which change frequency, damping ratio and amplitude
+        omega, ratio = own.omega(v[:-1]), own.ratio(v[:-1])
+        row_of[-3] = way[1] * omega / size[1] - way[2] * ratio / size[2]
+        row_of[-2] = way[2] * own.level(1.0, omega) ** -1 / size[2]
+        row_of[-1] = way[0] / size[0] / np.log(10.0)
+        value = float(row_of @ v)
+        for _ in range(CORRECTIONS):
+            solved = newton(partial(across, self.curve.problem(0), row=row_of, value=value), v, HOW.newton)  # fmt: skip
+            if not solved.status.converged:
+                return np.inf
+            v = solved.x
+            off = row / size - self.in_plane(v) / size
+            along = float(off @ way)
+            if abs(along) < CLOSE:
+                return float(np.linalg.norm(off))
+            value = float(row_of @ v) + along
+        return np.inf
+
+    def in_plane(self, v: FloatArray) -> FloatArray:
+        """Return what unknowns and ln of the size are in the plane."""
+        solution = Solution(v[:-1], Status.CONVERGED, 0, 0.0, 0.0, 0.0)
+        point = Point(v[:-1], float(v[-1]), np.zeros(v.size), 0.0, solution, 0.0)
+        return plane(mode_point(self.curve, Followed("found", 0, 0, point, Judged(), 0.0)))
 
 
 def run() -> list[Record]:
@@ -57,16 +145,18 @@ def run() -> list[Record]:
     if not has_complete():
         return [left_out(CASE, "the curve is not at hand", SOURCE)]
     rows = chain_mode()
-    fine, _ = ours(FINE)
-    away = distances(rows[:, [0, 2, 4]], fine[:, :3])
-    plain, _ = ours(PLAIN)
+    fine = ours(FINE)
+    away = distances(rows[:, [0, 2, 4]], fine)
     theirs = folds(rows[:, 0])
+    plain, close = (
+        folds(np.array([plane(p)[0] for p in f.solutions])) for f in (ours(PLAIN), fine)
+    )
     records = [
-        bound(CASE, f"largest distance of {len(rows)} rows", float(away.max()), CHORD, SOURCE),
+        bound(CASE, f"largest distance of {len(rows)} rows", float(away.max()), LARGEST, SOURCE),
         bound(CASE, "median distance", float(np.median(away)), 5e-5, SOURCE),
-        record(CASE, f"folds with {PLAIN} points asked for", len(folds(plain[:, 0])), len(theirs), 0.0, SOURCE),
+        record(CASE, f"folds with {PLAIN} points asked for", len(plain), len(theirs), 0.0, SOURCE),
     ]  # fmt: skip
     return records + [
         record(CASE, f"log10 a of fold {i + 1}", float(one), float(other), 2e-3, SOURCE)
-        for i, (one, other) in enumerate(zip(folds(fine[:, 0]), theirs, strict=True))
+        for i, (one, other) in enumerate(zip(close, theirs, strict=True))
     ]
