@@ -17,6 +17,7 @@ from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.vector_forces import known_by_vectors
 from stickslip.model.matrices import lumped
 from stickslip.report.page import plots
 from stickslip.response.at_rest import holding, opening
@@ -124,6 +125,34 @@ def test_slip_begins_where_the_motion_slips_and_not_where_a_slider_shakes_down()
     mode = stuck_modes(system, 1, holding(system, load.static))[0]
     problem = self_excited_motions(system, load, mode, 0, Discretisation(order=3))
     assert slip_amplitude(problem) == pytest.approx(0.2, rel=0.03)
+
+
+def test_residuals_without_condensed_matrices_are_those_with_them():
+    """Trials of a corrector are evaluated by products with vectors; damping by mass adds the same force either way."""
+    rng = np.random.default_rng(4)
+    chain = small_chain()
+    mode = stuck_modes(chain, 1)[0]
+    how = Discretisation(order=3)
+    static = HarmonicLoad(rng.standard_normal(20))
+    plain = self_excited_motions(chain, static, mode, 19, how).balance
+    linear, interior = plain.linear, plain.linear.interior.size
+    assert interior > 0
+    assert known_by_vectors(linear) is linear
+    x = rng.standard_normal(plain.size)
+    for rate in (0.0, -0.3):
+        balance = replace(plain, linear=linear.with_mass_damping(rate))
+        period = balance.forces(x, 7.0)
+        whole = balance.linearise(x, 7.0, period).residual
+        size = np.max(np.abs(whole))
+        np.testing.assert_allclose(
+            balance.residual(x, 7.0, period), whole, rtol=0, atol=1e-12 * size
+        )
+        # the force is no straight line in the rate: the interior is damped too
+        ends = [replace(plain, linear=linear.with_mass_damping(rate + d)).linear_residual(x, 7.0) for d in (-1e-4, 1e-4)]  # fmt: skip
+        slope = balance.by_mass_damping(x, 7.0, lambda h: chain.structure.of_harmonic(h).mass)
+        np.testing.assert_allclose(
+            slope, (ends[1] - ends[0]) / 2e-4, rtol=0, atol=1e-7 * np.max(np.abs(slope))
+        )
 
 
 def test_harmonics_are_raised_until_frequency_and_damping_stay():

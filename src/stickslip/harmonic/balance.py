@@ -26,6 +26,11 @@ from stickslip.harmonic.support import (
     real_rows,
     rows_of,
 )
+from stickslip.harmonic.vector_forces import (
+    known_by_vectors,
+    linear_force,
+    mass_damping_slope,
+)
 
 JacobianForm = Literal["auto", "dense", "structured"]
 CROSSOVER = 500  # unknowns above which products and a Krylov method cost less than an array and its LU factors
@@ -187,6 +192,15 @@ class HarmonicBalance:
             period.events if period.events is not None and period.events.whole else None,
         )
 
+    def residual(self, x: FloatArray, omega: float, period: ContactPeriod) -> FloatArray:
+        """Return the (size,) scaled residual from contacts whose `period` is known: without condensed matrices, if it can be."""
+        direct = known_by_vectors(self.linear)
+        if direct is None or self.large or self.structured:
+            return self.linearise(x, omega, period).residual
+        linear = real_rows(linear_force(direct, omega, self.coefficients(x)), self.harmonics)
+        self.rows.add_forces(period.coefficients, linear)
+        return linear.reshape(-1) / self.force_scale
+
     def linear_residual(self, x: FloatArray, omega: float) -> FloatArray:
         """Return the (size,) scaled residual without the contact forces."""
         q = x.reshape(self.n_rows, self.linear.n) * self.displacement_scale
@@ -204,8 +218,12 @@ class HarmonicBalance:
     ) -> FloatArray:
         """Return the (size,) derivative of the scaled residual by a rate, 1/s, of damping in proportion to the `mass` of each harmonic.
 
-        The motion is spread over all dofs, and the force of their mass is condensed as a load is.
+        Where no products with vectors give it, the motion is spread over all dofs, and the force of their mass is condensed as a load is.
         """
+        direct = known_by_vectors(self.linear)
+        if direct is not None:
+            known = mass_damping_slope(direct, omega, self.coefficients(x))
+            return real_rows(known, self.harmonics).reshape(-1) / self.force_scale
         spread = self.linear.recover_change(omega, self.coefficients(x))
         moving = (h for h in self.harmonics if h > 0)
         force = {h: -1j * h * omega * (mass(h) @ spread[h]) for h in moving}

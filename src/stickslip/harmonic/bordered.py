@@ -8,11 +8,13 @@ and a row for each condition. Inside the border the Jacobian stays what it was, 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from time import perf_counter
 from typing import Protocol
 
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.harmonic.aft import ContactPeriod
 from stickslip.harmonic.balance import HarmonicBalance, Linearisation
 from stickslip.harmonic.parameters import BalanceAt, ParameterLinearisation, difference
 from stickslip.operators import Bordered, Inverse, Jacobian
@@ -106,7 +108,24 @@ class State:
     @cached_property
     def at(self) -> Linearisation:
         """Residual and derivatives of the balance."""
-        return self.setting.balance.linearise(self.x, self.setting.omega)
+        return self.setting.balance.linearise(self.x, self.setting.omega, self._contacts[0])
+
+    @cached_property
+    def residual(self) -> FloatArray:
+        """(size,) residual of the balance; derivatives wait until they are asked for."""
+        return self.setting.balance.residual(self.x, self.setting.omega, self._contacts[0])
+
+    @property
+    def seconds_contact(self) -> float:
+        """Time that the contacts took."""
+        return self._contacts[1]
+
+    @cached_property
+    def _contacts(self) -> tuple[ContactPeriod, float]:
+        """Contacts over one period, and the time that they took."""
+        start = perf_counter()
+        period = self.setting.balance.forces(self.x, self.setting.omega)
+        return period, perf_counter() - start
 
     @cached_property
     def columns(self) -> FloatArray:
@@ -127,7 +146,7 @@ class State:
         balance, omega = self.setting.balance, self.setting.omega
         if self.setting.linear_alone:
             return balance.linear_residual(self.x, omega)
-        return self.at.residual
+        return self.residual
 
     @cached_property
     def inverse(self) -> Inverse | None:
@@ -191,24 +210,58 @@ class PeriodicProblem:
     def residual(self, y: FloatArray, p: float) -> FloatArray:
         """Return the (size + m,) residual."""
         state = self.state(y, p)
-        return np.append(state.at.residual, [c.value(state) for c in self.conditions])
+        return np.append(state.residual, [c.value(state) for c in self.conditions])
 
-    def linearise(self, y: FloatArray, p: float) -> ParameterLinearisation:
-        """Evaluate everything at the unknowns `y` (size + m,) and the parameter `p`; infinite out of bounds."""
+    def linearise(self, y: FloatArray, p: float) -> "ParameterLinearisation | Evaluated":
+        """Evaluate the equations at the unknowns `y` (size + m,) and the parameter `p`; infinite out of bounds."""
         state, n = self.state(y, p), y.size
         if not 0.0 <= state.setting.omega < np.inf:
             return ParameterLinearisation(np.full(n, np.inf), np.eye(n), 0.0, lambda: np.zeros(n))
         values = np.array([c.value(state) for c in self.conditions])
+        return Evaluated(state, values)
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluated:
+    """The equations at one state; their derivatives are computed when they are asked for, which for a trial that is not accepted they never are.
+
+    Parameters
+    ----------
+    state
+        Where.
+    values
+        (m,) of the conditions.
+    """
+
+    state: State
+    values: FloatArray
+
+    @cached_property
+    def residual(self) -> FloatArray:
+        """(size + m,) residual."""
+        return np.append(self.state.residual, self.values)
+
+    @property
+    def seconds_contact(self) -> float:
+        """Time spent in contact forces."""
+        return self.state.seconds_contact
+
+    @cached_property
+    def jac(self) -> Bordered:
+        """Derivative by all unknowns."""
+        state, values = self.state, self.values
+        n = state.y.size
         rows = np.zeros((values.size, n))
-        for row, condition, value in zip(rows, self.conditions, values, strict=True):
+        for row, condition, value in zip(rows, state.problem.conditions, values, strict=True):
             if np.isfinite(value):
                 row[:] = condition.gradient(state)
         size = n - values.size
-        jac = Bordered(state.at.jac, state.columns, rows[:, :size], rows[:, size:])
-        known = self.by_parameter
-        return ParameterLinearisation(
-            np.append(state.at.residual, values),
-            jac,
-            state.at.seconds_contact,
-            lambda: difference(lambda v: self.residual(y, v), p) if known is None else known(state),
-        )
+        return Bordered(state.at.jac, state.columns, rows[:, :size], rows[:, size:])
+
+    @cached_property
+    def jac_p(self) -> FloatArray:
+        """(size + m,) derivative by the parameter."""
+        state, known = self.state, self.state.problem.by_parameter
+        if known is not None:
+            return known(state)
+        return difference(lambda v: state.problem.residual(state.y, v), state.p)

@@ -103,7 +103,7 @@ class CondensedStiffness:
 
     def products(self, omega: float, harmonics: Harmonics) -> CondensedProduct:
         """Return the same by its products, at `omega` (rad/s) and for the `harmonics` of a support."""
-        return at_frequency(self.spectral, self._loads(harmonics[-1]), omega, harmonics)
+        return at_frequency(self.spectral, self.modal_loads(harmonics[-1]), omega, harmonics)
 
     def _summed(self, sums: "_Sums", omega: float, order: int) -> Condensed:
         """Condense by the spectral decomposition of the interior."""
@@ -121,7 +121,7 @@ class CondensedStiffness:
         """Condense by solving the interior at each harmonic."""
         h = np.arange(order + 1)
         s = (h * omega)[:, None, None]
-        f_n, f_l = self._loads(order)
+        f_n, f_l = self.modal_loads(order)
         d_nn, g_nn = _dynamic(self.nn, s, self.loss and self.loss[0])
         d_nl, g_nl = _dynamic(self.nl, s, self.loss and self.loss[1])
         d_ln, g_ln = (d_nl, g_nl) if self.ln is None else self._back(s)
@@ -161,7 +161,7 @@ class CondensedStiffness:
         q
             (H+1, n) coefficients of the retained coordinates.
         """
-        return self._spread(omega, q, self._loads(q.shape[0] - 1)[1])
+        return self._spread(omega, q, self.modal_loads(q.shape[0] - 1)[1])
 
     def recover_change(self, omega: float, dq: ComplexArray) -> ComplexArray:
         """Return the change of every dof (H+1, n_all) that a change `dq` of the retained coordinates causes."""
@@ -186,7 +186,7 @@ class CondensedStiffness:
 
     def strain_energy(self, omega: float, q: ComplexArray) -> FloatArray:
         """Return the (H+1,) strain energy of the whole structure in each harmonic, mean over the period, J."""
-        inner = self._inside(omega, q, self._loads(q.shape[0] - 1)[1])
+        inner = self._inside(omega, q, self.modal_loads(q.shape[0] - 1)[1])
         outer = np.sum(q.conj() * (q @ self.nn[0].T + 2.0 * inner @ self.nl[0].T), axis=1).real
         # the interior's modes have unit stiffness
         share = 0.25 + 0.25 * (np.arange(len(q)) == 0)
@@ -208,7 +208,8 @@ class CondensedStiffness:
         each = zip(1j * s[:, 0, 0], right[:, :, 0], strict=True)
         return np.array([states.solve(p, own) for p, own in each])
 
-    def _loads(self, order: int) -> tuple[ComplexArray, ComplexArray]:
+    def modal_loads(self, order: int) -> tuple[ComplexArray, ComplexArray]:
+        """Return the load on the retained coordinates (H+1, n) and on the modes of the interior (H+1, l), N."""
         f_n, f_l = self._modal_load
         return padded(f_n, order), padded(f_l, order)
 

@@ -24,6 +24,7 @@ from stickslip.errors import input_error
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.bordered import (
     Condition,
+    Evaluated,
     Invert,
     PeriodicProblem,
     State,
@@ -294,7 +295,7 @@ class PeakProblem:
         """Return the frequency of the unknowns `y`, rad/s."""
         return self.omega_scale * float(np.exp(y[-1]))
 
-    def linearise(self, y: FloatArray, p: float) -> ParameterLinearisation:
+    def linearise(self, y: FloatArray, p: float) -> ParameterLinearisation | Evaluated:
         """Evaluate the bordered problem at the unknowns `y` (size + 1,) and the design parameter `p`."""
         return self.bordered.linearise(y, p)
 

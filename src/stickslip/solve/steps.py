@@ -1,6 +1,7 @@
 """One step along a branch: predict, correct, and find the way round corners."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from stickslip.solve.branch import (
     Following,
     Latest,
     Measure,
+    ParameterEvaluation,
     Point,
     Problem,
     StepControl,
@@ -38,16 +40,25 @@ LEAVES_BY = (4.0, 16.0, 1.0, 64.0)  # smallest steps taken along the far side
 class _Across:
     """The equation with one more condition below it: ``row @ (x, p) = value``."""
 
+    at: ParameterEvaluation
+    row: FloatArray
     residual: FloatArray
-    jac: Bordered
-    seconds_contact: float
+
+    @cached_property
+    def jac(self) -> Bordered:
+        """Derivative by all unknowns; trials that are not accepted never ask for it."""
+        return Bordered(self.at.jac, self.at.jac_p, self.row[:-1], float(self.row[-1]))
+
+    @property
+    def seconds_contact(self) -> float:
+        """Time spent in contact forces."""
+        return self.at.seconds_contact
 
 
 def across(problem: Problem, y: FloatArray, row: FloatArray, value: float) -> _Across:
     """Evaluate the equation and the condition ``row @ y = value`` at `y` (n + 1,)."""
     at = problem.linearise(y[:-1], float(y[-1]))
-    jac = Bordered(at.jac, at.jac_p, row[:-1], float(row[-1]))
-    return _Across(np.append(at.residual, row @ y - value), jac, at.seconds_contact)
+    return _Across(at, row, np.append(at.residual, row @ y - value))
 
 
 def take_step(

@@ -14,7 +14,7 @@ from stickslip.response.follow import follow
 from stickslip.response.resonances.first import PeakSearch
 from stickslip.response.resonances.point import PeakPoint
 from stickslip.response.resonances.tracker import Tracker, trackers
-from stickslip.solve.branch import Following, Latest
+from stickslip.solve.branch import Following, Latest, ParameterEvaluation
 from stickslip.solve.continuation import Point
 from stickslip.solve.newton_method import Solution
 
@@ -97,7 +97,7 @@ class _Equation:
     span: tuple[float, float]
     evaluations: int = 0
 
-    def linearise(self, y: FloatArray, p: float) -> ParameterLinearisation:
+    def linearise(self, y: FloatArray, p: float) -> ParameterEvaluation:
         """Evaluate everything at (y, p); infinite where a corrector goes far beyond the span, or to a value there that the model refuses."""
         self.evaluations += EVALUATIONS[self.problem.by]
         lowest, highest = sorted(self.span)

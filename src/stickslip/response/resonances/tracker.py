@@ -7,10 +7,10 @@ import numpy as np
 import scipy.optimize
 
 from stickslip.arrays import FloatArray
-from stickslip.harmonic.parameters import ParameterLinearisation
 from stickslip.harmonic.peak import EVALUATIONS, PeakProblem
 from stickslip.response.resonances.first import PeakSearch, Start, first_peaks
 from stickslip.response.resonances.point import PeakPoint, peak_point
+from stickslip.solve.branch import ParameterEvaluation
 from stickslip.solve.newton_method import Newton, Solution, charged, newton
 from stickslip.solve.status import Status
 
@@ -113,7 +113,7 @@ class Tracker:
         """Solve from the predicted peak; another peak than the one that was followed is none."""
         guess = self._predicted(value)
 
-        def evaluate(v: FloatArray) -> ParameterLinearisation:
+        def evaluate(v: FloatArray) -> ParameterEvaluation:
             self.evaluations += EVALUATIONS[self.problem.by]
             return self.problem.linearise(v, value)
 
