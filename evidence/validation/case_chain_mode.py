@@ -35,7 +35,8 @@ SOURCE = "tmdsimpy, commit 17d5fc3"
 CASE = "chain of 20 masses, mode 1"
 HOW = Discretisation(order=5, samples=256, evaluator="intervals")
 FINE = 600  # points, from which motions beside the rows are solved
-CORRECTIONS = 8  # of what is solved, until it lies beside the row in the plane
+CORRECTIONS = 12  # of what is solved, until it is the nearest to the row
+AHEAD = 1e-6  # of the ranges, to a second motion that tells the direction of the curve
 CLOSE = 1e-8  # of the ranges, along the curve
 LARGEST = 1e-3  # distance, in ranges
 PLAIN = 30
@@ -76,10 +77,10 @@ def nearest(row: FloatArray, curve: FloatArray) -> tuple[int, float]:
 
 
 def distances(rows: FloatArray, found: Backbone) -> FloatArray:
-    """Return how far each row is from the motion of ours that is solved beside it, in ranges of the rows; infinite where none is found.
+    """Return how far each row is from the nearest motion of ours that is solved, in ranges of the rows; infinite where none is found.
 
-    A chord of our curve tells where to begin and in which direction the row is looked at: the motion that is solved lies beside the row, across
-    that direction in the plane. The equations are those of the mode with one condition more, no row's amplitude being held, since at folds that decides nothing.
+    A chord of our curve tells where to begin, and in which direction of the plane a motion is asked for; it is no part of the distance. The equations
+    are those of the mode with one condition more, no row's amplitude being held, since at folds that decides nothing.
     """
     size = np.ptp(rows, axis=0)
     curve = np.array([plane(p) for p in found.solutions]) / size
@@ -107,7 +108,7 @@ class Beside:
         return cls(ModeCurve.of(own, (1.0, np.e), 1), tuple(known))
 
     def distance(self, row: FloatArray, curve: FloatArray, size: FloatArray) -> float:
-        """Return how far our motion beside a row is from it."""
+        """Return how far our motion nearest to a row is from it; every one that is solved bounds that."""
         at, share = nearest(row / size, curve)
         way = curve[at + 1] - curve[at]
         way /= np.linalg.norm(way)
@@ -120,18 +121,23 @@ class Beside:
         row_of[-3] = way[1] * omega / size[1] - way[2] * ratio / size[2]
         row_of[-2] = way[2] * own.level(1.0, omega) ** -1 / size[2]
         row_of[-1] = way[0] / size[0] / np.log(10.0)
-        value = float(row_of @ v)
+        value, best = float(row_of @ v), np.inf
         for _ in range(CORRECTIONS):
-            solved = newton(partial(across, self.curve.problem(0), row=row_of, value=value), v, HOW.newton)  # fmt: skip
-            if not solved.status.converged:
-                return np.inf
-            v = solved.x
-            off = row / size - self.in_plane(v) / size
-            along = float(off @ way)
+            ends = []
+            for ahead in (0.0, AHEAD):
+                equation = partial(across, self.curve.problem(0), row=row_of, value=value + ahead)
+                solved = newton(equation, v, HOW.newton)
+                if not solved.status.converged:
+                    return best
+                v = solved.x
+                ends.append(self.in_plane(v) / size)
+            off, way = row / size - ends[0], ends[1] - ends[0]
+            best = min(best, float(np.linalg.norm(off)))
+            along = float(off @ way) / float(way @ way) * AHEAD
             if abs(along) < CLOSE:
-                return float(np.linalg.norm(off))
-            value = float(row_of @ v) + along
-        return np.inf
+                break
+            value += along
+        return best
 
     def in_plane(self, v: FloatArray) -> FloatArray:
         """Return what unknowns and ln of the size are in the plane."""
