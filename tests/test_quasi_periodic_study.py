@@ -11,6 +11,7 @@ from test_limit_cycle_study import SHROUDS, flow
 import stickslip as ss
 from stickslip.errors import InputError
 from stickslip.report.page import plots
+from stickslip.response.quasi_periodic import find
 from stickslip.response.self_excited.in_time import march_periods, wave_history
 from stickslip.response.time.sectors import all_sectors
 from stickslip.response.time.start import start_from_harmonics
@@ -86,7 +87,25 @@ def test_a_tone_that_nothing_drives_from_python() -> None:
     assert data["time_least"].values == pytest.approx(data["least"].values, rel=0.02)
     still = rubbing(-3.0).quasi_periodic(frequencies_hz=[21.5])["quasi_periodic"]
     assert still["kind"].values.item() == "no second tone"
+    assert still["unknown"].values.item() == ""
     assert still["largest"].values == pytest.approx(still["least"].values, rel=1e-6)
+
+
+def test_what_was_not_examined_is_doubtful(monkeypatch: pytest.MonkeyPatch) -> None:
+    second = ss.Load(on="pair.m2", newton=4.0, omega_ratio=1.3)
+    model = rubbing(-3.0)
+    both = replace(model, loads={**model.loads, "own": second})
+    unlooked = both.quasi_periodic(frequencies_hz=[21.5], in_time=False)
+    assert any("stability was not examined" in str(v) for v in unlooked.verdicts)
+    assert {v.level for v in unlooked.verdicts} == {"doubtful"}
+
+    def fails(*_: object) -> None:
+        raise FloatingPointError("no multipliers today")
+
+    monkeypatch.setattr(find, "stability", fails)
+    unknown = model.quasi_periodic(frequencies_hz=[21.5])
+    assert any("no multipliers today" in str(v) for v in unknown.verdicts)
+    assert {v.level for v in unknown.verdicts} == {"doubtful"}
 
 
 WAKE = """

@@ -1,5 +1,6 @@
 """[residual_tractions] of a study: four masses with a stop that the last one touches, its page, resuming, Python."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -103,6 +104,13 @@ def test_what_would_take_too_long_is_refused(tmp_path: Path) -> None:
         RESIDUAL_TRACTIONS.inputs(case, case.build())
     told = RESIDUAL_TRACTIONS.check(*_fine(tmp_path / "fine"))
     assert told[0].startswith("residual_tractions: 2 tangential springs")
+
+
+def test_a_load_of_zero_is_refused_by_its_field(tmp_path: Path) -> None:
+    case, model = _fine(tmp_path / "fine")
+    still = replace(model, loads={n: replace(load, newton=0.0) for n, load in model.loads.items()})
+    with pytest.raises(InputError, match=r"load\.\w+\.force_n"):
+        RESIDUAL_TRACTIONS.check(case, still)
 
 
 def _fine(folder: Path) -> tuple[Case, Model]:

@@ -20,7 +20,8 @@ Indices = tuple[tuple[int, int], ...]  # (0, 0) first, then one of each pair (j,
 TURNS_A_HARMONIC, LEAST_TURNS = 4, 24
 SAMPLES_A_HARMONIC, LEAST_SAMPLES = 8, 48  # a turn of the faster phase
 SLIP = 2e-3  # rad a turn by which the second phase may be off: ten times as much changes forces by some thousandths
-MOST_TURNS = 250
+EXACT = 1e-6  # rad a turn: a ratio that is so near to one of whole numbers is one
+LONG = 4  # times the usual number of turns, in a path through all of a slow beat
 
 
 @dataclass(frozen=True)
@@ -95,8 +96,26 @@ def closed_path(ratio: float, order: int, refine: float = 1.0) -> TorusPath:
     off = [2.0 * np.pi * abs(ratio - q / p) for p, q in choices]
     near = [i for i, slip in enumerate(off) if slip <= SLIP]
     p, q = choices[near[0] if near else int(np.argmin(off))]
+    if p < least and 2.0 * np.pi * abs(ratio - q / p) > EXACT:
+        p, q = _through_beat(ratio, least)
     a_turn = ceil(refine * max(SAMPLES_A_HARMONIC * order, LEAST_SAMPLES) * max(1.0, ratio))
     return TorusPath((p, q), ceil(least / p), p * a_turn)
+
+
+def _through_beat(ratio: float, least: int) -> tuple[int, int]:
+    """Return the turns of one characteristic for a ratio near one of small numbers, the nearest of those with enough turns.
+
+    Characteristics beside each other would each have sliders of their own; those that stick in a part of the beat keep what they were left
+    with in another part.
+    """
+    turns = range(least, LONG * least)
+    choices = [
+        (p, q)
+        for p in turns
+        for q in {max(1, int(ratio * p)), int(ratio * p) + 1}
+        if gcd(p, q) == 1
+    ]
+    return min(choices, key=lambda c: abs(ratio - c[1] / c[0]))
 
 
 @lru_cache(maxsize=64)

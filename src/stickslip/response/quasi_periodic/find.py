@@ -118,8 +118,14 @@ def swept(problem: TwoTones, load: HarmonicLoad, omega: float) -> Iterator[Compl
                 yield forced.low.linear.recover(point.omega, point.coefficients)[:, retained]
 
 
-def growing_tones(problem: TwoTones, load: HarmonicLoad, omega: float) -> list[float]:
-    """Return the frequencies (rad/s) that the multipliers of the forced motion of a single structure say; none where these are not known."""
+def growing_tones(problem: TwoTones, load: HarmonicLoad, omega: float) -> tuple[list[float], str]:
+    """Return the frequencies (rad/s) that the multipliers of the forced motion of a single structure say.
+
+    Returns
+    -------
+    list[float], str
+        The frequencies, and why the multipliers do not show that all disturbances die; empty where they do.
+    """
     sweep = Sweep(
         omega_range=((1.0 - NARROW) * omega, (1.0 + NARROW) * omega), at=(omega,), low=ORDER, high=ORDER,
         selection="always_low", peak_points=0,
@@ -129,8 +135,10 @@ def growing_tones(problem: TwoTones, load: HarmonicLoad, omega: float) -> list[f
         points = accepted_points(list(forced_response(problem.system, load, sweep)))
         known = [p for p in points if p.converged]
         if not known:
-            return []
-        multipliers = stability(forced, known[0]).floquet.multipliers
-    except (StickslipError, FloatingPointError, np.linalg.LinAlgError):
-        return []
-    return tones_of_multipliers(multipliers[np.isfinite(multipliers)], omega, HIGHEST)
+            return [], f"no multipliers: the forced motion was not found with {ORDER} harmonics"
+        found = stability(forced, known[0])
+    except (StickslipError, FloatingPointError, np.linalg.LinAlgError) as error:
+        return [], f"no multipliers ({str(error).removesuffix('.')})"
+    multipliers = found.floquet.multipliers
+    doubt = "" if found.verdict == "stable" else f"{found.verdict}: {found.reason}"
+    return tones_of_multipliers(multipliers[np.isfinite(multipliers)], omega, HIGHEST), doubt

@@ -132,7 +132,7 @@ def question_of(case: Case, model: Model) -> Question:
     Raises
     ------
     InputError
-        If a contact has no springs that start somewhere, a load drives more harmonics than are kept, or none, or the estimated cost
+        If a contact has no springs that start somewhere, a load drives more harmonics than are kept, or none, or a force of zero, or the estimated cost
         exceeds the study's limits.
     """
     asked: ResidualTractionsTable = case.settings.residual_tractions
@@ -152,6 +152,13 @@ def question_of(case: Case, model: Model) -> Question:
     if (refusal := above(case.settings.limits, what, cost.memory_gb, cost.seconds)) is not None:
         raise refusal
     assembled = peak_first(model.assembled(asked.harmonics, case.store))
+    if not any(np.any(force) for force in assembled.load.harmonics.values()):
+        name = next(iter(model.driven))
+        raise input_error(
+            f"load.{name}.force_n",
+            "is 0 N where it acts: residual_tractions needs a vibration",
+            "Give it a force that is not zero.",
+        )
     try:
         starts_of(assembled.system.interface)
     except InputError as error:

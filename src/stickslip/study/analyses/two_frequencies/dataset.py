@@ -20,6 +20,7 @@ ABOUT = {
     "second_hz": ("point", "Hz", "second frequency; NaN where there is none"),
     "kind": ("point", "1", "two loads, second tone, no second tone or not found"),
     "why": ("point", "1", "what that rests on"),
+    "unknown": ("point", "1", "where there is no second tone: why it is not known that nothing else grows; empty where it is"),
     "combined": ("point", "1", "combined frequencies that are kept"),
     "left_out": ("point", "1", "what those left out would move the contacts by, root mean square over that of the motion"),
     "slip": ("point", "rad", "by how much the second phase in the contacts is off after a turn of the first"),
@@ -36,7 +37,7 @@ ABOUT = {
     "time_off": ("point", "1", "difference of the motion in time from the balance, root mean square over that of the motion; of two loads"),
 }  # fmt: skip
 EACH = {
-    "kind": "kind", "why": "why", "left_out": "left_out", "slip": "slip", "newton_iterations": "iterations", "largest": "largest",
+    "kind": "kind", "why": "why", "unknown": "unknown", "left_out": "left_out", "slip": "slip", "newton_iterations": "iterations", "largest": "largest",
     "least": "least", "rms": "rms", "extreme": "extreme", "envelope": "envelope", "time_largest": "time_largest",
     "time_least": "time_least", "time_off": "time_off",
 }  # fmt: skip

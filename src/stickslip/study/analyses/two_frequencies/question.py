@@ -17,12 +17,15 @@ from stickslip.response.quasi_periodic.problem import TwoTones, two_tones
 from stickslip.response.self_excited.modes import StuckMode, stuck_modes
 from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.facts import facts_of
+from stickslip.study.analyses.forced.in_time import seconds_in_time
 from stickslip.study.analyses.forced.question import peak_first
 from stickslip.study.analyses.two_frequencies.table import QuasiPeriodicTable
 from stickslip.units import HZ, RPM
 
 NAME = "quasi_periodic"
 APART = 1000  # harmonics of the second loads of a single structure while they are assembled with the first
+MARCHED = 5.0  # times the steps that an estimate is for, in a comparison in time
+SOON = 30.0  # seconds that comparisons of a case may take which nobody asked for
 MODES = 12  # whose growth is looked at
 MOST_RATIO = 100.0  # of the second frequency to the first: contacts are sampled as finely as the faster one needs, over many turns of the slower
 
@@ -62,6 +65,14 @@ class Question:
     def driven(self) -> bool:
         """Whether the second frequency is that of a load."""
         return self.second_of != (None, None)
+
+    @property
+    def in_time(self) -> bool:
+        """Whether motions are compared with time integration: as asked, or where that is soon done."""
+        if self.asked.in_time is not None:
+            return self.asked.in_time
+        each = MARCHED * seconds_in_time(self.model.system)
+        return self.waves is None and len(self.asked.first_hz) * each < SOON
 
     def second_frequency(self, omega: float) -> float:
         """Return the frequency of the second loads beside a first one, rad/s."""

@@ -22,6 +22,8 @@ class TwoFrequencies:
         What it rests on, or why none was found.
     indices
         (K, 2) of the combined frequencies.
+    unknown
+        Where there is no second tone: why it is not known that nothing else grows; empty where it is.
     coefficients
         (K, outputs, 2) real and imaginary part, m.
     unknowns
@@ -44,6 +46,7 @@ class TwoFrequencies:
     second: float
     kind: str
     why: str
+    unknown: str
     indices: IntArray
     coefficients: FloatArray
     unknowns: FloatArray

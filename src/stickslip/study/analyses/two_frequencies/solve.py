@@ -47,10 +47,10 @@ def solve(
 def at_frequency(question: Question, omega: float, before: TwoFrequencies | None) -> TwoFrequencies:
     """Return the motion at a first frequency, rad/s; `before`: one at another, to begin from."""
     try:
-        problem, motion, kind, why = _found(question, omega, before)
+        problem, motion, kind, why, unknown = _found(question, omega, before)
         if motion is None or not motion.converged:
             return _nothing(question, omega, why)
-        in_time = compared(question, problem, motion, kind) if question.asked.in_time else None
+        in_time = _in_time(question, problem, motion, kind) if question.in_time else None
     except FAILED as error:
         return _nothing(question, omega, str(error))
     outputs = np.asarray(question.model.system.outputs)
@@ -59,17 +59,28 @@ def at_frequency(question: Question, omega: float, before: TwoFrequencies | None
     none = np.full(outputs.size, np.nan)
     largest, least, off = (none, none, np.nan) if in_time is None else in_time
     return TwoFrequencies(
-        motion.omegas[0], np.nan if alone else motion.omegas[1], kind, why, np.array(motion.indices, dtype=np.int64),
+        motion.omegas[0], np.nan if alone else motion.omegas[1], kind, why, unknown, np.array(motion.indices, dtype=np.int64),
         _parts(motion.coefficients[:, outputs]), _parts(problem.balance.coefficients(motion.x)),
         shown.largest, shown.least, shown.rms, _extreme(motion, outputs), shown.amplitude[:, 0],
         motion.left_out, motion.slip, motion.iterations, largest, least, off,
     )  # fmt: skip
 
 
+def _in_time(
+    question: Question, problem: TwoTones, motion: TorusMotion, kind: str
+) -> tuple[FloatArray, FloatArray, float] | None:
+    """Return what time integration comes to; None where it comes to nothing."""
+    try:
+        return compared(question, problem, motion, kind)
+    except FAILED as error:
+        LOG.warning(f"{NAME}: {hertz(motion.omegas[0])}: not integrated in time: {error}")
+        return None
+
+
 def _found(
     question: Question, omega: float, before: TwoFrequencies | None
-) -> tuple[TwoTones, TorusMotion | None, str, str]:
-    """Return the problem, its motion, what its second frequency is, and why."""
+) -> tuple[TwoTones, TorusMotion | None, str, str, str]:
+    """Return the problem, its motion, what its second frequency is, why, and what is not known where there is none."""
     problem = question.problem()
     if question.driven:
         omegas = omega, question.second_frequency(omega)
@@ -87,47 +98,50 @@ def _found(
             motion = driven(problem, None, None)
         if motion.converged:
             problem, motion = _enough(question, problem, motion, driven)
-        return problem, motion, kind, why
+        return problem, motion, kind, why, ""
     return _of_tone(question, problem, omega, before)
 
 
 def _of_tone(
     question: Question, problem: TwoTones, omega: float, before: TwoFrequencies | None
-) -> tuple[TwoTones, TorusMotion | None, str, str]:
+) -> tuple[TwoTones, TorusMotion | None, str, str, str]:
     kind = "second tone"
     if before is not None and before.kind == kind:
         near, x = _begun(problem, before)
         motion = solve_free(near, x, (omega, before.second))
         if motion.converged:
             enough = _enough(question, near, motion, _free(motion))
-            return *enough, kind, "followed from the frequency before"
-    guesses = _guesses(question, problem, omega)
+            return *enough, kind, "followed from the frequency before", ""
+    guesses, unknown = _guesses(question, problem, omega)
     starts = [] if question.waves is not None else swept(problem, question.first, omega)
     found = tone_beside(problem, omega, guesses, starts)
     if found.motion is not None:
         enough = _enough(question, problem, found.motion, _free(found.motion))
         why = f"it grows out of the forced motion near {hertz(found.near)} with a damping ratio of {100 * found.ratio:.3g} %"
-        return *enough, kind, why
+        return *enough, kind, why, ""
     if not found.forced.converged:
-        return problem, None, kind, "the forced motion was not found"
+        return problem, None, kind, "the forced motion was not found", ""
     alone = problem.with_indices(found.forced.indices)
     if np.isnan(found.ratio) and guesses:
-        return problem, None, kind, "no second tone converged near " + ", ".join(hertz(g) for g in guesses[:3])  # fmt: skip
+        return problem, None, kind, "no second tone converged near " + ", ".join(hertz(g) for g in guesses[:3]), ""  # fmt: skip
     if found.ratio < 0.0:
-        return problem, None, kind, f"a tone near {hertz(found.near)} grows, and friction holds it at no amplitude that was found"  # fmt: skip
+        return problem, None, kind, f"a tone near {hertz(found.near)} grows, and friction holds it at no amplitude that was found", ""  # fmt: skip
     why = "nothing was found that grows" if not guesses else f"a second tone near {hertz(found.near)} decays, damping ratio {100 * found.ratio:.3g} %"  # fmt: skip
-    return alone, replace(found.forced, left_out=np.nan), "no second tone", why
+    return alone, replace(found.forced, left_out=np.nan), "no second tone", why, unknown
 
 
-def _guesses(question: Question, problem: TwoTones, omega: float) -> list[float]:
-    """Return near which frequencies a second tone is looked for, rad/s."""
+def _guesses(question: Question, problem: TwoTones, omega: float) -> tuple[list[float], str]:
+    """Return near which frequencies a second tone is looked for, rad/s, and why more may grow; empty where that is known."""
     if question.asked.second_hz is not None:
-        return [HZ * question.asked.second_hz]
+        return [HZ * question.asked.second_hz], ""
     wave = None if question.waves is None else question.waves[1] % question.model.sectors
     found = [m.omega for k, m in question.growing() if wave is None or k == wave]
-    if question.waves is None and not too_long(question.model.system, forced=True):
-        found += growing_tones(problem, question.first, omega)
-    return found
+    if question.waves is not None:
+        return found, "of a tuned wheel multipliers are not looked at"
+    if why := too_long(question.model.system, forced=True):
+        return found, why
+    more, unknown = growing_tones(problem, question.first, omega)
+    return found + more, unknown
 
 
 def _enough(question: Question, problem, motion, solve_at):  # type: ignore[no-untyped-def]
@@ -164,7 +178,7 @@ def _nothing(question: Question, omega: float, why: str) -> TwoFrequencies:
     n = len(question.model.system.outputs)
     none = np.full(n, np.nan)
     return TwoFrequencies(
-        omega, np.nan, "not found", why, np.zeros((0, 2), dtype=np.int64), np.zeros((0, n, 2)), np.zeros((0, 0, 2)),
+        omega, np.nan, "not found", why, "", np.zeros((0, 2), dtype=np.int64), np.zeros((0, n, 2)), np.zeros((0, 0, 2)),
         none, none, none, none, np.full(PHASES, np.nan), np.nan, np.nan, 0, none, none, np.nan,
     )  # fmt: skip
 

@@ -48,9 +48,10 @@ class QuasiPeriodicTable(Section):
         1.0,
         description="root mean square of what is left out, in percent of the motion of the contacts, below which combined frequencies are enough",
     )
-    in_time: bool = Field(
-        False,
-        description="whether each motion is compared with time integration; for single structures",
+    in_time: bool | None = Field(
+        None,
+        description="whether each motion is compared with time integration, which also tells whether it is left; for single structures; left out: "
+        "where that is estimated to take less than half a minute",
     )
 
     @property

@@ -63,6 +63,8 @@ def _two_loads(
     """Integrate loads in a ratio of whole numbers near that of the motion, and compare with the balance at that ratio."""
     p, q = _turns(motion)
     base = motion.omegas[0] / p
+    if p == q:
+        return None  # they beat more slowly than is marched
     near = problem.solve((motion.omegas[0], q * base), motion.x)
     if not near.converged:
         return None

@@ -1,6 +1,6 @@
 """What is told of motions with two frequencies: verdicts, and what the terminal prints."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import xarray as xr
@@ -20,11 +20,7 @@ def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     if points and not found:
         worst = np.nanmax(np.append(case["left_out"].values, np.nan_to_num(0.0)))
         why = f"{points} motions, combined frequencies left out would move the contacts by at most {100 * worst:.2g} %"
-        how = "whether disturbances die was not examined: quasi_periodic.in_time marches from them"
-        if "time_largest" in case:
-            without = int(np.count_nonzero(~np.isfinite(case["time_largest"].values[:, 0])))
-            how = "compared with time integration" if not without else f"time integration came to nothing at {without} of them"  # fmt: skip
-        found.append(Verdict("trusted", label, None, f"{why}; {how}"))
+        found.append(Verdict("trusted", label, None, f"{why}; compared with time integration"))
     return found
 
 
@@ -37,8 +33,8 @@ def _of_point(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdi
         remedy = "Give quasi_periodic.second_hz, more harmonics, or nearer frequencies_hz."
         return [Verdict("wrong", label, hz, f"no motion was found: {why.removesuffix('.')}", remedy)]  # fmt: skip
     if kind == "no second tone":
-        return [Verdict("trusted", label, hz, f"there is no second tone: {why}")]
-    found = []
+        return [_without(label, hz, why, str(case["unknown"].values[i]))]
+    found = list(_unexamined(label, case, i))
     if number("left_out") > LARGE:
         left = f"combined frequencies left out would move the contacts by {100 * number('left_out'):.2g} %"
         found.append(Verdict("doubtful", label, hz, left, "Raise quasi_periodic.most_harmonics."))
@@ -57,6 +53,26 @@ def _of_point(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdi
             told = f"in time the amplitude goes from {1e3 * ends[1][1]:.4g} to {1e3 * ends[0][1]:.4g} mm, the balance has {1e3 * ends[1][0]:.4g} to {1e3 * size:.4g} mm"
             found.append(Verdict("doubtful", label, hz, told, "The motion may be left, or not be settled in time."))  # fmt: skip
     return found
+
+
+def _without(label: str, hz: float, why: str, unknown: str) -> Verdict:
+    if not unknown:
+        return Verdict("trusted", label, hz, f"there is no second tone: {why}")
+    told = f"no second tone was found: {why}; whether anything else grows is not known: {unknown.removesuffix('.')}"
+    remedy = "Give quasi_periodic.second_hz, or see forced_response --verify."
+    return Verdict("doubtful", label, hz, told, remedy)
+
+
+def _unexamined(label: str, case: Mapping[str, xr.Variable], i: int) -> Iterator[Verdict]:
+    """Yield a doubt where no time integration says whether the motion is left."""
+    hz, told = float(case["first_hz"].values[i]), "its stability was not examined"
+    if "time_largest" not in case:
+        remedy = "Set quasi_periodic.in_time = true, of a single structure."
+        yield Verdict("doubtful", label, hz, told, remedy)
+    elif not np.isfinite(case["time_largest"].values[i, 0]):
+        told += ": time integration came to nothing"
+        remedy = "Take frequencies whose ratio is nearer to one of small numbers, but not to 1."
+        yield Verdict("doubtful", label, hz, told, remedy)
 
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
