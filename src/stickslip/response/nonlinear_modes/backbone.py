@@ -274,11 +274,11 @@ def _end(points: Sequence[ModePoint], found: Followed, last: float, *, stops: bo
     slips = next((p.amplitude for p in solved if p.slipping == 1.0), None)
     if points[-1] is end and (found.p == last or (stops and end.slipping == 1.0)):
         if found.p != last:
-            return f"gross slip at {end.amplitude:.4g} m"
+            return f"gross slip at {1e3 * end.amplitude:.4g} mm"
         if slips is None and end.sticking == 0.0:
-            return f"amplitude reached, no contact sticks at {end.amplitude:.4g} m: those that do not slip stay open"
-        return f"amplitude reached{'' if slips is None else f', gross slip from {slips:.4g} m on'}"
-    told = f"{end.amplitude:.4g} m after {len(points)} points"
+            return f"amplitude reached, no contact sticks at {1e3 * end.amplitude:.4g} mm: those that do not slip stay open"
+        return f"amplitude reached{'' if slips is None else f', gross slip from {1e3 * slips:.4g} mm on'}"
+    told = f"{1e3 * end.amplitude:.4g} mm after {len(points)} points"
     if end.open_for > 0.0:
         opened = f"contacts open for up to {100 * end.open_for:.0f} % of the period"
         return f"lift-off ends it at {told}: {opened}"

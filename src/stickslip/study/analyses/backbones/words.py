@@ -1,6 +1,6 @@
 """What is told of nonlinear modes: verdicts, and what the terminal prints."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
@@ -10,13 +10,30 @@ from stickslip.study.analyses.cycles.words import branch_name
 from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.keep.netcdf import alike, one_case
 
+NONE = 1e-9  # damping ratio below which there is none
 LIFTS, AGAIN = "lift-off", "taken up again"  # in the words of `Backbone.end`
 
 
 def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     """Return what is to be thought of a case from its variables."""
-    branches = case["mode"].size if "mode" in case else 0
-    return [v for i in range(branches) for v in _of_branch(label, case, i)]
+    each = [_of_branch(label, case, i) for i in range(case["mode"].size if "mode" in case else 0)]
+    sound = [i for i, own in enumerate(each) if all(v.level == "trusted" for v in own)]
+    found = [v for own in each for v in own]
+    return [*found, Verdict("trusted", label, None, _followed(case, sound))] if sound else found
+
+
+def _followed(case: Mapping[str, xr.Variable], sound: Sequence[int]) -> str:
+    """Say of modes without doubts over which amplitudes they were followed, and the largest damping ratio of them."""
+    every = case["mode"].size
+    amplitude, ratios = case["amplitude"].values[sound], case["largest_damping_ratio"].values[sound]
+    most = sound[int(np.argmax(ratios))]
+    ratio, at = (float(case[f"largest_damping_{n}"].values[most]) for n in ("ratio", "amplitude"))
+    who = branch_name(case, most) if every == 1 else f"{len(sound)} of {every} modes"
+    damping = f"the largest damping ratio is {100 * ratio:.3g} %" if abs(ratio) > NONE else "without damping"  # fmt: skip
+    where = f" at {1e3 * at:.4g} mm" if abs(ratio) > NONE else ""
+    of = f", of {branch_name(case, most)}" if every > 1 and where else ""
+    low, high = 1e3 * float(np.nanmin(amplitude)), 1e3 * float(np.nanmax(amplitude))
+    return f"{who} followed from {low:.4g} to {high:.4g} mm: {damping}{where}{of}"
 
 
 def _of_branch(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdict]:
