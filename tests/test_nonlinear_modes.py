@@ -13,6 +13,8 @@ from evidence.models.lumped import griffin, small_chain
 from evidence.validation import case_nonlinear_modes
 from stickslip.contact.interface import Interface
 from stickslip.contact.laws.cubic_spring import CubicSpring
+from stickslip.contact.laws.iwan import Iwan
+from stickslip.contact.laws.iwan_populations import UniformBand
 from stickslip.contact.laws.jenkins import Jenkins
 from stickslip.contact.laws.unilateral_spring import UnilateralSpring
 from stickslip.errors import InputError
@@ -28,6 +30,7 @@ from stickslip.response.self_excited.modes import stuck_modes
 from stickslip.response.self_excited.problem import self_excited_motions
 from stickslip.response.system import System
 from stickslip.study.analyses.backbones.words import case_verdicts
+from stickslip.study.check import check_study
 from stickslip.study.keep.netcdf import one_case
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
@@ -191,6 +194,38 @@ def test_a_mode_ends_at_gross_slip_where_that_is_asked():
     found = followed(system, HarmonicLoad(load.static), Discretisation(order=3), ModeSweep(to_gross_slip=True))  # fmt: skip
     assert found.end.startswith("gross slip at 2")
     assert [p.slipping for p in found.points[-2:]] == [0.0, 1.0]
+
+
+def test_gross_slip_of_several_sliders_is_that_of_the_last_of_them():
+    """Twenty sliders that slip from 0.01 to 0.39 m on, beside one that never does."""
+    law = Iwan(k_t=0.5, limit=0.09, population=UniformBand(elastic_share=0.1))
+    sweep = ModeSweep(to_gross_slip=True)
+    found = followed(*one_mass(law, 0), Discretisation(order=3), sweep)
+    assert found.end.startswith("gross slip at ")
+    before, last = found.points[-2:]
+    assert [p.slipping for p in found.points[:1]] == [0.0]
+    assert before.slipping in np.arange(1, 20) / 20
+    assert before.sticking == pytest.approx(1.0 - before.slipping)
+    assert (last.slipping, last.sticking) == (1.0, 0.0)
+    travels = [0.5 * np.ptp(_history(p)) for p in (before, last)]
+    assert travels[0] < 0.39 < travels[1]
+
+
+def _history(point) -> np.ndarray:
+    time = np.linspace(0.0, 2.0 * np.pi, 2001)
+    order = np.arange(len(point.coefficients))
+    return np.real(np.exp(1j * np.outer(time, order)) @ point.coefficients[:, 0])
+
+
+def test_springs_that_do_not_slip_need_a_range_of_amplitudes(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no contact slips or opens"):
+        followed(*one_mass(CubicSpring(cubic_t=0.5), 0), Discretisation(order=3), ModeSweep())
+    old = STUDY[STUDY.index('law = "jenkins"') : STUDY.index("[load.shaker]")]
+    path = tmp_path / "study.toml"
+    text = STUDY.replace(old, 'law = "cubic_spring"\ncubic_tangential_n_per_m3 = 0.5\n')
+    path.write_text(text.replace("amplitude_mm = [100.0, 2000.0]\n", ""), encoding="utf-8")
+    with pytest.raises(InputError, match=r"nonlinear_mode\.amplitude_mm"):
+        check_study(read_study(path))
 
 
 def test_both_concepts_agree_as_the_square_of_the_damping():

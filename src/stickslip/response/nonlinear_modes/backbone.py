@@ -11,12 +11,14 @@ from typing import Literal
 import numpy as np
 
 from stickslip.arrays import ComplexArray
+from stickslip.contact.interface import Interface
+from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.branch import Followed, Route
 from stickslip.response.follow import LEAPS, follow
 from stickslip.response.nonlinear_modes.levels import ModeCurve
 from stickslip.response.parameter import Discretisation
-from stickslip.response.self_excited.contacts import Contacts, contacts_of
+from stickslip.response.self_excited.contacts import Contacts, contacts_of, leaving
 from stickslip.response.self_excited.curve import slip_amplitude
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.response.self_excited.problem import self_excited_motions
@@ -57,7 +59,7 @@ class ModePoint:
     status
         How the solver ended; a point that did not converge is no motion.
     slipping
-        Share of the contact points that slip or open at some time.
+        Share of the contact points that slip or open at some time; a contact of several sliders counts with the share of them that slip.
     open_for
         Largest share of the period for which a contact point is open.
     change
@@ -126,7 +128,7 @@ class ModeSweep:
     span
         First and last amplitude, m: of the coordinate as long as the motion has the shape of the linear mode, else of the motion of the
         same kinetic energy over the square of its frequency. None: from half of that at which slip begins to 300 times
-        that, or on to gross slip.
+        that, or on to gross slip; contacts of which none slips or opens need a span.
     points
         Least number of points.
     most_harmonics
@@ -135,7 +137,7 @@ class ModeSweep:
     tolerance
         Relative.
     to_gross_slip
-        Whether the curve ends where every contact that can slip has slipped or opened.
+        Whether the curve ends where every contact that can slip has slipped, of several sliders all of them, or opened.
     concept
         What motions it is made of: ``periodic`` ones that a level of damping keeps going (Krack 2015), or those that are ``decaying`` as
         they are, ``e^{λt}`` and its powers (Laxalde & Thouverez 2009).
@@ -147,6 +149,15 @@ class ModeSweep:
     tolerance: float = 1e-3
     to_gross_slip: bool = False
     concept: Concept = "periodic"
+
+    def require_span(self, interface: Interface, name: str = "ModeSweep.span") -> None:
+        """Raise `InputError` if the span, called `name`, is left out and no contact says where it begins and ends."""
+        if self.span is None and not np.any(leaving(interface)):
+            raise input_error(
+                name,
+                "is left out, and no contact slips or opens: nothing says where the amplitudes begin and end",
+                "Give the lowest and the highest amplitude.",
+            )
 
 
 def nonlinear_mode(
@@ -179,6 +190,7 @@ def nonlinear_mode(
     InputError
         If a contact is rigid, a harmonic load acts, the coordinate is none of the mode, or nothing slips and there is no span.
     """
+    (sweep or ModeSweep()).require_span(system.interface)
     problem = self_excited_motions(system, load, mode, dof, how or Discretisation())
     along, span = sweep or ModeSweep(), None if sweep is None else sweep.span
     if span is None:

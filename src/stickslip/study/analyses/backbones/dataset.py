@@ -27,7 +27,7 @@ ABOUT = {
     "accuracy": ("branch", "1", "relative change by more harmonics that was asked for"),
     "end": ("branch", "1", "how the mode ends"),
     "problem": ("branch", "1", "why there is none"),
-    "gross_slip_amplitude": ("branch", "m", "amplitude from which on all contacts slip or open at some time"),
+    "gross_slip_amplitude": ("branch", "m", "amplitude from which on all contacts, and all their sliders, slip or open at some time"),
     "largest_damping_ratio": ("branch", "1", "largest damping ratio"),
     "largest_damping_amplitude": ("branch", "m", "amplitude there"),
     "amplitude": ("branch point", "m", "amplitude of the output in the first harmonic"),
@@ -37,7 +37,7 @@ ABOUT = {
     "energy": ("branch point", "J", "twice the mean kinetic energy of all harmonics, of a wheel of one sector"),
     "harmonics": ("branch point", "1", "highest harmonic"),
     "status": ("branch point", "1", "how the solver ended: 0 is a solution"),
-    "slipping": ("branch point", "1", "share of the contact points that slip or open at some time"),
+    "slipping": ("branch point", "1", "share of the contact points that slip or open at some time; of a contact of several sliders the share that slips"),
     "open_for": ("branch point", "1", "largest share of the period for which a contact point is open"),
     "change": ("branch point", "1", "relative change of frequency or damping ratio that more harmonics are foretold to make; with the most harmonics that of fewer; NaN with one set alone"),
 }  # fmt: skip

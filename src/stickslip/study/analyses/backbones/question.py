@@ -99,7 +99,8 @@ def question_of(case: Case, model: Model) -> Question:
     Raises
     ------
     InputError
-        If a wave number is none of the wheel, a mode is none of a wave, a contact is rigid, or the model cannot be assembled.
+        If a wave number is none of the wheel, a mode is none of a wave, a contact is rigid, no contact slips or opens and there are no amplitudes, or the model
+        cannot be assembled.
     """
     asked: NonlinearModeTable = case.settings.nonlinear_mode
     refuse_waves(NAME, asked.wave_numbers, model)
@@ -123,6 +124,7 @@ def question_of(case: Case, model: Model) -> Question:
         case.settings.solver.evaluator,
         facts_of(model, model.speed / RPM),
     )
+    question.sweep.require_span(assembled.system.interface, f"{NAME}.amplitude_mm")
     modes = [mode for wave in question.waves for mode in _required(question, wave)]
     force = question.model.system.structure.feedback_of(1)
     if force is not None and force.influence.refuses and modes:

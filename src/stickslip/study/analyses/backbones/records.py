@@ -24,7 +24,7 @@ class ModeBranch:
     order, status
         (points,) highest harmonic, and how the solver ended.
     slipping, open_for, change
-        (points,) share of contact points that slip or open, largest share of the period for which one is open, and relative change that
+        (points,) share of contact points that slip or open (of several sliders the share that slips), largest share of the period for which one is open, and relative change that
         more harmonics are foretold to make.
     tolerance
         Relative change of frequency or damping ratio that was asked for.

@@ -30,7 +30,7 @@ class NonlinearModeTable(Section):
         min_length=2,
         max_length=2,
         description="the range [lowest, highest] of the amplitude of the peak output, as long as the motion has the shape of the linear mode; left "
-        "out: from where nothing slips to 300 times where slip begins, or on to gross slip",
+        "out: from where nothing slips to 300 times where slip begins, or on to gross slip; springs that neither slip nor open need it",
     )
     points: int = Field(30, ge=5, le=1000, description="least number of points, 5 to 1000")
     harmonics: int = Field(
@@ -48,7 +48,7 @@ class NonlinearModeTable(Section):
     )
     to_gross_slip: bool = Field(
         False,
-        description="whether a mode ends where every contact that can slip has slipped or opened",
+        description="whether a mode ends where every contact that can slip has slipped, of several sliders all of them, or opened",
     )
     concept: Concept = Field(
         "periodic",

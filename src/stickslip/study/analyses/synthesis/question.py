@@ -93,7 +93,8 @@ def question_of(case: Case, model: Model) -> Question:
     Raises
     ------
     InputError
-        If no load or one of a higher harmonic drives the model, a contact is rigid, there is no such mode, or the model cannot be assembled.
+        If no load or one of a higher harmonic drives the model, a contact is rigid, there is no such mode, no contact slips or opens and
+        there are no amplitudes, or the model cannot be assembled.
     """
     asked: ModalSynthesisTable = case.settings.modal_synthesis
     driven = {name: harmonic for name, harmonic in model.driven.items() if harmonic > 0}
@@ -116,6 +117,7 @@ def question_of(case: Case, model: Model) -> Question:
         )
     facts = facts_of(model, model.speed / RPM)
     question = Question(case.label, assembled, asked, case.settings.solver.evaluator, facts)
+    question.sweep.require_span(assembled.system.interface, f"{NAME}.amplitude_mm")
     mode = question.mode
     if mode is None:
         raise input_error(
