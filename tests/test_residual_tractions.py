@@ -7,7 +7,15 @@ import pytest
 
 from evidence.models.lumped import blades_and_damper, lumped, system
 from evidence.validation.case_b8_residual_traction import TABLE, y2
-from stickslip import CoupledCoulomb, Interface, Iwan, Jenkins, RigidCoulomb, UnilateralSpring
+from stickslip import (
+    CoupledCoulomb,
+    CubicSpring,
+    Interface,
+    Iwan,
+    Jenkins,
+    RigidCoulomb,
+    UnilateralSpring,
+)
 from stickslip.contact.element import element, element_step
 from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
@@ -19,6 +27,7 @@ from stickslip.response.residual_tractions import (
     traction_bounds,
 )
 from stickslip.response.residual_tractions.bounds import _at, _setup
+from stickslip.response.residual_tractions.branches import may_be_several
 from stickslip.response.residual_tractions.search import sliders_at
 from stickslip.response.system import System
 from stickslip.response.time.start import TransientStart
@@ -168,6 +177,39 @@ def test_other_laws(law, rows):
     for end in (bounds.least, bounds.most):
         assert np.nanmax(np.abs(end.multipliers)) <= 1.0 + 1e-9
         assert confirmed(made, load, omega, end, 0, how, TimeStepping(steps_per_period=256)).agrees
+
+
+def test_bounds_hold_the_motions_of_other_branches():
+    """One harmonic of a Duffing oscillator: its three amplitudes are the roots of a cubic in a²."""
+    m, c, k, cubic, force, omega = 1.0, 2.0, 1e4, 1e8, 2.0, 115.0
+    gap = np.zeros((6, 1))
+    gap[[0, 3]] = 1.0
+    laws = [CubicSpring(cubic_t=cubic), Jenkins(k_t=1e2, limit=1e-6)]  # slips all the time
+    made = system(lumped(m * np.eye(1), c * np.eye(1), k * np.eye(1)), laws, gap)
+    load = HarmonicLoad(np.zeros(1), {1: np.array([force + 0j])})
+    slope, off = 0.75 * cubic, k - m * omega**2
+    squares = np.roots([slope**2, 2 * slope * off, off**2 + (c * omega) ** 2, -(force**2)])
+    sizes = np.sort(np.sqrt(squares[np.abs(squares.imag) < 1e-12].real))
+    assert len(sizes) == 3
+    how = Discretisation(order=1)
+    (bounds,) = traction_bounds(made, load, [omega], 0, how, TractionSearch(starts=0))
+    assert bounds.branches == 3
+    assert [bounds.least.amplitude, bounds.most.amplitude] == pytest.approx(sizes[[0, 2]], rel=1e-4)
+    # the branch ends where the force does the work of the dashpot alone: a = F / (c ω) on the backbone
+    omegas = np.linspace(116.0, 126.0, 6)
+    known = list(traction_bounds(made, load, list(omegas), 0, how, TractionSearch(starts=0)))
+    top = resonance_bounds(made, load, known, "most", 0, how, TractionSearch(starts=0))
+    end = np.sqrt((k + np.sqrt(k**2 + 4 * m * slope * (force / c) ** 2)) / (2 * m))
+    assert [b.branches for b in known] == [3 if b.omega < end else 1 for b in known]
+    assert top.most.amplitude == pytest.approx(force / (c * end), rel=2e-4)
+
+
+def test_friction_under_a_constant_normal_load_is_not_swept():
+    alone = [Jenkins(k_t=1e4, limit=6.0), Iwan(k_t=1e4, limit=6.0), CoupledCoulomb(k_t=1e4, k_n=0.0, mu=0.5, preload=12.0)]  # fmt: skip
+    others = [UnilateralSpring(k_n=5e4, preload=2.0), CoupledCoulomb(k_t=1e4, k_n=1e4, mu=0.5, preload=12.0)]  # fmt: skip
+    for law in (*alone, *others):
+        interface = Interface(("one",), (law,), np.eye(3))
+        assert may_be_several(interface) == (law in others)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -97,6 +97,47 @@ def test_an_interrupted_search_goes_on_and_python_gives_the_same(tmp_path: Path)
     assert found == pytest.approx(own["most_amplitude"].values[at], rel=1e-9)
 
 
+BENT = """
+schema_version = 2
+title = "A mass that stiffens, and a brake"
+[part.mass]
+shape = "lumped"
+masses_kg = [1.0]
+springs_n_per_m = [["ground", 1, 1e4]]
+dashpots_n_s_per_m = [["ground", 1, 2.0]]
+[contact]
+stop = { between = ["mass.m1", "ground"], law = "cubic_spring", cubic_tangential_n_per_m3 = 1e8 }
+brake = { between = ["mass.m1", "ground"], law = "jenkins", tangential_stiffness_n_per_m = 1e2, slip_limit_n = 1e-6 }
+[load.shaker]
+on = "mass.m1"
+force_n = 2.0
+[residual_tractions]
+frequency_hz = [17.0, 21.0]
+points = 5
+harmonics = 1
+starts = 0
+in_time = false
+[output]
+points = { tip = "mass.m1" }
+peak = "tip.x"
+"""
+
+
+def test_several_motions_from_one_start_are_doubtful(tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(BENT, encoding="utf-8")
+    outcome = run_study(read_study(path))
+    data = outcome.tree["residual_tractions"].to_dataset()
+    several = data["branches"].values[0] == 3
+    assert several.any()
+    assert not several.all()
+    wide = data["most_amplitude"].values[0] > 1.5 * data["least_amplitude"].values[0]
+    assert np.array_equal(wide, several)
+    (told,) = [v for v in outcome.verdicts if "has several motions, up to 3" in v.why]
+    assert told.level == "doubtful"
+    assert "[all_motions]" in told.remedy
+
+
 def test_what_would_take_too_long_is_refused(tmp_path: Path) -> None:
     path = written(tmp_path, TABLE + "[limits]\nwork_s = 0.1\n")
     case = read_study(path).cases()[0]

@@ -58,6 +58,8 @@ def _caption(view: Tractions) -> str:
         f"Amplitude of {escape(view.text('output'))}, H = {int(view.scalar('harmonics', 0))}: a contact that sticks keeps a traction from before, "
         "and every one within the friction cone is a steady motion. "
     )
+    if view.has("branches") and np.nanmax(view.floats("branches")) > 1:
+        text += "Where the own start has several motions, the band holds all that sweeps up and down met. "
     if not np.isfinite(width).any() or np.nanmax(width) < 1e-6:
         return text + "Here both bounds are equal at all frequencies: the answer is unique."
     at = int(np.nanargmax(width))

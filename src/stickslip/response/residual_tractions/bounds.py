@@ -13,8 +13,10 @@ from stickslip.errors import SingularError, input_error
 from stickslip.harmonic.balance import HarmonicBalance, harmonic_balance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.peak import Driven, driven_by
+from stickslip.response.branch import Followed
 from stickslip.response.ladder import without_branch
 from stickslip.response.parameter import Discretisation
+from stickslip.response.residual_tractions.branches import both_ways, crossings, may_be_several
 from stickslip.response.residual_tractions.problem import TractionProblem, TractionState
 from stickslip.response.residual_tractions.search import Extremes, TractionSearch, extremes
 from stickslip.response.system import System
@@ -23,6 +25,7 @@ from stickslip.solve.newton_method import newton
 PEAK_WIDTH = 3e-5  # relative width of the bracket of a resonance
 PEAK_TRIALS = 9  # frequencies that are tried in it
 EQUAL = 1e-6  # relative difference of two bounds that are one
+APART = 1e-3  # relative difference of the amplitudes of two motions from one start that stand on different branches
 
 End = Literal["least", "most"]
 
@@ -70,6 +73,8 @@ class TractionBounds:
         Names of the contacts to which the rows of sliders belong.
     solves, failures
         Motions that were solved for, and starts from which none was found.
+    branches
+        Motions from the model's own start: more than one where sweeps up and down met others at this frequency. The bounds hold them all.
     """
 
     omega: float
@@ -79,6 +84,7 @@ class TractionBounds:
     springs: tuple[str, ...]
     solves: int
     failures: int
+    branches: int = 1
 
     @property
     def converged(self) -> bool:
@@ -96,6 +102,7 @@ class _Setup:
     system: System
     problem: TractionProblem
     given: HarmonicBalance
+    swept: Sequence[Sequence[Followed]] = ()
 
     def reference(self, omega: float, near: Sequence[FloatArray]) -> TractionState:
         """Solve from the model's own start."""
@@ -106,13 +113,26 @@ class _Setup:
             raise SingularError(
                 f"residual tractions: no motion at {omega:.6g} rad/s: {solution.status.advice}"
             )
+        return self._state(solution.x, omega)
+
+    def others(self, omega: float, reference: TractionState) -> list[TractionState]:
+        """Return the motions from the model's own start on other branches than the reference."""
+        found = [reference]
+        for x in crossings(self.swept, self.given, omega, self.problem.newton):
+            state = self._state(x, omega)
+            if all(abs(np.log(state.amplitude / one.amplitude)) > APART for one in found):
+                found.append(state)
+        return found[1:]
+
+    def _state(self, x: FloatArray, omega: float) -> TractionState:
+        """Return a motion from the model's own start."""
         self.problem.spent.solves += 1
         starts = self.problem.starts
-        given = TractionState(self.problem, omega, _own_sliders(starts), solution.x)
+        given = TractionState(self.problem, omega, _own_sliders(starts), x)
         if all(getattr(law, "residual_traction", None) is None for law in starts.given.laws):
             return given
         # a share of the limit says where sliders rest only once the motion is known
-        period = self.given.contacts(solution.x, omega)
+        period = self.given.contacts(x, omega)
         force = period.force[:, :2, 0] / starts.interface.factors[:, None]
         rests = period.gap[:, :2, 0] - force / np.maximum(starts.stiffness, 1e-300)
         sliders = np.where(starts.stiffness > 0.0, rests, 0.0)
@@ -133,6 +153,9 @@ def traction_bounds(
     near: TractionBounds | None = None,
 ) -> Iterator[TractionBounds]:
     """Find the smallest and the largest amplitude of an output over all residual tractions of contacts that stick.
+
+    Where a law is more than friction under a constant normal load, the response may be multi-valued: a sweep up and one down through a wider range
+    look for other branches, and the bounds are those over all motions that these meet. Detached branches they do not meet.
 
     Parameters
     ----------
@@ -162,6 +185,8 @@ def traction_bounds(
         If a contact is rigid or a law does not say where its springs start, or a frequency or the output is none.
     """
     setup = _setup(system, load, omegas, output, discretisation)
+    if may_be_several(system.interface):
+        setup = _swept(setup, omegas)
     how = search or TractionSearch()
     last = _again(setup, near) if near is not None and near.converged else None
     for omega in omegas:
@@ -183,6 +208,8 @@ def resonance_bounds(
     search: TractionSearch | None = None,
 ) -> TractionBounds:
     """Find the highest point of a bound between frequencies at which it is known: the bound of the resonance amplitude.
+
+    Where several motions were met, the highest point of either curve is that over all of them.
 
     Whatever tractions there are at each frequency, and whether or not they change from one to the next, the resonance is at least as
     high as the highest point of the smallest amplitudes and at most as high as that of the largest ones.
@@ -214,6 +241,8 @@ def resonance_bounds(
     if top in (0, len(known) - 1):
         return known[top]
     setup = _setup(system, load, [b.omega for b in known], output, discretisation)
+    if any(b.branches > 1 for b in known):
+        setup = _swept(setup, [b.omega for b in known])
     how = search or TractionSearch()
     beside = [_again(setup, known[k]) for k in (top, top - 1, top + 1)]
     found: dict[float, Extremes] = {}
@@ -227,6 +256,8 @@ def resonance_bounds(
         depth, bounds=limits, method="bounded",
         options={"xatol": PEAK_WIDTH * known[top].omega, "maxiter": PEAK_TRIALS},
     )  # fmt: skip
+    for omega in _highest(setup, *limits):  # a bound that ends at a fold has a jump there
+        depth(omega)
     best = max(found.values(), key=lambda e: float(getattr(e, end).amplitude))
     if getattr(best, end).amplitude <= heights[top]:
         return known[top]
@@ -267,7 +298,25 @@ def _at(
     near = [b for b in beside if b is not None]
     reference = setup.reference(omega, [b.reference.x for b in near])
     more = [s.inside() for b in near for s in (b.least, b.most)]
-    return extremes(reference, search, more)
+    others = setup.others(omega, reference)
+    found = [extremes(one, search, more) for one in (reference, *others)]
+    least = min((e.least for e in found), key=lambda s: s.amplitude)
+    most = max((e.most for e in found), key=lambda s: s.amplitude)
+    return Extremes(reference, least, most, 1 + len(others))
+
+
+def _highest(setup: _Setup, low: float, high: float) -> list[float]:
+    """Return the frequency between two others at which the swept branches are highest; none where nothing was swept."""
+    balance, driven = setup.given, setup.problem.driven
+    inside = [f for way in setup.swept for f in way if f.converged and low < f.p < high]
+    inside.sort(key=lambda f: float(np.linalg.norm(driven.motion(balance, f.point.x))))
+    return [f.p for f in inside[-1:]]
+
+
+def _swept(setup: _Setup, omegas: Sequence[float]) -> _Setup:
+    """Return a setup that knows the branches around some frequencies."""
+    swept = both_ways(setup.system, setup.given, omegas, setup.problem.newton)
+    return replace(setup, swept=swept)
 
 
 def _again(setup: _Setup, bounds: TractionBounds) -> Extremes:
@@ -286,7 +335,9 @@ def _bounds(setup: _Setup, found: Extremes) -> TractionBounds:
     spent, names = setup.problem.spent, setup.problem.starts.interface.names
     reference, least, most = map(_bound, (found.reference, found.least, found.most))
     omega = found.reference.omega
-    made = TractionBounds(omega, reference, least, most, names, spent.solves, spent.failures)
+    made = TractionBounds(
+        omega, reference, least, most, names, spent.solves, spent.failures, found.branches
+    )
     spent.solves = spent.failures = 0
     return made
 

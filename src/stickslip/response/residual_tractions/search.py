@@ -46,11 +46,12 @@ class TractionSearch:
 
 @dataclass(frozen=True, eq=False)
 class Extremes:
-    """The motions with the smallest and the largest amplitude that were found."""
+    """The motions with the smallest and the largest amplitude that were found, and on how many branches."""
 
     reference: TractionState
     least: TractionState
     most: TractionState
+    branches: int = 1
 
 
 def extremes(
@@ -83,8 +84,8 @@ def extremes(
     least, most = (_best(seen, sense) for sense in (-1.0, 1.0))
     low = min((_ascended(s, -1.0) for s in least), key=lambda s: s.amplitude, default=reference)
     high = max((_ascended(s, 1.0) for s in most), key=lambda s: s.amplitude, default=reference)
-    ends = (e if abs(np.log(e.amplitude / reference.amplitude)) > GAIN else reference for e in (low, high))  # fmt: skip
-    return Extremes(reference, *ends)
+    ends = [e if abs(np.log(e.amplitude / reference.amplitude)) > GAIN else reference for e in (low, high)]  # fmt: skip
+    return Extremes(reference, ends[0], ends[1])
 
 
 def _best(seen: Sequence[TractionState], sense: float) -> list[TractionState]:

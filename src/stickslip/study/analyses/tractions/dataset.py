@@ -27,6 +27,7 @@ ABOUT = {
     "stuck_springs": ("traction_point bound", "1", "tangential springs that stick all the time: own start, smallest, largest amplitude"),
     "solves": ("traction_point", "1", "motions that were solved for"),
     "failures": ("traction_point", "1", "starts from which no motion was found"),
+    "branches": ("traction_point", "1", "motions from the model's own start that sweeps up and down met; the bounds hold them all"),
     "resonance_hz": ("bound", "Hz", "where the curve of each bound is highest: own start, smallest, largest amplitude"),
     "resonance_amplitude": ("bound", "m", "its height there"),
     "resonance_inside": ("bound", "1", "1 where that is within the range, 0 at its ends"),
@@ -87,6 +88,7 @@ def _of_points(points: Sequence[TractionRecord]) -> dict[str, Any]:
         "stuck_springs": stuck,
         "solves": np.array([r.solves for r in points]),
         "failures": np.array([r.failures for r in points]),
+        "branches": np.array([r.branches for r in points]),
     }
 
 

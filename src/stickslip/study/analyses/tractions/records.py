@@ -33,6 +33,8 @@ class TractionRecord:
         JSON list of names.
     solves, failures
         Motions solved for, and starts from which none was found.
+    branches
+        As of `TractionBounds`.
     """
 
     stage: Stage
@@ -44,6 +46,7 @@ class TractionRecord:
     springs: str
     solves: int
     failures: int
+    branches: int = 1
 
 
 def to_record(bounds: TractionBounds, stage: Stage) -> TractionRecord:
@@ -55,7 +58,7 @@ def to_record(bounds: TractionBounds, stage: Stage) -> TractionRecord:
 
     return TractionRecord(
         stage, bounds.omega, every("amplitude"), np.array([one.coefficients for one in each]),
-        every("sliders"), every("multipliers"), json.dumps(bounds.springs), bounds.solves, bounds.failures,
+        every("sliders"), every("multipliers"), json.dumps(bounds.springs), bounds.solves, bounds.failures, bounds.branches,
     )  # fmt: skip
 
 
@@ -67,5 +70,5 @@ def of_record(record: TractionRecord) -> TractionBounds:
     )  # fmt: skip
     names = tuple(json.loads(record.springs))
     return TractionBounds(
-        record.omega, reference, least, most, names, record.solves, record.failures
+        record.omega, reference, least, most, names, record.solves, record.failures, record.branches
     )

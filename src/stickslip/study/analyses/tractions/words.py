@@ -23,6 +23,7 @@ def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     if not np.all(case["resonance_inside"].values):
         why = "a bound is highest at the end of residual_tractions.frequency_hz, which is no resonance"
         found.append(Verdict("doubtful", label, None, why, "Widen the range."))
+    found += _of_branches(label, case)
     failures = int(case["failures"].values.sum())
     if failures:
         count = int(case["solves"].values.sum())
@@ -53,6 +54,32 @@ def _of_width(
     return Verdict(
         "trusted", label, None, why, "Design with the largest.", warns=most > (1.0 + LARGE) * least
     )
+
+
+def _of_branches(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
+    """Doubt bounds at frequencies with several motions from one start."""
+    several = case["branches"].values > 1
+    if not several.any():
+        return []
+    hertz = case["frequency_hz"].values[several]
+    where = (
+        f"at {hertz[0]:.5g} Hz"
+        if hertz.size == 1
+        else f"at {hertz.size} frequencies from {hertz.min():.5g} to {hertz.max():.5g} Hz"
+    )
+    why = (
+        f"{where} the model's own start has several motions, up to {int(np.max(case['branches'].values))}: the bounds hold all that sweeps up and "
+        "down met, so that they are wide for another reason than residual tractions, and a detached motion may lie outside"
+    )
+    return [
+        Verdict(
+            "doubtful",
+            label,
+            float(hertz[0]),
+            why,
+            "Ask [all_motions] there which motions there are, and on which of them most starts end.",
+        )
+    ]
 
 
 def _widest(case: Mapping[str, xr.Variable]) -> str:
