@@ -100,8 +100,12 @@ def _counted(axis: Sequence[Segment]) -> int | None:
 
 
 def _rings(axis: Sequence[Segment]) -> bool:
-    """Return whether a mode rings in a harmonic that is solved; contacts that change a structure of none may lower one from above them all."""
-    return not axis[0].hill.tangents or any(own.size for segment in axis for own in segment.slow)
+    """Return whether a mode rings in a harmonic that is solved, and contacts lower none from above them all."""
+    hill = axis[0].hill
+    if not hill.tangents:
+        return True
+    rings = any(own.size for segment in axis for own in segment.slow)
+    return rings and not hill.side.lowers(hill.order)
 
 
 def _turns(segment: Segment) -> tuple[float, int]:
