@@ -13,7 +13,7 @@ from stickslip.model.matrices import lumped
 from stickslip.response.quasi_periodic.find import swept
 from stickslip.response.quasi_periodic.in_time import course, statistics
 from stickslip.response.quasi_periodic.motion import TorusMotion, change_of, envelope
-from stickslip.response.quasi_periodic.problem import TwoTones, two_tones, with_enough
+from stickslip.response.quasi_periodic.problem import TwoTones, off_by, two_tones, with_enough
 from stickslip.response.quasi_periodic.start import distinct, tones_of_multipliers
 from stickslip.response.quasi_periodic.tone import (
     beginnings,
@@ -136,6 +136,10 @@ def test_two_loads_are_what_a_march_by_hand_comes_to() -> None:
     late = times > 1.8
     few, more = (off(m.at_times(BOTH, times[late]), judge[late]) for m in (motion, better))
     assert more < 0.5 * few
+    # a Newton step with more combined frequencies tells how far off the few are
+    wider = tuple(i for i in half_plane(11) if i not in motion.indices)
+    told = off_by(problem, motion, closed_path(omegas[1] / omegas[0], 11, 0.5), wider)
+    assert 0.5 * few < told < 2.0 * few
     assert more < 0.01
 
 

@@ -34,7 +34,7 @@ class TorusMotion:
     unsettled
         Contacts whose state did not repeat on a characteristic.
     left_out
-        What the combined frequencies left out would move the contacts by, root mean square over that of the motion; NaN where nobody asked.
+        By how much a Newton step with those left out changes the motion, root mean square over that of the motion, of the coordinate that it changes most; NaN where nobody asked.
     """
 
     indices: Indices

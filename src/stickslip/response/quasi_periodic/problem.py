@@ -1,6 +1,6 @@
 """Motions with two given frequencies."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +9,12 @@ from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.linear import DynamicStiffness
-from stickslip.harmonic.torus import MOST_UNKNOWNS, TorusBalance, torus_balance
+from stickslip.harmonic.torus import (
+    MOST_UNKNOWNS,
+    TorusBalance,
+    TorusLinearisation,
+    torus_balance,
+)
 from stickslip.harmonic.torus_path import Indices, TorusPath, closed_path, half_plane
 from stickslip.harmonic.torus_side import TorusSide
 from stickslip.harmonic.travelling import condense_side
@@ -21,6 +26,10 @@ from stickslip.solve.newton_method import Newton, Solution, newton
 
 LEVELS = 8  # steps of the second load where Newton's method does not find the way at once
 MOST_RAISES = 6
+FAINT = (
+    0.01  # of the coordinate that moves most: the change of one that moves less counts against that
+)
+STEP_MORE = 40  # combined frequencies more in the Newton step that says how far off a motion is
 BEYOND = 4  # sums of harmonics above the largest, that are looked at but not taken
 SHARE = 0.5  # of the tolerance, below which together combined frequencies stay out
 
@@ -236,7 +245,7 @@ def with_enough(
     tolerance: float,
     solve: Callable[[TwoTones, FloatArray, TorusPath], TorusMotion],
 ) -> tuple[TwoTones, TorusMotion]:
-    """Add combined frequencies until what is left out would move the contacts by less than `tolerance` of their motion.
+    """Add combined frequencies until what is left out would change the motion by less than `tolerance`.
 
     Two lightly damped resonances are hit by some combined frequency of almost any order: those are taken which the contact forces move
     most, not all up to an order.
@@ -266,20 +275,69 @@ def with_enough(
         more = tuple(i for i in candidates if i not in own)
         moved = problem.balance.left_out(motion.x, motion.omegas, path, more)
         square = np.sum(np.abs(moved) ** 2, axis=1) / size
-        motion = replace(motion, left_out=float(np.sqrt(np.sum(square))))
+        plain = float(np.sqrt(np.sum(square)))
+        motion = replace(motion, left_out=plain)
         within = np.flatnonzero([abs(j) + abs(k) <= most for j, k in more])
-        if np.sum(square[within]) <= tolerance**2 or room(problem) < 1 or raised == MOST_RAISES:
-            break
         order = within[np.argsort(square[within], kind="stable")]
         rest = np.cumsum(square[order])
-        added = order[rest > (SHARE * tolerance) ** 2][::-1][: room(problem)]
+        stays = SHARE * tolerance
+        if rest[-1] <= tolerance**2 or room(problem) < 1 or raised == MOST_RAISES:
+            told = off_by(problem, motion, path, [more[i] for i in np.argsort(square)[::-1]])
+            motion = replace(motion, left_out=max(plain, told))
+            if motion.left_out <= tolerance or room(problem) < 1 or raised == MOST_RAISES:
+                break
+            stays *= plain / motion.left_out  # resonance makes more of it
+        added = order[rest > stays**2][::-1][: room(problem)]
+        if not added.size:
+            break
         wider = problem.with_indices((*problem.balance.indices, *(more[i] for i in sorted(added))))
         start = wider.balance.from_other(problem.balance, motion.x)
         found = solve(wider, start, wider.path(ratio))
         if not found.converged:
+            told = off_by(problem, motion, path, [more[i] for i in np.argsort(square)[::-1]])
+            motion = replace(motion, left_out=max(motion.left_out, told))
             break
         problem, motion = wider, found
     return problem, motion
+
+
+def off_by(
+    problem: TwoTones, motion: TorusMotion, path: TorusPath, more: Sequence[tuple[int, int]]
+) -> float:
+    """Return by how much a Newton step with more combined frequencies changes a motion: root mean square over that of the motion, of the coordinate that it changes most.
+
+    Parameters
+    ----------
+    problem, motion
+        What was found.
+    path
+        That samples the larger set finely enough.
+    more
+        Combined frequencies, those that matter most first; as many are taken as a step may have.
+    """
+    few = max(0, min(STEP_MORE, room(problem)))
+    wider = problem.balance.with_indices((*motion.indices, *more[:few]))
+    x = wider.from_other(problem.balance, motion.x)
+    at = wider.linearise(x, motion.omegas, path)
+    jac, right = at.jac, at.residual
+    if not any(np.any(force) for force in wider.side.second.load.harmonics.values()):
+        jac, right = _with_free_tone(wider, x, at)
+    step = np.linalg.solve(jac, right)[: x.size]
+    size = np.linalg.norm(wider.coefficients(x)[1:], axis=0)
+    change = np.linalg.norm(wider.coefficients(step)[1:], axis=0)
+    return float(np.max(change / np.maximum(size, FAINT * np.max(size))))
+
+
+def _with_free_tone(
+    balance: TorusBalance, x: FloatArray, at: TorusLinearisation
+) -> tuple[FloatArray, FloatArray]:
+    """Return a Jacobian and residual with the second frequency among the unknowns, and no step along the phase of the second tone."""
+    own = balance.coefficients(x)
+    along = balance.unknowns(np.array([1j * k * row for (_, k), row in zip(balance.indices, own, strict=True)]))  # fmt: skip
+    jac = np.zeros((x.size + 1, x.size + 1))
+    jac[:-1, :-1], jac[:-1, -1] = at.jac, at.by_second
+    jac[-1, :-1] = along
+    return jac, np.append(at.residual, 0.0)
 
 
 def room(problem: TwoTones) -> int:

@@ -22,7 +22,7 @@ ABOUT = {
     "why": ("point", "1", "what that rests on"),
     "unknown": ("point", "1", "where there is no second tone: why it is not known that nothing else grows; empty where it is"),
     "combined": ("point", "1", "combined frequencies that are kept"),
-    "left_out": ("point", "1", "what those left out would move the contacts by, root mean square over that of the motion"),
+    "left_out": ("point", "1", "what those left out would change the motion by, root mean square over it, of the coordinate that they change most"),
     "slip": ("point", "rad", "by how much the second phase in the contacts is off after a turn of the first"),
     "newton_iterations": ("point", "1", "Newton steps of the last solution"),
     "largest": ("point output", "m", "largest amplitude, half of peak to peak in a period of the first frequency"),

@@ -19,7 +19,7 @@ def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     found = [v for i in range(points) for v in _of_point(label, case, i)]
     if points and not found:
         worst = np.nanmax(np.append(case["left_out"].values, np.nan_to_num(0.0)))
-        why = f"{points} motions, combined frequencies left out would move the contacts by at most {100 * worst:.2g} %"
+        why = f"{points} motions, combined frequencies left out would change the motion by at most {100 * worst:.2g} %"
         found.append(Verdict("trusted", label, None, f"{why}; compared with time integration"))
     return found
 
@@ -36,7 +36,7 @@ def _of_point(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdi
         return [_without(label, hz, why, str(case["unknown"].values[i]))]
     found = list(_unexamined(label, case, i))
     if number("left_out") > LARGE:
-        left = f"combined frequencies left out would move the contacts by {100 * number('left_out'):.2g} %"
+        left = f"combined frequencies left out would change the motion by {100 * number('left_out'):.2g} %"
         found.append(Verdict("doubtful", label, hz, left, "Raise quasi_periodic.most_harmonics."))
     if number("slip") > SLIP:
         off = f"contacts were marched at a ratio by which the second phase is off by {number('slip'):.2g} rad a turn"
