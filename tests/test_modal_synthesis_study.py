@@ -111,3 +111,52 @@ def test_what_it_has_no_form_for_is_refused_before_anything_is_computed(tmp_path
     ):
         with pytest.raises(InputError, match=what):
             run_study(study_of(tmp_path, STUDY.replace(*change)))
+
+
+# softening, then hardening: a detached curve, in closed form in test_all_motions.py
+DETACHED = """
+schema_version = 2
+[part.mass]
+shape = "lumped"
+masses_kg = [1.0]
+springs_n_per_m = [["ground", 1, 1.0]]
+dashpots_n_s_per_m = [["ground", 1, 0.05]]
+[contact.spring]
+between = ["mass.m1", "ground"]
+law = "polynomial_spring"
+along_t = [0.0, 0.0, -2.0, 0.0, 1.0]
+[load.shaker]
+on = "mass.m1"
+force_n = 0.02
+[modal_synthesis]
+levels = [0.5, 1.0]
+harmonics = 1
+most_harmonics = 1
+amplitude_mm = [50.0, 3000.0]
+"""
+
+
+def test_the_peak_told_is_that_of_a_sweep_and_a_detached_curve_is_a_doubt(tmp_path):
+    outcome = run_study(study_of(tmp_path, DETACHED))
+    case = one_case(outcome.tree["modal_synthesis"].to_dataset(), 0)
+
+    def force(amplitude: float) -> float:  # at the peak, with one harmonic
+        stiffness = 1.0 - 1.5 * amplitude**2 + 0.625 * amplitude**4
+        return float(0.05 * amplitude * np.sqrt(stiffness - 0.05**2 / 4))
+
+    swept, detached = (case[n].values for n in ("peak_amplitude", "detached_peak_amplitude"))
+    assert [force(a) for a in swept] == pytest.approx([0.01, 0.02], rel=1e-3)
+    assert force(detached[1]) == pytest.approx(0.02, rel=1e-3)
+    assert detached[1] > 1.5 * swept[1]
+    assert np.isnan(detached[0])
+    assert list(case["answer"].values) == ["trusted", "doubtful"]
+    (told,) = (v for v in outcome.verdicts if v.rank)
+    assert f"meets has {1e3 * swept[1]:.4g} mm" in told.why
+    assert f"detached curve {1e3 * detached[1]:.4g} mm" in told.why
+    assert "a sweep does not reach" in told.why
+    assert told.remedy.startswith("[all_motions]")
+
+
+def test_a_level_beyond_all_numbers_is_refused_by_its_value(tmp_path):
+    with pytest.raises(InputError, match=r"modal_synthesis\.levels: holds 1e\+300"):
+        run_study(study_of(tmp_path, STUDY.replace("levels = [0.02, 0.5, 1.0, 2.0]", "levels = [1.0, 1e300]")))  # fmt: skip

@@ -6,7 +6,7 @@ places at which the least level needed crosses the level are the peaks, and seve
 curves: the first is that on which the machine comes up from small amplitudes, the others are detached.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -57,8 +57,15 @@ class Synthesised:
 
     @property
     def peaks(self) -> "tuple[Resonance, ...]":
-        """The resonances that are peaks."""
+        """The resonances that are peaks, one of each curve."""
         return tuple(r for r in self.resonances if r.top)
+
+    def alone(self, curve: int) -> "Synthesised":
+        """Return one of the curves."""
+        own = self.curve == curve
+        return replace(
+            self, place=self.place[own], omega=self.omega[own], amplitude=self.amplitude[own], phase=self.phase[own], curve=self.curve[own], stable=self.stable[own]
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)

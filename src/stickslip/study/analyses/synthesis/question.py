@@ -1,6 +1,6 @@
 """What a job solves: the model with its loads, and the mode that answers."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -24,6 +24,7 @@ from stickslip.study.analyses.synthesis.table import ModalSynthesisTable
 from stickslip.units import RPM
 
 NAME = "modal_synthesis"
+MOST_FORCE = 1e60  # N of a level: beyond, the polynomial of the response overflows
 FACTOR = 2  # times the highest harmonic: what direct solutions are held against
 
 
@@ -116,6 +117,7 @@ def question_of(case: Case, model: Model) -> Question:
             "Give the contacts a stiffness, such as elastic_coulomb.",
         )
     facts = facts_of(model, model.speed / RPM)
+    _bounded(asked.levels, assembled.load)
     question = Question(case.label, assembled, asked, case.settings.solver.evaluator, facts)
     question.sweep.require_span(assembled.system.interface, f"{NAME}.amplitude_mm")
     mode = question.mode
@@ -129,3 +131,15 @@ def question_of(case: Case, model: Model) -> Question:
     if force is not None and force.influence.refuses:
         force.influence.require(mode.omega, most * mode.omega, f"a nonlinear mode with up to {most} harmonics (most_harmonics)")  # fmt: skip
     return question
+
+
+def _bounded(levels: Sequence[float], load: HarmonicLoad) -> None:
+    """Refuse levels of forces that no number of the response can hold."""
+    force = max(float(np.max(np.abs(f), initial=0.0)) for f in load.harmonics.values())
+    for level in levels:
+        if not level * force <= MOST_FORCE:
+            raise input_error(
+                f"{NAME}.levels",
+                f"holds {level:g}, with which the loads are above {MOST_FORCE:g} N",
+                "Levels are factors on the harmonic loads: give some between 0.01 and 100.",
+            )

@@ -18,7 +18,9 @@ class SynthesisLevel:
     why
         What that rests on, in words.
     peak, peak_omega
-        Largest amplitude of the output in the first harmonic, m, and its frequency, rad/s; NaN where there is none to be shown.
+        Largest amplitude of the output in the first harmonic, m, on the curve that a sweep meets, and its frequency, rad/s; NaN where there is none to be shown.
+    detached_peak, detached_peak_omega
+        The same of the detached curves; NaN without any.
     foreign, output, gaps, distance, overlap, growth, harmonics
         See `Isolation`, at the peak.
     linear
@@ -46,6 +48,8 @@ class SynthesisLevel:
     why: str
     peak: float
     peak_omega: float
+    detached_peak: float
+    detached_peak_omega: float
     foreign: float
     output: float
     gaps: float

@@ -108,16 +108,22 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
     own, question = shared.oscillator, shared.question
     curve = synthesise(own, level)
     tops = curve.peaks
-    peaks = [peak_with_others(shared.others, curve, r, question.dof) for r in tops]
-    at = int(np.argmax([size for size, _ in peaks])) if peaks else -1
-    alone = isolation(shared.others, tops[at], question.dof) if peaks else NOBODY
-    resolved = _resolved(shared, tops[at]) if peaks else np.nan
+    # every curve has one peak, and the first curve is the one that a sweep meets
+    peaks = [peak_with_others(shared.others, curve.alone(i), r, question.dof) for i, r in enumerate(tops)]  # fmt: skip
+    alone = isolation(shared.others, tops[0], question.dof) if peaks else NOBODY
+    resolved = _resolved(shared, tops[0]) if peaks else np.nan
+    detached = max(peaks[1:], default=(np.nan, np.nan))
     answer, why = "beyond", "the nonlinear mode ends before it needs so much of the load"
     if not curve.place.size:
         why = "the nonlinear mode begins with more than the level reaches"
     if peaks and float(curve.place.max()) < own.ends[1]:
         answer, why = judged(alone, resolved)
     shown = answer in ("trusted", "doubtful")
+    if shown and not curve.resonances[0].top:
+        answer, why = "doubtful", f"the nonlinear mode begins with more than the level reaches, so that this is the peak of a detached curve, which a sweep does not reach; {why}"  # fmt: skip
+    elif shown and len(peaks) > 1:
+        swept = f"the highest peak that a sweep meets has {1e3 * peaks[0][0]:.4g} mm at {peaks[0][1] / HZ:.5g} Hz"
+        answer, why = "doubtful", f"{swept}, that of a detached curve {1e3 * detached[0]:.4g} mm at {detached[1] / HZ:.5g} Hz, which a sweep does not reach; {why}"  # fmt: skip
     inside = (curve.omega >= shared.ends[0]) & (curve.omega <= shared.ends[1]) & shown
     amplitude = np.abs(with_others(shared.others, curve, np.array([question.dof]))[:, 0])
     spent = process_time() - began
@@ -129,8 +135,10 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
         level=level,
         answer=answer,
         why=why,
-        peak=peaks[at][0] if shown else np.nan,
-        peak_omega=peaks[at][1] if shown else np.nan,
+        peak=peaks[0][0] if shown else np.nan,
+        peak_omega=peaks[0][1] if shown else np.nan,
+        detached_peak=detached[0] if shown else np.nan,
+        detached_peak_omega=detached[1] if shown else np.nan,
         foreign=alone.foreign,
         output=alone.output,
         gaps=alone.gaps,

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
+from stickslip.arrays import IntArray
 from stickslip.study.analyses.analysis import TextTable
 from stickslip.study.analyses.verdict import Level, Verdict
 from stickslip.study.keep.netcdf import alike, one_case
@@ -16,6 +17,7 @@ REMEDIES = {
     "refused": ASK,
     "beyond": "Widen modal_synthesis.amplitude_mm, or ask for [forced_response] there.",
 }
+APART = "[all_motions] searches for motions that a sweep does not reach."
 FAST = 0.05  # relative change in a radian beyond which a passage is doubtful
 WRONG = 0.02  # of the peak, against the direct solution
 
@@ -25,16 +27,23 @@ def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     if "level" not in case:
         return []
     answers = [str(a) for a in case["answer"].values]
-    found = [_of_answer(label, case, answer) for answer in REMEDIES if answer in answers]
+    apart = np.isfinite(case["detached_peak_amplitude"].values)
+    found = [
+        _of_answer(label, case, answer, own, remedy)
+        for answer, told in REMEDIES.items()
+        for remedy, among in ((told, ~apart), (APART, apart))
+        if (own := np.flatnonzero((np.array(answers) == answer) & among)).size
+    ]
     if not set(answers) & {"trusted", "doubtful"}:
         why = "nothing is left: at no level the nonlinear mode answers alone"
         found.append(Verdict("wrong", label, None, why, "Ask for [forced_response]."))
     return [*found, *_of_direct(label, case), *_of_passages(label, case)]
 
 
-def _of_answer(label: str, case: Mapping[str, xr.Variable], answer: str) -> Verdict:
-    """Return one verdict on all levels with the same answer: that of the worst of them."""
-    own = np.flatnonzero(case["answer"].values.astype(str) == answer)
+def _of_answer(
+    label: str, case: Mapping[str, xr.Variable], answer: str, own: IntArray, remedy: str
+) -> Verdict:
+    """Return one verdict on all levels with the same answer and remedy: that of the worst of them."""
     foreign = np.nan_to_num(case["foreign"].values[own], nan=0.0)
     worst = int(own[int(np.argmax(foreign))])
     levels = case["level"].values[own]
@@ -48,7 +57,7 @@ def _of_answer(label: str, case: Mapping[str, xr.Variable], answer: str) -> Verd
     level: Level = "trusted" if answer == "trusted" else "doubtful"
     at = "" if own.size == 1 else f"at {case['level'].values[worst]:g} "
     why = f"{what}: {at}{case['why'].values[worst]!s}"
-    return Verdict(level, label, None, why, REMEDIES[answer])
+    return Verdict(level, label, None, why, remedy)
 
 
 def _of_direct(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
