@@ -84,7 +84,11 @@ harmonics = 1
 def test_two_peaks_that_become_one_are_one_from_there_on(tmp_path: Path) -> None:
     for values, second in (("[8, 4, 2, 1]", [8.0, 4.0]), ("[1, 2, 4, 8]", [4.0, 8.0])):
         text = TWO_IN_ONE.replace("[8, 4, 2, 1]", values)
-        case = one_case(answered(text, tmp_path / values[1]).tree["resonance"].to_dataset(), 0)
+        outcome = answered(text, tmp_path / values[1])
+        case = one_case(outcome.tree["resonance"].to_dataset(), 0)
+        (note,) = (v for v in outcome.verdicts if "has become one with another peak" in v.why)
+        assert note.word == "note"
+        assert "ends after 4: at 2 it" in note.why
         first, other = (v[np.isfinite(v)].tolist() for v in case["value"].values)
         assert sorted(first) == [1.0, 2.0, 4.0, 8.0]
         assert other == second
@@ -168,6 +172,9 @@ by = "phase_quadrature"
         (("damper.slip_limit_n\"", "damper.slip_limt_n\""), "parameter: contact.damper.slip_limt_n = 0.2 is refused: there is no key 'slip_limt_n'. Did you mean"),
         (('"contact.damper.slip_limit_n"', '"resonance.peaks"'), "resonance.parameter: is resonance.peaks, which is no key of the model"),
         (("[0.2, 0.12", "[-0.3, 0.12"), "slip_limit_n = -0.3 is refused: must be greater than or equal to 0"),
+        (("0.12, 0.09]", "-0.12, 0.09]"), "slip_limit_n = -0.12 is refused: must be greater than or equal to 0"),
+        (('"contact.damper.slip_limit_n"\nvalues = [0.2, 0.12', '"limit"\nvalues = [0.2, -0.12'), "resonance: parameter: limit = -0.12 is refused"),
+        (('"contact.damper.slip_limit_n"', '"static_load"'), "resonance.parameter: is static_load, but no static load acts"),
         (("values = [0.2, 0.12, 0.09]", ""), "resonance.values: values and span are both missing"),
         (("harmonics = 1", "harmonics = 1\nharmonic = 3"), "resonance.harmonic: is 3, above harmonics = 1"),
     ],
@@ -220,3 +227,29 @@ def test_too_few_harmonics_are_told(tmp_path: Path) -> None:
     assert told.remedy == "Raise resonance.harmonics."
     (trusted,) = answered(text.replace("harmonics = 1", "harmonics = 6"), tmp_path / "more").verdicts  # fmt: skip
     assert trusted.level == "trusted"
+
+
+def test_a_peak_that_no_sweep_at_its_value_meets_is_doubtful(tmp_path: Path) -> None:
+    # softening, then hardening: up to 1 the upper peak is that of a detached curve, at 2 a sweep goes over it
+    text = B3[: B3.index("[contact.damper]")].replace("0.02]]", "0.05]]") + """
+[contact.spring]
+between = ["blade.m1", "ground"]
+law = "polynomial_spring"
+along_t = [0.0, 0.0, -2.0, 0.0, 1.0]
+[load.shaker]
+on = "blade.m1"
+force_n = 0.02
+[resonance]
+frequency_hz = [0.016, 0.3]
+parameter = "excitation"
+values = [0.95, 1.0, 2.0]
+harmonics = 1
+"""  # fmt: skip
+    outcome = answered(text, tmp_path)
+    (told,) = (v for v in outcome.verdicts if "followed back" in v.why)
+    assert told.level == "doubtful"
+    assert (
+        told.why
+        == "peak 2 at 1, 0.95 was followed back from the last value: sweeps at these values were not seen to reach it"
+    )
+    assert "[all_motions]" in told.remedy

@@ -1,5 +1,6 @@
 """Where the peaks of a response are: one sweep, and the maxima that stand out of it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import get_args
@@ -14,6 +15,7 @@ from stickslip.harmonic.parameters import BalanceAt
 from stickslip.harmonic.peak import Driven, Peak, PeakProblem, driven_by
 from stickslip.response.ladder import plain_sweep
 from stickslip.response.parameter import Discretisation, Parameter, parameter_family, system_at
+from stickslip.response.resonances.point import PeakPoint
 from stickslip.response.resonances.subharmonic import motions_of_several_periods
 from stickslip.response.system import System
 from stickslip.solve.continuation import Point
@@ -26,6 +28,8 @@ STEPS = 12  # of Newton from peak to peak
 EVALUATIONS_BESIDE = 2  # of a point of a sweep, beside one a Newton step: the start and the tangent
 EXACT = 1e-12  # relative residual of sensitivities that are found by iteration ...
 STEP = 1e-6  # ... and of Newton steps, each of which costs three evaluations and two sensitivities
+CLOSE = 1e-6  # in ln ω: at a fold a peak may lie beyond both of its neighbours by as much
+SAG = 0.02  # between two points of a sweep a peak stands above both by less: 0.5 % at most of 80 peaks
 STANDS_OUT = 1.01  # a maximum over the higher one of the minima on its sides
 
 
@@ -176,29 +180,20 @@ def first_peaks(search: PeakSearch, value: float) -> tuple[list[Start], int]:
     """
     if not np.isfinite(value):
         raise input_error("values", "are empty or not finite", "Give numbers.")
-    problem, how = search.problem(value), search.how
-    balance = problem.family(value)
-    changed = system_at(search.system, search.parameter, value, balance)
-    if search.periods > 1:
-        points = motions_of_several_periods(
-            changed, balance, search.lower_range, search.periods, SWEEP_POINTS, how.newton
-        )
-    else:
-        found = plain_sweep(changed, balance, search.omega_range, SWEEP_POINTS, how.newton)
-        points = [f.point for f in found if f.converged]
-    few = replace(
-        how.newton,
-        max_iterations=min(STEPS, how.newton.max_iterations),
-        linear=to_tolerance(how.newton.linear, STEP),
-    )
-    motions = np.array([problem.driven.motion(balance, p.x) for p in points])
-    heights = np.linalg.norm(motions, axis=1) if points else np.zeros(0)
+    problem = search.problem(value)
+    points, motions = _swept(search, problem, value)
+    heights = np.linalg.norm(motions, axis=1)
     if not points or int(np.argmax(heights)) in (0, len(points) - 1):
         raise input_error(
             "omega_range",
             f"holds no peak at {value:g}: of {len(points)} solutions the first or the last is the highest",
             "Widen it, or choose another output.",
         )
+    few = replace(
+        search.how.newton,
+        max_iterations=min(STEPS, search.how.newton.max_iterations),
+        linear=to_tolerance(search.how.newton.linear, STEP),
+    )
     starts = []
     for top in maxima(heights):
         x, omega = _near(problem, points, motions, top)
@@ -207,6 +202,52 @@ def first_peaks(search: PeakSearch, value: float) -> tuple[list[Start], int]:
         own = own.sharpened(here).aligned(here)
         starts.append(Start(own, y, value, few, float(heights[top])))
     return starts, sum(p.solution.iterations + EVALUATIONS_BESIDE for p in points)
+
+
+def met_by_a_sweep(search: PeakSearch, peaks: Sequence[PeakPoint]) -> list[bool]:
+    """Return whether a sweep goes over each of some peaks at one value of the parameter.
+
+    Parameters
+    ----------
+    search
+        Of what; its range of frequencies is swept once.
+    peaks
+        All at the same value, which converged.
+    """
+    value = peaks[0].value
+    problem = search.problem(value)
+    points, motions = _swept(search, problem, value)
+    if not points:
+        return [False] * len(peaks)
+    log_omega = np.log(search.periods * np.array([p.p for p in points]))
+    log_height = np.log(np.linalg.norm(motions, axis=1))
+    return [_goes_over(log_omega, log_height, peak) for peak in peaks]
+
+
+def _goes_over(log_omega: FloatArray, log_height: FloatArray, peak: PeakPoint) -> bool:
+    """Whether a curve of points goes over a peak: two of them next to each other on its sides, at its height."""
+    place, height = np.log(peak.omega), np.log(peak.amplitude)
+    low = np.minimum(log_omega[:-1], log_omega[1:]) - CLOSE
+    high = np.maximum(log_omega[:-1], log_omega[1:]) + CLOSE
+    above = np.maximum(log_height[:-1], log_height[1:])
+    return bool(np.any((low <= place) & (place <= high) & (np.abs(above - height) <= SAG)))
+
+
+def _swept(
+    search: PeakSearch, problem: PeakProblem, value: float
+) -> tuple[list[Point], ComplexArray]:
+    """Return the points of a sweep at a value of the parameter, and the motion of the output in each."""
+    balance, how = problem.family(value), search.how
+    changed = system_at(search.system, search.parameter, value, balance)
+    if search.periods > 1:
+        points = motions_of_several_periods(
+            changed, balance, search.lower_range, search.periods, SWEEP_POINTS, how.newton
+        )
+    else:
+        found = plain_sweep(changed, balance, search.omega_range, SWEEP_POINTS, how.newton)
+        points = [f.point for f in found if f.converged]
+    motions = [problem.driven.motion(balance, p.x) for p in points]
+    return points, np.array(motions).reshape(len(points), -1)
 
 
 def maxima(heights: FloatArray) -> list[int]:

@@ -43,6 +43,8 @@ class Case:
         As `digest`, without harmonic loads and outputs.
     at
         Makes the model with another value of a key, picklable; None where no key can be changed.
+    accepts
+        Refuses a value of a key, without a model; None where only the model itself can tell.
     """
 
     index: int
@@ -56,6 +58,7 @@ class Case:
     store: Store = in_memory
     digest_at_rest: str = ""
     at: "Callable[[str, float], Model] | None" = None
+    accepts: "Callable[[str, float], object] | None" = None
 
 
 @dataclass(frozen=True, eq=False)

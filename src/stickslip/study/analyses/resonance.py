@@ -18,12 +18,14 @@ from stickslip.study.analyses.resonances.dataset import dataset
 from stickslip.study.analyses.resonances.envelope import heights, valley
 from stickslip.study.analyses.resonances.question import SAMPLES, Question, more_than, question_of
 from stickslip.study.analyses.resonances.table import ResonanceTable
+from stickslip.study.analyses.resonances.unmet import unmet_peaks
 from stickslip.study.analyses.resonances.words import tables
 from stickslip.study.analyses.verdict import Verdict, doubt, stored, to_json
 from stickslip.study.keep.progress import LOG, advance
 from stickslip.units import HZ
 
 MODEL, FIRST, SMALLEST, LAST = "model", "first", "smallest", "last"  # notes
+UNMET = "unmet"  # note: peaks that were followed back and that no sweep at their value reaches
 HARMONICS = "harmonics"  # note: the highest peak with more of them
 
 
@@ -73,17 +75,19 @@ class ResonanceAnalysis:
         # what was followed back from the last value before an interruption is none of the first ones
         first = notes.get(FIRST)
         known = [p for p in every if first is None or p.peak < first["peaks"]]
-        notes.put(FIRST, {"peaks": 1 + max((p.peak for p in known), default=-1)})
+        later = 1 + max((p.peak for p in known), default=-1)
+        notes.put(FIRST, {"peaks": later})
         problem = ""
         if asked.values is not None and len(asked.values) > 1:
             try:
-                later = later_peaks(inputs.search, asked.values, known, asked.peaks, done)
-                for point in _told(later, inputs):
+                back = later_peaks(inputs.search, asked.values, known, asked.peaks, done)
+                for point in _told(back, inputs):
                     every.append(point)
                     yield point
             except InputError as error:
                 problem = error.problem
             between = valley(every, heights(every, asked.values), asked.values)
+            notes.put(UNMET, unmet_peaks(inputs.search, every, asked.values, later))
             notes.put(SMALLEST, {} if between is None else _smallest(inputs, between))
         notes.put(HARMONICS, _more_harmonics(inputs, every))
         notes.put(LAST, {"problem": problem})

@@ -102,6 +102,7 @@ class Study:
 
     def _case(self, index: int, case: TablesOfCase) -> Case:
         whole, at_rest = model_digests(case.tables, self.file.home)
+        other = OtherModel(self.path, with_values(self.file.raw, case.values), self.memo)
         return Case(
             index=index,
             label=case.label,
@@ -111,7 +112,8 @@ class Study:
             digest=whole,
             home=self.file.home,
             digest_at_rest=at_rest,
-            at=OtherModel(self.path, with_values(self.file.raw, case.values), self.memo),
+            at=other,
+            accepts=other.study,
         )
 
 
@@ -141,14 +143,30 @@ class OtherModel:
         InputError
             If there is no such key, or its value is refused.
         """
+        found = self.study(key, value)
+        try:
+            return found.model()
+        except InputError as error:
+            raise self._refused(key, value, error) from None
+
+    def study(self, key: str, value: float) -> Study:
+        """Return the study of the model: read and found good as far as that is possible without a mesh.
+
+        Raises
+        ------
+        InputError
+            If there is no such key, or its value is refused.
+        """
         raw = {**self.raw, "vary": {key: [value]}}
         try:
-            file = StudyFile(self.path, "", raw, validated(self.path, raw))
-            return _checked(Study(file, self.memo)).model()
+            return _checked(Study(StudyFile(self.path, "", raw, validated(self.path, raw)), self.memo))  # fmt: skip
         except InputError as error:
-            told = str(error).replace(f"{self.path}: ", "").removeprefix(f"vary.{key}: ")
-            remedy = "Name a key of the model as [vary] does, and values that it takes."
-            raise input_error("parameter", f"{key} = {value:g} is refused: {told.rstrip('.?')}", remedy) from None  # fmt: skip
+            raise self._refused(key, value, error) from None
+
+    def _refused(self, key: str, value: float, error: InputError) -> InputError:
+        told = str(error).replace(f"{self.path}: ", "").removeprefix(f"vary.{key}: ")
+        remedy = "Name a key of the model as [vary] does, and values that it takes."
+        return input_error("parameter", f"{key} = {value:g} is refused: {told.rstrip('.?')}", remedy)  # fmt: skip
 
     def __getstate__(self) -> dict[str, Any]:
         return {"path": self.path, "raw": self.raw, "memo": {}}

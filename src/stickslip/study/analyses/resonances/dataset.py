@@ -35,7 +35,7 @@ def dataset(solved: Sequence[Solved]) -> xr.Dataset:
     labels = [one.case.label for one in solved]
     cases = [_of_case(one) for one in solved]
     found = [
-        v for one, own in zip(solved, cases, strict=True) for v in case_verdicts(one.case.label, own, one.notes)
+        v for one, own in zip(solved, cases, strict=True) for v in case_verdicts(one.case.label, own, one.notes, one.case.settings.resonance.values or ())
     ]  # fmt: skip
     failed = sum(int(np.sum(own["maximum"].values == -1)) for own in cases if "maximum" in own)
     attributes = {ATTRIBUTE: to_json(of_all_cases(found, labels)), "failed": failed}

@@ -4,11 +4,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, get_args
 
+import numpy as np
+
 from stickslip.assembly.model import Model
 from stickslip.assembly.reduced import Store
 from stickslip.contact.compiled import Evaluator
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.peak import PeakProblem
 from stickslip.response.parameter import Discretisation, LoadName, Parameter
 from stickslip.response.resonances.first import PeakSearch
 from stickslip.response.self_excited.problem import SAMPLES_A_HARMONIC
@@ -91,9 +94,11 @@ def question_of(case: Case, model: Model) -> Question:
     Raises
     ------
     InputError
-        If the parameter is none, the model at its first or last value is refused, a contact is rigid, or no load drives a harmonic.
+        If the parameter is none or changes nothing, one of its values is refused, a contact is rigid, or no load drives a harmonic.
     """
     asked: ResonanceTable = case.settings.resonance
+    parameter = _parameter(case, asked)
+    _accepted(case, asked, parameter)
     assembled = peak_first(model.assembled(more_than(asked.harmonics), case.store))
     if assembled.system.interface.rigid:
         raise input_error(
@@ -106,17 +111,46 @@ def question_of(case: Case, model: Model) -> Question:
     how = Discretisation(order=asked.harmonics, samples=samples, evaluator=evaluator)
     lowest, highest = (HZ * f for f in asked.frequency_hz)
     search = PeakSearch(
-        assembled.system, assembled.load, _parameter(case, asked), (lowest, highest), asked.by, 0, how, asked.harmonic, asked.periods
+        assembled.system, assembled.load, parameter, (lowest, highest), asked.by, 0, how, asked.harmonic, asked.periods
     )  # fmt: skip
+    if parameter == "static_load" and not np.any(assembled.load.static):
+        raise input_error(
+            "resonance.parameter",
+            "is static_load, but no static load acts: the factor changes nothing",
+            "Give a load with harmonic = 0, or take another parameter.",
+        )
     try:
         for value in asked.ends:
-            search.problem(value)
+            problem = search.problem(value)
+        if isinstance(parameter, str) and parameter not in FACTORS:
+            _accepted_by_laws(problem, asked)
     except InputError as error:
         raise error.inside("resonance") from None
     facts = facts_of(model, model.speed / RPM)
     return Question(
         case.label, asked, search, assembled.output_labels[0], facts, tuple(assembled.warnings)
     )
+
+
+def _accepted(case: Case, asked: ResonanceTable, parameter: Parameter) -> None:
+    """Refuse values that the tables of the study refuse."""
+    if case.accepts is None or not isinstance(parameter, OfKey):
+        return
+    for value in asked.values or asked.ends:
+        try:
+            case.accepts(parameter.key, value)
+        except InputError as error:
+            raise error.inside("resonance") from None
+
+
+def _accepted_by_laws(problem: PeakProblem, asked: ResonanceTable) -> None:
+    """Refuse values that the contact laws refuse."""
+    for value in asked.values or asked.ends:
+        try:
+            problem.family(value)
+        except InputError as error:
+            problem_told = f"{asked.parameter} = {value:g} is refused: {error.problem}"
+            raise input_error("parameter", problem_told, error.remedy) from None
 
 
 def _parameter(case: Case, asked: ResonanceTable) -> Parameter:

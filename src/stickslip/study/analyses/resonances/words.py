@@ -1,6 +1,6 @@
 """What is told of resonances: verdicts, and what the terminal prints."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,9 +16,12 @@ SPARSE = 12  # values that the terminal prints of each peak
 
 
 def case_verdicts(
-    label: str, case: Mapping[str, xr.Variable], notes: Mapping[str, Mapping[str, Any]]
+    label: str,
+    case: Mapping[str, xr.Variable],
+    notes: Mapping[str, Mapping[str, Any]],
+    values: Sequence[float],
 ) -> list[Verdict]:
-    """Return what is to be thought of a case from its variables and notes."""
+    """Return what is to be thought of a case from its variables and notes, and the values that were visited, if any."""
     found = list(from_json(str(notes.get("model", {}).get("verdicts", "[]"))))
     problem = str(notes.get("last", {}).get("problem", ""))
     if "maximum" not in case:
@@ -26,6 +29,8 @@ def case_verdicts(
         return [*found, Verdict("wrong", label, None, why, "Widen resonance.frequency_hz.")]
     kind, value = case["maximum"].values, case["value"].values
     found += _of_points(label, kind, value)
+    found += _of_unmet(label, notes.get("unmet", {}))
+    found += _of_joined(label, value, values)
     found += _of_phase(label, case)
     found += _of_harmonics(label, notes.get("harmonics", {}))
     if "overtaking_value" in case:
@@ -50,6 +55,33 @@ def _of_points(label: str, kind: np.ndarray, value: np.ndarray) -> list[Verdict]
         if low.size:
             why = f"peak {i + 1} is no maximum at {_values(low)}: it has met a minimum of the response and is gone there"
             found.append(Verdict("doubtful", label, None, why, "Do not read these as peaks; where the curve folds, the peak ends."))  # fmt: skip
+    return found
+
+
+def _of_unmet(label: str, noted: Mapping[str, Any]) -> list[Verdict]:
+    """Return doubts of peaks that are known from the last value alone."""
+    found = []
+    number, value = (np.atleast_1d(noted.get(k, [])) for k in ("peak", "value"))
+    for peak in np.unique(number):
+        own = value[number == peak]
+        why = f"peak {int(peak) + 1} at {_values(own)} was followed back from the last value: a sweep at this value was not seen to reach it"
+        if own.size > 1:
+            why = why.replace("a sweep at this value was", "sweeps at these values were")
+        found.append(Verdict("doubtful", label, None, why, "The other peaks there are what a sweep meets; ask for [all_motions]."))  # fmt: skip
+    return found
+
+
+def _of_joined(label: str, value: np.ndarray, values: Sequence[float]) -> list[Verdict]:
+    """Return notes of peaks that end because they have become another one; those that were followed back end towards the first value."""
+    found = []
+    for i, row in enumerate(value if values else []):
+        own = set(row[np.isfinite(row)].tolist())
+        visited = values if values[0] in own else values[::-1]
+        last = max((k for k, v in enumerate(visited) if v in own), default=-1)
+        if last < 0 or last == len(visited) - 1:
+            continue
+        why = f"peak {i + 1} ends after {visited[last]:.4g}: at {visited[last + 1]:.4g} it has become one with another peak"
+        found.append(Verdict("trusted", label, None, why, "Beyond, both are told as that one."))
     return found
 
 
