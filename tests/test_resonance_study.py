@@ -57,6 +57,15 @@ def test_the_optimum_of_the_benchmark_from_a_study(tmp_path: Path) -> None:
     assert case["value"].values.tolist() == [[0.2, 0.12, 0.09]]
 
 
+def test_only_cases_with_a_lowest_peak_tell_where_it_is(tmp_path: Path) -> None:
+    """With several cases those without one have no number there."""
+    data = answered(B3 + "[vary]\nload.shaker.force_n = [0.1, 0.3]\n", tmp_path).tree["resonance"]
+    lowest = [one_case(data.to_dataset(), i).attrs["smallest_value"] for i in range(2)]
+    assert np.isfinite(lowest).tolist() == [True, False]
+    lines = [table.lines for table in RESONANCE.summary(data.to_dataset())]
+    assert [len(own) for own in lines] == [1, 0]
+
+
 TWO_IN_ONE = """
 schema_version = 2
 [part.pair]

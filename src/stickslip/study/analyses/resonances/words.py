@@ -144,7 +144,7 @@ def _table(case: xr.Dataset, head: str) -> TextTable:
         rows += [_row(case, i, int(k)) for k in few]
     columns = ("peak", "value", "Hz", "amplitude mm", "phase deg", "energy mJ", "of friction %")
     lines = []
-    if "smallest_value" in case.attrs:
+    if np.isfinite(float(case.attrs.get("smallest_value", np.nan))):
         value, amplitude, hertz = (float(case.attrs[f"smallest_{k}"]) for k in ("value", "amplitude", "frequency_hz"))  # fmt: skip
         where = f"at {hertz:.6g} Hz" if np.isfinite(hertz) else "where two peaks are equally high"
         lines.append(
