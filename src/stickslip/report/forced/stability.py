@@ -1,10 +1,13 @@
 """The table that says whether motions are stable."""
 
+from html import escape, unescape
+
 import numpy as np
 
-from stickslip.report.forced.tables import sentences
 from stickslip.report.quantities import NONE, fixed, number
 from stickslip.report.response import Response
+from stickslip.response.stability.modulus import modulus_text
+from stickslip.study.analyses.forced.stable_words import FEW, all_lines
 
 BY_MOTION = (
     ", the motion in time being "  # in the sentence of a point whose multipliers leave it undecided
@@ -19,16 +22,13 @@ def stability(response: Response) -> str | None:
     case = response.integers(names[0])
     hz, size, error = (response.floats(name) for name in (names[1], *names[3:]))
     verdict = [str(text) for text in response.data[names[2]].values]
-    told = (
-        response.labels_of("stability_sentence")
-        if response.has("stability_sentence")
-        else [""] * len(verdict)
-    )
+    told_each = response.has("stability_sentence")
+    told = response.labels_of("stability_sentence") if told_each else [""] * len(verdict)
     by = ["motion in time" if BY_MOTION in text else "multiplier" for text in told]
     rows = [
         [response.cases[int(case[i])].short, fixed(float(hz[i]), 3), verdict[i],
          by[i] if verdict[i] in ("stable", "unstable") else NONE,
-         number(float(size[i]), 5) if np.isfinite(size[i]) else NONE,
+         modulus_text(float(size[i])) if np.isfinite(size[i]) else NONE,
          _error(float(error[i]))]
         for i in range(len(verdict))
     ]  # fmt: skip
@@ -37,7 +37,15 @@ def stability(response: Response) -> str | None:
         "than its error a machine does not stay there. Where the error reaches 1 the motion in time decides, or nothing does.</p>"
     )
     head = ["frequency (Hz)", "verdict", "decided by", "largest multiplier", "its error"]
-    return text + response.table(head, rows) + sentences(response, "stability_sentence")
+    lines = (
+        all_lines(response.data, [unescape(c.label) for c in response.cases]) if told_each else ()
+    )
+    table = response.table(head, rows)
+    if len(rows) > FEW:
+        table = f"<details><summary>All {len(rows)} points</summary>{table}</details>"
+    shown = "".join(f"<li>{escape(line)}</li>" for line in lines)
+    listed = f"<ul>{shown}</ul>" * bool(lines)
+    return text + (listed + table if len(rows) > FEW else table + listed)
 
 
 def _error(error: float) -> str:

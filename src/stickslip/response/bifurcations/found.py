@@ -120,8 +120,17 @@ class Bifurcations:
     @property
     def sentences(self) -> tuple[str, ...]:
         """What was found, and `limits`."""
-        told = [b.sentence for b in self.found] or ["no bifurcation was met on the branch"]
-        return (*told, *self.limits)
+        return (*(b.sentence for b in self.found), *self.none_met, *self.limits)
+
+    @property
+    def none_met(self) -> tuple[str, ...]:
+        """That none was met, or nothing; and how many motions of the branch have multipliers that leave it open."""
+        known = [s for s in self.stabilities if s is not None]
+        open_ = sum(s.verdict == "undecided" for s in known)
+        unjudged = f"{open_} of {len(known)} motions could not be judged" if open_ else ""
+        if self.found:
+            return (unjudged,) * bool(unjudged)
+        return (f"no bifurcation was met on the branch{', but ' * bool(unjudged)}{unjudged}",)
 
     @property
     def limits(self) -> tuple[str, ...]:

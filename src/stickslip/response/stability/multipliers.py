@@ -21,6 +21,7 @@ from stickslip.response.stability.contact_states import (
 from stickslip.response.stability.kicks import sample_times, sampled_monodromy
 from stickslip.response.stability.missing_harmonics import corrected
 from stickslip.response.stability.modal_states import ModalStates, modal_states
+from stickslip.response.stability.modulus import modulus_text
 from stickslip.response.stability.monodromy import monodromy, share_of_monodromy
 from stickslip.response.stability.sampled_tangents import (
     Path,
@@ -105,7 +106,7 @@ class Stability:
                 f"as it was solved the motion has a largest multiplier of modulus {size:.4g}; what more harmonics would change in it "
                 "is not known, no motion with more was found nearby"
             )
-        said = f"{size:.4g} ± {error:.2g}" if error > 0.0 else f"{size:.4g}"
+        said = modulus_text(size, error)
         return {
             "unstable": f"a multiplier of modulus {said} lies outside the unit circle: a disturbance grows by as much in a period",
             "stable": f"the largest multiplier that is not neutral has the modulus {said}: disturbances die",

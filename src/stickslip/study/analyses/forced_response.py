@@ -58,6 +58,7 @@ from stickslip.study.analyses.forced.stable import (
     to_integrate,
     with_motion,
 )
+from stickslip.study.analyses.forced.stable_words import FEW, Point, runs_line
 from stickslip.study.analyses.forced.summary import tables
 from stickslip.study.analyses.forced.values import (
     Values,
@@ -219,8 +220,9 @@ def _judge(question: Question, response: Response, notes: Notes) -> None:
     if checks:
         notes.put(IN_TIME, of_checks(list(checks.values())))
     told = [with_motion(one, checks.get(one.omega)) for one in examined]
-    for one in told:
-        LOG.info(f"stability: {question.said(one.sentence)}")
+    points = [Point(o.omega / HZ, o.verdict, o.multiplier, o.error, o.sentence) for o in told]
+    for line in [p.sentence for p in points] if len(points) <= FEW else [runs_line(points)]:
+        LOG.info(f"stability: {question.said(line)}")
     notes.put(STABLE, of_examined(told))
     if question.not_periodic_s > 0.0:
         _answer_in_time(question, response, told, notes)

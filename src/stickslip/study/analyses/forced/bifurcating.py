@@ -120,8 +120,7 @@ def limits(question: Question, found: Bifurcations) -> tuple[str, ...]:
     more = [f"branches of {len(followed_alone)} more bifurcations were not followed"] * bool(
         followed_alone and question.bifurcations == "branches"
     )
-    none = ["no bifurcation was met on the branch"] * (not found.found)
-    return (*none, *alone, *found.limits, *more)
+    return (*found.none_met, *alone, *found.limits, *more)
 
 
 def bifurcations_line(question: Question) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from stickslip.study.analyses.verdict import Level, from_json
 
 LARGE_SHIFT = 0.01  # relative change of the peak with a tenth of the retention stiffness
 STUCK = 1e-18  # m/N: no structure is so stiff; what moves less sticks to rigid contacts or is held
-UNSTABLE = 1  # flag of motion_stability
+UNSTABLE, UNDECIDED = 1, 2  # flags of motion_stability
 LEAVING = dict.fromkeys(
     ("period doubling", "branch point"),
     'forced_response.bifurcations = "branches" follows what leaves there.',
@@ -206,6 +206,16 @@ def bifurcated(case: Curve) -> Iterator[Finding]:
             why = "a machine does not stay there: multipliers lie outside the unit circle"
             remedy = 'See the table of bifurcations: bifurcations = "branches" follows what leaves the response.'
             yield Finding("wrong", why, remedy, (int(i),), float(case.amplitude[i]))
+    unjudged = case.floats("motion_stability") == UNDECIDED
+    if unjudged.any():
+        judged = np.isin(case.floats("motion_stability"), (0, UNSTABLE, UNDECIDED))
+        hz = case.hz[unjudged]
+        why = (
+            f"bifurcations may be missed: {hz.size} of {judged.sum()} motions along the branch could not be judged, between "
+            f"{hz.min():.2f} and {hz.max():.2f} Hz"
+        )
+        remedy = "More harmonics make the errors of multipliers smaller; --verify integrates in time at the peak."
+        yield Finding("trusted", why, remedy)
     left = {float(said["side_branch_frequency_hz"]) for said in case.rows("side_branch")}
     for said in case.rows("bifurcation"):
         if said["bifurcation_kind"] == "fold":  # the rule of folds tells of these

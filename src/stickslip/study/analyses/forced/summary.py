@@ -6,6 +6,7 @@ import xarray as xr
 from stickslip.harmonic.support import named
 from stickslip.study.analyses.analysis import TextTable
 from stickslip.study.analyses.forced.bounds import BOUND
+from stickslip.study.analyses.forced.stable_words import all_lines
 from stickslip.study.analyses.forced.working_words import TITLE, range_lines
 from stickslip.study.analyses.verdict import LEVELS, said
 
@@ -47,7 +48,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
         _lines(TITLE, range_lines(data)),
         _lines(_choice_title(data), choices(data)),
         _lines("Against twice as many harmonics", _sentences(data, "reference_sentence", labels)),
-        _lines("Is it stable?", _along(data, "stability", labels)),
+        _lines("Is it stable?", all_lines(data, labels)),
         _lines("Bifurcations", bifurcation_lines(data, labels)),
         _lines(
             "In time, where no periodic motion stands for it", _along(data, "not_periodic", labels)
