@@ -358,6 +358,12 @@ def test_the_last_line_names_the_cases_that_are_not_trusted() -> None:
         "See the verdicts."
     )
     first = data.isel(case=[0]).assign(verdict=("point", [0, 1, 2, 1]))
+    off = data.isel(case=[0, 1]).assign_attrs(
+        verdicts=to_json([Verdict("wrong", "b", 3.0, "it leaves")])
+    )
+    assert not_trusted(xr.DataTree.from_dict({"forced_response": off})) == (
+        "Not to be trusted as it stands: forced response: wrong at single points of b, 1 of 2 cases doubtful (b). See the verdicts."
+    )
     good = xr.DataTree.from_dict({"forced_response": first})
     assert not_trusted(good) == ""
     assert conclusion(good) == (

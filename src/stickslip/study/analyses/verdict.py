@@ -176,12 +176,18 @@ def _not_trusted(name: str, data: xr.Dataset) -> str:
         level = worst(v.level for v in stored(data.attrs))
         return "" if level == "trusted" else f"{words}: {level}"
     levels = data["case_verdict"].values
+    if not np.any(levels):
+        return ""
+    bad = list(dict.fromkeys(v.case for v in stored(data.attrs) if v.level == "wrong"))
     if levels.size == 1:
-        return f"{words}: {LEVELS[int(levels[0])]}" if levels[0] else ""
+        apart = "wrong at single points, the case " * bool(bad and levels[0] < 2)
+        return f"{words}: {apart}{LEVELS[int(levels[0])]}"
     labels = np.array([str(x) for x in data["case_label"].values])
-    said = [
+    beside = [label for label in bad if label in labels[levels < 2]]
+    said = [f"wrong at single points of {', '.join(beside)}"] * bool(beside)
+    said += [
         f"{np.sum(levels == rank)} of {levels.size} cases {LEVELS[rank]} ({', '.join(labels[levels == rank])})"
         for rank in (2, 1)
         if np.any(levels == rank)
     ]
-    return f"{words}: {', '.join(said)}" if said else ""
+    return f"{words}: {', '.join(said)}"
