@@ -262,3 +262,12 @@ harmonics = 1
         == "peak 2 at 1, 0.95 was followed back from the last value: sweeps at these values were not seen to reach it"
     )
     assert "[all_motions]" in told.remedy
+
+
+def test_a_key_that_the_cases_vary_too_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(f"{B3}[vary]\ncontact.damper.slip_limit_n = [0.2, 0.1]\n", encoding="utf-8")
+    with pytest.raises(
+        InputError, match=r"resonance\.parameter: .* which \[vary\] varies too.*Drop it"
+    ):
+        run_study(read_study(path))

@@ -111,9 +111,10 @@ def _by_case(section: Section, data: xr.Dataset, bodies: Sequence[str]) -> str:
     if len(bodies) == 1:
         n = data.sizes["case"] if section.by_case else 1
         return (f"<p>The same in all {n} cases.</p>" if n > 1 else "") + bodies[0]
+    names = [f"<p><b>{c.label}</b></p>" if c.label else "" for c in cases_of(data)]
     each = "".join(
-        f'<div data-case="{k}"{" hidden" if k else ""}>{body}</div>'
-        for k, body in enumerate(bodies)
+        f'<div data-case="{k}"{" hidden" if k else ""}>{name}{body}</div>'
+        for k, (name, body) in enumerate(zip(names, bodies, strict=True))
     )
     return (case_buttons(varied(data), cases_of(data), 0) or "") + each
 

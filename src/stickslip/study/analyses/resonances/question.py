@@ -97,6 +97,12 @@ def question_of(case: Case, model: Model) -> Question:
         If the parameter is none or changes nothing, one of its values is refused, a contact is rigid, or no load drives a harmonic.
     """
     asked: ResonanceTable = case.settings.resonance
+    if asked.parameter in case.values:
+        raise input_error(
+            "resonance.parameter",
+            f"is {asked.parameter}, which [vary] varies too: every case would follow the same peaks",
+            "Drop it from [vary], or give another parameter.",
+        )
     parameter = _parameter(case, asked)
     _accepted(case, asked, parameter)
     assembled = peak_first(model.assembled(more_than(asked.harmonics), case.store))
