@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from stickslip.errors import InputError
 from stickslip.front.study import Study
 from stickslip.report.sections.all_motions import Motions, basin_table, branch_table, branches
+from stickslip.study.analyses.all_motions import ALL_MOTIONS
+from stickslip.study.analyses.motions.words import case_verdicts
 from stickslip.study.keep.netcdf import one_case
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
@@ -111,3 +114,27 @@ def test_bad_tables_are_refused_by_key(tmp_path, line, said):
     (tmp_path / "study.toml").write_text("\n".join([*kept, line]), encoding="utf-8")
     with pytest.raises(InputError, match=said):
         read_study(tmp_path / "study.toml")
+
+
+def test_a_largest_stable_motion_that_no_start_reached_is_noted(result):
+    case = one_case(result.data["all_motions"].to_dataset(), 0)
+    told = {name: case[name].variable for name in case.variables}
+    for name in ("seconds", "budget_s", "tries", "spent", "unmarched"):
+        told[name] = xr.Variable((), case.attrs[name])
+    stable = np.where(case["motion_stability"].values[0] == "stable", case["motion_amplitude"].values[0], np.nan)  # fmt: skip
+    count = case["motion_count"].values.copy()
+    for reached in (3, 0):
+        count[0, int(np.nanargmax(stable))] = reached
+        found = case_verdicts(
+            "", told | {"motion_count": xr.Variable(("searched", "motion"), count)}
+        )
+        notes = [v for v in found if "was reached by none of 12 starts" in v.why]
+        assert [v.word for v in notes] == ["note"] * (reached == 0)
+
+
+def test_the_check_estimates_the_time(folder):
+    study = read_study(folder / "study.toml")
+    case = study.cases()[0]
+    told = ALL_MOTIONS.check(case, study.model())[1]
+    seconds = float(told.removeprefix("all_motions: about ").partition(" s ")[0])
+    assert 0.001 < seconds < 1000.0

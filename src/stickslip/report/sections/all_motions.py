@@ -41,7 +41,7 @@ def branches(view: Motions) -> Plot:
         figure.add_trace(
             go.Scatter(
                 x=hertz[i][there], y=scale.factor * height[i][there], mode="lines", name=name,
-                line={"color": colour(i), "width": 2},
+                line={"color": colour(i), "width": 1},
                 hovertemplate=f"{name}: %{{y:.6g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>",
             )
         )  # fmt: skip
@@ -56,6 +56,7 @@ def branches(view: Motions) -> Plot:
         f"{_several(view.integers('searched_hz').size, 'frequency', 'frequencies')} (marks) other motions were searched by "
         f"{int(view.scalar('tries'))} deflated solves and from {int(np.sum(view.integers('starts')))} random states in time, "
         f"{number(view.scalar('seconds'), 3)} s of a budget of {number(view.scalar('budget_s'), 4)} s; what was new was followed.{spent} "
+        "Stability is examined at the marks alone: the lines between them are thin, for nobody knows whether a motion there lasts. "
         "Nothing proves that there is no other motion."
     )
     return Plot(f"all_motions{view.key}", "All motions that were found", caption, figure)

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 import xarray as xr
 
 from stickslip.assembly.model import Model
+from stickslip.response.all_motions.estimate import PERIODS_OF_A_START, search_seconds
 from stickslip.response.all_motions.found import Stage, gathered
 from stickslip.response.all_motions.search import search_stages
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
@@ -64,7 +65,12 @@ class AllMotionsAnalysis:
 
     def check(self, case: Case, model: Model) -> tuple[str, ...]:
         """Say what is searched, and for how long."""
-        return (f"all_motions: {_said(question_of(case, model))}",)
+        question = question_of(case, model)
+        seconds = search_seconds(question.problem, question.search)
+        return (
+            f"all_motions: {_said(question)}",
+            f"all_motions: about {seconds:.2g} s for these, where a start settles in {PERIODS_OF_A_START} periods; branches that are found take more",
+        )
 
     def summary(self, data: xr.Dataset) -> tuple[TextTable, ...]:
         """Return what the terminal prints."""

@@ -66,6 +66,7 @@ def _basins(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
         if aperiodic > 0:
             why = f"{aperiodic} of {starts} starts end on no motion of the load's period within the periods allowed"
             found.append(Verdict("trusted", label, float(hertz[i]), why, "Ask for all_motions.periods = 2 or 3, or raise all_motions.most_periods.", warns=True))  # fmt: skip
+        found += _not_reached(label, case, i)
         if not np.any(np.isfinite(share[i])):
             continue
         most = int(np.nanargmax(share[i]))
@@ -78,6 +79,25 @@ def _basins(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
             )
             found.append(Verdict("trusted", label, float(hertz[i]), why, "The branch of the sweep is not what the machine is most likely to do.", warns=True))  # fmt: skip
     return found
+
+
+def _not_reached(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Verdict]:
+    """Return the largest stable motion at a frequency where no start ends on it."""
+    height = np.where(case["motion_stability"].values[i] == "stable", case["motion_amplitude"].values[i], np.nan)  # fmt: skip
+    if not np.any(np.isfinite(height)):
+        return []
+    k = int(np.nanargmax(height))
+    if case["motion_count"].values[i, k] != 0:
+        return []
+    high = 100 * case["motion_share_high"].values[i, k]
+    why = (
+        f"the largest stable motion, {1e3 * height[k]:.4g} mm, was reached by none of {int(case['starts'].values[i])} starts: its share "
+        f"of such starts is below {high:.2g} % with 95 % confidence, not zero"
+    )
+    remedy = (
+        "Count on its amplitude all the same, or raise all_motions.starts and all_motions.spread."
+    )
+    return [Verdict("trusted", label, float(case["searched_hz"].values[i]), why, remedy)]
 
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
