@@ -8,6 +8,7 @@ from stickslip.arrays import FloatArray
 from stickslip.report.cases import ShownCase
 from stickslip.report.quantities import percent
 from stickslip.report.response import Response
+from stickslip.report.sections.residual_tractions import has_width
 
 ANALYSIS = "residual_tractions"
 _TAKEN = (
@@ -51,21 +52,25 @@ def draw_bands(figure: go.Figure, response: Response) -> str:
     """Draw the band of each case behind its curve; return what the caption says of it, nothing where there is none."""
     if not _has(response) or response.has("speed_rpm"):
         return ""
+    drawn = False
     for case in response.cases:
         hertz, least, most = (
             _of(response, case, name)
             for name in ("frequency_hz", "least_amplitude", "most_amplitude")
         )
         known = np.isfinite(least) & np.isfinite(most)
-        if not known.any():
+        if not has_width(least, most):
             continue
         scale = response.scale.factor * _per_force(response, case)
         shared = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "legendgroup": "tractions"}  # fmt: skip
         figure.add_scatter(x=hertz[known], y=least[known] * scale, showlegend=False, **shared)
         figure.add_scatter(
             x=hertz[known], y=most[known] * scale, fill="tonexty", fillcolor=_faint(case.colour),
-            name="residual tractions", showlegend=case is response.cases[0], **shared,
+            name="residual tractions", showlegend=not drawn, **shared,
         )  # fmt: skip
+        drawn = True
+    if not drawn:
+        return " Residual tractions leave it as it is: the bounds are equal."
     return f" Band: what residual tractions leave open, with H = {_harmonics(response)}."
 
 
@@ -101,6 +106,8 @@ def draw_peak_bands(figure: go.Figure, response: Response, cases: list[ShownCase
         return ""
     x = np.array([c.value for c in cases])[known]
     least, most = (bounds[known, k] * factor for k in (1, 2))
+    if not has_width(least, most):
+        return " Residual tractions leave the peaks as they are: the bounds are equal."
     shared = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "showlegend": False}
     figure.add_scatter(x=x, y=least, row=1, col=1, **shared)
     figure.add_scatter(

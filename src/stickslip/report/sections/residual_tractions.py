@@ -6,6 +6,7 @@ from html import escape
 import numpy as np
 import plotly.graph_objects as go
 
+from stickslip.arrays import FloatArray
 from stickslip.report.node import Node
 from stickslip.report.plot import COLOURS, INK, Plot, log_ticks, styled
 from stickslip.report.quantities import NONE, number, percent, quantity, scale_for
@@ -13,6 +14,13 @@ from stickslip.report.section import Block, Card, Section
 from stickslip.report.tables import html_table
 
 _NAMES = ("own start", "smallest", "largest")
+_EQUAL = 1e-6  # relative difference of bounds that are one
+
+
+def has_width(least: FloatArray, most: FloatArray) -> bool:
+    """Whether bounds differ anywhere by more than rounding."""
+    known = np.isfinite(least) & np.isfinite(most)
+    return bool(np.any(most[known] - least[known] > _EQUAL * np.abs(least[known])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,16 +38,18 @@ def band(view: Tractions) -> Plot | None:
     figure = go.Figure()
     edge = {"mode": "lines", "line": {"color": COLOURS[0], "width": 1}}
     hover = f"%{{y:.4g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>"
-    figure.add_scatter(x=hertz, y=scale.factor * least, name="smallest", hovertemplate=hover, **edge)  # fmt: skip
+    wide = has_width(least, most)
+    if wide:
+        figure.add_scatter(x=hertz, y=scale.factor * least, name="smallest", hovertemplate=hover, **edge)  # fmt: skip
+        figure.add_scatter(
+            x=hertz, y=scale.factor * most, name="largest", fill="tonexty", fillcolor="rgba(0,114,178,0.25)",
+            hovertemplate=hover, **edge,
+        )  # fmt: skip
     figure.add_scatter(
-        x=hertz, y=scale.factor * most, name="largest", fill="tonexty", fillcolor="rgba(0,114,178,0.25)",
-        hovertemplate=hover, **edge,
-    )  # fmt: skip
-    figure.add_scatter(
-        x=hertz, y=scale.factor * own, name="own start", mode="lines+markers", marker={"size": 5},
+        x=hertz, y=scale.factor * own, name="own start" if wide else "amplitude", mode="lines+markers", marker={"size": 5},
         line={"color": INK, "width": 1.4}, hovertemplate=hover,
     )  # fmt: skip
-    if view.has("resonance_amplitude"):
+    if _open_resonance(view):
         figure.add_scatter(
             x=view.floats("resonance_hz")[1:], y=scale.factor * view.floats("resonance_amplitude")[1:], name="bounds of the resonance",
             mode="markers", marker={"symbol": "diamond", "size": 10, "color": COLOURS[1]}, hovertemplate=hover,
@@ -53,24 +63,33 @@ def band(view: Tractions) -> Plot | None:
 
 def _caption(view: Tractions) -> str:
     least, most = (view.floats(f"{name}_amplitude") for name in ("least", "most"))
-    width = most / least - 1
     text = (
         f"Amplitude of {escape(view.text('output'))}, H = {int(view.scalar('harmonics', 0))}: a contact that sticks keeps a traction from before, "
         "and every one within the friction cone is a steady motion. "
     )
     if view.has("branches") and np.nanmax(view.floats("branches")) > 1:
         text += "Where the own start has several motions, the band holds all that sweeps up and down met. "
-    if not np.isfinite(width).any() or np.nanmax(width) < 1e-6:
-        return text + "Here both bounds are equal at all frequencies: the answer is unique."
+    if not has_width(least, most):
+        return text + "The bounds are equal at all frequencies: the answer is unique."
+    width = most / least - 1
     at = int(np.nanargmax(width))
     hertz = number(float(view.floats("frequency_hz")[at]), 5)
     return text + f"The band is widest at {hertz} Hz, {percent(100 * float(width[at]))}. Bounds are found motions; the true band is at least as wide."  # fmt: skip
+
+
+def _open_resonance(view: Tractions) -> bool:
+    """Whether there are bounds of the resonance, and they differ."""
+    if not view.has("resonance_amplitude"):
+        return False
+    _, least, most = view.floats("resonance_amplitude")
+    return has_width(np.atleast_1d(least), np.atleast_1d(most))
 
 
 def resonances(view: Tractions) -> str | None:
     """Return the bounds of the resonance, and what time integration says of them."""
     if not view.has("resonance_amplitude"):
         return None
+    equal = "" if _open_resonance(view) else "<p>The bounds are equal.</p>"
     height, hertz = view.floats("resonance_amplitude"), view.floats("resonance_hz")
     rows = []
     for k, name in enumerate(_NAMES):
@@ -87,11 +106,11 @@ def resonances(view: Tractions) -> str | None:
         off = percent(100 * float(height[k] / height[0] - 1)) if k else ""
         rows.append([name, quantity(float(height[k]), "m"), off, number(float(hertz[k]), 6), again, time, told])  # fmt: skip
     head = ["resonance", "amplitude", "against own start", "at (Hz)", "solved again", "in time", ""]
-    return "<h3>Bounds of the resonance</h3>" + html_table(head, rows)
+    return "<h3>Bounds of the resonance</h3>" + equal + html_table(head, rows)
 
 
 def _cards(view: Tractions) -> list[Card]:
-    if not view.has("resonance_amplitude"):
+    if not _open_resonance(view):
         return []
     own, least, most = (float(h) for h in view.floats("resonance_amplitude"))
     text = f"{percent(100 * (least / own - 1))} to {percent(100 * (most / own - 1))}"
