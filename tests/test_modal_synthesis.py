@@ -21,6 +21,7 @@ from stickslip.response.nonlinear_modes.backbone import (
     nonlinear_mode,
 )
 from stickslip.response.nonlinear_modes.design import is_homogeneous, peak_curve
+from stickslip.response.nonlinear_modes.flanks import along, slips_from
 from stickslip.response.nonlinear_modes.isolated import isolation, other_modes, with_others
 from stickslip.response.nonlinear_modes.more_points import refined
 from stickslip.response.nonlinear_modes.one_mass import ModalOscillator, modal_oscillator
@@ -264,6 +265,26 @@ def test_with_the_other_modes_a_response_that_nothing_slips_in_is_exact():
     for omega, both in zip(found.omega[near], motion[near], strict=True):
         exact = np.linalg.solve(matrix - (omega**2 - 0.01j * omega) * np.eye(2), 0.05 * load.harmonics[1])  # fmt: skip
         np.testing.assert_allclose(both, exact, rtol=1e-5)
+
+
+def test_along_a_curve_the_mode_is_alone_where_nothing_slips_or_little_of_the_others_is_felt():
+    system, load = pair(1.0)
+    own = synthesis_of(system, load)
+    others = other_modes(own)
+    low, high = (synthesise(own, level) for level in (0.05, 3.0))
+    quiet, loud = (along(others, found, 1) for found in (low, high))
+    np.testing.assert_allclose(loud.amplitude, np.abs(with_others(others, high, np.array([1]))[:, 0]))  # fmt: skip
+    # others that move much are added exactly where nothing slips
+    assert np.all(quiet.alone)
+    assert np.max(quiet.share) > 0.2
+    top = np.argmax(loud.amplitude)
+    assert high.place[top] > slips_from(own)
+    assert loud.alone[top]
+    # a neighbour that is near moves as much as the mode does
+    system, load = pair(0.03)
+    own = synthesis_of(system, load)
+    mixed = along(other_modes(own), synthesise(own, 3.0), 1)
+    assert not mixed.alone[np.argmax(mixed.amplitude)]
 
 
 def test_the_peaks_of_all_levels_are_one_curve_and_a_limit_of_its_own_is_no_homogeneous_law():

@@ -63,7 +63,15 @@ def test_levels_of_b3_from_its_mode_with_direct_solutions_beside_them(tmp_path):
     figures = plots(outcome.tree)
     assert {"modal_synthesis", "modal_synthesis_peaks", "modal_synthesis_passage"} <= set(figures)
     told = outcome.summaries["modal_synthesis"][0]
-    assert told.rows[0][4] == "trusted"
+    assert told.head[6] == "answer"
+    assert told.rows[0][6] == "trusted"
+    through = outcome.summaries["modal_synthesis"][1]
+    assert len(through.rows) == 2
+    assert case["passage_share"].values[:, 0] == pytest.approx(case["passage_peak_amplitude"].values[:, 0] / case["peak_amplitude"].values)  # fmt: skip
+    # one mass has no other mode: all of the curve is alone, and as far off as the text of the theory says
+    assert np.all(case["alone"].values[case["curve"].values >= 0] == 1)
+    assert np.all(np.abs(case["along_error"].values) < 0.03)
+    assert any("synthesised curves differ" in v.why for v in outcome.verdicts)
 
 
 def test_a_level_at_which_the_mode_is_not_alone_is_refused_and_not_shown(tmp_path):

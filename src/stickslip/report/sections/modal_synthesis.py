@@ -6,15 +6,16 @@ from html import escape
 import numpy as np
 import plotly.graph_objects as go
 
-from stickslip.arrays import FloatArray
+from stickslip.arrays import BoolArray, FloatArray
 from stickslip.report.node import Node
-from stickslip.report.plot import INK, MUTED, Plot, colour, log_ticks, styled
-from stickslip.report.quantities import NONE, counted, joined, number, percent, quantity, scale_for
+from stickslip.report.plot import INK, MUTED, Plot, colour, log_ticks, ramp, ring, styled
+from stickslip.report.quantities import NONE, counted, joined, number, quantity, scale_for
 from stickslip.report.section import Block, Card, Section
 from stickslip.report.tables import shortened
+from stickslip.study.analyses.synthesis.percents import percent
 
 NAME = "modal_synthesis"
-MOST = 12  # curves that get a name of their own
+MOST = 24  # curves that get a name of their own
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,55 +37,96 @@ class Synthesised(Node):
         """Levels that have a response."""
         return [i for i, a in enumerate(self.answers) if a in ("trusted", "doubtful")]
 
+    def tint(self, level: int) -> str:
+        """Return the colour of a level: from dark for the lowest to gold for the highest."""
+        order = np.argsort(np.argsort(self.levels))
+        return ramp(self.levels.size)[int(order[level])]
+
 
 def responses(view: Synthesised) -> Plot | None:
     """Show the responses, the nonlinear mode through their peaks, and direct solutions where there are any."""
     if not view.has("amplitude") or not view.shown:
         return None
-    hertz, amplitude = (view.values(n, "level", "point") for n in ("frequency_hz", "amplitude"))
-    stable, curve = (view.values(n, "level", "point") for n in ("stable", "curve"))
+    hertz, amplitude, stable, curve, alone = (view.values(n, "level", "point") for n in ("frequency_hz", "amplitude", "stable", "curve", "alone"))  # fmt: skip
     scale, figure = scale_for(amplitude, "m"), go.Figure()
     direct = view.has("direct_amplitude")
-    for i in view.shown:
+    for i in view.shown if direct else ():
+        # below the curves, so that they hide nothing
+        figure.add_scatter(
+            x=view.values("direct_frequency_hz", "level", "direct_point")[i],
+            y=scale.factor * view.values("direct_amplitude", "level", "direct_point")[i],
+            mode="markers", name="direct solution", legendgroup="direct", showlegend=i == view.shown[0], opacity=0.7, marker=ring(view.tint(i), 5, 0.8),
+            hovertemplate=f"direct, level {number(float(view.levels[i]))}: %{{y:.5g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>",
+        )  # fmt: skip
+    every = -(-len(view.shown) // MOST)
+    for k, i in enumerate(view.shown):
         label = f"level {number(float(view.levels[i]))}"
         doubt = ", doubtful" if view.answers[i] == "doubtful" else ""
-        for part in range(int(curve[i].max()) + 1):
-            own = curve[i] == part
-            for held, dash in ((1, "solid"), (0, "dot")):
-                y = np.where(stable[i][own] == held, scale.factor * amplitude[i][own], np.nan)
+        named = k % every != 0
+        for keep, width, opacity in ((True, 2.0, 1.0), (False, 1.0, 0.6)):
+            for steady in (1, 0):
+                y = _where(
+                    amplitude[i], curve[i], (stable[i] == steady) & ((alone[i] == 1) == keep)
+                )
                 if not np.any(np.isfinite(y)):
                     continue
+                dash = ("solid" if keep else "dash") if steady else "dot"
                 figure.add_scatter(
-                    x=hertz[i][own], y=y, mode="lines", name=f"{label}{doubt}", legendgroup=label,
-                    showlegend=part == 0 and held == 1 and i < MOST, line={"color": colour(i), "width": 1.8, "dash": dash},
-                    hovertemplate=f"{label}{doubt}: %{{y:.5g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>",
+                    x=hertz[i], y=scale.factor * y, mode="lines", name=f"{label}{doubt}", legendgroup=label, showlegend=not named,
+                    opacity=opacity, line={"color": view.tint(i), "width": width, "dash": dash},
+                    hovertemplate=f"{label}{doubt}{'' if keep else ', other modes above 5 %'}: %{{y:.5g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>",
                 )  # fmt: skip
-        if direct:
-            figure.add_scatter(
-                x=view.values("direct_frequency_hz", "level", "direct_point")[i],
-                y=scale.factor * view.values("direct_amplitude", "level", "direct_point")[i],
-                mode="markers", name="direct solution", legendgroup="direct", showlegend=i == view.shown[0],
-                marker={"color": colour(i), "size": 5, "symbol": "circle-open"},
-                hovertemplate=f"direct, {label}: %{{y:.5g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>",
-            )  # fmt: skip
+                named = True
+        figure.add_scatter(
+            x=[view.floats("peak_frequency_hz")[i]], y=[scale.factor * view.floats("peak_amplitude")[i]], mode="markers", legendgroup=label,
+            showlegend=False, marker={"symbol": "diamond" if doubt else "circle", "size": 7, "color": view.tint(i)},
+            hovertemplate=f"peak of {label}{doubt}: %{{y:.5g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>",
+        )  # fmt: skip
     mode, height = view.floats("backbone_frequency_hz"), view.floats("backbone_amplitude")
     near = (height >= np.nanmin(amplitude)) & (height <= 1.2 * np.nanmax(amplitude))
     figure.add_scatter(
         x=mode[near], y=scale.factor * height[near], mode="lines", name="nonlinear mode",
         line={"color": INK, "width": 1.4, "dash": "dash"}, hovertemplate=f"nonlinear mode: %{{y:.5g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>",
     )  # fmt: skip
-    styled(figure, 480)
+    styled(figure, 560)
+    figure.update_layout(legend_tracegroupgap=0)
     span = np.concatenate([hertz[i] for i in view.shown])
     figure.update_xaxes(title_text="frequency (Hz)", range=[np.nanmin(span), np.nanmax(span)])
     figure.update_yaxes(type="log", title_text=f"amplitude of {escape(view.text('output'))} ({scale.unit})", **log_ticks(scale.factor * amplitude[np.isfinite(amplitude)]))  # fmt: skip
     caption = (
-        "Each curve is the response at a level of the loads, from the nonlinear mode alone, the other modes added as linear ones. Dotted: unstable in "
-        "the mode's own amplitude and phase."
+        "Each curve is the response at a level of the loads, from the nonlinear mode, the other modes added as linear ones. The answer of a level, trusted "
+        "(dot) or doubtful (diamond), is that of its peak. Thin and dashed: something slips and the other modes move by more than 5 % of the mode, or change "
+        "the amplitude by more than that; the curve may be far off there. Dotted: unstable in the mode's own amplitude and phase."
     )
-    caption += " Circles are solved directly." if direct else ""
+    caption += f" Rings are solved directly.{_along(view)}" if direct else ""
     left = [i for i, a in enumerate(view.answers) if a in ("refused", "beyond")]
     caption += f" {counted(len(left), 'level')} not shown: see the table." if left else ""
     return Plot(f"modal_synthesis{view.key}", "Responses from one nonlinear mode", caption, figure)
+
+
+def _where(amplitude: FloatArray, curve: FloatArray, own: BoolArray) -> FloatArray:
+    """Return the amplitudes of some points and the first beyond each run, so that runs meet; gaps elsewhere and between curves."""
+    next_to = own.copy()
+    same = curve[1:] == curve[:-1]
+    next_to[1:] |= own[:-1] & same
+    return np.where(next_to & (curve >= 0), amplitude, np.nan)
+
+
+def _share(value: float) -> str:
+    """Write a share in per cent, as the terminal does."""
+    return escape(percent(value)) if np.isfinite(value) else NONE
+
+
+def _along(view: Synthesised) -> str:
+    """Say how far the curves are from the direct ones where the mode is alone."""
+    error = np.abs(view.floats("along_error")) if view.has("along_error") else np.zeros(0)
+    if not np.any(np.isfinite(error)):
+        return ""
+    worst = int(np.nanargmax(error))
+    return (
+        f" Where the lines around the peaks are full they differ from them by up to {_share(float(error[worst]))}, at level "
+        f"{number(float(view.levels[worst]))} and {number(float(view.floats('along_error_hz')[worst]), 5)} Hz."
+    )
 
 
 def peaks(view: Synthesised) -> Plot | None:
@@ -99,6 +141,11 @@ def peaks(view: Synthesised) -> Plot | None:
         x=level[known], y=scale.factor * per[known], mode="lines", name="nonlinear mode", line={"color": colour(0), "width": 2},
         hovertemplate=f"%{{y:.5g}} {scale.unit} per level at level %{{x:.5g}}<extra></extra>",
     )  # fmt: skip
+    if view.has("direct_peak_amplitude"):
+        figure.add_scatter(
+            x=view.levels, y=scale.factor * view.floats("direct_peak_amplitude") / view.levels, mode="markers", name="direct solution",
+            marker=ring(INK, 14, 1.0), hovertemplate=f"direct: %{{y:.5g}} {scale.unit} per level<extra></extra>",
+        )  # fmt: skip
     for answer, symbol, tint in (("trusted", "circle", colour(0)), ("doubtful", "diamond-open", colour(1)), ("refused", "x", MUTED)):  # fmt: skip
         own = [i for i, a in enumerate(view.answers) if a == answer]
         if own:
@@ -107,11 +154,6 @@ def peaks(view: Synthesised) -> Plot | None:
                 x=view.levels[own], y=scale.factor * at, mode="markers", name=answer,
                 marker={"symbol": symbol, "size": 9, "color": tint}, hovertemplate=f"{answer}: level %{{x:.5g}}<extra></extra>",
             )  # fmt: skip
-    if view.has("direct_peak_amplitude"):
-        figure.add_scatter(
-            x=view.levels, y=scale.factor * view.floats("direct_peak_amplitude") / view.levels, mode="markers", name="direct solution",
-            marker={"symbol": "circle-open", "size": 11, "color": INK}, hovertemplate=f"direct: %{{y:.5g}} {scale.unit} per level<extra></extra>",
-        )  # fmt: skip
     styled(figure, 420)
     figure.update_xaxes(type="log", title_text="level of the loads", **log_ticks(level[known]))
     figure.update_yaxes(title_text=f"peak per level ({scale.unit})", rangemode="tozero")
@@ -138,10 +180,10 @@ def passages(view: Synthesised) -> Plot | None:
             name = f"level {number(float(view.levels[i]))}, {number(float(rate))} Hz/s"
             figure.add_scatter(
                 x=hertz[i, j], y=scale.factor * amplitude[i, j], mode="lines", name=name,
-                line={"color": colour(i), "width": 1.5, "dash": ("solid", "dash", "dot", "dashdot")[j % 4]},
+                line={"color": view.tint(i), "width": 1.5, "dash": ("solid", "dash", "dot", "dashdot")[j % 4]},
                 hovertemplate=f"{name}: %{{y:.5g}} {scale.unit} at %{{x:.6g}} Hz<extra></extra>",
             )  # fmt: skip
-    styled(figure, 440)
+    styled(figure, 500)
     figure.update_xaxes(title_text="frequency of the loads (Hz)")
     figure.update_yaxes(title_text=f"amplitude ({scale.unit})", rangemode="tozero")
     caption = "The frequency runs through the resonance at a constant rate, from the steady motion at its beginning: the slowly varying amplitude of the nonlinear mode."
@@ -152,22 +194,53 @@ def table(view: Synthesised) -> str:
     """Return the levels, their peaks, and why they are trusted or not."""
     if not view.has("level"):
         return ""
-    direct = view.has("direct_error")
-    head = ["level", "peak", "at (Hz)", "answer", "other modes"]
-    head += ["direct peak", "error", "why"] if direct else ["why"]
+    head = ["level", "peak", "at (Hz)", "answer of the peak", "motion of the other modes", "predicted error of the peak", "alone around the peak (Hz)"]  # fmt: skip
+    head.append("why")
     rows = []
     for i, answer in enumerate(view.answers):
-        peak, hertz, foreign = (float(view.floats(n)[i]) for n in ("peak_amplitude", "peak_frequency_hz", "foreign"))  # fmt: skip
+        peak, hertz, foreign, low, high = (float(view.floats(n)[i]) for n in ("peak_amplitude", "peak_frequency_hz", "foreign", "alone_from_hz", "alone_to_hz"))  # fmt: skip
+        moves = max(float(view.floats(n)[i]) for n in ("others_in_output", "others_in_gaps"))
         row = [
             number(float(view.levels[i])), quantity(peak, "m", 5), number(hertz, 7) if np.isfinite(hertz) else NONE,
-            f"<b>{answer}</b>" if answer != "trusted" else answer,
-            percent(foreign) if np.isfinite(foreign) else NONE,
+            f"<b>{answer}</b>" if answer != "trusted" else answer, _share(moves), _share(foreign),
+            f"{number(low, 5)} to {number(high, 5)}" if np.isfinite(low) else "nowhere" if np.isfinite(peak) else NONE,
         ]  # fmt: skip
-        if direct:
-            error = float(view.floats("direct_error")[i])
-            row += [quantity(float(view.floats("direct_peak_amplitude")[i]), "m", 5), f"{number(100 * error, 2)} %" if np.isfinite(error) else NONE]  # fmt: skip
-        rows.append([*row, escape(view.labels_of("why")[i])])
-    return f"<h3>Levels</h3>{shortened(head, rows, 'levels')}{_cycles(view)}"
+        rows.append([*row, view.labels_of("why")[i]])
+    said = (
+        "<p>Predicted and found errors, and the answer, are those of the peak. <i>Alone</i>: from where to where around the peak nothing slips, or the "
+        "other modes move by at most 5 % of the mode and change the amplitude by at most that.</p>"
+    )
+    return f"<h3>Levels</h3>{said}{shortened(head, rows, 'levels', worded=True)}{_cycles(view)}"
+
+
+def against_direct(view: Synthesised) -> str:
+    """Return the differences from the direct solutions, of the peaks and along the curves."""
+    if not view.has("direct_error"):
+        return ""
+    names = ("peak_amplitude", "direct_peak_amplitude", "direct_error", "along_error", "along_error_hz")  # fmt: skip
+    columns = [view.floats(n) for n in names]
+    rows = []
+    for i in range(view.levels.size):
+        peak, direct, error, along, hertz = (float(c[i]) for c in columns)
+        rows.append([number(float(view.levels[i])), quantity(peak, "m", 5), quantity(direct, "m", 5), _share(error), _share(along), number(hertz, 5)])  # fmt: skip
+    head = ["level", "peak", "direct peak", "error of the peak", "largest along the curve, where alone", "at (Hz)"]  # fmt: skip
+    return f"<h3>Against direct solutions</h3>{shortened(head, rows, 'levels')}"
+
+
+def passage_peaks(view: Synthesised) -> str:
+    """Return the peak of each passage beside the steady one."""
+    if not view.has("passage_peak_amplitude"):
+        return ""
+    peak, hertz, share, change = (view.values(f"passage_{n}", "level", "rate") for n in ("peak_amplitude", "peak_frequency_hz", "share", "change"))  # fmt: skip
+    rows = [
+        [
+            number(float(view.levels[i])), number(float(rate)), quantity(float(peak[i, j]), "m", 5), number(float(hertz[i, j]), 5),
+            quantity(float(view.floats("peak_amplitude")[i]), "m", 5), _share(float(share[i, j])), _share(float(change[i, j])),
+        ]
+        for i in view.shown for j, rate in enumerate(view.floats("passage_hz_per_s")) if np.isfinite(peak[i, j])
+    ]  # fmt: skip
+    head = ["level", "rate (Hz/s)", "peak", "at (Hz)", "steady peak", "share of it", "change in a radian"]  # fmt: skip
+    return f"<h3>Passages</h3>{shortened(head, rows, 'passages')}" if rows else ""
 
 
 def _cycles(view: Synthesised) -> str:
@@ -179,10 +252,15 @@ def _cycles(view: Synthesised) -> str:
 
 
 def _cards(view: Synthesised) -> list[Card]:
-    shown, every = len(view.shown), len(view.answers)
-    left = every - shown
-    return [Card(f"{shown} of {every}", "levels from one nonlinear mode", f"{left} refused or beyond it" if left else "the mode answers alone", left > 0)]  # fmt: skip
+    words = {"trusted": "trusted", "doubtful": "doubtful", "refused": "refused", "beyond": "beyond the mode"}  # fmt: skip
+    each = {answer: view.answers.count(answer) for answer in words}
+    note = joined([f"{n} {words[answer]}" for answer, n in each.items() if n and answer != "trusted"])  # fmt: skip
+    return [Card(f"{each['trusted']} of {len(view.answers)}", "peaks of levels trusted to one nonlinear mode", note or "no other is doubtful or refused", bool(note))]  # fmt: skip
 
 
-_BLOCK = Block("modal-synthesis", "Nonlinear modal synthesis", (responses, peaks, passages, table))
+_BLOCK = Block(
+    "modal-synthesis",
+    "Nonlinear modal synthesis",
+    (responses, peaks, passages, passage_peaks, table, against_direct),
+)
 SECTION: Section = Section(NAME, ("level",), Synthesised, (_BLOCK,), by_case=True, cards=_cards)

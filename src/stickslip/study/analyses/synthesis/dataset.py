@@ -8,6 +8,7 @@ import xarray as xr
 
 from stickslip.arrays import FloatArray
 from stickslip.study.analyses.analysis import Solved
+from stickslip.study.analyses.synthesis.ranges import along_error, around_peak
 from stickslip.study.analyses.synthesis.records import SynthesisLevel
 from stickslip.study.analyses.synthesis.words import case_verdicts
 from stickslip.study.analyses.verdict import ATTRIBUTE, of_all_cases, to_json
@@ -49,16 +50,24 @@ ABOUT = {
     "amplitude": ("level point", "m", "amplitude of the output in the first harmonic"),
     "curve": ("level point", "1", "0: hangs together with small amplitudes; others are detached"),
     "stable": ("level point", "1", "1 where slow changes of this mode die out"),
+    "others": ("level point", "1", "motion of the other modes over that of the mode, at the output or in the gaps"),
+    "alone": ("level point", "1", "1 where the mode answers alone: nothing slips, or the others change motion and amplitude by at most 5 %"),
+    "alone_from_hz": ("level", "Hz", "lowest frequency around the peak at which the mode answers alone; NaN where it does not at the peak"),
+    "alone_to_hz": ("level", "Hz", "highest such frequency"),
     "direct_frequency_hz": ("level direct_point", "Hz", "frequency of the direct solution"),
     "direct_amplitude": ("level direct_point", "m", "amplitude of the output in the first harmonic, solved directly"),
     "direct_peak_amplitude": ("level", "m", "peak of the direct solution"),
     "direct_peak_frequency_hz": ("level", "Hz", "its frequency"),
     "direct_error": ("level", "1", "synthesised peak over the direct one, less one"),
+    "along_error": ("level", "1", "largest difference of synthesised and direct curve, over the direct one, where the mode answers alone around the peak"),
+    "along_error_hz": ("level", "Hz", "its frequency"),
     "direct_seconds": ("level", "s", "time of the processor for the direct solution"),
     "passage_hz_per_s": ("rate", "Hz/s", "rates of the passages"),
     "passage_frequency_hz": ("level rate moment", "Hz", "frequency of the load during a passage"),
     "passage_amplitude": ("level rate moment", "m", "amplitude of the output then"),
     "passage_peak_amplitude": ("level rate", "m", "its largest"),
+    "passage_peak_frequency_hz": ("level rate", "Hz", "frequency of the load then"),
+    "passage_share": ("level rate", "1", "that amplitude over the steady peak"),
     "passage_finished": ("level rate", "1", "1 where a passage came to its end"),
     "passage_change": ("level rate", "1", "relative change of the amplitude in a radian of the vibration, while it is above half its peak"),
 }  # fmt: skip
@@ -117,6 +126,10 @@ def _of_levels(levels: Sequence[SynthesisLevel], rates: FloatArray) -> dict[str,
         "amplitude": _rows(levels, "amplitude"),
         "curve": _rows(levels, "curve", -1.0).astype(np.int64),
         "stable": _rows(levels, "stable", -1.0).astype(np.int64),
+        "others": _rows(levels, "others"),
+        "alone": _rows(levels, "alone", -1.0).astype(np.int64),
+        "alone_from_hz": np.array([around_peak(one)[0] for one in levels]) / HZ,
+        "alone_to_hz": np.array([around_peak(one)[1] for one in levels]) / HZ,
     }
     if any(one.direct_omega.size for one in levels):
         values |= {
@@ -125,20 +138,30 @@ def _of_levels(levels: Sequence[SynthesisLevel], rates: FloatArray) -> dict[str,
             "direct_peak_amplitude": each("direct_peak"),
             "direct_peak_frequency_hz": each("direct_peak_omega") / HZ,
             "direct_error": each("peak") / each("direct_peak") - 1.0,
+            "along_error": np.array([along_error(one)[0] for one in levels]),
+            "along_error_hz": np.array([along_error(one)[1] for one in levels]) / HZ,
             "direct_seconds": each("direct_seconds"),
         }
     if rates.size:
-        amplitude = each("passage_amplitude")
-        values |= {
-            "passage_hz_per_s": rates,
-            "passage_frequency_hz": each("passage_omega") / HZ,
-            "passage_amplitude": amplitude,
-            "passage_peak_amplitude": np.max(np.where(np.isfinite(amplitude), amplitude, -np.inf), axis=2),
-            "passage_finished": each("passage_finished"),
-            "passage_change": each("passage_change"),
-        }  # fmt: skip
-        values["passage_peak_amplitude"][~np.isfinite(values["passage_peak_amplitude"])] = np.nan
+        values |= _of_passages(levels, rates)
     return values
+
+
+def _of_passages(levels: Sequence[SynthesisLevel], rates: FloatArray) -> dict[str, Any]:
+    omega, amplitude = (np.array([getattr(one, n) for one in levels]) for n in ("passage_omega", "passage_amplitude"))  # fmt: skip
+    known = np.isfinite(amplitude)
+    top = np.argmax(np.where(known, amplitude, -np.inf), axis=2)[:, :, None]
+    peak, at = (np.take_along_axis(v, top, axis=2)[:, :, 0] for v in (amplitude, omega))
+    return {
+        "passage_hz_per_s": rates,
+        "passage_frequency_hz": omega / HZ,
+        "passage_amplitude": amplitude,
+        "passage_peak_amplitude": peak,
+        "passage_peak_frequency_hz": at / HZ,
+        "passage_share": peak / np.array([one.peak for one in levels])[:, None],
+        "passage_finished": np.array([one.passage_finished for one in levels]),
+        "passage_change": np.array([one.passage_change for one in levels]),
+    }
 
 
 def _rows(levels: Sequence[SynthesisLevel], name: str, missing: float = np.nan) -> FloatArray:

@@ -31,6 +31,10 @@ class SynthesisLevel:
         Number of curves that do not hang together with small amplitudes.
     omega, amplitude, curve, stable
         (p,) of the response: rad/s, m, number of its curve, 1 where it is stable in this mode.
+    others
+        (p,) motion of the other modes over that of the mode, at the output or in the gaps.
+    alone
+        (p,) 1 where the mode answers alone: see `Along`.
     direct_omega, direct_amplitude
         (q,) of the direct solution, in the order of its branch; empty where it was not asked for.
     direct_peak, direct_peak_omega
@@ -64,6 +68,8 @@ class SynthesisLevel:
     amplitude: FloatArray
     curve: IntArray
     stable: IntArray
+    others: FloatArray
+    alone: IntArray
     direct_omega: FloatArray
     direct_amplitude: FloatArray
     direct_peak: float

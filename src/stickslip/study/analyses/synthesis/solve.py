@@ -15,13 +15,13 @@ from stickslip.response.forced.problem import forced_problem
 from stickslip.response.forced.response import forced_response
 from stickslip.response.forced.sweep import Sweep
 from stickslip.response.nonlinear_modes.design import is_homogeneous, peak_curve
+from stickslip.response.nonlinear_modes.flanks import along
 from stickslip.response.nonlinear_modes.isolated import (
     Isolation,
     OtherModes,
     isolation,
     other_modes,
     peak_with_others,
-    with_others,
 )
 from stickslip.response.nonlinear_modes.one_mass import ModalOscillator, modal_oscillator
 from stickslip.response.nonlinear_modes.passage import Swept, passage_through_resonance
@@ -33,6 +33,7 @@ from stickslip.response.nonlinear_modes.synthesis import (
 )
 from stickslip.study.analyses.analysis import Notes
 from stickslip.study.analyses.synthesis.backbone_note import backbone_of
+from stickslip.study.analyses.synthesis.percents import percent
 from stickslip.study.analyses.synthesis.question import Question
 from stickslip.study.analyses.synthesis.records import SynthesisLevel
 from stickslip.study.keep.progress import LOG, advance
@@ -85,21 +86,21 @@ def solve(
 
 def judged(alone: Isolation, resolved: float) -> tuple[str, str]:
     """Return what is to be thought of a peak, and why."""
-    percent = 100 * alone.foreign
-    motion = f"the other modes move by {100 * max(alone.output, alone.gaps):.2g} % of the mode"
-    near = f"the next frequency is {100 * alone.distance:.2g} % away"
+    off = percent(alone.foreign)
+    motion = f"the other modes move by {percent(max(alone.output, alone.gaps))} of the mode"
+    near = f"the next frequency is {percent(alone.distance)} away"
     if not np.isfinite(alone.distance):
         motion, near = "there is no other mode", "nothing is near"
     if alone.linear:
         return "trusted", "nothing slips: the other modes are added, and the response is exact"
     if alone.foreign > DOUBTFUL:
-        return "refused", f"{motion}, {near}: the peak would be off by about {percent:.2g} %"
+        return "refused", f"{motion}, {near}: the peak would be off by about {off}"
     if alone.foreign > TRUSTED:
-        return "doubtful", f"{motion}, {near}: the peak may be off by about {percent:.2g} %"
+        return "doubtful", f"{motion}, {near}: the peak may be off by about {off}"
     if resolved > COARSE:
-        return "doubtful", f"the nonlinear mode has too few points here: without every second one the peak moves by {100 * resolved:.2g} %"  # fmt: skip
+        return "doubtful", f"the nonlinear mode has too few points here: without every second one the peak moves by {percent(resolved)}"  # fmt: skip
     if alone.harmonics > HARMONICS:
-        return "doubtful", f"higher harmonics have {100 * alone.harmonics:.2g} % of the first, and the load works on that alone"  # fmt: skip
+        return "doubtful", f"higher harmonics have {percent(alone.harmonics)} of the first, and the load works on that alone"  # fmt: skip
     return "trusted", motion if not np.isfinite(alone.distance) else f"{motion}, {near}"
 
 
@@ -125,7 +126,7 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
         swept = f"the highest peak that a sweep meets has {1e3 * peaks[0][0]:.4g} mm at {peaks[0][1] / HZ:.5g} Hz"
         answer, why = "doubtful", f"{swept}, that of a detached curve {1e3 * detached[0]:.4g} mm at {detached[1] / HZ:.5g} Hz, which a sweep does not reach; {why}"  # fmt: skip
     inside = (curve.omega >= shared.ends[0]) & (curve.omega <= shared.ends[1]) & shown
-    amplitude = np.abs(with_others(shared.others, curve, np.array([question.dof]))[:, 0])
+    beside = along(shared.others, curve, question.dof)
     spent = process_time() - began
     passages = _passages(shared, level, shown=shown)
     began = process_time()
@@ -150,7 +151,9 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
         resolved=resolved,
         detached=int(curve.curve.max(initial=0)) if shown else 0,
         omega=curve.omega[inside],
-        amplitude=amplitude[inside],
+        amplitude=beside.amplitude[inside],
+        others=beside.share[inside],
+        alone=beside.alone[inside].astype(np.int64),
         curve=curve.curve[inside],
         stable=curve.stable[inside].astype(np.int64),
         direct_omega=direct[0],

@@ -5,8 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from stickslip.arrays import IntArray
+from stickslip.arrays import FloatArray, IntArray
+from stickslip.response.nonlinear_modes.flanks import ALONE
 from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.analyses.synthesis.percents import percent
 from stickslip.study.analyses.verdict import Level, Verdict
 from stickslip.study.keep.netcdf import alike, one_case
 
@@ -18,8 +20,11 @@ REMEDIES = {
     "beyond": "Widen modal_synthesis.amplitude_mm, or ask for [forced_response] there.",
 }
 APART = "[all_motions] searches for motions that a sweep does not reach."
+BESIDE = "The direct solutions beside it show the error."
 FAST = 0.05  # relative change in a radian beyond which a passage is doubtful
 WRONG = 0.02  # of the peak, against the direct solution
+ALONG = 0.05  # of the curve where the mode answers alone, against the direct solution
+FEW = 4  # levels that are named each
 
 
 def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
@@ -47,7 +52,7 @@ def _of_answer(
     foreign = np.nan_to_num(case["foreign"].values[own], nan=0.0)
     worst = int(own[int(np.argmax(foreign))])
     levels = case["level"].values[own]
-    span = f"level {levels[0]:g}" if own.size == 1 else f"{own.size} levels from {levels.min():g} to {levels.max():g}"  # fmt: skip
+    span = _levels(levels)
     what = {
         "trusted": f"the nonlinear mode answers alone at {span}",
         "doubtful": f"the response at {span} is doubtful",
@@ -57,7 +62,26 @@ def _of_answer(
     level: Level = "trusted" if answer == "trusted" else "doubtful"
     at = "" if own.size == 1 else f"at {case['level'].values[worst]:g} "
     why = f"{what}: {at}{case['why'].values[worst]!s}"
-    return Verdict(level, label, None, why, remedy)
+    if answer in ("trusted", "doubtful"):
+        why += f". {_of_peaks(case, own)}"
+    solved = remedy == REMEDIES["doubtful"] and "direct_error" in case
+    return Verdict(level, label, None, why, BESIDE if solved else remedy)
+
+
+def _of_peaks(case: Mapping[str, xr.Variable], own: IntArray) -> str:
+    """Say that this is the peak, and within which frequencies around it the mode answers alone: the narrowest of some levels."""
+    low, high = (case[name].values[own] for name in ("alone_from_hz", "alone_to_hz"))
+    around = np.flatnonzero(np.isfinite(low))
+    said = "This is said of the peak" if own.size == 1 else "This is said of the peaks"
+    if not around.size:
+        return f"{said}: the rest of the curve may be off by more, since the other modes change it by more than {percent(ALONE)}"
+    few = int(around[int(np.argmin(high[around] / low[around]))])
+    level = "" if own.size == 1 else f" at level {case['level'].values[own[few]]:g}"
+    wider = " and in a wider range at the others" if around.size == own.size > 1 else ""
+    rest = np.delete(own, around)
+    if rest.size:
+        wider = f", and at {_levels(case['level'].values[rest])} not even at the peak"
+    return f"{said}: along the curve the other modes stay below {percent(ALONE)} from {low[few]:.5g} to {high[few]:.5g} Hz{level}{wider}"
 
 
 def _of_direct(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
@@ -68,9 +92,18 @@ def _of_direct(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     if not np.any(shown):
         return []
     worst = int(np.nanargmax(np.where(shown, error, np.nan)))
-    why = f"synthesised peaks differ from direct ones by up to {100 * error[worst]:.2g} %, at level {case['level'].values[worst]:g}"
+    level = case["level"].values
+    why = f"synthesised peaks differ from direct ones by up to {percent(error[worst])}, at level {level[worst]:g}"
     off = bool(error[worst] > WRONG)
-    return [Verdict("doubtful" if off else "trusted", label, None, why, "Believe the direct ones." if off else "")]  # fmt: skip
+    found = [Verdict("doubtful" if off else "trusted", label, None, why, "Believe the direct ones." if off else "")]  # fmt: skip
+    along = np.abs(case["along_error"].values)
+    if np.any(np.isfinite(along)):
+        worst = int(np.nanargmax(along))
+        off = bool(along[worst] > ALONG)
+        hertz = case["along_error_hz"].values[worst]
+        why = f"where the other modes stay below {percent(ALONE)} synthesised curves differ from direct ones by up to {percent(along[worst])}, at level {level[worst]:g} and {hertz:.5g} Hz"
+        found.append(Verdict("doubtful" if off else "trusted", label, None, why, "Believe the direct ones." if off else ""))  # fmt: skip
+    return found
 
 
 def _of_passages(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
@@ -78,14 +111,26 @@ def _of_passages(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
         return []
     change, finished = case["passage_change"].values, case["passage_finished"].values
     found, known = [], np.isfinite(change)
-    if np.any(known & (change > FAST)):
-        rate = float(np.min(case["passage_hz_per_s"].values[np.any(known & (change > FAST), axis=0)]))  # fmt: skip
-        why = f"from {rate:g} Hz/s on the amplitude changes by more than {100 * FAST:g} % in a radian of the vibration"
+    fast = known & (change > FAST)
+    if np.any(fast):
+        rate = float(np.min(case["passage_hz_per_s"].values[np.any(fast, axis=0)]))
+        levels = case["level"].values[np.any(fast, axis=1)]
+        why = f"in passages from {rate:g} Hz/s on at {_levels(levels)} the amplitude changes by more than {percent(FAST)} in a radian of the vibration"
         found.append(Verdict("doubtful", label, None, why, "Integrate in time where the peak counts."))  # fmt: skip
-    if np.any(known & (finished == 0)):
-        why = "a passage left the nonlinear mode at its end"
+    left = known & (finished == 0)
+    if np.any(left):
+        why = f"a passage at {_levels(case['level'].values[np.any(left, axis=1)])} left the nonlinear mode at its end"
         found.append(Verdict("doubtful", label, None, why, "Raise modal_synthesis.amplitude_mm."))
     return found
+
+
+def _levels(levels: FloatArray) -> str:
+    """Name levels: each of a few, the number and the range of many."""
+    if levels.size == 1:
+        return f"level {levels[0]:g}"
+    if levels.size <= FEW:
+        return f"levels {', '.join(f'{v:g}' for v in levels[:-1])} and {levels[-1]:g}"
+    return f"{levels.size} levels from {levels.min():g} to {levels.max():g}"
 
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
@@ -98,6 +143,7 @@ def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
         head = f"{'; '.join(labels)}: " if labels else ""
         if "level" in case:
             found.append(_table(case, head))
+            found += _passages(case, head)
     return tuple(found)
 
 
@@ -109,15 +155,52 @@ def _table(case: xr.Dataset, head: str) -> TextTable:
             f"{float(case['level'][i]):g}",
             _number(1e3 * float(case["peak_amplitude"][i])),
             _number(float(case["peak_frequency_hz"][i]), 7),
-            _number(100 * float(case["foreign"][i]), 2),
+            percent(float(max(case["others_in_output"][i], case["others_in_gaps"][i])), unit=False),
+            percent(float(case["foreign"][i]), unit=False),
+            _range(case, i),
             str(case["answer"][i].values),
         ]
         if direct:
-            row += [_number(1e3 * float(case["direct_peak_amplitude"][i])), _number(100 * float(case["direct_error"][i]), 2)]  # fmt: skip
+            row += [_number(1e3 * float(case["direct_peak_amplitude"][i])), percent(float(case["direct_error"][i]), unit=False), percent(float(case["along_error"][i]), unit=False)]  # fmt: skip
         rows.append(tuple(row))
-    beside = ("direct mm", "error %") if direct else ()
-    columns = ("level", "peak mm", "Hz", "other modes %", "answer", *beside)
-    return TextTable(f"{head}Responses of one nonlinear mode, {case.attrs.get('output', '')}", columns, tuple(rows))  # fmt: skip
+    beside = ("direct mm", "error %", "along %") if direct else ()
+    lines = [f"others: motion of the other modes over that of the mode, at the peak; predicted error: that of the peak; alone: where around the peak the others stay below {percent(ALONE)}"]  # fmt: skip
+    if direct:
+        lines.append("error: of the peak against the direct one; along: the largest along the curve where the mode is alone")  # fmt: skip
+    columns = (
+        "level",
+        "peak mm",
+        "Hz",
+        "others %",
+        "predicted error %",
+        "alone Hz",
+        "answer",
+        *beside,
+    )
+    return TextTable(f"{head}Responses of one nonlinear mode, {case.attrs.get('output', '')}", columns, tuple(rows), tuple(lines))  # fmt: skip
+
+
+def _range(case: xr.Dataset, i: int) -> str:
+    low, high = (float(case[name][i]) for name in ("alone_from_hz", "alone_to_hz"))
+    return f"{low:.5g} to {high:.5g}" if np.isfinite(low) else "-"
+
+
+def _passages(case: xr.Dataset, head: str) -> list[TextTable]:
+    """Return the peaks of the passages."""
+    if "passage_peak_amplitude" not in case:
+        return []
+    rows = []
+    for i in range(case.sizes["level"]):
+        for j in range(case.sizes["rate"]):
+            peak = float(case["passage_peak_amplitude"][i, j])
+            if np.isfinite(peak):
+                rows.append((
+                    f"{float(case['level'][i]):g}", f"{float(case['passage_hz_per_s'][j]):g}", _number(1e3 * peak),
+                    _number(float(case["passage_peak_frequency_hz"][i, j])), percent(float(case["passage_share"][i, j]), unit=False),
+                    percent(float(case["passage_change"][i, j]), unit=False),
+                ))  # fmt: skip
+    columns = ("level", "Hz/s", "peak mm", "at Hz", "of the steady one %", "change in a radian %")
+    return [TextTable(f"{head}Passages through resonance, {case.attrs.get('output', '')}", columns, tuple(rows))] if rows else []  # fmt: skip
 
 
 def _number(value: float, digits: int = 5) -> str:

@@ -1,0 +1,25 @@
+"""Per cent as it is written: two digits, three from 100 on, and never an exponent."""
+
+import numpy as np
+
+
+def percent(share: float, *, unit: bool = True) -> str:
+    """Write a share in per cent with at most three digits; what is beyond 1000 % is said to be so."""
+    value = 100 * share
+    if not np.isfinite(value):
+        return "-"
+    if abs(value) > 1000.0:
+        text = "over 1000" if value > 0 else "below -1000"
+    elif abs(value) >= 9.95:
+        text = f"{value:.0f}"
+    else:
+        text = _short(value)
+    return f"{text} %" if unit else text
+
+
+def _short(value: float) -> str:
+    """Write a number below ten with two digits; what is below a thousandth is zero to a reader."""
+    if abs(value) < 1e-3:
+        return "0" if value == 0.0 else "< 0.001"
+    digits = max(0, 1 - int(np.floor(np.log10(abs(value)))))
+    return f"{value:.{digits}f}".rstrip("0").rstrip(".")
