@@ -114,8 +114,8 @@ def test_each_case_has_its_chapter_and_buttons_choose(tmp_path: Path) -> None:
     html = report_html(tree_of(provenance(), modes=two))
     assert html.count("<h2>Natural frequencies and mode shapes</h2>") == 1
     assert 'data-case="0" aria-pressed="true"' in html
-    assert '<div data-case="0"><figure id="fig-diameters"' in html
-    assert '<div data-case="1" hidden><figure id="fig-diameters_1"' in html
+    assert '<div data-case="0"><p><b>span = 1</b></p><figure id="fig-diameters"' in html
+    assert '<div data-case="1" hidden><p><b>span = 2</b></p><figure id="fig-diameters_1"' in html
 
 
 def test_cases_that_are_alike_are_drawn_once() -> None:

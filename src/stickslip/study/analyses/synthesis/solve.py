@@ -27,6 +27,7 @@ from stickslip.response.nonlinear_modes.one_mass import ModalOscillator, modal_o
 from stickslip.response.nonlinear_modes.passage import Swept, passage_through_resonance
 from stickslip.response.nonlinear_modes.synthesis import (
     Resonance,
+    Synthesised,
     free_motions,
     resonances,
     synthesise,
@@ -114,15 +115,9 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
     alone = isolation(shared.others, tops[0], question.dof) if peaks else NOBODY
     resolved = _resolved(shared, tops[0]) if peaks else np.nan
     detached = max(peaks[1:], default=(np.nan, np.nan))
-    answer, why = "beyond", "the nonlinear mode ends before it needs so much of the load"
-    if not curve.place.size:
-        why = "the nonlinear mode begins with more than the level reaches"
-    if peaks and float(curve.place.max()) < own.ends[1]:
-        answer, why = judged(alone, resolved)
+    answer, why = _answer(shared, curve, alone, resolved)
     shown = answer in ("trusted", "doubtful")
-    if shown and not curve.resonances[0].top:
-        answer, why = "doubtful", f"the nonlinear mode begins with more than the level reaches, so that this is the peak of a detached curve, which a sweep does not reach; {why}"  # fmt: skip
-    elif shown and len(peaks) > 1:
+    if shown and len(peaks) > 1 and curve.resonances[0].top:
         swept = f"the highest peak that a sweep meets has {1e3 * peaks[0][0]:.4g} mm at {peaks[0][1] / HZ:.5g} Hz"
         answer, why = "doubtful", f"{swept}, that of a detached curve {1e3 * detached[0]:.4g} mm at {detached[1] / HZ:.5g} Hz, which a sweep does not reach; {why}"  # fmt: skip
     inside = (curve.omega >= shared.ends[0]) & (curve.omega <= shared.ends[1]) & shown
@@ -167,6 +162,20 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
         passage_finished=passages[2],
         passage_change=passages[3],
     )
+
+
+def _answer(
+    shared: Synthesis, curve: Synthesised, alone: Isolation, resolved: float
+) -> tuple[str, str]:
+    """Say whether a level has an answer, of its peaks the one from small amplitudes, and why."""
+    if not curve.place.size:
+        return "beyond", "the nonlinear mode begins with more than the level reaches"
+    if not curve.peaks or float(curve.place.max()) >= shared.oscillator.ends[1]:
+        return "beyond", "the nonlinear mode ends before it needs so much of the load"
+    answer, why = judged(alone, resolved)
+    if answer in ("trusted", "doubtful") and not curve.resonances[0].top:
+        return "doubtful", f"the nonlinear mode begins with more than the level reaches, so that this is the peak of a detached curve, which a sweep does not reach; {why}"  # fmt: skip
+    return answer, why
 
 
 def _resolved(shared: Synthesis, found: Resonance) -> float:
