@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from study_texts import DETACHED, study_of
 
 from stickslip.errors import InputError
 from stickslip.front.study import Study
@@ -14,22 +15,7 @@ from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
 from stickslip.units import HZ
 
-# softening, then hardening: an isola above the resonance, see test_all_motions.py
-STUDY = """
-schema_version = 2
-[part.mass]
-shape = "lumped"
-masses_kg = [1.0]
-springs_n_per_m = [["ground", 1, 1.0]]
-dashpots_n_s_per_m = [["ground", 1, 0.05]]
-[contact.spring]
-between = ["mass.m1", "ground"]
-law = "polynomial_spring"
-along_t = [0.0, 0.0, -2.0, 0.0, 1.0]
-[load.shaker]
-on = "mass.m1"
-force_n = 0.02
-[all_motions]
+STUDY = f"""{DETACHED}[all_motions]
 frequency_hz = [0.016, 0.2]
 at_hz = [0.055]
 harmonics = 1
@@ -43,8 +29,7 @@ most_periods = 200
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     home = tmp_path_factory.mktemp("all_motions")
-    (home / "study.toml").write_text(STUDY, encoding="utf-8")
-    return home
+    return study_of(STUDY, home).path.parent
 
 
 @pytest.fixture(scope="module")
@@ -111,9 +96,8 @@ def test_python_gives_the_motions_of_a_study(folder):
 def test_bad_tables_are_refused_by_key(tmp_path, line, said):
     key = line.split(" = ", maxsplit=1)[0]
     kept = [own for own in STUDY.splitlines() if not own.startswith(key)]
-    (tmp_path / "study.toml").write_text("\n".join([*kept, line]), encoding="utf-8")
     with pytest.raises(InputError, match=said):
-        read_study(tmp_path / "study.toml")
+        study_of("\n".join([*kept, line]), tmp_path)
 
 
 def test_a_largest_stable_motion_that_no_start_reached_is_noted(result):

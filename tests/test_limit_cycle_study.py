@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from small_v2 import EXAMPLES, changed
+from study_texts import JENKINS, answered, study_of
 
 import stickslip as ss
 from stickslip.errors import InputError
@@ -19,38 +20,17 @@ from stickslip.study.analyses.cycles.words import case_verdicts
 from stickslip.study.analyses.limit_cycle import LIMIT_CYCLE
 from stickslip.study.keep.journal import JobJournal
 from stickslip.study.keep.netcdf import one_case
-from stickslip.study.models.study import read_study
-from stickslip.study.outcome import Outcome
-from stickslip.study.run import run_study
 
-B13 = """
-schema_version = 2
-[part.blade]
-shape = "lumped"
-masses_kg = [1.0]
-springs_n_per_m = [["ground", 1, 1.0]]
-dashpots_n_s_per_m = [["ground", 1, -0.1]]
-[contact.damper]
-between = ["blade.m1", "ground"]
-law = "jenkins"
-tangential_stiffness_n_per_m = 0.5
-slip_limit_n = 0.1
-[load.shaker]
-on = "blade.m1"
-force_n = 1.0
+B13 = (
+    JENKINS.replace("0.02]]", "-0.1]]").replace("force_n = 0.1", "force_n = 1.0")
+    + """
 [limit_cycle]
 harmonics = 1
 most_harmonics = 1
 points = 15
 amplitude_mm = [150.0, 3000.0]
 """
-
-
-def answered(text: str, folder: Path, checks: frozenset[str] = frozenset()) -> Outcome:
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / "study.toml"
-    path.write_text(text, encoding="utf-8")
-    return run_study(read_study(path), checks=checks)
+)
 
 
 def test_the_benchmark_from_a_study_and_its_words(tmp_path: Path) -> None:
@@ -102,7 +82,7 @@ def test_harmonics_are_raised_and_time_confirms(tmp_path: Path) -> None:
 
 
 def test_python_gives_the_same_and_a_sealed_mode_is_not_solved_again(tmp_path: Path) -> None:
-    (case,) = read_study(_path(B13, tmp_path)).cases()
+    (case,) = study_of(B13, tmp_path).cases()
     model = case.build()
     front = ss.Model(**{f: getattr(model, f) for f in ("parts", "contacts", "loads", "outputs")})
     result = front.limit_cycle(
@@ -114,12 +94,6 @@ def test_python_gives_the_same_and_a_sealed_mode_is_not_solved_again(tmp_path: P
         records = list(LIMIT_CYCLE.solve(question, (), journal))
         assert records[0].cycle_amplitude == pytest.approx(own["cycle_amplitude"].values, rel=1e-12)
         assert list(LIMIT_CYCLE.solve(question, records, journal)) == []
-
-
-def _path(text: str, folder: Path) -> Path:
-    path = folder / "study.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
 
 
 def flutter_ring(folder: Path, **keys: str) -> str:
@@ -192,7 +166,7 @@ def test_waves_compete_in_time_and_what_has_no_flutter_says_so(
 
 
 def test_waves_without_a_found_cycle_compete_from_where_they_slip(tmp_path: Path) -> None:
-    (case,) = read_study(_path(flutter_ring(tmp_path, periods="64"), tmp_path)).cases()
+    (case,) = study_of(flutter_ring(tmp_path, periods="64"), tmp_path).cases()
     question = LIMIT_CYCLE.inputs(case, case.build())
     found = [(w, m) for w in (1, 2) for m in question.followed(question.modes(w))]
     lost = [_without(wave, mode, "") for wave, mode in found]
@@ -219,17 +193,17 @@ def test_what_friction_cannot_bound_is_told(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_asked_is_refused(tmp_path: Path) -> None:
-    (case,) = read_study(_path(changed(B13, {"limit_cycle.wave_numbers": "[1]"}), tmp_path)).cases()
+    (case,) = study_of(changed(B13, {"limit_cycle.wave_numbers": "[1]"}), tmp_path).cases()
     with pytest.raises(InputError, match="are those of a tuned wheel"):
         LIMIT_CYCLE.inputs(case, case.build())
     text = flutter_ring(tmp_path / "ring", wave_numbers="[12]")
-    (wheel,) = read_study(_path(text, tmp_path / "ring")).cases()
+    (wheel,) = study_of(text, tmp_path / "ring").cases()
     with pytest.raises(InputError, match="12 sectors have the waves 0 to 11"):
         LIMIT_CYCLE.inputs(wheel, wheel.build())
     rigid = B13.replace('law = "jenkins"', 'law = "rigid_coulomb"').replace(
         "tangential_stiffness_n_per_m = 0.5\nslip_limit_n = 0.1", "friction_coefficient = 0.3\npreload_n = 1.0"
     )  # fmt: skip
-    (stiff,) = read_study(_path(rigid, tmp_path)).cases()
+    (stiff,) = study_of(rigid, tmp_path).cases()
     with pytest.raises(InputError, match="a contact is rigid"):
         LIMIT_CYCLE.inputs(stiff, stiff.build())
 
@@ -295,7 +269,7 @@ def test_what_grows_is_judged_with_coefficients_of_its_own_frequency(tmp_path: P
     head = "frequency_hz,neighbour,force_point,motion_point,real_n_per_m,imag_n_per_m"
     (tmp_path / "c.csv").write_text("\n".join([head, *rows]), encoding="utf-8")
     text = SHROUDS.replace("reference_hz = 80", "reference_hz = 150\nbeyond = 'nearest'")
-    (case,) = read_study(_path(text, tmp_path)).cases()
+    (case,) = study_of(text, tmp_path).cases()
     question = LIMIT_CYCLE.inputs(case, case.build())
     M = np.diag([1.2, 0.33])
     for k in range(5):

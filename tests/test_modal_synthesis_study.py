@@ -1,34 +1,17 @@
 """[modal_synthesis] in a study: levels against direct solutions, verdicts, the page, going on after an interruption."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from study_texts import DETACHED, JENKINS, answered, study_of
 
 import stickslip as ss
 from stickslip.errors import InputError
 from stickslip.report.page import plots
 from stickslip.study.analyses.synthesis import solve as solving
 from stickslip.study.keep.netcdf import one_case
-from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
 
-STUDY = """
-schema_version = 2
-[part.blade]
-shape = "lumped"
-masses_kg = [1.0]
-springs_n_per_m = [["ground", 1, 1.0]]
-dashpots_n_s_per_m = [["ground", 1, 0.02]]
-[contact.damper]
-between = ["blade.m1", "ground"]
-law = "jenkins"
-tangential_stiffness_n_per_m = 0.5
-slip_limit_n = 0.1
-[load.shaker]
-on = "blade.m1"
-force_n = 0.1
-[modal_synthesis]
+STUDY = f"""{JENKINS}[modal_synthesis]
 levels = [0.02, 0.5, 1.0, 2.0]
 harmonics = 3
 most_harmonics = 3
@@ -41,16 +24,10 @@ NEAR = STUDY.replace("masses_kg = [1.0]", "masses_kg = [1.0, 1.0]").replace(
 ).replace('[["ground", 1, 0.02]]', '[["ground", 1, 0.01], ["ground", 2, 0.01]]').replace('on = "blade.m1"\nforce_n = 0.1', 'on = "blade.m2"\nforce_n = 0.02').replace("tangential_stiffness_n_per_m = 0.5", "tangential_stiffness_n_per_m = 0.2")  # fmt: skip
 
 
-def study_of(tmp_path: Path, text: str):
-    path = tmp_path / "study.toml"
-    path.write_text(text, encoding="utf-8")
-    return read_study(path)
-
-
 def test_levels_of_b3_from_its_mode_with_direct_solutions_beside_them(tmp_path):
     text = STUDY.replace("[0.02, 0.5, 1.0, 2.0]", "[0.5, 1.0]")
     text += "direct = true\npassage_hz_per_s = [2e-5]\n"
-    outcome = run_study(study_of(tmp_path, text))
+    outcome = answered(text, tmp_path)
     case = one_case(outcome.tree["modal_synthesis"].to_dataset(), 0)
     assert set(case["answer"].values) == {"trusted"}
     # B3 at fc = 0.2 and 0.1 by similarity, one harmonic: 0.6038447 / 2, 0.6260618
@@ -75,7 +52,7 @@ def test_levels_of_b3_from_its_mode_with_direct_solutions_beside_them(tmp_path):
 
 
 def test_a_level_at_which_the_mode_is_not_alone_is_refused_and_not_shown(tmp_path):
-    model = ss.Study.from_file(study_of(tmp_path, NEAR).path).model()
+    model = ss.Study.from_file(study_of(NEAR, tmp_path).path).model()
     result = model.modal_synthesis(levels=[0.5, 3.0], harmonics=5, most_harmonics=5, folder=tmp_path / "out")  # fmt: skip
     case = one_case(result.data["modal_synthesis"].to_dataset(), 0)
     assert list(case["answer"].values) == ["trusted", "refused"]
@@ -93,7 +70,7 @@ def test_a_level_at_which_the_mode_is_not_alone_is_refused_and_not_shown(tmp_pat
 
 
 def test_an_interrupted_run_goes_on_with_the_mode_that_it_has(tmp_path, monkeypatch):
-    study = study_of(tmp_path, STUDY)
+    study = study_of(STUDY, tmp_path)
     own, calls = solving._level, []
 
     def stopped(shared, level):
@@ -118,34 +95,12 @@ def test_what_it_has_no_form_for_is_refused_before_anything_is_computed(tmp_path
         (("levels = [0.02, 0.5", "levels = [0.5, 0.5"), "twice"),
     ):
         with pytest.raises(InputError, match=what):
-            run_study(study_of(tmp_path, STUDY.replace(*change)))
-
-
-# softening, then hardening: a detached curve, in closed form in test_all_motions.py
-DETACHED = """
-schema_version = 2
-[part.mass]
-shape = "lumped"
-masses_kg = [1.0]
-springs_n_per_m = [["ground", 1, 1.0]]
-dashpots_n_s_per_m = [["ground", 1, 0.05]]
-[contact.spring]
-between = ["mass.m1", "ground"]
-law = "polynomial_spring"
-along_t = [0.0, 0.0, -2.0, 0.0, 1.0]
-[load.shaker]
-on = "mass.m1"
-force_n = 0.02
-[modal_synthesis]
-levels = [0.5, 1.0]
-harmonics = 1
-most_harmonics = 1
-amplitude_mm = [50.0, 3000.0]
-"""
+            answered(STUDY.replace(*change), tmp_path)
 
 
 def test_the_peak_told_is_that_of_a_sweep_and_a_detached_curve_is_a_doubt(tmp_path):
-    outcome = run_study(study_of(tmp_path, DETACHED))
+    text = f"{DETACHED}[modal_synthesis]\nlevels = [0.5, 1.0]\nharmonics = 1\nmost_harmonics = 1\namplitude_mm = [50.0, 3000.0]\n"  # fmt: skip
+    outcome = answered(text, tmp_path)
     case = one_case(outcome.tree["modal_synthesis"].to_dataset(), 0)
 
     def force(amplitude: float) -> float:  # at the peak, with one harmonic
@@ -167,4 +122,4 @@ def test_the_peak_told_is_that_of_a_sweep_and_a_detached_curve_is_a_doubt(tmp_pa
 
 def test_a_level_beyond_all_numbers_is_refused_by_its_value(tmp_path):
     with pytest.raises(InputError, match=r"modal_synthesis\.levels: holds 1e\+300"):
-        run_study(study_of(tmp_path, STUDY.replace("levels = [0.02, 0.5, 1.0, 2.0]", "levels = [1.0, 1e300]")))  # fmt: skip
+        answered(STUDY.replace("levels = [0.02, 0.5, 1.0, 2.0]", "levels = [1.0, 1e300]"), tmp_path)  # fmt: skip

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.integrate import quad
+from study_texts import JENKINS, answered, study_of
 
 from evidence.judges.free_decay import free_decay
 from evidence.models.lumped import griffin, small_chain
@@ -32,8 +33,6 @@ from stickslip.response.system import System
 from stickslip.study.analyses.backbones.words import case_verdicts
 from stickslip.study.check import check_study
 from stickslip.study.keep.netcdf import one_case
-from stickslip.study.models.study import read_study
-from stickslip.study.run import run_study
 
 
 def one_mass(law: object, row: int, stiffness: float = 1.0) -> tuple[System, HarmonicLoad]:
@@ -221,11 +220,10 @@ def test_springs_that_do_not_slip_need_a_range_of_amplitudes(tmp_path: Path) -> 
     with pytest.raises(InputError, match="no contact slips or opens"):
         followed(*one_mass(CubicSpring(cubic_t=0.5), 0), Discretisation(order=3), ModeSweep())
     old = STUDY[STUDY.index('law = "jenkins"') : STUDY.index("[load.shaker]")]
-    path = tmp_path / "study.toml"
     text = STUDY.replace(old, 'law = "cubic_spring"\ncubic_tangential_n_per_m3 = 0.5\n')
-    path.write_text(text.replace("amplitude_mm = [100.0, 2000.0]\n", ""), encoding="utf-8")
+    text = text.replace("amplitude_mm = [100.0, 2000.0]\n", "")
     with pytest.raises(InputError, match=r"nonlinear_mode\.amplitude_mm"):
-        check_study(read_study(path))
+        check_study(study_of(text, tmp_path))
 
 
 def test_both_concepts_agree_as_the_square_of_the_damping():
@@ -283,22 +281,7 @@ def test_a_free_motion_decays_as_the_mode_says():
     assert decay.amplitude[-1] < 0.9 * decay.amplitude[0]
 
 
-STUDY = """
-schema_version = 2
-[part.blade]
-shape = "lumped"
-masses_kg = [1.0]
-springs_n_per_m = [["ground", 1, 1.0]]
-dashpots_n_s_per_m = [["ground", 1, 0.02]]
-[contact.damper]
-between = ["blade.m1", "ground"]
-law = "jenkins"
-tangential_stiffness_n_per_m = 0.5
-slip_limit_n = 0.1
-[load.shaker]
-on = "blade.m1"
-force_n = 0.1
-[forced_response]
+STUDY = f"""{JENKINS}[forced_response]
 frequency_hz = [0.15, 0.2]
 points = 15
 stability = "off"
@@ -309,9 +292,7 @@ points = 10
 
 
 def test_the_mode_from_a_study_its_words_and_its_backbone_over_the_response(tmp_path: Path) -> None:
-    path = tmp_path / "study.toml"
-    path.write_text(STUDY, encoding="utf-8")
-    outcome = run_study(read_study(path))
+    outcome = answered(STUDY, tmp_path)
     case = one_case(outcome.tree["nonlinear_mode"].to_dataset(), 0)
     assert case["mode_frequency_hz"].values == pytest.approx(np.sqrt(1.5) / (2 * np.pi), rel=1e-9)
     assert 0.2 < float(case["gross_slip_amplitude"][0]) < 0.3
@@ -331,10 +312,8 @@ def test_the_mode_from_a_study_its_words_and_its_backbone_over_the_response(tmp_
 
 
 def test_what_has_no_such_mode_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "study.toml"
-    path.write_text(STUDY.replace("points = 10", "modes = [2]"), encoding="utf-8")
     with pytest.raises(InputError, match="has no such mode"):
-        run_study(read_study(path))
+        answered(STUDY.replace("points = 10", "modes = [2]"), tmp_path)
 
 
 def case_of(end: str, status: list[int], change: list[float], problem: str = "") -> dict[str, xr.Variable]:  # fmt: skip

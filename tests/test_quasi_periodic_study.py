@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from small_v2 import EXAMPLES, changed
+from study_texts import answered, study_of
 from test_limit_cycle_study import SHROUDS, flow
 
 import stickslip as ss
@@ -17,18 +18,8 @@ from stickslip.response.time.sectors import all_sectors
 from stickslip.response.time.start import start_from_harmonics
 from stickslip.study.analyses.quasi_periodic import QUASI_PERIODIC
 from stickslip.study.analyses.two_frequencies.solve import at_frequency
-from stickslip.study.models.study import read_study
-from stickslip.study.outcome import Outcome
-from stickslip.study.run import run_study
 
 TWO_TONES = (EXAMPLES / "two_tones" / "study.toml").read_text(encoding="utf-8")
-
-
-def answered(text: str, folder: Path) -> Outcome:
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / "study.toml"
-    path.write_text(text, encoding="utf-8")
-    return run_study(read_study(path))
 
 
 def test_two_loads_from_a_study_are_what_time_integration_comes_to(tmp_path: Path) -> None:
@@ -123,8 +114,7 @@ def test_a_flutter_wave_beside_a_forced_wave_is_that_of_all_sectors_in_time(tmp_
     """Blades that touch their neighbours: the wake drives wave 1, a fluid feeds wave 4."""
     flow(tmp_path)
     text = SHROUDS.split("[limit_cycle]")[0] + WAKE
-    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
-    (case,) = read_study(tmp_path / "study.toml").cases()
+    (case,) = study_of(text, tmp_path).cases()
     question = QUASI_PERIODIC.inputs(case, case.build())
     assert question.waves == (1, 4)
     found = at_frequency(question, 2 * np.pi * 88.0, None)

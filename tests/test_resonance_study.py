@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from study_texts import DETACHED, JENKINS, answered, study_of
 
 from stickslip.assembly.model import Model as Assembly
 from stickslip.errors import InputError
@@ -14,38 +15,17 @@ from stickslip.front.study import Study
 from stickslip.report.sections.resonance import Peaks, amplitudes, peak_table
 from stickslip.study.analyses.resonance import RESONANCE
 from stickslip.study.keep.netcdf import one_case
-from stickslip.study.models.study import read_study
-from stickslip.study.outcome import Outcome
-from stickslip.study.run import run_study
 
-B3 = """
-schema_version = 2
-[part.blade]
-shape = "lumped"
-masses_kg = [1.0]
-springs_n_per_m = [["ground", 1, 1.0]]
-dashpots_n_s_per_m = [["ground", 1, 0.02]]
-[contact.damper]
-between = ["blade.m1", "ground"]
-law = "jenkins"
-tangential_stiffness_n_per_m = 0.5
-slip_limit_n = 0.2
-[load.shaker]
-on = "blade.m1"
-force_n = 0.1
+B3 = (
+    JENKINS.replace("slip_limit_n = 0.1", "slip_limit_n = 0.2")
+    + """
 [resonance]
 frequency_hz = [0.127, 0.223]
 parameter = "contact.damper.slip_limit_n"
 values = [0.2, 0.12, 0.09]
 harmonics = 1
 """
-
-
-def answered(text: str, folder: Path) -> Outcome:
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / "study.toml"
-    path.write_text(text, encoding="utf-8")
-    return run_study(read_study(path))
+)
 
 
 def test_the_optimum_of_the_benchmark_from_a_study(tmp_path: Path) -> None:
@@ -128,9 +108,7 @@ def test_the_example_of_two_peaks_tells_where_one_overtakes_the_other(tmp_path: 
 
 def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
     text = B3.replace("slip_limit_n = 0.2", "slip_limit_n = 0.25")
-    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
-    study = read_study(tmp_path / "study.toml")
-    (case,) = study.cases()
+    (case,) = study_of(text, tmp_path).cases()
     inputs = RESONANCE.inputs(case, case.build())
     whole = list(RESONANCE.solve(inputs, [], Kept()))
     rest = list(RESONANCE.solve(inputs, whole[:2], Kept()))
@@ -203,8 +181,7 @@ def test_a_range_without_a_peak_is_told(tmp_path: Path) -> None:
 
 
 def test_python_asks_the_same(tmp_path: Path) -> None:
-    (tmp_path / "study.toml").write_text(B3, encoding="utf-8")
-    model = Study.from_file(tmp_path / "study.toml").model()
+    model = Study.from_file(study_of(B3, tmp_path).path).model()
     keys = {"frequency_hz": (0.127, 0.223), "values": [0.3, 0.2], "harmonics": 1}
     by_field = model.resonance(parameter="limit", **keys).data["resonance"]
 
@@ -240,14 +217,7 @@ def test_too_few_harmonics_are_told(tmp_path: Path) -> None:
 
 def test_a_peak_that_no_sweep_at_its_value_meets_is_doubtful(tmp_path: Path) -> None:
     # softening, then hardening: up to 1 the upper peak is that of a detached curve, at 2 a sweep goes over it
-    text = B3[: B3.index("[contact.damper]")].replace("0.02]]", "0.05]]") + """
-[contact.spring]
-between = ["blade.m1", "ground"]
-law = "polynomial_spring"
-along_t = [0.0, 0.0, -2.0, 0.0, 1.0]
-[load.shaker]
-on = "blade.m1"
-force_n = 0.02
+    text = DETACHED + """
 [resonance]
 frequency_hz = [0.016, 0.3]
 parameter = "excitation"
@@ -265,9 +235,7 @@ harmonics = 1
 
 
 def test_a_key_that_the_cases_vary_too_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "study.toml"
-    path.write_text(f"{B3}[vary]\ncontact.damper.slip_limit_n = [0.2, 0.1]\n", encoding="utf-8")
     with pytest.raises(
         InputError, match=r"resonance\.parameter: .* which \[vary\] varies too.*Drop it"
     ):
-        run_study(read_study(path))
+        answered(f"{B3}[vary]\ncontact.damper.slip_limit_n = [0.2, 0.1]\n", tmp_path)
