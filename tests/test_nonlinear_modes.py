@@ -38,7 +38,7 @@ from stickslip.study.keep.netcdf import one_case
 def one_mass(law: object, row: int, stiffness: float = 1.0) -> tuple[System, HarmonicLoad]:
     gap = np.zeros((3, 1))
     gap[row, 0] = 1.0
-    contacts = Interface(("c",), (law,), gap)  # type: ignore[arg-type]
+    contacts = Interface(("c",), (law,), gap)
     return System(lumped(np.eye(1), stiffness * np.eye(1)), contacts, np.array([0])), HarmonicLoad(np.zeros(1))  # fmt: skip
 
 

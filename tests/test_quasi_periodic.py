@@ -46,7 +46,7 @@ def tone(*newton: float) -> ss.HarmonicLoad:
     return ss.HarmonicLoad(np.zeros(2), {1: np.array(newton, dtype=complex)})
 
 
-def by_hand(damping: np.ndarray, tones: list, seconds: float, step: float):  # type: ignore[no-untyped-def,type-arg]
+def by_hand(damping: np.ndarray, tones: list, seconds: float, step: float):
     """March the pair from rest by Runge-Kutta steps with a slider that is dragged along: shares no code with the package."""
     steps = round(seconds / step)
     q, v, slider = np.zeros(2), np.zeros(2), 0.0
@@ -79,7 +79,7 @@ def off(found: np.ndarray, judge: np.ndarray) -> float:
 
 
 def with_all(problem: TwoTones, motion: TorusMotion, tolerance: float) -> TorusMotion:
-    def solve(wider, start, path):  # type: ignore[no-untyped-def]
+    def solve(wider, start, path):
         return wider.solve(motion.omegas, start, path)
 
     return with_enough(problem, motion, 15, tolerance, solve)[1]
@@ -176,7 +176,7 @@ def test_what_lies_beyond_the_most_harmonics_is_left_out_too(most: int) -> None:
     omegas = 140.0, 1.3152 * 140.0
     problem = two_tones(rubbing_pair(DAMPING), tone(10.0, 0.0), tone(0.0, 8.0), most)
 
-    def solve(wider, start, path):  # type: ignore[no-untyped-def]
+    def solve(wider, start, path):
         return wider.solve(omegas, start, path)
 
     few = with_enough(problem, problem.solve(omegas), most, 0.01, solve)[1]
@@ -217,7 +217,7 @@ def test_flutter_beside_a_forced_vibration_is_what_a_march_by_hand_comes_to() ->
     motion = second_tone(begin)
     assert motion is not None
 
-    def solve(wider, start, path):  # type: ignore[no-untyped-def]
+    def solve(wider, start, path):
         return solve_free(wider, start, motion.omegas)
 
     motion = with_enough(problem, motion, 15, 0.01, solve)[1]
@@ -270,7 +270,7 @@ def test_modulation_beyond_a_neimark_sacker_point_is_what_scipy_integrates() -> 
     motion = second_tone(begin)
     assert motion is not None
 
-    def solve(wider, start, path):  # type: ignore[no-untyped-def]
+    def solve(wider, start, path):
         return solve_free(wider, start, motion.omegas)
 
     motion = with_enough(problem, motion, 11, 0.01, solve)[1]

@@ -235,7 +235,10 @@ def test_a_subharmonic_resonance_is_that_of_time_integration():
     found = newton(lambda v: balance.linearise(v, omega), balance.unknowns(more.coefficients), Newton())  # fmt: skip
     motion = balance.coefficients(found.x)[:, 0]
     assert abs(motion[1]) > 0.9 * more.amplitude
-    force = lambda t, x, v: 3.0 * np.cos(3.0 * omega * t) - 0.06 * v - x - x**3  # noqa: E731
+
+    def force(t: float, x: float, v: float) -> float:
+        return 3.0 * np.cos(3.0 * omega * t) - 0.06 * v - x - x**3
+
     assert in_time(force, omega, more.coefficients[:, 0], 1, 60) == pytest.approx(abs(motion[1]), rel=1e-4)  # fmt: skip
 
 
@@ -268,7 +271,8 @@ def test_quadrature_is_no_mode_where_one_force_cannot_balance_friction(
     point = list(follow_peaks(search, [0.4, level], 1))[-1]
     motions = self_excited_motions(system, HarmonicLoad(np.zeros(2)), stuck, 0, how)
     mode = at_amplitude(motions, point.amplitude)
-    assert point.converged and mode.converged  # noqa: PT018
+    assert point.converged
+    assert mode.converged
     assert point.omega / mode.omega - 1.0 == pytest.approx(frequency, abs=5e-5)
     h = np.arange(6)
     kinetic = 0.5 * float(np.sum((h * point.omega) ** 2 * np.sum(np.abs(point.coefficients) ** 2, axis=1)))  # fmt: skip

@@ -63,9 +63,10 @@ class Starts:
     def law(self, contact: int, slider: FloatArray) -> ContactLaw:
         """Return the law of a contact of `interface` that starts from a slider (2,), m."""
         own: Any = self.interface.laws[contact]
-        if not np.any(self.stiffness[contact]):
-            return own  # type: ignore[no-any-return]
-        return replace(own, slider=(float(slider[0]), float(slider[1])))  # type: ignore[no-any-return]
+        if np.any(self.stiffness[contact]):
+            own = replace(own, slider=(float(slider[0]), float(slider[1])))
+        begun: ContactLaw = own
+        return begun
 
     def started(self, sliders: FloatArray) -> Interface:
         """Return the interface whose springs start from sliders (n, 2), m."""
@@ -146,7 +147,8 @@ def _fields(law: Any) -> set[str]:
 def _without_start(law: Any) -> ContactLaw:
     """Return a law whose springs are unstretched at zero displacement."""
     none: dict[str, None] = {n: None for n in ("slider", "residual_traction") if n in _fields(law)}
-    return replace(law, **none) if none else law  # type: ignore[no-any-return]
+    without: ContactLaw = replace(law, **none) if none else law
+    return without
 
 
 def _holds(law: ContactLaw) -> bool:

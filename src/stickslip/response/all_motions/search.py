@@ -20,7 +20,7 @@ from stickslip.response.all_motions.basins import (
     sampler,
 )
 from stickslip.response.all_motions.deflation import Distance, deflated_newton, distance_among
-from stickslip.response.all_motions.found import SPENT, AllMotions, Origin, Stage, gathered
+from stickslip.response.all_motions.found import SPENT, AllMotions, Kind, Origin, Stage, gathered
 from stickslip.response.all_motions.options import MotionSearch, search_problem
 from stickslip.response.bifurcations.side_branch import both_ways
 from stickslip.response.branch import following_vibration, steps_through, vibration_weights
@@ -185,12 +185,12 @@ class _Search:
         return self._stage("branch", place, origin, points, end)
 
     def _stage(
-        self, kind: str, place: int, origin: Origin, points: Sequence[ForcedPoint], end: str
+        self, kind: Kind, place: int, origin: Origin, points: Sequence[ForcedPoint], end: str
     ) -> Stage:
         rows = np.array([p.coefficients for p in points])
         none = np.zeros((0, self.order + 1, self.balance.linear.n), dtype=complex)
         omega = np.array([p.omega for p in points])
-        return Stage(kind, place, origin, end, omega, rows if points else none)  # type: ignore[arg-type]
+        return Stage(kind, place, origin, end, omega, rows if points else none)
 
     # --- deflation ----------------------------------------------------------------------------
 

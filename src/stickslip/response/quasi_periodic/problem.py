@@ -238,12 +238,15 @@ def check_frequencies(omegas: tuple[float, float]) -> None:
         )
 
 
+Solving = Callable[[TwoTones, FloatArray, TorusPath], TorusMotion]
+
+
 def with_enough(
     problem: TwoTones,
     motion: TorusMotion,
     most: int,
     tolerance: float,
-    solve: Callable[[TwoTones, FloatArray, TorusPath], TorusMotion],
+    solve: Solving,
 ) -> tuple[TwoTones, TorusMotion]:
     """Add combined frequencies until what is left out would change the motion by less than `tolerance`.
 

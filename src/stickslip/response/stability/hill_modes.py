@@ -73,11 +73,10 @@ class HillModes:
         out = np.diag(out) if out.ndim == 1 else out
         out = out - z * (self.springs.conj().T @ self.springs)
         out.flat[:: len(out) + 1] += self.stiffness + z * z * self.mass
-        return np.asarray(out if self.feedback is None else out - self._air(z))
+        return np.asarray(out if self.feedback is None else out - self._air(self.feedback, z))
 
-    def _air(self, z: complex) -> ComplexArray:
+    def _air(self, force: Feedback, z: complex) -> ComplexArray:
         """Return what a table of frequencies adds to the frozen force, at the frequency of the disturbance."""
-        force: Feedback = self.feedback  # type: ignore[assignment]  # asked for where there is one
         s = self.omega * z.imag
         stiff, damp = force.influence.frozen(force.phase_angle, force.reference)
         if s >= 0.0:

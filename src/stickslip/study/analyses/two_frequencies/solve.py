@@ -10,7 +10,7 @@ from stickslip.errors import StickslipError
 from stickslip.harmonic.torus_path import Indices, TorusPath
 from stickslip.response.quasi_periodic.find import growing_tones, swept, tone_beside
 from stickslip.response.quasi_periodic.motion import TorusMotion, envelope
-from stickslip.response.quasi_periodic.problem import TwoTones, with_enough
+from stickslip.response.quasi_periodic.problem import Solving, TwoTones, with_enough
 from stickslip.response.quasi_periodic.tone import solve_free
 from stickslip.study.analyses.analysis import Notes
 from stickslip.study.analyses.forced.examination import too_long
@@ -144,16 +144,15 @@ def _guesses(question: Question, problem: TwoTones, omega: float) -> tuple[list[
     return found + more, unknown
 
 
-def _enough(question: Question, problem, motion, solve_at):  # type: ignore[no-untyped-def]
+def _enough(
+    question: Question, problem: TwoTones, motion: TorusMotion, solving: Solving
+) -> tuple[TwoTones, TorusMotion]:
     asked = question.asked
-    return with_enough(problem, motion, asked.most_harmonics, 0.01 * asked.accuracy_percent, solve_at)  # fmt: skip
+    return with_enough(problem, motion, asked.most_harmonics, 0.01 * asked.accuracy_percent, solving)  # fmt: skip
 
 
-def _free(motion: TorusMotion):  # type: ignore[no-untyped-def]
-    def free(own: TwoTones, x: FloatArray, _path: TorusPath) -> TorusMotion:
-        return solve_free(own, x, motion.omegas)
-
-    return free
+def _free(motion: TorusMotion) -> Solving:
+    return lambda own, x, _path: solve_free(own, x, motion.omegas)
 
 
 def _begun(problem: TwoTones, before: TwoFrequencies) -> tuple[TwoTones, FloatArray]:
