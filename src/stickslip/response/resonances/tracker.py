@@ -8,6 +8,7 @@ import scipy.optimize
 
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.peak import EVALUATIONS, PeakProblem
+from stickslip.response.parameter import Discretisation
 from stickslip.response.resonances.first import PeakSearch, Start, first_peaks
 from stickslip.response.resonances.point import PeakPoint, peak_point
 from stickslip.solve.branch import ParameterEvaluation
@@ -208,9 +209,8 @@ def _is_another(one: Tracker, made: list[Tracker]) -> bool:
     return all(abs(omega - other) > SAME * other for other in others)
 
 
-def with_order(search: PeakSearch, point: PeakPoint, order: int, samples: int) -> PeakPoint:
-    """Return a peak as it is with harmonics up to `order` and so many samples, from the known one, by horizontal tangent."""
-    how = replace(search.how, order=order, samples=samples)
+def represented_as(search: PeakSearch, point: PeakPoint, how: Discretisation) -> PeakPoint:
+    """Return a peak as it is with other harmonics, from the known one, by horizontal tangent."""
     more = replace(search, how=how, by="horizontal_tangent")
     problem = more.problem(point.value)
     problem = replace(problem, omega_scale=point.omega / search.periods)

@@ -8,13 +8,14 @@ import xarray as xr
 from stickslip.assembly.model import Model
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
 from stickslip.study.analyses.cycles.dataset import dataset
-from stickslip.study.analyses.cycles.question import IN_TIME, ONE, Question, question_of
+from stickslip.study.analyses.cycles.question import IN_TIME, Question, question_of
 from stickslip.study.analyses.cycles.records import CycleBranch
 from stickslip.study.analyses.cycles.solve import solve
 from stickslip.study.analyses.cycles.table import LimitCycleTable
 from stickslip.study.analyses.cycles.words import tables
 from stickslip.study.analyses.forced.examination import too_long
 from stickslip.study.analyses.verdict import Verdict, stored
+from stickslip.study.analyses.vibrating import ONE
 
 
 class LimitCycleAnalysis:

@@ -13,8 +13,8 @@ from stickslip.study.analyses.backbones.records import ModeBranch
 from stickslip.study.analyses.backbones.solve import solve
 from stickslip.study.analyses.backbones.table import NonlinearModeTable
 from stickslip.study.analyses.backbones.words import tables
-from stickslip.study.analyses.cycles.question import ONE
 from stickslip.study.analyses.verdict import Verdict, stored
+from stickslip.study.analyses.vibrating import ONE
 from stickslip.units import HZ
 
 

@@ -10,17 +10,17 @@ from stickslip.assembly.model import Model
 from stickslip.errors import InputError
 from stickslip.response.resonances.curve import peak_curve
 from stickslip.response.resonances.point import PeakPoint
-from stickslip.response.resonances.tracker import with_order
+from stickslip.response.resonances.tracker import represented_as
 from stickslip.response.resonances.tracking import follow_peaks, later_peaks, smallest_peak
-from stickslip.response.self_excited.problem import SAMPLES_A_HARMONIC
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
 from stickslip.study.analyses.resonances.dataset import dataset
 from stickslip.study.analyses.resonances.envelope import heights, valley
-from stickslip.study.analyses.resonances.question import SAMPLES, Question, more_than, question_of
+from stickslip.study.analyses.resonances.question import Question, more_than, question_of
 from stickslip.study.analyses.resonances.table import ResonanceTable
 from stickslip.study.analyses.resonances.unmet import unmet_peaks
 from stickslip.study.analyses.resonances.words import tables
 from stickslip.study.analyses.verdict import Verdict, doubt, stored, to_json
+from stickslip.study.analyses.vibrating import represented
 from stickslip.study.keep.progress import LOG, advance
 from stickslip.units import HZ
 
@@ -147,8 +147,8 @@ def _more_harmonics(inputs: Question, points: Sequence[PeakPoint]) -> dict[str, 
         return {}
     top = max(maxima, key=lambda p: p.amplitude)
     order = more_than(inputs.asked.harmonics)
-    samples = max(SAMPLES, SAMPLES_A_HARMONIC * order)
-    more = with_order(inputs.search, top, order, samples)
+    how = represented(order, inputs.search.how.evaluator)
+    more = represented_as(inputs.search, top, how)
     # a peak by phase lies below the maximum, by what it says itself
     there = top.amplitude * (1.0 + (top.below if np.isfinite(top.below) else 0.0))
     change = more.amplitude / there - 1.0 if more.converged else np.nan

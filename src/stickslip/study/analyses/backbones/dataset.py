@@ -11,8 +11,8 @@ from stickslip.reduction.waves import wave
 from stickslip.study.analyses.analysis import Solved
 from stickslip.study.analyses.backbones.records import ModeBranch
 from stickslip.study.analyses.backbones.words import case_verdicts
-from stickslip.study.analyses.cycles.question import ONE
 from stickslip.study.analyses.verdict import ATTRIBUTE, of_all_cases, to_json
+from stickslip.study.analyses.vibrating import ONE
 from stickslip.study.analyses.waves.about import told
 from stickslip.study.keep.netcdf import stacked, variable
 from stickslip.units import HZ

@@ -4,24 +4,28 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
 from stickslip.contact.compiled import Evaluator
-from stickslip.errors import input_error
 from stickslip.reduction.tuned import TunedWheel
-from stickslip.response.at_rest import pressed_by
 from stickslip.response.nonlinear_modes.backbone import ModeSweep
 from stickslip.response.parameter import Discretisation
-from stickslip.response.self_excited.modes import StuckMode, stuck_modes
-from stickslip.response.self_excited.problem import SAMPLES_A_HARMONIC
-from stickslip.response.system import System
+from stickslip.response.self_excited.modes import StuckMode
 from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.backbones.table import NonlinearModeTable
-from stickslip.study.analyses.cycles.question import ONE, SAMPLES, refuse_waves
 from stickslip.study.analyses.facts import facts_of
-from stickslip.study.analyses.forced.question import peak_first
+from stickslip.study.analyses.synthesis.table import ModalSynthesisTable
+from stickslip.study.analyses.vibrating import (
+    ONE,
+    coordinate,
+    free_to_vibrate,
+    modes_of,
+    no_such_mode,
+    refuse_rigid,
+    refuse_waves,
+    represented,
+    require_flow,
+)
 from stickslip.units import RPM
 
 NAME = "nonlinear_mode"
@@ -54,43 +58,37 @@ class Question:
     evaluator: Evaluator
     facts: Mapping[str, Any] = field(default_factory=dict)
 
-    def system(self, wave: int) -> System:
-        """Return the system that vibrates as a wave."""
-        side = self.model.system.structure
-        if not isinstance(side, TunedWheel):
-            return self.model.system
-        return replace(self.model.system, structure=side.travelling_as(wave))
-
     def followed(self, wave: int) -> list[StuckMode]:
         """Return the modes of a wave that are followed."""
-        holds = pressed_by(self.model.system.springs.laws, self.model.static_force)
-        every = stuck_modes(self.system(wave), max(self.asked.modes), holds)
+        every = modes_of(self.model, max(self.asked.modes), wave)
         return [m for m in every if m.number in self.asked.modes]
 
     @property
     def dof(self) -> int:
         """The coordinate of the first output."""
-        return int(np.asarray(self.model.system.outputs)[0])
+        return coordinate(self.model.system)
 
     @property
     def discretisation(self) -> Discretisation:
         """With the fewest harmonics."""
-        order = self.asked.harmonics
-        samples = max(SAMPLES, SAMPLES_A_HARMONIC * order)
-        return Discretisation(order=order, samples=samples, evaluator=self.evaluator)
+        return represented(self.asked.harmonics, self.evaluator)
 
     @property
     def sweep(self) -> ModeSweep:
         """Over which amplitudes."""
-        asked, given = self.asked, self.asked.amplitude_mm
-        return ModeSweep(
-            span=None if given is None else (1e-3 * given[0], 1e-3 * given[1]),
-            points=asked.points,
-            most_harmonics=asked.most_harmonics,
-            tolerance=0.01 * asked.accuracy_percent,
-            to_gross_slip=asked.to_gross_slip,
-            concept=asked.concept,
-        )
+        asked = self.asked
+        return replace(sweep_of(asked), to_gross_slip=asked.to_gross_slip, concept=asked.concept)
+
+
+def sweep_of(asked: NonlinearModeTable | ModalSynthesisTable) -> ModeSweep:
+    """Return over which amplitudes a table follows a nonlinear mode."""
+    given = asked.amplitude_mm
+    return ModeSweep(
+        span=None if given is None else (1e-3 * given[0], 1e-3 * given[1]),
+        points=asked.points,
+        most_harmonics=asked.most_harmonics,
+        tolerance=0.01 * asked.accuracy_percent,
+    )
 
 
 def question_of(case: Case, model: Model) -> Question:
@@ -105,31 +103,19 @@ def question_of(case: Case, model: Model) -> Question:
     asked: NonlinearModeTable = case.settings.nonlinear_mode
     refuse_waves(NAME, asked.wave_numbers, model)
     most = max(asked.harmonics, asked.most_harmonics)
-    still = model.undriven
-    wheel = still.sectors > 1 and still.mistuning is None
-    assembled = still.assembled(
-        most, case.store, wave_number=0 if wheel else None, every_wave=wheel
-    )
-    if assembled.system.interface.rigid:
-        raise input_error(
-            NAME,
-            "a contact is rigid: its force is no function of its gap",
-            "Give the contacts a stiffness, such as elastic_coulomb.",
-        )
+    assembled = free_to_vibrate(model, most, case.store)
+    refuse_rigid(NAME, assembled)
     question = Question(
         case.label,
-        peak_first(assembled),
+        assembled,
         asked,
-        _waves(asked, model, wheel=wheel),
+        _waves(asked, model, assembled),
         case.settings.solver.evaluator,
         facts_of(model, model.speed / RPM),
     )
     question.sweep.require_span(assembled.system.interface, f"{NAME}.amplitude_mm")
     modes = [mode for wave in question.waves for mode in _required(question, wave)]
-    force = question.model.system.structure.feedback_of(1)
-    if force is not None and force.influence.refuses and modes:
-        low, high = (f(m.omega for m in modes) for f in (min, max))
-        force.influence.require(low, most * high, f"a nonlinear mode with up to {most} harmonics (most_harmonics)")  # fmt: skip
+    require_flow(assembled, modes, most, "a nonlinear mode")
     return question
 
 
@@ -139,16 +125,12 @@ def _required(question: Question, wave: int) -> list[StuckMode]:
     missing = sorted(set(wanted) - {m.number for m in modes})
     if missing:
         of = "the model" if wave == ONE else f"wave {wave}"
-        raise input_error(
-            f"{NAME}.modes",
-            f"holds {missing[0]}, and {of} has no such mode that vibrates",
-            "Modes count from 1 by frequency with contacts stuck; [modes] lists them.",
-        )
+        raise no_such_mode(f"{NAME}.modes", f"holds {missing[0]}", of)
     return modes
 
 
-def _waves(asked: NonlinearModeTable, model: Model, *, wheel: bool) -> tuple[int, ...]:
-    if not wheel:
+def _waves(asked: NonlinearModeTable, model: Model, assembled: Assembled) -> tuple[int, ...]:
+    if not isinstance(assembled.system.structure, TunedWheel):
         return (ONE,)
     if asked.wave_numbers is not None:
         return tuple(asked.wave_numbers)

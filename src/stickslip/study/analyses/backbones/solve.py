@@ -11,7 +11,7 @@ from stickslip.response.self_excited.modes import StuckMode
 from stickslip.study.analyses.analysis import Notes
 from stickslip.study.analyses.backbones.question import Question
 from stickslip.study.analyses.backbones.records import ModeBranch
-from stickslip.study.analyses.cycles.question import ONE
+from stickslip.study.analyses.vibrating import ONE, as_wave
 from stickslip.study.keep.progress import LOG, advance
 from stickslip.units import HZ
 
@@ -34,7 +34,7 @@ def follow_mode(question: Question, wave: int, mode: StuckMode) -> ModeBranch:
     """Return what is found of a mode."""
     try:
         found = nonlinear_mode(
-            question.system(wave),
+            as_wave(question.model.system, wave),
             question.model.load,
             mode,
             question.dof,
@@ -42,7 +42,9 @@ def follow_mode(question: Question, wave: int, mode: StuckMode) -> ModeBranch:
             question.sweep,
         )
     except StickslipError as error:
-        found = Backbone(question.system(wave), question.model.load, mode, question.dof, (), "")
+        found = Backbone(
+            as_wave(question.model.system, wave), question.model.load, mode, question.dof, (), ""
+        )
         return _branch(wave, found, question.sweep.tolerance, str(error))
     return _branch(wave, found, question.sweep.tolerance)
 

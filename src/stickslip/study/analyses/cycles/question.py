@@ -1,31 +1,31 @@
 """What a job solves: the model, the waves and modes that are asked for, and those that grow by themselves."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
-from stickslip.arrays import BoolArray
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
 from stickslip.contact.compiled import Evaluator
 from stickslip.errors import input_error
 from stickslip.reduction.tuned import TunedWheel
-from stickslip.response.at_rest import pressed_by
 from stickslip.response.parameter import Discretisation
-from stickslip.response.self_excited.modes import StuckMode, stuck_modes
-from stickslip.response.self_excited.problem import SAMPLES_A_HARMONIC
-from stickslip.response.system import System
+from stickslip.response.self_excited.modes import StuckMode
 from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.cycles.table import MODES, LimitCycleTable
 from stickslip.study.analyses.facts import facts_of
-from stickslip.study.analyses.forced.question import peak_first
+from stickslip.study.analyses.vibrating import (
+    ONE,
+    free_to_vibrate,
+    modes_of,
+    refuse_rigid,
+    refuse_waves,
+    represented,
+    require_flow,
+)
 from stickslip.units import RPM
 
 IN_TIME = "verify"
-ONE = -1  # wave number of a single structure
-SAMPLES = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,24 +64,12 @@ class Question:
             return tuple(self.asked.wave_numbers)
         return tuple(range(self.model.sectors))
 
-    def system(self, wave: int) -> System:
-        """Return the system that vibrates as a wave."""
-        side = self.model.system.structure
-        if not isinstance(side, TunedWheel):
-            return self.model.system
-        return replace(self.model.system, structure=side.travelling_as(wave))
-
-    @property
-    def holds(self) -> BoolArray:
-        """(p,) contact points that stick under the static loads."""
-        return pressed_by(self.model.system.springs.laws, self.model.static_force)
-
     def modes(self, wave: int) -> list[StuckMode]:
         """Return the modes of a wave that are looked at."""
         blades = self.model.blades
         every = MODES if blades is None else MODES * blades.sectors
         count = max([every, *(self.asked.modes or [])])
-        return stuck_modes(self.system(wave), count, self.holds)
+        return modes_of(self.model, count, wave)
 
     def followed(self, modes: list[StuckMode]) -> list[StuckMode]:
         """Return those of some modes of a wave whose amplitude is followed: those that are named, or that grow."""
@@ -93,9 +81,7 @@ class Question:
     @property
     def discretisation(self) -> Discretisation:
         """Of the curve over the amplitude."""
-        order = self.asked.harmonics
-        samples = max(SAMPLES, SAMPLES_A_HARMONIC * order)
-        return Discretisation(order=order, samples=samples, evaluator=self.evaluator)
+        return represented(self.asked.harmonics, self.evaluator)
 
 
 def question_of(case: Case, model: Model) -> Question:
@@ -109,35 +95,23 @@ def question_of(case: Case, model: Model) -> Question:
     asked: LimitCycleTable = case.settings.limit_cycle
     refuse_waves("limit_cycle", asked.wave_numbers, model)
     most = max(asked.harmonics, asked.most_harmonics)
-    still = model.undriven
-    wheel = still.sectors > 1 and still.mistuning is None
-    assembled = still.assembled(
-        most, case.store, wave_number=0 if wheel else None, every_wave=wheel
-    )
-    if assembled.system.interface.rigid:
-        raise input_error(
-            "limit_cycle",
-            "a contact is rigid: its force is no function of the gap",
-            "Give the contacts a stiffness, such as elastic_coulomb.",
-        )
+    assembled = free_to_vibrate(model, most, case.store)
+    refuse_rigid("limit_cycle", assembled)
     question = Question(
         case.label,
-        peak_first(assembled),
+        assembled,
         asked,
         case.settings.solver.evaluator,
         asked.in_time or IN_TIME in case.checks,
         facts_of(model, model.speed / RPM),
     )
-    force = question.model.system.structure.feedback_of(1)
-    table = None if force is None or not force.influence.refuses else force.influence
-    if asked.modes is None and table is None:
+    force = assembled.system.structure.feedback_of(1)
+    if asked.modes is None and (force is None or not force.influence.refuses):
         return question
     modes = [question.modes(wave) for wave in question.waves]
     _refuse_modes(asked, modes)
-    followed = [mode.omega for own in modes for mode in question.followed(own)]
-    if table is not None and followed:
-        what = f"a limit cycle with up to {most} harmonics (most_harmonics)"
-        table.require(min(followed), most * max(followed), what)
+    followed = [mode for own in modes for mode in question.followed(own)]
+    require_flow(assembled, followed, most, "a limit cycle")
     return question
 
 
@@ -151,27 +125,3 @@ def _refuse_modes(asked: LimitCycleTable, modes: Sequence[Sequence[StuckMode]]) 
             f"holds {wanted}, and what is looked at has {most} modes",
             "Name others, or leave it out: then the unstable ones are followed.",
         )
-
-
-def refuse_waves(analysis: str, wanted: Sequence[int] | None, model: Model) -> None:
-    """Refuse wave numbers of a model that is no tuned wheel, and those that it does not have."""
-    if wanted is None:
-        return
-    if model.sectors == 1 or model.mistuning is not None:
-        raise input_error(
-            f"{analysis}.wave_numbers",
-            "are those of a tuned wheel, and the model is none",
-            "Leave them out.",
-        )
-    beyond = [k for k in wanted if k >= model.sectors]
-    if beyond:
-        raise input_error(
-            f"{analysis}.wave_numbers",
-            f"holds {beyond[0]}, and {model.sectors} sectors have the waves 0 to {model.sectors - 1}",
-            f"A backward wave of d nodal diameters is d, a forward one {model.sectors} - d.",
-        )
-
-
-def coordinate(system: System) -> int:
-    """Return the coordinate whose amplitude is given: that of the first output."""
-    return int(np.asarray(system.outputs)[0])

@@ -23,10 +23,11 @@ from stickslip.response.self_excited.modes import StuckMode
 from stickslip.response.self_excited.problem import SelfExcited, self_excited_motions
 from stickslip.response.self_excited.stable import CycleStability, cycle_stability
 from stickslip.study.analyses.analysis import Notes
-from stickslip.study.analyses.cycles.question import ONE, Question, coordinate
+from stickslip.study.analyses.cycles.question import Question
 from stickslip.study.analyses.cycles.records import CycleBranch
 from stickslip.study.analyses.cycles.time import compete, settle_cycles
 from stickslip.study.analyses.forced.examination import too_long
+from stickslip.study.analyses.vibrating import ONE, as_wave, coordinate
 from stickslip.study.keep.progress import LOG, advance
 from stickslip.units import HZ
 
@@ -63,7 +64,7 @@ def solve(question: Question, done: Sequence[CycleBranch], notes: Notes) -> Iter
 
 def follow_mode(question: Question, wave: int, mode: StuckMode) -> CycleBranch:
     """Return what is found of a mode."""
-    system = question.system(wave)
+    system = as_wave(question.model.system, wave)
     try:
         problem = self_excited_motions(
             system, question.model.load, mode, coordinate(system), question.discretisation

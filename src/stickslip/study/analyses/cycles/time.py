@@ -22,9 +22,10 @@ from stickslip.response.self_excited.in_time import (
 from stickslip.response.system import System
 from stickslip.response.time.sectors import whole_wheel
 from stickslip.response.time.start import TransientStart, start_from_harmonics
-from stickslip.study.analyses.cycles.question import ONE, Question, coordinate
+from stickslip.study.analyses.cycles.question import Question
 from stickslip.study.analyses.cycles.records import CycleBranch
 from stickslip.study.analyses.forced.question import MOST_IN_TIME
+from stickslip.study.analyses.vibrating import ONE, as_wave, coordinate
 from stickslip.study.keep.progress import LOG
 from stickslip.units import HZ
 
@@ -73,7 +74,7 @@ def compete(question: Question, branches: Sequence[CycleBranch]) -> dict[str, An
     if len({b.wave_number for b in there}) < 2:
         return own | nothing
     try:
-        system = question.system(there[0].wave_number)
+        system = as_wave(question.model.system, there[0].wave_number)
         structure, contacts, load, outputs = in_time(system, question)
         motions = _beginnings(question, there)
     except StickslipError as error:
@@ -116,7 +117,7 @@ def _beginnings(
         if not slips:
             raise StickslipError("no wave has an amplitude from which on it slips")
         amplitude = branch.slips if np.isfinite(branch.slips) else min(slips)
-        system = question.system(branch.wave_number)
+        system = as_wave(question.model.system, branch.wave_number)
         mode = next(m for m in question.modes(branch.wave_number) if m.number == branch.mode)
         shape = amplitude / abs(mode.shape[coordinate(system)]) * mode.shape
         full = np.array([np.zeros_like(shape), shape])
@@ -150,7 +151,7 @@ def in_time(
 
 
 def _from_cycle(question: Question, branch: CycleBranch, i: int) -> Marched:
-    system = question.system(branch.wave_number)
+    system = as_wave(question.model.system, branch.wave_number)
     structure, contacts, load, outputs = in_time(system, question)
     motion, omega = _motion(question, branch, i), float(branch.cycle_omega[i])
     start = start_from_harmonics(motion, omega, contacts.gap_operator, contacts.laws)
@@ -165,7 +166,7 @@ def _motion(question: Question, branch: CycleBranch, i: int) -> ComplexArray:
     full = branch.coefficients[i, ..., 0] + 1j * branch.coefficients[i, ..., 1]
     if branch.wave_number == ONE:
         return full
-    return whole_wheel(question.system(branch.wave_number)).spread(full)
+    return whole_wheel(as_wave(question.model.system, branch.wave_number)).spread(full)
 
 
 def _kicked(start: TransientStart, motions: Sequence[tuple[ComplexArray, float]]) -> TransientStart:

@@ -12,18 +12,17 @@ from stickslip.contact.compiled import Evaluator
 from stickslip.errors import InputError, input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.peak import PeakProblem
-from stickslip.response.parameter import Discretisation, LoadName, Parameter
+from stickslip.response.parameter import LoadName, Parameter
 from stickslip.response.resonances.first import PeakSearch
-from stickslip.response.self_excited.problem import SAMPLES_A_HARMONIC
 from stickslip.response.system import System
 from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.forced.question import peak_first
 from stickslip.study.analyses.resonances.table import ResonanceTable
+from stickslip.study.analyses.vibrating import refuse_rigid, represented
 from stickslip.study.file.tables import OF_THE_MODEL
 from stickslip.units import HZ, RPM
 
-SAMPLES = 256
 VALUE = "value"  # of a function in Python
 FACTORS = get_args(LoadName)  # on loads, which are no keys
 
@@ -106,15 +105,9 @@ def question_of(case: Case, model: Model) -> Question:
     parameter = _parameter(case, asked)
     _accepted(case, asked, parameter)
     assembled = peak_first(model.assembled(more_than(asked.harmonics), case.store))
-    if assembled.system.interface.rigid:
-        raise input_error(
-            "resonance",
-            "a contact is rigid: its force is no function of the gap",
-            "Give the contacts a stiffness, such as elastic_coulomb.",
-        )
+    refuse_rigid("resonance", assembled)
     evaluator: Evaluator = case.settings.solver.evaluator
-    samples = max(SAMPLES, SAMPLES_A_HARMONIC * asked.harmonics)
-    how = Discretisation(order=asked.harmonics, samples=samples, evaluator=evaluator)
+    how = represented(asked.harmonics, evaluator)
     lowest, highest = (HZ * f for f in asked.frequency_hz)
     search = PeakSearch(
         assembled.system, assembled.load, parameter, (lowest, highest), asked.by, 0, how, asked.harmonic, asked.periods

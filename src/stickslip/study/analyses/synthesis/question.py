@@ -11,16 +11,22 @@ from stickslip.assembly.model import Model
 from stickslip.contact.compiled import Evaluator
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response.at_rest import pressed_by
 from stickslip.response.nonlinear_modes.backbone import ModeSweep
 from stickslip.response.parameter import Discretisation
-from stickslip.response.self_excited.modes import StuckMode, stuck_modes
-from stickslip.response.self_excited.problem import SAMPLES_A_HARMONIC
+from stickslip.response.self_excited.modes import StuckMode
 from stickslip.study.analyses.analysis import Case
-from stickslip.study.analyses.cycles.question import SAMPLES
+from stickslip.study.analyses.backbones.question import sweep_of
 from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.forced.question import peak_first
 from stickslip.study.analyses.synthesis.table import ModalSynthesisTable
+from stickslip.study.analyses.vibrating import (
+    coordinate,
+    modes_of,
+    no_such_mode,
+    refuse_rigid,
+    represented,
+    require_flow,
+)
 from stickslip.units import RPM
 
 NAME = "modal_synthesis"
@@ -55,7 +61,7 @@ class Question:
     @property
     def dof(self) -> int:
         """The coordinate of the first output."""
-        return int(np.asarray(self.model.system.outputs)[0])
+        return coordinate(self.model.system)
 
     @property
     def rest(self) -> HarmonicLoad:
@@ -65,27 +71,18 @@ class Question:
     @property
     def mode(self) -> StuckMode | None:
         """The mode that answers; None where there is no such mode."""
-        holds = pressed_by(self.model.system.springs.laws, self.model.static_force)
-        every = stuck_modes(self.model.system, self.asked.mode, holds)
+        every = modes_of(self.model, self.asked.mode)
         return next((m for m in every if m.number == self.asked.mode), None)
 
     @property
     def discretisation(self) -> Discretisation:
         """Of the nonlinear mode, with the fewest harmonics."""
-        order = self.asked.harmonics
-        samples = max(SAMPLES, SAMPLES_A_HARMONIC * order)
-        return Discretisation(order=order, samples=samples, evaluator=self.evaluator)
+        return represented(self.asked.harmonics, self.evaluator)
 
     @property
     def sweep(self) -> ModeSweep:
         """Over which amplitudes the nonlinear mode is followed."""
-        asked, given = self.asked, self.asked.amplitude_mm
-        return ModeSweep(
-            span=None if given is None else (1e-3 * given[0], 1e-3 * given[1]),
-            points=asked.points,
-            most_harmonics=asked.most_harmonics,
-            tolerance=0.01 * asked.accuracy_percent,
-        )
+        return sweep_of(self.asked)
 
 
 def question_of(case: Case, model: Model) -> Question:
@@ -110,26 +107,15 @@ def question_of(case: Case, model: Model) -> Question:
             )
     most = FACTOR * max(asked.harmonics, asked.most_harmonics)
     assembled = peak_first(model.assembled(most, case.store))
-    if assembled.system.interface.rigid:
-        raise input_error(
-            NAME,
-            "a contact is rigid: its force is no function of its gap",
-            "Give the contacts a stiffness, such as elastic_coulomb.",
-        )
+    refuse_rigid(NAME, assembled)
     facts = facts_of(model, model.speed / RPM)
     _bounded(asked.levels, assembled.load)
     question = Question(case.label, assembled, asked, case.settings.solver.evaluator, facts)
     question.sweep.require_span(assembled.system.interface, f"{NAME}.amplitude_mm")
     mode = question.mode
     if mode is None:
-        raise input_error(
-            f"{NAME}.mode",
-            f"is {asked.mode}, and the model has no such mode that vibrates",
-            "Modes count from 1 by frequency with contacts stuck; [modes] lists them.",
-        )
-    force = assembled.system.structure.feedback_of(1)
-    if force is not None and force.influence.refuses:
-        force.influence.require(mode.omega, most * mode.omega, f"a nonlinear mode with up to {most} harmonics (most_harmonics)")  # fmt: skip
+        raise no_such_mode(f"{NAME}.mode", f"is {asked.mode}")
+    require_flow(assembled, [mode], most, "a nonlinear mode")
     return question
 
 

@@ -20,6 +20,7 @@ from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.forced.estimate import Estimate, estimate
 from stickslip.study.analyses.forced.question import peak_first
+from stickslip.study.analyses.vibrating import represented
 from stickslip.study.file.harmonics import HIGHEST
 from stickslip.study.file.section import Positive, Section, rising_pair
 from stickslip.study.models.cost import above
@@ -30,8 +31,6 @@ MOTIONS = (
     100,
 )  # solved at a frequency: where hardly a spring keeps a traction, and where many do
 STEPS = 0.5  # Newton steps that one of them takes, over those of a point of a response
-SAMPLES = 256
-SAMPLES_A_HARMONIC = 16
 
 
 class ResidualTractionsTable(Section):
@@ -100,9 +99,7 @@ class Question:
     @property
     def discretisation(self) -> Discretisation:
         """Of the motions."""
-        order = self.asked.harmonics
-        samples = max(SAMPLES, SAMPLES_A_HARMONIC * order)
-        return Discretisation(order=order, samples=samples, evaluator=self.evaluator)
+        return represented(self.asked.harmonics, self.evaluator)
 
     @property
     def search(self) -> TractionSearch:

@@ -1,6 +1,6 @@
 """What a job solves: the model, its loads sorted by frequency, and near which frequencies a second tone may be."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,14 +12,14 @@ from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.reduction.tuned import TunedWheel
-from stickslip.response.at_rest import pressed_by
 from stickslip.response.quasi_periodic.problem import TwoTones, two_tones
-from stickslip.response.self_excited.modes import StuckMode, stuck_modes
+from stickslip.response.self_excited.modes import StuckMode
 from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.forced.in_time import seconds_in_time
 from stickslip.study.analyses.forced.question import peak_first
 from stickslip.study.analyses.two_frequencies.table import QuasiPeriodicTable
+from stickslip.study.analyses.vibrating import modes_of
 from stickslip.units import HZ, RPM
 
 NAME = "quasi_periodic"
@@ -92,17 +92,11 @@ class Question:
 
     def growing(self) -> list[tuple[int, StuckMode]]:
         """Return the modes that grow with contacts stuck, with their wave numbers (0 for a single structure), the fastest first."""
-        side = self.model.system.structure
-        holds = pressed_by(self.model.system.springs.laws, self.model.static_force)
-        found: list[tuple[int, StuckMode]] = []
+        side, chosen = self.model.system.structure, self.asked.second_wave
+        waves: Sequence[int] = [0]
         if isinstance(side, TunedWheel):
-            chosen = self.asked.second_wave
             waves = range(side.sectors) if chosen is None else [chosen]
-            for wave in waves:
-                system = replace(self.model.system, structure=side.travelling_as(wave))
-                found += [(wave, m) for m in stuck_modes(system, MODES, holds)]
-        else:
-            found = [(0, m) for m in stuck_modes(self.model.system, MODES, holds)]
+        found = [(wave, m) for wave in waves for m in modes_of(self.model, MODES, wave)]
         return sorted((m for m in found if m[1].unstable), key=lambda m: m[1].ratio)
 
 
