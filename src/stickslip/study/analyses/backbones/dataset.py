@@ -6,15 +6,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stickslip.arrays import FloatArray
 from stickslip.reduction.waves import wave
 from stickslip.study.analyses.analysis import Solved
 from stickslip.study.analyses.backbones.records import ModeBranch
 from stickslip.study.analyses.backbones.words import case_verdicts
-from stickslip.study.analyses.verdict import ATTRIBUTE, of_all_cases, to_json
+from stickslip.study.analyses.collected import Variables, described, each, of_cases, rows
 from stickslip.study.analyses.vibrating import ONE
-from stickslip.study.analyses.waves.about import told
-from stickslip.study.keep.netcdf import stacked, variable
 from stickslip.units import HZ
 
 ABOUT = {
@@ -49,57 +46,45 @@ POINTS = {
 
 def dataset(solved: Sequence[Solved]) -> xr.Dataset:
     """Return the modes of all cases."""
-    cases = [_of_case(one) for one in solved]
-    labels = [one.case.label for one in solved]
-    doubts = [v for label, own in zip(labels, cases, strict=True) for v in case_verdicts(label, own)]  # fmt: skip
-    failed = sum(int(np.count_nonzero(own["status"].values > 0)) for own in cases if "status" in own)  # fmt: skip
-    attributes = {ATTRIBUTE: to_json(of_all_cases(doubts, labels)), "failed": failed}
-    return xr.Dataset(stacked(cases), attrs=attributes)
+    return of_cases(solved, _of_case, case_verdicts, _lost)
 
 
-def _of_case(solved: Solved) -> dict[str, xr.Variable]:
+def _lost(case: Variables) -> int:
+    return int(np.count_nonzero(case["status"].values > 0)) if "status" in case else 0
+
+
+def _of_case(solved: Solved) -> Variables:
     branches: Sequence[ModeBranch] = solved.records
     model = solved.notes.get("model", {})
     sectors = int(model.get("sectors", 1))
     values: dict[str, Any] = {"output": str(model.get("output", ""))}
     if branches:
         values |= _of_branches(branches, sectors)
-    known = {name: value for name, value in values.items() if np.size(value) > 0}
-    return told(model) | {
-        name: variable(ABOUT[name][0], value, *ABOUT[name][1:]) for name, value in known.items()
-    }
+    return described(ABOUT, values, model)
 
 
 def _of_branches(branches: Sequence[ModeBranch], sectors: int) -> dict[str, Any]:
-    most = max(b.amplitude.size for b in branches)
-
-    def rows(name: str, missing: float = np.nan) -> FloatArray:
-        out = np.full((len(branches), most), missing)
-        for row, branch in zip(out, branches, strict=True):
-            own = getattr(branch, name)
-            row[: own.size] = own
-        return out
-
-    def each(name: str) -> Any:
-        return np.array([getattr(b, name) for b in branches])
-
-    waves, ratios, amplitudes = each("wave_number"), rows("motion_ratio"), rows("amplitude")
+    waves, ratios, amplitudes = (
+        each(branches, "wave_number"),
+        rows(branches, "motion_ratio"),
+        rows(branches, "amplitude"),
+    )
     top = [int(np.nanargmax(r)) if np.any(np.isfinite(r)) else -1 for r in ratios]
-    gross = rows("slipping") == 1.0
+    gross = rows(branches, "slipping") == 1.0
     return {
         "wave_number": waves,
         "nodal_diameter": np.array([wave(int(k), sectors).nodal_diameter if k >= 0 else ONE for k in waves]),
-        "mode": each("mode"),
-        "mode_frequency_hz": each("omega") / HZ,
-        "mode_damping_ratio": each("ratio"),
-        "accuracy": each("tolerance"),
-        "end": each("end"),
-        "problem": each("problem"),
+        "mode": each(branches, "mode"),
+        "mode_frequency_hz": each(branches, "omega") / HZ,
+        "mode_damping_ratio": each(branches, "ratio"),
+        "accuracy": each(branches, "tolerance"),
+        "end": each(branches, "end"),
+        "problem": each(branches, "problem"),
         "gross_slip_amplitude": np.array([a[g][0] if np.any(g) else np.nan for a, g in zip(amplitudes, gross, strict=True)]),
         "largest_damping_ratio": np.array([r[i] if i >= 0 else np.nan for r, i in zip(ratios, top, strict=True)]),
         "largest_damping_amplitude": np.array([a[i] if i >= 0 else np.nan for a, i in zip(amplitudes, top, strict=True)]),
-        "frequency_hz": rows("motion_omega") / HZ,
-        "harmonics": rows("order", -1.0).astype(np.int64),
-        "status": rows("status", -1.0).astype(np.int64),
-        **{name: rows(own) for name, own in POINTS.items()},
+        "frequency_hz": rows(branches, "motion_omega") / HZ,
+        "harmonics": rows(branches, "order", -1.0).astype(np.int64),
+        "status": rows(branches, "status", -1.0).astype(np.int64),
+        **{name: rows(branches, own) for name, own in POINTS.items()},
     }  # fmt: skip

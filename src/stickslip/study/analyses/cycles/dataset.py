@@ -7,18 +7,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stickslip.arrays import FloatArray
 from stickslip.reduction.waves import wave
 from stickslip.study.analyses.analysis import Solved
+from stickslip.study.analyses.collected import Variables, described, each, of_cases, rows
 from stickslip.study.analyses.cycles.records import CycleBranch
 from stickslip.study.analyses.cycles.words import case_verdicts
-from stickslip.study.analyses.verdict import ATTRIBUTE, of_all_cases, to_json
 from stickslip.study.analyses.vibrating import ONE
-from stickslip.study.analyses.waves.about import told
-from stickslip.study.keep.netcdf import stacked, variable
 from stickslip.units import HZ
 
-Variables = dict[str, xr.Variable]
 ABOUT = {
     "output": ("", "1", "output whose amplitude is given"),
     "linear_wave": ("linear", "1", "wave number of the modes looked at; -1 for a single structure"),
@@ -62,12 +58,7 @@ ABOUT = {
 
 def dataset(solved: Sequence[Solved]) -> xr.Dataset:
     """Return the limit cycles of all cases."""
-    cases = [_of_case(one) for one in solved]
-    labels = [one.case.label for one in solved]
-    doubts = [v for label, own in zip(labels, cases, strict=True) for v in case_verdicts(label, own)]  # fmt: skip
-    failed = sum(_failed(own) for own in cases)
-    attributes = {ATTRIBUTE: to_json(of_all_cases(doubts, labels)), "failed": failed}
-    return xr.Dataset(stacked(cases), attrs=attributes)
+    return of_cases(solved, _of_case, case_verdicts, _lost)
 
 
 def _of_case(solved: Solved) -> Variables:
@@ -87,40 +78,25 @@ def _of_case(solved: Solved) -> Variables:
         values |= _of_branches(branches, sectors)
         values |= _of_cycles(branches)
         values |= _in_time(branches, notes)
-    known = {name: value for name, value in values.items() if np.size(value) > 0}
-    return told(model) | {
-        name: variable(ABOUT[name][0], value, *ABOUT[name][1:]) for name, value in known.items()
-    }
+    return described(ABOUT, values, model)
 
 
 def _of_branches(branches: Sequence[CycleBranch], sectors: int) -> dict[str, Any]:
-    most = max(b.amplitude.size for b in branches)
-
-    def rows(name: str) -> FloatArray:
-        out = np.full((len(branches), most), np.nan)
-        for row, branch in zip(out, branches, strict=True):
-            own = getattr(branch, name)
-            row[: own.size] = own
-        return out
-
-    def each(name: str) -> Any:
-        return np.array([getattr(b, name) for b in branches])
-
-    waves = each("wave_number")
+    waves = each(branches, "wave_number")
     return {
         "wave_number": waves,
         "nodal_diameter": np.array([wave(int(k), sectors).nodal_diameter if k >= 0 else ONE for k in waves]),
-        "mode": each("mode"),
-        "mode_frequency_hz": each("omega") / HZ,
-        "mode_damping_ratio": each("ratio"),
-        "slip_amplitude": each("slips"),
-        "largest_damping_ratio": each("largest_ratio"),
-        "largest_damping_amplitude": each("largest_at"),
-        "problem": each("problem"),
-        "lost_cycles": each("lost"),
-        "amplitude": rows("amplitude"),
-        "frequency_hz": rows("motion_omega") / HZ,
-        "damping_ratio": rows("motion_ratio"),
+        "mode": each(branches, "mode"),
+        "mode_frequency_hz": each(branches, "omega") / HZ,
+        "mode_damping_ratio": each(branches, "ratio"),
+        "slip_amplitude": each(branches, "slips"),
+        "largest_damping_ratio": each(branches, "largest_ratio"),
+        "largest_damping_amplitude": each(branches, "largest_at"),
+        "problem": each(branches, "problem"),
+        "lost_cycles": each(branches, "lost"),
+        "amplitude": rows(branches, "amplitude"),
+        "frequency_hz": rows(branches, "motion_omega") / HZ,
+        "damping_ratio": rows(branches, "motion_ratio"),
     }  # fmt: skip
 
 
@@ -172,7 +148,7 @@ def _in_time(
     return values
 
 
-def _failed(case: Variables) -> int:
+def _lost(case: Variables) -> int:
     if "amplitude" not in case:
         return 0
     wanted, found = (np.isfinite(case[name].values) for name in ("amplitude", "damping_ratio"))

@@ -9,22 +9,16 @@ import xarray as xr
 from stickslip.response.all_motions.basins import APERIODIC, PERIODIC
 from stickslip.response.all_motions.found import AllMotions, AtFrequency
 from stickslip.study.analyses.analysis import Solved
+from stickslip.study.analyses.collected import Variables, of_cases, rows
 from stickslip.study.analyses.motions.words import case_verdicts
-from stickslip.study.analyses.verdict import ATTRIBUTE, of_all_cases, to_json
 from stickslip.study.analyses.waves.about import told
-from stickslip.study.keep.netcdf import stacked, variable
+from stickslip.study.keep.netcdf import variable
 from stickslip.units import HZ
-
-Variables = dict[str, xr.Variable]
 
 
 def dataset(solved: Sequence[Solved]) -> xr.Dataset:
     """Return what was found in all cases."""
-    labels = [one.case.label for one in solved]
-    cases = [_of_case(one) for one in solved]
-    verdicts = [v for one, own in zip(solved, cases, strict=True) for v in case_verdicts(one.case.label, own)]  # fmt: skip
-    attributes = {ATTRIBUTE: to_json(of_all_cases(verdicts, labels)), "failed": 0}
-    return xr.Dataset(stacked(cases), attrs=attributes)
+    return of_cases(solved, _of_case, case_verdicts)
 
 
 def _of_case(solved: Solved) -> Variables:
@@ -68,14 +62,10 @@ ABOUT = {
 
 def noted(found: AllMotions, budget: float) -> dict[str, Any]:
     """Return what was found as named arrays."""
-    most = max((b.omega.size for b in found.branches), default=0)
-    lines = {name: np.full((len(found.branches), most), np.nan) for name in ("frequency_hz", "amplitude")}  # fmt: skip
-    for i, branch in enumerate(found.branches):
-        lines["frequency_hz"][i, : branch.omega.size] = branch.omega / HZ
-        lines["amplitude"][i, : branch.omega.size] = branch.amplitude
     own = found.branches
     return {
-        **lines,
+        "frequency_hz": rows(own, "omega") / HZ,
+        "amplitude": rows(own, "amplitude"),
         "origin": np.array([b.origin for b in own], dtype=str),
         "end": np.array([b.end for b in own], dtype=str),
         "isola": np.array([int(b.isola) for b in own]),

@@ -9,14 +9,14 @@ import xarray as xr
 from stickslip.arrays import FloatArray
 from stickslip.response.resonances.point import PeakPoint
 from stickslip.study.analyses.analysis import Solved
+from stickslip.study.analyses.collected import Variables, of_cases
 from stickslip.study.analyses.resonances.envelope import along_span, heights, overtakings
 from stickslip.study.analyses.resonances.words import case_verdicts
-from stickslip.study.analyses.verdict import ATTRIBUTE, of_all_cases, to_json
+from stickslip.study.analyses.verdict import Verdict
 from stickslip.study.analyses.waves.about import told
-from stickslip.study.keep.netcdf import stacked, variable
+from stickslip.study.keep.netcdf import variable
 from stickslip.units import DEG, HZ
 
-Variables = dict[str, xr.Variable]
 CURVES = {
     "value": ("1", "value of the parameter"),
     "frequency_hz": ("Hz", "frequency of the peak"),
@@ -32,14 +32,17 @@ CURVES = {
 
 def dataset(solved: Sequence[Solved]) -> xr.Dataset:
     """Return the peaks of all cases."""
-    labels = [one.case.label for one in solved]
-    cases = [_of_case(one) for one in solved]
-    found = [
-        v for one, own in zip(solved, cases, strict=True) for v in case_verdicts(one.case.label, own, one.notes, one.case.settings.resonance.values or ())
-    ]  # fmt: skip
-    failed = sum(int(np.sum(own["maximum"].values == -1)) for own in cases if "maximum" in own)
-    attributes = {ATTRIBUTE: to_json(of_all_cases(found, labels)), "failed": failed}
-    return xr.Dataset(stacked(cases), attrs=attributes)
+    by_label = {one.case.label: one for one in solved}
+
+    def verdicts(label: str, own: Variables) -> Sequence[Verdict]:
+        one = by_label[label]
+        return case_verdicts(label, own, one.notes, one.case.settings.resonance.values or ())
+
+    return of_cases(solved, _of_case, verdicts, _lost)
+
+
+def _lost(case: Variables) -> int:
+    return int(np.sum(case["maximum"].values == -1)) if "maximum" in case else 0
 
 
 def _of_case(solved: Solved) -> Variables:

@@ -8,12 +8,10 @@ import xarray as xr
 
 from stickslip.arrays import FloatArray
 from stickslip.study.analyses.analysis import Solved
+from stickslip.study.analyses.collected import Variables, described, each, of_cases, rows
 from stickslip.study.analyses.synthesis.ranges import along_error, around_peak
 from stickslip.study.analyses.synthesis.records import SynthesisLevel
 from stickslip.study.analyses.synthesis.words import case_verdicts
-from stickslip.study.analyses.verdict import ATTRIBUTE, of_all_cases, to_json
-from stickslip.study.analyses.waves.about import told
-from stickslip.study.keep.netcdf import stacked, variable
 from stickslip.units import HZ
 
 ABOUT = {
@@ -80,14 +78,10 @@ PLAIN = {
 
 def dataset(solved: Sequence[Solved]) -> xr.Dataset:
     """Return the responses of all cases."""
-    cases = [_of_case(one) for one in solved]
-    labels = [one.case.label for one in solved]
-    doubts = [v for label, own in zip(labels, cases, strict=True) for v in case_verdicts(label, own)]  # fmt: skip
-    attributes = {ATTRIBUTE: to_json(of_all_cases(doubts, labels)), "failed": 0}
-    return xr.Dataset(stacked(cases), attrs=attributes)
+    return of_cases(solved, _of_case, case_verdicts)
 
 
-def _of_case(solved: Solved) -> dict[str, xr.Variable]:
+def _of_case(solved: Solved) -> Variables:
     levels: Sequence[SynthesisLevel] = solved.records
     model = solved.notes.get("model", {})
     values: dict[str, Any] = {"output": str(model.get("output", ""))}
@@ -108,39 +102,33 @@ def _of_case(solved: Solved) -> dict[str, xr.Variable]:
         }
     if levels:
         values |= _of_levels(levels, np.asarray(solved.case.settings.modal_synthesis.passage_hz_per_s))  # fmt: skip
-    known = {name: value for name, value in values.items() if np.size(value) > 0}
-    return told(model) | {
-        name: variable(ABOUT[name][0], value, *ABOUT[name][1:]) for name, value in known.items()
-    }
+    return described(ABOUT, values, model)
 
 
 def _of_levels(levels: Sequence[SynthesisLevel], rates: FloatArray) -> dict[str, Any]:
-    def each(name: str) -> Any:
-        return np.array([getattr(one, name) for one in levels])
-
-    values = {name: each(own) for name, own in PLAIN.items()} | {
-        "peak_frequency_hz": each("peak_omega") / HZ,
-        "detached_peak_amplitude": each("detached_peak"),
-        "detached_peak_frequency_hz": each("detached_peak_omega") / HZ,
-        "frequency_hz": _rows(levels, "omega") / HZ,
-        "amplitude": _rows(levels, "amplitude"),
-        "curve": _rows(levels, "curve", -1.0).astype(np.int64),
-        "stable": _rows(levels, "stable", -1.0).astype(np.int64),
-        "others": _rows(levels, "others"),
-        "alone": _rows(levels, "alone", -1.0).astype(np.int64),
+    values = {name: each(levels, own) for name, own in PLAIN.items()} | {
+        "peak_frequency_hz": each(levels, "peak_omega") / HZ,
+        "detached_peak_amplitude": each(levels, "detached_peak"),
+        "detached_peak_frequency_hz": each(levels, "detached_peak_omega") / HZ,
+        "frequency_hz": rows(levels, "omega") / HZ,
+        "amplitude": rows(levels, "amplitude"),
+        "curve": rows(levels, "curve", -1.0).astype(np.int64),
+        "stable": rows(levels, "stable", -1.0).astype(np.int64),
+        "others": rows(levels, "others"),
+        "alone": rows(levels, "alone", -1.0).astype(np.int64),
         "alone_from_hz": np.array([around_peak(one)[0] for one in levels]) / HZ,
         "alone_to_hz": np.array([around_peak(one)[1] for one in levels]) / HZ,
     }
     if any(one.direct_omega.size for one in levels):
         values |= {
-            "direct_frequency_hz": _rows(levels, "direct_omega") / HZ,
-            "direct_amplitude": _rows(levels, "direct_amplitude"),
-            "direct_peak_amplitude": each("direct_peak"),
-            "direct_peak_frequency_hz": each("direct_peak_omega") / HZ,
-            "direct_error": each("peak") / each("direct_peak") - 1.0,
+            "direct_frequency_hz": rows(levels, "direct_omega") / HZ,
+            "direct_amplitude": rows(levels, "direct_amplitude"),
+            "direct_peak_amplitude": each(levels, "direct_peak"),
+            "direct_peak_frequency_hz": each(levels, "direct_peak_omega") / HZ,
+            "direct_error": each(levels, "peak") / each(levels, "direct_peak") - 1.0,
             "along_error": np.array([along_error(one)[0] for one in levels]),
             "along_error_hz": np.array([along_error(one)[1] for one in levels]) / HZ,
-            "direct_seconds": each("direct_seconds"),
+            "direct_seconds": each(levels, "direct_seconds"),
         }
     if rates.size:
         values |= _of_passages(levels, rates)
@@ -162,11 +150,3 @@ def _of_passages(levels: Sequence[SynthesisLevel], rates: FloatArray) -> dict[st
         "passage_finished": np.array([one.passage_finished for one in levels]),
         "passage_change": np.array([one.passage_change for one in levels]),
     }
-
-
-def _rows(levels: Sequence[SynthesisLevel], name: str, missing: float = np.nan) -> FloatArray:
-    out = np.full((len(levels), max(getattr(one, name).size for one in levels)), missing)
-    for row, one in zip(out, levels, strict=True):
-        own = getattr(one, name)
-        row[: own.size] = own
-    return out

@@ -8,14 +8,11 @@ import numpy as np
 import xarray as xr
 
 from stickslip.study.analyses.analysis import Solved
+from stickslip.study.analyses.collected import Variables, described, of_cases
 from stickslip.study.analyses.tractions.records import Stage, TractionRecord
 from stickslip.study.analyses.tractions.words import case_verdicts
-from stickslip.study.analyses.verdict import ATTRIBUTE, of_all_cases, to_json
-from stickslip.study.analyses.waves.about import told
-from stickslip.study.keep.netcdf import stacked, variable
 from stickslip.units import HZ
 
-Variables = dict[str, xr.Variable]
 ABOUT = {
     "output": ("", "1", "output whose amplitude is bounded"),
     "excitation_n": ("", "N", "amplitude of the harmonic force"),
@@ -42,16 +39,12 @@ ABOUT = {
 
 def dataset(solved: Sequence[Solved]) -> xr.Dataset:
     """Return the bounds of all cases."""
-    cases = [_of_case(one) for one in solved]
-    labels = [one.case.label for one in solved]
-    found = [v for label, own in zip(labels, cases, strict=True) for v in case_verdicts(label, own)]  # fmt: skip
-    failed = sum(
-        int(np.count_nonzero(np.isnan(own["reference_amplitude"].values)))
-        for own in cases
-        if "reference_amplitude" in own
-    )
-    attributes = {ATTRIBUTE: to_json(of_all_cases(found, labels)), "failed": failed}
-    return xr.Dataset(stacked(cases), attrs=attributes)
+    return of_cases(solved, _of_case, case_verdicts, _lost)
+
+
+def _lost(case: Variables) -> int:
+    known = case.get("reference_amplitude")
+    return 0 if known is None else int(np.count_nonzero(np.isnan(known.values)))
 
 
 def _of_case(solved: Solved) -> Variables:
@@ -70,11 +63,7 @@ def _of_case(solved: Solved) -> Variables:
         values |= _of_resonance(points, by_stage)
     if "confirmed" in solved.notes:
         values |= dict(solved.notes["confirmed"])
-    known = {name: value for name, value in values.items() if np.size(value) > 0}
-    facts = {name: value for name, value in model.items() if name not in ABOUT}
-    return told(facts) | {
-        name: variable(ABOUT[name][0], value, *ABOUT[name][1:]) for name, value in known.items()
-    }
+    return described(ABOUT, values, model)
 
 
 def _of_points(points: Sequence[TractionRecord]) -> dict[str, Any]:

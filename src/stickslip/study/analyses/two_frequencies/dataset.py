@@ -7,11 +7,9 @@ import numpy as np
 import xarray as xr
 
 from stickslip.study.analyses.analysis import Solved
+from stickslip.study.analyses.collected import Variables, described, each, of_cases
 from stickslip.study.analyses.two_frequencies.records import TwoFrequencies
 from stickslip.study.analyses.two_frequencies.words import case_verdicts
-from stickslip.study.analyses.verdict import ATTRIBUTE, of_all_cases, to_json
-from stickslip.study.analyses.waves.about import told
-from stickslip.study.keep.netcdf import stacked, variable
 from stickslip.units import HZ
 
 ABOUT = {
@@ -45,29 +43,25 @@ EACH = {
 
 def dataset(solved: Sequence[Solved]) -> xr.Dataset:
     """Return the motions of all cases."""
-    cases = [_of_case(one) for one in solved]
-    labels = [one.case.label for one in solved]
-    doubts = [v for label, own in zip(labels, cases, strict=True) for v in case_verdicts(label, own)]  # fmt: skip
-    failed = sum(int(np.count_nonzero(own["kind"].values == "not found")) for own in cases if "kind" in own)  # fmt: skip
-    attributes = {ATTRIBUTE: to_json(of_all_cases(doubts, labels)), "failed": failed}
-    return xr.Dataset(stacked(cases), attrs=attributes)
+    return of_cases(solved, _of_case, case_verdicts, _lost)
 
 
-def _of_case(solved: Solved) -> dict[str, xr.Variable]:
+def _lost(case: Variables) -> int:
+    return int(np.count_nonzero(case["kind"].values == "not found")) if "kind" in case else 0
+
+
+def _of_case(solved: Solved) -> Variables:
     points: Sequence[TwoFrequencies] = solved.records
     model = dict(solved.notes.get("model", {}))
     names = [str(name) for name in np.atleast_1d(model.pop("output", []))]
     values: dict[str, Any] = {"output_name": np.array(names, dtype=str)}
     if points:
         values |= _of_points(points)
-    known = {name: value for name, value in values.items() if np.size(value) > 0}
-    return told(model) | {
-        name: variable(ABOUT[name][0], value, *ABOUT[name][1:]) for name, value in known.items()
-    }
+    return described(ABOUT, values, model)
 
 
 def _of_points(points: Sequence[TwoFrequencies]) -> dict[str, Any]:
-    found: dict[str, Any] = {name: np.array([getattr(p, own) for p in points]) for name, own in EACH.items()}  # fmt: skip
+    found: dict[str, Any] = {name: each(points, own) for name, own in EACH.items()}
     most = max(len(p.indices) for p in points)
     outputs = points[0].largest.size
     index = np.zeros((len(points), most, 2), dtype=np.int64)
@@ -78,8 +72,8 @@ def _of_points(points: Sequence[TwoFrequencies]) -> dict[str, Any]:
     if not np.any(np.isfinite(found["time_largest"])):
         found = {name: value for name, value in found.items() if not name.startswith("time_")}
     return found | {
-        "first_hz": np.array([p.first for p in points]) / HZ,
-        "second_hz": np.array([p.second for p in points]) / HZ,
+        "first_hz": each(points, "first") / HZ,
+        "second_hz": each(points, "second") / HZ,
         "combined": np.array([max(len(p.indices) - 1, 0) for p in points]),
         "index": index,
         "amplitude": amplitude,

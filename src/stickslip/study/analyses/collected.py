@@ -1,0 +1,65 @@
+"""How what the jobs of an analysis found becomes its node: records as rows of arrays, cases side by side, the verdicts of all."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stickslip.arrays import FloatArray
+from stickslip.study.analyses.analysis import Solved
+from stickslip.study.analyses.verdict import ATTRIBUTE, Verdict, of_all_cases, to_json
+from stickslip.study.analyses.waves.about import told
+from stickslip.study.keep.netcdf import stacked, variable
+
+Variables = dict[str, xr.Variable]
+About = Mapping[str, tuple[str, str, str]]  # dimensions, unit and words of each variable
+
+
+def of_cases(
+    solved: Sequence[Solved],
+    of_case: Callable[[Solved], Variables],
+    verdicts: Callable[[str, Variables], Iterable[Verdict]],
+    lost: Callable[[Variables], int] = lambda _: 0,
+) -> xr.Dataset:
+    """Return the node of all cases.
+
+    Parameters
+    ----------
+    solved
+        What the jobs found.
+    of_case
+        Returns the variables of a case.
+    verdicts
+        Returns what is to be thought of a case, by its label and its variables.
+    lost
+        Returns how many of its points have no solution.
+    """
+    cases = [of_case(one) for one in solved]
+    labels = [one.case.label for one in solved]
+    found = [v for label, own in zip(labels, cases, strict=True) for v in verdicts(label, own)]
+    failed = sum(lost(own) for own in cases)
+    attributes = {ATTRIBUTE: to_json(of_all_cases(found, labels)), "failed": failed}
+    return xr.Dataset(stacked(cases), attrs=attributes)
+
+
+def described(about: About, values: Mapping[str, Any], model: Mapping[str, Any]) -> Variables:
+    """Return the values that are not empty as variables, beside what is known of the model."""
+    known = {name: value for name, value in values.items() if np.size(value) > 0}
+    return told(model) | {
+        name: variable(about[name][0], value, *about[name][1:]) for name, value in known.items()
+    }
+
+
+def each(records: Sequence[object], name: str) -> Any:
+    """Return the array of an attribute of all records."""
+    return np.array([getattr(one, name) for one in records])
+
+
+def rows(records: Sequence[object], name: str, missing: float = np.nan) -> FloatArray:
+    """Return an attribute of all records, arrays of different lengths, as rows that are filled up."""
+    every = [getattr(one, name) for one in records]
+    out = np.full((len(every), max((own.size for own in every), default=0)), missing)
+    for row, own in zip(out, every, strict=True):
+        row[: own.size] = own
+    return out
