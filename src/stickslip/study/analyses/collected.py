@@ -1,6 +1,6 @@
 """How what the jobs of an analysis found becomes its node: records as rows of arrays, cases side by side, the verdicts of all."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from stickslip.arrays import FloatArray
 from stickslip.study.analyses.analysis import Solved
 from stickslip.study.analyses.verdict import ATTRIBUTE, Verdict, of_all_cases, to_json
 from stickslip.study.analyses.waves.about import told
-from stickslip.study.keep.netcdf import stacked, variable
+from stickslip.study.keep.netcdf import alike, one_case, stacked, variable
 
 Variables = dict[str, xr.Variable]
 About = Mapping[str, tuple[str, str, str]]  # dimensions, unit and words of each variable
@@ -63,3 +63,16 @@ def rows(records: Sequence[object], name: str, missing: float = np.nan) -> Float
     for row, own in zip(out, every, strict=True):
         row[: own.size] = own
     return out
+
+
+def told_apart(data: xr.Dataset) -> Iterator[tuple[xr.Dataset, str]]:
+    """Yield each different case once, with the head of its tables: the labels of all that are alike, nothing where all are."""
+    groups = alike(data)
+    for group in groups:
+        labels = [str(data["case_label"].values[i]) for i in group if len(groups) > 1]
+        yield one_case(data, group[0]), f"{'; '.join(labels)}: " if labels else ""
+
+
+def number(value: float, digits: int = 5) -> str:
+    """Return a number for a table, with a dash for none."""
+    return f"{value:.{digits}g}" if np.isfinite(value) else "-"

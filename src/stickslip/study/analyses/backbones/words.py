@@ -6,9 +6,9 @@ import numpy as np
 import xarray as xr
 
 from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.analyses.collected import number, told_apart
 from stickslip.study.analyses.cycles.words import branch_name
 from stickslip.study.analyses.verdict import Verdict
-from stickslip.study.keep.netcdf import alike, one_case
 
 NONE = 1e-9  # damping ratio below which there is none
 LIFTS, AGAIN = "lift-off", "taken up again"  # in the words of `Backbone.end`
@@ -82,15 +82,7 @@ def _of_harmonics(label: str, name: str, case: Mapping[str, xr.Variable], i: int
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     """Return what the terminal prints: the modes of each case."""
-    found = []
-    groups = alike(data)
-    for group in groups:
-        case = one_case(data, group[0])
-        labels = [str(data["case_label"].values[i]) for i in group if len(groups) > 1]
-        head = f"{'; '.join(labels)}: " if labels else ""
-        if "mode" in case:
-            found.append(_table(case, head))
-    return tuple(found)
+    return tuple(_table(case, head) for case, head in told_apart(data) if "mode" in case)
 
 
 def _table(case: xr.Dataset, head: str) -> TextTable:
@@ -104,14 +96,10 @@ def _table(case: xr.Dataset, head: str) -> TextTable:
                 f"{float(case['mode_frequency_hz'][i]):.6g}",
                 f"{known.min():.6g} to {known.max():.6g}" if known.size else "-",
                 f"{100 * float(case['mode_damping_ratio'][i]):+.4g}",
-                _number(100 * float(case["largest_damping_ratio"][i])),
-                _number(1e3 * float(case["largest_damping_amplitude"][i])),
+                number(100 * float(case["largest_damping_ratio"][i])),
+                number(1e3 * float(case["largest_damping_amplitude"][i])),
                 str(case["problem"][i].values) or str(case["end"][i].values),
             )
         )
     columns = ("mode", "Hz, stuck", "Hz", "damping %, stuck", "most damping %", "at mm", "end")
     return TextTable(f"{head}Nonlinear modes over the amplitude of {case.attrs.get('output', '')}", columns, tuple(rows))  # fmt: skip
-
-
-def _number(value: float) -> str:
-    return f"{value:.5g}" if np.isfinite(value) else "-"

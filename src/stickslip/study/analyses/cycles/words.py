@@ -1,15 +1,14 @@
 """What is told of limit cycles: verdicts, and what the terminal prints."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from stickslip.response.self_excited.in_time import UNSETTLED
 from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.analyses.collected import number, told_apart
 from stickslip.study.analyses.verdict import Verdict
-from stickslip.study.keep.netcdf import alike, one_case
 
 CLOSE = 1e-3  # of amplitude or frequency, by which time integration may be off a cycle
 MORE = "Raise limit_cycle.most_harmonics."
@@ -158,14 +157,7 @@ def _cycles(case: Mapping[str, xr.Variable]) -> range:
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     """Return what the terminal prints: the limit cycles of each case."""
-    found = []
-    groups = alike(data)
-    for group in groups:
-        case = one_case(data, group[0])
-        labels = [str(data["case_label"].values[i]) for i in group if len(groups) > 1]
-        head = f"{'; '.join(labels)}: " if labels else ""
-        found += _tables(case, head)
-    return tuple(found)
+    return tuple(table for case, head in told_apart(data) for table in _tables(case, head))
 
 
 def _tables(case: xr.Dataset, head: str) -> list[TextTable]:
@@ -176,7 +168,7 @@ def _tables(case: xr.Dataset, head: str) -> list[TextTable]:
             branch_name(case, i),
             f"{float(case['mode_frequency_hz'][i]):.6g}",
             f"{100 * float(case['mode_damping_ratio'][i]):+.4g}",
-            _mm(case["slip_amplitude"][i]),
+            number(1e3 * float(case["slip_amplitude"][i])),
             f"{100 * float(case['largest_damping_ratio'][i]):+.4g}",
         )
         for i in range(case.sizes["branch"])
@@ -192,7 +184,7 @@ def _tables(case: xr.Dataset, head: str) -> list[TextTable]:
         cycles.append(
             (
                 branch_name(case, int(case["cycle_branch"][c])),
-                _mm(case["cycle_amplitude"][c]),
+                number(1e3 * float(case["cycle_amplitude"][c])),
                 f"{float(case['cycle_frequency_hz'][c]):.6g}",
                 "attracting" if float(case["cycle_slope"][c]) > 0.0 else "repelling",
                 f"{case['cycle_stability'][c].values!s}{grows}",
@@ -201,8 +193,3 @@ def _tables(case: xr.Dataset, head: str) -> list[TextTable]:
         )
     names = ("mode", "amplitude mm", "Hz", "in its amplitude", "against all disturbances", "H")
     return [*found, TextTable(f"{head}Limit cycles", names, tuple(cycles))]
-
-
-def _mm(value: Any) -> str:
-    number = 1e3 * float(value)
-    return f"{number:.5g}" if np.isfinite(number) else "-"

@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 
 from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.analyses.collected import told_apart
 from stickslip.study.analyses.verdict import Verdict
-from stickslip.study.keep.netcdf import alike, one_case
 
 HIGHER = 1.001  # times the swept peak, from where a branch is said to reach higher
 
@@ -102,15 +102,7 @@ def _not_reached(label: str, case: Mapping[str, xr.Variable], i: int) -> list[Ve
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     """Return what the terminal prints: the motions at the frequencies that were searched."""
-    found = []
-    groups = alike(data)
-    for group in groups:
-        case = one_case(data, group[0])
-        if "origin" not in case:
-            continue
-        labels = [str(data["case_label"].values[i]) for i in group if len(groups) > 1]
-        found.append(_table(case, f"{'; '.join(labels)}: " if labels else ""))
-    return tuple(found)
+    return tuple(_table(case, head) for case, head in told_apart(data) if "origin" in case)
 
 
 def _table(case: xr.Dataset, head: str) -> TextTable:

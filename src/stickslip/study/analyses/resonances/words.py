@@ -7,8 +7,8 @@ import numpy as np
 import xarray as xr
 
 from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.analyses.collected import number, told_apart
 from stickslip.study.analyses.verdict import Verdict, from_json
-from stickslip.study.keep.netcdf import alike, one_case
 
 FAR_BELOW = 0.01  # of the maximum beside it: by phase, a peak that is none
 ENOUGH = 0.01  # change of the highest peak by twice the harmonics
@@ -61,9 +61,9 @@ def _of_points(label: str, kind: np.ndarray, value: np.ndarray) -> list[Verdict]
 def _of_unmet(label: str, noted: Mapping[str, Any]) -> list[Verdict]:
     """Return doubts of peaks that are known from the last value alone."""
     found = []
-    number, value = (np.atleast_1d(noted.get(k, [])) for k in ("peak", "value"))
-    for peak in np.unique(number):
-        own = value[number == peak]
+    which, value = (np.atleast_1d(noted.get(k, [])) for k in ("peak", "value"))
+    for peak in np.unique(which):
+        own = value[which == peak]
         why = f"peak {int(peak) + 1} at {_values(own)} was followed back from the last value: a sweep at this value was not seen to reach it"
         if own.size > 1:
             why = why.replace("a sweep at this value was", "sweeps at these values were")
@@ -126,14 +126,7 @@ def _values(values: np.ndarray) -> str:
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     """Return what the terminal prints: the peaks of each case."""
-    found = []
-    groups = alike(data)
-    for group in groups:
-        case = one_case(data, group[0])
-        labels = [str(data["case_label"].values[i]) for i in group if len(groups) > 1]
-        if "maximum" in case:
-            found.append(_table(case, f"{'; '.join(labels)}: " if labels else ""))
-    return tuple(found)
+    return tuple(_table(case, head) for case, head in told_apart(data) if "maximum" in case)
 
 
 def _table(case: xr.Dataset, head: str) -> TextTable:
@@ -174,5 +167,5 @@ def _row(case: xr.Dataset, i: int, k: int) -> tuple[str, ...]:
         f"{1e3 * of('amplitude'):.6g}",
         f"{of('phase_deg'):.1f}",
         f"{1e3 * energy:.4g}",
-        f"{share:.3g}" if np.isfinite(share) else "-",
+        number(share, 3),
     )

@@ -8,9 +8,9 @@ import xarray as xr
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.response.nonlinear_modes.flanks import ALONE
 from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.analyses.collected import number, told_apart
 from stickslip.study.analyses.synthesis.percents import percent
 from stickslip.study.analyses.verdict import Level, Verdict
-from stickslip.study.keep.netcdf import alike, one_case
 
 ASK = "Ask for [forced_response] there."
 REMEDIES = {
@@ -136,11 +136,7 @@ def _levels(levels: FloatArray) -> str:
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     """Return what the terminal prints: the levels of each case."""
     found = []
-    groups = alike(data)
-    for group in groups:
-        case = one_case(data, group[0])
-        labels = [str(data["case_label"].values[i]) for i in group if len(groups) > 1]
-        head = f"{'; '.join(labels)}: " if labels else ""
+    for case, head in told_apart(data):
         if "level" in case:
             found.append(_table(case, head))
             found += _passages(case, head)
@@ -153,15 +149,15 @@ def _table(case: xr.Dataset, head: str) -> TextTable:
     for i in range(case.sizes["level"]):
         row = [
             f"{float(case['level'][i]):g}",
-            _number(1e3 * float(case["peak_amplitude"][i])),
-            _number(float(case["peak_frequency_hz"][i]), 7),
+            number(1e3 * float(case["peak_amplitude"][i])),
+            number(float(case["peak_frequency_hz"][i]), 7),
             percent(float(max(case["others_in_output"][i], case["others_in_gaps"][i])), unit=False),
             percent(float(case["foreign"][i]), unit=False),
             _range(case, i),
             str(case["answer"][i].values),
         ]
         if direct:
-            row += [_number(1e3 * float(case["direct_peak_amplitude"][i])), percent(float(case["direct_error"][i]), unit=False), percent(float(case["along_error"][i]), unit=False)]  # fmt: skip
+            row += [number(1e3 * float(case["direct_peak_amplitude"][i])), percent(float(case["direct_error"][i]), unit=False), percent(float(case["along_error"][i]), unit=False)]  # fmt: skip
         rows.append(tuple(row))
     beside = ("direct mm", "error %", "along %") if direct else ()
     lines = [f"others: motion of the other modes over that of the mode, at the peak; predicted error: that of the peak; alone: where around the peak the others stay below {percent(ALONE)}"]  # fmt: skip
@@ -195,13 +191,9 @@ def _passages(case: xr.Dataset, head: str) -> list[TextTable]:
             peak = float(case["passage_peak_amplitude"][i, j])
             if np.isfinite(peak):
                 rows.append((
-                    f"{float(case['level'][i]):g}", f"{float(case['passage_hz_per_s'][j]):g}", _number(1e3 * peak),
-                    _number(float(case["passage_peak_frequency_hz"][i, j])), percent(float(case["passage_share"][i, j]), unit=False),
+                    f"{float(case['level'][i]):g}", f"{float(case['passage_hz_per_s'][j]):g}", number(1e3 * peak),
+                    number(float(case["passage_peak_frequency_hz"][i, j])), percent(float(case["passage_share"][i, j]), unit=False),
                     percent(float(case["passage_change"][i, j]), unit=False),
                 ))  # fmt: skip
     columns = ("level", "Hz/s", "peak mm", "at Hz", "of the steady one %", "change in a radian %")
     return [TextTable(f"{head}Passages through resonance, {case.attrs.get('output', '')}", columns, tuple(rows))] if rows else []  # fmt: skip
-
-
-def _number(value: float, digits: int = 5) -> str:
-    return f"{value:.{digits}g}" if np.isfinite(value) else "-"

@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 
 from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.analyses.collected import number, told_apart
 from stickslip.study.analyses.verdict import Verdict
-from stickslip.study.keep.netcdf import alike, one_case
 
 LARGE = 0.02  # left out, or off from time integration, above which a motion is doubtful
 SLIP = 5e-3  # rad a turn, the same
@@ -77,35 +77,23 @@ def _unexamined(label: str, case: Mapping[str, xr.Variable], i: int) -> Iterator
 
 def tables(data: xr.Dataset) -> tuple[TextTable, ...]:
     """Return what the terminal prints: the motions of each case."""
-    found = []
-    groups = alike(data)
-    for group in groups:
-        case = one_case(data, group[0])
-        labels = [str(data["case_label"].values[i]) for i in group if len(groups) > 1]
-        head = f"{'; '.join(labels)}: " if labels else ""
-        if "kind" in case:
-            found.append(_table(case, head))
-    return tuple(found)
+    return tuple(_table(case, head) for case, head in told_apart(data) if "kind" in case)
 
 
 def _table(case: xr.Dataset, head: str) -> TextTable:
     rows = [
         (
-            _text(float(case["first_hz"][i])),
-            _text(float(case["second_hz"][i])),
+            number(float(case["first_hz"][i])),
+            number(float(case["second_hz"][i])),
             str(case["kind"][i].values),
-            _text(1e3 * float(case["least"][i, 0])),
-            _text(1e3 * float(case["largest"][i, 0])),
-            _text(1e3 * float(case["rms"][i, 0])),
+            number(1e3 * float(case["least"][i, 0])),
+            number(1e3 * float(case["largest"][i, 0])),
+            number(1e3 * float(case["rms"][i, 0])),
             str(int(case["combined"][i])),
-            _text(100 * float(case["left_out"][i])),
+            number(100 * float(case["left_out"][i])),
         )
         for i in range(case.sizes["point"])
     ]
     columns = ("first Hz", "second Hz", "", "least mm", "largest mm", "rms mm", "combined", "left out %")  # fmt: skip
     name = str(case["output_name"].values[0])
     return TextTable(f"{head}Motions with two frequencies, amplitude of {name}", columns, tuple(rows))  # fmt: skip
-
-
-def _text(value: float) -> str:
-    return f"{value:.5g}" if np.isfinite(value) else "-"

@@ -6,9 +6,9 @@ import numpy as np
 import xarray as xr
 
 from stickslip.study.analyses.analysis import TextTable
+from stickslip.study.analyses.collected import told_apart
 from stickslip.study.analyses.waves.numbers import label, wave_name
 from stickslip.study.analyses.waves.of_wheel import table as of_wheel
-from stickslip.study.keep.netcdf import alike, one_case
 
 LEAST = 5  # modes of a mistuned wheel that are shown
 MOST_PAIRS = 30  # of an interference table on the screen
@@ -20,13 +20,9 @@ def of_cases(
 ) -> tuple[TextTable, ...]:
     """Return the tables of each case, and what the centrifugal load does; cases that are alike share theirs."""
     found = []
-    groups = alike(data)
-    for group in groups:
-        case = one_case(data, group[0])
+    for case, head in told_apart(data):
         if not case.sizes.get("wave"):
             continue
-        labels = [str(data["case_label"].values[i]) for i in group if len(groups) > 1]
-        head = f"{'; '.join(labels)}: " if labels else ""
         made = (*tables(case), *_static(case))
         found += [TextTable(f"{head}{t.title}", t.head, t.rows) for t in made]
     return tuple(found)
