@@ -1,22 +1,26 @@
 # The README's two commands are `make run` and `make test`. Everything is installed into .venv from
-# requirements.lock; nothing else needs to be on the machine but Python 3.11, make and pip.
+# requirements.lock; nothing else needs to be on the machine but Python 3.11 or newer, make and pip.
 
-PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV ?= .venv
+# the one that made .venv, else what there is
+PYTHON ?= $(shell sed -n 's/^executable = //p' $(VENV)/pyvenv.cfg 2>/dev/null | grep . || command -v python3.11 || command -v python3)
 STUDY  ?= examples/two_blades/study.toml
 WORKERS ?= 2
 
-VENV := .venv
+VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null)
 BIN := $(VENV)/bin
-INSTALLED := $(VENV)/.installed
-DOCS_INSTALLED := $(VENV)/.docs-installed
-READERS_INSTALLED := $(VENV)/.readers-installed
-SPARSE_INSTALLED := $(VENV)/.sparse-installed
-LOCK_FLAGS := --quiet --generate-hashes --strip-extras \
-	--no-emit-index-url --no-emit-find-links --no-emit-trusted-host
+# another Python is another installation, and makes .venv anew
+INSTALLED := $(VENV)/.installed-$(VERSION)
+DOCS_INSTALLED := $(VENV)/.docs-installed-$(VERSION)
+OPTIONAL_INSTALLED := $(VENV)/.optional-installed-$(VERSION)
+PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+# one resolution for Linux, macOS and Windows and for all Pythons that pyproject.toml allows, in markers
+LOCK := $(BIN)/uv pip compile pyproject.toml --quiet --universal --python-version 3.11 --generate-hashes --upgrade \
+	--no-config --custom-compile-command "make lock"
 # Two test workers on two cores: a threaded BLAS under each would only make them wait for each other.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help install run test coverage readers test-readers sparse test-sparse lint docs figures second-damper reconstruction bench bench-rival calculix validate baseline strategies alarms sections lock clean
+.PHONY: help install run test coverage optional test-optional lint docs release figures second-damper reconstruction bench bench-rival calculix validate baseline strategies alarms sections lock clean
 .DELETE_ON_ERROR:
 
 help:  ## list the targets
@@ -25,12 +29,12 @@ help:  ## list the targets
 install: $(INSTALLED)  ## make .venv, install the locked versions and compile the contact laws
 
 $(INSTALLED): requirements.lock pyproject.toml
-	@test -n "$(PYTHON)" || { echo "No Python found. Install Python 3.11 or name it: make PYTHON=/path/to/python3.11"; exit 1; }
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || \
-		{ echo "$(PYTHON) is not Python 3.11, for which requirements.lock is made. Name one: make PYTHON=/path/to/python3.11"; exit 1; }
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@test -n "$(VERSION)" || { echo "No Python found. Install Python 3.11 or newer, or name it: make PYTHON=/path/to/python3.12"; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "$(PYTHON) is Python $(VERSION), and 3.11 is the oldest that does. Name one: make PYTHON=/path/to/python3.12"; exit 1; }
+	$(PYTHON) -m venv $(if $(wildcard $@),,--clear) $(VENV)
+	$(PIP_INSTALL) --require-hashes -r requirements.lock
+	$(PIP_INSTALL) --no-deps --no-build-isolation -e .
 	@$(BIN)/python .ci/system_libraries.py
 	@$(BIN)/stickslip compile
 	@touch $@
@@ -45,23 +49,15 @@ test: $(INSTALLED)  ## run the tests
 coverage: $(INSTALLED)  ## run the tests and report their coverage, a quarter slower
 	$(ONE_THREAD) $(BIN)/python -m pytest -n $(WORKERS) --durations=20 --cov --cov-report=term:skip-covered
 
-readers: $(READERS_INSTALLED)  ## install what reads Nastran's binary files, and files of ANSYS to test with
+optional: $(OPTIONAL_INSTALLED)  ## install what nobody needs by default: readers, a faster factorisation, files of ANSYS to test with (1 GB)
 
-$(READERS_INSTALLED): $(INSTALLED) readers-requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r readers-requirements.lock
+$(OPTIONAL_INSTALLED): $(INSTALLED) optional-requirements.lock
+	$(PIP_INSTALL) --require-hashes -r optional-requirements.lock
 	@touch $@
 
-test-readers: $(READERS_INSTALLED)  ## run the tests of the readers of ANSYS and Nastran files, none skipped
-	$(ONE_THREAD) STICKSLIP_READERS=required $(BIN)/python -m pytest tests/test_readers_ansys.py tests/test_readers_nastran.py
-
-sparse: $(SPARSE_INSTALLED)  ## install the faster factorisation of large models
-
-$(SPARSE_INSTALLED): $(INSTALLED) sparse-requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes -r sparse-requirements.lock
-	@touch $@
-
-test-sparse: $(SPARSE_INSTALLED)  ## run the tests of factorisations and modes with it
-	$(ONE_THREAD) $(BIN)/python -m pytest tests/test_factorisation.py tests/test_modes.py
+test-optional: $(OPTIONAL_INSTALLED)  ## run the tests of these, none skipped
+	$(ONE_THREAD) STICKSLIP_OPTIONAL=required $(BIN)/python -m pytest tests/test_readers_ansys.py tests/test_readers_nastran.py \
+		tests/test_factorisation.py tests/test_modes.py
 
 lint: $(INSTALLED)  ## style, types and the direction of imports
 	$(BIN)/ruff check .
@@ -70,7 +66,7 @@ lint: $(INSTALLED)  ## style, types and the direction of imports
 	$(BIN)/lint-imports
 
 $(DOCS_INSTALLED): $(INSTALLED) docs/requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r docs/requirements.lock
+	$(PIP_INSTALL) --require-hashes -r docs/requirements.lock
 	@touch $@
 
 docs: $(DOCS_INSTALLED)  ## build the documentation; any warning is an error
@@ -119,20 +115,22 @@ validate: $(INSTALLED)  ## compare with closed forms, other codes and the litera
 baseline: $(INSTALLED)  ## compare the examples with the results of the commit that the moves began from (some minutes)
 	$(ONE_THREAD) $(BIN)/python -m evidence.baseline
 
-lock: $(INSTALLED)  ## resolve the newest versions and write both lock files
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check pip-tools
-	CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra fe --extra report --extra test \
-		--build-deps-for editable -o requirements.lock pyproject.toml
-	CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra docs \
-		-c requirements.lock -o docs/requirements.lock pyproject.toml
-	CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra bench \
-		-o evidence/benchmarks/requirements.lock pyproject.toml
-	CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra readers --extra readers-test \
-		-c requirements.lock -c docs/requirements.lock -o readers-requirements.lock pyproject.toml
-	CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/python -m piptools compile $(LOCK_FLAGS) --upgrade --extra sparse \
-		-c requirements.lock -o sparse-requirements.lock pyproject.toml
+release: $(DOCS_INSTALLED)  ## build the wheel, the source archive and the notes of a release into dist/ and try them; uploads nothing
+	rm -rf dist
+	$(BIN)/python -m build --no-isolation --outdir dist .
+	$(BIN)/python -m twine check --strict dist/*
+	$(BIN)/python .ci/release_notes.py >dist/NOTES.md
+	$(BIN)/python .ci/wheel_journey.py dist $(BIN)/python
+
+lock: $(INSTALLED)  ## resolve the newest versions for every Python and system, and write the lock files
+	$(PIP_INSTALL) uv
+	$(LOCK) --extra fe --extra report --extra test --group editable -o requirements.lock
+	$(LOCK) --extra docs --group release -c requirements.lock -o docs/requirements.lock
+	$(LOCK) --extra readers --extra readers-test --extra sparse --extra cluster -c requirements.lock -c docs/requirements.lock \
+		-o optional-requirements.lock
+	$(LOCK) --extra bench -o evidence/benchmarks/requirements.lock
 
 clean:  ## remove everything that the other targets made, .venv included
-	rm -rf $(VENV) .venv-rival .coverage* htmlcov .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache \
+	rm -rf $(VENV) .venv-rival dist .coverage* htmlcov .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache \
 		docs/_build docs/auto_examples docs/generated evidence/benchmarks/out evidence/validation/out examples/*/results
 	find src tests evidence docs examples -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,6 +1,6 @@
 """Readers of ANSYS files: against files that ANSYS wrote, files written here, and cut or spoilt ones.
 
-The files of ANSYS ship inside the package ansys-mapdl-reader, whose own reading is one of the judges (`make test-readers`).
+The files of ANSYS ship inside the package ansys-mapdl-reader, whose own reading is one of the judges (`make test-optional`).
 """
 
 import importlib.util
@@ -45,8 +45,10 @@ def samples():
     except ModuleNotFoundError:
         found = None
     if found is None:
-        message = "ansys-mapdl-reader, which has the files of ANSYS, is not installed: make readers"
-        if os.environ.get("STICKSLIP_READERS") == "required":
+        message = (
+            "ansys-mapdl-reader, which has the files of ANSYS, is not installed: make optional"
+        )
+        if os.environ.get("STICKSLIP_OPTIONAL") == "required":
             pytest.fail(message)
         pytest.skip(message)
     return Path(found.origin).parent / "examples"
