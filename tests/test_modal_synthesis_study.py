@@ -120,6 +120,17 @@ def test_the_peak_told_is_that_of_a_sweep_and_a_detached_curve_is_a_doubt(tmp_pa
     assert told.remedy.startswith("[all_motions]")
 
 
+def test_a_level_at_which_nothing_slips_is_answered_in_proportion_however_small(tmp_path):
+    text = STUDY.replace("levels = [0.02, 0.5, 1.0, 2.0]", "levels = [1e-300, 1e-3]")
+    outcome = answered(text.replace("amplitude_mm = [100.0, 20000.0]\n", ""), tmp_path)
+    case = one_case(outcome.tree["modal_synthesis"].to_dataset(), 0)
+    # stuck: 0.1 N over c ω, damped as little as that
+    exact = 0.1 * case["level"].values / (0.02 * np.sqrt(1.5 - 0.02**2 / 4))
+    assert case["peak_amplitude"].values == pytest.approx(exact, rel=1e-6)
+    assert np.nanmax(case["amplitude"].values[0]) == pytest.approx(exact[0], rel=1e-6)
+    assert [v.level for v in outcome.verdicts] == ["trusted"]
+
+
 def test_a_level_beyond_all_numbers_is_refused_by_its_value(tmp_path):
     with pytest.raises(InputError, match=r"modal_synthesis\.levels: holds 1e\+300"):
         answered(STUDY.replace("levels = [0.02, 0.5, 1.0, 2.0]", "levels = [1.0, 1e300]"), tmp_path)  # fmt: skip

@@ -35,6 +35,15 @@ def test_the_optimum_of_the_benchmark_from_a_study(tmp_path: Path) -> None:
     assert case.attrs["smallest_value"] == pytest.approx(0.138956, abs=5e-7)
     assert case.attrs["smallest_amplitude"] == pytest.approx(0.5509002, abs=5e-8)
     assert case["value"].values.tolist() == [[0.2, 0.12, 0.09]]
+    assert outcome.verdicts[-1].why.endswith("followed from the first value, not held against sweeps at the others")  # fmt: skip
+
+
+@pytest.mark.parametrize(("key", "slow"), [("contact.damper.slip_limit_n", 1), ("limit", 0)])
+def test_the_check_says_where_a_span_is_slow(key: str, slow: int, tmp_path: Path) -> None:
+    text = B3.replace("values = [0.2, 0.12, 0.09]", "span = [0.2, 0.1]")
+    (case,) = study_of(text.replace("contact.damper.slip_limit_n", key), tmp_path).cases()
+    (told,) = RESONANCE.check(case, case.build())
+    assert told.count("takes minutes where a contact begins to slip") == slow
 
 
 def test_only_cases_with_a_lowest_peak_tell_where_it_is(tmp_path: Path) -> None:
@@ -164,6 +173,7 @@ by = "phase_quadrature"
         (('"contact.damper.slip_limit_n"', '"static_load"'), "resonance.parameter: is static_load, but no static load acts"),
         (("values = [0.2, 0.12, 0.09]", ""), "resonance.values: values and span are both missing"),
         (("harmonics = 1", "harmonics = 1\nharmonic = 3"), "resonance.harmonic: is 3, above harmonics = 1"),
+        (('"contact.damper.slip_limit_n"\nvalues = [0.2, 0.12', '"excitation"\nvalues = [1.0, -1.0'), r"study\.toml: resonance\.values: holds -1, and excitation is a factor .* Give factors above zero"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_followed_is_refused_by_its_key(

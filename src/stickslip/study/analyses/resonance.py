@@ -119,9 +119,13 @@ class ResonanceAnalysis:
 
     def check(self, case: Case, model: Model) -> tuple[str, ...]:
         """Say what is followed, and how many peaks there will be at most."""
-        asked = question_of(case, model).asked
+        question = question_of(case, model)
+        asked = question.asked
         count = len(asked.values) if asked.values else asked.points
-        return (f"resonance: {count} values of {asked.parameter}, up to {asked.peaks} peaks each, by {asked.by}",)  # fmt: skip
+        told = f"resonance: {count} values of {asked.parameter}, up to {asked.peaks} peaks each, by {asked.by}"  # fmt: skip
+        if asked.span is not None and callable(question.search.parameter):
+            told += "; a span makes the model anew for each trial, which takes minutes where a contact begins to slip at the peak: values are faster"
+        return (told,)
 
     def summary(self, data: xr.Dataset) -> tuple[TextTable, ...]:
         """Return what the terminal prints."""

@@ -30,7 +30,8 @@ class ResonanceTable(Section):
         None,
         min_length=2,
         max_length=2,
-        description="in place of values: first and last value of the parameter; the curve is followed by arc length, round folds",
+        description="in place of values: first and last value of the parameter; the curve is followed by arc length, round folds, over a key of the model "
+        "for minutes where a contact begins to slip at the peak",
     )
     points: int = Field(
         30, ge=2, le=1000, description="least number of points of a span, 2 to 1000"
@@ -67,6 +68,7 @@ class ResonanceTable(Section):
             raise custom_error(f"values and span {both}", "Give one of them.", "values")
         once(self.values or [], "values")
         once(self.span or [], "span")
+        self._vibrates()
         if self.harmonic is not None and self.harmonic > self.harmonics:
             raise custom_error(
                 f"is {self.harmonic}, above harmonics = {self.harmonics}",
@@ -80,6 +82,16 @@ class ResonanceTable(Section):
                 "periods",
             )
         return self
+
+    def _vibrates(self) -> None:
+        key = "values" if self.values is not None else "span"
+        for value in self.values or self.span or []:
+            if self.parameter == "excitation" and value <= 0.0:
+                raise custom_error(
+                    f"holds {value:g}, and excitation is a factor on what makes the peaks",
+                    "Give factors above zero.",
+                    key,
+                )
 
     @property
     def ends(self) -> tuple[float, float]:

@@ -41,6 +41,8 @@ def case_verdicts(
     if not any(v.rank for v in found):
         count = int(np.sum(np.any(kind >= 0, axis=1)))
         why = f"{count} peak{'s' * (count > 1)} of {case['output'].values} over {case['parameter'].values}, every point a solution and a maximum"
+        if np.unique(value[np.isfinite(value)]).size > 1:
+            why += "; followed from the first value, not held against sweeps at the others"
         found.append(Verdict("trusted", label, None, why))
     return found
 

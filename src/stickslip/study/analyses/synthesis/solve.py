@@ -46,6 +46,7 @@ HARMONICS = 0.2  # higher harmonics over the first, beyond which the first alone
 AROUND = 12.0  # half-widths of the widest peak that are shown on either side
 NARROWEST, WIDEST = 0.02, 0.2  # relative, of that
 MOMENTS = 600  # that are kept of a passage
+FAINT = 1e-3  # of the level that the first motion of a mode needs that begins linear: below, responses are in proportion to their level
 NOTHING = np.zeros(0)
 NOBODY = Isolation(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, linear=False)
 
@@ -108,7 +109,9 @@ def judged(alone: Isolation, resolved: float) -> tuple[str, str]:
 def _level(shared: Synthesis, level: float) -> SynthesisLevel:
     began = process_time()
     own, question = shared.oscillator, shared.question
-    curve = synthesise(own, level)
+    known = _in_proportion(own, level)
+    share = level / known
+    curve = synthesise(own, known)
     tops = curve.peaks
     # every curve has one peak, and the first curve is the one that a sweep meets
     peaks = [peak_with_others(shared.others, curve.alone(i), r, question.dof) for i, r in enumerate(tops)]  # fmt: skip
@@ -123,7 +126,7 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
     inside = (curve.omega >= shared.ends[0]) & (curve.omega <= shared.ends[1]) & shown
     beside = along(shared.others, curve, question.dof)
     spent = process_time() - began
-    passages = _passages(shared, level, shown=shown)
+    passages = _passages(shared, known, shown=shown)
     began = process_time()
     direct = _direct(shared, level) if question.asked.direct else (NOTHING, NOTHING)
     top = int(np.nanargmax(direct[1])) if np.any(np.isfinite(direct[1])) else -1
@@ -131,7 +134,7 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
         level=level,
         answer=answer,
         why=why,
-        peak=peaks[0][0] if shown else np.nan,
+        peak=share * peaks[0][0] if shown else np.nan,
         peak_omega=peaks[0][1] if shown else np.nan,
         detached_peak=detached[0] if shown else np.nan,
         detached_peak_omega=detached[1] if shown else np.nan,
@@ -146,7 +149,7 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
         resolved=resolved,
         detached=int(curve.curve.max(initial=0)) if shown else 0,
         omega=curve.omega[inside],
-        amplitude=beside.amplitude[inside],
+        amplitude=share * beside.amplitude[inside],
         others=beside.share[inside],
         alone=beside.alone[inside].astype(np.int64),
         curve=curve.curve[inside],
@@ -158,10 +161,18 @@ def _level(shared: Synthesis, level: float) -> SynthesisLevel:
         seconds=spent,
         direct_seconds=process_time() - began if question.asked.direct else 0.0,
         passage_omega=passages[0],
-        passage_amplitude=passages[1],
+        passage_amplitude=share * passages[1],
         passage_finished=passages[2],
         passage_change=passages[3],
     )
+
+
+def _in_proportion(own: ModalOscillator, level: float) -> float:
+    """Return a level whose response is in proportion to that of a level where nothing slips, else the level itself."""
+    faint = FAINT * float(own.needed(np.array([own.begins]))[0])
+    if own.begins == 0.0 or level >= faint or len(resonances(own, faint)) > 1:
+        return level
+    return faint
 
 
 def _answer(
