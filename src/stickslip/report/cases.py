@@ -1,7 +1,6 @@
 """The cases that [vary] spans, as pages name and colour them."""
 
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 import xarray as xr
@@ -13,7 +12,7 @@ from stickslip.study.analyses.varied import as_number, first_varied_number, vari
 
 @dataclass(frozen=True)
 class ShownCase:
-    """A case as the page names it; its texts are escaped for HTML.
+    """A case as the page names it.
 
     Parameters
     ----------
@@ -50,20 +49,18 @@ class ShownCase:
 
 
 def varied(data: xr.Dataset) -> str:
-    """Return the varied keys as the heading of a legend or column, escaped."""
-    return escape(", ".join(varied_values(data)[0])) or "case"
+    """Return the varied keys as the heading of a legend or column."""
+    return ", ".join(varied_values(data)[0]) or "case"
 
 
 def first_number(data: xr.Dataset) -> tuple[str, np.ndarray]:
-    """Return the first varied key whose values are numbers, escaped, and its values (case,); NaN without one."""
+    """Return the first varied key whose values are numbers, and its values (case,); NaN without one."""
     key, values = first_varied_number(data)
-    return escape(key), values
+    return key, values
 
 
 def _short(row: np.ndarray) -> str:
-    return ", ".join(
-        number(as_number(v), 4) if np.isfinite(as_number(v)) else escape(str(v)) for v in row
-    )
+    return ", ".join(number(as_number(v), 4) if np.isfinite(as_number(v)) else str(v) for v in row)
 
 
 def cases_of(data: xr.Dataset) -> tuple[ShownCase, ...]:
@@ -75,6 +72,6 @@ def cases_of(data: xr.Dataset) -> tuple[ShownCase, ...]:
         np.asarray(data["excitation_n"].values) if "excitation_n" in data else np.full(n, np.nan)
     )
     return tuple(
-        ShownCase(i, escape(labels[i]), _short(values[i]) or str(i + 1), float(numbers[i]), float(force[i]), colour)
+        ShownCase(i, labels[i], _short(values[i]) or str(i + 1), float(numbers[i]), float(force[i]), colour)
         for i, colour in enumerate(ramp(n))
     )  # fmt: skip

@@ -1,14 +1,20 @@
-"""What every page is made of: numbered figures, chapters, boxes, and the frame around them."""
+"""How a page is put together: its contents in the templates of `assets`, which escape all that is no markup of ours."""
 
-from collections.abc import Sequence
-from html import escape
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
+from typing import Literal
 
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
 from plotly.offline import get_plotlyjs
 
+from stickslip.report.content import Chooser, Table, Words
 from stickslip.report.plot import Plot
-from stickslip.report.section import Card
+from stickslip.report.section import Card, Content
 from stickslip.study.analyses.verdict import Verdict, worst_first
 from stickslip.study.keep.whole import write_whole
 
@@ -19,42 +25,86 @@ _CONFIG = {
     # the camera saves pictures for print: twice the size on the screen
     "toImageButtonOptions": {"scale": 2},
 }
+_BOLD, _CODE = re.compile(r"\*\*(.+?)\*\*"), re.compile(r"`([^`]+)`")
 
 
-def figure_html(plot: Plot, number: int) -> str:
-    """Return a figure with its number in the page and its caption."""
-    captions = "".join(
-        f'<span data-case="{index}"{"" if index == plot.chosen else " hidden"}> {text}</span>'
-        for index, text in plot.case_captions.items()
-    )
-    caption = f"<figcaption><b>Figure {number}. {escape(plot.title)}.</b> {plot.caption}{captions}</figcaption>"
-    drawing = plot.figure.to_html(
-        full_html=False, include_plotlyjs=False, div_id=f"plot-{plot.key}", config=_CONFIG
-    )
-    kind = "by-case" if plot.case_captions else "all-cases"
-    ends = [axis.domain[1] for axis in plot.figure.select_xaxes() if axis.domain]
-    if min(ends, default=1.0) < 0.9 or len(list(plot.figure.select_scenes())) > 1:
-        # panels beside each other scroll on a narrow screen
-        drawing = f'<div class="wide panels">{drawing}</div>'
-    return f'<figure id="fig-{plot.key}" class="{kind}">{plot.controls}{drawing}{caption}</figure>'
+Kind = Literal["figure", "table", "words", "chooser"]
 
 
-def chapter(key: str, title: str, body: str) -> str:
-    """Return a chapter with its heading."""
-    return f'<section id="{key}"><h2>{title}</h2>{body}</section>'
+@dataclass(frozen=True)
+class Placed:
+    """Something in its place on the page; a figure has its number, its drawing, and whether it scrolls on a narrow screen."""
+
+    own: Content
+    kind: Kind
+    number: int = 0
+    drawing: Markup = field(default_factory=Markup)
+    wide: bool = False
 
 
-def cards_html(cards: Sequence[Card]) -> str:
-    """Return the boxes at the top."""
-    boxes = "".join(
-        f'<div class="card{" danger" * c.danger}"><b>{c.value}</b><span>{c.label}</span><small>{c.note}</small></div>'
-        for c in cards
-    )
-    return f'<div class="cards">{boxes}</div>' if boxes else ""
+@dataclass(frozen=True)
+class CaseBody:
+    """What a chapter shows while a case is chosen."""
+
+    index: int
+    label: str
+    shown: Sequence[Placed]
 
 
-def verdicts_html(verdicts: Sequence[Verdict], told: str, *, bad: bool) -> str:
-    """Return what is not trusted, why, and what to do, the worst first; folded below it what is trusted.
+@dataclass(frozen=True)
+class Chapter:
+    """A chapter of the page: what it shows of all cases, then of each."""
+
+    key: str
+    title: str
+    shown: Sequence[Placed]
+    cases: Sequence[CaseBody] = ()
+    folded: bool = False
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What is not trusted, why, and what to do, the worst first; and what is trusted."""
+
+    told: str
+    kind: Literal["good", "some", "bad"]
+    shown: Sequence[Verdict]
+    good: Sequence[Verdict]
+
+
+@dataclass
+class Placing:
+    """Numbers the figures of a page."""
+
+    figures: int = field(default=0)
+
+    def __call__(self, contents: Iterable[Content]) -> list[Placed]:
+        """Return the contents in their places."""
+        return [self._placed(own) for own in contents]
+
+    def _placed(self, own: Content) -> Placed:
+        if not isinstance(own, Plot):
+            return Placed(own, _kind(own))
+        self.figures += 1
+        drawing = own.figure.to_html(
+            full_html=False,
+            include_plotlyjs=False,
+            div_id=f"plot-{anchor(own.key)}",
+            config=_CONFIG,
+        )
+        ends = [axis.domain[1] for axis in own.figure.select_xaxes() if axis.domain]
+        wide = min(ends, default=1.0) < 0.9 or len(list(own.figure.select_scenes())) > 1
+        return Placed(own, "figure", self.figures, Markup(drawing), wide)
+
+
+def _kind(own: Table | Words | Chooser) -> Kind:
+    if isinstance(own, Table):
+        return "table"
+    return "words" if isinstance(own, Words) else "chooser"
+
+
+def concluded(verdicts: Sequence[Verdict], told: str, *, bad: bool) -> Conclusion:
+    """Sort the verdicts of a result for its head.
 
     Parameters
     ----------
@@ -67,44 +117,63 @@ def verdicts_html(verdicts: Sequence[Verdict], told: str, *, bad: bool) -> str:
     """
     every = worst_first(verdicts)
     shown = [v for v in every if v.told]
-    good = [v for v in every if not v.told]
-    kind = "bad" if bad else "some" if any(v.rank or v.warns for v in shown) else "good"
-    items = f"<ul>{''.join(map(_verdict, shown))}</ul>" if shown else ""
-    top = f'<div class="box {kind}"><b>{escape(told)}</b>{items}</div>'
-    if not good:
-        return top
-    rest = "".join(map(_verdict, good))
-    return f"{top}<details><summary>Trusted, and what for: {len(good)}</summary><ul>{rest}</ul></details>"
+    warns = any(v.rank or v.warns for v in shown)
+    kind: Literal["good", "some", "bad"] = "bad" if bad else "some" if warns else "good"
+    return Conclusion(told, kind, shown, [v for v in every if not v.told])
 
 
-def _verdict(verdict: Verdict) -> str:
-    remedy = f" <i>{escape(verdict.remedy)}</i>" if verdict.remedy else ""
-    word = f'<b class="{verdict.word}">{verdict.word.upper()}:</b>'
-    return f"<li>{word} {escape(verdict.finding)}{remedy}</li>"
+def anchor(key: str) -> str:
+    """Return a name as part of an anchor: names of bodies may hold anything."""
+    return re.sub(r"[^\w-]", "_", key)
 
 
-def page_html(title: str, made: str, body: str) -> str:
+def inline(text: str) -> Markup:
+    """Escape a text and set its **bold** words, its `code` and its line breaks."""
+    if isinstance(text, Markup):
+        return text
+    safe = _BOLD.sub(r"<b>\1</b>", str(escape(text)))
+    return Markup(_CODE.sub(r"<code>\1</code>", safe).replace("\n", "<br>"))
+
+
+@cache
+def _templates() -> Environment:
+    found = Environment(
+        loader=PackageLoader("stickslip.report", "assets"),
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    found.filters |= {"inline": inline, "anchor": anchor}
+    return found
+
+
+def page_html(
+    title: str,
+    made: str,
+    chapters: Sequence[Chapter],
+    *,
+    cards: Sequence[Card] = (),
+    conclusion: Conclusion | None = None,
+) -> str:
     """Return a whole page, which needs neither network nor other files.
 
     Parameters
     ----------
     title, made
-        Its heading and the line below it, plain text.
-    body
-        HTML.
+        Its heading and the line below it.
+    chapters
+        In their order.
+    cards
+        Boxes at the top.
+    conclusion
+        What is trusted and what is not, above all else.
     """
-    title, made = escape(title), escape(made)
-    return (
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{title}</title><style>{_asset('page.css')}</style><script>{get_plotlyjs()}</script></head>"
-        f'<body><main><header><h1>{title}</h1><p class="made">{made}</p></header>{body}</main>'
-        f"<script>{_asset('page.js')}{_asset('shapes.js')}</script></body></html>\n"
-    )
+    return _templates().get_template("page.html").render(
+        title=title, made=made, chapters=chapters, cards=cards, conclusion=conclusion,
+        style=_asset("page.css"), plotly=Markup(get_plotlyjs()), scripts=_asset("page.js") + _asset("shapes.js"),
+    )  # fmt: skip
 
 
-def _asset(name: str) -> str:
-    return files("stickslip.report").joinpath("assets", name).read_text(encoding="utf-8")
+def _asset(name: str) -> Markup:
+    return Markup(files("stickslip.report").joinpath("assets", name).read_text(encoding="utf-8"))
 
 
 def write_page(page: str, path: Path) -> None:

@@ -1,7 +1,6 @@
 """The page of a fit to hysteresis loops: what was measured, what the law makes of it, and what is left."""
 
 from collections.abc import Sequence
-from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +8,11 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from stickslip.contact.loop_fit import LoopFit
-from stickslip.report.frame import chapter, figure_html, page_html, write_page
+from stickslip.report.content import Words
+from stickslip.report.frame import Chapter, Placing, page_html, write_page
 from stickslip.report.plot import COLOURS, MUTED, Plot, legend_above, styled
 from stickslip.report.quantities import counted, number, scale_for
+from stickslip.report.section import Content
 
 MOST_DRAWN = 20_000  # samples of a recording: more are thinned out
 
@@ -64,13 +65,18 @@ def write_loop_page(
     """
     n = counted(sum(x.size for x, _ in fit.loops), "sample")
     caption = f"Left: the measured loop and the law walked along its displacements. Right: what is left, {number(fit.residual)} N as a standard deviation over {n}."
-    drawing = figure_html(Plot("loops", "Hysteresis loop and fit", caption, loop_figure(fit)), 1)
-    notes = "".join(f"<li>{escape(note)}.</li>" for note in fit.notes)
-    body = chapter("estimates", "Estimates", f"<pre>{escape(chr(10).join(estimates))}</pre>")
-    body += chapter("loops", "Loop and fit", drawing)
-    if notes:
-        body += chapter(
-            "notes", "What the loops cannot tell, and what is doubtful", f"<ul>{notes}</ul>"
-        )
-    body += chapter("study", "For the study file", f"<pre>{escape(chr(10).join(lines))}</pre>")
-    write_page(page_html("Friction contact from measured loops", source.name, body), target)
+    placing = Placing()
+
+    def own(key: str, title: str, content: Content) -> Chapter:
+        return Chapter(key, title, placing([content]))
+
+    drawing = Plot("loops", "Hysteresis loop and fit", caption, loop_figure(fit))
+    chapters = [
+        own("estimates", "Estimates", Words(preformatted="\n".join(estimates))),
+        own("loops", "Loop and fit", drawing),
+    ]
+    if fit.notes:
+        notes = Words(items=[f"{note}." for note in fit.notes])
+        chapters.append(own("notes", "What the loops cannot tell, and what is doubtful", notes))
+    chapters.append(own("study", "For the study file", Words(preformatted="\n".join(lines))))
+    write_page(page_html("Friction contact from measured loops", source.name, chapters), target)

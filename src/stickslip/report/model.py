@@ -1,18 +1,17 @@
 """The chapter on the model: its skin and contact points, how well the reduced model stands for it, and its facts."""
 
 from collections.abc import Mapping
-from html import escape
 
 import numpy as np
 import xarray as xr
 
 from stickslip.arrays import FloatArray
+from stickslip.report.content import Table
 from stickslip.report.node import Node
 from stickslip.report.plot import Plot
 from stickslip.report.quantities import NONE, fixed, number, percent, quantity
 from stickslip.report.response import Response
 from stickslip.report.skin import skin_picture
-from stickslip.report.tables import html_table
 
 _CHECKED = (
     ("free", "frequency_full_hz", "frequency_reduced_hz"),
@@ -26,7 +25,7 @@ def picture(nodes: Mapping[str, Node]) -> Plot | None:
     return next((plot for plot in found if plot is not None), None)
 
 
-def reduction(nodes: Mapping[str, Node]) -> str | None:
+def reduction(nodes: Mapping[str, Node]) -> Table | None:
     """Frequencies of the full against the reduced model."""
     node = next((n for n in nodes.values() if n.has(*_CHECKED[0][1:])), None)
     if node is None:
@@ -45,9 +44,9 @@ def reduction(nodes: Mapping[str, Node]) -> str | None:
             ]
             off += np.abs(difference[np.isfinite(difference)]).tolist()
     worst = percent(100 * max(off)) if off else NONE
-    text = f"<h3>Reduction</h3><p>The reduced model reproduces the frequencies of the full one within {worst}.</p>"
+    text = f"The reduced model reproduces the frequencies of the full one within {worst}."
     head = ["mode", "full (Hz)", "reduced (Hz)", "difference"]
-    return text + html_table(head, rows) if rows else None
+    return Table(head, rows, "Reduction", (text,)) if rows else None
 
 
 def _first(node: Node, name: str) -> FloatArray:
@@ -56,7 +55,7 @@ def _first(node: Node, name: str) -> FloatArray:
     return np.asarray((found.isel(case=0) if "case" in found.dims else found).values, dtype=float)
 
 
-def contacts(nodes: Mapping[str, Node]) -> str | None:
+def contacts(nodes: Mapping[str, Node]) -> Table | None:
     """Return a row a contact of the model: its points, law, and force under the static loads."""
     node = next((n for n in nodes.values() if isinstance(n, Response) and n.groups), None)
     if not isinstance(node, Response) or not node.has("contact_law", "static_force"):
@@ -67,10 +66,10 @@ def contacts(nodes: Mapping[str, Node]) -> str | None:
         for group, at in node.groups.items()
     ]  # fmt: skip
     head = ["contact", "points", "law", "normal force at rest"]
-    return "<h3>Contacts</h3>" + html_table(head, rows, numeric=False)
+    return Table(head, rows, "Contacts", numeric=False)
 
 
-def facts(nodes: Mapping[str, Node]) -> str | None:
+def facts(nodes: Mapping[str, Node]) -> Table | None:
     """Return mass, centre, size and counts of the model."""
     node = _together(nodes)
     if node.stored("mass_kg") is None:
@@ -80,7 +79,7 @@ def facts(nodes: Mapping[str, Node]) -> str | None:
     sectors = 1 if stages else sectors
     mass, each = node.scalar("mass_kg"), " of a sector" if sectors > 1 else ""
     rows = [
-        ["stages", escape(stages) or NONE],
+        ["stages", stages or NONE],
         ["sectors", str(sectors) if sectors > 1 else NONE],
         [f"mass{each}", quantity(1e3 * mass, "g", 6)],
         ["mass of the wheel", quantity(1e3 * sectors * mass, "g", 6) if sectors > 1 else NONE],
@@ -88,10 +87,10 @@ def facts(nodes: Mapping[str, Node]) -> str | None:
         ["box from", _lengths(node.numbers("box_low_m"))],
         ["box to", _lengths(node.numbers("box_high_m"))],
         *([text, fixed(node.scalar(name), 0)] for name, text in _COUNTS),
-        ["rotation", escape(node.text("rotation")) or NONE],
+        ["rotation", node.text("rotation") or NONE],
         *_static(node),
     ]
-    return "<h3>Facts</h3>" + html_table([], [row for row in rows if row[1] != NONE], numeric=False)
+    return Table((), [row for row in rows if row[1] != NONE], "Facts", numeric=False)
 
 
 def _together(nodes: Mapping[str, Node]) -> Node:

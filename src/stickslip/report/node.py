@@ -1,7 +1,6 @@
 """An analysis of a result as figures and tables see it: a dataset, and the few things that each of them asks of it."""
 
 from dataclasses import dataclass
-from html import escape
 from typing import Any
 
 import numpy as np
@@ -43,21 +42,21 @@ class Node:
         return np.asarray(self.data[name].values).astype(np.int64)
 
     def labels(self, dimension: str) -> tuple[str, ...]:
-        """Return the labels of a dimension, escaped for HTML; numbers where it has none."""
+        """Return the labels of a dimension; numbers where it has none."""
         if dimension in self.data.coords:
-            return tuple(escape(str(v)) for v in self.data[dimension].values)
+            return tuple(str(v) for v in self.data[dimension].values)
         return tuple(str(i) for i in range(self.data.sizes.get(dimension, 0)))
 
     def labels_of(self, name: str) -> tuple[str, ...]:
-        """Return the texts of a variable, escaped for HTML."""
-        return tuple(escape(str(v)) for v in self.data[name].values)
+        """Return the texts of a variable."""
+        return tuple(str(v) for v in self.data[name].values)
 
     def stored(self, name: str) -> Any:
         """Return a number, list or text that stands as a variable or as an attribute; None where there is none."""
         return self.data[name].values if name in self.data else self.data.attrs.get(name)
 
     def text(self, name: str, default: str = "") -> str:
-        """Return what is stored under a name as text, not escaped."""
+        """Return what is stored under a name as text."""
         value = self.stored(name)
         return default if value is None else str(value)
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -12,21 +11,14 @@ import xarray as xr
 from stickslip.errors import input_error
 from stickslip.report import model
 from stickslip.report.cases import cases_of, varied
-from stickslip.report.forced.contact import case_buttons
+from stickslip.report.content import Table, Words, chooser
 from stickslip.report.forced.tractions import with_bands
-from stickslip.report.frame import (
-    cards_html,
-    chapter,
-    figure_html,
-    page_html,
-    verdicts_html,
-    write_page,
-)
+from stickslip.report.frame import CaseBody, Chapter, Placing, concluded, page_html, write_page
 from stickslip.report.node import Node
 from stickslip.report.plot import Plot
 from stickslip.report.quantities import NONE, fixed, quantity
 from stickslip.report.result import analysis, open_result, versions
-from stickslip.report.section import Card, Part, Section, Shown
+from stickslip.report.section import Block, Card, Content, Part, Section
 from stickslip.report.sections import (
     all_motions,
     campbell,
@@ -42,7 +34,6 @@ from stickslip.report.sections import (
     run_up,
     safe,
 )
-from stickslip.report.tables import html_table
 from stickslip.study.analyses.verdict import conclusion, not_trusted, of_tree
 from stickslip.study.keep.netcdf import alike, one_case
 
@@ -83,77 +74,70 @@ def _views(section: Section, data: xr.Dataset) -> list[Any]:
     return [views[0], *(replace(view, key=f"_{k}") for k, view in enumerate(views[1:], 1))]
 
 
-def _as_list(shown: Shown) -> Sequence[Plot | str]:
-    if shown is None:
-        return ()
-    return (shown,) if isinstance(shown, (Plot, str)) else shown
+def _contents(parts: Sequence[Part], view: Any) -> Iterator[Content]:
+    """Return what the parts of a chapter show of a view."""
+    for part in parts:
+        shown = part(view)
+        if isinstance(shown, Sequence):
+            yield from shown
+        elif shown is not None:
+            yield shown
 
 
-class _Numbered:
-    """Draws parts, numbering the figures of a page."""
-
-    def __init__(self) -> None:
-        self._count = 0
-
-    def html(self, parts: Sequence[Part], view: Any) -> str:
-        """Return the parts of a chapter that the view holds."""
-        return "".join(self._one(shown) for part in parts for shown in _as_list(part(view)))
-
-    def _one(self, shown: Plot | str) -> str:
-        if isinstance(shown, str):
-            return shown
-        self._count += 1
-        return figure_html(shown, self._count)
-
-
-def _by_case(section: Section, data: xr.Dataset, bodies: Sequence[str]) -> str:
-    """Return the same chapter for each case, and the buttons that choose between them."""
+def _chapter(
+    section: Section, block: Block, data: xr.Dataset, views: Sequence[Any], placing: Placing
+) -> Chapter | None:
+    """Return a chapter for all cases, or for each case with the buttons that choose between them; None for an empty one."""
+    bodies = [placing(_contents(block.parts, view)) for view in views]
+    if not any(bodies):
+        return None
     if len(bodies) == 1:
         n = data.sizes["case"] if section.by_case else 1
-        return (f"<p>The same in all {n} cases.</p>" if n > 1 else "") + bodies[0]
-    names = [f"<p><b>{c.label}</b></p>" if c.label else "" for c in cases_of(data)]
-    each = "".join(
-        f'<div data-case="{k}"{" hidden" if k else ""}>{name}{body}</div>'
-        for k, (name, body) in enumerate(zip(names, bodies, strict=True))
+        same = [Words((f"The same in all {n} cases.",))] if n > 1 else []
+        return Chapter(block.key, block.title, [*placing(same), *bodies[0]], folded=block.folded)
+    cases = cases_of(data)
+    buttons = chooser(varied(data), cases, 0)
+    each = [
+        CaseBody(k, case.label, body)
+        for k, (case, body) in enumerate(zip(cases, bodies, strict=True))
+    ]
+    return Chapter(
+        block.key, block.title, placing([buttons] if buttons else []), each, block.folded
     )
-    return (case_buttons(varied(data), cases_of(data), 0) or "") + each
 
 
 def _nodes(tree: xr.DataTree) -> dict[str, Node]:
     return {section.name: _views(section, data)[0] for section, data in _shown(tree)}
 
 
-def _provenance(tree: xr.DataTree) -> str:
+def _provenance(tree: xr.DataTree) -> list[Content]:
     """Who made this, with what, from which study."""
     node = Node(tree.to_dataset())
     used = versions(node.text("versions", "{}"))
     rows = [
-        ["created", escape(node.text("created", NONE))],
-        ["stickslip", escape(node.text("stickslip_version", NONE))],
-        *([escape(name), escape(used[name])] for name in used if name != "stickslip"),
+        ["created", node.text("created", NONE)],
+        ["stickslip", node.text("stickslip_version", NONE)],
+        *([name, used[name]] for name in used if name != "stickslip"),
         ["wall time", quantity(node.scalar("wall_seconds"), "s")],
     ]
     for section, data in _shown(tree):
         own = Node(data)
         if own.text("selection"):
-            chosen, samples = escape(own.text("selection")), fixed(own.scalar("samples"), 0)
-            rows.append([f"{section.name}: harmonics", f"chosen by {chosen}"])
-            rows.append([f"{section.name}: samples per period", samples])
-    study, text = escape(node.text("study_toml")), html_table([], rows, numeric=False)
-    more = f"<details><summary>The study file</summary><pre>{study}</pre></details>"
-    return text + more if study else text
+            rows.append([f"{section.name}: harmonics", f"chosen by {own.text('selection')}"])
+            rows.append([f"{section.name}: samples per period", fixed(own.scalar("samples"), 0)])
+    study, table = node.text("study_toml"), Table((), rows, numeric=False)
+    return [table, Words(folded="The study file", preformatted=study)] if study else [table]
 
 
 def plots(tree: xr.DataTree) -> dict[str, go.Figure]:
     """Return every figure of the page by its name, in the order of the page."""
-    found: list[Plot | str | None] = []
+    found: list[Content] = []
     for section, data in _shown(tree):
         parts = [part for block in section.blocks for part in block.parts]
         for view in _views(section, data):
-            found += [shown for part in parts for shown in _as_list(part(view))]
-    nodes = _nodes(tree)
-    found += [nonlinear_mode.over_responses(nodes), model.picture(nodes)]
-    return {plot.key: plot.figure for plot in found if isinstance(plot, Plot)}
+            found += _contents(parts, view)
+    found += _contents((nonlinear_mode.over_responses, model.picture), _nodes(tree))
+    return {own.key: own.figure for own in found if isinstance(own, Plot)}
 
 
 def report_html(tree: xr.DataTree) -> str:
@@ -164,27 +148,25 @@ def report_html(tree: xr.DataTree) -> str:
     tree
         A result: a node an analysis, provenance in the attributes of the root. What is missing is left out.
     """
-    numbered, chapters = _Numbered(), []
+    placing, chapters = Placing(), []
     cards: list[Card] = []
     for section, data in _shown(tree):
         views = _views(section, data)
         cards += section.cards(views[0])
-        for block in section.blocks:
-            bodies = [numbered.html(block.parts, view) for view in views]
-            if any(bodies):
-                chapters.append(chapter(block.key, block.title, _by_case(section, data, bodies)))
+        own = (_chapter(section, block, data, views, placing) for block in section.blocks)
+        chapters += [chapter for chapter in own if chapter is not None]
     nodes = _nodes(tree)
-    body = numbered.html((nonlinear_mode.over_responses,), nodes)
-    chapters += [chapter("backbones", "Responses and modes", body)] if body else []
-    body = numbered.html(model.PARTS, nodes)
-    chapters += [chapter("model", "Model", body)] if body else []
-    chapters.append(chapter("provenance", "Provenance", _provenance(tree)))
+    for key, title, parts in (
+        ("backbones", "Responses and modes", (nonlinear_mode.over_responses,)),
+        ("model", "Model", model.PARTS),
+    ):
+        body = placing(_contents(parts, nodes))
+        chapters += [Chapter(key, title, body)] if body else []
+    chapters.append(Chapter("provenance", "Provenance", placing(_provenance(tree))))
     root = Node(tree.to_dataset())
     made = f"stickslip {root.text('stickslip_version')} · {root.text('created')}"
-    top = cards_html(cards) + verdicts_html(
-        of_tree(tree), conclusion(tree), bad=bool(not_trusted(tree))
-    )
-    return page_html(root.text("title") or "Result", made, top + "".join(chapters))
+    told = concluded(of_tree(tree), conclusion(tree), bad=bool(not_trusted(tree)))
+    return page_html(root.text("title") or "Result", made, chapters, cards=cards, conclusion=told)
 
 
 def write_report(tree: xr.DataTree, path: Path) -> None:

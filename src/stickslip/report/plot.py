@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import plotly.graph_objects as go
+from markupsafe import Markup
 
 from stickslip.arrays import FloatArray
 
@@ -51,16 +52,16 @@ class Plot:
     title
         Its heading.
     caption
-        HTML: what to see, in words and numbers taken from the data.
+        What to see, in words and numbers taken from the data.
     figure
         The figure.
     case_captions
-        Case -> HTML added to the caption while that case is chosen; empty if the figure does not depend
+        Case -> words added to the caption while that case is chosen; empty if the figure does not depend
         on the choice. Traces of such a figure carry the case in ``meta``.
     chosen
         The case shown first.
     controls
-        HTML above the figure, for scripts that change it.
+        HTML above the figure, for scripts that change it; safe to be put into a page as it is.
     """
 
     key: str
@@ -69,7 +70,7 @@ class Plot:
     figure: go.Figure
     case_captions: Mapping[int, str] = field(default_factory=dict)
     chosen: int = -1
-    controls: str = ""
+    controls: Markup = field(default_factory=Markup)
 
     def __post_init__(self) -> None:
         """Hide the traces that belong to other cases, for a reader without scripts and for the first view."""

@@ -10,6 +10,7 @@ from stickslip.arrays import FloatArray
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 NARROW_SPACE = "\u202f"
 NONE = "–"
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ def number(value: float, digits: int = 3) -> str:
     exponent = math.floor(math.log10(abs(value)))
     if exponent < -4 or exponent > 6:
         mantissa = f"{value / 10.0**exponent:.{digits - 1}f}"
-        return f"{mantissa}·10<sup>{exponent}</sup>".replace("-", "−")
+        return f"{mantissa}·10".replace("-", "−") + str(exponent).translate(_RAISED)
     rounded = round(value, digits - 1 - exponent)
     decimals = max(0, digits - 1 - exponent)
     text = f"{rounded:,.{decimals}f}".replace(",", NARROW_SPACE)

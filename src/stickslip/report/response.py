@@ -4,7 +4,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from html import escape
 
 import numpy as np
 import numpy.typing as npt
@@ -14,9 +13,9 @@ from stickslip.harmonic.selection import STRATEGIES, strategy_named
 from stickslip.harmonic.selection.strategy import always_kept
 from stickslip.harmonic.support import named
 from stickslip.report.cases import ShownCase, cases_of, varied
+from stickslip.report.content import Table
 from stickslip.report.node import Node
 from stickslip.report.quantities import Scale, number, predicted, scale_for
-from stickslip.report.tables import html_table
 from stickslip.study.analyses.forced.curve import (
     Curve,
     branch_length,
@@ -50,7 +49,7 @@ class Response(Node):
 
     @property
     def varied(self) -> str:
-        """The varied keys, escaped: heading of legends and columns."""
+        """The varied keys: heading of legends and columns."""
         return varied(self.data)
 
     def floats(self, name: str) -> FloatArray:
@@ -90,7 +89,7 @@ class Response(Node):
 
     @property
     def output_name(self) -> str:
-        """Label of the output whose peak counts, escaped; of a mistuned wheel with several cases it says of which blade."""
+        """Label of the output whose peak counts; of a mistuned wheel with several cases it says of which blade."""
         labels = self.labels("output")
         own = labels[int(self.outputs[0])]
         if not self.mistuned:
@@ -160,8 +159,8 @@ class Response(Node):
 
     @property
     def selection(self) -> str:
-        """Name of the strategy, escaped."""
-        return escape(self.text("selection", "jacobian_alert"))
+        """Name of the strategy."""
+        return self.text("selection", "jacobian_alert")
 
     @property
     def is_error(self) -> bool:
@@ -257,12 +256,22 @@ class Response(Node):
         return scale_for(self.accepted, self.unit)
 
     def table(
-        self, head: Sequence[str], rows: Sequence[Sequence[str]], *, numeric: bool = True
-    ) -> str:
+        self,
+        heading: str,
+        told: Sequence[str],
+        head: Sequence[str],
+        rows: Sequence[Sequence[str]],
+        *,
+        numeric: bool = True,
+        items: Sequence[str] = (),
+        folded: str = "",
+    ) -> Table:
         """Return a table whose first column names the case; without it where there is one case."""
         first = 0 if len(self.cases) > 1 or self.cases[0].label else 1
         cells = [list(row)[first:] for row in rows]
-        return html_table([self.varied, *head][first:], cells, numeric=numeric)
+        return Table(
+            [self.varied, *head][first:], cells, heading, told, numeric, items=items, folded=folded
+        )
 
     def points(self, case: ShownCase) -> IntArray:
         """Points of a case in the order in which a curve joins them, the unconverged ones included.
@@ -304,15 +313,22 @@ class Response(Node):
 
     @property
     def chosen(self) -> int:
-        """The case whose contacts are shown first: the last one with a peak."""
-        return self.peaked[-1].index if self.peaked else -1
+        """The case whose contacts are shown first: of those with the best verdict the one with the smallest peak of resonance; -1 for none."""
+        if not self.peaked:
+            return -1
+        levels = {c: LEVELS.index(self.level(c)) if self.level(c) else 0 for c in self.peaked}
+
+        def rank(case: ShownCase) -> tuple[int, bool, float]:
+            return levels[case], not self.resonates(case), self.peak_response(case)
+
+        return min(self.peaked, key=rank).index
 
     @cached_property
     def groups(self) -> dict[str, list[int]]:
-        """Contact points by the contact of the model that they belong to, names escaped; by contact line in files which do not say."""
+        """Contact points by the contact of the model that they belong to; by contact line in files which do not say."""
         names = self.labels("contact")
         if self.has("contact_group"):
-            names = tuple(escape(str(v)) + "." for v in self.data["contact_group"].values)
+            names = tuple(f"{v}." for v in self.data["contact_group"].values)
         found: dict[str, list[int]] = {}
         for index, name in enumerate(names):
             found.setdefault(name.partition(".")[0], []).append(index)

@@ -6,9 +6,11 @@ from typing import Any
 
 import xarray as xr
 
+from stickslip.report.content import Chooser, Table, Words
 from stickslip.report.plot import Plot
 
-Shown = Plot | str | Sequence[Plot] | None  # None where the dataset does not hold what is shown
+Content = Plot | Table | Words | Chooser
+Shown = Content | Sequence[Content] | None  # None where the dataset does not hold what is shown
 Part = Callable[[Any], Shown]  # of a view of the dataset
 
 
@@ -31,14 +33,17 @@ class Block:
     key
         Its anchor.
     title
-        Its heading, HTML.
+        Its heading.
     parts
         In their order.
+    folded
+        Whether only the heading is shown at first.
     """
 
     key: str
     title: str
     parts: tuple[Part, ...]
+    folded: bool = False
 
 
 def _nothing(_: Any) -> Sequence[Any]:
@@ -62,7 +67,7 @@ class Section:
     by_case
         Whether `view` sees one case at a time, so that the blocks are drawn for each.
     cards
-        Boxes for the top of the page, HTML.
+        Boxes for the top of the page.
     """
 
     name: str

@@ -6,11 +6,11 @@ n times the pitch and multiplied by exp(i n theta).
 
 import base64
 import json
-from html import escape
 
 import numpy as np
 import numpy.typing as npt
 import plotly.graph_objects as go
+from markupsafe import Markup, escape
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.coarse_skin import coarse_skin
@@ -114,11 +114,12 @@ def _text(values: npt.NDArray[np.generic]) -> str:
     return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
 
 
-def _controls(view: Waves, modes: int, data: dict[str, object]) -> str:
+def _controls(view: Waves, modes: int, data: dict[str, object]) -> Markup:
     """Return the form above the picture and the data behind it, as HTML."""
     pairs = enumerate(zip(view.waves, view.kinds, strict=True))
-    names = [(k, f"{escape(name)} ({escape(kind)})") for k, (name, kind) in pairs]
-    waves = "".join(f'<option value="{k}">{name}</option>' for k, name in names)
+    waves = "".join(
+        f'<option value="{k}">{escape(f"{name} ({kind})")}</option>' for k, (name, kind) in pairs
+    )
     numbers = "".join(f'<option value="{m}">{m + 1}</option>' for m in range(modes))
     views = (
         '<label>show <select name="view"><option value="wheel">whole wheel</option>'
@@ -128,7 +129,7 @@ def _controls(view: Waves, modes: int, data: dict[str, object]) -> str:
     )
     # "<" could end the script element early
     text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
-    return (
+    return Markup(
         f'<form class="shapes"><label>wave <select name="wave">{waves}</select></label>'
         f'<label>mode <select name="mode">{numbers}</select></label>{views}'
         '<label>phase <input type="range" name="phase" min="0" max="360" value="0" step="5"></label>'

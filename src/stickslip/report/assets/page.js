@@ -14,3 +14,24 @@ if (innerWidth < 600) document.querySelectorAll(".js-plotly-plot").forEach(plot 
   if (plot.closest(".panels") || !(legend.x > 1)) return;
   Plotly.relayout(plot, {"legend.orientation": "h", "legend.x": 0, "legend.y": -0.16, "legend.yanchor": "top"});
 });
+// a figure in what was folded away has no width until it is opened
+document.querySelectorAll("details").forEach(folded => folded.addEventListener("toggle", () => {
+  if (folded.open) folded.querySelectorAll(".js-plotly-plot").forEach(plot => Plotly.Plots.resize(plot));
+}));
+document.querySelectorAll("button.rest").forEach(button => button.addEventListener("click", () => {
+  button.closest(".table").querySelectorAll("tr[hidden]").forEach(row => { row.hidden = false; });
+  button.remove();
+}));
+// plain numbers for a spreadsheet: no narrow spaces between thousands, no typographic minus
+const cell = own => `"${own.innerText.replace(/\u202f/g, "").replace(/\u2212/g, "-").replace(/"/g, '""').replace(/\n/g, "; ")}"`;
+document.querySelectorAll("button.csv").forEach(button => button.addEventListener("click", () => {
+  const rows = [...button.closest(".table").querySelectorAll("tr")];
+  const text = rows.map(row => [...row.cells].map(cell).join(",")).join("\r\n");
+  const link = document.createElement("a"), section = button.closest("section");
+  const number = [...section.querySelectorAll("button.csv")].indexOf(button) + 1;
+  link.href = URL.createObjectURL(new Blob(["\ufeff", text], {type: "text/csv"}));
+  link.download = `${section.id}_${number}.csv`;
+  link.click();
+}));
+// paper shows what is folded away
+addEventListener("beforeprint", () => document.querySelectorAll("details").forEach(folded => { folded.open = true; }));

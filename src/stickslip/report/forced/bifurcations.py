@@ -1,11 +1,10 @@
 """Bifurcations of the response: marks on its curves, the branches that leave there, and a table."""
 
-from html import escape
-
 import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.report.cases import ShownCase
+from stickslip.report.content import Table, Words
 from stickslip.report.plot import MUTED, key_marker
 from stickslip.report.quantities import NONE, counted, fixed, number, quantity
 from stickslip.report.response import Response
@@ -87,15 +86,17 @@ def _divisor(response: Response, case: int) -> float:
     return response.cases[case].excitation if response.per_force else 1.0
 
 
-def bifurcations(response: Response) -> str | None:
+def bifurcations(response: Response) -> Table | Words | None:
     """One row a bifurcation: where, what, and which multiplier crosses."""
     if not response.has("bifurcations_limits"):
         return None
     labels = [c.label for c in response.cases]
-    lines = "".join(f"<li>{escape(line)}</li>" for line in beside_bifurcations(response.data, labels))  # fmt: skip
-    text = "<h3>Bifurcations</h3><p>Where multipliers of the motion cross the unit circle along the branch, or it turns back.</p>"
+    title, lines = "Bifurcations", list(beside_bifurcations(response.data, labels))
+    text = (
+        "Where multipliers of the motion cross the unit circle along the branch, or it turns back."
+    )
     if not response.has("bifurcation_case"):
-        return f"{text}<ul>{lines}</ul>"
+        return Words((text,), title, lines)
     case = response.integers("bifurcation_case")
     hz, off, size, error = (response.values(f"bifurcation_{name}") for name in ROWS)
     parts = response.values("bifurcation_multiplier", "bifurcation", "part")
@@ -106,7 +107,7 @@ def bifurcations(response: Response) -> str | None:
         for i in range(len(hz))
     ]  # fmt: skip
     head = ["kind", "frequency (Hz)", "± (Hz)", "amplitude", "multiplier", "±"]
-    return f"{text}{response.table(head, rows)}<ul>{lines}</ul>"
+    return response.table(title, (text,), head, rows, items=lines)
 
 
 def _known(error: float) -> str:

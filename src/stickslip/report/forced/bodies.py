@@ -2,6 +2,7 @@
 
 import numpy as np
 import plotly.graph_objects as go
+from markupsafe import Markup
 from plotly.subplots import make_subplots
 
 from stickslip.arrays import FloatArray
@@ -20,7 +21,7 @@ _AXIS_LINES = (
 
 
 def rigid_bodies(response: Response) -> dict[str, list[int]]:
-    """Return the bodies all of whose six coordinates are retained: name, escaped -> their positions along ``retained``."""
+    """Return the bodies all of whose six coordinates are retained: name -> their positions along ``retained``."""
     labels = response.labels("retained")
     place = {label: k for k, label in enumerate(labels)}
     names = dict.fromkeys(label.rpartition(".")[0] for label in labels)
@@ -183,8 +184,12 @@ def energy(response: Response) -> Plot | None:
         figure.update_yaxes(type="log", range=span, **log_ticks(drawn), col=2)
     figure.update_yaxes(title_text=f"energy ({sums.unit})", col=2)
     figure.update_xaxes(title_text="frequency (Hz)", col=2)
-    key = ", ".join(f'<b style="color:{c}">{g}</b>' for g, c in group_colours(response).items())
-    caption = f"Work of the friction forces in one cycle. Left: coloured by contact ({key}). {_widest_range(response, total)}"
+    key = Markup(", ").join(
+        Markup('<b style="color:{}">{}</b>').format(c, g)
+        for g, c in group_colours(response).items()
+    )
+    told = Markup("Work of the friction forces in one cycle. Left: coloured by contact ({}). {}")
+    caption = told.format(key, _widest_range(response, total))
     captions = {c.index: _energy_caption(response, c) for c in response.peaked}
     title = "Energy dissipated in a cycle"
     return Plot("energy", title, caption, figure, captions, response.chosen)

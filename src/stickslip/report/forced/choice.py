@@ -1,12 +1,12 @@
 """Where more harmonics were needed and why, in plain words."""
 
 from collections import Counter
-from html import escape
 
 import numpy as np
 
 from stickslip.harmonic.support import named
 from stickslip.report.cases import ShownCase
+from stickslip.report.content import Table, Words
 from stickslip.report.forced.contact import states
 from stickslip.report.quantities import NONE, number, predicted
 from stickslip.report.response import Response
@@ -62,13 +62,13 @@ def _why(response: Response, case: ShownCase) -> str:
     return "; ".join(reasons) or "–"
 
 
-def choice(response: Response) -> str | None:
+def choice(response: Response) -> list[Table | Words]:
     """Where more harmonics were needed, what chose them, and why, in plain words."""
     if not response.decides:
         kept = _kept_where(response)
-        return f"<p>The same harmonics everywhere (<code>{response.selection}</code>): {kept}.</p>"
+        return [Words((f"The same harmonics everywhere (`{response.selection}`): {kept}.",))]
     if not response.alert.error.size:
-        return None
+        return []
     alert, middle, text = _other_row, ("harmonics kept", "largest indicator"), _other_text
     if response.auto:
         alert, text = _auto_row, _auto_text
@@ -80,12 +80,12 @@ def choice(response: Response) -> str | None:
         middle = (f"{response.more_name} asked for", "largest predicted error")
         alert, text = _alert_row, _alert_text
     rows = [[c.short, *alert(response, c), _why(response, c)] for c in response.cases]
-    found = text(response) + response.table([*middle, "why"], rows, numeric=False)
+    told = [text(response)]
     if response.has("unknowns_solved", "retained_displacement"):
-        found += f"<p>{cost_sentence(response.data)}</p>"
-    said = escape(response.text("alert_explanation"))
-    more = f"<details><summary>As the run put it</summary><p>{said}</p></details>"
-    return found + (more if said else "")
+        told.append(cost_sentence(response.data))
+    found = response.table("", told, [*middle, "why"], rows, numeric=False)
+    said = response.text("alert_explanation")
+    return [found, Words((said,), folded="As the run put it")] if said else [found]
 
 
 _REASON = (
@@ -95,23 +95,23 @@ _REASON = (
 
 
 def _alert_text(response: Response) -> str:
-    over = escape(response.text("error_over")) or "the output"
+    over = response.text("error_over") or "the output"
     first = "Each point is first solved"
     if response.text("passages") == "single":
         first = "Each frequency is settled before the next one, beginning"
     return (
-        f"<p>{first} with H = {response.low_name}. <code>{response.selection}</code> then predicts how far the motion of {over} would "
+        f"{first} with H = {response.low_name}. `{response.selection}` then predicts how far the motion of {over} would "
         f"change with H = {response.high_name}; where that exceeds {response.shown(response.threshold)}, the point is solved again "
-        f"with more harmonics. {_REASON}</p>"
+        f"with more harmonics. {_REASON}"
     )
 
 
 def _auto_text(response: Response) -> str:
-    over = escape(response.text("error_over")) or "the output"
+    over = response.text("error_over") or "the output"
     return (
-        f"<p>Harmonics are raised along the branch, from H = {response.low_name} up to {response.high_harmonics[-1]}, until "
-        f"<code>{response.selection}</code> predicts that more would change the motion of {over} by well below "
-        f"{response.shown(response.threshold)}. Some points and the peak are solved with more in any case, to compare: audits. {_REASON}</p>"
+        f"Harmonics are raised along the branch, from H = {response.low_name} up to {response.high_harmonics[-1]}, until "
+        f"`{response.selection}` predicts that more would change the motion of {over} by well below "
+        f"{response.shown(response.threshold)}. Some points and the peak are solved with more in any case, to compare: audits. {_REASON}"
     )
 
 
@@ -124,10 +124,10 @@ def _auto_row(response: Response, case: ShownCase) -> tuple[str, str]:
 
 def _other_text(response: Response) -> str:
     return (
-        f"<p><code>{response.selection}</code> chooses among the harmonics of H = {response.high_name}, never fewer than "
+        f"`{response.selection}` chooses among the harmonics of H = {response.high_name}, never fewer than "
         f"H = {response.low_name}, one frequency after the other: it compares an indicator of its own, which is no error, with "
-        f"{response.shown(response.threshold)}. How good the solution is, it does not say; <code>--verify-harmonics</code> does. "
-        f"{_REASON}</p>"
+        f"{response.shown(response.threshold)}. How good the solution is, it does not say; `--verify-harmonics` does. "
+        f"{_REASON}"
     )
 
 
@@ -142,7 +142,7 @@ def _alert_row(response: Response, case: ShownCase) -> tuple[str, str]:
         return "nowhere", "–"
     worst = own[int(np.argmax(response.alert.error[own]))]
     largest = f"{response.shown(float(response.alert.error[worst]))} at {number(float(response.alert.hz[worst]), 5)} Hz"
-    return "<br>".join(ranges) or "nowhere", largest
+    return "\n".join(ranges) or "nowhere", largest
 
 
 def _other_row(response: Response, case: ShownCase) -> tuple[str, str]:

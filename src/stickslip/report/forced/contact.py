@@ -6,6 +6,7 @@ from plotly.subplots import make_subplots
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.cases import ShownCase
+from stickslip.report.content import Chooser, chooser
 from stickslip.report.plot import MUTED, STATE_COLOURS, STATE_NAMES, Plot, legend_above, styled
 from stickslip.report.quantities import counted, joined, percent, quantity
 from stickslip.report.response import Response
@@ -17,21 +18,9 @@ _MOST_STATES = 40  # rows with a name of their own
 _STATE_SCALE = [[a, colour] for k, colour in enumerate(STATE_COLOURS) for a in (k / 3, (k + 1) / 3)]
 
 
-def chooser(response: Response) -> str | None:
+def chosen_case(response: Response) -> Chooser | None:
     """Buttons that choose the case of the figures below."""
-    return case_buttons(response.varied, response.peaked, response.chosen)
-
-
-def case_buttons(heading: str, cases: tuple[ShownCase, ...], chosen: int) -> str | None:
-    """Return buttons that choose a case; None where there is no choice."""
-    if len(cases) < 2:
-        return None
-    buttons = "".join(
-        f'<button type="button" data-case="{c.index}" aria-pressed="{str(c.index == chosen).lower()}">'
-        f'<i style="background:{c.colour}"></i>{c.short}</button>'
-        for c in cases
-    )
-    return f'<nav class="chooser" aria-label="case"><span>{heading}:</span>{buttons}</nav>'
+    return chooser(response.varied, response.peaked, response.chosen)
 
 
 def contact_lines(response: Response) -> list[list[int]]:

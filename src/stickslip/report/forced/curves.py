@@ -1,5 +1,6 @@
 """Figures of the response: curves of all cases, low against accepted order, the optimisation curves."""
 
+from html import escape
 from textwrap import wrap
 
 import numpy as np
@@ -89,7 +90,7 @@ def _reasons(response: Response) -> np.ndarray:
 
 
 def _wrapped(text: str) -> str:
-    return "<br>".join(wrap(text, 80))
+    return "<br>".join(escape(line) for line in wrap(text, 80))
 
 
 def _failures(response: Response) -> go.Scatter:
@@ -134,7 +135,7 @@ def _caption(response: Response) -> str:
     name = amplitude_name(response.data)
     text = f"{name[0].upper()}{name[1:]} of {response.output_name}{over}. {_peaks(response)}"
     if not response.decides:
-        text += f"All points keep the same harmonics (<code>{response.selection}</code>)."
+        text += f"All points keep the same harmonics (`{response.selection}`)."
     else:
         n = counted(int(converged.sum()), "accepted point")
         ends = [number(float(f), 4) for f in (hz[high].min(), hz[high].max())] if high.any() else []

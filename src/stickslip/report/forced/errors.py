@@ -51,18 +51,18 @@ def _caption(response: Response) -> str:
     above, real = error > response.threshold, np.isfinite(response.floats("real_error_percent"))
     if response.auto:
         text = (
-            f"The error that <code>{response.selection}</code> predicts of each accepted solution's own harmonics; the dashed line "
+            f"The error that `{response.selection}` predicts of each accepted solution's own harmonics; the dashed line "
             f"is the threshold of {percent(response.threshold)}. {_above(response)}"
         )
     elif response.is_error:
         text = (
-            f"The error that <code>{response.selection}</code> predicts of the solution with few harmonics "
+            f"The error that `{response.selection}` predicts of the solution with few harmonics "
             f"(H = {response.low_name} at least); the dashed line is the threshold of {percent(response.threshold)}. "
             f"{int(above.sum())} of {counted(error.size, 'checked point')} lie above it and were asked to repeat with more. "
         )
     else:
         text = (
-            f"What <code>{response.selection}</code> compares with its threshold of {response.shown(response.threshold)} "
+            f"What `{response.selection}` compares with its threshold of {response.shown(response.threshold)} "
             "(dashed) at the accepted solution of each frequency: no error, and not to be compared with the indicators of others. "
         )
     worst = int(np.argmax(error))

@@ -71,7 +71,7 @@ def _lost(response: Response, at: IntArray, highest: int) -> go.Scatter:
 def _caption(response: Response, cases: list[ShownCase]) -> str:
     good = response.converged
     text = (
-        f"A mark stands for a harmonic that the accepted solution keeps, chosen by <code>{response.selection}</code>; the "
+        f"A mark stands for a harmonic that the accepted solution keeps, chosen by `{response.selection}`; the "
         f"static term is always kept. {int(np.sum(response.more & good))} of {counted(int(good.sum()), 'accepted point')} "
         f"keep other harmonics than H = {response.low_name}"
     )

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 import plotly.graph_objects as go
@@ -31,7 +30,7 @@ class Measured:
     values
         (n,) of the key that the curves are drawn over.
     others
-        (n,) what else was varied, escaped; empty where it is not told.
+        (n,) what else was varied; empty where it is not told.
     amplitude, amplitude_error
         (n,) as `Response.peak_response`; NaN where it is not known.
     hz, hz_error
@@ -71,7 +70,7 @@ class Measured:
 
     def _points(self, own: BoolArray, y: FloatArray, error: FloatArray, unit: str) -> go.Scatter:
         """Return some of the points, all with bars or all without."""
-        source = escape(self.response.text("measured_source"))
+        source = self.response.text("measured_source")
         points = go.Scatter(
             x=self.values[own], y=y[own], mode="markers", text=[source] * int(own.sum()),
             marker={"size": 9, "color": INK, "line": {"width": 1.6}},
@@ -84,10 +83,10 @@ class Measured:
 
     def caption(self, cases: Sequence[ShownCase]) -> str:
         """Say where the points come from, what their bars are, and how many computed peaks agree with them."""
-        source = escape(self.response.text("measured_source"))
+        source = self.response.text("measured_source")
         of = f" from {source}" if source else ""
         n = counted(len(self.values), "point")
-        text = f" Measured: {n}{of} (<code>{escape(self.response.text('measured_file'))}</code>)"
+        text = f" Measured: {n}{of} (`{self.response.text('measured_file')}`)"
         bars = [
             f"{kind} of {what}"
             for what, name in (("amplitudes", "measured_amplitude"), ("frequencies", "measured_frequency_hz"))
@@ -130,7 +129,7 @@ class Measured:
 
 def measured_of(response: Response, key: str) -> Measured | None:
     """Return what was measured over the key that the curves are drawn over; None for nothing."""
-    if not response.has("measured_value") or escape(response.text("measured_key")) != key:
+    if not response.has("measured_value") or response.text("measured_key") != key:
         return None
     values = response.values("measured_value")
     nothing = np.full(values.size, np.nan)

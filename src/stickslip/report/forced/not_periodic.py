@@ -1,11 +1,10 @@
 """Motions in time where no balance stands for them: how their amplitude goes up and down, and what they are made of."""
 
-from html import escape
-
 import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.arrays import FloatArray
+from stickslip.report.content import Table
 from stickslip.report.forced.tables import sentences
 from stickslip.report.plot import Plot, colour, styled
 from stickslip.report.quantities import NONE, fixed, number, quantity, scale_for
@@ -31,7 +30,7 @@ def amplitudes_in_time(response: Response) -> Plot | None:
             go.Scatter(
                 x=np.arange(own.size), y=scale.factor * own, mode="lines+markers", name=name,
                 line={"color": colour(i), "width": 1.4}, marker={"size": 4},
-                hovertemplate=f"%{{y:.4g}} {scale.unit}<extra>{escape(name)}</extra>",
+                hovertemplate=f"%{{y:.4g}} {scale.unit}<extra>{name}</extra>",
             )
         )  # fmt: skip
     styled(figure, 380)
@@ -44,7 +43,7 @@ def amplitudes_in_time(response: Response) -> Plot | None:
     return Plot("not_periodic", "What is not periodic, in time", caption, figure)
 
 
-def statistics_in_time(response: Response) -> str | None:
+def statistics_in_time(response: Response) -> Table | None:
     """One row a motion: envelope, root mean square, spectrum, whether it has settled."""
     if not response.has(*NEEDED):
         return None
@@ -69,10 +68,11 @@ def statistics_in_time(response: Response) -> str | None:
     ]  # fmt: skip
     head = ["frequency (Hz)", "largest amplitude", "least", "root mean square", "mean", "largest lines of the spectrum", "periods", "settled, spread"]  # fmt: skip
     text = (
-        "<h3>What is not periodic</h3><p>Amplitudes are half of peak to peak in a period, over the later half of the march. It has settled "
-        "where the largest amplitudes and root mean squares of four windows of that half are alike.</p>"
+        "Amplitudes are half of peak to peak in a period, over the later half of the march. It has settled "
+        "where the largest amplitudes and root mean squares of four windows of that half are alike."
     )
-    return text + response.table(head, rows) + sentences(response, "not_periodic_sentence")
+    items = sentences(response, "not_periodic_sentence")
+    return response.table("What is not periodic", (text,), head, rows, items=items)
 
 
 def _report(response: Response) -> int:
@@ -82,4 +82,4 @@ def _report(response: Response) -> int:
 
 def _lines(hz: FloatArray, heights: FloatArray) -> str:
     known = [f"{number(float(f), 5)} Hz: {quantity(float(a), 'm', 3)}" for f, a in zip(hz, heights, strict=True) if np.isfinite(f)]  # fmt: skip
-    return "<br>".join(known[:4]) or NONE
+    return "\n".join(known[:4]) or NONE

@@ -1,9 +1,8 @@
 """The table that says whether motions are stable."""
 
-from html import escape, unescape
-
 import numpy as np
 
+from stickslip.report.content import Table, Words
 from stickslip.report.quantities import NONE, fixed, number
 from stickslip.report.response import Response
 from stickslip.response.stability.modulus import modulus_text
@@ -14,11 +13,11 @@ BY_MOTION = (
 )
 
 
-def stability(response: Response) -> str | None:
+def stability(response: Response) -> list[Table | Words]:
     """One row a point that was examined: verdict and multiplier."""
     names = [f"stability_{word}" for word in ("case", "frequency_hz", "verdict", "multiplier", "multiplier_error")]  # fmt: skip
     if not response.has(*names):
-        return None
+        return []
     case = response.integers(names[0])
     hz, size, error = (response.floats(name) for name in (names[1], *names[3:]))
     verdict = [str(text) for text in response.data[names[2]].values]
@@ -33,19 +32,15 @@ def stability(response: Response) -> str | None:
         for i in range(len(verdict))
     ]  # fmt: skip
     text = (
-        "<h3>Stability</h3><p>Whether a small disturbance of the motion dies. Each is multiplied by so much in a period; above 1 by more "
-        "than its error a machine does not stay there. Where the error reaches 1 the motion in time decides, or nothing does.</p>"
+        "Whether a small disturbance of the motion dies. Each is multiplied by so much in a period; above 1 by more "
+        "than its error a machine does not stay there. Where the error reaches 1 the motion in time decides, or nothing does."
     )
     head = ["frequency (Hz)", "verdict", "decided by", "largest multiplier", "its error"]
-    lines = (
-        all_lines(response.data, [unescape(c.label) for c in response.cases]) if told_each else ()
-    )
-    table = response.table(head, rows)
+    lines = all_lines(response.data, [c.label for c in response.cases]) if told_each else ()
     if len(rows) > FEW:
-        table = f"<details><summary>All {len(rows)} points</summary>{table}</details>"
-    shown = "".join(f"<li>{escape(line)}</li>" for line in lines)
-    listed = f"<ul>{shown}</ul>" * bool(lines)
-    return text + (listed + table if len(rows) > FEW else table + listed)
+        every = response.table("", (), head, rows, folded=f"All {len(rows)} points")
+        return [Words((text,), "Stability", lines), every]
+    return [response.table("Stability", (text,), head, rows, items=lines)]
 
 
 def _error(error: float) -> str:

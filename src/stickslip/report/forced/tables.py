@@ -1,16 +1,15 @@
 """Tables of a forced response: cases, everything that was solved, and the checks of the numbers."""
 
-from html import escape
-
 import numpy as np
 
 from stickslip.harmonic.support import named
+from stickslip.report.content import Table
 from stickslip.report.quantities import NONE, fixed, number, percent, predicted, quantity, scale_for
 from stickslip.report.response import Response
 from stickslip.study.analyses.verdict import said
 
 
-def peaks(response: Response) -> str:
+def peaks(response: Response) -> Table:
     """One row a case: peak, points, work."""
     scale = scale_for(np.array([response.peak_response(c) for c in response.cases]), response.unit)
     head = [
@@ -35,10 +34,10 @@ def peaks(response: Response) -> str:
             + [fixed(response.number_of(name, case), 0) for name in counts]
             + [fixed(response.number_of(name, case), 2) for name in clocks]
         )  # fmt: skip
-    return _work_sentence(response) + response.table(head, rows)
+    return response.table("", _work_sentence(response), head, rows)
 
 
-def _work_sentence(response: Response) -> str:
+def _work_sentence(response: Response) -> list[str]:
     words = {"contact": "the contact laws", "linear": "linear algebra", "rest": "the rest"}
     spent = {
         text: float(np.nansum(response.floats(f"seconds_{name}")))
@@ -47,12 +46,12 @@ def _work_sentence(response: Response) -> str:
     }
     total = sum(spent.values())
     if total <= 0:
-        return ""
+        return []
     shares = [f"{number(100 * s / total, 2)} % in {text}" for text, s in spent.items()]
-    return f"<p>The solver took {quantity(total, 's')}: {', '.join(shares)}.</p>"
+    return [f"The solver took {quantity(total, 's')}: {', '.join(shares)}."]
 
 
-def attempts(response: Response) -> str | None:
+def attempts(response: Response) -> Table | None:
     """One row a case and set of harmonics: what it cost, those solutions included that nothing came of."""
     if not response.has("attempt_case", "attempt_kept"):
         return None
@@ -73,27 +72,24 @@ def attempts(response: Response) -> str | None:
             )
     head = ["H", "solved", "not converged", "Newton steps", "unknowns", "time (s)"]
     text = (
-        "<h3>Everything that was solved</h3><p>By case and harmonics, those solutions included in whose place others were "
-        "accepted. The unknowns of all solutions together compare the work of strategies, whatever the machine.</p>"
+        "By case and harmonics, those solutions included in whose place others were "
+        "accepted. The unknowns of all solutions together compare the work of strategies, whatever the machine."
     )
-    return text + response.table(head, rows)
+    return response.table("Everything that was solved", (text,), head, rows)
 
 
-def sentences(response: Response, name: str) -> str:
+def sentences(response: Response, name: str) -> list[str]:
     """List what each check said, in words."""
     if not response.has(name):
-        return ""
+        return []
     each = [str(s) for s in response.data[name].values]
     rows = f"{name.partition('_')[0]}_case"
     at = response.integers(rows) if response.has(rows) else np.arange(len(each))
     labels = [response.cases[int(k)].label for k in at]
-    items = (
-        f"<li>{said(label, escape(text))}</li>" for label, text in zip(labels, each, strict=True)
-    )
-    return f"<ul>{''.join(items)}</ul>"
+    return [said(label, text) for label, text in zip(labels, each, strict=True)]
 
 
-def more_harmonics(response: Response) -> str | None:
+def more_harmonics(response: Response) -> Table | None:
     """Say what twice as many harmonics would change."""
     names = ("reference_worst_percent", "reference_worst_hz", "reference_above")
     if not response.has(*names):
@@ -104,13 +100,14 @@ def more_harmonics(response: Response) -> str | None:
         rows.append([case.short, predicted(worst), fixed(hz, 2), fixed(above, 0)])
     head = ["largest predicted change", "at (Hz)", "points above the threshold"]
     text = (
-        f"<h3>More harmonics</h3><p>What twice as many harmonics as {response.high_name} are predicted to change at the accepted "
-        "points: the change of the complex amplitude, phase included, over its size.</p>"
+        f"What twice as many harmonics as {response.high_name} are predicted to change at the accepted "
+        "points: the change of the complex amplitude, phase included, over its size."
     )
-    return text + response.table(head, rows) + sentences(response, "reference_sentence")
+    items = sentences(response, "reference_sentence")
+    return response.table("More harmonics", (text,), head, rows, items=items)
 
 
-def time_integration(response: Response) -> str | None:
+def time_integration(response: Response) -> Table | None:
     """Time integration against harmonic balance."""
     words = ("case", "frequency_hz", "transient", "balance", "difference_percent")
     names = [f"verify_{word}" for word in words]
@@ -136,13 +133,13 @@ def time_integration(response: Response) -> str | None:
     ways = ["by time integration", "by harmonic balance"]
     head = ["frequency (Hz)", *ways, "difference", "motion in time", "periods"]
     text = (
-        f"<h3>Time integration</h3><p>Amplitude of {response.output_name}: the two independent ways differ by at most "
-        f"{worst}.</p>"
+        f"Amplitude of {response.output_name}: the two independent ways differ by at most {worst}."
     )
-    return text + response.table(head, rows) + sentences(response, "verify_sentence")
+    items = sentences(response, "verify_sentence")
+    return response.table("Time integration", (text,), head, rows, items=items)
 
 
-def retention(response: Response) -> str | None:
+def retention(response: Response) -> Table | None:
     """How much the small retention stiffness of rigid bodies moves the peak."""
     shift = {c: response.number_of("retention_peak_shift", c) for c in response.cases}
     known = [c for c in response.cases if np.isfinite(shift[c])]
@@ -153,7 +150,8 @@ def retention(response: Response) -> str | None:
     rows = [[c.short, percent(100 * shift[c]), moved[c]] for c in known]
     rows += [[c.short, "no periodic motion found", NONE] for c in response.cases if c not in known]
     text = (
-        "<h3>Retention</h3><p>With a retention stiffness ten times smaller the peak changes most"
-        f"{worst.where}: by {percent(100 * shift[worst])}.</p>"
+        "With a retention stiffness ten times smaller the peak changes most"
+        f"{worst.where}: by {percent(100 * shift[worst])}."
     )
-    return text + response.table(["change of the peak", "change of its frequency (Hz)"], rows)
+    head = ["change of the peak", "change of its frequency (Hz)"]
+    return response.table("Retention", (text,), head, rows)

@@ -1,23 +1,21 @@
 """Where friction works, on the page: the ends of the optimisation curves in words, and a band behind them."""
 
-from html import escape
-
 import numpy as np
 import plotly.graph_objects as go
 
+from stickslip.report.content import Words
 from stickslip.report.plot import GRID
 from stickslip.report.response import Response
 from stickslip.study.analyses.forced.working_range import working_ranges
 from stickslip.study.analyses.forced.working_words import TITLE, range_lines
 
 
-def where_friction_works(response: Response) -> str | None:
+def where_friction_works(response: Response) -> Words | None:
     """Say where all contacts stick, where friction works, and where it lets go."""
     lines = range_lines(response.data)
     if not lines:
         return None
-    items = "".join(f"<li>{escape(line)}</li>" for line in lines)
-    return f"<h3>{TITLE}</h3><ul>{items}</ul>"
+    return Words(heading=TITLE, items=lines)
 
 
 def shade_working_range(figure: go.Figure, response: Response, *, logarithmic: bool) -> str:

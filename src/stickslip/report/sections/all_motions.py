@@ -2,16 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 import plotly.graph_objects as go
 
+from stickslip.report.content import Table, Words
 from stickslip.report.node import Node
 from stickslip.report.plot import MUTED, Plot, colour, styled
 from stickslip.report.quantities import NONE, counted, number, quantity, scale_for
 from stickslip.report.section import Block, Card, Section
-from stickslip.report.tables import shortened
 
 _SYMBOLS = {"stable": "circle", "unstable": "x", "undecided": "diamond-open", "not examined": "circle-open"}  # fmt: skip
 _ORIGIN = {"sweep": "the sweep", "deflation": "found by deflation", "time": "found in time"}
@@ -49,7 +48,7 @@ def branches(view: Motions) -> Plot:
         _mark(view, figure, scale.factor, scale.unit)
     styled(figure, 480)
     figure.update_xaxes(title_text="frequency (Hz)")
-    figure.update_yaxes(title_text=f"amplitude of {escape(view.text('output'))} ({scale.unit})", rangemode="tozero")  # fmt: skip
+    figure.update_yaxes(title_text=f"amplitude of {view.text('output')} ({scale.unit})", rangemode="tozero")  # fmt: skip
     spent = " The budget ended the search before all was tried." * bool(view.scalar("spent"))
     caption = (
         f"{_several(len(view.names), 'branch', 'branches')}: the first is what a sweep by arc length meets. At "
@@ -85,7 +84,7 @@ def _mark(view: Motions, figure: go.Figure, factor: float, unit: str) -> None:
         )  # fmt: skip
 
 
-def branch_table(view: Motions) -> str:
+def branch_table(view: Motions) -> Table:
     """Return the branches."""
     rows = [
         [name, quantity(float(peak), "m", 5), number(float(hertz), 6), end]
@@ -94,13 +93,13 @@ def branch_table(view: Motions) -> str:
         )
     ]  # fmt: skip
     head = ["branch", "largest amplitude", "at (Hz)", "how it ends"]
-    return "<h3>Branches</h3>" + shortened(head, rows, "branches")
+    return Table(head, rows, "Branches")
 
 
-def basin_table(view: Motions) -> str:
+def basin_table(view: Motions) -> Table | Words:
     """Return the motions at each frequency with the share of the starts that ends on them."""
     if not view.has("motion_branch"):
-        return "<p>No motion was found at a frequency that was searched.</p>"
+        return Words(("No motion was found at a frequency that was searched.",))
     dims, names = ("searched", "motion"), view.names
     told = ("amplitude", "share", "share_low", "share_high", "multiplier")
     column = {n: view.values(f"motion_{n}", *dims) for n in told}
@@ -115,7 +114,7 @@ def basin_table(view: Motions) -> str:
             rows.append(
                 [
                     number(float(hertz), 6), names[number_of[i, k]], quantity(float(column["amplitude"][i, k]), "m", 5),
-                    f"<b>{escape(words[i, k])}</b>", number(float(column["multiplier"][i, k]), 4), ends if starts[i] else NONE,
+                    f"**{words[i, k]}**", number(float(column["multiplier"][i, k]), 4), ends if starts[i] else NONE,
                 ]
             )  # fmt: skip
         if aperiodic[i]:
@@ -123,10 +122,10 @@ def basin_table(view: Motions) -> str:
             rows.append([number(float(hertz), 6), "none of the load's period", NONE, NONE, NONE, ends])  # fmt: skip
     head = ["frequency (Hz)", "branch", "amplitude", "stability", "multiplier", "starts that end on it (95 %)"]  # fmt: skip
     said = (
-        "<p>Starts are drawn in the lowest modes about the mean of the known motions, with sliders that never moved: shares are those of "
-        "such starts, with the binomial interval of Clopper and Pearson.</p>"
+        "Starts are drawn in the lowest modes about the mean of the known motions, with sliders that never moved: shares are those of "
+        "such starts, with the binomial interval of Clopper and Pearson."
     )
-    return "<h3>Motions and their basins</h3>" + shortened(head, rows, "motions") + said
+    return Table(head, rows, "Motions and their basins", (said,))
 
 
 def _cards(view: Motions) -> Sequence[Card]:

@@ -1,15 +1,13 @@
 """The Campbell diagram: frequencies over speed, engine-order lines, and where they meet."""
 
-from html import escape
-
 import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.report.content import Table, Words
 from stickslip.report.plot import INK, MUTED, Plot, ring, styled
 from stickslip.report.quantities import counted, number
 from stickslip.report.section import Block, Card, Section
-from stickslip.report.tables import shortened
 from stickslip.report.waves import NEEDED, Waves
 
 _DASHES = ("solid", "dot", "dashdot", "longdash")
@@ -106,7 +104,7 @@ def _not_shown(view: Waves, top: float) -> str:
         each = zip(orders, lowest, strict=True)
         named = [f"EO {order:.0f} from {rpm:.4g} rpm" for order, rpm in each]
         text += (
-            " <b>Not judged</b>, because they lie above the followed modes of the nodal diameters that they excite: "
+            " **Not judged**, because they lie above the followed modes of the nodal diameters that they excite: "
             f"{', '.join(named)}."
         )
     return text
@@ -137,11 +135,12 @@ def campbell_diagram(view: Waves) -> Plot:
     return Plot(f"campbell{view.key}", "Campbell diagram", caption, figure)
 
 
-def crossings(view: Waves) -> str:
+def crossings(view: Waves) -> Table | Words:
     """Return the crossings of a Campbell diagram in the order of speed."""
-    title = "<h3>Crossings</h3>"
+    title = "Crossings"
     if not view.has("crossing_speed_rpm"):
-        return title + "<p>No engine order meets a mode that it excites within the speeds.</p>"
+        told = "No engine order meets a mode that it excites within the speeds."
+        return Words((told,), title)
     rpm, hz = view.floats("crossing_speed_rpm"), view.floats("crossing_frequency_hz")
     order, wave, mode = (
         view.integers(f"crossing_{name}") for name in ("engine_order", "wave", "mode")
@@ -149,9 +148,9 @@ def crossings(view: Waves) -> str:
     rows = []
     for i in np.argsort(rpm, kind="stable"):
         met = [number(float(v), 6) for v in (rpm[i], hz[i])]
-        rows.append([*met, f"{order[i]}", escape(view.waves[wave[i]]), str(mode[i] + 1)])
+        rows.append([*met, f"{order[i]}", view.waves[wave[i]], str(mode[i] + 1)])
     head = ["speed (rpm)", "frequency (Hz)", "engine order", "wave", "mode"]
-    return title + shortened(head, rows, "crossings")
+    return Table(head, rows, title)
 
 
 def _cards(view: Waves) -> list[Card]:

@@ -1,14 +1,12 @@
 """Flutter margins on the page: the least stable diagram and a table of all waves."""
 
-from html import escape
-
 import numpy as np
 import plotly.graph_objects as go
 
+from stickslip.report.content import Table, Words
 from stickslip.report.plot import ALARM, MUTED, Plot, colour, ring, styled
 from stickslip.report.quantities import counted, number
 from stickslip.report.section import Block, Card, Section
-from stickslip.report.tables import html_table
 from stickslip.report.waves import Waves
 
 _NEEDED = (
@@ -61,13 +59,13 @@ def least_stable_diagram(view: Waves) -> Plot:
     caption = (
         f"Aerodynamic damping over the inter-blade phase angle. The curve follows from the influence coefficients at any angle by "
         f"the energy method; marks are the waves that the wheel has. Angles above zero are waves that run backward, against the "
-        f"rotation. The least stable is {escape(names[i])}, mode {m + 1}, with {number(float(total[i, m]), 4)} % of critical "
+        f"rotation. The least stable is {names[i]}, mode {m + 1}, with {number(float(total[i, m]), 4)} % of critical "
         f"damping, that of the structure included. {fate}"
     )
     return Plot(f"flutter{view.key}", "Least stable diagram", caption, figure)
 
 
-def margins(view: Waves) -> str:
+def margins(view: Waves) -> Table:
     """Return the damping of each wave: a row a wave and mode, by phase angle."""
     hz, angle = view.floats("frequency_hz"), view.floats("phase_angle_deg")
     shares = [_PERCENT * view.floats(name) for name in _NEEDED[2:]]
@@ -84,27 +82,28 @@ def margins(view: Waves) -> str:
                 if shares[2][w, m] < 0
                 else "below required"
             )
-            name = escape(view.waves[w])
+            name = view.waves[w]
             rows.append([f"{name}, mode {m + 1}", number(float(angle[w]), 5), number(float(hz[w, m]), 6), number(float(flow[w, m]), 6), *told, fate])  # fmt: skip
     head = [
         "wave", "phase angle (°)", "still fluid (Hz)", "in the flow (Hz)", "by energy (%)", "by eigenvalue (%)",
         "with the structure (%)", "",
     ]  # fmt: skip
-    return "<h3>Margins</h3>" + html_table(head, rows)
+    return Table(head, rows, "Margins")
 
 
-def mistuned(view: Waves) -> str | None:
+def mistuned(view: Waves) -> Words | None:
     """Return what becomes of the wheel whose sectors differ."""
     if not view.has("wheel_damping"):
         return None
     damping, hertz = _PERCENT * view.floats("wheel_damping"), view.floats("wheel_frequency_hz")
     tuned = _PERCENT * float(view.floats("damping").min())
     grows = int(np.count_nonzero(damping < 0))
-    return (
-        f"<h3>With the sectors as they differ</h3><p>No wave is a mode then. The least damped mode of the wheel has "
+    told = (
+        f"No wave is a mode then. The least damped mode of the wheel has "
         f"{number(float(damping[0]), 4)} % at {number(float(hertz[0]), 6)} Hz, where the least stable wave of the tuned wheel has "
-        f"{number(tuned, 4)} %; {grows} of {len(damping)} modes grow. The coefficients are those of the reference frequency.</p>"
+        f"{number(tuned, 4)} %; {grows} of {len(damping)} modes grow. The coefficients are those of the reference frequency."
     )
+    return Words((told,), "With the sectors as they differ")
 
 
 def _cards(view: Waves) -> list[Card]:

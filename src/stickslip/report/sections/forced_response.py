@@ -4,7 +4,7 @@ from stickslip.report.forced import tables
 from stickslip.report.forced.bifurcations import bifurcations
 from stickslip.report.forced.bodies import bodies, energy
 from stickslip.report.forced.choice import choice
-from stickslip.report.forced.contact import chooser, hysteresis_t, hysteresis_w, state_map
+from stickslip.report.forced.contact import chosen_case, hysteresis_t, hysteresis_w, state_map
 from stickslip.report.forced.curves import frequency_response, low_order, optimisation
 from stickslip.report.forced.errors import error_scatter, errors
 from stickslip.report.forced.harmonics import kept_harmonics
@@ -24,21 +24,8 @@ SECTION: Section = Section(
     NEEDED,
     Response,
     (
-        Block("alert", "Where more harmonics were needed", (choice,)),
-        Block(
-            "response",
-            "Forced response",
-            (
-                frequency_response,
-                of_each_order,
-                low_order,
-                kept_harmonics,
-                errors,
-                error_scatter,
-                optimisation,
-                where_friction_works,
-            ),
-        ),
+        Block("response", "Forced response", (frequency_response, of_each_order)),
+        Block("optimisation", "Optimisation curves", (optimisation, where_friction_works)),
         Block(
             "wheel",
             "Blades of the wheel",
@@ -47,9 +34,9 @@ SECTION: Section = Section(
         Block(
             "contact",
             "Contacts at the peak",
-            (chooser, surface_map, hysteresis_t, hysteresis_w, state_map, bodies, energy),
+            (chosen_case, state_map, surface_map, hysteresis_t, hysteresis_w, energy, bodies),
         ),
-        Block("cases", "Cases", (tables.peaks, tables.attempts)),
+        Block("cases", "Cases", (tables.peaks,)),
         Block(
             "checks",
             "Checks",
@@ -58,10 +45,23 @@ SECTION: Section = Section(
                 bifurcations,
                 amplitudes_in_time,
                 statistics_in_time,
-                tables.more_harmonics,
                 tables.time_integration,
                 tables.retention,
             ),
+        ),
+        Block(
+            "harmonics",
+            "Harmonics: where more were needed, and what they cost",
+            (
+                choice,
+                kept_harmonics,
+                errors,
+                error_scatter,
+                low_order,
+                tables.more_harmonics,
+                tables.attempts,
+            ),
+            folded=True,
         ),
     ),
     cards=cards,

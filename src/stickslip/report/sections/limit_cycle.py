@@ -2,17 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.report.content import Table, Words
 from stickslip.report.node import Node
-from stickslip.report.plot import ALARM, INK, Plot, colour, log_ticks, styled
+from stickslip.report.plot import INK, Plot, colour, log_ticks, styled
 from stickslip.report.quantities import NONE, counted, joined, number, quantity, scale_for
 from stickslip.report.section import Block, Card, Section
-from stickslip.report.tables import shortened
 
 _SYMBOLS = {"stable": "circle", "unstable": "x", "undecided": "diamond-open", "not examined": "circle-open"}  # fmt: skip
 _READING = (
@@ -118,22 +117,22 @@ def waves_in_time(view: Cycles) -> Plot | None:
     figure.update_yaxes(title_text=f"amplitude of each wave ({scale.unit})", rangemode="tozero")
     caption = (
         "All sectors in time from a mixed start, 30 % of the limit cycle of each unstable wave, or its mode where slip begins if none was "
-        f"found: <b>{escape(view.text('outcome'))}</b>. Waves are told apart by the motion of all sectors at "
+        f"found: **{view.text('outcome')}**. Waves are told apart by the motion of all sectors at "
         "one time and by the direction in which they turn; another start may end elsewhere."
     )
     return Plot(f"competing_waves{view.key}", "Competing waves in time", caption, figure)
 
 
-def cycle_table(view: Cycles) -> str:
+def cycle_table(view: Cycles) -> Table | Words:
     """Return the limit cycles, and the modes that have none."""
     if not view.has("wave_number"):
         least = 100 * float(np.nanmin(view.floats("linear_damping_ratio")))
-        return f"<p>No mode that was looked at grows with contacts stuck: the least damping ratio is {number(least)} %.</p>"
+        told = f"No mode that was looked at grows with contacts stuck: the least damping ratio is {number(least)} %."
+        return Words((told,))
     names = view.names
     rows = [_row(view, names, c) for c in range(view.cycles)]
     head = ["mode", "amplitude", "frequency (Hz)", "harmonics", "stability", "multiplier", "in time"]  # fmt: skip
-    table = shortened(head, rows, "limit cycles") if rows else ""
-    return f"<h3>Limit cycles</h3>{table}{_without(view, names)}"
+    return Table(head, rows, "Limit cycles", items=_without(view, names))
 
 
 def _row(view: Cycles, names: Sequence[str], c: int) -> list[str]:
@@ -154,18 +153,20 @@ def _row(view: Cycles, names: Sequence[str], c: int) -> list[str]:
     few = "" if int(view.integers("cycle_enough")[c]) else " (not enough)"
     return [
         names[int(view.integers("cycle_branch")[c])], quantity(value("amplitude"), "m", 5), number(value("frequency_hz"), 7),
-        f"{int(view.integers('cycle_harmonics')[c])}{few}", f"<b>{word}</b>{grows}",
+        f"{int(view.integers('cycle_harmonics')[c])}{few}", f"**{word}**{grows}",
         multiplier if np.isfinite(value("multiplier")) else NONE, in_time,
     ]  # fmt: skip
 
 
-def _without(view: Cycles, names: Sequence[str]) -> str:
+def _without(view: Cycles, names: Sequence[str]) -> list[str]:
     """Say which modes friction cannot bound."""
     most, lost = view.floats("largest_damping_ratio"), _unbounded(view)
     if not lost:
-        return ""
+        return []
     said = [f"{names[i]} (at most {number(100 * most[i])} %)" for i in lost]
-    return f"<p><b>Friction cannot bound</b> {joined(said)}: the damping is negative at every amplitude.</p>"
+    return [
+        f"**Friction cannot bound** {joined(said)}: the damping is negative at every amplitude."
+    ]
 
 
 def _unbounded(view: Cycles) -> list[int]:
@@ -189,7 +190,7 @@ def _over_amplitude(view: Cycles, name: str, factor: float, at_cycles: FloatArra
         )  # fmt: skip
     styled(figure, 460)
     ticks = log_ticks(scale.factor * every[np.isfinite(every)])
-    output = escape(view.text("output"))
+    output = view.text("output")
     title = f"amplitude of {output} ({scale.unit})"
     figure.update_xaxes(type="log", title_text=title, **ticks)
     figure.update_layout(meta={"factor": scale.factor, "unit": scale.unit})
@@ -230,7 +231,7 @@ def _caption(view: Cycles) -> str:
     return " ".join(parts)
 
 
-def linear_table(view: Cycles) -> str | None:
+def linear_table(view: Cycles) -> Table | None:
     """Return the damping of all modes that were looked at, contacts stuck."""
     if not view.has("linear_damping_ratio"):
         return None
@@ -244,14 +245,14 @@ def linear_table(view: Cycles) -> str | None:
         ]
         for k, own, damped in zip(waves, hertz, ratio, strict=True)
     ]
-    return "<h3>Modes with contacts stuck</h3>" + shortened(head, rows, "waves")
+    return Table(head, rows, "Modes with contacts stuck")
 
 
 def _small(hertz: float, ratio: float) -> str:
     if not np.isfinite(hertz):
         return NONE
     text = f"{number(hertz, 5)}, {number(100 * ratio, 3)}"
-    return f'<b style="color:{ALARM}">{text}</b>' if ratio < 0 else text
+    return f"**{text}**" if ratio < 0 else text
 
 
 def _cards(view: Cycles) -> list[Card]:

@@ -1,17 +1,16 @@
 """Synthesised responses over the backbone, peaks over the level, passages, and what is to be thought of them."""
 
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.arrays import BoolArray, FloatArray
+from stickslip.report.content import Table
 from stickslip.report.node import Node
 from stickslip.report.plot import INK, MUTED, Plot, colour, log_ticks, ramp, ring, styled
 from stickslip.report.quantities import NONE, counted, joined, number, quantity, scale_for
 from stickslip.report.section import Block, Card, Section
-from stickslip.report.tables import shortened
 from stickslip.study.analyses.synthesis.percents import percent
 
 NAME = "modal_synthesis"
@@ -92,7 +91,7 @@ def responses(view: Synthesised) -> Plot | None:
     figure.update_layout(legend_tracegroupgap=0)
     span = np.concatenate([hertz[i] for i in view.shown])
     figure.update_xaxes(title_text="frequency (Hz)", range=[np.nanmin(span), np.nanmax(span)])
-    figure.update_yaxes(type="log", title_text=f"amplitude of {escape(view.text('output'))} ({scale.unit})", **log_ticks(scale.factor * amplitude[np.isfinite(amplitude)]))  # fmt: skip
+    figure.update_yaxes(type="log", title_text=f"amplitude of {view.text('output')} ({scale.unit})", **log_ticks(scale.factor * amplitude[np.isfinite(amplitude)]))  # fmt: skip
     caption = (
         "Each curve is the response at a level of the loads, from the nonlinear mode, the other modes added as linear ones. The answer of a level, trusted "
         "(dot) or doubtful (diamond), is that of its peak. Thin and dashed: something slips and the other modes move by more than 5 % of the mode, or change "
@@ -114,7 +113,7 @@ def _where(amplitude: FloatArray, curve: FloatArray, own: BoolArray) -> FloatArr
 
 def _share(value: float) -> str:
     """Write a share in per cent, as the terminal does."""
-    return escape(percent(value)) if np.isfinite(value) else NONE
+    return percent(value) if np.isfinite(value) else NONE
 
 
 def _along(view: Synthesised) -> str:
@@ -190,10 +189,10 @@ def passages(view: Synthesised) -> Plot | None:
     return Plot(f"modal_synthesis_passage{view.key}", "Passage through resonance", caption, figure)
 
 
-def table(view: Synthesised) -> str:
+def table(view: Synthesised) -> Table | None:
     """Return the levels, their peaks, and why they are trusted or not."""
     if not view.has("level"):
-        return ""
+        return None
     head = ["level", "peak", "at (Hz)", "answer of the peak", "motion of the other modes", "predicted error of the peak", "alone around the peak (Hz)"]  # fmt: skip
     head.append("why")
     rows = []
@@ -202,21 +201,21 @@ def table(view: Synthesised) -> str:
         moves = max(float(view.floats(n)[i]) for n in ("others_in_output", "others_in_gaps"))
         row = [
             number(float(view.levels[i])), quantity(peak, "m", 5), number(hertz, 7) if np.isfinite(hertz) else NONE,
-            f"<b>{answer}</b>" if answer != "trusted" else answer, _share(moves), _share(foreign),
+            f"**{answer}**" if answer != "trusted" else answer, _share(moves), _share(foreign),
             f"{number(low, 5)} to {number(high, 5)}" if np.isfinite(low) else "nowhere" if np.isfinite(peak) else NONE,
         ]  # fmt: skip
         rows.append([*row, view.labels_of("why")[i]])
     said = (
-        "<p>Predicted and found errors, and the answer, are those of the peak. <i>Alone</i>: from where to where around the peak nothing slips, or the "
-        "other modes move by at most 5 % of the mode and change the amplitude by at most that.</p>"
+        "Predicted and found errors, and the answer, are those of the peak. **Alone**: from where to where around the peak nothing slips, or the "
+        "other modes move by at most 5 % of the mode and change the amplitude by at most that."
     )
-    return f"<h3>Levels</h3>{said}{shortened(head, rows, 'levels', worded=True)}{_cycles(view)}"
+    return Table(head, rows, "Levels", (said,), worded=True, items=_cycles(view))
 
 
-def against_direct(view: Synthesised) -> str:
+def against_direct(view: Synthesised) -> Table | None:
     """Return the differences from the direct solutions, of the peaks and along the curves."""
     if not view.has("direct_error"):
-        return ""
+        return None
     names = ("peak_amplitude", "direct_peak_amplitude", "direct_error", "along_error", "along_error_hz")  # fmt: skip
     columns = [view.floats(n) for n in names]
     rows = []
@@ -224,13 +223,13 @@ def against_direct(view: Synthesised) -> str:
         peak, direct, error, along, hertz = (float(c[i]) for c in columns)
         rows.append([number(float(view.levels[i])), quantity(peak, "m", 5), quantity(direct, "m", 5), _share(error), _share(along), number(hertz, 5)])  # fmt: skip
     head = ["level", "peak", "direct peak", "error of the peak", "largest along the curve, where alone", "at (Hz)"]  # fmt: skip
-    return f"<h3>Against direct solutions</h3>{shortened(head, rows, 'levels')}"
+    return Table(head, rows, "Against direct solutions")
 
 
-def passage_peaks(view: Synthesised) -> str:
+def passage_peaks(view: Synthesised) -> Table | None:
     """Return the peak of each passage beside the steady one."""
     if not view.has("passage_peak_amplitude"):
-        return ""
+        return None
     peak, hertz, share, change = (view.values(f"passage_{n}", "level", "rate") for n in ("peak_amplitude", "peak_frequency_hz", "share", "change"))  # fmt: skip
     rows = [
         [
@@ -240,15 +239,17 @@ def passage_peaks(view: Synthesised) -> str:
         for i in view.shown for j, rate in enumerate(view.floats("passage_hz_per_s")) if np.isfinite(peak[i, j])
     ]  # fmt: skip
     head = ["level", "rate (Hz/s)", "peak", "at (Hz)", "steady peak", "share of it", "change in a radian"]  # fmt: skip
-    return f"<h3>Passages</h3>{shortened(head, rows, 'passages')}" if rows else ""
+    return Table(head, rows, "Passages") if rows else None
 
 
-def _cycles(view: Synthesised) -> str:
+def _cycles(view: Synthesised) -> list[str]:
     """Return the amplitudes at which the mode goes on without any load."""
     if not view.has("cycle_amplitude"):
-        return ""
+        return []
     each = joined([quantity(float(a), "m", 4) for a in view.floats("cycle_amplitude")])
-    return f"<p>The damping of the mode is zero at {each}: limit cycles, which <code>[limit_cycle]</code> examines.</p>"
+    return [
+        f"The damping of the mode is zero at {each}: limit cycles, which `[limit_cycle]` examines."
+    ]
 
 
 def _cards(view: Synthesised) -> list[Card]:

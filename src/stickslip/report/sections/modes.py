@@ -1,17 +1,15 @@
 """Natural frequencies and mode shapes on the page."""
 
-from html import escape
-
 import numpy as np
 import plotly.graph_objects as go
 
+from stickslip.report.content import Table, Words
 from stickslip.report.diameters import diameter_axes, mode_lines
 from stickslip.report.mistuned_modes import modes_of_wheel
 from stickslip.report.plot import INK, Plot, colour, ring, styled
 from stickslip.report.quantities import NONE, counted, number, percent
 from stickslip.report.section import Block, Card, Section
 from stickslip.report.shapes import mode_shapes
-from stickslip.report.tables import html_table
 from stickslip.report.waves import NEEDED, Waves
 
 
@@ -42,7 +40,7 @@ def diameter_map(view: Waves) -> Plot:
     return Plot(f"diameters{view.key}", "Nodal-diameter map", caption, figure)
 
 
-def frequencies(view: Waves) -> str:
+def frequencies(view: Waves) -> list[Table]:
     """Return the natural frequencies: a row a wave, a column a mode."""
     hz = view.floats("frequency_hz")
     head = ["wave", *(f"mode {m + 1} (Hz)" for m in range(hz.shape[1]))]
@@ -53,33 +51,29 @@ def frequencies(view: Waves) -> str:
         f"{name}, {kind}" if view.sectors > 1 else name
         for name, kind in zip(view.waves, kinds, strict=True)
     ]
-    rows = [
-        [escape(name), *(number(f, 7) for f in row)] for name, row in zip(names, hz, strict=True)
-    ]
-    found = "<h3>Natural frequencies</h3>" + html_table(head, rows)
+    rows = [[name, *(number(f, 7) for f in row)] for name, row in zip(names, hz, strict=True)]
+    found = [Table(head, rows, "Natural frequencies")]
     if not view.has("stiffest_hz"):
         return found
     held = view.floats("stiffest_hz")
-    rows = [
-        [escape(name), *(number(f, 7) for f in row)] for name, row in zip(names, held, strict=True)
-    ]
-    title = "<h3>All harmonics held that flanges do not couple</h3>"
-    told = "<p>Flanges move freely in the harmonics that they do not couple, which makes them softer than they are; held there, they are stiffer.</p>"
-    return found + title + told + html_table(head, rows)
+    rows = [[name, *(number(f, 7) for f in row)] for name, row in zip(names, held, strict=True)]
+    title = "All harmonics held that flanges do not couple"
+    told = "Flanges move freely in the harmonics that they do not couple, which makes them softer than they are; held there, they are stiffer."
+    return [*found, Table(head, rows, title, (told,))]
 
 
-def in_flow(view: Waves) -> str | None:
+def in_flow(view: Waves) -> Table | None:
     """Return frequencies and damping ratios with aerodynamic forces, a row a wave."""
     if not view.has("damped_hz", "damping"):
         return None
     hz, damping = view.floats("damped_hz"), 100 * view.floats("damping")
     head = ["wave", *(f"mode {m + 1}" for m in range(hz.shape[1]))]
     rows = [
-        [escape(f"{name}, {kind}"), *(f"{number(f, 7)} Hz, {number(d, 4)} %" for f, d in zip(*own, strict=True))]
+        [f"{name}, {kind}", *(f"{number(f, 7)} Hz, {number(d, 4)} %" for f, d in zip(*own, strict=True))]
         for name, kind, own in zip(view.waves, view.kinds, zip(hz, damping, strict=True), strict=True)
     ]  # fmt: skip
-    text = "<p>Eigenvalues with aerodynamic forces and the structure's damping: frequency and damping ratio.</p>"
-    return "<h3>In the flow</h3>" + text + html_table(head, rows)
+    text = "Eigenvalues with aerodynamic forces and the structure's damping: frequency and damping ratio."
+    return Table(head, rows, "In the flow", (text,))
 
 
 def stage_shares(view: Waves) -> Plot | None:
@@ -97,7 +91,7 @@ def stage_shares(view: Waves) -> Plot | None:
     bars = [
         go.Bar(
             x=places, y=100 * share[:, :, i].ravel(), name=f"{name} ({count} sectors)", marker={"color": colour(i)},
-            customdata=hz.ravel(), hovertemplate="%{y:.3g} % at %{customdata:.6g} Hz<extra>" + escape(name) + "</extra>",
+            customdata=hz.ravel(), hovertemplate="%{y:.3g} % at %{customdata:.6g} Hz<extra>" + name + "</extra>",
         )
         for i, (name, count) in enumerate(zip(stages, counts, strict=True))
     ]  # fmt: skip
@@ -111,31 +105,31 @@ def stage_shares(view: Waves) -> Plot | None:
     )
     caption = (
         "A mode with nearly all its energy in one stage is one of that wheel, to be looked for on it alone; modes that two stages share "
-        f"exist in the assembly only. Waves that the flanges let vibrate together: {escape(waves)}. All else of the flanges moves freely."
+        f"exist in the assembly only. Waves that the flanges let vibrate together: {waves}. All else of the flanges moves freely."
     )
     return Plot(f"stages{view.key}", "Which stage vibrates", caption, figure)
 
 
-def comparison(view: Waves) -> str | None:
+def comparison(view: Waves) -> Table | Words | None:
     """Return the relative differences from the reference, a row a wave."""
     if not view.has("difference"):
         return None
-    title, off = "<h3>Against the reference</h3>", view.floats("difference")
+    title, off = "Against the reference", view.floats("difference")
     known = int(np.isfinite(off).sum())
     if not known:
-        return title + "<p>The reference has none of these frequencies.</p>"
+        return Words(("The reference has none of these frequencies.",), title)
     rows = [
-        [escape(name), *(_share(float(d)) for d in row)]
+        [name, *(_share(float(d)) for d in row)]
         for name, row in zip(view.waves, off, strict=True)
         if np.isfinite(row).any()
     ]
     worst = np.unravel_index(np.nanargmax(np.abs(off)), off.shape)
     text = (
-        f"<p>{known} {'frequency' if known == 1 else 'frequencies'} compared; the largest relative difference is "
-        f"{_share(float(off[worst]))}, at {escape(view.waves[worst[0]])}, mode {worst[1] + 1}.</p>"
+        f"{known} {'frequency' if known == 1 else 'frequencies'} compared; the largest relative difference is "
+        f"{_share(float(off[worst]))}, at {view.waves[worst[0]]}, mode {worst[1] + 1}."
     )
     head = ["wave", *(f"mode {m + 1}" for m in range(off.shape[1]))]
-    return title + text + html_table(head, rows)
+    return Table(head, rows, title, (text,))
 
 
 def _share(value: float) -> str:

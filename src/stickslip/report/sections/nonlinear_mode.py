@@ -2,19 +2,18 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.arrays import FloatArray
+from stickslip.report.content import Table
 from stickslip.report.forced.curves import abscissa
 from stickslip.report.node import Node
 from stickslip.report.plot import INK, Plot, colour, log_ticks, styled
 from stickslip.report.quantities import NONE, joined, number, quantity, scale_for
 from stickslip.report.response import Response
 from stickslip.report.section import Block, Card, Section
-from stickslip.report.tables import shortened
 
 NAME = "nonlinear_mode"
 _READING = (
@@ -77,7 +76,7 @@ def energies(view: Modes) -> list[Plot]:
     return found
 
 
-def table(view: Modes) -> str:
+def table(view: Modes) -> Table:
     """Return the modes: where they begin, how much they damp, how they end."""
     head = ["mode", "Hz, stuck", "damping %, stuck", "most damping %", "at", "all contacts slip from", "harmonics", "end"]  # fmt: skip
     rows = []
@@ -93,7 +92,7 @@ def table(view: Modes) -> str:
                 view.labels_of("problem")[i] or view.labels_of("end")[i],
             ]
         )  # fmt: skip
-    return shortened(head, rows, "modes")
+    return Table(head, rows)
 
 
 def over_responses(nodes: Mapping[str, Node]) -> Plot | None:
@@ -101,7 +100,7 @@ def over_responses(nodes: Mapping[str, Node]) -> Plot | None:
     modes, response = nodes.get(NAME), nodes.get("forced_response")
     if not isinstance(modes, Modes) or not isinstance(response, Response):
         return None
-    output = escape(modes.text("output"))
+    output = modes.text("output")
     labels = response.labels("output")
     if output not in labels or response.has("speed_rpm") or not modes.has("amplitude"):
         return None
@@ -157,7 +156,7 @@ def _over(view: Modes, over: str, name: str, factor: float, unit: str) -> go.Fig
             hovertemplate=f"{label}: %{{y:.6g}} at %{{x:.5g}} {scale.unit}<extra></extra>",
         )  # fmt: skip
     styled(figure, 440)
-    title = "energy" if over == "energy" else f"amplitude of {escape(view.text('output'))}"
+    title = "energy" if over == "energy" else f"amplitude of {view.text('output')}"
     ticks = log_ticks(scale.factor * every[np.isfinite(every)])
     figure.update_xaxes(type="log", title_text=f"{title} ({scale.unit})", **ticks)
     return figure

@@ -1,16 +1,15 @@
 """Motions with two frequencies: envelopes, and the combined frequencies that they are made of."""
 
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 import plotly.graph_objects as go
 
+from stickslip.report.content import Table
 from stickslip.report.node import Node
 from stickslip.report.plot import Plot, colour, styled
 from stickslip.report.quantities import NONE, counted, fixed, number, quantity, scale_for
 from stickslip.report.section import Block, Card, Section
-from stickslip.report.tables import shortened
 
 SHOWN = 6  # motions drawn one by one
 FAINT = 1e-4  # of the largest: combined frequencies that are not drawn
@@ -60,7 +59,7 @@ def envelopes(view: TwoTonesView) -> Plot | None:
         )  # fmt: skip
     styled(figure, 440)
     figure.update_xaxes(title_text="first frequency (Hz)")
-    figure.update_yaxes(title_text=f"{escape(view.name)} ({scale.unit})", rangemode="tozero")
+    figure.update_yaxes(title_text=f"{view.name} ({scale.unit})", rangemode="tozero")
     caption = (
         "The amplitude, half of peak to peak in a period of the first frequency, goes up and down between its least and its largest value "
         "as the phases drift past each other. Where there is no second tone both are one."
@@ -85,7 +84,7 @@ def over_phase(view: TwoTonesView) -> Plot | None:
         )  # fmt: skip
     styled(figure, 420)
     figure.update_xaxes(title_text="phase of the second frequency where a period begins (degrees)")
-    figure.update_yaxes(title_text=f"amplitude of {escape(view.name)} ({scale.unit})", rangemode="tozero")  # fmt: skip
+    figure.update_yaxes(title_text=f"amplitude of {view.name} ({scale.unit})", rangemode="tozero")  # fmt: skip
     caption = "Half of peak to peak over one period of the first frequency, for each phase of the second one at which that may begin."
     return Plot(f"two_frequencies_phase{view.key}", "Slow change of the amplitude", caption, figure)
 
@@ -111,12 +110,12 @@ def combined(view: TwoTonesView) -> Plot | None:
         )  # fmt: skip
     styled(figure, 420)
     figure.update_xaxes(title_text="frequency (Hz)")
-    figure.update_yaxes(type="log", title_text=f"amplitude of {escape(view.name)} ({scale.unit})", exponentformat="power")  # fmt: skip
+    figure.update_yaxes(type="log", title_text=f"amplitude of {view.name} ({scale.unit})", exponentformat="power")  # fmt: skip
     caption = "Amplitudes of the combined frequencies j f1 + k f2 that were kept; below zero they are shown at their absolute value."
     return Plot(f"two_frequencies_lines{view.key}", "Combined frequencies", caption, figure)
 
 
-def motions(view: TwoTonesView) -> str:
+def motions(view: TwoTonesView) -> Table:
     """Return a row a motion."""
     kinds, reasons = view.labels_of("kind"), view.labels_of("why")
     largest, least, rms, extreme = (view.values(w, "point", "output")[:, 0] for w in ("largest", "least", "rms", "extreme"))  # fmt: skip
@@ -131,10 +130,10 @@ def motions(view: TwoTonesView) -> str:
             [
                 fixed(float(view.floats("first_hz")[i]), 3), fixed(second, 3) if np.isfinite(second) else NONE, kind, *lengths,
                 str(int(view.integers("combined")[i])), number(100 * left, 2) if np.isfinite(left) else NONE,
-                *([_in_time(view, i)] if timed else []), escape(reasons[i]),
+                *([_in_time(view, i)] if timed else []), reasons[i],
             ]
         )  # fmt: skip
-    return f"<h3>Motions</h3>{shortened(head, rows, 'motions')}"
+    return Table(head, rows, "Motions")
 
 
 def _in_time(view: TwoTonesView, i: int) -> str:

@@ -1,17 +1,16 @@
 """Residual tractions: the band that they leave open over frequency, and of the resonance."""
 
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.arrays import FloatArray
+from stickslip.report.content import Table
 from stickslip.report.node import Node
 from stickslip.report.plot import COLOURS, INK, Plot, log_ticks, styled
 from stickslip.report.quantities import NONE, number, percent, quantity, scale_for
 from stickslip.report.section import Block, Card, Section
-from stickslip.report.tables import html_table
 
 _NAMES = ("own start", "smallest", "largest")
 _EQUAL = 1e-6  # relative difference of bounds that are one
@@ -64,7 +63,7 @@ def band(view: Tractions) -> Plot | None:
 def _caption(view: Tractions) -> str:
     least, most = (view.floats(f"{name}_amplitude") for name in ("least", "most"))
     text = (
-        f"Amplitude of {escape(view.text('output'))}, H = {int(view.scalar('harmonics', 0))}: a contact that sticks keeps a traction from before, "
+        f"Amplitude of {view.text('output')}, H = {int(view.scalar('harmonics', 0))}: a contact that sticks keeps a traction from before, "
         "and every one within the friction cone is a steady motion. "
     )
     if view.has("branches") and np.nanmax(view.floats("branches")) > 1:
@@ -85,11 +84,11 @@ def _open_resonance(view: Tractions) -> bool:
     return has_width(np.atleast_1d(least), np.atleast_1d(most))
 
 
-def resonances(view: Tractions) -> str | None:
+def resonances(view: Tractions) -> Table | None:
     """Return the bounds of the resonance, and what time integration says of them."""
     if not view.has("resonance_amplitude"):
         return None
-    equal = "" if _open_resonance(view) else "<p>The bounds are equal.</p>"
+    equal = () if _open_resonance(view) else ("The bounds are equal.",)
     height, hertz = view.floats("resonance_amplitude"), view.floats("resonance_hz")
     rows = []
     for k, name in enumerate(_NAMES):
@@ -106,7 +105,7 @@ def resonances(view: Tractions) -> str | None:
         off = percent(100 * float(height[k] / height[0] - 1)) if k else ""
         rows.append([name, quantity(float(height[k]), "m"), off, number(float(hertz[k]), 6), again, time, told])  # fmt: skip
     head = ["resonance", "amplitude", "against own start", "at (Hz)", "solved again", "in time", ""]
-    return "<h3>Bounds of the resonance</h3>" + equal + html_table(head, rows)
+    return Table(head, rows, "Bounds of the resonance", equal)
 
 
 def _cards(view: Tractions) -> list[Card]:

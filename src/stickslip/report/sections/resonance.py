@@ -2,17 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.arrays import FloatArray
+from stickslip.report.content import Table
 from stickslip.report.node import Node
 from stickslip.report.plot import INK, MUTED, Plot, colour, ring, styled
 from stickslip.report.quantities import NONE, counted, joined, number, quantity, scale_for
 from stickslip.report.section import Block, Card, Section
-from stickslip.report.tables import shortened
 
 _BY = {
     "horizontal_tangent": "the largest amplitude of the output, where its response has a horizontal tangent",
@@ -40,9 +39,9 @@ def amplitudes(view: Peaks) -> Plot:
     """Show the amplitude of the peaks over the parameter, the lowest place of the highest, and where one overtakes another."""
     scale = scale_for(view.floats("amplitude"), "m")
     figure = _over_parameter(view, "amplitude", scale.factor, scale.unit)
-    figure.update_yaxes(title_text=f"amplitude of {escape(view.text('output'))} ({scale.unit})", rangemode="tozero")  # fmt: skip
+    figure.update_yaxes(title_text=f"amplitude of {view.text('output')} ({scale.unit})", rangemode="tozero")  # fmt: skip
     parts = [
-        f"{counted(view.count, 'peak')} followed over {escape(view.text('parameter'))}: {_BY[view.text('by')]}.",
+        f"{counted(view.count, 'peak')} followed over {view.text('parameter')}: {_BY[view.text('by')]}.",
         "Dashed: the curve has met a minimum of the response, and is no peak any more."
         * _any_minimum(view),
     ]
@@ -51,7 +50,7 @@ def amplitudes(view: Peaks) -> Plot:
         _mark(figure, np.array([x]), scale.factor * np.array([y]), "lowest", INK)
         where = f"at {number(hertz, 6)} Hz" if np.isfinite(hertz) else "where two are equally high"
         parts.append(
-            f"The highest peak is lowest at <b>{number(x, 5)}</b>: {quantity(y, 'm', 5)} {where}."
+            f"The highest peak is lowest at **{number(x, 5)}**: {quantity(y, 'm', 5)} {where}."
         )
     if view.has("overtaking_value"):
         met, height = view.floats("overtaking_value"), view.floats("overtaking_amplitude")
@@ -101,7 +100,7 @@ def energies(view: Peaks) -> Plot:
     return Plot(f"resonance_energy{view.key}", "Dissipated energy", caption, figure)
 
 
-def peak_table(view: Peaks) -> str:
+def peak_table(view: Peaks) -> Table:
     """Return the peaks."""
     rows = []
     for i in range(view.count):
@@ -115,8 +114,8 @@ def peak_table(view: Peaks) -> str:
                     number(float(phase), 4), quantity(float(energy), "J", 4), f"{number(float(share), 3)} %" if np.isfinite(share) else NONE,
                 ]
             )  # fmt: skip
-    head = ["peak", escape(view.text("parameter")), "frequency (Hz)", "amplitude", "phase (°)", "energy", "of friction"]  # fmt: skip
-    return "<h3>Peaks</h3>" + shortened(head, rows, "peaks")
+    head = ["peak", view.text("parameter"), "frequency (Hz)", "amplitude", "phase (°)", "energy", "of friction"]  # fmt: skip
+    return Table(head, rows, "Peaks")
 
 
 def _over_parameter(view: Peaks, name: str, factor: float, unit: str) -> go.Figure:
@@ -135,7 +134,7 @@ def _over_parameter(view: Peaks, name: str, factor: float, unit: str) -> go.Figu
                 )
             )  # fmt: skip
     styled(figure, 440)
-    figure.update_xaxes(title_text=escape(view.text("parameter")))
+    figure.update_xaxes(title_text=view.text("parameter"))
     return figure
 
 

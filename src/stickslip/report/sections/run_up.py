@@ -6,11 +6,11 @@ import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.arrays import BoolArray
+from stickslip.report.content import Table
 from stickslip.report.node import Node
 from stickslip.report.plot import INK, MUTED, Plot, colour, styled
 from stickslip.report.quantities import counted, number, percent, quantity, scale_for
 from stickslip.report.section import Block, Card, Section
-from stickslip.report.tables import shortened
 
 _DASHES = ("dash", "dot", "dashdot", "longdash")
 _LARGEST, _SMALLEST = 26.0, 3.0  # markers of the largest and of no amplitude
@@ -165,7 +165,7 @@ def fast(view: RunUpView) -> Plot | None:
     return Plot(f"run_up_fast{view.key}", "Fast run-up", caption, figure)
 
 
-def fast_peaks(view: RunUpView) -> str | None:
+def fast_peaks(view: RunUpView) -> Table | None:
     """Return the peaks of fast run-ups as a table."""
     if not view.has("fast_speed_rpm"):
         return None
@@ -180,7 +180,7 @@ def fast_peaks(view: RunUpView) -> str | None:
         later = [number(ratio, 4), number(rpm, 6), number(shift, 4), percent(100 * off)]
         rows.append([*first, *later])
     head = ["engine order", "rpm/s", "peak", "of the steady one", "at rpm", "shift in rpm", "left out"]  # fmt: skip
-    return "<h3>Peaks of fast run-ups</h3>" + shortened(head, rows, "run-ups")
+    return Table(head, rows, "Peaks of fast run-ups")
 
 
 def static_forces(view: RunUpView) -> Plot:
@@ -204,7 +204,7 @@ def static_forces(view: RunUpView) -> Plot:
     return Plot(f"run_up_static{view.key}", "Static normal force over speed", caption, figure)
 
 
-def peaks(view: RunUpView) -> str:
+def peaks(view: RunUpView) -> Table:
     """Return the peaks as a table."""
     rows = []
     for i, order in enumerate(view.orders):
@@ -226,7 +226,7 @@ def peaks(view: RunUpView) -> str:
             ]
         )
     head = ["engine order", "wave", "peak", "rpm", "Hz", "contacts that slip", "dissipated", "failed points", ""]  # fmt: skip
-    return "<h3>Peaks</h3>" + shortened(head, rows, "engine orders")
+    return Table(head, rows, "Peaks")
 
 
 def _cards(view: RunUpView) -> list[Card]:

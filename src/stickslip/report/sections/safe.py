@@ -1,16 +1,14 @@
 """The SAFE diagram: which modes engine orders can excite at a speed."""
 
-from html import escape
-
 import numpy as np
 import plotly.graph_objects as go
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.report.content import Table
 from stickslip.report.diameters import diameter_axes, mode_lines
 from stickslip.report.plot import ALARM, INK, MUTED, Plot, ring, styled
 from stickslip.report.quantities import NONE, counted, number, percent
 from stickslip.report.section import Block, Card, Section
-from stickslip.report.tables import shortened
 from stickslip.report.waves import NEEDED, Waves
 
 _MOST_LABELS = 40  # engine orders written beside the zig-zag line
@@ -74,7 +72,7 @@ def safe_diagram(view: Waves) -> Plot:
     )
     if unjudged:
         caption += (
-            f" <b>Not judged</b> (crossed squares): {', '.join(f'EO {m}' for m in sorted(unjudged))}, above the highest "
+            f" **Not judged** (crossed squares): {', '.join(f'EO {m}' for m in sorted(unjudged))}, above the highest "
             "computed mode of the nodal diameter."
         )
     return Plot(f"safe{view.key}", "SAFE diagram", caption, figure)
@@ -123,7 +121,7 @@ def _near(view: Waves, near: np.ndarray) -> go.Scatter:
     )  # fmt: skip
 
 
-def interference(view: Waves) -> str:
+def interference(view: Waves) -> Table:
     """Return the pairs of engine order and mode, the nearest first."""
     margin, near = view.floats("pair_margin"), view.integers("pair_near")
     order, wave, mode = (view.integers(f"pair_{name}") for name in ("engine_order", "wave", "mode"))
@@ -134,17 +132,16 @@ def interference(view: Waves) -> str:
     rows = []
     for i in np.argsort(np.abs(margin), kind="stable"):
         verdict = "clear" if judged[i] else "order not judged"
-        verdict = "<b>near resonance</b>" if near[i] else verdict
+        verdict = "**near resonance**" if near[i] else verdict
         rows.append(
-            [f"{order[i]}", escape(view.waves[wave[i]]), str(mode[i] + 1), number(float(own[i]), 6), number(float(excitation[i]), 6),
+            [f"{order[i]}", view.waves[wave[i]], str(mode[i] + 1), number(float(own[i]), 6), number(float(excitation[i]), 6),
              _rpm(float(meeting[i]), float(margin[i])), percent(100 * float(margin[i]), 3) if np.isfinite(margin[i]) else NONE, verdict]
         )  # fmt: skip
     at = f"at {number(view.scalar('speed_rpm'), 5)} rpm"
     head = [
         "engine order", "wave", "mode", f"mode {at} (Hz)", f"excitation {at} (Hz)", "resonance at (rpm)", "margin in speed", "",
     ]  # fmt: skip
-    title = "<h3>Engine orders and the modes that they can excite</h3>"
-    return title + shortened(head, rows, "pairs")
+    return Table(head, rows, "Engine orders and the modes that they can excite")
 
 
 def _rpm(value: float, margin: float) -> str:

@@ -1,0 +1,81 @@
+"""What a page is made of besides figures: tables, words, and buttons that choose a case. Plain text, which the templates escape."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from stickslip.report.cases import ShownCase
+
+# In all texts **words** are set bold, `names` as code, and a line break is kept.
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table, which the page offers as CSV, too.
+
+    Parameters
+    ----------
+    head
+        Of the columns; empty for a list of facts.
+    rows
+        As many cells each.
+    heading
+        Above it; empty for none.
+    told
+        Paragraphs between the heading and the table.
+    numeric
+        Whether cells are set flush right from the second column.
+    worded
+        Whether the last column of a numeric table holds words.
+    items
+        Sentences listed below it.
+    folded
+        What is said while the table is folded away; empty where it is open.
+    """
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    heading: str = ""
+    told: Sequence[str] = ()
+    numeric: bool = True
+    worded: bool = False
+    items: Sequence[str] = ()
+    folded: str = ""
+
+
+@dataclass(frozen=True)
+class Words:
+    """Paragraphs and a list.
+
+    Parameters
+    ----------
+    told
+        Paragraphs.
+    heading
+        Above them; empty for none.
+    items
+        Sentences listed below them.
+    folded
+        What is said while all of it is folded away; empty where it is open.
+    preformatted
+        Lines below all else that are shown as they are.
+    """
+
+    told: Sequence[str] = ()
+    heading: str = ""
+    items: Sequence[str] = ()
+    folded: str = ""
+    preformatted: str = ""
+
+
+@dataclass(frozen=True)
+class Chooser:
+    """Buttons that choose the case of what stands below."""
+
+    heading: str
+    cases: tuple[ShownCase, ...]
+    chosen: int
+
+
+def chooser(heading: str, cases: tuple[ShownCase, ...], chosen: int) -> Chooser | None:
+    """Return buttons that choose a case; None where there is no choice."""
+    return Chooser(heading, cases, chosen) if len(cases) > 1 else None
