@@ -1,6 +1,11 @@
 """Factorisations against dense solutions: every backend, real and complex, and what is singular."""
 
+import logging
+import os
+import re
+import sys
 from importlib.util import find_spec
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +16,10 @@ from stickslip.model.fe import factorisation
 from stickslip.model.fe.factorisation import factorise, negative_eigenvalues
 
 RNG = np.random.default_rng(5)
+REQUIRED = os.environ.get("STICKSLIP_OPTIONAL") == "required"  # then nothing is skipped
 needs_feral = pytest.mark.skipif(
-    find_spec("feral") is None, reason="feral is not installed: pip install 'stickslip[sparse]'"
+    find_spec("feral") is None and not REQUIRED,
+    reason="feral is not installed: pip install 'stickslip[sparse]'",
 )
 SPARSE = ["superlu", pytest.param("feral", marks=needs_feral)]
 
@@ -169,6 +176,117 @@ def test_negative_eigenvalues_are_counted_without_an_optional_package(size, phas
     expected = np.count_nonzero(np.linalg.eigvalsh(matrix) < 0)
     assert negative_eigenvalues(scipy.sparse.csr_array(matrix)) == expected
     assert factorise(scipy.sparse.csr_array(matrix), backend="superlu").negative == expected
+
+
+@needs_feral
+@pytest.mark.parametrize("draw", [laplacian, hermitian])
+def test_the_package_leaves_the_matrix_as_it_is(draw):
+    matrix = scipy.sparse.csc_array(draw((23, 22), -0.3))
+    before = matrix.toarray()
+    factorise(matrix, backend="feral")
+    np.testing.assert_array_equal(matrix.toarray(), before)
+
+
+class PanicException(BaseException):  # what a panic of Rust becomes
+    pass
+
+
+class Young:
+    """The interface of feral-solver over a dense solution, with faults of choice."""
+
+    class FeralError(Exception):
+        pass
+
+    def __init__(self, *, off=0.0, miscounted=0, vanish=0, error=None):
+        self.off, self.miscounted, self.error = off, miscounted, error
+        self.inertia = SimpleNamespace(n_zero=vanish)
+
+    def CscMatrix(self, n, indptr, indices, data):
+        lower = scipy.sparse.csc_array((data, indices, indptr), shape=(n, n)).toarray()
+        return lower + np.tril(lower, -1).T
+
+    def Solver(self, **_):
+        return self
+
+    def factor(self, matrix):
+        if self.error:
+            raise self.error
+        self.matrix = matrix
+        counted = np.count_nonzero(np.linalg.eigvalsh(matrix) < 0)
+        self.num_negative_eigenvalues = int(counted) + self.miscounted
+
+    def solve(self, right):
+        answer = np.linalg.solve(self.matrix, right)
+        answer[7] *= 1 + self.off
+        return answer
+
+
+@pytest.fixture
+def young(monkeypatch):
+    """Put a package in the place of feral that has the faults asked for, for matrices of more than 100 rows."""
+
+    def put(**faults):
+        monkeypatch.setattr(factorisation, "LARGE", 100)
+        monkeypatch.setattr(factorisation, "DENSE", 50)
+        monkeypatch.setattr(factorisation, "find_spec", lambda _: SimpleNamespace(origin="there"))
+        monkeypatch.setitem(sys.modules, "feral", Young(**faults))
+
+    return put
+
+
+@pytest.mark.parametrize("draw", [laplacian, hermitian])
+def test_factors_with_a_small_residual_are_used(young, caplog, draw):
+    young()
+    matrix = draw((13, 12), -0.3)
+    found = factorise(matrix)
+    assert found.backend == "feral"
+    check(found, matrix)
+    negative = int(np.count_nonzero(np.linalg.eigvalsh(matrix.toarray()) < 0))
+    assert found.negative == negative_eigenvalues(matrix) == negative > 0
+    assert caplog.messages == []
+
+
+@pytest.mark.parametrize("draw", [laplacian, hermitian])
+@pytest.mark.parametrize(
+    ("faults", "told"),
+    [
+        ({"off": 1e-6}, r"leaves a residual of \S+ in 156 equations"),
+        ({"off": np.nan}, "leaves a residual of nan"),
+        ({"error": Young.FeralError("delayed")}, r"failed \(delayed\)"),
+        ({"error": PanicException("index")}, r"failed \(index\)"),
+        ({"vanish": 2}, None),
+    ],
+)
+def test_superlu_takes_its_place_where_the_package_errs(young, caplog, draw, faults, told):
+    young(**faults)
+    matrix = draw((13, 12), -0.3)
+    found = factorise(matrix)
+    assert found.backend == "superlu"
+    check(found, matrix)
+    negative = np.count_nonzero(np.linalg.eigvalsh(matrix.toarray()) < 0)
+    assert negative_eigenvalues(matrix) == negative
+    if told:
+        assert [r.levelno for r in caplog.records] == 2 * [logging.WARNING]
+        assert re.search(
+            f"feral-solver is not used: it {told}.*SuperLU takes its place", caplog.text
+        )
+    with pytest.raises(StickslipError, match=told or "2 pivots vanish"):
+        factorise(matrix, backend="feral")
+
+
+@pytest.mark.parametrize("limit", [1000, 100])
+def test_counts_are_checked_with_superlu(young, caplog, monkeypatch, limit):
+    """Up to a size beyond which its factors do not fit."""
+    monkeypatch.setattr(factorisation, "CHECKED", limit)
+    young(miscounted=1)
+    matrix = laplacian((13, 12), -0.3)
+    right = np.count_nonzero(np.linalg.eigvalsh(matrix.toarray()) < 0)
+    said = []
+    assert negative_eigenvalues(matrix, say=said.append) == (right if limit == 1000 else right + 1)
+    if limit == 1000:
+        assert f"it counts {right + 1} negative pivots of 156, SuperLU {right}" in caplog.text
+    else:
+        assert said[-1].startswith(f"{right + 1} negative pivots by feral alone")
 
 
 @pytest.mark.skipif(find_spec("feral") is not None, reason="feral is installed")

@@ -1,6 +1,8 @@
 """Factorisations of structural matrices: one function from a matrix to the map that solves with it."""
 
-from collections.abc import Callable
+import logging
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 
@@ -10,7 +12,7 @@ import scipy.sparse
 import scipy.sparse.linalg
 
 from stickslip.arrays import Matrix
-from stickslip.errors import SingularError, input_error, missing_package
+from stickslip.errors import SingularError, StickslipError, input_error, missing_package
 from stickslip.model.fe.multifrontal import multifrontal
 
 DENSE = 400  # below this many rows dense algebra is faster than sparse
@@ -19,11 +21,18 @@ HUGE = 20_000  # below this many rows SuperLU is as fast as the multifrontal met
 SINGULAR = 1e13  # a condition number above which nothing of a solution is known
 SYMMETRIC = 1e-10  # a matrix counts as Hermitian where it differs by less, over its largest entry
 PIVOTS = 0.01  # SuperLU leaves the diagonal for a pivot more than a hundred times as large
+RESIDUAL = 1e-9  # of each equation, over the sum of its terms: factors of feral that solve no better are not used
+CHECKED = 100_000  # rows up to which SuperLU counts again what feral has counted
 COUNTED = 50_000_000  # entries of factors that are copied to see the signs of the pivots: 0.6 GB
 BACKENDS = ("auto", "dense", "multifrontal", "superlu", "feral")
 
+LOG = logging.getLogger("stickslip")
 Solve = Callable[[Matrix], Matrix]
 Say = Callable[[str], None]
+
+
+class _DistrustedError(Exception):
+    """Why factors of feral, a young package, are not used."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +76,8 @@ def factorise(matrix: Matrix, *, backend: str = "auto", say: Say = silent) -> Fa
         (n, n), dense or sparse, real or complex: symmetric, Hermitian or general.
     backend
         ``dense``; ``multifrontal`` (real symmetric and complex Hermitian, positive definite); ``superlu`` (SciPy's); ``feral``
-        (optional, for real symmetric and complex Hermitian matrices); ``auto`` takes the fastest of those that are installed and apply.
+        (optional, for real symmetric and complex Hermitian matrices); ``auto`` takes the fastest of those that are installed and apply,
+        and SuperLU, with a warning, where feral fails, finds a vanishing pivot, or solves with too large a residual.
     say
         Called with a sentence before a long factorisation.
 
@@ -78,7 +88,7 @@ def factorise(matrix: Matrix, *, backend: str = "auto", say: Say = silent) -> Fa
     InputError
         If `backend` is unknown, or is ``feral`` or ``multifrontal`` and the matrix is neither symmetric nor Hermitian.
     StickslipError
-        If `backend` is ``feral`` and the package is not installed.
+        If `backend` is ``feral`` and the package is not installed, fails, or solves with too large a residual.
     """
     chosen = _chosen(matrix, backend)
     if chosen == "dense":
@@ -87,10 +97,16 @@ def factorise(matrix: Matrix, *, backend: str = "auto", say: Say = silent) -> Fa
         say(f"factorising {matrix.shape[0]} equations ({chosen})")
         try:
             found = SPARSE[chosen](scipy.sparse.csc_array(matrix))
+        except _DistrustedError as error:
+            if backend != "auto":
+                raise StickslipError(f"factorise: {error}") from error
+            _warn(error)
+            found = _superlu(scipy.sparse.csc_array(matrix))
         except SingularError:
-            if chosen != "multifrontal" or backend != "auto":
+            if chosen not in ("multifrontal", "feral") or backend != "auto":
                 raise
-            say("the matrix is not positive definite: factorising again (superlu)")
+            not_so = "positive definite" if chosen == "multifrontal" else "regular for feral"
+            say(f"the matrix is not {not_so}: factorising again (superlu)")
             found = _superlu(scipy.sparse.csc_array(matrix))
     refuse_singular(matrix, found)
     return found
@@ -168,13 +184,34 @@ def negative_eigenvalues(matrix: Matrix, *, say: Say = silent) -> int | None:
         signs = scipy.linalg.eigvalsh_tridiagonal(np.diag(blocks).real, beside)
         return int(np.count_nonzero(signs < 0))
     say(f"factorising {matrix.shape[0]} equations ({chosen}) to count frequencies")
+    matrix = scipy.sparse.csc_array(matrix)
+    return _by_feral(matrix, say) if chosen == "feral" else _by_superlu(matrix)
+
+
+def _by_superlu(matrix: Matrix) -> int | None:
+    """Count with all pivots on the diagonal, so that their signs count."""
     try:
-        if chosen == "feral":
-            return _feral(scipy.sparse.csc_array(matrix)).negative
-        # all pivots on the diagonal, so that their signs count
-        return _superlu(scipy.sparse.csc_array(matrix), threshold=0.0).negative
+        return _superlu(matrix, threshold=0.0).negative
     except SingularError:
         return None
+
+
+def _by_feral(matrix: Matrix, say: Say) -> int | None:
+    """Count with feral, and up to `CHECKED` rows with SuperLU again, which is believed where they differ."""
+    try:
+        found = _feral(matrix).negative
+    except (SingularError, _DistrustedError) as error:
+        if isinstance(error, _DistrustedError):
+            _warn(error)
+        return _by_superlu(matrix)
+    if matrix.shape[0] > CHECKED:
+        say(f"{found} negative pivots by feral alone: too many equations to count them again")
+        return found
+    again = _by_superlu(matrix)
+    if again is None or again == found:
+        return found
+    _warn(f"it counts {found} negative pivots of {matrix.shape[0]}, SuperLU {again}")
+    return again
 
 
 def _superlu(matrix: Matrix, threshold: float = PIVOTS) -> Factorisation:
@@ -209,17 +246,34 @@ def _multifrontal(matrix: Matrix) -> Factorisation:
 
 
 def _feral(matrix: Matrix) -> Factorisation:
-    """Factorise a real symmetric or, as a real matrix of twice the size, a Hermitian matrix."""
+    """Factorise a real symmetric or, as a real matrix of twice the size, a Hermitian matrix.
+
+    Raises
+    ------
+    SingularError
+        If a pivot vanishes.
+    _DistrustedError
+        If the package fails, or solves with a residual above `RESIDUAL`.
+    """
     try:
         import feral
     except ImportError as error:
         raise missing_package("feral-solver", error, "sparse") from error
-    if not np.iscomplexobj(matrix):
-        solver = _factored(feral, matrix)
-        return Factorisation(
-            _of_complex(solver.solve), "feral", lambda: solver.num_negative_eigenvalues
+    with _failures_of(feral):
+        found = _of_feral(feral, matrix)
+        left = _residual(matrix, found)
+    if not left <= RESIDUAL:
+        raise _DistrustedError(
+            f"it leaves a residual of {left:.1g} in {matrix.shape[0]} equations, above {RESIDUAL:g}"
         )
-    real, imaginary = matrix.real, matrix.imag
+    return found
+
+
+def _of_feral(feral: Matrix, matrix: Matrix) -> Factorisation:
+    if not np.iscomplexobj(matrix):
+        own = _factored(feral, matrix)
+        return Factorisation(_of_complex(own.solve), "feral", lambda: own.num_negative_eigenvalues)
+    real, imaginary = matrix.real, matrix.imag.copy()  # else zeros vanish from `matrix`, too
     imaginary.eliminate_zeros()
     doubled = scipy.sparse.block_array([[real, -imaginary], [imaginary, real]], format="csc")
     solver, n = _factored(feral, doubled), matrix.shape[0]
@@ -240,16 +294,38 @@ def _factored(feral: Matrix, matrix: Matrix) -> Matrix:
     lower.sort_indices()
     solver = feral.Solver(parallel=False, fma=True)
     pattern = lower.indptr.astype(np.int64), lower.indices.astype(np.int64)
-    try:
-        solver.factor(feral.CscMatrix(lower.shape[0], *pattern, lower.data))
-    except feral.FeralError as error:
-        raise SingularError(f"factorise: {error}") from error
+    solver.factor(feral.CscMatrix(lower.shape[0], *pattern, lower.data))
     if solver.inertia.n_zero:
         raise SingularError(
             f"factorise: the matrix of {lower.shape[0]} equations is singular: "
             f"{solver.inertia.n_zero} pivots vanish"
         )
     return solver
+
+
+@contextmanager
+def _failures_of(feral: Matrix) -> Iterator[None]:
+    """Turn what the package raises into distrust; a panic of Rust is no `Exception`."""
+    try:
+        yield
+    except BaseException as error:
+        if isinstance(error, feral.FeralError) or type(error).__name__ == "PanicException":
+            raise _DistrustedError(f"it failed ({error})") from error
+        raise
+
+
+def _residual(matrix: Matrix, solve: Solve) -> float:
+    """Return by which share the entries must change to explain the solution of random equations (Oettli & Prager 1964)."""
+    size = np.sqrt(np.asarray(abs(matrix).sum(axis=1)).ravel())
+    right = size * np.random.default_rng(1).standard_normal(matrix.shape[0])
+    with np.errstate(all="ignore"):  # an overflow is judged by who asks
+        answer = solve(right)
+        terms = abs(matrix) @ abs(answer) + abs(right)
+        return float(np.max(abs(matrix @ answer - right) / terms))
+
+
+def _warn(why: object) -> None:
+    LOG.warning("feral-solver is not used: %s. SuperLU takes its place.", why)
 
 
 def _of_complex(solve: Solve) -> Solve:
