@@ -12,7 +12,7 @@ from stickslip.harmonic.torus_path import closed_path, half_plane, torus_basis
 from stickslip.model.matrices import lumped
 from stickslip.response.quasi_periodic.find import swept
 from stickslip.response.quasi_periodic.in_time import course, statistics
-from stickslip.response.quasi_periodic.motion import TorusMotion, change_of, envelope
+from stickslip.response.quasi_periodic.motion import TorusMotion, envelope
 from stickslip.response.quasi_periodic.problem import TwoTones, off_by, two_tones, with_enough
 from stickslip.response.quasi_periodic.start import distinct, tones_of_multipliers
 from stickslip.response.quasi_periodic.tone import (
@@ -76,6 +76,16 @@ def by_hand(damping: np.ndarray, tones: list, seconds: float, step: float):
 
 def off(found: np.ndarray, judge: np.ndarray) -> float:
     return float(np.linalg.norm(found - judge) / np.linalg.norm(judge - judge.mean(axis=0)))
+
+
+def change_of(one: TorusMotion, other: TorusMotion, dofs: np.ndarray) -> float:
+    """Return the root mean square of the difference of two motions at the outputs, relative to the second."""
+    every = dict.fromkeys((*one.indices[1:], *other.indices[1:]))
+    none = np.zeros(len(dofs), dtype=complex)
+    rows = [dict(zip(m.indices, m.coefficients[:, dofs], strict=True)) for m in (one, other)]
+    apart = [rows[0].get(i, none) - rows[1].get(i, none) for i in every]
+    size = float(np.linalg.norm(other.coefficients[1:, dofs]))
+    return float(np.linalg.norm(apart)) / size if size > 0.0 else np.inf
 
 
 def with_all(problem: TwoTones, motion: TorusMotion, tolerance: float) -> TorusMotion:

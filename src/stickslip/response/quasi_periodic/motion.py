@@ -112,13 +112,3 @@ def envelope(motion: TorusMotion, dofs: IntArray, phases: int = 96) -> Envelope:
     )
     size = np.sum(np.abs(motion.coefficients[1:, dofs]) ** 2, axis=0)
     return Envelope(begins, amplitude, np.sqrt(0.5 * size))
-
-
-def change_of(one: TorusMotion, other: TorusMotion, dofs: IntArray) -> float:
-    """Return the root mean square of the difference of two motions at the outputs, relative to the second."""
-    every = dict.fromkeys((*one.indices[1:], *other.indices[1:]))
-    none = np.zeros(len(dofs), dtype=complex)
-    rows = [dict(zip(m.indices, m.coefficients[:, dofs], strict=True)) for m in (one, other)]
-    apart = [rows[0].get(i, none) - rows[1].get(i, none) for i in every]
-    size = float(np.linalg.norm(other.coefficients[1:, dofs]))
-    return float(np.linalg.norm(apart)) / size if size > 0.0 else np.inf

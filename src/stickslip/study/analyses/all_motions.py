@@ -1,6 +1,5 @@
 """Motions that a sweep does not meet, and which one most starts end on: the analysis ``all_motions``."""
 
-import json
 from collections.abc import Iterator, Sequence
 
 import xarray as xr
@@ -32,8 +31,7 @@ class AllMotionsAnalysis:
 
     def key(self, case: Case) -> str:
         """Return the tables that the stages of a case depend on beside the model."""
-        own = (case.settings.all_motions, case.settings.solver)
-        return json.dumps([table.model_dump(mode="json") for table in own], sort_keys=True)
+        return case.as_text("all_motions", "solver")
 
     def inputs(self, case: Case, model: Model) -> Question:
         """Return what is searched; refuse what cannot be."""

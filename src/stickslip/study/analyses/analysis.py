@@ -1,5 +1,6 @@
 """The seam of analyses: a question, its table, its jobs, its solution record by record, its dataset."""
 
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -59,6 +60,11 @@ class Case:
     digest_at_rest: str = ""
     at: "Callable[[str, float], Model] | None" = None
     accepts: "Callable[[str, float], object] | None" = None
+
+    def as_text(self, *tables: str) -> str:
+        """Return tables of the settings, by name, as a text that changes where they do."""
+        own = (getattr(self.settings, name) for name in tables)
+        return json.dumps([table.model_dump(mode="json") for table in own], sort_keys=True)
 
 
 @dataclass(frozen=True, eq=False)

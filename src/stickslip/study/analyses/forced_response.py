@@ -1,6 +1,5 @@
 """The steady vibration under harmonic loads, friction and all: branches, peaks, and how far its harmonics are to be trusted."""
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from time import perf_counter
@@ -101,9 +100,7 @@ class ForcedResponseAnalysis:
 
     def key(self, case: Case) -> str:
         """Return the tables that the points of a case depend on beside the model."""
-        settings = case.settings
-        own = (settings.forced_response, settings.harmonics, settings.solver)
-        return json.dumps([table.model_dump(mode="json") for table in own], sort_keys=True)
+        return case.as_text("forced_response", "harmonics", "solver")
 
     def inputs(self, case: Case, model: Model) -> Question:
         """Return the assembled model and the sweep; refuse what cannot be computed."""

@@ -1,6 +1,5 @@
 """Motions that nothing drives: unstable waves that friction bounds, where it does, and whether the machine stays there."""
 
-import json
 from collections.abc import Iterator, Sequence
 
 import xarray as xr
@@ -29,8 +28,7 @@ class LimitCycleAnalysis:
 
     def key(self, case: Case) -> str:
         """Return the tables that the records depend on."""
-        own = (case.settings.limit_cycle, case.settings.solver)
-        return json.dumps([table.model_dump(mode="json") for table in own], sort_keys=True)
+        return case.as_text("limit_cycle", "solver")
 
     def inputs(self, case: Case, model: Model) -> Question:
         """Return the assembled model and what is asked of it."""

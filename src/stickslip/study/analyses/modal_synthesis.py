@@ -1,6 +1,5 @@
 """Forced responses at many levels from one nonlinear mode."""
 
-import json
 from collections.abc import Iterator, Sequence
 
 import xarray as xr
@@ -28,8 +27,7 @@ class ModalSynthesisAnalysis:
 
     def key(self, case: Case) -> str:
         """Return the tables that the records depend on."""
-        own = (case.settings.modal_synthesis, case.settings.solver)
-        return json.dumps([table.model_dump(mode="json") for table in own], sort_keys=True)
+        return case.as_text("modal_synthesis", "solver")
 
     def inputs(self, case: Case, model: Model) -> Question:
         """Return the assembled model and what is asked of it."""

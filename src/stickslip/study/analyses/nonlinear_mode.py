@@ -1,6 +1,5 @@
 """Nonlinear modes: frequency and damping ratio over amplitude and energy."""
 
-import json
 from collections.abc import Iterator, Sequence
 
 import xarray as xr
@@ -29,8 +28,7 @@ class NonlinearModeAnalysis:
 
     def key(self, case: Case) -> str:
         """Return the tables that the records depend on."""
-        own = (case.settings.nonlinear_mode, case.settings.solver)
-        return json.dumps([table.model_dump(mode="json") for table in own], sort_keys=True)
+        return case.as_text("nonlinear_mode", "solver")
 
     def inputs(self, case: Case, model: Model) -> Question:
         """Return the assembled model and what is asked of it."""

@@ -1,6 +1,5 @@
 """How far the response depends on residual tractions: bounds over a range of frequencies and of the resonance."""
 
-import json
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -44,8 +43,7 @@ class ResidualTractions:
 
     def key(self, case: Case) -> str:
         """Return the tables that the records depend on."""
-        own = (case.settings.residual_tractions, case.settings.solver)
-        return json.dumps([table.model_dump(mode="json") for table in own], sort_keys=True)
+        return case.as_text("residual_tractions", "solver")
 
     def inputs(self, case: Case, model: Model) -> Question:
         """Return the assembled model and what is asked of it."""

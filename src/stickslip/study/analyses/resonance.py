@@ -1,6 +1,5 @@
 """Resonance peaks over a design parameter: the analysis ``resonance``."""
 
-import json
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -40,8 +39,7 @@ class ResonanceAnalysis:
 
     def key(self, case: Case) -> str:
         """Return the tables that the points of a case depend on beside the model."""
-        own = (case.settings.resonance, case.settings.solver)
-        return json.dumps([table.model_dump(mode="json") for table in own], sort_keys=True)
+        return case.as_text("resonance", "solver")
 
     def inputs(self, case: Case, model: Model) -> Question:
         """Return what is followed; refuse what cannot be."""

@@ -1,6 +1,5 @@
 """The response over speed and engine order, each speed with its own stiffness and preload."""
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -47,9 +46,7 @@ class RunUp:
 
     def key(self, case: Case) -> str:
         """Return the tables that the points of a case depend on beside the model."""
-        settings = case.settings
-        own = (settings.run_up, settings.harmonics, settings.solver)
-        return json.dumps([table.model_dump(mode="json") for table in own], sort_keys=True)
+        return case.as_text("run_up", "harmonics", "solver")
 
     def inputs(self, case: Case, model: Model) -> Question:
         """Return the model along each engine order; refuse what cannot be computed."""
