@@ -12,7 +12,9 @@ from evidence.validation.case_bifurcations import absorber
 from stickslip.errors import InputError
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.bifurcations import bifurcations, side_branches, subharmonic_branch
-from stickslip.response.stability import stability
+from stickslip.response.stability import Stability, stability
+from stickslip.response.time.floquet import Floquet
+from stickslip.solve.status import Status
 
 DAMPING, STOP = 0.05, 10.0  # of a mass that meets a stop ten times as stiff as its spring
 
@@ -249,6 +251,39 @@ def test_folds_of_one_harmonic_lie_where_the_closed_form_has_them():
     assert [b.kind for b in found.found] == ["fold", "fold"]
     assert sorted(b.omega for b in found.found) == pytest.approx(true, abs=1e-6)
     assert found.examined == 0
+
+
+def test_a_pair_that_more_harmonics_bring_together_at_a_fold_is_that_of_the_fold():
+    # as two masses near 1:2 showed it: without its error the pair would be a torus beside each fold
+    problem = cubic_mass((0.8, 1.6), force=0.02, highest=1, points=30)
+    load = problem.low.linear.load
+    points = ss.response.accepted_points(
+        list(ss.forced_response(problem.system, load, problem.sweep))
+    )
+    alone = bifurcations(problem, points, examine=None).found
+
+    def phase(point):
+        return float(np.angle(point.coefficients[1, 0]))  # falls along the whole branch
+
+    ends = [phase(b.point) for b in alone]
+
+    def examine(problem, point):
+        beyond = 0.01 * (ends[0] - phase(point)) * (phase(point) - ends[1])
+        values = np.array([1.0 + beyond + 0.003j, 0.99 - 0.003j])
+        return Stability(Floquet(values), np.full(2, 0.03), 0, 0, 0)
+
+    found = bifurcations(problem, points, examine=examine).found
+    assert [(b.kind, b.before, b.after) for b in found] == [("fold", 0, 1), ("fold", 1, 0)]
+
+
+def test_points_without_a_motion_and_points_that_are_skipped_are_told():
+    problem, points, _ = doubling()
+    lost = [*points[:4], replace(points[4], status=Status.STALLED), *points[5:]]
+    (told,) = bifurcations(problem, lost, examine=None).unseen
+    assert told == (points[3].omega, points[5].omega, "no motion was found there")
+    few = bifurcations(problem, points, most=20)
+    assert few.stride > 1
+    assert any("points of the branch was looked at" in line for line in few.limits)
 
 
 def test_a_torus_of_an_absorber_lies_where_shooting_has_it():

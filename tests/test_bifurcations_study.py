@@ -12,7 +12,7 @@ from stickslip.cli import app
 from stickslip.errors import InputError
 from stickslip.response.forced.response import forced_response
 from stickslip.study.analyses.forced import bifurcating
-from stickslip.study.analyses.forced.bifurcating import located
+from stickslip.study.analyses.forced.bifurcating import limits, located
 from stickslip.study.analyses.forced.points import collect
 from stickslip.study.analyses.forced_response import FORCED_RESPONSE
 from stickslip.study.models.study import read_study
@@ -65,6 +65,47 @@ def test_a_word_that_is_none_is_refused(tmp_path):
         read_study(study)
 
 
+def test_false_is_taken_for_off(tmp_path):
+    study = tmp_path / "study.toml"
+    study.write_text(EXAMPLE.read_text().replace('"branches"', "false"))
+    with pytest.raises(InputError, match=r"got False\. Did you mean 'off'"):
+        read_study(study)
+
+
+def asked_of(path):
+    """Return what the only case of a study asks for, and its response."""
+    (case,) = read_study(path).cases()
+    asked = FORCED_RESPONSE.inputs(case, case.build())
+    points = list(forced_response(asked.model.system, asked.model.load, asked.sweep))
+    return asked, collect(asked.problem, points, asked.model.peak_output)
+
+
+def test_structural_damping_is_located_by_hill(tmp_path):
+    study, plain = tmp_path / "study.toml", EXAMPLE.read_text()
+    damped = plain.replace('dashpots_n_s_per_m = [["ground", 1, 10.0]]', "")
+    damped = damped.replace("[25.0, 42.0]\npoints = 20", "[36.0, 38.2]\npoints = 2")
+    damped = damped.replace("= 15", "= 7")
+    # the loss of the viscous one at half the frequency of the load, at which the doubled motion vibrates most
+    study.write_text(damped.replace("[contact.stop]", "[damping]\nloss_factor = 0.1\n\n[contact.stop]"))  # fmt: skip
+    asked, response = asked_of(study)
+    found = located(asked, response, Kept())
+    assert [b.kind for b in found.found] == ["period doubling"]
+    assert found.found[0].omega / (2 * np.pi) == pytest.approx(37.57, abs=0.05)
+    assert "those of Hill's method" in " ".join(limits(asked, found))
+
+
+def test_what_is_refused_is_told_and_not_taken_for_none(monkeypatch):
+    asked, response = asked_of(EXAMPLE)
+
+    def refused(problem, point):
+        raise InputError("of this motion", "nothing is known", "Ask for another one.")
+
+    monkeypatch.setattr(bifurcating, "stability", refused)
+    found = located(asked, response, Kept())
+    assert found.none_met == ("no fold was met on the branch",)
+    assert any("nothing is known" in line for line in limits(asked, found))
+
+
 def test_check_names_the_cost(tmp_path):
     shutil.copy(EXAMPLE, tmp_path)
     said = CliRunner().invoke(app, ["check", str(tmp_path / EXAMPLE.name)]).output
@@ -79,11 +120,7 @@ class Kept(dict):
 
 
 def test_an_interrupted_search_asks_for_no_multipliers_again(monkeypatch):
-    (case,) = read_study(EXAMPLE).cases()
-    asked = FORCED_RESPONSE.inputs(case, case.build())
-    sweep = asked.sweep
-    points = list(forced_response(asked.model.system, asked.model.load, sweep))
-    response = collect(asked.problem, points, asked.model.peak_output)
+    asked, response = asked_of(EXAMPLE)
     notes = Kept()
     first = located(asked, response, notes)
 

@@ -110,12 +110,15 @@ class Bifurcations:
         Number of motions whose multipliers were asked for.
     stabilities
         What is known of the stability of each point of the branch; None where it was not asked for, or nothing is known.
+    stride
+        Of how many points one was looked at, and those between where the numbers of multipliers outside differ.
     """
 
     found: tuple[Bifurcation, ...]
     unseen: tuple[tuple[float, float, str], ...]
     examined: int
     stabilities: tuple[Stability | None, ...] = ()
+    stride: int = 1
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -130,7 +133,8 @@ class Bifurcations:
         unjudged = f"{open_} of {len(known)} motions could not be judged" if open_ else ""
         if self.found:
             return (unjudged,) * bool(unjudged)
-        return (f"no bifurcation was met on the branch{', but ' * bool(unjudged)}{unjudged}",)
+        none = "no bifurcation" if self.examined else "no fold"
+        return (f"{none} was met on the branch{', but ' * bool(unjudged)}{unjudged}",)
 
     @property
     def limits(self) -> tuple[str, ...]:
@@ -141,4 +145,8 @@ class Bifurcations:
         ]
         if self.examined:
             told.append(f"multipliers of {self.examined} motions were asked for")
+        if self.stride > 1:
+            told.append(
+                f"one in {self.stride} points of the branch was looked at: a loss of stability that ends before the next one is not seen"
+            )
         return tuple(told)

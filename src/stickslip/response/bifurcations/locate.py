@@ -23,12 +23,15 @@ from stickslip.solve.branch import Point
 
 TOLERANCE = 1e-6  # length along the branch to which a bifurcation is located
 MOST = 300  # motions whose multipliers are asked for
-FOR_LOCATING = 0.5  # share of these that is kept for locating what the points of the branch show
+LOOKING = (
+    2 / 3
+)  # share of these that the points of the branch may take; locating what they show has the others
 JUMP = (
     5e-3  # change of a modulus within the last bracket, a hundred times smaller where it is smooth
 )
 NO_CORNER = "no solution with the harmonics of both ends is found at one of them"
 GAP = "the branch has a gap there, and goes on elsewhere"
+NO_MOTION = "no motion was found there"
 UNKNOWN = "no multipliers are known at one of its ends"
 ROUGH = (
     0.1  # error of a multiplier beyond which a crossing that it may not make at all tells nothing
@@ -63,7 +66,7 @@ def bifurcations(
     tolerance
         Length along the branch to which they are located, see `StepControl`.
     most
-        Motions whose multipliers are asked for. Where the branch has more than half as many points, only every second, third, ... is
+        Motions whose multipliers are asked for. Where the branch has more than two thirds as many points, only every second, third, ... is
         looked at, and those between where the numbers differ.
 
     Raises
@@ -83,10 +86,16 @@ def bifurcations(
     branch = list(points)
     while branch and branch[-1].stage == "peak":
         branch.pop()
-    for run in _runs(branch):
+    runs = list(_runs(branch))
+    for run in runs:
         walk.through(branch, run)
+    last = len(branch) - 1
+    for before, after in pairwise([range(0), *runs, range(last + 1, last + 1)]):
+        if before.stop < after.start:
+            walk.lost(branch[max(before.stop - 1, 0)].omega, branch[min(after.start, last)].omega, NO_MOTION)  # fmt: skip
     known = [walk.seen.get(id(point), (point, None))[1] for point in points]
-    return Bifurcations(tuple(walk.ordered()), tuple(walk.unseen), walk.examined, tuple(known))
+    found = tuple(walk.ordered())
+    return Bifurcations(found, tuple(walk.unseen), walk.examined, tuple(known), walk.stride)
 
 
 def _runs(branch: Sequence[ForcedPoint]) -> Iterator[range]:
@@ -94,9 +103,11 @@ def _runs(branch: Sequence[ForcedPoint]) -> Iterator[range]:
     begin = 0
     for place, point in enumerate(branch):
         if not point.converged:
-            yield range(begin, place)
+            if begin < place:
+                yield range(begin, place)
             begin = place + 1
-    yield range(begin, len(branch))
+    if begin < len(branch):
+        yield range(begin, len(branch))
 
 
 _Seen = tuple[Point, Spectrum]
@@ -122,18 +133,20 @@ class _Walk:
     crossings: list[_Crossing] = field(default_factory=list)
     examined: int = 0
     seen: dict[int, tuple[ForcedPoint, Stability | None]] = field(default_factory=dict)
+    stride: int = 1
 
     def through(self, branch: Sequence[ForcedPoint], run: range) -> None:
         """Look at points that follow each other."""
         steps = {i: stretch(self.problem, branch[i], branch[i + 1]) for i in run[:-1]}
         for i, step in steps.items():
             if step is None:
-                self._lost(branch[i].omega, branch[i + 1].omega, NO_CORNER)
+                self.lost(branch[i].omega, branch[i + 1].omega, NO_CORNER)
             elif step.folds:
                 self._fold(step, i)
         if self.examine is None or len(run) < 2:
             return
-        stride = max(1, int(np.ceil(len(run) / (FOR_LOCATING * self.most))))
+        stride = max(1, int(np.ceil(len(run) / (LOOKING * self.most))))
+        self.stride = max(self.stride, stride)
         looked = sorted({*run[::stride], run[-1]})
         for a, b in pairwise(looked):
             self._compare(branch, steps, a, b)
@@ -144,25 +157,18 @@ class _Walk:
         taken: set[int] = set()
         counted: dict[int, Bifurcation] = {}
         for fold in (c for c in own if c.found.kind == "fold"):
-            near = [
-                c
-                for c in own
-                if c.found.kind in ("branch point", "jump of multipliers")
-                and c.found.multiplicity == 1
-                and c.found.multiplier.real > 0.0
-                and id(c) not in taken
-                and abs(c.found.place[0] - fold.found.place[0]) <= 1
-            ]
-            if near:
+            near = [c for c in own if id(c) not in taken and _at_one_beside(fold.found, c.found)]
+            single = [c for c in near if c.found.multiplicity == 1]
+            if single:
                 way = fold.found.place[0] + fold.share
-                its = min(near, key=lambda c: abs(c.found.place[0] + c.share - way))
-                taken.add(id(its))
-                counted[id(fold)] = replace(
-                    fold.found, before=its.found.before, after=its.found.after
-                )
+                its = min(single, key=lambda c: abs(c.found.place[0] + c.share - way))
+                both = [c for c in near if c is its or _not_told_apart(fold.found, c.found)]
+                taken.update(map(id, both))
+                before, after = both[0].found.before, both[-1].found.after
+                counted[id(fold)] = replace(fold.found, before=before, after=after)
         return [counted.get(id(c), c.found) for c in own if id(c) not in taken]
 
-    def _lost(self, first: float, last: float, why: str) -> None:
+    def lost(self, first: float, last: float, why: str) -> None:
         """Put down where nothing is seen; steps that follow each other for the same reason are one."""
         if self.unseen and self.unseen[-1][2] == why:
             begin, end, _ = self.unseen[-1]
@@ -190,7 +196,7 @@ class _Walk:
     def _fold(self, step: Stretch, place: int) -> None:
         at = step.fold()
         if not at.solution.status.converged:
-            self._lost(step.before.p, step.after.p, GAP)
+            self.lost(step.before.p, step.after.p, GAP)
             return
         point = step.forced(at)
         found = None
@@ -224,7 +230,7 @@ class _Walk:
         first, last = self._look(branch[a]), self._look(branch[b])
         if first is None or last is None:
             spent = self.examined >= self.most
-            self._lost(branch[a].omega, branch[b].omega, SPENT if spent else UNKNOWN)
+            self.lost(branch[a].omega, branch[b].omega, SPENT if spent else UNKNOWN)
             return
         neutral = min(neutral_of(first), neutral_of(last))
         if spectrum(first, neutral).outside == spectrum(last, neutral).outside:
@@ -242,7 +248,7 @@ class _Walk:
         """Locate all that crosses within a step: one after the other, in what is left on both sides."""
         ends = [self._look(step.forced(p)) for p in (step.before, step.after)]
         if ends[0] is None or ends[1] is None:
-            self._lost(step.before.p, step.after.p, SPENT)
+            self.lost(step.before.p, step.after.p, SPENT)
             return
         neutral = min(neutral_of(ends[0]), neutral_of(ends[1]))
         self._within(step, step, place, spectrum(ends[0], neutral), spectrum(ends[1], neutral), neutral)  # fmt: skip
@@ -255,17 +261,17 @@ class _Walk:
         k = min(first.outside, last.outside)
         found = self._root(step, k, first, last, neutral)
         if isinstance(found, str):
-            self._lost(step.before.p, step.after.p, found)
+            self.lost(step.before.p, step.after.p, found)
             return
         at, low, high = found
         if not step.connected(low[0], high[0], self.tolerance):
-            self._lost(low[0].p, high[0].p, GAP)
+            self.lost(low[0].p, high[0].p, GAP)
         else:
             made = self._described(step, place, k, (first, last), (low, high), at)
             if made.certain or made.multiplier_error <= ROUGH:
                 self.crossings.append(_Crossing(whole.along(at), made))
             else:
-                self._lost(step.before.p, step.after.p, ROUGHLY)
+                self.lost(step.before.p, step.after.p, ROUGHLY)
         self._within(whole, step.between(step.before, low[0]), place, first, low[1], neutral)
         self._within(whole, step.between(high[0], step.after), place, high[1], last, neutral)
 
@@ -316,7 +322,7 @@ class _Walk:
         kind: BifurcationKind
         if jumps:
             kind = "jump of multipliers"
-        elif abs(value.imag) > ON_AXIS:
+        elif abs(value.imag) > ON_AXIS and (before.outside - after.outside) % 2 == 0:
             kind = "Neimark-Sacker"
         else:
             kind = "period doubling" if value.real < 0.0 else "branch point"
@@ -329,6 +335,23 @@ class _Walk:
             kind, point, self.problem.amplitude(point), value, error, off,
             before.outside, after.outside, (place, place + 1), all(own.known(k) for own in ends),
         )  # fmt: skip
+
+
+def _at_one_beside(fold: Bifurcation, other: Bifurcation) -> bool:
+    """Whether what crosses near a fold may be the multiplier of the fold."""
+    real = other.kind in ("branch point", "jump of multipliers") and other.multiplicity == 1
+    return (
+        other.kind != "fold"
+        and other.multiplier.real > 0.0
+        and (real or _not_told_apart(fold, other))
+        and abs(other.place[0] - fold.place[0]) <= 1
+    )
+
+
+def _not_told_apart(fold: Bifurcation, other: Bifurcation) -> bool:
+    """Whether a crossing is at 1 and at a fold, by its errors: there two multipliers that more harmonics bring together look like a pair."""
+    at_one = abs(other.multiplier - 1.0) <= other.multiplier_error
+    return at_one and abs(other.omega - fold.omega) <= other.omega_error + fold.omega_error
 
 
 class _NoMultipliersError(Exception):

@@ -155,7 +155,8 @@ def _problem(spot: Spot, details: ErrorDetails, context: dict[str, Any]) -> tupl
         return f"unknown key {spot.keys[-1]!r}", did_you_mean(spot.keys[-1], known)
     if kind == "literal_error":
         known = context["expected"].replace("'", "").replace(" or ", ", ").split(", ")
-        return f"is not known, got {got}", _one_of(str(details["input"]), known, spot.about)
+        word = "off" if details["input"] is False else str(details["input"])
+        return f"is not known, got {got}", _one_of(word, known, spot.about)
     said = _KINDS.get(kind) or details["msg"]
     for of_pydantic, ours in _WORDS:
         said = said.replace(of_pydantic, ours)

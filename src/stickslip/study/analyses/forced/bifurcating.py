@@ -1,29 +1,40 @@
 """The bifurcations of a response, and the branches that leave there: what a job puts down of them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from stickslip.errors import StickslipError
+from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.bifurcations.found import Bifurcation, Bifurcations
 from stickslip.response.bifurcations.locate import MOST, bifurcations
 from stickslip.response.bifurcations.side_branch import POINTS, SideBranch, side_branches
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem
-from stickslip.response.stability import Stability, stability
+from stickslip.response.stability import Stability, hill_stability, stability
 from stickslip.response.time.floquet import Floquet
 from stickslip.study.analyses.analysis import Notes
 from stickslip.study.analyses.forced.curve import branch_length
-from stickslip.study.analyses.forced.examination import FLOPS, examination_work
+from stickslip.study.analyses.forced.examination import (
+    FLOPS,
+    by_hill,
+    examination_work,
+    hill_work,
+)
 from stickslip.study.analyses.forced.points import Response
 from stickslip.study.analyses.forced.question import Question
-from stickslip.study.analyses.forced.stable import unexaminable
+from stickslip.study.analyses.forced.stable import why_not
 from stickslip.study.analyses.forced.values import Values, texts
 from stickslip.units import HZ
 
 COUNTS = ("resting", "grazing", "transitions")  # of a stability
 LEAVES = ("period doubling", "branch point")  # kinds from which a periodic branch is followed
 MOST_FOLLOWED = 6  # bifurcations of a case from which branches are followed
+FEWEST = 40  # motions of a wheel that Hill's method looks at, however long it takes,
+HILL_SECONDS = 1800.0  # and in how long, by its estimate, it looks at more
+NOT_FOLLOWED = (
+    "what leaves there is not followed: every sector of so large a wheel would count for itself"
+)
 BY_VERDICT = {"stable": 0, "unstable": 1, "undecided": 2}
 NOT_EXAMINED = 3
 
@@ -33,6 +44,7 @@ class Remembered:
     """Multipliers in the order in which they are asked for; what an interrupted run has asked for is not done again."""
 
     notes: Notes
+    hill: bool = False
     count: int = 0
 
     def __call__(self, problem: ForcedProblem, point: ForcedPoint) -> Stability:
@@ -41,7 +53,7 @@ class Remembered:
         name = f"bifurcations.{self.count}"
         known = self.notes.get(name)
         if known is None or known["omega"] != point.omega:
-            found = stability(problem, point)
+            found = _by_hill(problem, point) if self.hill else stability(problem, point)
             values = found.floquet.multipliers
             known = {
                 "omega": point.omega,
@@ -60,20 +72,46 @@ def located(question: Question, response: Response, notes: Notes) -> Bifurcation
     every = response.accepted
     along = branch_length(np.array([a.point.stage == "peak" for a in every], dtype=float))
     branch = [a.point for a in every[:along]]
-    if question.bifurcations == "folds" or unexaminable(question):
+    if question.bifurcations == "folds" or why_not(question):
         return bifurcations(question.problem, branch, examine=None)
+    examine = Remembered(notes, by_hill(question.model.system))
     try:
-        return bifurcations(question.problem, branch, examine=Remembered(notes))
-    except StickslipError:  # as the examination of the peak has told
-        return bifurcations(question.problem, branch, examine=None)
+        return bifurcations(question.problem, branch, examine=examine, most=_most(question))
+    except StickslipError as error:
+        found = bifurcations(question.problem, branch, examine=None)
+        omega = [p.omega for p in branch]
+        return replace(found, unseen=(*found.unseen, (min(omega), max(omega), f"{error}")))
+
+
+def _by_hill(problem: ForcedProblem, point: ForcedPoint) -> Stability:
+    """Return the multipliers of a motion by Hill's method; none where it did not find all that it counted."""
+    found = hill_stability(problem, point)
+    if found.missing == 0:
+        return found.stability
+    none = np.array([np.nan + 0j])
+    return replace(found.stability, floquet=Floquet(none), errors=np.array([np.inf]))
+
+
+def _most(question: Question) -> int:
+    """Return how many motions of a case are examined at most."""
+    if not by_hill(question.model.system):
+        return MOST
+    seconds = hill_work(question.model.system) / FLOPS
+    return int(np.clip(HILL_SECONDS / seconds, FEWEST, MOST))
 
 
 def followed(question: Question, found: Bifurcations) -> list[tuple[Bifurcation, SideBranch]]:
     """Return the branches that leave the response, each with where it does."""
     if question.bifurcations != "branches":
         return []
-    own = [b for b in found.found if b.kind in LEAVES][:MOST_FOLLOWED]
+    own = [b for b in found.found if b.kind in LEAVES][: _most_followed(question)]
     return [(b, side) for b in own for side in side_branches(question.problem, b)]
+
+
+def _most_followed(question: Question) -> int:
+    """Return from how many bifurcations of a case branches are followed: from none of a wheel that is too large for its multipliers."""
+    system = question.model.system
+    return 0 if isinstance(system.structure, TunedWheel) and by_hill(system) else MOST_FOLLOWED
 
 
 def of_bifurcations(
@@ -114,31 +152,36 @@ def of_bifurcations(
 
 def limits(question: Question, found: Bifurcations) -> tuple[str, ...]:
     """Return what was not looked at, and what looking took."""
-    why = unexaminable(question) if question.bifurcations != "folds" else ""
+    why = why_not(question) if question.bifurcations != "folds" else ""
     alone = [f"folds alone were looked for: {why}"] * bool(why)
-    followed_alone = [b for b in found.found if b.kind in LEAVES][MOST_FOLLOWED:]
-    more = [f"branches of {len(followed_alone)} more bifurcations were not followed"] * bool(
-        followed_alone and question.bifurcations == "branches"
+    hill = by_hill(question.model.system)
+    way = ["they are those of Hill's method"] * bool(hill and found.examined)
+    count = len([b for b in found.found if b.kind in LEAVES][_most_followed(question) :])
+    more = [f"branches of {count} bifurcations were not followed"] * bool(
+        count and question.bifurcations == "branches"
     )
-    return (*found.none_met, *alone, *found.limits, *more)
+    return (*found.none_met, *alone, *found.limits, *way, *more)
 
 
 def bifurcations_line(question: Question) -> tuple[str, ...]:
     """Return what ``stickslip check`` says of the search for bifurcations."""
     if question.bifurcations == "off":
         return ()
-    why = unexaminable(question)
+    why, system = why_not(question), question.model.system
     if question.bifurcations == "folds" or why:
         because = f" ({why})" if why and question.bifurcations != "folds" else ""
         return (f"bifurcations: folds alone{because}, a few solutions each",)
-    each = examination_work(question.model.system) / FLOPS
-    sides = (
-        f"; branches of at most {POINTS} points from at most {MOST_FOLLOWED} of them"
-        if question.bifurcations == "branches"
-        else ""
+    hill = by_hill(system)
+    each = (
+        f"up to {max(1.0, hill_work(system) / FLOPS):.0f} s each by Hill's method"
+        if hill
+        else f"about {examination_work(system) / FLOPS:.1g} s each"
     )
+    branches = question.bifurcations == "branches"
+    sides = f"; branches of at most {POINTS} points from at most {MOST_FOLLOWED} of them"
+    sides = sides if _most_followed(question) else f"; {NOT_FOLLOWED}"
     return (
-        f"bifurcations: multipliers along the branch, of at most {MOST} motions a case, about {each:.1g} s each{sides}",
+        f"bifurcations: multipliers along the branch, of at most {_most(question)} motions a case, {each}{sides * branches}",
     )
 
 

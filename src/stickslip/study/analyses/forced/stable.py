@@ -162,10 +162,11 @@ def with_motion(examined: Examined, check: Check | None) -> Examined:
 
 
 def to_integrate(question: Question, response: Response, examined: list[Examined]) -> bool:
-    """Whether the peak is integrated in time without being asked to: where it is undecided, and soon done."""
+    """Whether the peak is integrated in time without being asked to: where it is undecided, and soon done; not with structural damping."""
     top = response.top
     return (
         top is not None
+        and question.model.system.structure.of_harmonic(1).loss is None
         and any(e.omega == top.point.omega and e.verdict == "undecided" for e in examined)
         and seconds_in_time(question.model.system) < MOST_IN_TIME
     )
