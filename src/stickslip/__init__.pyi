@@ -27,6 +27,7 @@ from .contact.laws.unilateral_spring import UnilateralSpring as UnilateralSpring
 from .errors import InputError as InputError
 from .errors import SingularError as SingularError
 from .errors import StickslipError as StickslipError
+from .front.comparison import compare as compare
 from .front.model import Model as Model
 from .front.result import Result as Result
 from .front.study import Study as Study

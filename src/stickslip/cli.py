@@ -18,6 +18,7 @@ from stickslip.front.screen import Screen, on_screen
 
 if TYPE_CHECKING:
     from stickslip.front.result import Result
+    from stickslip.front.table import Table as Columns
     from stickslip.study.analyses.analysis import TextTable
 
 PLAIN_WIDTH = 130  # columns of a table that is not on a terminal
@@ -167,6 +168,35 @@ def report(
         from stickslip.report.page import report_file
 
         typer.echo(f"{report_file(result)} written")
+
+
+@app.command()
+def compare(
+    compared: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="A B ...",
+            help="Results (files, folders, or study files that were run), and CSV files with frequency_hz and amplitude_um "
+            "(_mm, _m, _um_per_n ...) of a measurement or another program.",
+        ),
+    ],
+    *,
+    name: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--name", help="What to call each, in the same order; left out: by folders and files."
+        ),
+    ] = None,
+    page: Annotated[Path, typer.Option(help="The page to write.")] = Path("comparison.html"),
+) -> None:
+    """Hold designs against each other: peaks, responses, optimisation curves, modes and inputs on one page."""
+    with _errors_as_text():
+        from stickslip.front.comparison import compare as compared_designs
+
+        found = compared_designs(*compared, names=name or ())
+        for title, table in (("Peaks", found.peaks), ("What differs", found.inputs)):
+            _print_columns(title, table)
+        _print_lines("Files", [str(found.report(page))])
 
 
 @app.command()
@@ -334,6 +364,17 @@ def _print_table(found: "TextTable") -> None:
     _console().print(table)
     for line in found.lines:
         _say(f"  {line}")
+
+
+def _print_columns(title: str, found: "Columns") -> None:
+    if len(found):
+        _say(f"\n{title}")
+        table = Table()
+        for name in found:
+            table.add_column(name, overflow="fold")
+        for cells in found.rows():
+            table.add_row(*(printable(cell) for cell in cells))
+        _console().print(table)
 
 
 def _print_lines(title: str, texts: Sequence[str]) -> None:

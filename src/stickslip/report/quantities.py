@@ -65,6 +65,23 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
     return f"{number(value * scale.factor, digits)} {scale.unit}" if math.isfinite(value) else NONE
 
 
+def column(values: FloatArray, unit: str, digits: int = 4) -> tuple[str, list[str]]:
+    """Write numbers of one column with one unit and the same decimals; the smallest keeps two digits where five decimals do.
+
+    Returns
+    -------
+    unit, cells
+    """
+    scale = scale_for(values, unit)
+    scaled = np.asarray(values) * scale.factor
+    sizes = np.abs(scaled[np.isfinite(scaled) & (scaled != 0.0)])
+    if not sizes.size:
+        return scale.unit, [fixed(float(v), 0) for v in scaled]
+    of_largest, of_smallest = (math.floor(math.log10(v)) for v in (sizes.max(), sizes.min()))
+    decimals = min(max(0, digits - 1 - of_largest, 1 - of_smallest), 5)
+    return scale.unit, [fixed(float(v), decimals) for v in scaled]
+
+
 def percent(value: float, digits: int = 2) -> str:
     """Write a value in percent; what is below a ten thousandth is said to be so."""
     if math.isfinite(value) and 0 < abs(value) < 1e-4:

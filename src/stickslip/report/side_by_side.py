@@ -1,0 +1,300 @@
+"""The page that holds designs against each other: peaks, responses, optimisation curves, inputs."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from stickslip.arrays import FloatArray
+from stickslip.report.cases import ShownCase, first_number
+from stickslip.report.content import Table, Words, chooser
+from stickslip.report.designs import Design, MeasuredCurve, differences, per_force
+from stickslip.report.frame import Chapter, Placing, page_html
+from stickslip.report.plot import INK, MUTED, Plot, log_ticks, styled
+from stickslip.report.quantities import (
+    NONE,
+    Scale,
+    column,
+    counted,
+    fixed,
+    joined,
+    number,
+    percent,
+    quantity,
+    scale_for,
+)
+from stickslip.report.response import Response
+from stickslip.report.section import Card, Content
+from stickslip.study.analyses.verdict import conclusion
+
+_BEST = "best of each"
+_DASHES = ("dash", "dot", "dashdot", "longdash")
+_MOST_INPUTS = 400  # characters of a value that a cell shows
+
+
+def amplitudes(design: Response, *, divided: bool) -> FloatArray:
+    """Return (point,) amplitudes in m, or per newton; NaN where a point did not converge."""
+    whole = design.at_outputs(design.values("amplitude", "point", "output"))
+    force = np.array([c.excitation for c in design.cases])[design.point_case]
+    return np.where(design.converged, whole / force if divided else whole, np.nan)
+
+
+def choices(designs: Sequence[Design]) -> tuple[ShownCase, ...]:
+    """Return what the reader chooses between: the best case of each design, then each case that any of them has; nothing where each has one case."""
+    labels = dict.fromkeys(
+        c.label
+        for d in designs
+        if d.response and len(d.response.cases) > 1
+        for c in d.response.cases
+    )
+    names = [_BEST, *labels] if labels else []
+    return tuple(
+        ShownCase(i, name, name, float("nan"), float("nan"), MUTED) for i, name in enumerate(names)
+    )
+
+
+def _case(design: Design, choice: ShownCase) -> ShownCase | None:
+    return design.best if choice.index == 0 else design.case(choice.label)
+
+
+def responses(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Plot | None:
+    """Draw the responses of all designs over each other, a case at a time."""
+    told = [d for d in designs if d.response is not None]
+    if not told:
+        return None
+    divided, figure, offered = per_force(designs, curves), go.Figure(), choices(designs)
+    unit = told[0].response.length + ("/N" if divided else "") if told[0].response else "m"
+    every = [amplitudes(d.response, divided=divided) for d in told if d.response]
+    scale = scale_for(np.concatenate([*every, *(c.amplitude for c in curves)]), unit)
+    for design, own in zip(told, every, strict=True):
+        response = design.response
+        if response is None:
+            continue
+        pairs: list[tuple[int | None, ShownCase | None]]
+        pairs = [(choice.index, _case(design, choice)) for choice in offered]
+        if not offered or len(response.cases) == 1:
+            pairs = [(None, response.cases[0])]
+        for k, case in pairs:
+            if case is not None:
+                figure.add_trace(_line(design, response, case, own * scale.factor, scale).update(meta=k))  # fmt: skip
+    for k, curve in enumerate(curves):
+        figure.add_scatter(
+            x=curve.hz, y=scale.factor * curve.amplitude, mode="lines+markers", name=curve.name,
+            line={"color": INK, "width": 1.2, "dash": _DASHES[k % len(_DASHES)]}, marker={"size": 4, "color": INK},
+            hovertemplate=f"%{{y:.4g}} {scale.unit} at %{{x:.5g}} Hz<extra>{curve.name}</extra>",
+        )  # fmt: skip
+    styled(figure, 540)
+    drawn = np.concatenate([np.asarray(t.y, dtype=float) for t in figure.data])
+    over = " / force" if divided else ""
+    figure.update_yaxes(title_text=f"amplitude{over} ({scale.unit})", type="log", **log_ticks(drawn))  # fmt: skip
+    figure.update_xaxes(title_text="frequency (Hz)")
+    caption = f"Amplitude of {joined([_output(d) for d in told])}. Open symbols are doubtful points, crosses wrong ones."
+    captions = {c.index: _shown(told, c) for c in offered}
+    return Plot("compared_responses", "Responses over each other", caption, figure, captions, 0 if offered else -1)  # fmt: skip
+
+
+def _output(design: Design) -> str:
+    return f"{design.response.output_name} ({design.name})" if design.response else design.name
+
+
+def _shown(designs: Sequence[Design], choice: ShownCase) -> str:
+    """Say which case of each design is drawn, and which have none."""
+    own = [(d, _case(d, choice)) for d in designs]
+    there = [f"{d.name}: {c.label or 'its only case'}" for d, c in own if c is not None]
+    without = [d.name for d, c in own if c is None]
+    lacks = f" Without this case: {', '.join(without)}." if without else ""
+    return f"Drawn: {'; '.join(there)}.{lacks}"
+
+
+def _line(
+    design: Design, response: Response, case: ShownCase, y: FloatArray, scale: Scale
+) -> go.Scatter:
+    at = response.points(case)
+    symbols = np.array(["circle", "circle-open", "x"])[response.levels[at]]
+    return go.Scatter(
+        x=response.hz[at], y=y[at], mode="lines+markers", name=design.name, line={"color": design.colour, "width": 1.8},
+        marker={"symbol": symbols.tolist(), "size": 5, "color": design.colour, "line": {"width": 1}},
+        hovertemplate=f"%{{y:.4g}} {scale.unit} at %{{x:.5g}} Hz{f'<br>{case.label}' * bool(case.label)}<extra>{design.name}</extra>",
+    )  # fmt: skip
+
+
+def optimisation(designs: Sequence[Design], *, divided: bool) -> Plot | None:
+    """Draw the optimisation curves of all designs over each other, where two of them vary the same number."""
+    numbered = [(d, d.response, first_number(d.response.data)[0]) for d in designs if d.response]
+    keys = [key for _, _, key in numbered]
+    key = max(keys, key=keys.count, default="")
+    told = [(d, r) for d, r, own in numbered if own == key and len(r.peaked) > 1]
+    if not key or len(told) < 2:
+        return None
+    figure, heights = make_subplots(1, 2, horizontal_spacing=0.12), []
+    curves = []
+    for design, response in told:
+        cases = sorted(response.peaked, key=lambda c: c.value)
+        peak = np.array([_peak(response, c, divided=divided) for c in cases])
+        heights.append(peak)
+        curves.append((design, [c.value for c in cases], peak, [response.peak_hz(c) for c in cases]))  # fmt: skip
+    scale = scale_for(np.concatenate(heights), "m/N" if divided else "m")
+    for design, values, peak, hz in curves:
+        for panel, (y, unit) in enumerate(((scale.factor * peak, scale.unit), (hz, "Hz")), 1):
+            figure.add_scatter(
+                x=values, y=y, mode="lines+markers", name=design.name, showlegend=panel == 1, legendgroup=design.name,
+                line={"color": design.colour, "width": 1.8}, hovertemplate=f"%{{y:.4g}} {unit} at %{{x:.4g}}<extra>{design.name}</extra>",
+                row=1, col=panel,
+            )  # fmt: skip
+    styled(figure, 400)
+    every = [value for _, own, _, _ in curves for value in own]
+    wide = min(every) > 0 and max(every) > 5 * min(every)
+    figure.update_xaxes(title_text=key, type="log" if wide else "linear")
+    drawn = scale.factor * np.concatenate(heights)
+    over = " / force" if divided else ""
+    figure.update_yaxes(title_text=f"peak amplitude{over} ({scale.unit})", type="log", **log_ticks(drawn), col=1)  # fmt: skip
+    figure.update_yaxes(title_text="peak frequency (Hz)", col=2)
+    lowest = min(((float(np.nanmin(p)), d.name, v[int(np.nanargmin(p))]) for d, v, p, _ in curves), key=lambda t: t[0])  # fmt: skip
+    caption = f"Peak and its frequency over {key}. The smallest peak of all is that of {lowest[1]}, {quantity(lowest[0], 'm/N' if divided else 'm')} at {number(lowest[2], 4)}."
+    return Plot("compared_optimisation", "Optimisation curves over each other", caption, figure)
+
+
+def _peak(response: Response, case: ShownCase, *, divided: bool) -> float:
+    at = response.peak(case)
+    return float(amplitudes(response, divided=divided)[at]) if at >= 0 else float("nan")
+
+
+def peaks(designs: Sequence[Design], *, divided: bool) -> Table | None:
+    """Return a row for each case of each design: its peak, and how far it is from that of the first design."""
+    told = [d for d in designs if d.response is not None]
+    if not told:
+        return None
+    labels = [c.label for c in choices(designs)][1:] or [""]
+    unit = "m/N" if divided else "m"
+    rows, heights = [], []
+    for label in labels:
+        own = told[0].case(label)
+        of_first = (_peak(told[0].response, own, divided=divided), told[0].response.peak_hz(own)) if own and told[0].response else None  # fmt: skip
+        for design in told:
+            case, response = design.case(label), design.response
+            if case is None or response is None:
+                continue
+            height, hz = _peak(response, case, divided=divided), response.peak_hz(case)
+            off = [NONE, NONE]
+            if of_first and design is not told[0]:
+                off = [fixed(100 * (height / of_first[0] - 1), 2), fixed(hz - of_first[1], 3)]
+            heights.append(height)
+            rows.append([label or NONE, design.name, fixed(hz, 3), response.level(case) or NONE, *off])  # fmt: skip
+    prefixed, cells = column(np.array(heights), unit)
+    head = ["case", "design", f"peak ({prefixed})", "at (Hz)", "verdict", "against the first (%)", "shift (Hz)"]  # fmt: skip
+    return Table(head, [[*row[:2], cell, *row[2:]] for row, cell in zip(rows, cells, strict=True)])
+
+
+def against_curves(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Table | None:
+    """Return how far the best case of each design is from each curve that was read: at the peak, and along it."""
+    if not curves:
+        return None
+    divided, rows = per_force(designs, curves), []
+    for curve in curves:
+        top = int(np.argmax(curve.amplitude))
+        for design in designs:
+            case, response = design.best, design.response
+            if case is None or response is None:
+                continue
+            height, hz = _peak(response, case, divided=divided), response.peak_hz(case)
+            off = percent(100 * (height / curve.amplitude[top] - 1), 3)
+            rows.append([curve.name, design.name, case.label or NONE, off, fixed(hz - float(curve.hz[top]), 3), _along(response, case, curve, divided=divided)])  # fmt: skip
+    head = ["curve", "design", "case", "peak off by", "frequency off by (Hz)", "largest difference along it"]  # fmt: skip
+    told = "Along a curve: the difference of the amplitudes over the curve's peak, where frequencies of both overlap, with straight lines between the points of the design."
+    return Table(head, rows, "Against other curves", (told,))
+
+
+def _along(response: Response, case: ShownCase, curve: MeasuredCurve, *, divided: bool) -> str:
+    at = response.points(case)
+    own = amplitudes(response, divided=divided)[at]
+    hz = response.hz[at]
+    if np.any(np.diff(hz) < 0):
+        return "the response folds"
+    known = np.isfinite(own)
+    if np.count_nonzero(known) < 2:
+        return NONE
+    inside = (curve.hz >= hz[known][0]) & (curve.hz <= hz[known][-1])
+    if not np.any(inside):
+        return "no common frequency"
+    off = np.interp(curve.hz[inside], hz[known], own[known]) - curve.amplitude[inside]
+    worst = int(np.argmax(np.abs(off)))
+    return f"{percent(100 * float(off[worst]) / float(curve.amplitude.max()), 3)} at {number(float(curve.hz[inside][worst]), 5)} Hz"
+
+
+def frequencies(designs: Sequence[Design]) -> Table | None:
+    """Return the natural frequencies of the designs that have them, wave by wave, against the first."""
+    told = [(d, d.modes) for d in designs if d.modes is not None]
+    if len(told) < 2:
+        return None
+    known = [{(w, m): float(f) for w, row in zip(v.waves, v.floats("frequency_hz"), strict=True) for m, f in enumerate(row)} for _, v in told]  # fmt: skip
+    rows = []
+    for wave, mode in known[0]:
+        if all((wave, mode) in each for each in known):
+            own = [each[wave, mode] for each in known]
+            rows.append([f"{wave}, mode {mode + 1}", *(number(f, 7) for f in own), *(percent(100 * (f / own[0] - 1), 3) for f in own[1:])])  # fmt: skip
+    head = ["", *(f"{d.name} (Hz)" for d, _ in told), *(f"{d.name} off by" for d, _ in told[1:])]
+    return Table(head, rows, "Natural frequencies") if rows else None
+
+
+def inputs(designs: Sequence[Design]) -> Table | Words:
+    """Return what differs between the study files."""
+    rows, title = differences(designs), "What differs between the study files"
+    without = [d.name for d in designs if not d.inputs]
+    told = [f"Made without a study file, inputs not known: {', '.join(without)}."] if without else []  # fmt: skip
+    if not rows:
+        return Words([*told, "Nothing differs that the results know of."])
+    cells = [[c if len(c) <= _MOST_INPUTS else f"{c[:_MOST_INPUTS]} …" for c in row] for row in rows]  # fmt: skip
+    return Table(
+        ["key", *(d.name for d in designs)], cells, "", [title + ".", *told], numeric=False
+    )
+
+
+def _cards(designs: Sequence[Design], *, divided: bool) -> list[Card]:
+    found, first = [], None
+    for design in designs:
+        case, response = design.best, design.response
+        if case is None or response is None:
+            continue
+        height = _peak(response, case, divided=divided)
+        note = f"at {number(response.peak_hz(case), 5)} Hz{case.where}; {response.level(case) or 'no verdict'}"
+        if first is None:
+            first = height
+        else:
+            note += f"; {percent(100 * (height / first - 1), 3)} against {designs[0].name}"
+        found.append(Card(quantity(height, "m/N" if divided else "m"), f"smallest peak of {design.name}", note))  # fmt: skip
+    return found
+
+
+def contents(
+    designs: Sequence[Design], curves: Sequence[MeasuredCurve]
+) -> list[tuple[str, str, list[Content]]]:
+    """Return the chapters of a comparison: key, title, and what they show.
+
+    Raises
+    ------
+    InputError
+        If curves cannot be compared with what the designs have.
+    """
+    divided, offered = per_force(designs, curves), choices(designs)
+    verdicts = Words(items=[f"**{d.name}**: {conclusion(d.tree)}" for d in designs])
+    each: list[tuple[str, str, list[Content | None]]] = [
+        ("verdicts", "Verdicts", [verdicts]),
+        ("responses", "Forced response", [chooser("case", offered, 0), responses(designs, curves), against_curves(designs, curves)]),
+        ("optimisation", "Optimisation curves", [optimisation(designs, divided=divided)]),
+        ("peaks", "Peaks", [peaks(designs, divided=divided)]),
+        ("modes", "Modes", [frequencies(designs)]),
+        ("inputs", "Inputs", [inputs(designs)]),
+    ]  # fmt: skip
+    kept = [(key, title, [c for c in own if c is not None]) for key, title, own in each]
+    return [chapter for chapter in kept if chapter[2]]
+
+
+def comparison_html(designs: Sequence[Design], curves: Sequence[MeasuredCurve] = ()) -> str:
+    """Return the page of a comparison; `InputError` if curves cannot be compared with the designs."""
+    placing = Placing()
+    chapters = [Chapter(key, title, placing(own)) for key, title, own in contents(designs, curves)]
+    names = [d.name for d in designs]
+    made = f"{counted(len(designs), 'design')}" + (f" and {counted(len(curves), 'curve')}" if curves else "")  # fmt: skip
+    cards = _cards(designs, divided=per_force(designs, curves))
+    return page_html(f"{joined(names)} compared", made, chapters, cards=cards)

@@ -1,0 +1,133 @@
+"""Designs held against each other, in Python, by the command line, and against a CSV file."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic_result import KEY, synthetic_result, tree_of
+from typer.testing import CliRunner
+
+import stickslip as ss
+from stickslip.cli import app
+from stickslip.front.comparison import Comparison
+from stickslip.report.quantities import column
+
+STUDY = (
+    'schema_version = 2\n[contact.flat]\nfriction_coefficient = {mu}\n[study]\ntitle = "{title}"\n'
+)
+
+
+def design(ratios: tuple[int, ...], factor: float, mu: float, title: str = "same") -> ss.Result:
+    """Return a synthetic result whose amplitudes are scaled, and its study file."""
+    data = synthetic_result(ratios=ratios, n=24)
+    data["amplitude"] = factor * data["amplitude"]
+    tree = tree_of(forced_response=data)
+    tree.attrs["study_toml"] = STUDY.format(mu=mu, title=title)
+    return ss.Result(tree)
+
+
+@pytest.fixture(scope="module")
+def pair() -> Comparison:
+    return ss.compare(design((50, 5), 1.0, 0.6), design((50, 20), 1.2, 0.4), names=("a", "b"))
+
+
+def test_peaks_are_held_against_the_first_design_case_by_case(pair: Comparison) -> None:
+    cases = list(zip(pair.peaks["case"], pair.peaks["design"], strict=True))
+    assert cases == [(f"{KEY} = 50", "a"), (f"{KEY} = 50", "b"), (f"{KEY} = 5", "a"), (f"{KEY} = 20", "b")]  # fmt: skip
+    assert pair.peaks["against the first (%)"].tolist() == ["–", "20.00", "–", "–"]
+    assert pair.peaks["shift (Hz)"].tolist() == ["–", "0.000", "–", "–"]
+
+
+def test_only_what_differs_in_the_study_files_is_told(pair: Comparison) -> None:
+    assert pair.inputs["key"].tolist() == ["contact.flat.friction_coefficient"]
+    assert pair.inputs["a"].tolist() == ["0.6"]
+    assert pair.inputs["b"].tolist() == ["0.4"]
+
+
+def test_each_case_is_drawn_for_the_designs_that_have_it(pair: Comparison) -> None:
+    figure = pair.plot("compared_responses")
+    drawn = [(t.meta, t.name) for t in figure.data]
+    assert drawn == [(0, "a"), (1, "a"), (2, "a"), (0, "b"), (1, "b"), (3, "b")]
+    assert [t.visible for t in figure.data] == [True, False, False, True, False, False]
+    own, other = (np.asarray(figure.data[k].y, dtype=float) for k in (1, 4))
+    np.testing.assert_allclose(other, 1.2 * own)
+    assert "compared_optimisation" in pair.plots
+    with pytest.raises(ss.InputError, match="is no figure of this comparison"):
+        pair.plot("compared_response")
+
+
+def test_a_curve_from_a_file_is_held_against_the_best_case(tmp_path: Path) -> None:
+    one = design((50,), 1.0, 0.6)
+    figure = ss.compare(one, one, names=("a", "b")).plot("compared_responses")
+    hz = np.asarray(figure.data[0].x, dtype=float)
+    response = one["forced_response"]
+    force = float(response["excitation_n"][0])
+    whole = np.asarray(response["amplitude"].isel(output=0).values)[np.argsort(response["frequency_hz"].values)]  # fmt: skip
+    file = tmp_path / "rig.csv"
+    lines = [f"{f},{1.1e6 * a / force}" for f, a in zip(np.sort(hz), whole, strict=True)]
+    file.write_text("frequency_hz,amplitude_um_per_n\n" + "\n".join(lines))
+    found = ss.compare(one, file, names=("a", "rig"))
+    html = found.report(tmp_path / "c.html").read_text(encoding="utf-8")
+    assert "Against other curves" in html
+    assert f"<td>{100 / 1.1 - 100:.2f}".replace("-", "−") in html
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        ("frequency_hz,amplitude_um\n1,2\n2,-3\n", r"line 3: amplitude_um: is no amplitude"),
+        ("hz,amplitude_um\n1,2\n", r"has no column frequency_hz"),
+        ("frequency_hz,height\n1,2\n", r"has no column amplitude_m"),
+    ],
+)
+def test_a_bad_curve_is_refused_by_its_line(tmp_path: Path, text: str, match: str) -> None:
+    file = tmp_path / "rig.csv"
+    file.write_text(text)
+    with pytest.raises(ss.InputError, match=match):
+        ss.compare(design((5,), 1.0, 0.6), file)
+
+
+def test_what_cannot_be_compared_is_refused(tmp_path: Path) -> None:
+    one, file = design((5,), 1.0, 0.6), tmp_path / "rig.csv"
+    file.write_text("frequency_hz,amplitude_um\n1,2\n")
+    with pytest.raises(ss.InputError, match=r"has 0 results and 1 curves\. Give two results"):
+        ss.compare(file)
+    with pytest.raises(ss.InputError, match=r"are no 2 names that differ"):
+        ss.compare(one, one, names=("a", "a"))
+    with pytest.raises(ss.InputError, match=r"none: no such file|none.*no such file"):
+        ss.compare(one, tmp_path / "none")
+    other = tmp_path / "per.csv"
+    other.write_text("frequency_hz,amplitude_um_per_n\n1,2\n")
+    with pytest.raises(ss.InputError, match=r"are amplitudes and amplitudes per newton"):
+        ss.compare(one, file, other)
+
+
+def test_from_the_command_line(tmp_path: Path) -> None:
+    for name, mu in (("first", 0.6), ("second", 0.4)):
+        folder = tmp_path / name / "results"
+        folder.mkdir(parents=True)
+        design((50, 5), mu, mu).save(folder)
+    page = tmp_path / "c.html"
+    asked = ["compare", str(tmp_path / "first"), str(tmp_path / "second"), "--page", str(page)]
+    told = CliRunner().invoke(app, asked)
+    assert told.exit_code == 0, told.output
+    assert "contact.flat.friction_coefficient" in told.output
+    assert "first and second compared" in page.read_text(encoding="utf-8")
+    wrong = CliRunner().invoke(app, ["compare", str(tmp_path / "first"), str(tmp_path)])
+    assert wrong.exit_code == 2
+    assert "no such file" in wrong.output
+
+
+@pytest.mark.parametrize(
+    ("values", "unit", "cells"),
+    [
+        ([44.35e-6, 16.9e-6, 5.39e-6], "µm", ["44.35", "16.90", "5.39"]),
+        ([1.0, 0.0, math.nan], "m", ["1.000", "0.000", "–"]),
+        ([], "m", []),
+    ],
+)
+def test_numbers_of_a_column_have_the_same_decimals(
+    values: list[float], unit: str, cells: list[str]
+) -> None:
+    assert column(np.array(values), "m") == (unit, cells)
