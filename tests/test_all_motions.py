@@ -15,6 +15,7 @@ from stickslip.errors import InputError
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.structure import Structure
 from stickslip.response.all_motions import MotionSearch, all_motions, share_interval
+from stickslip.response.all_motions.basins import APERIODIC, DIVERGED
 from stickslip.response.all_motions.options import search_problem
 from stickslip.response.all_motions.search import search_stages
 from stickslip.response.system import System
@@ -145,6 +146,12 @@ def test_deflation_finds_the_isola_of_the_closed_form_and_follows_it_round():
     assert ring.amplitude.min() == pytest.approx(low, rel=2e-2)
     assert ring.peak > result.branches[0].peak, "the isola is higher than what a sweep shows"
     assert not result.spent
+    # its folds and its peak lie between the points: ω² = K - c²/2 ± sqrt(F²/s - c² (K - c²/4))
+    s = np.linspace(low**2, high**2, 200_001)
+    root = np.sqrt(np.maximum(PUSH**2 / s - WEAK**2 * (stiffness(s) - WEAK**2 / 4.0), 0.0))
+    squares = stiffness(s) - WEAK**2 / 2.0 + np.array([[-1.0], [1.0]]) * root
+    np.testing.assert_allclose(ring.extent, np.sqrt([squares.min(), squares.max()]), rtol=3e-4)
+    assert ring.peak == pytest.approx(high, rel=3e-4)
 
 
 # ---- an absorber ---------------------------------------------------------------------------------------------------------------
@@ -310,6 +317,9 @@ def test_a_budget_that_is_spent_is_said_and_nothing_begins_after_it():
     assert result.spent
     assert result.tries == result.starts == 0
     assert len(result.at) == 5
+    assert all(at.spent for at in result.at)
+    assert result.branches[0].omega.size == 1, "the sweep ends with the budget, too"
+    assert result.branches[0].end == "the budget is spent"
 
 
 def test_an_interrupted_search_goes_on_to_the_same_stages():
@@ -327,6 +337,55 @@ def test_an_interrupted_search_goes_on_to_the_same_stages():
             np.testing.assert_array_equal(one.coefficients, other.coefficients)
             np.testing.assert_array_equal(one.branch, other.branch)
             assert one.tries == other.tries
+
+
+def test_an_interrupted_search_draws_the_same_states_after_a_motion_was_found_in_time():
+    system, load = stop()
+    search = MotionSearch(
+        omega_range=(1.1, 1.2), at=(FAST,), harmonics=3, points=8, tries=1, starts=5, spread=6.0, steps=64, most_periods=400
+    )  # fmt: skip
+    problem = search_problem(system, load, search)
+    whole = list(search_stages(problem, search))
+    kinds = [(s.kind, s.origin) for s in whole]
+    after = kinds.index(("branch", "time")) + 1
+    again = [*whole[:after], *search_stages(problem, search, whole[:after])]
+    assert [(s.kind, s.origin) for s in again] == kinds
+    for one, other in zip(whole, again, strict=True):
+        np.testing.assert_array_equal(one.branch, other.branch)
+
+
+def test_a_start_that_still_rings_at_half_the_frequency_has_not_settled():
+    """A spring with a square feeds what rings at half of the frequency: a multiplier of 0.997, while the driven harmonic hardly changes."""
+    system, load = one_mass(PolynomialSpring(along_t=(0.0, 0.56, 0.4)), 0.043, 0.271)
+    search = MotionSearch(
+        omega_range=(1.9, 2.0), at=(1.97,), periods=2, harmonics=2, points=8, tries=1, starts=3, steps=64, most_periods=60, seed=3
+    )  # fmt: skip
+    assert all_motions(system, load, search).at[0].basins.ends == 3 * (APERIODIC,)
+
+
+def test_starts_that_grow_without_bound_are_counted_as_that():
+    system, load = one_mass(CubicSpring(cubic_t=CUBIC, k_t=1e-12), -0.6, FORCE)
+    search = MotionSearch(
+        omega_range=(0.8, 1.6), at=(OMEGA,), harmonics=1, points=8, tries=1, starts=2, steps=64
+    )
+    at = all_motions(system, load, search).at[0]
+    assert at.basins.ends == (DIVERGED, DIVERGED)
+
+
+def test_what_more_harmonics_would_change_is_told_of_each_motion(found):
+    """The change by a Newton step is about the distance from the motions with nine harmonics."""
+    system, load = duffing()
+    search = MotionSearch(
+        omega_range=(0.6, 1.7), at=(OMEGA,), harmonics=9, samples=128, points=30, tries=1, starts=0
+    )
+    more = sorted(all_motions(system, load, search).at[0].motions, key=lambda m: m.amplitude)
+    few = sorted(found.at[0].motions, key=lambda m: m.amplitude)
+    for one, other in zip(few, more, strict=True):
+        apart = other.coefficients[1:].copy()
+        apart[0] -= one.coefficients[1]
+        real = float(np.linalg.norm(apart) / np.linalg.norm(other.coefficients[1:]))
+        assert 0.5 * real < one.change < 2.0 * real
+        assert other.change < 1e-3
 
 
 def test_what_cannot_be_marched_is_searched_and_said():
@@ -349,6 +408,7 @@ def test_what_cannot_be_marched_is_searched_and_said():
         ({"at": (9.0,)}, "MotionSearch.at"),
         ({"seconds": 0.0}, "seconds"),
         ({"points": 0}, "MotionSearch.points"),
+        ({"periods": 20, "harmonics": 13}, "MotionSearch.steps"),
     ],
 )
 def test_bad_searches_are_refused(keys, said):

@@ -116,6 +116,36 @@ def test_a_largest_stable_motion_that_no_start_reached_is_noted(result):
         assert [v.word for v in notes] == ["note"] * (reached == 0)
 
 
+def test_what_the_budget_left_and_where_a_branch_was_lost_are_said(result):
+    case = one_case(result.data["all_motions"].to_dataset(), 0)
+    told = {name: case[name].variable for name in case.variables}
+    for name in ("seconds", "budget_s", "tries", "spent", "unmarched"):
+        told[name] = xr.Variable((), case.attrs[name])
+    lost = case["end"].values.astype(object)
+    lost[-1] = "lost at 0.05 Hz (why)"
+    told |= {
+        "spent": xr.Variable((), 1),
+        "searched_spent": xr.Variable("searched", [1]),
+        "end": xr.Variable("branch", lost),
+    }
+    said = [v.why for v in case_verdicts("", told) if v.level == "doubtful"]
+    assert any("at 1 of 1 frequencies (0.055 Hz) not all was tried" in why for why in said)
+    assert any(
+        f"branch {lost.size} (deflation) is not known to its end: lost" in why for why in said
+    )
+
+
+def test_motions_that_need_more_harmonics_are_doubtful(result):
+    """With one harmonic there is an isola that does not exist: the true motion has a third harmonic near the mass's own frequency."""
+    assert any(v.level == "doubtful" and "more harmonics" in v.why for v in result.verdicts)
+
+
+def test_more_modes_than_the_model_has_are_refused(folder):
+    model = Study.from_file(folder / "study.toml").model()
+    with pytest.raises(InputError, match=r"all_motions.modes.*: 1\."):
+        model.all_motions(frequency_hz=(0.016, 0.2), at_hz=[0.055], harmonics=1, modes=2)
+
+
 def test_the_check_estimates_the_time(folder):
     study = read_study(folder / "study.toml")
     case = study.cases()[0]

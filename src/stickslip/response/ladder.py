@@ -1,6 +1,6 @@
 """How a periodic motion is found where no branch leads to it: one ladder, every rung counted and bounded in Newton steps."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -69,12 +69,23 @@ def plain_sweep(
     omega_range: tuple[float, float],
     points: int,
     options: Newton,
+    over: Callable[[], bool] = bool,
 ) -> list[Followed]:
-    """Return the response of `balance` between two frequencies, in the order of the branch; it may hold points that were not found."""
+    """Return the response of `balance` between two frequencies, in the order of the branch; it may hold points that were not found.
+
+    `over` is asked after each solution, and ends the sweep.
+    """
     first, last = omega_range
     way = following_vibration(balance, steps_through(last - first, points), options)
     curve = OneLevel(balance, way, partial(without_branch, system, balance, options))
-    return branch_of(follow(curve, Route(first=first, last=last, points=points)))
+    return branch_of(_until(over, follow(curve, Route(first=first, last=last, points=points))))
+
+
+def _until(over: Callable[[], bool], every: Iterable[Followed]) -> Iterator[Followed]:
+    for one in every:
+        yield one
+        if over():
+            return
 
 
 def _ways(system: System, balance: AnyBalance, omega: float) -> Iterator[Homotopy]:

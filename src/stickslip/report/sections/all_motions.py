@@ -87,12 +87,13 @@ def _mark(view: Motions, figure: go.Figure, factor: float, unit: str) -> None:
 def branch_table(view: Motions) -> Table:
     """Return the branches."""
     rows = [
-        [name, quantity(float(peak), "m", 5), number(float(hertz), 6), end]
-        for name, peak, hertz, end in zip(
-            view.names, view.floats("peak_amplitude"), view.floats("peak_hz"), view.labels_of("end"), strict=True
+        [name, f"{number(float(low), 6)} to {number(float(high), 6)}", quantity(float(peak), "m", 5), number(float(hertz), 6), end]
+        for name, low, high, peak, hertz, end in zip(
+            view.names, view.floats("lowest_hz"), view.floats("highest_hz"), view.floats("peak_amplitude"), view.floats("peak_hz"),
+            view.labels_of("end"), strict=True,
         )
     ]  # fmt: skip
-    head = ["branch", "largest amplitude", "at (Hz)", "how it ends"]
+    head = ["branch", "range (Hz)", "largest amplitude", "at (Hz)", "how it ends"]
     return Table(head, rows, "Branches")
 
 
@@ -101,11 +102,16 @@ def basin_table(view: Motions) -> Table | Words:
     if not view.has("motion_branch"):
         return Words(("No motion was found at a frequency that was searched.",))
     dims, names = ("searched", "motion"), view.names
-    told = ("amplitude", "share", "share_low", "share_high", "multiplier")
+    told = ("amplitude", "share", "share_low", "share_high", "multiplier", "change")
     column = {n: view.values(f"motion_{n}", *dims) for n in told}
     number_of = view.data["motion_branch"].transpose(*dims).values.astype(int)
     words = view.data["motion_stability"].transpose(*dims).values.astype(str)
-    starts, aperiodic = view.integers("starts"), view.integers("aperiodic")
+    starts = view.integers("starts")
+    others = {
+        "none of the load's period": view.integers("aperiodic"),
+        "no solution with these harmonics": view.integers("unsolved"),
+        "none: it grows without bound": view.integers("diverged"),
+    }
     rows = []
     for i, hertz in enumerate(view.floats("searched_hz")):
         for k in np.flatnonzero(number_of[i] >= 0):
@@ -114,18 +120,24 @@ def basin_table(view: Motions) -> Table | Words:
             rows.append(
                 [
                     number(float(hertz), 6), names[number_of[i, k]], quantity(float(column["amplitude"][i, k]), "m", 5),
-                    f"**{words[i, k]}**", number(float(column["multiplier"][i, k]), 4), ends if starts[i] else NONE,
+                    f"**{words[i, k]}**", number(float(column["multiplier"][i, k]), 4),
+                    _changed(float(column["change"][i, k])), ends if starts[i] else NONE,
                 ]
             )  # fmt: skip
-        if aperiodic[i]:
-            ends = f"{number(100 * aperiodic[i] / starts[i], 3)} % of {starts[i]}"
-            rows.append([number(float(hertz), 6), "none of the load's period", NONE, NONE, NONE, ends])  # fmt: skip
-    head = ["frequency (Hz)", "branch", "amplitude", "stability", "multiplier", "starts that end on it (95 %)"]  # fmt: skip
+        rows += [
+            [number(float(hertz), 6), what, NONE, NONE, NONE, NONE, f"{number(100 * count[i] / starts[i], 3)} % of {starts[i]}"]
+            for what, count in others.items() if count[i]
+        ]  # fmt: skip
+    head = ["frequency (Hz)", "branch", "amplitude", "stability", "multiplier", "change by more harmonics", "starts that end on it (95 %)"]  # fmt: skip
     said = (
         "Starts are drawn in the lowest modes about the mean of the known motions, with sliders that never moved: shares are those of "
         "such starts, with the binomial interval of Clopper and Pearson."
     )
     return Table(head, rows, "Motions and their basins", (said,))
+
+
+def _changed(share: float) -> str:
+    return "no motion near" if np.isinf(share) else f"{number(100 * share, 2)} %"
 
 
 def _cards(view: Motions) -> Sequence[Card]:

@@ -19,6 +19,7 @@ from stickslip.response.time.transient import TimeStepping, TransientResult, int
 CONFIDENCE = 0.95
 PERIODIC = -1  # a motion that repeats, for which no solution was found
 APERIODIC = -2  # it does not repeat with the period of the load
+DIVERGED = -3  # it grows without bound
 ALIKE = 0.03  # relative distance of the harmonics in time from those of a solution within which it is that one
 
 
@@ -32,7 +33,8 @@ class Basins:
         rad/s.
     ends
         (starts,) number of the motion at this frequency that each ends on; `APERIODIC`: on none that repeats with the load's period, or
-        on none within the periods allowed; `PERIODIC`: on one that repeats, for which no solution was found.
+        on none within the periods allowed; `PERIODIC`: on one that repeats, for which no solution was found; `DIVERGED`: it grows without
+        bound.
     """
 
     omega: float

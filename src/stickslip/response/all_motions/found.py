@@ -38,6 +38,8 @@ class Stage:
         (k,) of motions the number of their branch; of starts the number of their motion or what `Basins` says; else empty.
     multiplier, error
         (k,) of motions: modulus of the multiplier that decides and its error; NaN where it was not examined.
+    change
+        (k,) of motions: what more harmonics would change in it, relative to its vibration; infinite where no motion with more is near.
     words
         Of motions, ``stable``, ``unstable``, ``undecided`` or ``not examined``, separated by ``;``.
     tries
@@ -55,6 +57,7 @@ class Stage:
     branch: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     multiplier: FloatArray = field(default_factory=lambda: np.zeros(0))
     error: FloatArray = field(default_factory=lambda: np.zeros(0))
+    change: FloatArray = field(default_factory=lambda: np.zeros(0))
     words: str = ""
     tries: int = 0
     seconds: float = 0.0
@@ -89,13 +92,43 @@ class MotionBranch:
 
     @property
     def peak(self) -> float:
-        """Its largest amplitude, m."""
-        return float(np.max(self.amplitude, initial=0.0))
+        """Its largest amplitude, m, between its points by a parabola; 0 without a point."""
+        return self._turning(self.amplitude)[0] if self.omega.size else 0.0
 
     @property
     def peak_omega(self) -> float:
         """Frequency there, rad/s; NaN without a point."""
-        return float(self.omega[np.argmax(self.amplitude)]) if self.omega.size else np.nan
+        return self._turning(self.amplitude)[1] if self.omega.size else np.nan
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Its lowest and highest frequency, rad/s, where it folds between its points by a parabola; NaN without a point."""
+        if not self.omega.size:
+            return np.nan, np.nan
+        return -self._turning(-self.omega)[0], self._turning(self.omega)[0]
+
+    def _turning(self, values: FloatArray) -> tuple[float, float]:
+        """Return the largest of the values along the branch, and the frequency there."""
+        around = np.arange(-1, 2) + int(np.argmax(values))
+        if self.isola:
+            around = around % values.size
+        elif around[0] < 0 or around[2] >= values.size:
+            return float(values[around[1]]), float(self.omega[around[1]])
+        q = self.coefficients[around].reshape(3, -1)
+        spans = float(np.ptp(self.omega)) or 1.0, float(np.max(np.abs(self.coefficients), initial=0.0)) or 1.0  # fmt: skip
+        path = np.column_stack(
+            [self.omega[around] / spans[0], q.real / spans[1], q.imag / spans[1]]
+        )
+        before, after = np.linalg.norm(np.diff(path, axis=0), axis=1)
+        if before == 0.0 or after == 0.0:
+            return float(values[around[1]]), float(self.omega[around[1]])
+        at = np.array([-before, 0.0, after])
+        bend, slope, middle = np.polyfit(at, values[around], 2)
+        if bend == 0.0:
+            return float(middle), float(self.omega[around[1]])
+        top = float(np.clip(-slope / (2.0 * bend), at[0], at[2]))
+        along = np.polyfit(at, self.omega[around], 2)
+        return float(middle + top * (slope + top * bend)), float(np.polyval(along, top))
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +147,8 @@ class MotionAt:
         ``stable``, ``unstable``, ``undecided`` or ``not examined``.
     multiplier, error
         Modulus of the multiplier that decides, and its error.
+    change
+        What more harmonics would change in the motion, relative to its vibration; infinite where no motion with more is near.
     """
 
     branch: int
@@ -122,15 +157,30 @@ class MotionAt:
     stability: str
     multiplier: float
     error: float
+    change: float
 
 
 @dataclass(frozen=True, eq=False)
 class AtFrequency:
-    """What was found at a frequency: motions in the order of their branches, and where starts end."""
+    """What was found at a frequency: motions in the order of their branches, and where starts end.
+
+    Attributes
+    ----------
+    omega
+        Of the load, rad/s.
+    motions, basins
+        What was found, and where starts end.
+    tries
+        Deflated solves there.
+    spent
+        Whether the budget ended the deflation or the starts there.
+    """
 
     omega: float
     motions: tuple[MotionAt, ...]
     basins: Basins
+    tries: int
+    spent: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,20 +233,22 @@ def gathered(problem: ForcedProblem, stages: list[Stage], search: MotionSearch) 
         amplitude = _amplitudes(problem, stage, periods)
         words = stage.words.split(";")
         motions = tuple(
-            MotionAt(int(stage.branch[i]), float(amplitude[i]), stage.coefficients[i], words[i], float(stage.multiplier[i]), float(stage.error[i]))
+            MotionAt(int(stage.branch[i]), float(amplitude[i]), stage.coefficients[i], words[i], float(stage.multiplier[i]), float(stage.error[i]), float(stage.change[i]))
             for i in range(amplitude.size)
         )  # fmt: skip
         own = starts.get(stage.place)
         ends = () if own is None else tuple(int(e) for e in own.branch)
         omega = search.places[stage.place]
-        at.append(AtFrequency(omega, motions, Basins(omega, ends)))
+        here = [s for s in stages if s.place == stage.place and s.kind in ("searched", "starts")]
+        tries = sum(s.tries for s in stages if s.place == stage.place and s.kind != "starts")
+        at.append(AtFrequency(omega, motions, Basins(omega, ends), tries, any(s.end == SPENT for s in here)))  # fmt: skip
     return AllMotions(
         tuple(branches),
         tuple(at),
         sum(s.tries for s in stages if s.kind != "starts"),
         sum(s.tries for s in stages if s.kind == "starts"),
         sum(s.seconds for s in stages),
-        any(s.end == SPENT for s in stages),
+        any(SPENT in s.end for s in stages),
         next((s.end for s in starts.values() if s.end != SPENT), ""),
     )
 

@@ -39,15 +39,15 @@ class MotionSearch:
     starts
         Random states at each frequency.
     modes
-        Lowest modes, contacts stuck, in which states are drawn.
+        Lowest modes, contacts stuck, in which states are drawn; all where there are fewer.
     spread
         Largest modal amplitude of a state, in units of the largest of the motions that are known.
     most_periods
         After which a start that repeats nothing is given up.
     steps
-        Steps in a period.
+        Steps in a period of the motion.
     seconds
-        Budget: no solve and no start begins after it, and deflation leaves half of it to the starts.
+        Budget: no solve, no start and no point of a branch begins after it, and deflation leaves half of it to the starts.
     seed
         Of the random states.
     evaluator
@@ -86,6 +86,8 @@ class MotionSearch:
         ):
             if getattr(self, name) < 1:
                 raise input_error(f"MotionSearch.{name}", f"is {getattr(self, name)}", "Give a count from 1 on.")  # fmt: skip
+        if 2 * self.periods * self.harmonics >= self.steps:
+            raise input_error("MotionSearch.steps", f"is {self.steps}, too few for {self.harmonics} harmonics over periods = {self.periods}", f"Give more than {2 * self.periods * self.harmonics}.")  # fmt: skip
         if not (self.seconds > 0.0 and self.spread > 0.0):
             raise input_error("MotionSearch", f"seconds = {self.seconds}, spread = {self.spread}", "Both are above zero.")  # fmt: skip
         low, high = self.omega_range

@@ -13,6 +13,7 @@ from stickslip.harmonic.support import harmonics_of
 from stickslip.response.all_motions.basins import (
     ALIKE,
     APERIODIC,
+    DIVERGED,
     PERIODIC,
     drawn,
     in_time,
@@ -32,6 +33,7 @@ from stickslip.response.forced.problem import (
     with_stiffness,
 )
 from stickslip.response.ladder import plain_sweep
+from stickslip.response.stability.missing_harmonics import corrected
 from stickslip.response.stability.multipliers import stability
 from stickslip.response.system import System
 from stickslip.response.time.transient import TimeStepping
@@ -46,6 +48,7 @@ SCALES = (
 )  # of known motions, as starts: what lies above a resonance that is left may be tens of times as large
 OTHER = 0.5  # share of the starts with another harmonic
 GUESSES = (0.5, 2.0, -1.0)
+WHOLE = "it reaches the end of the range"
 LONGEST = 6  # times the points of a sweep that a branch may have
 
 
@@ -124,10 +127,12 @@ class _Search:
     def _spent(self, share: float = 1.0) -> bool:
         return self.before + perf_counter() - self.began > share * self.search.seconds
 
-    def _at(self, omega: float) -> list[tuple[int, FloatArray]]:
-        """Return the solutions at a frequency, each once, with the number of the branch that holds it."""
+    def _at(self, omega: float, but: int = -1) -> list[tuple[int, FloatArray]]:
+        """Return the solutions at a frequency, each once, with the number of the branch that holds it; `but` those found in time at a place."""
         found: list[tuple[int, FloatArray]] = []
         for number, stage in enumerate(self._branches()):
+            if but >= 0 and (stage.origin, stage.place) == ("time", but):
+                continue
             for guess in self._crossings(stage, omega):
                 solved = newton(lambda v: self.balance.linearise(v, omega), guess, self.search.newton)  # fmt: skip
                 if solved.status.converged and not self._known(solved.x, [z for _, z in found]):
@@ -168,10 +173,12 @@ class _Search:
 
     def _swept(self) -> Stage:
         search = self.search
-        made = plain_sweep(self.problem.system, self.balance, self.problem.sweep.omega_range, search.points, search.newton)  # fmt: skip
+        made = plain_sweep(self.problem.system, self.balance, self.problem.sweep.omega_range, search.points, search.newton, self._spent)  # fmt: skip
         points = [forced_point(self.balance, f.point.solution, "point", f.index, f.p, 0.0) for f in made if f.converged]  # fmt: skip
         lost = len(made) - len(points)
-        end = f"{lost} points were not found" if lost else "it reaches the end of the range"
+        end = f"{lost} points were not found" if lost else WHOLE
+        if not made or made[-1].p != self.problem.sweep.omega_range[1]:
+            end = SPENT
         return self._stage("branch", -1, "sweep", points, end)
 
     def _branch(self, place: int, origin: Origin, x: FloatArray, omega: float) -> Stage:
@@ -181,7 +188,14 @@ class _Search:
         following = following_vibration(self.balance, steps_through(high - low, search.points), search.newton)  # fmt: skip
         first = start_point(self.balance, x, omega, following)
         most = LONGEST * search.points
-        points, end = both_ways(self.problem, self.balance, following, first, most)
+        points, end = both_ways(
+            self.problem,
+            self.balance,
+            following,
+            first,
+            most,
+            lambda: SPENT if self._spent() else "",
+        )
         return self._stage("branch", place, origin, points, end)
 
     def _stage(
@@ -267,16 +281,17 @@ class _Search:
         if why or not solutions or not search.starts:
             yield self._kept(self._stage("starts", place, "time", (), why))
             return
-        stepping = TimeStepping(steps_per_period=search.steps, max_periods=search.most_periods, harmonics=self.order, tolerance=1e-4)  # fmt: skip
+        stepping = TimeStepping(steps_per_period=search.steps, max_periods=search.most_periods, harmonics=self.order, tolerance=1e-4, every_harmonic=True)  # fmt: skip
         linear = self.problem.low.linear
-        motions = [linear.recover(omega, self.balance.coefficients(x)) for x in solutions]
+        # as they were known when the starts began: an interrupted search draws the same states again
+        motions = [linear.recover(omega, self.balance.coefficients(x)) for _, x in self._at(omega, place)]  # fmt: skip
         own = sampler(self.problem, omega, motions, search.modes, search.spread)
-        ends: list[ComplexArray] = []
+        ends: list[tuple[int, ComplexArray]] = []
         states = drawn(own, search.seed, place)
         while len(ends) < search.starts and not self._spent():
             found = in_time(own, next(states), stepping)
             rows = found.harmonics[:, : self.balance.linear.n]
-            ends.append(rows if found.settled else np.full_like(rows, np.nan))
+            ends.append(({"settled": PERIODIC, "unsettled": APERIODIC, "diverged": DIVERGED}[found.status], rows))  # fmt: skip
             if found.settled and self._nearest(rows, solutions) < 0:
                 solved = newton(lambda v: self.balance.linearise(v, omega), self.balance.unknowns(rows), search.newton)  # fmt: skip
                 new = solved.status.converged and not self._known(solved.x, solutions)
@@ -284,7 +299,7 @@ class _Search:
                     yield self._kept(self._branch(place, "time", solved.x, omega))
                     solutions = [x for _, x in self._at(omega)]
         made = self._stage("starts", place, "time", (), "" if len(ends) == search.starts else SPENT)
-        numbers = [APERIODIC if np.isnan(e).any() else self._nearest(e, solutions) for e in ends]
+        numbers = [self._nearest(e, solutions) if why == PERIODIC else why for why, e in ends]
         yield self._kept(replace(made, branch=np.array(numbers, dtype=np.int64), tries=len(ends)))
 
     def _apart(self, rows: ComplexArray, x: FloatArray) -> float:
@@ -313,5 +328,17 @@ class _Search:
             branch=np.array([number for number, _ in found], dtype=np.int64),
             multiplier=np.array([np.nan if j is None else j.multiplier for j in judged]),
             error=np.array([np.nan if j is None else j.multiplier_error for j in judged]),
+            change=np.array([self._change(p) for p in points]),
             words=";".join("not examined" if j is None else j.verdict for j in judged),
         )
+
+    def _change(self, point: ForcedPoint) -> float:
+        """Return what more harmonics would change in a motion, relative to its vibration."""
+        more = corrected(self.problem, point)
+        if more is None:
+            return np.inf
+        high, factor = more
+        change = high.coefficients[1:].copy()
+        change[: point.order] -= point.coefficients[1:]
+        size = max(float(np.linalg.norm(point.coefficients[1:])), np.finfo(float).tiny)
+        return factor * float(np.linalg.norm(change)) / size

@@ -30,6 +30,13 @@ CLOSED = (
 FEWEST = 6  # points before which it does not
 TURNS = 24  # points that lie within a share of the longest step where a corner holds a branch
 SHORT = 0.02  # that share
+CLOSES = "it closes in itself"
+LEAVES = "it leaves the range of frequencies"
+
+
+def _never() -> str:
+    """Return no reason to end a branch."""
+    return ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,10 +220,18 @@ def subharmonic_branch(
 
 
 def both_ways(
-    problem: ForcedProblem, balance: Balance, following: Following, first: Point, points: int
+    problem: ForcedProblem,
+    balance: Balance,
+    following: Following,
+    first: Point,
+    points: int,
+    over: Callable[[], str] = _never,
 ) -> tuple[list[ForcedPoint], str]:
-    """Follow a branch from one of its points to both sides; return at most so many points in their order, and why they end."""
-    way = _Way(problem, balance, following, points)
+    """Follow a branch from one of its points to both sides; return at most so many points in their order, and why they end.
+
+    `over` is asked before each step, and ends the branch with what it says.
+    """
+    way = _Way(problem, balance, following, points, over)
     upward, end = way.followed(first, way.closes(first))
     ends = [end]
     downward: list[Point] = []
@@ -224,10 +239,9 @@ def both_ways(
         left = replace(way, points=points - len(upward) + 1)
         downward, other = left.followed(reversed_point(first), None)
         ends.insert(0, other)
-    return [way.point(p) for p in (*downward[:0:-1], *upward)], "; ".join(ends)
+    return [way.point(p) for p in (*downward[:0:-1], *upward)], "; ".join(dict.fromkeys(ends))
 
 
-CLOSES = "it closes in itself"
 Stop = Callable[[Point, Point], str]
 
 
@@ -239,6 +253,7 @@ class _Way:
     balance: Balance
     following: Following
     points: int
+    over: Callable[[], str] = _never
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -257,7 +272,9 @@ class _Way:
             here = found[-1]
             end = high if here.tangent[-1] > 0.0 else low
             if not low < here.p < high:
-                return found, "it leaves the range of frequencies"
+                return found, LEAVES
+            if why := self.over():
+                return found, why
             after = advance(self.balance, here, end, self.following)
             if not after.solution.status.converged:
                 return found, f"lost at {here.p * self._load / HZ:.6g} Hz ({after.solution.status.advice})"  # fmt: skip

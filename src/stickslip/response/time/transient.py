@@ -47,6 +47,9 @@ class TimeStepping:
         Highest harmonic reported.
     min_periods
         Go on for so many periods, however settled the motion is: a disturbance may need them to show.
+    every_harmonic
+        Judge all reported harmonics but the mean, not those that the load drives alone: of a motion over several periods of the load the
+        others hold what is its own.
     """
 
     steps_per_period: int = quantity("steps in a period", default=1024, least=16, most=MOST_STEPS)
@@ -54,6 +57,7 @@ class TimeStepping:
     tolerance: float = quantity("relative change, 1e-5 is usual", default=1e-5, above=0, below=1)
     harmonics: int = quantity("highest harmonic reported", default=7, least=1)
     min_periods: int = quantity("periods at least", default=1, least=1)
+    every_harmonic: bool = False
 
     def __post_init__(self) -> None:
         check_quantities(self)
@@ -189,7 +193,8 @@ def integrate(  # noqa: PLR0913
     start = start or rest(marcher.n, laws)
     check_start(start, marcher.n, marcher.contacts, "integrate")
     driven = tuple(h for h, f in sorted(load.harmonics.items()) if 0 < h <= stepping.harmonics and np.any(f))  # fmt: skip
-    return _settle(marcher, marcher.begun(start), outputs, stepping, driven or (1,))
+    judged = tuple(range(1, stepping.harmonics + 1)) if stepping.every_harmonic else driven or (1,)
+    return _settle(marcher, marcher.begun(start), outputs, stepping, judged)
 
 
 def _settle(

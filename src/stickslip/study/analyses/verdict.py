@@ -63,7 +63,8 @@ class Verdict:
     @property
     def finding(self) -> str:
         """The verdict in words, but for its level and what to do."""
-        place = "" if self.frequency_hz is None else f"{self.frequency_hz:.2f} Hz: "
+        hertz = self.frequency_hz
+        place = "" if hertz is None else f"{hertz:.2f} Hz: " if hertz >= 1.0 else f"{hertz:.4g} Hz: "  # fmt: skip
         return said(self.case, f"{place}{self.why}.")
 
     @property

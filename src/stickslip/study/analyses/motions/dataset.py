@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stickslip.response.all_motions.basins import APERIODIC, PERIODIC
+from stickslip.response.all_motions.basins import APERIODIC, DIVERGED, PERIODIC
 from stickslip.response.all_motions.found import AllMotions, AtFrequency
 from stickslip.study.analyses.analysis import Solved
 from stickslip.study.analyses.collected import Variables, of_cases, rows
@@ -39,15 +39,21 @@ ABOUT = {
     "isola": ("branch", "1", "1: it closes in itself, and no sweep meets it"),
     "peak_amplitude": ("branch", "m", "its largest amplitude"),
     "peak_hz": ("branch", "Hz", "frequency there"),
+    "lowest_hz": ("branch", "Hz", "its lowest frequency"),
+    "highest_hz": ("branch", "Hz", "its highest frequency"),
     "searched_hz": ("searched", "Hz", "frequencies that were searched"),
     "starts": ("searched", "1", "random states that were integrated in time"),
     "aperiodic": ("searched", "1", "those that end on no motion of the load's period, or on none in the periods allowed"),
+    "diverged": ("searched", "1", "those that grow without bound"),
+    "searched_tries": ("searched", "1", "deflated solves at the frequency"),
+    "searched_spent": ("searched", "1", "1: the budget ended the deflation or the starts there"),
     "unsolved": ("searched", "1", "those that end on a periodic motion which is no solution with the harmonics kept"),
     "motion_branch": ("searched motion", "1", "branch of each motion; -1 where there are no more"),
     "motion_amplitude": ("searched motion", "m", "its amplitude"),
     "motion_stability": ("searched motion", "1", "stable, unstable, undecided or not examined"),
     "motion_multiplier": ("searched motion", "1", "modulus of the multiplier that decides"),
     "motion_multiplier_error": ("searched motion", "1", "its error"),
+    "motion_change": ("searched motion", "1", "what more harmonics would change in it, relative to its vibration; infinite where no motion with more is near"),
     "motion_count": ("searched motion", "1", "starts that end on it; -1 where there is no motion"),
     "motion_share": ("searched motion", "1", "share of the starts that ends on it"),
     "motion_share_low": ("searched motion", "1", "lower end of its 95 % interval (Clopper and Pearson)"),
@@ -71,6 +77,8 @@ def noted(found: AllMotions, budget: float) -> dict[str, Any]:
         "isola": np.array([int(b.isola) for b in own]),
         "peak_amplitude": np.array([b.peak for b in own]),
         "peak_hz": np.array([b.peak_omega / HZ for b in own]),
+        "lowest_hz": np.array([b.extent[0] / HZ for b in own]),
+        "highest_hz": np.array([b.extent[1] / HZ for b in own]),
         **_at(found.at),
         "tries": found.tries,
         "seconds": found.seconds,
@@ -83,7 +91,7 @@ def noted(found: AllMotions, budget: float) -> dict[str, Any]:
 def _at(places: Sequence[AtFrequency]) -> Mapping[str, Any]:
     """Return what was found at the frequencies that were searched."""
     shape = (len(places), max((len(at.motions) for at in places), default=0))
-    numbers = ("amplitude", "multiplier", "multiplier_error", "share", "share_low", "share_high")
+    numbers = ("amplitude", "multiplier", "multiplier_error", "change", "share", "share_low", "share_high")  # fmt: skip
     out: dict[str, Any] = {f"motion_{n}": np.full(shape, np.nan) for n in numbers}
     out |= {"motion_branch": np.full(shape, -1), "motion_count": np.full(shape, -1)}
     words = [[""] * shape[1] for _ in places]
@@ -93,7 +101,7 @@ def _at(places: Sequence[AtFrequency]) -> Mapping[str, Any]:
             low, high = at.basins.interval(k)
             told_of = {
                 "branch": motion.branch, "amplitude": motion.amplitude, "multiplier": motion.multiplier,
-                "multiplier_error": motion.error, "count": at.basins.count(k), "share": at.basins.share(k),
+                "multiplier_error": motion.error, "change": motion.change, "count": at.basins.count(k), "share": at.basins.share(k),
                 "share_low": low, "share_high": high,
             }  # fmt: skip
             for name, value in told_of.items():
@@ -104,5 +112,8 @@ def _at(places: Sequence[AtFrequency]) -> Mapping[str, Any]:
         "searched_hz": np.array([at.omega / HZ for at in places]),
         "starts": np.array([len(at.basins.ends) for at in places]),
         "aperiodic": np.array([at.basins.count(APERIODIC) for at in places]),
+        "diverged": np.array([at.basins.count(DIVERGED) for at in places]),
+        "searched_tries": np.array([at.tries for at in places]),
+        "searched_spent": np.array([int(at.spent) for at in places]),
         "unsolved": np.array([at.basins.count(PERIODIC) for at in places]),
     }

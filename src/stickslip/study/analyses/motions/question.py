@@ -9,6 +9,8 @@ import numpy as np
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
 from stickslip.errors import InputError, input_error
+from stickslip.harmonic.linear import one_structure
+from stickslip.response.all_motions.basins import not_marched
 from stickslip.response.all_motions.options import MotionSearch, search_problem
 from stickslip.response.forced.problem import ForcedProblem
 from stickslip.study.analyses.analysis import Case
@@ -79,9 +81,23 @@ def question_of(case: Case, model: Model) -> Question:
         seed=asked.seed,
         evaluator=case.settings.solver.evaluator,
     )
+    _refuse_modes(asked, assembled)
     question = Question(case.label, assembled, search, facts_of(model, model.speed / RPM))
     try:
         _ = question.problem
     except InputError as error:
         raise error.inside("all_motions") from None
     return question
+
+
+def _refuse_modes(asked: AllMotionsTable, model: Assembled) -> None:
+    """Refuse more modes than what is marched has, where they were asked for."""
+    if not_marched(model.system) or not asked.starts or "modes" not in asked.model_fields_set:
+        return
+    most = one_structure(model.system.structure, "all_motions").n
+    if asked.modes > most:
+        raise input_error(
+            "all_motions.modes",
+            f"is {asked.modes}, more than the degrees of freedom of the model as it is integrated in time: {most}",
+            f"Give {most} at most, or leave it out.",
+        )

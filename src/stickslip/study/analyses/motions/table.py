@@ -25,7 +25,7 @@ class AllMotionsTable(Section):
     )
     budget_s: Positive = Field(
         120.0,
-        description="budget in seconds: nothing new begins after it; deflation leaves half of it to time integration",
+        description="budget in seconds of the clock: nothing new begins after it, branches end; deflation leaves half of it to time integration",
     )
     harmonics: int = Field(
         7, ge=1, le=HIGHEST, description=f"harmonics that are kept, 1 to {HIGHEST}"
@@ -47,7 +47,7 @@ class AllMotionsTable(Section):
         2,
         ge=1,
         le=1000,
-        description="lowest modes, contacts stuck, in which the random states are drawn",
+        description="lowest modes, contacts stuck, in which the random states are drawn; no more than there are degrees of freedom",
     )
     spread: Positive = Field(
         1.5,
@@ -65,8 +65,10 @@ class AllMotionsTable(Section):
         le=1_000_000,
         description="periods after which a start that does not settle is given up",
     )
-    steps: int = Field(512, ge=32, le=100_000, description="time steps in a period")
-    seed: int = Field(0, ge=0, description="of the random states and starts")
+    steps: int = Field(512, ge=32, le=100_000, description="time steps in a period of the motion")
+    seed: int = Field(
+        0, ge=0, description="a whole number that the random states and starts are made from"
+    )
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
@@ -80,10 +82,12 @@ class AllMotionsTable(Section):
                 "Widen the range, or leave it out.",
                 "at_hz",
             )
-        if 2 * self.harmonics >= self.steps:
+        least = 2 * self.periods * self.harmonics
+        if least >= self.steps:
+            over = f" over periods = {self.periods}" if self.periods > 1 else ""
             raise custom_error(
-                f"is {self.steps}, too few for {self.harmonics} harmonics",
-                f"Give more than {2 * self.harmonics}.",
+                f"is {self.steps}, too few for {self.harmonics} harmonics{over}",
+                f"Give more than {least}.",
                 "steps",
             )
         return self

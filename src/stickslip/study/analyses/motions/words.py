@@ -5,11 +5,17 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
+from stickslip.response.all_motions.basins import ALIKE
+from stickslip.response.all_motions.found import SPENT
+from stickslip.response.all_motions.search import WHOLE
+from stickslip.response.bifurcations.side_branch import CLOSES, LEAVES
 from stickslip.study.analyses.analysis import TextTable
 from stickslip.study.analyses.collected import told_apart
 from stickslip.study.analyses.verdict import Verdict
 
 HIGHER = 1.001  # times the swept peak, from where a branch is said to reach higher
+CHANGED = ALIKE  # relative change by more harmonics from which it is said: starts in time are told apart by as much
+NAMED = 5  # frequencies
 
 
 def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
@@ -21,8 +27,9 @@ def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
     tries, starts = int(case["tries"].values), int(np.sum(case["starts"].values))
     work = f"{tries} deflated solves and {starts} starts in time in {seconds:.3g} s"
     if int(case["spent"].values):
-        why = f"the budget of {budget:.4g} s ended the search: {work}"
+        why = f"the budget of {budget:.4g} s ended the search: {work}{_untried(case)}"
         found.append(Verdict("doubtful", label, None, why, "Raise all_motions.budget_s."))
+    found += [*_unfinished(label, case), *_harmonics(label, case)]
     unmarched = str(case["unmarched"].values)
     if unmarched:
         why = f"what attracts is not known: {unmarched}"
@@ -36,6 +43,48 @@ def case_verdicts(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
         isolas = int(np.sum(case["isola"].values))
         why = f"{_counted(count, 'branch', 'branches')}, {_counted(isolas, 'isola', 'isolas')} among them, by {work}; no search proves that there is no other motion"
         found.append(Verdict("trusted", label, None, why))
+    return found
+
+
+def _untried(case: Mapping[str, xr.Variable]) -> str:
+    """Return at which frequencies the budget left something untried."""
+    hertz = case["searched_hz"].values[case["searched_spent"].values > 0]
+    if not hertz.size:
+        return ""
+    named = ", ".join(f"{f:.6g}" for f in hertz[:NAMED]) + ", ..." * (hertz.size > NAMED)
+    return f"; at {hertz.size} of {case['searched_hz'].size} frequencies ({named} Hz) not all was tried"
+
+
+def _unfinished(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
+    """Return the branches that are not known to their ends, and the frequencies at which no motion is known."""
+    found = []
+    for i, end in enumerate(case["end"].values):
+        if str(end) not in (CLOSES, LEAVES, WHOLE) and SPENT not in str(end):
+            why = f"branch {i + 1} ({case['origin'].values[i]}) is not known to its end: {end}"
+            found.append(Verdict("doubtful", label, None, why, "Give all_motions.points more of them, or another range."))  # fmt: skip
+    none = np.zeros((case["searched_hz"].size, 0))
+    known = case["motion_branch"].values if "motion_branch" in case else none
+    for place in np.flatnonzero(~np.any(known >= 0, axis=1) & (case["searched_spent"].values == 0)):
+        why = "no motion is known: nothing was started in time"
+        found.append(Verdict("doubtful", label, float(case["searched_hz"].values[place]), why, "Raise all_motions.tries, or change harmonics."))  # fmt: skip
+    return found
+
+
+def _harmonics(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
+    """Return what more harmonics would change in the motions that were found."""
+    if "motion_change" not in case:
+        return []
+    change = case["motion_change"].values
+    lost, off = int(np.sum(np.isinf(change))), np.isfinite(change) & (change > CHANGED)
+    found = []
+    if lost:
+        why = f"{_counted(lost, 'motion', 'motions')} with no motion of more harmonics nearby: with these {'it' if lost == 1 else 'they'} may not exist"
+        found.append(Verdict("doubtful", label, None, why, "Raise all_motions.harmonics."))
+    if np.any(off):
+        at = int(np.nanargmax(np.max(np.where(off, change, 0.0), axis=1)))
+        largest, count = float(np.max(change[off])), int(np.sum(off))
+        why = f"more harmonics would change {_counted(count, 'motion', 'motions')} by up to {100 * largest:.2g} %, at {case['searched_hz'].values[at]:.6g} Hz"
+        found.append(Verdict("doubtful", label, None, why, "Raise all_motions.harmonics."))
     return found
 
 
@@ -66,6 +115,10 @@ def _basins(label: str, case: Mapping[str, xr.Variable]) -> list[Verdict]:
         if aperiodic > 0:
             why = f"{aperiodic} of {starts} starts end on no motion of the load's period within the periods allowed"
             found.append(Verdict("trusted", label, float(hertz[i]), why, "Ask for all_motions.periods = 2 or 3, or raise all_motions.most_periods.", warns=True))  # fmt: skip
+        diverged = int(case["diverged"].values[i])
+        if diverged > 0:
+            why = f"{diverged} of {starts} starts grow without bound"
+            found.append(Verdict("trusted", label, float(hertz[i]), why, "Look for negative damping or stiffness, or lower all_motions.spread.", warns=True))  # fmt: skip
         found += _not_reached(label, case, i)
         if not np.any(np.isfinite(share[i])):
             continue
@@ -124,7 +177,8 @@ def _table(case: xr.Dataset, head: str) -> TextTable:
             )
     title = f"{head}Motions of {case.attrs.get('output', '')}"
     lines = [
-        f"Branch {i + 1} ({case['origin'].values[i]}): up to {1e3 * peak:.6g} mm at {case['peak_hz'].values[i]:.6g} Hz; {case['end'].values[i]}"
+        f"Branch {i + 1} ({case['origin'].values[i]}): {case['lowest_hz'].values[i]:.6g} to {case['highest_hz'].values[i]:.6g} Hz, "
+        f"up to {1e3 * peak:.6g} mm at {case['peak_hz'].values[i]:.6g} Hz; {case['end'].values[i]}"
         for i, peak in enumerate(case["peak_amplitude"].values)
     ]
     budget = (
