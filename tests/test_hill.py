@@ -141,6 +141,41 @@ def test_a_mode_above_all_harmonics_is_not_counted_as_stable():
     assert found.missing is None
 
 
+def above_its_harmonics(slow, fast):
+    """Two modes that close a stop together, at 1.3 and 40 times the frequency of the motion, with these damping coefficients."""
+    two = Dofs(np.arange(2), ("x", "y"), np.zeros((2, 3)))
+    structure = Structure(np.eye(2), np.diag([slow, fast]), np.diag([1.69, 1600.0]), two)
+    interface = Interface(("s",), (UnilateralSpring(k_n=1.0e3, initial_gap=0.1),), np.array([[0.0, 0.0], [0.0, 0.0], [0.1, 1.0]]))  # fmt: skip
+    gaps = np.zeros((3, 3), dtype=complex)
+    gaps[1, 2], gaps[2, 2] = 0.7, 0.1j
+    system = System(structure, interface, np.array([0]))
+    exact = motion_stability(structure, interface, to_real(gaps), 1.0).floquet.multipliers
+    return system, gaps, exact
+
+
+def test_a_mode_that_contacts_feed_above_all_harmonics_makes_the_count_unknown():
+    """Its stiffness changes where the stop is met: it may grow unless its damping takes more in a period than these changes can give."""
+    system, gaps, exact = above_its_harmonics(0.02, 0.002)
+    assert hill_exponents(system, gaps, 1.0, 13).missing is None
+    found = hill_exponents(system, gaps, 1.0)  # with as many harmonics as the mode has
+    assert found.missing == 0
+    assert apart(exact, found.multipliers, 0.9) < 2e-2
+    system, gaps, exact = above_its_harmonics(0.02, 1.0)
+    found = hill_exponents(system, gaps, 1.0, 13)
+    assert found.missing == 0
+    assert apart(exact, found.multipliers, 0.7) < 5e-3
+
+
+def test_what_grows_is_known_where_the_count_is_not():
+    system, gaps, exact = above_its_harmonics(-0.1, 0.002)
+    found = hill_exponents(system, gaps, 1.0, 13)
+    assert found.missing is None
+    grows = np.abs(found.multipliers) > 1.0
+    said = 2 * np.pi * np.abs(found.multipliers) * found.errors
+    assert np.count_nonzero(grows) == 1
+    assert apart(found.multipliers[grows], exact, 1.0) < said[grows][0] < 0.2
+
+
 def test_verdicts_are_those_of_the_monodromy():
     problem, points = stopped(3)
     compared = 0

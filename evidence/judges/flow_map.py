@@ -20,7 +20,7 @@ ANGLE = 0.3  # of the fastest vibration, rad, in a step
 SMALL = 1e-7  # disturbance over the vibration
 SETTLING = 3  # periods after which the contacts repeat
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
-LOST = 20000  # steps after which a march is given up
+LOST = 20000  # steps beyond those of a march without changes, after which it is given up
 BISECTIONS = 60
 ROUND_OFF = 2e-15
 T, W, N, MU, PRELOAD, RESIDUAL, UNILATERAL = range(7)  # columns of the elements
@@ -276,7 +276,7 @@ def _march(begin, finish, step, y, a, b, c, model, modes, places):  # type: igno
     stages, end = np.zeros((12, 2 * n)), np.empty(2 * n)
     margins = np.empty((2, elements.shape[0], 3))
     tau, changes = begin, 0
-    for _ in range(LOST):
+    for _ in range(LOST + int((finish - begin) / step)):
         if tau >= finish:
             return changes
         h = min(step, finish - tau)

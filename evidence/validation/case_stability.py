@@ -6,11 +6,8 @@
 judges the multipliers to its accuracy; shooting finds the motion itself, and the balance is compared with 20 harmonics.
 """
 
-import argparse
-import json
 from collections import Counter
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 from time import process_time
 
 import numpy as np
@@ -19,6 +16,7 @@ from evidence.benchmarks.robustness import OutOfTimeError, at_most
 from evidence.judges.flow_map import FlowMap, judged
 from evidence.models.random_motions import Motion, random_motion
 from evidence.validation.compare import Record, bound, record
+from evidence.validation.going_on import go_on
 from stickslip.arrays import ComplexArray
 from stickslip.errors import StickslipError
 from stickslip.response.forced.problem import ForcedPoint
@@ -29,7 +27,6 @@ from stickslip.response.time.transient import TimeStepping
 
 CASE = "Stability of random motions"
 SOURCE = "differences of an independent flow map with located events"
-KEPT = Path(__file__).parent / "out" / "stability.jsonl"
 FEW = 10
 FLOW_SECONDS, SHOOTING_SECONDS = 40.0, 40.0  # CPU, of a motion
 STEPS = (2048, 4096)
@@ -204,13 +201,6 @@ def outcome(seed: int, number: int) -> Outcome:
     )  # fmt: skip
 
 
-def kept(path: Path = KEPT) -> list[Outcome]:
-    """Return the outcomes that a file holds."""
-    if not path.exists():
-        return []
-    return [Outcome(**json.loads(line)) for line in path.read_text().splitlines()]
-
-
 def table(outcomes: list[Outcome]) -> str:
     """Return what came out, in lines."""
     motions = [o for o in outcomes if o.dofs]
@@ -259,25 +249,5 @@ def run() -> list[Record]:
     ] + [record(CASE, "other verdicts", sum(o.disagrees for o in flow), 0.0, 0.0, SOURCE)]  # fmt: skip
 
 
-def main() -> None:
-    """Go on until there are so many motions, or the time is up; print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--motions", type=int, default=200)
-    parser.add_argument("--minutes", type=float, default=60.0)
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
-    KEPT.parent.mkdir(exist_ok=True)
-    found, began = kept(), process_time()
-    number = max((o.number for o in found), default=-1) + 1
-    while sum(o.dofs > 0 for o in found) < options.motions:
-        if process_time() - began > 60.0 * options.minutes:
-            break
-        found.append(outcome(options.seed, number))
-        with KEPT.open("a") as file:
-            file.write(json.dumps(asdict(found[-1])) + "\n")
-        number += 1
-    print(table(found))
-
-
 if __name__ == "__main__":
-    main()
+    go_on("stability", __doc__, Outcome, outcome, table)

@@ -7,11 +7,8 @@ counts where it is that of the balance with 20 harmonics, which the other two th
 exponents right of the axis, or its errors reach across, it says nothing (*not known*).
 """
 
-import argparse
-import json
 from collections import Counter
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 from time import process_time
 
 import numpy as np
@@ -20,6 +17,7 @@ from evidence.benchmarks.robustness import OutOfTimeError, at_most
 from evidence.models.random_motions import Motion, random_motion
 from evidence.validation.case_stability import SAME, growth, spread
 from evidence.validation.compare import Record, record
+from evidence.validation.going_on import go_on
 from stickslip.errors import StickslipError
 from stickslip.response.forced.problem import ForcedPoint
 from stickslip.response.stability import hill_exponents
@@ -30,7 +28,6 @@ from stickslip.response.time.transient import TimeStepping
 
 CASE = "Stability in three ways"
 SOURCE = "monodromy, Hill's method and shooting"
-KEPT = Path(__file__).parent / "out" / "three_ways.jsonl"
 FEW = 10
 HILL_SECONDS, SHOOTING_SECONDS = 30.0, 10.0  # CPU, of a motion
 STEPS = 2048  # of a period
@@ -62,9 +59,9 @@ class Outcome:
 
     @property
     def hill_knows(self) -> bool:
-        """Whether Hill's method has counted, and its error is within the distance that is allowed, or does not reach the circle."""
+        """Whether its error does not reach the circle, or is within the distance that is allowed, and it has counted, or found what grows."""
         sure = abs(self.hill - 1.0) > self.error or self.error < ON_CIRCLE
-        return self.missing == 0 and sure
+        return sure and (self.missing == 0 or self.hill > 1.0 + self.error)
 
     @property
     def shot(self) -> bool:
@@ -155,13 +152,6 @@ def outcome(seed: int, number: int) -> Outcome:
     )  # fmt: skip
 
 
-def kept(path: Path = KEPT) -> list[Outcome]:
-    """Return the outcomes that a file holds."""
-    if not path.exists():
-        return []
-    return [Outcome(**json.loads(line)) for line in path.read_text().splitlines()]
-
-
 def table(outcomes: list[Outcome]) -> str:
     """Return what came out, in lines."""
     motions = [o for o in outcomes if o.dofs]
@@ -203,25 +193,5 @@ def run() -> list[Record]:
     ]  # fmt: skip
 
 
-def main() -> None:
-    """Go on until there are so many motions, or the time is up; print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--motions", type=int, default=200)
-    parser.add_argument("--minutes", type=float, default=60.0)
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
-    KEPT.parent.mkdir(exist_ok=True)
-    found, began = kept(), process_time()
-    number = max((o.number for o in found), default=-1) + 1
-    while sum(o.dofs > 0 for o in found) < options.motions:
-        if process_time() - began > 60.0 * options.minutes:
-            break
-        found.append(outcome(options.seed, number))
-        with KEPT.open("a") as file:
-            file.write(json.dumps(asdict(found[-1])) + "\n")
-        number += 1
-    print(table(found))
-
-
 if __name__ == "__main__":
-    main()
+    go_on("three_ways", __doc__, Outcome, outcome, table)

@@ -28,7 +28,7 @@ FACTOR, MORE = 2, 3  # disturbances have FACTOR times the harmonics of the motio
 LEAST, MOST = 8, 20  # at least and at most these,
 ROWS = 1300  # and no more than make matrices of so many rows,
 FEWEST = 5  # but these
-MUCH = 700  # rows up to which their number is doubled where those beyond matter
+MUCH = 700  # rows up to which their number is doubled where those beyond matter, and up to which modes ring in one that contacts may make grow
 CHEAP = 400  # rows up to which harmonics are added until every mode rings in one
 SMALL = 700  # rows up to which all waves of a wheel are compared with those of the motion as it was solved; else
 ABOVE = 3e-4  # of a multiplier: what modes may do that ring above all harmonics that are solved; measured: 9e-5
@@ -62,8 +62,13 @@ class HillStability:
     @property
     def reason(self) -> str:
         """What the verdict rests on."""
+        if self.stability.verdict == "unstable":
+            return self.stability.reason
         if self.missing is None:
-            return "Hill's method did not count the multipliers outside the unit circle: its polynomial is too far from the contacts, or rounding made more transitions than there can be"
+            return (
+                "Hill's method did not count the multipliers outside the unit circle: contacts may make a mode grow that rings above the harmonics "
+                "solved, its polynomial is too far from the contacts, or rounding made more transitions than there can be"
+            )
         if self.missing:
             return f"{self.missing} multipliers outside the unit circle were counted that Hill's method did not find"
         return self.stability.reason
@@ -140,7 +145,8 @@ def _refined(hill: Hill) -> tuple[Hill, Exponents]:
         deciding = np.max(found.errors[found.values.real > DECIDING], initial=0.0)
         more = replace(hill, order=2 * hill.order)
         known = found.missing == 0 and deciding < CLOSE
-        if known or more.rows > MUCH:
+        in_vain = more.order < hill.reach
+        if known or in_vain or more.rows > MUCH:
             return hill, found
         hill, found = more, exponents(more)
 
@@ -173,18 +179,20 @@ def _prepared(
     if states is None:
         return None, None
     springs, ports, tangents = contact_tangents(states)
-    own = HillSide(system, springs, ports, omega, {})
-    return Hill(own, tangents, _order(own, len(gaps) - 1) if order is None else order), states
+    hill = Hill(HillSide(system, springs, ports, omega, {}), tangents, order or 0)
+    return replace(hill, order=_order(hill, len(gaps) - 1)) if order is None else hill, states
 
 
-def _order(side: HillSide, motion: int) -> int:
-    """Return how many harmonics are solved: so many that each mode rings in one of them, if that is cheap."""
-    ports = max(side.ports.size, 1)
-    ratios = side.modes(0, 0).ratios
-    highest = int(np.ceil(np.max(ratios[np.isfinite(ratios)], initial=0.0))) + 1
+def _order(hill: Hill, motion: int) -> int:
+    """Return how many harmonics are solved: so many that each mode rings in one of them, or each that may grow, if that is cheap."""
+    ports = max(hill.side.ports.size, 1)
+    ratios = hill.side.modes(0, 0).ratios
     least = min(max(FACTOR * motion + MORE, LEAST), MOST)
-    if highest > least and (2 * highest + 1) * ports <= CHEAP:
-        return highest
+    highest = float(np.max(ratios[np.isfinite(ratios)], initial=0.0))
+    for top, rows in ((max(highest, hill.reach), CHEAP), (hill.reach, MUCH)):
+        order = int(np.ceil(top)) + 1
+        if order > least and (2 * order + 1) * ports <= rows:
+            return order
     return max(min(least, (ROWS // ports - 1) // 2), FEWEST)
 
 
@@ -224,7 +232,8 @@ def _judged(
     if np.any(ratios[np.isfinite(ratios)] > hill.order) and hill.tangents:
         errors = errors + ABOVE * np.abs(values)
     if found.missing is None or found.missing:
-        errors = np.full_like(errors, np.inf)
+        # what was not found does not make those stable that are known to grow
+        errors = np.where(np.abs(values) > 1.0, errors, np.inf)
         if not values.size:
             values, errors = np.array([np.nan + 0j]), np.array([np.inf])
     own = Stability(Floquet(values), errors, states.resting, states.grazing, states.transitions)

@@ -187,20 +187,6 @@ class HillSide:
             self.known[number] = self._made(number)
         return self.known[number]
 
-    def lowers(self, order: int) -> bool:
-        """Say whether contacts that let go bring a mode from above the harmonics up to `order` down to the lower half of them.
-
-        Such a mode rings for a part of the period, where the others would only know its receptance.
-        """
-        springs = self.springs.copy()
-        springs[self.ports] = 0.0
-        loose = replace(self, springs=springs, known={})
-        return any(
-            np.count_nonzero(loose.modes(wave, 0).ratios < 0.5 * order)
-            > np.count_nonzero(self.modes(wave, 0).ratios <= order)
-            for wave in range(self.waves // 2 + 1)
-        )
-
     def _made(self, number: int) -> HillModes:
         side, gaps = self.system.structure, self.system.interface.gap_operator
         if not isinstance(side, TunedWheel):

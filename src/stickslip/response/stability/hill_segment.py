@@ -15,6 +15,7 @@ import scipy.linalg
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.response.stability.contact_tangent import ContactTangent
+from stickslip.response.stability.hill_fast import reach
 from stickslip.response.stability.hill_modes import HillModes, HillSide
 
 NODES = 8  # of the polynomial through a segment of half a frequency
@@ -46,6 +47,11 @@ class Hill:
     side: HillSide
     tangents: Sequence[ContactTangent]
     order: int
+
+    @cached_property
+    def reach(self) -> float:
+        """Number of harmonics up to which modes ring that contacts may make grow."""
+        return reach(self.side, self.tangents)
 
     @property
     def rows(self) -> int:

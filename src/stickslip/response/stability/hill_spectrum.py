@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.response.stability.hill_segment import HALF, Hill, Segment, fitted
 from stickslip.response.stability.hill_zeros import Matrix, Zeros, turning, zeros_near
 
@@ -19,6 +19,9 @@ EDGE = 5e-3  # beyond the ends of a segment that exponents may lie
 ON_AXIS = 1.6e-7  # real part up to which an exponent is on the imaginary axis
 PATH = 65  # values of a determinant along a segment
 STEPS = (0.4, 0.8, 1.2, 1.6, 2.0, 2.5, 3.0)  # real parts of segments where exponents are missing
+FURTHER = 1.25  # times the harmonics for an exponent that is solved again where others are missing,
+TRIES = 3  # of so many that grow,
+UNCOUNTED = 3e-3  # and what modes that ring above may change in it; measured: 1.4e-3
 TWIN = 1e-5  # distance of an exponent that two segments have found
 WHOLE = 0.05  # farther from a whole number the turns of a determinant are no count
 
@@ -36,7 +39,8 @@ class Exponents:
     waves, harmonics
         (e,) wave numbers of the disturbances, and the harmonic in which they vibrate most.
     missing
-        How many more lie right of the imaginary axis than were found; None where they could not be counted.
+        How many more lie right of the imaginary axis than were found; None where they could not be counted. Then that which grows most
+        among those that more harmonics confirm is the only one right of the axis.
     """
 
     values: ComplexArray
@@ -53,12 +57,16 @@ class Exponents:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Exponents about a segment of a wave."""
+    """Exponents about a segment."""
 
-    wave: int
+    segment: Segment
     values: ComplexArray
     errors: FloatArray
     harmonics: IntArray
+
+    def taken(self, which: BoolArray | IntArray) -> "Part":
+        """Return some of them."""
+        return Part(self.segment, self.values[which], self.errors[which], self.harmonics[which])
 
 
 def exponents(hill: Hill, segments: Sequence[Segment] = ()) -> Exponents:
@@ -75,8 +83,30 @@ def exponents(hill: Hill, segments: Sequence[Segment] = ()) -> Exponents:
         if _growing(parts, hill) >= (growing or 0):
             break
         parts += [_zeros(replace(segment, growth=growth)) for segment in axis]
-    missing = None if growing is None else max(0, growing - _growing(parts, hill))
-    return _gathered(parts, hill, missing)
+    if _growing(parts, hill) == growing:
+        return _gathered(parts, hill, 0)
+    parts = _confirmed(parts)
+    left = None if growing is None else growing - _growing(parts, hill)
+    return _gathered(parts, hill, left if left is None or left >= 0 else None)
+
+
+def _confirmed(parts: list[Part]) -> list[Part]:
+    """Return the parts with no exponent right of the axis but that which grows most among those that more harmonics confirm."""
+    growing = [(i, int(j)) for i, p in enumerate(parts) for j in np.flatnonzero(p.values.real > ON_AXIS)]  # fmt: skip
+    growing.sort(key=lambda at: -parts[at[0]].values[at[1]].real)
+    out = [p.taken(p.values.real <= ON_AXIS) for p in parts]
+    for i, j in growing[:TRIES]:
+        own = parts[i].taken(np.array([j]))
+        hill = own.segment.hill
+        more = replace(own.segment, hill=replace(hill, order=int(np.ceil(FURTHER * hill.order))))
+        again = _solved(more, complex(own.values[0]))
+        if again is None:
+            continue
+        off = abs(again[0] - own.values[0])
+        if off > 0.5 * own.values[0].real:
+            continue
+        return [*out, replace(own, errors=own.errors + 2.0 * off + UNCOUNTED)]
+    return out
 
 
 def segments_of(hill: Hill) -> list[Segment]:
@@ -100,12 +130,12 @@ def _counted(axis: Sequence[Segment]) -> int | None:
 
 
 def _rings(axis: Sequence[Segment]) -> bool:
-    """Return whether a mode rings in a harmonic that is solved, and contacts lower none from above them all."""
+    """Return whether a mode rings in a harmonic that is solved, and contacts can make none grow that rings above them all."""
     hill = axis[0].hill
     if not hill.tangents:
         return True
     rings = any(own.size for segment in axis for own in segment.slow)
-    return rings and not hill.side.lowers(hill.order)
+    return rings and hill.order >= hill.reach
 
 
 def _turns(segment: Segment) -> tuple[float, int]:
@@ -138,7 +168,7 @@ def _zeros(segment: Segment) -> Part:
         value, right, left = found.values[i], found.right[i], found.left[i]
         change, slope = beyond[i], found.slopes[i]
         if beside[i] > SURE or segment.growth:
-            again = _solved(segment, complex(value), found.scale)
+            again = _solved(segment, complex(value))
             if again is None:
                 continue
             value, right, left, change, slope = again
@@ -146,7 +176,7 @@ def _zeros(segment: Segment) -> Part:
         errors.append(abs(np.vdot(left, change @ right) / slope))
         most.append(harmonic[np.argmax(np.abs(right))])
     return Part(
-        segment.wave,
+        segment,
         np.array(values, dtype=complex),
         np.array(errors, dtype=float),
         np.array(most, dtype=np.int64),
@@ -154,12 +184,13 @@ def _zeros(segment: Segment) -> Part:
 
 
 def _solved(
-    segment: Segment, sigma: complex, scale: FloatArray
+    segment: Segment, sigma: complex
 ) -> tuple[complex, ComplexArray, ComplexArray, ComplexArray, complex] | None:
     """Return an exponent by Newton's method on the matrix itself, with its vectors, the part of harmonics beyond and the slope; None where there is none."""
     start = sigma
     for _ in range(ROUNDS):
         here, beside = segment.node(sigma), segment.node(sigma + STEP)
+        scale = np.max(np.abs(here.whole), axis=1, keepdims=True)
         whole = here.whole / scale
         u, _, vh = np.linalg.svd(whole)
         right, left = vh[-1].conj(), u[:, -1]
@@ -207,7 +238,7 @@ def _gathered(parts: list[Part], hill: Hill, missing: int | None) -> Exponents:
     """Return all exponents with their conjugates, each once, that which grows most first."""
     waves = hill.side.waves
     segment = np.concatenate([np.full(p.values.size, i) for i, p in enumerate(parts)])
-    wave = np.concatenate([np.full(p.values.size, p.wave) for p in parts])
+    wave = np.concatenate([np.full(p.values.size, p.segment.wave) for p in parts])
     values = np.concatenate([p.values for p in parts])
     errors = np.concatenate([p.errors for p in parts])
     harmonics = np.concatenate([p.harmonics for p in parts])
