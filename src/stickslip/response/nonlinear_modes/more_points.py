@@ -58,7 +58,7 @@ def refined(
         foretold = _numbers(backbone, load, known, here.modal_amplitude, known.index(before))
         known.insert(known.index(before) + 1, here)
         added += 1
-        off = _distance(foretold, _own_numbers(backbone, load, here))
+        off = _distance(foretold, _own_numbers(load, here))
         if off > tolerance:
             wanted += [(off, a, b) for a, b in ((before, here), (here, after)) if _far(a, b)]
             wanted.sort(key=lambda one: one[0])
@@ -112,7 +112,7 @@ def _doubted(
     for i in range(1, len(known) - 1):
         others = [*known[:i], *known[i + 1 :]]
         foretold = _numbers(backbone, load, others, known[i].modal_amplitude, i - 1)
-        off[i] = _distance(foretold, _own_numbers(backbone, load, known[i]))
+        off[i] = _distance(foretold, _own_numbers(load, known[i]))
     found = [
         (max(off[i], off[i + 1]), known[i], known[i + 1])
         for i in range(len(known) - 1)
@@ -132,7 +132,7 @@ def _numbers(
     return np.array([here.omega[0], here.ratio[0], abs(here.force[0])])
 
 
-def _own_numbers(backbone: Backbone, load: HarmonicLoad, point: ModePoint) -> FloatArray:
+def _own_numbers(load: HarmonicLoad, point: ModePoint) -> FloatArray:
     force = abs(np.vdot(point.coefficients[1], load.harmonics[1])) / point.modal_amplitude
     return np.array([point.omega, point.ratio, force])
 
