@@ -38,7 +38,6 @@ from .model.mesh.sector import BladedSector as BladedSector
 from .model.part import Part as Part
 from .model.readers.open_model import read_model as read_model
 from .model.readers.units import Units as Units
-from .model.rigid.body import RigidBody as RigidBody
 from .model.rigid.damper import FlatCurvedDamper as FlatCurvedDamper
 from .model.structure import Structure as Structure
 from .reduction.fixed_interface import craig_bampton as craig_bampton

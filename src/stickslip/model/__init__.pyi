@@ -59,6 +59,7 @@ from .readers.nastran import read_nastran_op4 as read_nastran_op4
 from .readers.nastran_dmig import read_nastran_dmig as read_nastran_dmig
 from .readers.open_model import model_summary as model_summary
 from .readers.summary import ModelSummary as ModelSummary
+from .rigid.body import RigidBody as RigidBody
 from .rigid.body import body_of_tensor as body_of_tensor
 from .rigid.damper import gap_operator as gap_operator
 from .rigid.prisms import CylinderDamper as CylinderDamper
