@@ -72,6 +72,22 @@ def run(
     workers: Annotated[
         int, typer.Option("--workers", min=1, max=256, help="Processes; the numbers stay the same.")
     ] = 1,
+    executor: Annotated[
+        str,
+        typer.Option(
+            "--executor",
+            metavar="KIND",
+            help="Let other machines that share the folder compute: dask=ADDRESS, slurm, flux; executorlib: this one.",
+        ),
+    ] = "",
+    shard: Annotated[
+        str | None,
+        typer.Option(
+            "--shard",
+            metavar="I/N",
+            help="Do this share of the jobs, as others do theirs; the last to end puts the result together.",
+        ),
+    ] = None,
     verify: Annotated[
         bool, typer.Option("--verify", help="Integrate in time at three frequencies and compare.")
     ] = False,
@@ -111,7 +127,11 @@ def run(
                 fresh=fresh,
                 verify=verify,
                 verify_harmonics=verify_harmonics,
+                executor=executor,
+                shard=shard,
             )
+        if result.waits:
+            raise typer.Exit(DONE)
         files = [*result.files, *([result.report()] if report else [])]
         _print_result(result, files)
     raise typer.Exit(NOT_CONVERGED if result.failed else DONE)

@@ -35,6 +35,8 @@ class Result:
         Number of points without a solution.
     summaries
         Of each analysis, what the terminal prints; empty for a result that was read from a file.
+    waits
+        For what it waits, of a shard that was not the last to end; empty: it is whole.
     """
 
     data: xr.DataTree
@@ -42,6 +44,7 @@ class Result:
     files: tuple[Path, ...] = ()
     failed: int = 0
     summaries: dict[str, tuple[TextTable, ...]] = field(default_factory=dict)
+    waits: str = ""
 
     @classmethod
     def open(cls, path: str | Path) -> "Result":
@@ -52,8 +55,9 @@ class Result:
     @classmethod
     def of(cls, outcome: Outcome) -> "Result":
         """Return what a run has found."""
-        path = outcome.files[0] if outcome.files else None
-        return cls(outcome.tree, path, outcome.files, outcome.failed, outcome.summaries)
+        path = outcome.files[0] if outcome.files and not outcome.waits else None
+        found = (outcome.tree, path, outcome.files, outcome.failed, outcome.summaries)
+        return cls(*found, outcome.waits)
 
     def __getitem__(self, name: str) -> xr.Dataset:
         """Return the dataset of an analysis.

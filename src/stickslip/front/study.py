@@ -1,6 +1,7 @@
 """A study file as a Python user holds it."""
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from hashlib import sha256
 from html import escape
@@ -16,6 +17,7 @@ from stickslip.study.keep.threads import one_loaded_blas_thread
 from stickslip.study.models.study import Study as Content
 from stickslip.study.models.study import read_study
 from stickslip.study.run import run_study
+from stickslip.study.shard import Shard
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +74,8 @@ class Study:
         verify: bool = False,
         verify_harmonics: bool = False,
         folder: str | Path | None = None,
+        executor: str | Executor = "",
+        shard: str | None = None,
     ) -> Result:
         """Answer the questions of the study, going on from what an interrupted run has finished.
 
@@ -90,6 +94,12 @@ class Study:
             Compare with time integration, and with twice as many harmonics.
         folder
             Where results go; left out: where the study says.
+        executor
+            What the jobs are given to: empty for this machine, ``dask=tcp://…``, ``slurm``, ``flux``, ``executorlib``, or any
+            executor like those of `concurrent.futures`, such as ``client.get_executor(pure=False)`` of a Dask client. Machines
+            share the folder.
+        shard
+            ``"2/5"``: the second of five runs that share the jobs, each started by itself.
 
         Raises
         ------
@@ -102,8 +112,17 @@ class Study:
         content = self.content
         if folder is not None:
             content = _Elsewhere(content.file, content.memo, Path(folder).resolve())
+        share = None if shard is None else Shard.read(shard)
         with by_default(workers), one_loaded_blas_thread():
-            outcome = run_study(content, only=names, workers=workers, fresh=fresh, checks=checks)
+            outcome = run_study(
+                content,
+                only=names,
+                workers=workers,
+                kind=executor,
+                shard=share,
+                fresh=fresh,
+                checks=checks,
+            )
         return Result.of(outcome)
 
     def check(self) -> tuple[str, ...]:

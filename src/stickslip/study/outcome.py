@@ -18,7 +18,12 @@ from stickslip.study.keep.provenance import Provenance
 from stickslip.study.measured_variables import with_measured
 from stickslip.study.models.measured import MeasuredPeaks
 
-UNSOLVED, CHECKED = "no solution", "checks"  # notes that the runner itself puts down
+# notes that the runner itself puts down
+UNSOLVED, ASIDE, CHECKED = "no solution", "set aside", "checks"
+NOT_SOLVED = {
+    UNSOLVED: "Check what holds the parts, and the size of the loads.",
+    ASIDE: "The same command goes on with it: give it more time or memory, or leave the case out.",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,12 +40,15 @@ class Outcome:
         Number of points without a solution.
     files
         Of the run; the result first.
+    waits
+        For what the result waits, where other runs have to put it together; empty: it is here.
     """
 
     tree: xr.DataTree
     summaries: dict[str, tuple[TextTable, ...]]
     failed: int
     files: tuple[Path, ...]
+    waits: str = ""
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
@@ -56,11 +64,18 @@ class Task:
     case: Case
     sealed: Path
 
-    def finished(self) -> bool:
-        """Whether nothing is left to do: the job is sealed, and has had the checks."""
+    def ended(self) -> bool:
+        """Whether the job is sealed, and has had the checks or was set aside."""
         if not self.sealed.exists():
             return False
-        return not self.case.checks or self.case.checks <= checked(read_note(self.sealed, CHECKED))
+        wanted = self.case.checks
+        if not wanted or wanted <= checked(read_note(self.sealed, CHECKED)):
+            return True
+        return read_note(self.sealed, ASIDE) is not None
+
+    def finished(self) -> bool:
+        """Whether nothing is left to do: the job has ended, and was not set aside."""
+        return self.ended() and read_note(self.sealed, ASIDE) is None
 
 
 def checked(note: Mapping[str, Any] | None) -> frozenset[str]:
@@ -92,7 +107,9 @@ class Book:
         node = asked.dataset(solved).assign(case_variables([s.case for s in solved]))
         if asked.name == "forced_response":
             node = with_regimes(with_measured(node, self.measured))
-        unsolved = [_unsolved(s) for s in solved if UNSOLVED in s.notes]
+        unsolved = [
+            _unsolved(s, *why) for s in solved for why in NOT_SOLVED.items() if why[0] in s.notes
+        ]
         found = (*unsolved, *asked.verdicts(node))
         for verdict in found:
             if verdict.told and verdict.sentence not in self.told:
@@ -123,10 +140,8 @@ class Book:
         )
 
 
-def _unsolved(solved: Solved) -> Verdict:
-    why = str(solved.notes[UNSOLVED]["text"])
-    remedy = "Check what holds the parts, and the size of the loads."
-    return Verdict("wrong", solved.case.label, None, why, remedy)
+def _unsolved(solved: Solved, note: str, remedy: str) -> Verdict:
+    return Verdict("wrong", solved.case.label, None, str(solved.notes[note]["text"]), remedy)
 
 
 def case_variables(cases: Sequence[Case]) -> dict[str, Any]:

@@ -2,35 +2,69 @@
 
 import json
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import Executor
 from contextlib import closing, contextmanager
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from hashlib import sha256
 from importlib.util import find_spec
+from math import inf
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from stickslip import __version__
-from stickslip.errors import InputError, SingularError, StickslipError, did_you_mean, input_error
+from stickslip.errors import InputError, did_you_mean, input_error
 from stickslip.model.mesh.solid_mesh import SolidMesh, write_mesh
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.analysis import Analysis, Case, Job, Solved, named
+from stickslip.study.jobs import Order, solve_job, worked
+from stickslip.study.keep.attempts import file_at_work, new_owner
+from stickslip.study.keep.cell import Limits, check_memory_limit
 from stickslip.study.keep.folder import JOBS, LOG_FILE, PARTS, RESULT, empty_folder, locked_folder
-from stickslip.study.keep.journal import AT_WORK, SEALED, JobJournal, read_sealed
+from stickslip.study.keep.journal import SEALED, JobJournal, read_sealed
 from stickslip.study.keep.netcdf import write_tree
-from stickslip.study.keep.progress import LOG, Interrupted, at_work, written_down
+from stickslip.study.keep.progress import LOG, Interrupted, written_down
 from stickslip.study.keep.provenance import Provenance, library_versions
 from stickslip.study.keep.store import PartStore
 from stickslip.study.keep.whole import whole_file
-from stickslip.study.keep.workers import executor
+from stickslip.study.keep.workers import check_kind
 from stickslip.study.models.study import Study
-from stickslip.study.outcome import CHECKED, UNSOLVED, Book, Outcome, Task, checked
+from stickslip.study.outcome import Book, Outcome, Task
+from stickslip.study.shard import Shard
 
-NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where the jobs of a run are worked off.
+
+    Parameters
+    ----------
+    workers
+        Number of processes; the numbers do not depend on it.
+    kind
+        What runs them, see `executor`.
+    shard
+        Which of them; None: all.
+    """
+
+    workers: int = 1
+    kind: str | Executor = ""
+    shard: Shard | None = None
+
+    def check(self, *, fresh: bool) -> None:
+        """Refuse what cannot be, before anything is computed."""
+        if self.workers < 1:
+            raise input_error(
+                "--workers", f"must be above zero, got {self.workers}", "Leave it out for one."
+            )
+        if isinstance(self.kind, str):
+            check_kind(self.kind)
+        if self.shard is not None and fresh:
+            raise input_error(
+                "--fresh",
+                "would remove what other shards have found",
+                "Leave it out, or run once with --fresh and without --shard.",
+            )
 
 
 def run_study(
@@ -38,6 +72,8 @@ def run_study(
     *,
     only: Sequence[str] = (),
     workers: int = 1,
+    kind: str | Executor = "",
+    shard: Shard | None = None,
     fresh: bool = False,
     checks: Sequence[str] = (),
 ) -> Outcome:
@@ -49,8 +85,8 @@ def run_study(
         That has been read.
     only
         Names of the analyses to answer; all of the study if empty.
-    workers
-        Number of processes; the numbers do not depend on it.
+    workers, kind, shard
+        Where the jobs are worked off, see `Place`.
     fresh
         Forget what the results folder holds.
     checks
@@ -63,15 +99,13 @@ def run_study(
     Interrupted
         If the user stops it; the message says how to go on.
     """
-    asked = asked_for(study, only)
-    if workers < 1:
-        raise input_error(
-            "--workers", f"must be above zero, got {workers}", "Leave it out for one."
-        )
-    with locked_folder(study.folder), written_down(study.folder / LOG_FILE):
+    asked, place = asked_for(study, only), Place(workers, kind, shard)
+    place.check(fresh=fresh)
+    log = study.folder / (LOG_FILE if shard is None else shard.log)
+    with locked_folder(study.folder, shared=shard is not None), written_down(log):
         LOG.info(f"stickslip {__version__}, study {study.path}")
         try:
-            return _run(study, asked, workers, fresh, frozenset(checks))
+            return _run(study, asked, place, fresh, frozenset(checks))
         except KeyboardInterrupt:
             LOG.info("interrupted by the user")
             raise Interrupted(
@@ -113,14 +147,14 @@ def answer(asked: Analysis, cases: Sequence[Case], title: str = "") -> Outcome:
     for case in cases:
         with JobJournal(Path(":memory:"), asked.record) as journal:
             job = Job(_label(asked, case), asked.inputs(case, case.build()))
-            _solve(asked, job, journal, case.checks)
+            solve_job(asked, job, journal, case.checks)
             found.append(Solved(case, journal.records(), journal.notes()))
     book.enter(asked, found)
     return book.outcome([asked])
 
 
 def _run(
-    study: Study, asked: Sequence[Analysis], workers: int, fresh: bool, checks: frozenset[str]
+    study: Study, asked: Sequence[Analysis], place: Place, fresh: bool, checks: frozenset[str]
 ) -> Outcome:
     origin = Provenance(study.title, study.text, library_versions())
     book = Book(origin, measured=study.measured)
@@ -129,30 +163,66 @@ def _run(
     tasks = _tasks(study, asked, cases, checks, book.origin.versions)
     # tasks whose numbers depend on the same things share a job; those not asked for are shown where they are finished
     unfinished = {t.sealed: t for t in tasks if fresh or not t.finished()}
-    to_do = [t for t in unfinished.values() if t.analysis in asked]
+    to_do = _longest_first([t for t in unfinished.values() if t.analysis in asked])
+    if place.shard is not None:
+        own = place.shard.own(
+            _longest_first({t.sealed: t for t in tasks if t.analysis in asked}.values())
+        )
+        to_do = [t for t in to_do if t.sealed in {o.sealed for o in own}]
     LOG.info(f"jobs to do: {len(to_do)}, answers: {len(tasks)}")
     # all refusals come before any long computation, and before anything is given up
-    jobs = [(t, _inputs(study, t)) for t in to_do]
+    jobs = [_order(study, t, place) for t in to_do]
     if not fresh:
         _check_files(to_do)
-        book.read(tasks, unfinished)
+        if place.shard is None:
+            book.read(tasks, unfinished)
     meshes = _meshes(t.case for t in to_do)
     if fresh:
         empty_folder(study.folder, [f"{name}.vtu" for name in meshes], store.written)
     for name, mesh in meshes.items():
         with whole_file(study.folder / f"{name}.vtu") as temporary:
             write_mesh(mesh, temporary)
+    files = [study.folder / f"{name}.vtu" for name in meshes]
     target = study.folder / RESULT
-    with closing(_worked(jobs, workers)) as finished:
+    with closing(_worked(study, jobs, place)) as finished:
         for sealed in finished:
             del unfinished[sealed]
-            book.read(tasks, unfinished)
-            write_tree(book.tree(complete=False), target)
+            if place.shard is None:
+                book.read(tasks, unfinished)
+                write_tree(book.tree(complete=False), target)
+    if place.shard is not None:
+        left = {t.sealed for t in tasks if t.analysis in asked and not t.ended()}
+        if left:
+            return place.shard.outcome(book, len(to_do), len(left), study.folder)
+        unfinished = {t.sealed: t for t in tasks if not t.ended()}
+        files = []
     book.read(tasks, unfinished)
     outcome = book.outcome(asked)
     write_tree(outcome.tree, target)
-    meshed = [study.folder / f"{name}.vtu" for name in meshes]
-    return replace(outcome, files=(target, *meshed, study.folder / LOG_FILE))
+    log = LOG_FILE if place.shard is None else place.shard.log
+    return replace(outcome, files=(target, *files, study.folder / log))
+
+
+def _longest_first(tasks: Iterable[Task]) -> list[Task]:
+    """Return tasks in the order of how long they may take: those that no linear answer does, and the more the harder they are driven."""
+    return sorted(tasks, key=lambda t: (t.analysis.linear, -t.case.drive))
+
+
+def _order(study: Study, task: Task, place: Place) -> Order:
+    """Return the job of a task, as it is given to whoever does it."""
+    own = getattr(task.case.settings, "limits", None)
+    limits = Limits(*(getattr(own, name, None) or inf for name in ("job_s", "job_memory_gb")))
+    with of_task(study, task.case):
+        check_memory_limit(limits)
+    job = Job(_label(task.analysis, task.case), _inputs(study, task))
+    owner = "" if place.shard is None else new_owner()
+    return Order(task.analysis, job, task.sealed, task.case.checks, limits, owner)
+
+
+def _worked(study: Study, orders: Sequence[Order], place: Place) -> Generator[Path]:
+    """Work jobs off; those with limits, and those of a shard, in a process of their own even where it is one at a time."""
+    apart = place.shard is not None or any(order.limits for order in orders)
+    return worked(orders, place.kind, place.workers, study.folder, apart=apart)
 
 
 def _tasks(
@@ -198,13 +268,12 @@ def _inputs(study: Study, task: Task) -> Any:
 def _check_files(tasks: Iterable[Task]) -> None:
     """Refuse damaged files of jobs that are to go on, before anything else is computed."""
     for task in tasks:
-        at_work_file = task.sealed.with_suffix(AT_WORK)
+        at_work_file = file_at_work(task.sealed)
         if task.sealed.exists():
             read_sealed(task.sealed, task.analysis.record)
-        elif at_work_file.exists():
+        if at_work_file.exists():
             with JobJournal(at_work_file, task.analysis.record) as journal:
-                journal.records()
-                journal.notes()
+                journal.check()
 
 
 def _label(asked: Analysis, case: Case) -> str:
@@ -220,57 +289,3 @@ def _meshes(cases: Iterable[Case]) -> dict[str, SolidMesh]:
         parts = case.build().parts.items()
         return {name: part.mesh for name, part in parts if part.mesh is not None}
     return {}
-
-
-def _worked(plan: Sequence[tuple[Task, Any]], workers: int) -> Generator[Path]:
-    """Work the jobs off; give the file of each when it is sealed."""
-    left = list(reversed(plan))
-    running: dict[Future[None], Path] = {}
-    with executor(workers) as pool:
-        while left or running:
-            while left and len(running) < workers:
-                task, inputs = left.pop()
-                job = Job(_label(task.analysis, task.case), inputs)
-                running[pool.submit(_work, task.analysis, job, task.sealed, task.case.checks)] = (
-                    task.sealed
-                )
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                _require(future)
-                yield running.pop(future)
-
-
-def _require(future: Future[None]) -> None:
-    """Raise what a job raised; a process that was killed by others is told in words."""
-    try:
-        future.result()
-    except BrokenProcessPool:
-        raise StickslipError(
-            "a worker process was ended from outside, as a rule for lack of memory. What is finished is kept: run the same "
-            "command with fewer --workers."
-        ) from None
-
-
-def _work(asked: Analysis, job: Job, sealed: Path, checks: frozenset[str]) -> None:
-    """Solve a job, going on from what its file holds, and seal the file; runs in any process."""
-    at_work_file = sealed.with_suffix(AT_WORK)
-    if sealed.exists():  # all is there but checks
-        sealed.replace(at_work_file)
-    with JobJournal(at_work_file, asked.record) as journal:
-        _solve(asked, job, journal, checks)
-        journal.seal()
-
-
-def _solve(asked: Analysis, job: Job, journal: JobJournal, checks: frozenset[str]) -> None:
-    """Add the records to the journal that are not in it."""
-    done = journal.records()
-    if done:
-        LOG.info(f"{job.label} goes on after {len(done)} records of the earlier start")
-    try:
-        with at_work(job.label):
-            for record in asked.solve(job.inputs, done, journal):
-                journal.add(record)
-    except NO_SOLUTION as error:
-        # a job without a solution must not take the finished ones with it
-        words = asked.name.replace("_", " ")
-        journal.put(UNSOLVED, {"text": f"{words} has no solution ({error})"})
-    journal.put(CHECKED, {"names": sorted(checks | checked(journal.get(CHECKED)))})

@@ -46,6 +46,8 @@ class Case:
         Makes the model with another value of a key, picklable; None where no key can be changed.
     accepts
         Refuses a value of a key, without a model; None where only the model itself can tell.
+    drive
+        Harmonic forces over static ones: the more, the more contacts slip, and the longer a response takes.
     """
 
     index: int
@@ -60,6 +62,7 @@ class Case:
     digest_at_rest: str = ""
     at: "Callable[[str, float], Model] | None" = None
     accepts: "Callable[[str, float], object] | None" = None
+    drive: float = 0.0
 
     def as_text(self, *tables: str) -> str:
         """Return tables of the settings, by name, as a text that changes where they do."""

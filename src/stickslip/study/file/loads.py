@@ -238,3 +238,12 @@ class Limits(Section):
         7200.0,
         description="estimated seconds that one case of an analysis may take on one core, greater than zero",
     )
+    job_s: Positive | None = Field(
+        None,
+        description="seconds after which a job, one case of one analysis, is ended and set aside, greater than zero; left out: none",
+    )
+    job_memory_gb: Positive | None = Field(
+        None,
+        description="memory in GB at which the process of a job is ended, and at the second time the job set aside, greater than zero; "
+        "left out: none",
+    )

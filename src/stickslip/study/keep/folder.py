@@ -6,6 +6,7 @@ import sqlite3
 from collections.abc import Container, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
+from uuid import uuid4
 
 from stickslip.errors import InputError, input_error
 from stickslip.study.keep.journal import AT_WORK, SEALED
@@ -21,12 +22,14 @@ OWN = (
     *map(beside, WHOLE),
     *(f"{JOBS}/*{end}{more}" for end in (AT_WORK, SEALED) for more in ("", "-journal")),
 )
-HELD = (LOCK, f"{LOCK}-journal", LOG_FILE, TRIAL)  # of every run, whatever it keeps
+LEFT = (*map(beside, WHOLE), "run-*.on", f"{TRIAL}-*")  # by a run that was killed
+SHARD_LOGS = "run-*-of-*.log"
+HELD = (LOCK, f"{LOCK}-journal", LOG_FILE, SHARD_LOGS, *LEFT)  # of every run, whatever it keeps
 
 
 @contextmanager
-def locked_folder(folder: Path) -> Iterator[None]:
-    """Make the folder, hold it for one run, and make sure that a run's files fit into it.
+def locked_folder(folder: Path, *, shared: bool = False) -> Iterator[None]:
+    """Make the folder, hold it for one run, or for all shards of one, and make sure that a run's files fit into it.
 
     Raises
     ------
@@ -41,13 +44,30 @@ def locked_folder(folder: Path) -> Iterator[None]:
     except OSError as error:
         raise _unwritable(folder, error) from None
     try:
-        lock = _locked(folder / LOCK, folder)
+        lock = _locked(folder / LOCK, folder, shared=shared)
     except sqlite3.DatabaseError as error:
         raise input_error(
             str(folder / LOCK), f"is no lock of a run ({error})", "Delete it."
         ) from None
     with closing(lock):
+        if not shared:
+            for path in (path for pattern in LEFT for path in _found(folder, pattern)):
+                with suppress(OSError):
+                    path.unlink(missing_ok=True)
         yield
+
+
+@contextmanager
+def token_file(folder: Path) -> Iterator[Path]:
+    """Give a file that is there while the block runs: other machines see by it that they see the folder, and that the run goes on."""
+    token = folder / f"run-{uuid4().hex[:12]}.on"
+    try:
+        token.touch(exist_ok=False)
+        yield token
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+    finally:
+        token.unlink(missing_ok=True)
 
 
 def empty_folder(folder: Path, own: Sequence[str] = (), spared: Container[Path] = ()) -> None:
@@ -96,8 +116,7 @@ def _stranger(path: Path, problem: str) -> InputError:
 
 
 def _try_out(folder: Path) -> None:
-    trial = folder / TRIAL
-    trial.unlink(missing_ok=True)
+    trial = folder / f"{TRIAL}-{uuid4().hex[:12]}"
     with trial.open("xb") as stream:
         stream.write(b"x")
         os.fsync(stream.fileno())
@@ -111,8 +130,10 @@ def _try_out(folder: Path) -> None:
         )
 
 
-def _locked(path: Path, folder: Path) -> sqlite3.Connection:
+def _locked(path: Path, folder: Path, *, shared: bool = False) -> sqlite3.Connection:
     """Return what holds a file until it is closed or the process ends: SQLite locks files alike on all systems.
+
+    Shards share it, so that no other run begins meanwhile; where the folder's machine knows no locks, they do without.
 
     Raises
     ------
@@ -123,8 +144,12 @@ def _locked(path: Path, folder: Path) -> sqlite3.Connection:
     """
     db = sqlite3.connect(path, isolation_level=None, timeout=0.5)
     try:
-        db.execute("begin exclusive")
+        db.execute("begin" if shared else "begin exclusive")
+        if shared:
+            db.execute("select count(*) from sqlite_master").fetchone()
     except sqlite3.DatabaseError as error:
+        if shared and "locked" not in str(error):
+            return db
         db.close()
         if "locked" in str(error):
             raise input_error(

@@ -1,7 +1,8 @@
 """The file of a job: everything it has finished, record by record.
 
 One SQLite file a job. Every record is its own transaction with full synchronisation and a rollback journal, so that a killed run
-leaves whole records only. While the job is at work its file is called ``<key>.part``; sealed, it is ``<key>.job``.
+leaves whole records only. While the job is at work its file is called ``<key>.part``, or ``<key>.<owner>.part`` where processes of
+several machines share the folder; sealed, it is ``<key>.job``.
 """
 
 import sqlite3
@@ -51,8 +52,7 @@ class JobJournal:
         self._path = path
         self._type = record_type
         with _named(path):
-            # autocommit: each insert is a transaction of its own
-            self._db = sqlite3.connect(path, isolation_level=None, timeout=0.5)
+            self._db = _opened(path)
             try:
                 # held until the process ends, however it ends
                 self._db.execute("pragma locking_mode = exclusive")
@@ -95,6 +95,11 @@ class JobJournal:
         with _named(self._path):
             self._db.execute("insert or replace into note values (?, ?)", (name, payload))
 
+    def forget(self, name: str) -> None:
+        """Remove what `put` stored under `name`."""
+        with _named(self._path):
+            self._db.execute("delete from note where name = ?", (name,))
+
     def get(self, name: str) -> dict[str, Any] | None:
         """Return what `put` stored under `name`, or None."""
         with _named(self._path):
@@ -105,12 +110,21 @@ class JobJournal:
         with _named(self._path):
             return _notes(self._db)
 
+    def check(self) -> None:
+        """Read everything, and refuse the file if any of it is damaged."""
+        with _named(self._path):
+            (said,) = self._db.execute("pragma quick_check").fetchone()
+            if said != "ok":
+                raise ValueError(said)
+            _records(self._db, self._type)
+            _notes(self._db)
+
     def seal(self) -> None:
         """Close the file and give it the name of a finished job."""
         with _named(self._path):
             self._db.execute("insert into meta values (?, 'yes')", (WHOLE,))
             self._db.close()
-            self._path.replace(self._path.with_suffix(SEALED))
+            self._path.replace(self._path.with_name(f"{_key(self._path)}{SEALED}"))
 
 
 def read_sealed(path: Path, record_type: type[Any]) -> tuple[list[Any], dict[str, dict[str, Any]]]:
@@ -143,8 +157,22 @@ def _reading(path: Path) -> Iterator[sqlite3.Connection]:
         db.close()
 
 
+def _opened(path: Path) -> sqlite3.Connection:
+    """Open a file: without locks where nobody else writes to it, as not all shared folders have them."""
+    name, alone = str(path), path.stem != _key(path)
+    if alone:
+        name = f"{path.absolute().as_uri()}?nolock=1"
+    # autocommit: each insert is a transaction of its own
+    return sqlite3.connect(name, isolation_level=None, timeout=0.5, uri=alone)
+
+
+def _key(path: Path) -> str:
+    """Return what a job is called, whoever's file of it this is."""
+    return path.name.partition(".")[0]
+
+
 def _mark(path: Path) -> str:
-    return f"{FORMAT}:{path.stem}"
+    return f"{FORMAT}:{_key(path)}"
 
 
 def _check_mark(db: sqlite3.Connection, path: Path) -> None:

@@ -7,6 +7,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from uuid import uuid4
 
 from stickslip.errors import InputError, input_error
 
@@ -30,10 +31,18 @@ def unwritable(path: Path, error: OSError) -> InputError:
     return input_error(str(path), f"cannot be written ({error.strerror or error})", remedy)
 
 
-def beside(name: str) -> str:
-    """Return what a file is called until it is whole: libraries go by what a name ends in."""
+def beside(name: str, mark: str = "*") -> str:
+    """Return what a file is called until it is whole: libraries go by what a name ends in.
+
+    Parameters
+    ----------
+    name
+        What it will be called.
+    mark
+        Of the process that writes it; left out: the pattern of all of them.
+    """
     path = Path(name)
-    return str(path.with_name(f"{path.stem}.part{path.suffix}"))
+    return str(path.with_name(f"{path.stem}.{mark}.part{path.suffix}"))
 
 
 @contextmanager
@@ -47,11 +56,9 @@ def whole_file(path: Path) -> Iterator[Path]:
     InputError
         If the file cannot be written.
     """
-    temporary = Path(beside(str(path)))
+    temporary = Path(beside(str(path), uuid4().hex[:12]))
     try:
         _refuse_folder(path)
-        # left by a kill, or a link, through which we would write elsewhere
-        temporary.unlink(missing_ok=True)
         temporary.open("xb").close()
         yield temporary
         with temporary.open("rb+") as stream:

@@ -114,6 +114,7 @@ class Study:
             digest_at_rest=at_rest,
             at=other,
             accepts=other.study,
+            drive=_drive(case.tables),
         )
 
 
@@ -181,6 +182,17 @@ def read_study(path: Path) -> Study:
         Naming every problem of the file, one a line.
     """
     return _checked(Study(read_file(path)))
+
+
+def _drive(tables: Tables) -> float:
+    """Return the harmonic forces over the static ones; over 1 N where there is none."""
+    static, harmonic = 0.0, 0.0
+    for load in tables.load.values():
+        if load.harmonic == 0:
+            static += abs(newton(tables, load))
+        else:
+            harmonic += abs(newton(tables, load))
+    return harmonic / (static or 1.0)
 
 
 def model_digests(tables: Tables, home: Path) -> tuple[str, str]:

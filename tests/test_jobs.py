@@ -1,0 +1,261 @@
+"""Jobs that run apart: limits, deaths, shards, files that several processes write, and what cannot be asked for."""
+
+import logging
+import shutil
+import signal
+import time
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from cell_work import die, eat, refuse
+from test_journal import Point, point
+from toy_analysis import ToyStudy
+
+from stickslip.errors import InputError, StickslipError
+from stickslip.study import jobs, run
+from stickslip.study.analyses import ANALYSES
+from stickslip.study.keep.attempts import begin, clear, file_at_work, left_behind
+from stickslip.study.keep.cell import Cell, Ended, Limits, OutOfTime, Stopped
+from stickslip.study.keep.folder import locked_folder
+from stickslip.study.keep.journal import JobJournal, read_sealed
+from stickslip.study.keep.workers import check_kind, executor
+from stickslip.study.run import run_study
+from stickslip.study.shard import Shard
+
+
+@pytest.fixture(autouse=True)
+def toy_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(ANALYSES, "toy", "toy_analysis:TOY")
+
+
+# ---- a process that is watched
+
+
+def never() -> bool:
+    return False
+
+
+def test_process_is_watched_and_started_again() -> None:
+    cell = Cell({})
+    try:
+        assert cell.answer(abs, -3, Limits(), never) == 3
+        with pytest.raises(ValueError, match="no such thing"):
+            cell.answer(refuse, "no such thing", Limits(), never)
+        with pytest.raises(OutOfTime, match=r"took more than 0\.2 s, the limit of a job"):
+            cell.answer(time.sleep, 60.0, Limits(seconds=0.2), never)
+        with pytest.raises(Ended, match="was ended by signal SIGSEGV"):
+            cell.answer(die, signal.SIGSEGV, Limits(), never)
+        with pytest.raises(Ended, match=r"GB of memory, the limit of a job is 0\.2 GB"):
+            cell.answer(eat, 0.3, Limits(memory_gb=0.2), never)
+        with pytest.raises(Stopped):
+            cell.answer(time.sleep, 60.0, Limits(), lambda: True)
+        assert cell.answer(abs, -4, Limits(), never) == 4
+    finally:
+        cell.close()
+
+
+# ---- what becomes of a job
+
+
+def order(folder: Path, index: int = 0) -> jobs.Order:
+    (folder / "results/jobs").mkdir(parents=True, exist_ok=True)
+    case = ToyStudy(folder / "study.toml").cases()[index]
+    toy = run.named("toy")
+    job = jobs.Job(case.label, toy.inputs(case, case.build()))
+    return jobs.Order(toy, job, folder / f"results/jobs/{index}.job")
+
+
+class Dying(Cell):
+    """A process that computes so many records in each life, one more life for each."""
+
+    def __init__(self, *lives: int | Exception) -> None:
+        super().__init__({})
+        self.lives = list(lives)
+
+    def answer(self, work, given, limits, stopped, hear=None):
+        life = self.lives.pop(0)
+        if isinstance(life, Exception):
+            raise life
+        begin(given.sealed, given.file, given.analysis.record)
+        with JobJournal(given.file, given.analysis.record) as journal:
+            new = given.analysis.solve(given.job.inputs, journal.records(), journal)
+            for _, record in zip(range(life), new, strict=False):
+                journal.add(record)
+        raise Ended("was ended by signal SIGKILL")
+
+
+def test_job_is_set_aside_that_dies_twice_at_the_same_place(tmp_path: Path) -> None:
+    said: list[str] = []
+    cell = Dying(1, 2, 0)  # the second life went on
+    made = order(tmp_path)
+    jobs.watched(made, cell, never, lambda record: said.append(record.getMessage()))
+    records, notes = read_sealed(made.sealed, made.analysis.record)
+    assert len(records) == 3
+    assert not cell.lives
+    assert len(said) == 2
+    why = "toy was set aside: its process was ended by signal SIGKILL, twice at the same place"
+    assert notes["set aside"]["text"] == why
+    # the next run takes it up
+    jobs.solve(made)
+    records, notes = read_sealed(made.sealed, made.analysis.record)
+    assert len(records) == 5
+    assert "set aside" not in notes
+
+
+def test_job_that_takes_too_long_is_set_aside_at_once(tmp_path: Path) -> None:
+    made = order(tmp_path)
+    jobs.watched(made, Dying(OutOfTime("it took more than 5 s")), never, print)
+    assert "took more than 5 s" in read_sealed(made.sealed, made.analysis.record)[1]["set aside"]["text"]  # fmt: skip
+
+
+# ---- files of several processes
+
+
+def test_every_attempt_goes_on_from_the_furthest_and_damages_no_other(tmp_path: Path) -> None:
+    sealed = tmp_path / "a.job"
+    for owner, count in (("one", 2), ("two", 3)):
+        with JobJournal(file_at_work(sealed, owner), Point) as journal:
+            for i in range(count):
+                journal.add(point(i))
+    file_at_work(sealed, "three").write_bytes(b"no database" * 10_000)  # the largest
+    own = file_at_work(sealed, "own")
+    with JobJournal(file_at_work(sealed, "two"), Point) as other:
+        begin(sealed, own, Point)  # while another is at work
+        other.add(point(3))
+    with JobJournal(own, Point) as journal:
+        assert [p.index for p in journal.records()] == [0, 1, 2]
+        journal.seal()
+    assert {p.name for p in left_behind(sealed)} == {f"a.{o}.part" for o in ("one", "two", "three")}  # fmt: skip
+    clear(sealed)
+    assert [p.name for p in tmp_path.iterdir()] == ["a.job"]
+    assert len(read_sealed(sealed, Point)[0]) == 3
+
+
+def test_copy_of_a_file_whose_write_was_cut_off_is_whole(tmp_path: Path) -> None:
+    sealed, cut = tmp_path / "a.job", tmp_path / "copied"
+    with JobJournal(file_at_work(sealed, "one"), Point) as journal:
+        journal.add(point(0))
+        journal._db.execute("pragma cache_spill = 1")
+        journal._db.execute("pragma cache_size = 1")
+        journal._db.execute("begin")
+        for i in range(1, 400):
+            journal.add(point(i))
+        cut.mkdir()
+        for path in tmp_path.glob("a.*"):
+            shutil.copy(path, cut)
+        journal._db.execute("rollback")
+    assert len(list(cut.iterdir())) == 2  # the file, half written, and what undoes it
+    begin(cut / "a.job", cut / "a.own.part", Point)
+    with JobJournal(cut / "a.own.part", Point) as journal:
+        assert [p.index for p in journal.records()] == [0]
+
+
+# ---- shards
+
+
+def bits(study: ToyStudy) -> np.ndarray:
+    tree = xr.load_datatree(study.folder / "result.nc", engine="h5netcdf")
+    assert tree.attrs["complete"] == 1
+    return np.asarray(tree["toy"].value.values)
+
+
+def test_last_shard_puts_the_result_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    together = jobs.worked
+    monkeypatch.setattr(run, "worked", lambda *given, apart: together(*given, apart=False))
+    factors = (1.5, 2.5, 3.5, 4.5, 5.5)
+    whole = ToyStudy(tmp_path / "whole.toml", factors)
+    run_study(whole)
+    expected = bits(whole)
+    (tmp_path / "shards").mkdir()
+    made = partial(ToyStudy, tmp_path / "shards/study.toml", factors)
+    told = [run_study(made(), shard=Shard(n, 3)) for n in (3, 1, 1)]
+    assert told[0].waits.startswith("shard 3/3: 1 jobs done, 4 of other shards are not.")
+    assert told[2].waits.startswith("shard 1/3: 0 jobs done, 2 of other shards are not.")
+    assert not (made().folder / "result.nc").exists()
+    last = made()
+    outcome = run_study(last, shard=Shard(2, 3))
+    assert not outcome.waits
+    assert len(last.built) == 2
+    np.testing.assert_array_equal(bits(last), expected)
+    assert outcome.files == (last.folder / "result.nc", last.folder / "run-2-of-3.log")
+
+
+def test_shards_share_a_folder_that_no_other_run_may_use(tmp_path: Path) -> None:
+    made = ToyStudy(tmp_path / "study.toml")
+    with (
+        locked_folder(made.folder, shared=True),
+        locked_folder(made.folder, shared=True),
+        pytest.raises(InputError, match="another run is at work in it"),
+    ):
+        run_study(made)
+    with locked_folder(made.folder), pytest.raises(InputError, match="another run is at work"):
+        run_study(made, shard=Shard(1, 2))
+
+
+# ---- what cannot be
+
+
+@pytest.mark.parametrize("text", ["5/4", "0/3", "1", "a/b", "-1/2", "1/2/3", ""])
+def test_share_that_is_none_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match=r"is no share of the jobs\. Give its number"):
+        Shard.read(text)
+
+
+def test_executor_that_is_none_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    study = ToyStudy(tmp_path / "study.toml")
+    with pytest.raises(InputError, match=r"--executor foo: is not known\. Known: dask, executorl"):
+        run_study(study, kind="foo")
+    with pytest.raises(InputError, match=r"is not known\. Did you mean 'slurm'"):
+        run_study(study, kind="slrum")
+    with pytest.raises(InputError, match="does not say where the scheduler is"):
+        check_kind("dask")
+    monkeypatch.setattr("stickslip.study.keep.workers.find_spec", lambda _name: None)
+    with pytest.raises(StickslipError, match=r"distributed: not installed\. Use: pip install 'stickslip\[cluster\]'"):  # fmt: skip
+        run_study(study, kind="dask=tcp://127.0.0.1:1")
+    with pytest.raises(StickslipError, match="executorlib: not installed"):
+        run_study(study, kind="slurm")
+    with pytest.raises(InputError, match="would remove what other shards have found"):
+        run_study(study, shard=Shard(1, 2), fresh=True)
+    assert not study.folder.exists()
+
+
+def test_machine_that_would_give_other_numbers_is_refused(tmp_path: Path) -> None:
+    made, token = order(tmp_path), tmp_path / "run.on"
+    answer = jobs.solve_far(made, token, {}, {})
+    assert f"does not see {tmp_path}. Put the study into a folder that all machines share" in str(answer.error)  # fmt: skip
+    token.touch()
+    answer = jobs.solve_far(made, token, {"numpy": "0.9"}, {})
+    assert f"has other versions, whose numbers may differ: numpy {np.__version__} for 0.9" in str(answer.error)  # fmt: skip
+
+
+class Losing:
+    """An executor whose workers are lost with every job."""
+
+    def submit(self, fn, *args):
+        future = jobs.Future()
+        future.set_exception(OSError("the machine is gone"))
+        return future
+
+
+def test_job_whose_workers_are_lost_stops_no_other(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:  # fmt: skip
+    with caplog.at_level(logging.INFO, "stickslip"):
+        made = order(tmp_path), order(tmp_path, 1)
+        for own in made:
+            jobs.set_aside(own, "for the sake of its notes")
+        ended = list(jobs.worked(made, Losing(), 1, tmp_path, apart=False))  # type: ignore[arg-type]
+    assert sorted(ended) == [own.sealed for own in made]
+    assert caplog.text.count("it is given to another") == 4
+    notes = read_sealed(made[0].sealed, made[0].analysis.record)[1]
+    assert notes["set aside"]["text"].startswith("toy was set aside: 3 workers were lost with it at the same place (OSError")  # fmt: skip
+
+
+def test_one_process_and_none_of_its_own_by_default() -> None:
+    with executor("", 1) as hands:
+        assert hands.cell is None
+    with executor("", 1, apart=True) as hands:
+        assert hands.cell is not None
