@@ -40,6 +40,14 @@ StudyKind = Annotated[
         "masses: four masses on springs, the smallest study.",
     ),
 ]
+OtherMachines = Annotated[
+    str,
+    typer.Option(metavar="KIND", help="dask=ADDRESS, slurm, flux or executorlib: docs/cluster.md."),
+]
+Share = Annotated[
+    str | None,
+    typer.Option(metavar="I/N", help="Do a share of the jobs; the last to end joins all."),
+]
 
 
 def main() -> None:
@@ -72,22 +80,8 @@ def run(
     workers: Annotated[
         int, typer.Option("--workers", min=1, max=256, help="Processes; the numbers stay the same.")
     ] = 1,
-    executor: Annotated[
-        str,
-        typer.Option(
-            "--executor",
-            metavar="KIND",
-            help="Let other machines that share the folder compute: dask=ADDRESS, slurm, flux; executorlib: this one.",
-        ),
-    ] = "",
-    shard: Annotated[
-        str | None,
-        typer.Option(
-            "--shard",
-            metavar="I/N",
-            help="Do this share of the jobs, as others do theirs; the last to end puts the result together.",
-        ),
-    ] = None,
+    executor: OtherMachines = "",
+    shard: Share = None,
     verify: Annotated[
         bool, typer.Option("--verify", help="Integrate in time at three frequencies and compare.")
     ] = False,
