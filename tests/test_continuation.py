@@ -395,3 +395,36 @@ def test_step_to_here_is_the_same_point():
     control = StepControl(scale=1.0)
     start = begin(CIRCLE, [0.8, 1.0], 0.6, control)
     assert step_to(CIRCLE, start, 0.6, along(control)) is start
+
+
+def test_kept_factors_lead_to_the_same_curve_with_fewer_jacobians():
+    """A residual is cheap where a Jacobian is factorised: around most of a circle, and its tangents are those of the circle."""
+    control = StepControl(scale=1.0, first=0.1, largest=0.2, growth=2.0)
+    factorised = []
+
+    @dataclass(frozen=True, eq=False)
+    class Told(At):
+        def __getattribute__(self, name):
+            if name == "jac":
+                factorised.append(1)
+            return super().__getattribute__(name)
+
+    class Counted(Curve):
+        def linearise(self, x, p):
+            at = super().linearise(x, p)
+            return Told(at.residual, at.jac, at.jac_p)
+
+    counts = []
+    circle = Counted(CIRCLE.f, CIRCLE.f_x, CIRCLE.f_p)
+    start = begin(CIRCLE, [-0.9, 1.0], -0.2, control)
+    for how in ({}, {"corrector": "kept_factors", "predictor": "parabola"}):
+        factorised.clear()
+        points = list(trace(circle, start, 0.95, replace(along(control), **how)))
+        assert all(on_the_circle(p) for p in points)
+        assert points[-1].p == 0.95
+        for point in points[:-1]:
+            radius = np.append(point.x[0], point.p)
+            tangent = np.append(point.tangent[0], point.tangent[-1])
+            assert abs(radius @ tangent) < 0.02 * np.linalg.norm(tangent)
+        counts.append(len(factorised) / len(points))
+    assert counts[1] < 0.6 * counts[0]

@@ -11,7 +11,8 @@ from stickslip.operators import Jacobian
 from stickslip.solve.newton_method import Newton, Solution
 
 Parametrisation = Literal["arc_length", "natural", "local"]
-Predictor = Literal["tangent", "secant"]
+Predictor = Literal["tangent", "secant", "parabola"]
+Corrector = Literal["newton", "kept_factors"]
 
 
 class ParameterEvaluation(Protocol):
@@ -60,6 +61,8 @@ class StepControl:
         Step lengths.
     max_points
         Where to stop a branch that does not reach its end.
+    growth
+        Factor on the step after a correction that took a Newton step or two where the branch hardly turned.
     """
 
     scale: float
@@ -67,6 +70,7 @@ class StepControl:
     smallest: float = 1e-3
     largest: float = 0.25
     max_points: int = 500
+    growth: float = 1.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,7 +90,10 @@ class Following:
         changes most (Rheinboldt & Burkardt 1983); ``natural``: p, which stops at folds with `Status.STEP_TOO_SMALL`.
     predictor
         Direction of travel: ``tangent``, which costs a linear system a point and sees corners and folds at once; or ``secant`` through
-        the last two points, which costs nothing.
+        the last two points, which costs nothing; or ``parabola``: the tangent, bent as the branch was between the last two points.
+    corrector
+        ``newton``, or ``kept_factors``: Newton steps whose factors are kept while they serve, for the tangent too where the branch hardly turned.
+        It gives up early, for a shorter step; the shortest ones are left to Newton.
     """
 
     newton: Newton
@@ -94,9 +101,14 @@ class Following:
     weights: FloatArray
     parametrisation: Parametrisation = "arc_length"
     predictor: Predictor = "tangent"
+    corrector: Corrector = "newton"
 
     def __post_init__(self) -> None:
-        for name, choices in (("parametrisation", Parametrisation), ("predictor", Predictor)):
+        for name, choices in (
+            ("parametrisation", Parametrisation),
+            ("predictor", Predictor),
+            ("corrector", Corrector),
+        ):
             check_choice(f"Following.{name}", getattr(self, name), get_args(choices))
 
 
@@ -120,6 +132,8 @@ class Point:
         (secants), NaN where the linear solver cannot tell.
     mark
         Name of the mark that was located here; empty for the points of the steps themselves.
+    bend
+        (n + 1,) half the change of the direction over the length of the last step, for the predictor ``parabola``; None where it is unknown.
     """
 
     x: FloatArray
@@ -129,6 +143,7 @@ class Point:
     solution: Solution
     orientation: float
     mark: str = ""
+    bend: FloatArray | None = None
 
     @property
     def y(self) -> FloatArray:
@@ -222,5 +237,5 @@ class Latest:
 
 
 def reversed_point(point: Point) -> Point:
-    """Return the point looking the other way along its branch."""
+    """Return the point looking the other way along its branch, which is bent to the same side."""
     return replace(point, tangent=-point.tangent, orientation=-point.orientation)

@@ -119,7 +119,7 @@ def factorised(linear: LinearSolver, jac: Jacobian) -> Inverse | None:
     if matrix is None:
         return _Iterated(linear, jac)
     lu, pivots = _factors(matrix)
-    return None if lu is None else _Factored(lu, pivots)
+    return None if lu is None else Factored(lu, pivots)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,11 +133,21 @@ class _Iterated:
 
 
 @dataclass(frozen=True, eq=False)
-class _Factored:
+class Factored:
+    """An array by its LU factors."""
+
     lu: FloatArray
     pivots: FloatArray
 
+    @property
+    def sign(self) -> float:
+        """Sign of its determinant."""
+        swaps = np.count_nonzero(self.pivots != np.arange(self.pivots.size))
+        flips = swaps + np.count_nonzero(np.diagonal(self.lu) < 0.0)
+        return 1.0 if flips % 2 == 0 else -1.0
+
     def __call__(self, right: FloatArray, *, transposed: bool = False) -> FloatArray:
+        """Solve; see `Inverse`."""
         solution, _ = scipy.linalg.lapack.dgetrs(self.lu, self.pivots, right, trans=int(transposed))
         return np.asarray(solution)
 
@@ -156,10 +166,8 @@ def solve_signed(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray | No
     lu, pivots = _factors(matrix)
     if lu is None:
         return None, 0.0
-    solution, _ = scipy.linalg.lapack.dgetrs(lu, pivots, right)
-    swaps = np.count_nonzero(pivots != np.arange(pivots.size))
-    flips = swaps + np.count_nonzero(np.diagonal(lu) < 0.0)
-    return np.asarray(solution, dtype=float), 1.0 if flips % 2 == 0 else -1.0
+    known = Factored(lu, pivots)
+    return known(right), known.sign
 
 
 def _array(jac: Jacobian) -> FloatArray:

@@ -18,6 +18,8 @@ from stickslip.solve.branch import (
     measure_at,
     tangent_at,
 )
+from stickslip.solve.kept import KeptFactors
+from stickslip.solve.linear import Factored
 from stickslip.solve.newton_method import newton
 from stickslip.solve.status import Status
 
@@ -25,6 +27,11 @@ SHARP_TURN = (
     0.5  # cosine between successive tangents below which the step is shortened, as far as that goes
 )
 SMOOTH_TURN = 0.9  # cosine above which a change of orientation is a bifurcation, not a corner
+STRAIGHT = 0.97  # cosine above which a branch hardly turns
+EASY = 2  # Newton steps
+CLOSE = 0.3  # of a step: distance from the prediction within which its factors tell the tangent
+ASIDE = 0.5  # of a step: a parabola that leaves the tangent by more is none of the branch
+PATIENT = 8.0  # smallest steps below which no factors are kept
 LOOKS_AHEAD = (
     1.0,
     4.0,
@@ -83,7 +90,7 @@ def take_step(
     """
     measure = measure_at(point.x, following)
     y = point.y
-    predicted = _prediction(unit, step, measure, following)
+    predicted = _prediction(point, unit, step, measure, following)
     if predicted is None:
         free = replace(point.solution, iterations=0, seconds_contact=0.0, seconds_linear=0.0)
         return replace(point, solution=replace(free, status=Status.STALLED))
@@ -96,7 +103,9 @@ def take_step(
         row = _natural_row(measure, y.size)
     value = float(row @ guess)
     latest = Latest(problem)
-    solution = newton(lambda v: across(latest, v, row, value), guess, following.newton)
+    own = following.newton
+    kept = KeptFactors(own.tolerance) if _keeps(following, step) else None
+    solution = newton(lambda v: across(latest, v, row, value), guess, own, kept)
     x, p = solution.x[:-1], end if passes else float(solution.x[-1])
     # a corrector that slides far away, or past the end of the range, has found another piece of the branch
     near = measure.of(solution.x - y) <= NEAR * reach and (p - end) * (point.p - end) >= 0.0
@@ -104,8 +113,43 @@ def take_step(
     if not (solution.status.converged and near):
         status = Status.STALLED if solution.status.converged else solution.status
         return replace(point, solution=replace(found, x=point.x, status=status))
-    tangent, sign = _direction(latest, point, solution.x, unit, following)
-    return Point(x, p, tangent, step, found, sign)
+    known = None
+    if (
+        kept is not None
+        and kept.inverse is not None
+        and measure.of(solution.x - guess) < CLOSE * step
+    ):
+        known = _by_factors(kept.inverse, point, solution.x, unit, following)
+    tangent, sign = known or _direction(latest, point, solution.x, unit, following)
+    return Point(x, p, tangent, step, found, sign, bend=_bend(solution.x, y, tangent, following))
+
+
+def _keeps(following: Following, step: float) -> bool:
+    """Whether factors are kept in a step: the shortest ones, at corners, are corrected by all that the corrector has."""
+    return following.corrector == "kept_factors" and step >= PATIENT * following.control.smallest
+
+
+def _by_factors(
+    inverse: Factored, before: Point, y: FloatArray, unit: FloatArray, following: Following
+) -> tuple[FloatArray, float] | None:
+    """Return direction and orientation by the factors of a Jacobian beside `y`; None where the branch turns, and that beside it tells too little."""
+    measure = measure_at(y[:-1], following)
+    tangent = inverse(np.eye(1, y.size, y.size - 1)[0])
+    tangent = tangent / measure.of(tangent)
+    straight = measure.cosine(unit, tangent) > STRAIGHT and inverse.sign * before.orientation > 0.0
+    return (tangent, inverse.sign) if straight else None
+
+
+def _bend(
+    y: FloatArray, before: FloatArray, tangent: FloatArray, following: Following
+) -> FloatArray | None:
+    """Return what a parabola through two points, with the tangent of the first of them, has beside that tangent."""
+    if following.predictor != "parabola":
+        return None
+    measure = measure_at(y[:-1], following)
+    back = before - y
+    length = measure.of(back)
+    return np.asarray((back + length * tangent) / length**2)
 
 
 def _natural_row(measure: Measure, size: int) -> FloatArray:
@@ -113,7 +157,7 @@ def _natural_row(measure: Measure, size: int) -> FloatArray:
 
 
 def _prediction(
-    unit: FloatArray, step: float, measure: Measure, following: Following
+    point: Point, unit: FloatArray, step: float, measure: Measure, following: Following
 ) -> tuple[FloatArray, FloatArray] | None:
     """Return the predicted change of (x, p) and the row of the condition that holds the corrector; None if it is too long."""
     if following.parametrisation == "natural":
@@ -128,7 +172,11 @@ def _prediction(
         row = np.zeros(unit.size)
         row[largest] = weights[largest]
         return step * unit, row
-    return step * unit, measure.row(unit)
+    ahead = step * unit
+    if point.bend is not None and unit @ point.tangent > 0.0:
+        aside = step**2 * point.bend
+        ahead = ahead + aside if measure.of(aside) < ASIDE * step else ahead
+    return ahead, measure.row(unit)
 
 
 def _direction(
@@ -203,6 +251,8 @@ def no_step(point: Point, control: StepControl, iterations: int) -> Point:
 def next_step(step: float, iterations: int, turn: float, control: StepControl) -> float:
     """Grow after easy corrections, shrink where Newton works hard or the branch turns."""
     factor = 1.5 if iterations <= 4 else 1.0 if iterations <= 8 else 0.6
-    if turn < 0.97:
+    if iterations <= EASY and turn > STRAIGHT:
+        factor = control.growth
+    if turn < STRAIGHT:
         factor = min(factor, 0.7)
     return float(np.clip(step * factor, control.smallest, control.largest))

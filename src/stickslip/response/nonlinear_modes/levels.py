@@ -22,6 +22,7 @@ from stickslip.solve.newton_method import Solution, first_converged, newton
 
 LARGEST = 0.1  # change of the shape in a step: with 0.25 a mode of a chain went past two of its four folds
 CORRECTIONS = 8  # Newton steps to a point: beyond a corner a shorter step takes fewer
+GROWTH = 2.5  # of steps beyond a corner, where they have become short
 MORE = 2  # times the harmonics, and one, from one level to the next
 SAFETY = 1.25
 AGREE = 0.5  # share of the tolerance by which neighbouring levels may differ
@@ -67,7 +68,9 @@ class ModeCurve(Curve):
         while every[-1].balance.order < most:
             every.append(problem.with_order(min(MORE * every[-1].balance.order + 1, most)))
         length = abs(float(np.log(span[1] / span[0])))
-        control = StepControl(scale=length / (points * LARGEST), first=0.05, largest=LARGEST)
+        control = StepControl(
+            scale=length / (points * LARGEST), first=0.05, largest=LARGEST, growth=GROWTH
+        )
         return cls(tuple(every), control, tolerance, decaying)
 
     @property
@@ -115,7 +118,13 @@ class ModeCurve(Curve):
         weights = np.ones(own.balance.size + 2)
         weights[: own.balance.linear.n] = 0.0
         few = replace(own.how.newton, max_iterations=CORRECTIONS)
-        return Following(newton=few, control=self.control, weights=weights)
+        return Following(
+            newton=few,
+            control=self.control,
+            weights=weights,
+            predictor="parabola",
+            corrector="kept_factors",
+        )
 
     def fresh(self, level: int, p: float, near: Sequence[Followed], most: bool) -> Solution:
         """Solve at an amplitude from motions nearby, or from the linear mode about the static state."""

@@ -1,6 +1,7 @@
 """What contacts do in a motion that nothing drives."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -51,6 +52,7 @@ def contacts_of(problem: SelfExcited, y: FloatArray, amplitude: float) -> Contac
     return Contacts(share, sticks, float(np.max(opened, initial=0.0)))
 
 
+@lru_cache(maxsize=8)
 def _sliders(interface: Interface) -> dict[int, FloatArray]:
     """Return of each contact of several sliders the (n, 2) travels from turn to turn along t and w, m, beyond which they slip."""
     found: dict[int, FloatArray] = {}
@@ -71,12 +73,15 @@ def _travels(law: ContactLaw) -> FloatArray:
     return np.asarray(travels[np.any(np.isfinite(travels), axis=1)])
 
 
+@lru_cache(maxsize=8)
 def leaving(interface: Interface) -> BoolArray:
     """Return the contact points (p,) whose law slips or opens at some gap."""
     found: dict[int, bool] = {}
     for law in interface.laws:
         found.setdefault(id(law), _leaves(law))
-    return np.array([found[id(law)] for law in interface.laws], dtype=bool)
+    leaves = np.array([found[id(law)] for law in interface.laws], dtype=bool)
+    leaves.setflags(write=False)
+    return leaves
 
 
 def _leaves(law: ContactLaw) -> bool:

@@ -15,7 +15,15 @@ from stickslip.response.parameter import Parameter
 from stickslip.response.self_excited.contacts import contacts_of
 from stickslip.response.self_excited.problem import SelfExcited, levels
 from stickslip.solve.branch import Following
-from stickslip.solve.newton_method import Newton, Solution, first_converged, newton
+from stickslip.solve.kept import KeptFactors
+from stickslip.solve.linear import Factored
+from stickslip.solve.newton_method import (
+    GLOBALISATIONS,
+    Newton,
+    Solution,
+    first_converged,
+    newton,
+)
 from stickslip.solve.status import Status
 
 FAINT = 1e-11  # m: a gap that moves less slips nowhere
@@ -121,6 +129,7 @@ class _Sticking:
     amplitude: float
     y: FloatArray
     noise: float
+    inverse: Factored | None
 
     @classmethod
     def at(
@@ -129,14 +138,18 @@ class _Sticking:
         equation: PeriodicProblem,
         amplitude: float,
         near: Sequence[FloatArray],
+        known: Factored | None = None,
     ) -> "_Sticking | None":
         """Return the motion at an amplitude, from others that may be near; None if there is none."""
         p = float(np.log(amplitude))
+        how = problem.how.newton
+        kept = KeptFactors(how.tolerance, GLOBALISATIONS[how.globalisation](), known)
         found = (
             newton(
                 lambda y: equation.linearise(y, p),
                 near[0],
-                replace(problem.how.newton, max_iterations=QUICK),
+                replace(how, max_iterations=QUICK),
+                kept,
             )
             if near
             else _solved(problem, equation, p, near)
@@ -144,7 +157,8 @@ class _Sticking:
         if not found.status.converged or contacts_of(problem, found.x, amplitude).slipping > 0.0:
             return None
         left = equation.residual(found.x, p)
-        return cls(problem, equation, amplitude, found.x, NOISE * float(np.max(np.abs(left))))
+        noise = NOISE * float(np.max(np.abs(left)))
+        return cls(problem, equation, amplitude, found.x, noise, kept.inverse)
 
     def grown(self, amplitude: float) -> FloatArray:
         """Return the unknowns in proportion at another amplitude."""
@@ -154,7 +168,8 @@ class _Sticking:
 
     def beyond(self, amplitude: float) -> "_Sticking | None":
         """Return the motion at a larger amplitude, about another mean, if its contacts do not change their states either."""
-        return self.at(self.problem, self.equation, amplitude, [self.grown(amplitude)])
+        start = self.grown(amplitude)
+        return self.at(self.problem, self.equation, amplitude, [start], self.inverse)
 
     def leaves(self, amplitude: float) -> bool:
         """Whether a contact leaves its state before an amplitude."""
