@@ -30,9 +30,12 @@ from stickslip.response.self_excited.curve import at_amplitude, slip_amplitude
 from stickslip.response.self_excited.modes import stuck_modes
 from stickslip.response.self_excited.problem import self_excited_motions
 from stickslip.response.system import System
+from stickslip.study.analyses.backbones.records import ModeRecord
 from stickslip.study.analyses.backbones.words import case_verdicts
 from stickslip.study.check import check_study
+from stickslip.study.keep.journal import JobJournal
 from stickslip.study.keep.netcdf import one_case
+from stickslip.study.keep.progress import Interrupted
 
 
 def one_mass(law: object, row: int, stiffness: float = 1.0) -> tuple[System, HarmonicLoad]:
@@ -309,6 +312,35 @@ def test_the_mode_from_a_study_its_words_and_its_backbone_over_the_response(tmp_
     order = np.argsort(backbone.y)
     at_peak = np.interp(response.y[top], np.array(backbone.y)[order], np.array(backbone.x)[order])
     assert response.x[top] == pytest.approx(at_peak, rel=0.01)
+
+
+def test_a_run_that_is_stopped_goes_on_inside_a_mode(tmp_path: Path, monkeypatch) -> None:
+    """Every solve is on the disk before the next one: a run that was stopped has the bits of one that was not."""
+    alone = STUDY.replace(STUDY[STUDY.index("[forced_response]") : STUDY.index("[nonlinear_mode]")], "").replace("points = 10", "points = 5")  # fmt: skip
+    add, kinds = JobJournal.add, list[str]()
+
+    def run(folder: str, stop: int) -> xr.Dataset:
+        kinds.clear()
+
+        def add_until(journal: JobJournal, record: ModeRecord) -> None:
+            if len(kinds) == stop:
+                raise Interrupted("stopped")
+            kinds.append(record.kind)
+            add(journal, record)
+
+        monkeypatch.setattr(JobJournal, "add", add_until)
+        return answered(alone, tmp_path / folder).tree["nonlinear_mode"].to_dataset()
+
+    whole = run("whole", 1000)
+    every = list(kinds)
+    assert every[-1] == "end"
+    assert "audit" in every
+    with pytest.raises(Interrupted):
+        run("stopped", 7)
+    resumed = run("stopped", 1000)
+    assert kinds == every[7:]
+    for name in whole:
+        np.testing.assert_array_equal(resumed[name].values, whole[name].values)
 
 
 def test_what_has_no_such_mode_is_refused(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal, Protocol, TypeVar
 
 import numpy as np
 
@@ -244,9 +244,22 @@ def vibration_weights(problem: AnyBalance) -> FloatArray:
     return weights
 
 
-def branch_of(every: Iterable[Followed]) -> list[Followed]:
+class Placed(Protocol):
+    """What has its place along a branch: `Followed`, or what is kept of it."""
+
+    @property
+    def kind(self) -> str: ...  # noqa: D102
+
+    @property
+    def index(self) -> int: ...  # noqa: D102
+
+
+P = TypeVar("P", bound=Placed)
+
+
+def branch_of(every: Iterable[P]) -> list[P]:
     """Return the points of a branch among all that were found on the way: those that no later one took the place of."""
-    branch: list[Followed] = []
+    branch: list[P] = []
     for one in every:
         if one.kind == "point":
             branch = [*branch[: one.index], one]

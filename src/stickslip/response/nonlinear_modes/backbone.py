@@ -4,8 +4,9 @@ The extended periodic motion concept (Krack, Computers & Structures 154 (2015) 5
 amplitude is periodic, and ``ξ / 2ω`` is the damping ratio that it has without the added term. A conservative mode is one for which ξ comes out as zero.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Literal
 
 import numpy as np
@@ -14,7 +15,7 @@ from stickslip.arrays import ComplexArray
 from stickslip.contact.interface import Interface
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.response.branch import Followed, Route
+from stickslip.response.branch import Followed, Route, branch_of
 from stickslip.response.follow import LEAPS, follow
 from stickslip.response.nonlinear_modes.levels import ModeCurve
 from stickslip.response.parameter import Discretisation
@@ -160,6 +161,56 @@ class ModeSweep:
             )
 
 
+@dataclass(frozen=True, eq=False)
+class ModeWay:
+    """A nonlinear mode that is to be followed; `mode_way` makes one.
+
+    Parameters
+    ----------
+    curve, route
+        The motions, and from where to where.
+    to_gross_slip
+        Whether it ends there.
+    """
+
+    curve: ModeCurve
+    route: Route
+    to_gross_slip: bool
+
+    def follow(self, done: Sequence[Followed] = ()) -> Iterator[Followed]:
+        """Yield what is found on the way to the end of the mode, or to where it is lost for good, and is not in `done`, what an interrupted run has yielded."""
+        branch: list[Followed] = []
+        for i, one in enumerate(chain(done, follow(self.curve, self.route, done))):
+            if i >= len(done):
+                yield one
+            if one.kind == "point":
+                branch = [*branch[: one.index], one]
+            elif one.kind == "found":
+                branch[one.index] = one
+            else:
+                continue
+            if self._ends(branch, one):
+                return
+
+    def backbone(self, every: Iterable[Followed]) -> Backbone:
+        """Return the mode from all that was found on the way."""
+        own, found = self.curve.problems[0], branch_of(every)
+        made = tuple(mode_point(self.curve, f) for f in found)
+        end = _end(made, found[-1], self.route.last, stops=self.to_gross_slip)
+        anew = _begun_anew(found, self.route, self.curve.control.first)
+        end += (
+            f"; taken up again {anew} time{'s' * (anew > 1)} where it led nowhere" if anew else ""
+        )
+        return Backbone(own.system, own.load, own.mode, own.dof, made, end)
+
+    def _ends(self, branch: Sequence[Followed], one: Followed) -> bool:
+        """Whether a mode is at its end with the latest point."""
+        lost = len(branch) > LOST and not any(f.converged for f in branch[-LOST:])
+        if lost or len(branch) > TIMES * self.route.points:
+            return True
+        return self.to_gross_slip and one.converged and self.curve.slips_grossly(one)
+
+
 def nonlinear_mode(
     system: System,
     load: HarmonicLoad,
@@ -190,9 +241,23 @@ def nonlinear_mode(
     InputError
         If a contact is rigid, a harmonic load acts, the coordinate is none of the mode, or nothing slips and there is no span.
     """
-    (sweep or ModeSweep()).require_span(system.interface)
+    way = mode_way(system, load, mode, dof, how, sweep)
+    return way.backbone(tuple(way.follow()))
+
+
+def mode_way(
+    system: System,
+    load: HarmonicLoad,
+    mode: StuckMode,
+    dof: int,
+    how: Discretisation | None = None,
+    sweep: ModeSweep | None = None,
+) -> ModeWay:
+    """Return the way of a nonlinear mode from its first amplitude to its last, for `nonlinear_mode`, whose parameters these are."""
+    along = sweep or ModeSweep()
+    along.require_span(system.interface)
     problem = self_excited_motions(system, load, mode, dof, how or Discretisation())
-    along, span = sweep or ModeSweep(), None if sweep is None else sweep.span
+    span = along.span
     if span is None:
         slips = slip_amplitude(problem)
         span = (BEGINS * slips, (GROSS if along.to_gross_slip else ENDS) * slips)
@@ -206,12 +271,7 @@ def nonlinear_mode(
     )
     first, last = (float(np.log(a)) for a in span)
     route = Route(first=first, last=last, points=along.points)
-    found = _followed(curve, route, to_gross_slip=along.to_gross_slip)
-    made = tuple(mode_point(curve, f) for f in found)
-    end = _end(made, found[-1], route.last, stops=along.to_gross_slip)
-    anew = _begun_anew(found, route, curve.control.first)
-    end += f"; taken up again {anew} time{'s' * (anew > 1)} where it led nowhere" if anew else ""
-    return Backbone(system, load, mode, dof, made, end)
+    return ModeWay(curve, route, along.to_gross_slip)
 
 
 def mode_point(curve: ModeCurve, found: Followed) -> ModePoint:
@@ -245,25 +305,6 @@ def mode_point(curve: ModeCurve, found: Followed) -> ModePoint:
 def _product(system: System, harmonic: int, moving: ComplexArray) -> float:
     """Return ``X^H M X`` of a harmonic."""
     return float(np.vdot(moving, system.structure.of_harmonic(harmonic).mass @ moving).real)
-
-
-def _followed(curve: ModeCurve, route: Route, *, to_gross_slip: bool) -> list[Followed]:
-    """Follow a curve to its end, or to where it is lost for good."""
-    branch: list[Followed] = []
-    for one in follow(curve, route):
-        if one.kind == "point":
-            branch = [*branch[: one.index], one]
-        elif one.kind == "found":
-            branch[one.index] = one
-        else:
-            continue
-        if len(branch) > LOST and not any(f.converged for f in branch[-LOST:]):
-            break
-        if len(branch) > TIMES * route.points:
-            break
-        if to_gross_slip and one.converged and curve.slips_grossly(one):
-            break
-    return branch
 
 
 def _begun_anew(found: Sequence[Followed], route: Route, first: float) -> int:

@@ -8,7 +8,7 @@ from stickslip.assembly.model import Model
 from stickslip.study.analyses.analysis import Case, Notes, Solved, TextTable
 from stickslip.study.analyses.backbones.dataset import dataset
 from stickslip.study.analyses.backbones.question import NAME, Question, question_of
-from stickslip.study.analyses.backbones.records import ModeBranch
+from stickslip.study.analyses.backbones.records import ModeRecord
 from stickslip.study.analyses.backbones.solve import solve
 from stickslip.study.analyses.backbones.table import NonlinearModeTable
 from stickslip.study.analyses.backbones.words import tables
@@ -22,7 +22,7 @@ class NonlinearModeAnalysis:
 
     name = NAME
     table = NonlinearModeTable
-    record = ModeBranch
+    record = ModeRecord
     linear = False
     checks = ()
 
@@ -35,9 +35,9 @@ class NonlinearModeAnalysis:
         return question_of(case, model)
 
     def solve(
-        self, inputs: Question, done: Sequence[ModeBranch], notes: Notes
-    ) -> Iterator[ModeBranch]:
-        """Yield the modes."""
+        self, inputs: Question, done: Sequence[ModeRecord], notes: Notes
+    ) -> Iterator[ModeRecord]:
+        """Yield what is found along the modes."""
         return solve(inputs, done, notes)
 
     def dataset(self, solved: Sequence[Solved]) -> xr.Dataset:

@@ -8,7 +8,7 @@ import xarray as xr
 
 from stickslip.reduction.waves import wave
 from stickslip.study.analyses.analysis import Solved
-from stickslip.study.analyses.backbones.records import ModeBranch
+from stickslip.study.analyses.backbones.records import ModeBranch, branches_of
 from stickslip.study.analyses.backbones.words import case_verdicts
 from stickslip.study.analyses.collected import Variables, described, each, of_cases, rows
 from stickslip.study.analyses.vibrating import ONE
@@ -54,7 +54,7 @@ def _lost(case: Variables) -> int:
 
 
 def _of_case(solved: Solved) -> Variables:
-    branches: Sequence[ModeBranch] = solved.records
+    branches = branches_of(solved.records)
     model = solved.notes.get("model", {})
     sectors = int(model.get("sectors", 1))
     values: dict[str, Any] = {"output": str(model.get("output", ""))}

@@ -1,8 +1,99 @@
-"""What is found of one nonlinear mode, as it is kept in the journal of a job."""
+"""What is found on the way along nonlinear modes, as it is kept in the journal of a job, and the modes that it makes."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import groupby
+
+import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.response.branch import Followed, Judged, Kind, branch_of
+from stickslip.response.nonlinear_modes.backbone import ModeWay, mode_point
+from stickslip.response.self_excited.modes import StuckMode
+from stickslip.solve.continuation import Point
+from stickslip.solve.newton_method import Solution
+from stickslip.solve.status import Status
+
+END = "end"  # kind of the record behind the last one of a mode
+NUMBERS = ("amplitude", "omega", "ratio", "modal_amplitude", "energy", "slipping", "open_for", "change")  # fmt: skip
+
+
+def _nothing() -> FloatArray:
+    return np.zeros(0)
+
+
+@dataclass(frozen=True, eq=False)
+class ModeRecord:
+    """What was found in one solve on the way along a nonlinear mode, or how the mode ended.
+
+    Parameters
+    ----------
+    wave_number, mode
+        -1 for a single structure; from 1, by frequency with contacts stuck.
+    kind
+        As of `stickslip.response.branch.Followed`, or ``end``.
+    index, level, seconds, bound
+        As of `Followed`, and of its judgement.
+    x, p, tangent, step, orientation, bend
+        Of its point, with all digits: an interrupted run goes on from them.
+    status, iterations, residual_norm
+        How the solver ended.
+    told
+        (8,) what results tell of a motion, in the order of `NUMBERS`; NaN of what is no point of the mode.
+    order
+        Highest harmonic.
+    mode_omega, mode_ratio, tolerance, end, problem
+        Of the end, as of `ModeBranch`.
+    """
+
+    wave_number: int
+    mode: int
+    kind: str
+    index: int = -1
+    level: int = -1
+    seconds: float = 0.0
+    bound: float = np.nan
+    x: FloatArray = field(default_factory=_nothing)
+    p: float = np.nan
+    tangent: FloatArray = field(default_factory=_nothing)
+    step: float = np.nan
+    orientation: float = np.nan
+    bend: FloatArray | None = None
+    status: Status = Status.CONVERGED
+    iterations: int = 0
+    residual_norm: float = np.nan
+    told: FloatArray = field(default_factory=_nothing)
+    order: int = -1
+    mode_omega: float = np.nan
+    mode_ratio: float = np.nan
+    tolerance: float = np.nan
+    end: str = ""
+    problem: str = ""
+
+    @property
+    def followed(self) -> Followed:
+        """What was found, as it was on the way."""
+        kind: Kind = self.kind  # type: ignore[assignment]  # any but that of the end
+        solution = Solution(self.x, self.status, self.iterations, self.residual_norm, 0.0, 0.0)
+        point = Point(
+            self.x, self.p, self.tangent, self.step, solution, self.orientation, bend=self.bend
+        )
+        return Followed(kind, self.index, self.level, point, Judged(self.bound), self.seconds)
+
+
+def record_of(wave: int, mode: StuckMode, way: ModeWay, found: Followed) -> ModeRecord:
+    """Return what is kept of what was found on the way along a mode of a wave."""
+    point, solution = found.point, found.point.solution
+    told = np.full(len(NUMBERS), np.nan)
+    if found.converged and found.kind in ("point", "found"):
+        motion = mode_point(way.curve, found)
+        told[:] = [getattr(motion, name) for name in NUMBERS]
+    return ModeRecord(
+        wave, mode.number, found.kind, found.index, found.level, found.seconds, found.judged.bound,
+        point.x, point.p, point.tangent, point.step, point.orientation, point.bend,
+        solution.status, solution.iterations, solution.residual_norm,
+        told, way.curve.problems[found.level].balance.order,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,3 +142,25 @@ class ModeBranch:
     tolerance: float
     end: str
     problem: str = ""
+
+
+def branches_of(records: Sequence[ModeRecord]) -> list[ModeBranch]:
+    """Return the modes whose ends are among the records."""
+    found = []
+    for _, group in groupby(records, lambda r: (r.wave_number, r.mode)):
+        *way, last = group
+        if last.kind == END:
+            found.append(_branch(way, last))
+    return found
+
+
+def _branch(way: Sequence[ModeRecord], last: ModeRecord) -> ModeBranch:
+    points = [] if last.problem else branch_of(way)
+    told = np.array([r.told for r in points]).reshape(-1, len(NUMBERS)).T
+    amplitude, omega, ratio, modal_amplitude, energy, slipping, open_for, change = told
+    order, status = (np.array([int(getattr(r, name)) for r in points], dtype=np.int64) for name in ("order", "status"))  # fmt: skip
+    return ModeBranch(
+        last.wave_number, last.mode, last.mode_omega, last.mode_ratio,
+        amplitude, omega, ratio, modal_amplitude, energy, order, status, slipping, open_for, change,
+        last.tolerance, last.end, last.problem,
+    )  # fmt: skip

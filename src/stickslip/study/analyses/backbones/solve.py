@@ -2,38 +2,41 @@
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
-from stickslip.arrays import FloatArray
 from stickslip.errors import StickslipError
-from stickslip.response.nonlinear_modes.backbone import Backbone, nonlinear_mode
+from stickslip.response.nonlinear_modes.backbone import mode_way
 from stickslip.response.self_excited.modes import StuckMode
 from stickslip.study.analyses.analysis import Notes
 from stickslip.study.analyses.backbones.question import Question
-from stickslip.study.analyses.backbones.records import ModeBranch
+from stickslip.study.analyses.backbones.records import END, ModeRecord, record_of
 from stickslip.study.analyses.vibrating import ONE, as_wave
 from stickslip.study.keep.progress import LOG, advance
 from stickslip.units import HZ
 
 
-def solve(question: Question, done: Sequence[ModeBranch], notes: Notes) -> Iterator[ModeBranch]:
-    """Yield the modes that are not done."""
+def solve(question: Question, done: Sequence[ModeRecord], notes: Notes) -> Iterator[ModeRecord]:
+    """Yield what is found on the way along each mode, and its end, of that what is not done."""
     notes.put("model", dict(question.facts) | {"output": question.model.output_labels[0]})
     tasks = [(wave, mode) for wave in question.waves for mode in question.followed(wave)]
     for i, (wave, mode) in enumerate(tasks):
-        if i < len(done):
+        known = [r for r in done if (r.wave_number, r.mode) == (wave, mode.number)]
+        if known and known[-1].kind == END:
             continue
-        branch = follow_mode(question, wave, mode)
         name = _named(question, wave, mode)
-        LOG.info(f"{name}: {branch.problem or branch.end}")
+        for record in follow_mode(question, wave, mode, known):
+            if record.kind == END:
+                LOG.info(f"{name}: {record.problem or record.end}")
+            yield record
         advance((i + 1) / len(tasks), name)
-        yield branch
 
 
-def follow_mode(question: Question, wave: int, mode: StuckMode) -> ModeBranch:
-    """Return what is found of a mode."""
+def follow_mode(
+    question: Question, wave: int, mode: StuckMode, done: Sequence[ModeRecord]
+) -> Iterator[ModeRecord]:
+    """Yield what is found along a mode and not done, and its end."""
+    end, problem = "", ""
+    every = [r.followed for r in done]
     try:
-        found = nonlinear_mode(
+        way = mode_way(
             as_wave(question.model.system, wave),
             question.model.load,
             mode,
@@ -41,26 +44,22 @@ def follow_mode(question: Question, wave: int, mode: StuckMode) -> ModeBranch:
             question.discretisation,
             question.sweep,
         )
+        for found in way.follow(tuple(every)):
+            every.append(found)
+            yield record_of(wave, mode, way, found)
+        end = way.backbone(every).end
     except StickslipError as error:
-        found = Backbone(
-            as_wave(question.model.system, wave), question.model.load, mode, question.dof, (), ""
-        )
-        return _branch(wave, found, question.sweep.tolerance, str(error))
-    return _branch(wave, found, question.sweep.tolerance)
-
-
-def _branch(wave: int, found: Backbone, tolerance: float, problem: str = "") -> ModeBranch:
-    points = found.points
-
-    def each(name: str) -> FloatArray:
-        return np.array([getattr(p, name) if p.converged else np.nan for p in points], dtype=float)
-
-    return ModeBranch(
-        wave, found.mode.number, found.mode.omega, found.mode.ratio,
-        each("amplitude"), each("omega"), each("ratio"), each("modal_amplitude"), each("energy"),
-        np.array([p.order for p in points], dtype=np.int64), np.array([int(p.status) for p in points], dtype=np.int64),
-        each("slipping"), each("open_for"), each("change"), tolerance, found.end, problem,
-    )  # fmt: skip
+        problem = str(error)
+    yield ModeRecord(
+        wave,
+        mode.number,
+        END,
+        mode_omega=mode.omega,
+        mode_ratio=mode.ratio,
+        tolerance=question.sweep.tolerance,
+        end=end,
+        problem=problem,
+    )
 
 
 def _named(question: Question, wave: int, mode: StuckMode) -> str:
