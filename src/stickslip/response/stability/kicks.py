@@ -132,12 +132,13 @@ def sampled_monodromy(
     kicks = _Kicks(modes, tangents, weights, now.motion.shape[1])
     springs = np.zeros_like(contacts.stiffness[0])
     springs[tangents.contacts] = kicks.springs.reshape(-1, 3, 1) * np.eye(3)
-    places = Sliders(modes, contacts)
+    places = Sliders(modes.gaps, contacts)
+    pull = modes.pull(places.own) * contacts.springs
     sample = 0
     for here in range(count):
         stuck = contacts.sticks[here]
         matrix = modes.matrix(contacts.stiffness[here] + springs)
-        exponential, driven = transition(matrix, places.pull[:, stuck], lengths[here])
+        exponential, driven = transition(matrix, pull[:, stuck], lengths[here])
         force = driven @ now.sliders[stuck]
         for _ in times[here]:
             kicks.kick(sample, shares[sample], now.motion)

@@ -7,8 +7,8 @@ import numpy as np
 from stickslip.arrays import BoolArray, FloatArray
 from stickslip.contact.slider import PERIOD
 from stickslip.response.stability.contact_states import ContactStates
+from stickslip.response.stability.low_rank_flow import flow_of
 from stickslip.response.stability.modal_states import ModalStates
-from stickslip.response.stability.propagation import propagate
 from stickslip.response.time.sectors import InTime
 
 
@@ -21,19 +21,18 @@ class Disturbance:
 
 
 class Sliders:
-    """The places of the sliders: how they pull the structure, and what sets them."""
+    """What sets the places of the sliders, gaps being (3 n_contacts, k) of the first k states."""
 
-    def __init__(self, modes: ModalStates, contacts: ContactStates) -> None:
-        self.modes, self.contacts = modes, contacts
-        self.own, self.normal = modes.gaps[contacts.rows], modes.gaps[contacts.normals]
-        self.pull = modes.pull(self.own) * contacts.springs
+    def __init__(self, gaps: FloatArray, contacts: ContactStates) -> None:
+        self.contacts = contacts
+        self.own, self.normal = gaps[contacts.rows], gaps[contacts.normals]
 
     def take_hold(self, interval: int, now: Disturbance) -> None:
         """Set the sliders anew that begin to rest with an interval."""
         new = self.contacts.takes_hold[interval]
         by_normal = self.contacts.by_normal[interval, new][:, None]
         row = self.own[new] + by_normal * self.normal[new]
-        now.sliders[new] = row @ now.motion[: self.modes.n]
+        now.sliders[new] = row @ now.motion[: row.shape[1]]
 
 
 def monodromy(modes: ModalStates, contacts: ContactStates) -> FloatArray:
@@ -42,20 +41,18 @@ def monodromy(modes: ModalStates, contacts: ContactStates) -> FloatArray:
     The states are those of the structure and the places of the sliders that rest at the time at which the period begins, which is
     the transition after which the fewest do; the non-zero multipliers are those of any other.
     """
-    places, count = Sliders(modes, contacts), len(contacts.times) - 1
+    flow, count = flow_of(modes, contacts), len(contacts.times) - 1
+    places = Sliders(flow.gaps, contacts)
     begin = int(np.argmin(contacts.sticks.sum(axis=1)))
     held = contacts.sticks[begin]
     now = identity(modes.n, held, 0)
+    now.motion = flow.into @ now.motion
     for i in range(begin, begin + count):
         here, following = i % count, (i + 1) % count
-        stuck = contacts.sticks[here]
-        matrix = modes.matrix(contacts.stiffness[here])
         length = contacts.times[here + 1] - contacts.times[here]
-        now.motion = propagate(
-            matrix, now.motion, places.pull[:, stuck], now.sliders[stuck], length
-        )
+        now.motion = flow.advance(here, length, now.motion, now.sliders)
         places.take_hold(following, now)
-    return np.vstack([now.motion, now.sliders[held]])
+    return np.vstack([flow.out @ now.motion, now.sliders[held]])
 
 
 def share_of_monodromy(
@@ -74,16 +71,14 @@ def share_of_monodromy(
     start = 0.5 * (times[begin] + times[begin + 1])
     stop = start + PERIOD / wheel.shares
     held = contacts.sticks[begin]
-    places, now = Sliders(modes, contacts), identity(modes.n, held, 0)
+    flow, now = flow_of(modes, contacts), identity(modes.n, held, 0)
+    places = Sliders(flow.gaps, contacts)
+    now.motion = flow.into @ now.motion
     here, at = begin, start
     while True:
         i, turn = here % count, (here // count) * PERIOD
         end = min(float(times[i + 1] + turn), stop)
-        stuck = contacts.sticks[i]
-        matrix = modes.matrix(contacts.stiffness[i])
-        now.motion = propagate(
-            matrix, now.motion, places.pull[:, stuck], now.sliders[stuck], end - at
-        )
+        now.motion = flow.advance(i, end - at, now.motion, now.sliders)
         if end >= stop:
             break
         here, at = here + 1, end
@@ -92,10 +87,8 @@ def share_of_monodromy(
         return None
     moved = np.linalg.solve(modes.basis, wheel.shifted(modes.basis))
     turned = moved * modes.speed / modes.speed[:, None]
-    n = modes.n
-    return np.vstack(
-        [moved @ now.motion[:n], turned @ now.motion[n:], wheel.shifted(now.sliders)[held]]
-    )
+    n, motion = modes.n, flow.out @ now.motion
+    return np.vstack([moved @ motion[:n], turned @ motion[n:], wheel.shifted(now.sliders)[held]])
 
 
 def identity(n: int, held: BoolArray, more: int) -> Disturbance:
