@@ -140,6 +140,43 @@ def test_motions_that_need_more_harmonics_are_doubtful(result):
     assert any(v.level == "doubtful" and "more harmonics" in v.why for v in result.verdicts)
 
 
+WHEEL = """
+schema_version = 2
+[part.blisk]
+shape = "lumped"
+sectors = 6
+names = ["disk", "tip"]
+masses_kg = [1.0, 0.5]
+springs_n_per_m = [["disk", "ground", 1e5], ["disk", "next.disk", 1e6], ["disk", "tip", 1e6]]
+[part.blisk.damping]
+modal_ratio = 1e-2
+[contact.spring]
+between = ["blisk.tip", "ground"]
+law = "polynomial_spring"
+along_t = [0.0, 0.0, 1e10]
+[load.gas]
+on = "blisk.tip"
+force_n = 20.0
+engine_order = 2
+[all_motions]
+frequency_hz = [180.0, 220.0]
+at_hz = [200.0]
+harmonics = 1
+points = 5
+tries = 1
+"""
+
+
+def test_of_a_wheel_travelling_waves_are_searched_and_what_is_not_examined_is_said(tmp_path):
+    (tmp_path / "study.toml").write_text(WHEEL, encoding="utf-8")
+    result = Study.from_file(tmp_path / "study.toml").run()
+    case = one_case(result.data["all_motions"].to_dataset(), 0)
+    assert set(case["motion_stability"].values.reshape(-1)) <= {"not examined", ""}
+    assert np.all(np.isnan(case["motion_change"].values))
+    assert any("travelling wave" in v.why for v in result.verdicts)
+    assert "not examined" in result.report(tmp_path / "page.html").read_text(encoding="utf-8")
+
+
 def test_more_modes_than_the_model_has_are_refused(folder):
     model = Study.from_file(folder / "study.toml").model()
     with pytest.raises(InputError, match=r"all_motions.modes.*: 1\."):

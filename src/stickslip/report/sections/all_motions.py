@@ -137,6 +137,8 @@ def basin_table(view: Motions) -> Table | Words:
 
 
 def _changed(share: float) -> str:
+    if np.isnan(share):
+        return NONE
     return "no motion near" if np.isinf(share) else f"{number(100 * share, 2)} %"
 
 

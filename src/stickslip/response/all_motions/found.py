@@ -148,7 +148,8 @@ class MotionAt:
     multiplier, error
         Modulus of the multiplier that decides, and its error.
     change
-        What more harmonics would change in the motion, relative to its vibration; infinite where no motion with more is near.
+        What more harmonics would change in the motion, relative to its vibration; infinite where no motion with more is near, NaN where it
+        was not examined.
     """
 
     branch: int

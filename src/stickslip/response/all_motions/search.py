@@ -10,6 +10,8 @@ from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.support import harmonics_of
+from stickslip.reduction.speed_line import SpeedLine
+from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.all_motions.basins import (
     ALIKE,
     APERIODIC,
@@ -333,7 +335,9 @@ class _Search:
         )
 
     def _change(self, point: ForcedPoint) -> float:
-        """Return what more harmonics would change in a motion, relative to its vibration."""
+        """Return what more harmonics would change in a motion, relative to its vibration; NaN for a wheel, whose waves end with its harmonics."""
+        if isinstance(self.problem.system.structure, TunedWheel | SpeedLine):
+            return np.nan
         more = corrected(self.problem, point)
         if more is None:
             return np.inf

@@ -165,7 +165,7 @@ def _table(case: xr.Dataset, head: str) -> TextTable:
         for k in np.flatnonzero(own >= 0):
             of = {n: case[f"motion_{n}"].values[i, k] for n in ("amplitude", "stability", "count", "share", "share_low", "share_high")}  # fmt: skip
             starts = int(case["starts"].values[i])
-            share = f"{100 * of['share']:.3g} ({100 * of['share_low']:.2g} to {100 * of['share_high']:.2g})"
+            share = f"{100 * of['share']:.3g} ({100 * of['share_low']:.3g} to {100 * of['share_high']:.3g})"
             rows.append(
                 (
                     f"{case['searched_hz'].values[i]:.6g}",
