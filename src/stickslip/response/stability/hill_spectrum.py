@@ -77,8 +77,9 @@ def exponents(hill: Hill, segments: Sequence[Segment] = ()) -> Exponents:
     if segments:
         return _gathered([_zeros(fitted(segment)) for segment in segments], hill, None)
     axis = [fitted(segment) for segment in segments_of(hill)]
-    parts = [_zeros(segment) for segment in axis]
-    growing = _counted(axis)
+    found = [_raw(segment, "whole") for segment in axis]
+    parts = [_zeros(segment, zeros) for segment, zeros in zip(axis, found, strict=True)]
+    growing = _counted(axis, found)
     for growth in STEPS if growing is not None else ():
         if _growing(parts, hill) >= (growing or 0):
             break
@@ -118,11 +119,11 @@ def segments_of(hill: Hill) -> list[Segment]:
     return found
 
 
-def _counted(axis: Sequence[Segment]) -> int | None:
+def _counted(axis: Sequence[Segment], found: Sequence[Zeros]) -> int | None:
     """Return how many exponents lie right of the imaginary axis, by the turns of the determinant along it; None where these are not known."""
     if not all(segment.smooth for segment in axis) or not _rings(axis):
         return None
-    each = [_turns(segment) for segment in axis]
+    each = [_turns(segment, zeros) for segment, zeros in zip(axis, found, strict=True)]
     turns, alone = 2.0 * sum(t for t, _ in each), 2 * sum(n for _, n in each)
     if np.isnan(turns) or abs(turns - round(turns)) > WHOLE:
         return None
@@ -138,7 +139,7 @@ def _rings(axis: Sequence[Segment]) -> bool:
     return rings and hill.order >= hill.reach
 
 
-def _turns(segment: Segment) -> tuple[float, int]:
+def _turns(segment: Segment, found: Zeros) -> tuple[float, int]:
     """Return how often the determinant turns along a segment, and how many exponents springs in place of the contacts have right of it."""
     whole, alone = _matrix(segment, "whole"), _matrix(segment, "alone")
     path = ON_AXIS + 1j * np.linspace(segment.low, segment.high, PATH)
@@ -146,19 +147,18 @@ def _turns(segment: Segment) -> tuple[float, int]:
     phases = np.array([node.phase for node in segment.nodes])
     steps = np.angle(np.exp(1j * np.diff(phases)))
     eliminated = float(steps.sum()) if np.all(np.abs(steps) < 2.0) else float("nan")
-    known = _raw(segment, "whole").values
-    turns = turning(whole, known, path) - turning(alone, without, path) + eliminated
+    turns = turning(whole, found.values, path) - turning(alone, without, path) + eliminated
     inside = (without.imag >= segment.low) & (without.imag < segment.high)
     growing = int(np.count_nonzero((without.real > ON_AXIS) & inside))
     return turns / (2.0 * np.pi), growing
 
 
-def _zeros(segment: Segment) -> Part:
+def _zeros(segment: Segment, zeros: Zeros | None = None) -> Part:
     """Return the exponents about a segment, their errors, and the harmonics in which they vibrate most.
 
     Far from the segment the polynomial has zeros that the matrix has not: those right of it are solved again with the matrix itself.
     """
-    found = _raw(segment, "whole")
+    found = _raw(segment, "whole") if zeros is None else zeros
     beside = found.values.real - segment.growth
     inside = (found.values.imag >= segment.low - EDGE) & (found.values.imag <= segment.high + EDGE)
     values, errors, most = [], [], []
@@ -221,10 +221,11 @@ def _matrix(segment: Segment, name: str) -> Matrix:
 
 def _slope(segment: Segment, name: str) -> Matrix:
     """Return its derivative, by central differences along the real axis."""
-    matrix, step = _matrix(segment, name), 1e-5
+    nodes, step = np.array([getattr(node, name) for node in segment.nodes]), 1e-5
 
     def slope(sigma: ComplexArray) -> ComplexArray:
-        return np.asarray((matrix(sigma + step) - matrix(sigma - step)) / (2.0 * step))
+        apart = segment.weights(sigma + step) - segment.weights(sigma - step)
+        return np.asarray(np.tensordot(apart / (2.0 * step), nodes, axes=1))
 
     return slope
 

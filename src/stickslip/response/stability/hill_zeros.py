@@ -92,27 +92,31 @@ def _polished(
     scale: FloatArray,
 ) -> Zeros:
     """Return the zeros next to starts by inverse iteration, those that it does not find being left out."""
-    now, right = starts.astype(complex), vectors
-    change = np.zeros_like(now)
+    now, right = starts.astype(complex), vectors.copy()
+    change = np.full_like(now, np.inf)
     for _ in range(ROUNDS):
+        moving = np.flatnonzero(np.abs(change) >= CLOSE)
+        if not moving.size:
+            break
         # no zero itself, where nothing could be solved
-        near: ComplexArray = np.asarray(now + NUDGE)
-        moved = _times(slope(near), right)
+        near: ComplexArray = np.asarray(now[moving] + NUDGE)
+        moved = _times(slope(near), right[moving])
         following = np.linalg.solve(matrix(near), moved[:, :, None])[:, :, 0]
-        share = np.einsum("ki,ki->k", right.conj(), following)
-        change = NUDGE - 1.0 / np.where(share != 0.0, share, 1.0)
-        change *= np.minimum(1.0, FAR / np.maximum(np.abs(change), FAR))
-        now, right = now + change, following / np.linalg.norm(following, axis=1, keepdims=True)
+        share = np.einsum("ki,ki->k", right[moving].conj(), following)
+        step = NUDGE - 1.0 / np.where(share != 0.0, share, 1.0)
+        step *= np.minimum(1.0, FAR / np.maximum(np.abs(step), FAR))
+        now[moving], change[moving] = now[moving] + step, step
+        right[moving] = following / np.linalg.norm(following, axis=1, keepdims=True)
     kept = (np.abs(change) < CLOSE) & (np.abs(now - starts) < FAR)
     now, right = now[kept], right[kept]
     slopes = slope(now)
-    adjoint, left = matrix(now + NUDGE).conj().transpose(0, 2, 1), right
+    adjoint, other = matrix(now + NUDGE).conj().transpose(0, 2, 1), right
     for _ in range(2):
-        moved = _times(slopes.conj().transpose(0, 2, 1), left)
-        left = np.linalg.solve(adjoint, moved[:, :, None])[:, :, 0]
-        left = left / np.linalg.norm(left, axis=1, keepdims=True)
-    along = np.einsum("ki,ki->k", left.conj(), _times(slopes, right))
-    return Zeros(now, right, left, along, scale)
+        moved = _times(slopes.conj().transpose(0, 2, 1), other)
+        other = np.linalg.solve(adjoint, moved[:, :, None])[:, :, 0]
+        other = other / np.linalg.norm(other, axis=1, keepdims=True)
+    along = np.einsum("ki,ki->k", other.conj(), _times(slopes, right))
+    return Zeros(now, right, other, along, scale)
 
 
 def _times(matrices: ComplexArray, vectors: ComplexArray) -> ComplexArray:
