@@ -234,11 +234,7 @@ def test_nothing_leaves_a_fold_or_a_torus():
 
 def test_folds_of_one_harmonic_lie_where_the_closed_form_has_them():
     force = 0.02
-    problem = cubic_mass((0.8, 1.6), force=force, highest=1, points=30)
-    load = problem.low.linear.load
-    points = ss.response.accepted_points(
-        list(ss.forced_response(problem.system, load, problem.sweep))
-    )
+    problem, points, _ = folded()
     found = bifurcations(problem, points, examine=None)
     # ((1 + 3/4 A^2 - w^2)^2 + (c w)^2) A^2 = F^2 is quadratic in w^2; its larger root over A turns twice
     size = np.linspace(0.05, 0.99, 400_001)
@@ -253,27 +249,55 @@ def test_folds_of_one_harmonic_lie_where_the_closed_form_has_them():
     assert found.examined == 0
 
 
-def test_a_pair_that_more_harmonics_bring_together_at_a_fold_is_that_of_the_fold():
-    # as two masses near 1:2 showed it: without its error the pair would be a torus beside each fold
+@cache
+def folded():
+    """Return a response of one harmonic with two folds, its points, and a phase that falls along the whole branch at both and their neighbours."""
     problem = cubic_mass((0.8, 1.6), force=0.02, highest=1, points=30)
     load = problem.low.linear.load
-    points = ss.response.accepted_points(
+    every = ss.response.accepted_points(
         list(ss.forced_response(problem.system, load, problem.sweep))
     )
-    alone = bifurcations(problem, points, examine=None).found
+    points = [p for p in every if p.stage != "peak"]
+    return problem, points, bifurcations(problem, points, examine=None).found
 
-    def phase(point):
-        return float(np.angle(point.coefficients[1, 0]))  # falls along the whole branch
 
-    ends = [phase(b.point) for b in alone]
+def phase(point):
+    return float(np.angle(point.coefficients[1, 0]))
+
+
+def with_multipliers(*values, error):
+    return Stability(Floquet(np.array(values, dtype=complex)), np.full(len(values), error), 0, 0, 0)
+
+
+def test_a_pair_that_more_harmonics_bring_together_at_a_fold_is_that_of_the_fold():
+    # as two masses near 1:2 showed it: without its error the pair would be a torus beside each fold
+    problem, points, folds = folded()
+    ends = [phase(b.point) for b in folds]
 
     def examine(problem, point):
         beyond = 0.01 * (ends[0] - phase(point)) * (phase(point) - ends[1])
-        values = np.array([1.0 + beyond + 0.003j, 0.99 - 0.003j])
-        return Stability(Floquet(values), np.full(2, 0.03), 0, 0, 0)
+        return with_multipliers(1.0 + beyond + 0.003j, 0.99 - 0.003j, error=0.03)
 
     found = bifurcations(problem, points, examine=examine).found
     assert [(b.kind, b.before, b.after) for b in found] == [("fold", 0, 1), ("fold", 1, 0)]
+
+
+def test_a_branch_point_in_the_step_of_a_fold_is_found():
+    # as a chain of masses showed it: both change the number of multipliers outside, and the two ends of the step have the same
+    problem, points, folds = folded()
+    ends = [phase(b.point) for b in folds]
+    after = phase(points[folds[0].place[1]])
+    there = ends[0] + 0.3 * (after - ends[0])
+
+    def examine(problem, point):
+        beyond = (ends[0] - phase(point)) * (phase(point) - ends[1])
+        return with_multipliers(1.0 + 0.1 * beyond, 1.0 + 0.1 * (phase(point) - there), error=1e-9)
+
+    found = bifurcations(problem, points, examine=examine).found
+    assert [(b.kind, b.before, b.after) for b in found] == [
+        ("fold", 1, 2), ("branch point", 2, 1), ("fold", 1, 0)
+    ]  # fmt: skip
+    assert phase(found[1].point) == pytest.approx(there, abs=1e-5)
 
 
 def test_points_without_a_motion_and_points_that_are_skipped_are_told():

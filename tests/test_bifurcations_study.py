@@ -1,6 +1,7 @@
 """Bifurcations through a study: dataset, verdicts, terminal and page of the example of an impacting mass."""
 
 import shutil
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -80,7 +81,9 @@ def asked_of(path):
     return asked, collect(asked.problem, points, asked.model.peak_output)
 
 
-def test_structural_damping_is_located_by_hill(tmp_path):
+def test_structural_damping_is_located_by_hill(tmp_path, monkeypatch):
+    quick = partial(bifurcating.bifurcations, tolerance=1e-4)
+    monkeypatch.setattr(bifurcating, "bifurcations", quick)
     study, plain = tmp_path / "study.toml", EXAMPLE.read_text()
     damped = plain.replace('dashpots_n_s_per_m = [["ground", 1, 10.0]]', "")
     damped = damped.replace("[25.0, 42.0]\npoints = 20", "[36.0, 38.2]\npoints = 2")

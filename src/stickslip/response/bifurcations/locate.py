@@ -29,6 +29,13 @@ LOOKING = (
 JUMP = (
     5e-3  # change of a modulus within the last bracket, a hundred times smaller where it is smooth
 )
+BESIDE = (
+    0.5,
+    0.2,
+    0.08,
+    0.03,
+    0.01,
+)  # of a step, from its fold: where it is looked at if another multiplier crosses, too
 NO_CORNER = "no solution with the harmonics of both ends is found at one of them"
 GAP = "the branch has a gap there, and goes on elsewhere"
 NO_MOTION = "no motion was found there"
@@ -233,7 +240,9 @@ class _Walk:
             self.lost(branch[a].omega, branch[b].omega, SPENT if spent else UNKNOWN)
             return
         neutral = min(neutral_of(first), neutral_of(last))
-        if spectrum(first, neutral).outside == spectrum(last, neutral).outside:
+        more = spectrum(last, neutral).outside - spectrum(first, neutral).outside
+        another = more % 2 == 0 and sum(s.folds for i in range(a, b) if (s := steps[i])) % 2 == 1
+        if more == 0 and not another:
             return
         if b > a + 1:
             middle = (a + b) // 2
@@ -242,16 +251,39 @@ class _Walk:
             return
         step = steps[a]
         if step is not None:
-            self._locate(step, a)
+            self._locate(step, a, beside_fold=another)
 
-    def _locate(self, step: Stretch, place: int) -> None:
-        """Locate all that crosses within a step: one after the other, in what is left on both sides."""
-        ends = [self._look(step.forced(p)) for p in (step.before, step.after)]
-        if ends[0] is None or ends[1] is None:
-            self.lost(step.before.p, step.after.p, SPENT)
+    def _locate(self, step: Stretch, place: int, *, beside_fold: bool) -> None:
+        """Locate all that crosses within a step: one after the other, in what is left on both sides; or on both sides of a fold."""
+        at = [step.before, step.after]
+        if beside_fold:
+            at[1:1] = self._around(step)
+        ends = [self._look(step.forced(p)) for p in at]
+        if any(end is None for end in ends):
+            self.lost(step.before.p, step.after.p, SPENT if self.examined >= self.most else UNKNOWN)
             return
-        neutral = min(neutral_of(ends[0]), neutral_of(ends[1]))
-        self._within(step, step, place, spectrum(ends[0], neutral), spectrum(ends[1], neutral), neutral)  # fmt: skip
+        known = [end for end in ends if end is not None]
+        neutral = min(map(neutral_of, known))
+        spectra = [spectrum(end, neutral) for end in known]
+        for i, (low, high) in enumerate(pairwise(at)):
+            self._within(step, step.between(low, high), place, spectra[i], spectra[i + 1], neutral)
+
+    def _around(self, step: Stretch) -> list[Point]:
+        """Return two points about a fold between which as many multipliers cross as at a fold, an odd number; none where there are none."""
+        fold = step.fold()
+        if not fold.solution.status.converged:
+            return []
+        share = step.along(fold)
+        for near in BESIDE:
+            shares = (share - near * share, share + near * (1.0 - share))
+            pair = [step.at(s, self.tolerance) for s in shares]
+            low, high = (self._look(step.forced(p)) for p in pair)
+            if low is None or high is None:
+                return []
+            neutral = min(neutral_of(low), neutral_of(high))
+            if (spectrum(high, neutral).outside - spectrum(low, neutral).outside) % 2 == 1:
+                return pair
+        return []
 
     def _within(
         self, whole: Stretch, step: Stretch, place: int, first: Spectrum, last: Spectrum, neutral: int

@@ -68,6 +68,10 @@ class Stretch:
         mark = Mark(name="bifurcation", value=value, tolerance=tolerance)
         return located(self.balance, self.before, self.after, mark, self.following)
 
+    def at(self, share: float, tolerance: float) -> Point:
+        """Return its point at a share of the chord."""
+        return self.where(lambda point: self.along(point) - share, tolerance)
+
     def connected(self, low: Point, high: Point, tolerance: float) -> bool:
         """Whether two neighbours of a located point are so near to each other that no gap of the branch lies between."""
         measure = measure_at(low.x, self.following)
