@@ -6,10 +6,12 @@ from html import escape
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import plotly.graph_objects as go
 import xarray as xr
 
 from stickslip.errors import did_you_mean, input_error
+from stickslip.front.frame_of import dataframe
 from stickslip.front.table import Table
 from stickslip.report.page import plots, write_report
 from stickslip.report.result import RESULT, open_result
@@ -73,6 +75,24 @@ class Result:
                 f"result[{name!r}]", "is no analysis of this result", did_you_mean(name, known)
             )
         return self.data[name].to_dataset()
+
+    def to_dataframe(self, name: str = "", of: str = "") -> pd.DataFrame:
+        """Return an analysis as a table of pandas, in Hz and SI units, which `DataFrame.attrs` names.
+
+        Parameters
+        ----------
+        name
+            Of the analysis; left out: the first of the result.
+        of
+            Variable that has an entry in each row, with all that belongs to it; left out: amplitude, damping or frequency.
+
+        Raises
+        ------
+        InputError
+            If there is no such analysis or variable.
+        """
+        name = name or next(iter(self.data.children), "")
+        return dataframe(self[name], name, of)
 
     def save(self, path: str | Path) -> Path:
         """Write the result as netCDF-4; return the file.

@@ -1,0 +1,56 @@
+"""A dataset as a table of pandas."""
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from stickslip.errors import did_you_mean, input_error
+from stickslip.study.analyses.varied import varied_values
+
+# what the rows of a table are of, the first that an analysis has, that with most dimensions
+_CHIEF = ("amplitude", "largest", "damping", "pair_margin", "level", "frequency_hz", "linear_damping_ratio")  # fmt: skip
+
+
+def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
+    """Return a variable and all that belongs to its entries, a row an entry; entries that are not there are left out.
+
+    Parameters
+    ----------
+    data
+        Of one analysis.
+    name
+        Of the analysis, for messages.
+    of
+        The variable; empty for the chief one.
+
+    Raises
+    ------
+    InputError
+        If there is no such variable.
+    """
+    names = [str(v) for v in data.data_vars]
+    if of and of not in names:
+        raise input_error(
+            f"to_dataframe({name!r}, of={of!r})", "is no variable of it", did_you_mean(of, names)
+        )
+    chief = of or next((v for v in _CHIEF if v in names), names[0] if names else "")
+    if not chief:
+        raise input_error(f"to_dataframe({name!r})", "holds no variables", "Look at result.data.")
+    dims = set(data[chief].dims)
+    at_case = data["point_case"].values if "point_case" in data and "point" in dims else None
+    per_case = {"case"} if dims != {"case"} else set()  # facts of a case stand in the dataset
+    kept = [v for v in names if set(data[v].dims) <= dims and set(data[v].dims) - per_case]
+    own = data[[chief, *(v for v in kept if v != chief)]]
+    frame = own.to_dataframe().reset_index()
+    if "status" not in own and frame[chief].dtype.kind == "f":
+        frame = frame[np.isfinite(frame[chief])].reset_index(drop=True)
+    case = frame["case"].to_numpy() if "case" in dims else None
+    if at_case is not None:
+        case = at_case[frame["point"].to_numpy()]
+    if case is not None and "vary" in data.coords:
+        keys, values = varied_values(data)
+        for k, key in reversed(list(enumerate(keys))):
+            frame.insert(0, key, values[case, k])
+    frame = frame.infer_objects()
+    frame.attrs["units"] = {str(v): str(own[v].attrs["units"]) for v in own if "units" in own[v].attrs}  # fmt: skip
+    return frame

@@ -1,0 +1,39 @@
+"""Results as tables of pandas."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from synthetic_result import KEY, synthetic_result, tree_of
+
+import stickslip as ss
+
+
+def test_a_response_is_a_row_a_point_and_output() -> None:
+    data = synthetic_result(ratios=(50, 5), n=10)
+    frame = ss.Result(tree_of(forced_response=data)).to_dataframe()
+    assert len(frame) == data.sizes["point"] * data.sizes["output"]
+    assert frame[KEY].dtype.kind == "f"
+    one = frame[(frame[KEY] == 5) & (frame["output"] == str(data["output"].values[1]))]
+    at = data["point_case"].values == 1
+    np.testing.assert_array_equal(one["frequency_hz"], data["frequency_hz"].values[at])
+    np.testing.assert_array_equal(one["amplitude"], data["amplitude"].values[at, 1])
+    assert frame.attrs["units"]["amplitude"] == data["amplitude"].attrs["units"]
+
+
+def test_entries_that_are_not_there_are_left_out_and_any_variable_may_be_asked_for() -> None:
+    height = np.array([[[1.0, 2.0], [3.0, np.nan]]])
+    data = xr.Dataset({
+        "amplitude": (("case", "branch", "point"), height),
+        "end": (("case", "branch"), [["gross slip", "lost"]]),
+        "mass_kg": ("case", [1.2]),
+    })  # fmt: skip
+    result = ss.Result(tree_of(nonlinear_mode=data))
+    frame = result.to_dataframe("nonlinear_mode")
+    assert frame["amplitude"].tolist() == [1.0, 2.0, 3.0]
+    assert frame["end"].tolist() == ["gross slip", "gross slip", "lost"]
+    assert "mass_kg" not in frame
+    assert result.to_dataframe(of="mass_kg")["mass_kg"].tolist() == [1.2]
+    with pytest.raises(ss.InputError, match=r"Did you mean 'amplitude'"):
+        result.to_dataframe(of="amplitud")
+    with pytest.raises(ss.InputError, match="is no analysis of this result"):
+        result.to_dataframe("modes")
