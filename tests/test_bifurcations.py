@@ -130,6 +130,31 @@ def test_a_doubled_period_is_followed_and_closes_in_time_after_two_periods():
     assert known == pytest.approx(np.abs(np.linalg.eigvals(matrix)).max(), abs=2e-3)
 
 
+def test_a_doubled_branch_between_two_doublings_is_followed_from_one_to_the_other():
+    # its first point lies near its top, where its tangent is across the direction in which it left
+    stiffness = np.array([[1.5051, -0.2573], [-0.2573, 1.5127]])
+    damping = np.array([[0.1096, -0.0153], [-0.0153, 0.1101]])
+    structure = ss.model.lumped(np.ones(2), stiffness, damping=damping, names=("first", "second"))
+    stops = (
+        ss.UnilateralSpring(k_n=7.5928, initial_gap=0.3367),
+        ss.UnilateralSpring(k_n=3.1849, initial_gap=0.5688),
+    )
+    gaps = np.zeros((6, 2))
+    gaps[2, 0], gaps[5, 1] = 1.0, -1.0
+    system = ss.System(structure, ss.Interface(("below", "above"), stops, gaps), np.array([0]))
+    load = ss.HarmonicLoad(np.zeros(2), {1: np.array([0.6086 + 0j, 0.0])})
+    sweep = ss.Sweep(
+        omega_range=(0.6, 0.7), low=21, high=21, selection="always_high", points=8, peak_points=0
+    )  # fmt: skip
+    problem = ss.response.forced_problem(system, load, sweep)
+    points = ss.response.accepted_points(list(ss.forced_response(system, load, sweep)))
+    lower, upper = bifurcations(problem, points).found
+    (branch,) = side_branches(problem, upper, points=20)
+    assert lower.kind == upper.kind == "period doubling"
+    assert lower.omega < branch.omegas.min() < lower.omega + 0.004
+    assert branch.end == "it comes back to the branch that it left"
+
+
 SECTORS, COUPLING, CLEARANCE = 4, 0.03, 0.1
 
 

@@ -5,7 +5,7 @@ import scipy.linalg
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.harmonic.balance import HarmonicBalance
-from stickslip.solve.branch import Following, Point, measure_at
+from stickslip.solve.branch import Following, Point, measure_at, reversed_point
 from stickslip.solve.steps import take_step
 
 AWAY = (
@@ -68,11 +68,12 @@ def candidates(
 def first_point(
     balance: HarmonicBalance, point: Point, direction: FloatArray, following: Following, end: float
 ) -> Point | None:
-    """Return a point of the branch that leaves in a direction; None where none is found."""
+    """Return a point of the branch that leaves in a direction, its tangent leading away from the other one; None where none is found."""
     measure = measure_at(point.x, following)
     unit = direction / measure.of(direction)
     for away in AWAY:
         found = take_step(balance, point, unit, away, end, following)
         if found.solution.status.converged:
-            return found
+            leads_away = measure.row(found.y - point.y) @ found.tangent >= 0.0
+            return found if leads_away else reversed_point(found)
     return None
