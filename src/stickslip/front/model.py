@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from html import escape
+from inspect import Parameter, Signature, signature
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,6 +17,7 @@ from stickslip.errors import did_you_mean, input_error
 from stickslip.front.result import Result
 from stickslip.front.screen import by_default
 from stickslip.model.part import Part
+from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.analysis import Case, named
 from stickslip.study.file.messages import told
 from stickslip.study.file.section import Section
@@ -221,11 +223,47 @@ def _contact(contact: Contact) -> str:
     return f"{' with '.join(contact.between)}, {type(contact.law).__name__}"
 
 
+def _sections(name: str) -> dict[str, type[Section]]:
+    """Return the tables of an analysis by name: its own and those that it shares."""
+    shared = _SHARED.get(name, ())
+    fields = {table: Tables.model_fields[table].annotation for table in shared}
+    return {name: named(name).table, **fields}  # type: ignore[dict-item]
+
+
+def _with_keys(name: str) -> Signature:
+    """Return the signature of a method with the keys of its tables, as `help` and notebooks show it."""
+    own = signature(getattr(Model, name))
+    first = [p for p in own.parameters.values() if p.kind is not Parameter.VAR_KEYWORD]
+    fields = {
+        key: f
+        for section in _sections(name).values()
+        for key, f in section.model_fields.items()
+        if key not in _OF_THE_MODEL and key not in own.parameters
+    }
+    return own.replace(
+        parameters=[
+            *first,
+            *(
+                Parameter(
+                    key,
+                    Parameter.KEYWORD_ONLY,
+                    default=Parameter.empty
+                    if f.is_required()
+                    else f.get_default(call_default_factory=True, validated_data={}),
+                )
+                for key, f in fields.items()
+            ),
+        ]
+    )
+
+
+for _name in ANALYSES:
+    getattr(Model, _name).__signature__ = _with_keys(_name)
+
+
 def _tables(name: str, keys: Mapping[str, Any]) -> dict[str, Section]:
     """Sort keys into the tables of an analysis and validate them."""
-    sections: dict[str, type[Section]] = {name: named(name).table}
-    shared = _SHARED.get(name, ())
-    sections |= {table: Tables.model_fields[table].annotation for table in shared}  # type: ignore[misc]
+    sections = _sections(name)
     home = {key: table for table, own in sections.items() for key in own.model_fields}
     values: dict[str, dict[str, Any]] = {table: {} for table in sections}
     for key, value in keys.items():

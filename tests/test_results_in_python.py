@@ -1,4 +1,6 @@
-"""Results as tables of pandas."""
+"""What Python users see: tables of pandas, and signatures with keys."""
+
+from inspect import Parameter, signature
 
 import numpy as np
 import pytest
@@ -6,6 +8,7 @@ import xarray as xr
 from synthetic_result import KEY, synthetic_result, tree_of
 
 import stickslip as ss
+from stickslip.study.analyses.analysis import named
 
 
 def test_a_response_is_a_row_a_point_and_output() -> None:
@@ -37,3 +40,12 @@ def test_entries_that_are_not_there_are_left_out_and_any_variable_may_be_asked_f
         result.to_dataframe(of="amplitud")
     with pytest.raises(ss.InputError, match="is no analysis of this result"):
         result.to_dataframe("modes")
+
+
+@pytest.mark.parametrize("name", ["forced_response", "nonlinear_mode", "safe"])
+def test_the_signature_of_a_question_has_the_keys_of_its_tables(name: str) -> None:
+    told = signature(getattr(ss.Model, name)).parameters
+    assert all(p.kind is not Parameter.VAR_KEYWORD for p in told.values())
+    for key, field in named(name).table.model_fields.items():
+        assert told[key].kind is Parameter.KEYWORD_ONLY
+        assert (told[key].default is Parameter.empty) == field.is_required()
