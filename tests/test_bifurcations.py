@@ -153,6 +153,8 @@ def test_a_doubled_branch_between_two_doublings_is_followed_from_one_to_the_othe
     assert lower.kind == upper.kind == "period doubling"
     assert lower.omega < branch.omegas.min() < lower.omega + 0.004
     assert branch.end == "it comes back to the branch that it left"
+    (other,) = side_branches(problem, lower, points=20)  # leaves by less than a hundredth
+    assert other.omegas.max() > upper.omega - 0.004
 
 
 SECTORS, COUPLING, CLEARANCE = 4, 0.03, 0.1

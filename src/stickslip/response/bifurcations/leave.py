@@ -15,6 +15,8 @@ AWAY = (
     0.02,
     0.4,
     0.01,
+    0.003,
+    0.001,
 )  # of the size of the motion: how far along the new branch its first point is looked for
 ROUNDS = 6  # of inverse iteration: singular values are far apart where one is nearly zero
 BESIDE = 1e-12  # of the largest entry: what keeps a singular matrix from being divided by
