@@ -62,7 +62,7 @@ class StepControl:
     max_points
         Where to stop a branch that does not reach its end.
     growth
-        Factor on the step after a correction that took a Newton step or two where the branch hardly turned.
+        Factor on the step after a correction that took a single Newton step where the branch hardly turned.
     """
 
     scale: float

@@ -28,9 +28,9 @@ SHARP_TURN = (
 )
 SMOOTH_TURN = 0.9  # cosine above which a change of orientation is a bifurcation, not a corner
 STRAIGHT = 0.97  # cosine above which a branch hardly turns
-EASY = 2  # Newton steps
+EASY = 1  # Newton step
 CLOSE = 0.3  # of a step: distance from the prediction within which its factors tell the tangent
-ASIDE = 0.5  # of a step: a parabola that leaves the tangent by more is none of the branch
+ASIDE = 0.3  # of a step: a parabola that leaves the tangent by more is none of the branch
 PATIENT = 8.0  # smallest steps below which no factors are kept
 LOOKS_AHEAD = (
     1.0,
