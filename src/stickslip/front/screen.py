@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from stickslip.errors import printable
+from stickslip.front.notebook import NotebookScreen, in_notebook
 from stickslip.study.keep.progress import head
 
 LOG = logging.getLogger("stickslip")
@@ -78,7 +79,7 @@ class Screen(logging.Handler):
 
 
 @contextmanager
-def on_screen(screen: Screen) -> Iterator[None]:
+def on_screen(screen: Screen | NotebookScreen) -> Iterator[None]:
     """Send what the package says to a screen while the block runs."""
     level = LOG.level
     LOG.addHandler(screen)
@@ -95,9 +96,10 @@ def on_screen(screen: Screen) -> Iterator[None]:
 
 @contextmanager
 def by_default(workers: int = 1) -> Iterator[None]:
-    """Show progress on stderr, unless the user has said where it goes: a handler of the root or of this package's logger."""
+    """Show progress on stderr, or in the output of a notebook, unless the user has said where it goes: a handler of the root or of this package's logger."""
     if logging.getLogger().handlers or LOG.handlers:
         yield
         return
-    with on_screen(Screen(Console(stderr=True), workers)):
+    screen = NotebookScreen() if in_notebook() else Screen(Console(stderr=True), workers)
+    with on_screen(screen):
         yield
