@@ -1,5 +1,6 @@
 """Sphinx configuration."""
 
+import re
 import sys
 from importlib.metadata import version as installed_version
 from pathlib import Path
@@ -59,3 +60,16 @@ sphinx_gallery_conf = {
 }
 
 generate.write_all(HERE / "generated")
+
+
+def _linked(_app, page, source):
+    """Make the names of the table of the interface links to their full text."""
+    if page == "api":
+        source[0] = re.sub(
+            r"^\| `ss\.([\w.]+)`", r"| {py:obj}`ss.\1 <stickslip.\1>`", source[0], flags=re.M
+        )
+
+
+def setup(app):
+    """Connect what this page of settings adds."""
+    app.connect("source-read", _linked)

@@ -1,81 +1,85 @@
-"""Write the parts of the documentation that are made from the code: study file, public names, validation, a drawing."""
+"""Write the parts of the documentation that are made from the code.
 
-import ast
+``python docs/generate.py`` writes the tables that lie in the repository: keys of study files, variables of results, public names.
+The build of the documentation adds what it alone can show: the full text of every name, comparisons, computed tables, a drawing.
+"""
+
 import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from alert_numbers import alert_tables
-from sector_drawing import draw_sector
+import interface_by_task
 
-import stickslip
-
-PARTS_OF_THE_PAGE = {
-    "general": ("", "material", "damping", "reduction"),
-    "parts": ("part",),
-    "contacts": ("contact", "join"),
-    "loads": ("load", "rotation"),
-    "aero": ("aero",),
-    "mistuning": ("mistuning",),
-    "output": ("output", "measured"),
+HERE = Path(__file__).parent
+# page -> its heading and the tables of the study file on it; the empty name is the top of the file
+PAGES_OF_KEYS = {
+    "general": ("At the top, material, damping, reduction", ("", "material", "damping", "reduction")),
+    "parts": ("Parts", ("part",)),
+    "contacts": ("Contacts and joins", ("contact", "join")),
+    "loads": ("Loads and rotation", ("load", "rotation")),
+    "aero": ("Aerodynamic coefficients", ("aero",)),
+    "mistuning": ("Mistuning", ("mistuning",)),
+    "output": ("Output and measured peaks", ("output", "measured")),
     "analyses": (
-        "forced_response",
-        "quasi_periodic",
-        "limit_cycle",
-        "nonlinear_mode",
-        "resonance",
-        "residual_tractions",
-        "modes",
-        "campbell",
-        "flutter",
-        "safe",
-        "run_up",
+        "Questions",
+        (
+            "forced_response", "resonance", "all_motions", "modal_synthesis", "nonlinear_mode",
+            "residual_tractions", "quasi_periodic", "limit_cycle", "run_up", "modes", "campbell",
+            "safe", "flutter",
+        ),
     ),
-    "settings": ("harmonics", "solver", "retention", "limits"),
-}
-RESULTS = Path(__file__).parent.parent / "evidence" / "validation" / "out" / "results.json"
-PACKAGES = [
-    "stickslip",
-    "stickslip.model",
-    "stickslip.assembly",
-    "stickslip.contact",
-    "stickslip.reduction",
-    "stickslip.harmonic",
-    "stickslip.solve",
-    "stickslip.response",
-    "stickslip.response.residual_tractions",
-    "stickslip.response.self_excited",
-]
+    "settings": ("Harmonics, solver, limits", ("harmonics", "solver", "retention", "limits")),
+}  # fmt: skip
+RESULTS = HERE.parent / "evidence" / "validation" / "out" / "results.json"
+
+MADE = "Made from the code by `python docs/generate.py`."
 
 
 def write_all(folder: Path) -> None:
-    """Write every generated page part into `folder`."""
+    """Write what only a build shows into `folder`."""
+    from alert_numbers import alert_tables
+    from sector_drawing import draw_sector
+
     folder.mkdir(exist_ok=True)
-    for name, tables in keys().items():
-        (folder / f"keys_{name}.md").write_text(tables, encoding="utf-8")
-    (folder / "keys_laws.md").write_text(laws(), encoding="utf-8")
-    (folder / "variables.md").write_text(variables(), encoding="utf-8")
-    (folder / "variables_of_cycles.md").write_text(variables_of_cycles(), encoding="utf-8")
-    (folder / "variables_of_tractions.md").write_text(variables_of_tractions(), encoding="utf-8")
-    (folder / "variables_of_models.md").write_text(variables_of_models(), encoding="utf-8")
     (folder / "validation.md").write_text(validation(), encoding="utf-8")
-    (folder / "api.md").write_text(api(), encoding="utf-8")
+    (folder / "api.md").write_text(interface_by_task.in_full(), encoding="utf-8")
     for name, table in alert_tables().items():
         (folder / name).write_text(table, encoding="utf-8")
     draw_sector(folder / "sector.svg")
 
 
+def kept() -> dict[str, str]:
+    """Return the pages that lie in the repository, by their paths below `docs`."""
+    titles = {name: title for name, (title, _) in PAGES_OF_KEYS.items()} | {"laws": "Contact laws"}
+    found = {
+        f"keys/{name}.md": f"# Keys: {titles[name]}\n\n{MADE} [The study file](../study_file.md) tells what they do.\n\n{text}"
+        for name, text in {**keys(), "laws": laws()}.items()
+    }
+    variables = {
+        "forced_response": ("a forced response", variables_of_response()),
+        "limit_cycle": ("limit cycles", variables_of_cycles()),
+        "residual_tractions": ("residual tractions", variables_of_tractions()),
+        "model": ("the model, in modes, Campbell and SAFE diagrams and flutter", variables_of_models()),
+    }  # fmt: skip
+    found |= {
+        f"variables/{name}.md": f"# Variables of {title}\n\n{MADE} [Results](../results.md) tells where they stand.\n\n{text}"
+        for name, (title, text) in variables.items()
+    }
+    pages = {**found, "api.md": interface_by_task.interface_page()}
+    return {path: text.rstrip() + "\n" for path, text in pages.items()}
+
+
 def keys() -> dict[str, str]:
-    """Return one table of keys for each table of the study file, by the parts of the page that include them."""
+    """Return one table of keys for each table of the study file, by the pages that hold them."""
     from stickslip.study.file.parts import PartTable
     from stickslip.study.file.tables import json_schema
 
     schema = json.loads(json_schema())
     return {
         name: "\n".join(Keys(schema, tuple(PartTable.model_fields)).of(tables))
-        for name, tables in PARTS_OF_THE_PAGE.items()
+        for name, (_, tables) in PAGES_OF_KEYS.items()
     }
 
 
@@ -157,7 +161,7 @@ class Keys:
         # the dataclass speaks of SI; keys have their units at their ends
         text = "" if flat else re.sub(r"; (lengths in )?metres.*", ".", node["description"])
         return [
-            f"### {title}", "", text, "",
+            f"## {title}", "", text, "",
             "| key | meaning | default |", "|---|---|---|", *rows, "", *below,
         ]  # fmt: skip
 
@@ -213,13 +217,13 @@ def laws() -> str:
             also = "" if of_area == key else f"`{of_area}`"
             rows.append(f"| `{key}` | {also} | {_escaped(column.description)} | {default} |")
         lines += [
-            f"### `law = \"{name}\"`", "", (law.__doc__ or "").partition("\n")[0], "",
+            f"## `law = \"{name}\"`", "", (law.__doc__ or "").partition("\n")[0], "",
             "| key | with `per = \"area\"` | meaning | default |", "|---|---|---|---|", *rows, "",
         ]  # fmt: skip
     return "\n".join(lines)
 
 
-def variables() -> str:
+def variables_of_response() -> str:
     """Return the variables of a forced response, as the code that writes them lists them."""
     from stickslip.study.analyses.forced.quantities import QUANTITIES
 
@@ -299,24 +303,7 @@ def _number(value: object) -> str:
     return f"{value:.7g}" if isinstance(value, float) else _escaped(str(value))
 
 
-def api() -> str:
-    """Return one heading a package with its public names, as its stub lists them."""
-    root = Path(stickslip.__file__).parent
-    lines = []
-    for package in PACKAGES:
-        stub = root.joinpath(*package.split(".")[1:], "__init__.pyi")
-        lines += [f"## {package}", ""]
-        for name in sorted(_names(stub)):
-            kind = "autoclass" if name[0].isupper() else "autofunction"
-            lines += ["```{eval-rst}", f".. {kind}:: {package}.{name}", "```", ""]
-    return "\n".join(lines)
-
-
-def _names(stub: Path) -> list[str]:
-    tree = ast.parse(stub.read_text(encoding="utf-8"))
-    return [
-        alias.name
-        for node in tree.body
-        if isinstance(node, ast.ImportFrom) and node.module  # packages have headings of their own
-        for alias in node.names
-    ]
+if __name__ == "__main__":
+    for path, text in kept().items():
+        (HERE / path).parent.mkdir(exist_ok=True)
+        (HERE / path).write_text(text, encoding="utf-8")

@@ -1,0 +1,46 @@
+"""Pages that are made from the code: current, and complete."""
+
+import importlib
+import json
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from stickslip.study.analyses import ANALYSES
+from stickslip.study.file.tables import json_schema
+
+DOCS = Path(__file__).parents[1] / "docs"
+NO_TABLES = {"schema_version", "title", "vary"}  # at the top of the file
+
+
+@pytest.fixture(scope="module")
+def generate() -> ModuleType:
+    """The module that writes them."""
+    sys.path.insert(0, str(DOCS))
+    try:
+        return importlib.import_module("generate")
+    finally:
+        sys.path.remove(str(DOCS))
+
+
+def test_pages_in_the_repository_are_what_the_code_says(generate: ModuleType) -> None:
+    pages = generate.kept()
+    there = {f"{p.parent.name}/{p.name}" for d in ("keys", "variables") for p in (DOCS / d).glob("*.md")}  # fmt: skip
+    assert there | {"api.md"} == set(pages)
+    old = [p for p, text in pages.items() if (DOCS / p).read_text(encoding="utf-8") != text]
+    assert old == [], "run `python docs/generate.py`"
+
+
+def test_every_table_of_a_study_has_its_keys_on_a_page(generate: ModuleType) -> None:
+    told = [name for _, tables in generate.PAGES_OF_KEYS.values() for name in tables]
+    assert len(told) == len(set(told))
+    assert set(told) - {""} == set(json.loads(json_schema())["properties"]) - NO_TABLES
+    assert set(generate.PAGES_OF_KEYS["analyses"][1]) == set(ANALYSES)
+
+
+def test_every_public_name_serves_a_task(generate: ModuleType) -> None:
+    tasks = generate.interface_by_task.by_task()
+    assert all(tasks.values())
+    assert sum(map(len, tasks.values())) == len(list(generate.interface_by_task.public_names()))
