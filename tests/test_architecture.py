@@ -87,11 +87,11 @@ def test_imports_point_one_way():
 
 
 def test_type_checking_imports_do_not_hide_from_the_contracts():
-    # import-linter leaves such imports out; the command line is on top of all layers
+    # import-linter leaves such imports out; the command line is on top of all layers, and `reading` names its own layer alone
     hidden = {
         str(path.relative_to(SOURCE)) for path in MODULES if "TYPE_CHECKING" in path.read_text()
     }
-    assert hidden <= {"cli.py"}
+    assert hidden <= {"cli.py", "front/reading.py"}
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(SOURCE)))

@@ -86,6 +86,31 @@ def test_light_commands_load_nothing_heavy(tmp_path: Path, words: list[str]) -> 
     assert ended.stderr.strip() == "[]"
 
 
+def test_a_wrong_study_is_refused_before_what_computes_and_draws_is_loaded(tmp_path: Path) -> None:
+    """Within a second: no kernel is compiled or read, no result or figure can be made yet."""
+    title = write_four_masses(tmp_path / "a", {"title": "3"})
+    part = write_four_masses(tmp_path / "b")
+    text = part.read_text(encoding="utf-8")
+    part.write_text(text.replace('"chain.m2", "ground"', '"chian.m2", "ground"'), encoding="utf-8")
+    late = (
+        "xarray", "pandas", "plotly", "stickslip.front.study", "stickslip.assembly.model",
+        "stickslip.response.system", "stickslip.harmonic.balance",
+    )  # fmt: skip
+    program = (
+        "import sys\nfrom stickslip.cli import main\n"
+        f"for study in {[str(title), str(part)]!r}:\n"
+        "    sys.argv = ['stickslip', 'check', study]\n"
+        "    try:\n        main()\n    except SystemExit as end:\n        assert end.code == 2, end.code\n"
+        f"print([m for m in {late!r} if m in sys.modules])\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert ended.stdout.strip() == "[]"
+    assert "title: must be a text, got 3" in ended.stderr
+    assert "there is no part 'chian'. Did you mean 'chain'?" in ended.stderr
+
+
 def test_version() -> None:
     assert invoke("--version").output == f"stickslip {stickslip.__version__}\n"
 

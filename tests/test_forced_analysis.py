@@ -41,7 +41,8 @@ from stickslip.study.analyses.analysis import Case, Solved
 from stickslip.study.analyses.forced.estimate import estimate, retained_of
 from stickslip.study.analyses.forced.known import mixed_places, no_resonance, nothing_pressed
 from stickslip.study.analyses.forced.question import Question, question_of
-from stickslip.study.analyses.forced.section import ForcedResponse, sweep_of
+from stickslip.study.analyses.forced.section import ForcedResponse
+from stickslip.study.analyses.forced.sweeps import sweep_of
 from stickslip.study.analyses.forced_response import FORCED_RESPONSE
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.keep.journal import JobJournal

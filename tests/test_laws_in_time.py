@@ -35,7 +35,7 @@ class Drag:
 
     k: float
     c: float
-    kernel: ClassVar[Any] = law_kernel(_drag)
+    kernel = law_kernel(_drag)
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def parameters(self) -> FloatArray:

@@ -3,7 +3,7 @@
 import re
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -18,14 +18,15 @@ from evidence.strategies.compare import compared
 from evidence.strategies.page import page
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
-from stickslip.harmonic.selection import STRATEGIES, strategy_named
+from stickslip.harmonic.selection import strategy_named
 from stickslip.harmonic.selection.grolet import Grolet
 from stickslip.harmonic.selection.jaumouille import Jaumouille, strain_energy
 from stickslip.harmonic.selection.laxalde import Laxalde, left_out
 from stickslip.harmonic.selection.maple import Maple
-from stickslip.harmonic.selection.strategy import ErrorMeasure, Step
+from stickslip.harmonic.selection.strategy import ErrorMeasure, Step, always_kept
 from stickslip.harmonic.selection.suess_jacobian import SuessJacobian, column_norms
 from stickslip.harmonic.selection.suess_spectral import SuessSpectral
+from stickslip.harmonic.strategies import FIXED, OPTIONS, STRATEGIES, VERIFYING, options_of
 from stickslip.harmonic.support import harmonics_of
 from stickslip.harmonic.travelling import condense_waves
 from stickslip.model.structure import Structure
@@ -292,6 +293,15 @@ def test_strain_energy_of_a_condensed_structure_is_that_of_all_dofs(damping):
 
 
 # ---- what every strategy keeps to ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", sorted(STRATEGIES))
+def test_what_a_study_file_is_judged_by_is_what_the_strategy_says(name):
+    found = strategy_named(name)
+    own = {field.name for field in fields(found)}
+    assert (name in VERIFYING) == found.verifies
+    assert (name in FIXED) == (always_kept(found) is not None)
+    assert options_of(name) == tuple(option for option in OPTIONS if option in own)
 
 
 @pytest.mark.parametrize("name", sorted(STRATEGIES))

@@ -13,9 +13,10 @@ import xarray as xr
 from small_v2 import write_four_masses, write_two_blades
 
 from stickslip.errors import InputError
-from stickslip.harmonic.selection import STRATEGIES, strategy_named
+from stickslip.harmonic.selection import strategy_named
 from stickslip.harmonic.selection.grolet import Grolet
 from stickslip.harmonic.selection.strategy import always_kept
+from stickslip.harmonic.strategies import STRATEGIES
 from stickslip.report.forced.choice import choice
 from stickslip.report.forced.errors import errors
 from stickslip.report.forced.harmonics import kept_harmonics

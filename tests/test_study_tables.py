@@ -27,12 +27,14 @@ from stickslip.model.mesh.blade_pair import BladePair
 from stickslip.model.mesh.sector import BladedSector
 from stickslip.model.mesh.sector_parts import Shroud
 from stickslip.model.rigid.damper import FlatCurvedDamper
+from stickslip.study.analyses import ANALYSES
+from stickslip.study.analyses.analysis import named
 from stickslip.study.file.contacts import ContactTable, keys_of
 from stickslip.study.file.example import Kind, example_text
 from stickslip.study.file.harmonics import Harmonics
 from stickslip.study.file.quantities import build, table_of
 from stickslip.study.file.study import read_file
-from stickslip.study.file.tables import json_schema
+from stickslip.study.file.tables import json_schema, study_tables
 from stickslip.study.models.cost import memory_gb, waves_gb
 from stickslip.study.models.parts import damper_of
 from stickslip.study.models.study import read_study
@@ -509,3 +511,8 @@ def test_replacing_keys_is_checked_like_the_file(tmp_path):
     with pytest.raises(InputError, match=r"unknown key 'forc_n'. Did you mean 'force_n'"):
         study.replace({"load.shaker.forc_n": 2.0})
     assert tomllib.loads(study.text)["load"]["shaker"]["force_n"] == 5.0
+
+
+@pytest.mark.parametrize("name", ANALYSES)
+def test_a_file_is_judged_by_the_table_of_the_analysis(name):
+    assert study_tables().model_fields[name].annotation == named(name).table | None

@@ -7,6 +7,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from numba.core.errors import TypingError
+
+from stickslip.contact.law import law_kernel
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "own_law.py"
 
@@ -61,3 +64,14 @@ def test_a_law_typed_at_a_prompt_works_without_a_file():
         [sys.executable, "-c", AT_A_PROMPT], capture_output=True, text=True, check=False
     )
     assert done.stdout.strip() == "True", done.stderr
+
+
+def test_a_step_is_compiled_when_its_kernel_is_first_read():
+    def step(displacement, velocity, state, parameters, force, new_state, jac, status):
+        return unknown  # noqa: F821
+
+    class Law:
+        kernel = law_kernel(step)
+
+    with pytest.raises(TypingError, match="unknown"):
+        _ = Law.kernel

@@ -10,7 +10,7 @@ from typing import Any
 
 from evidence.benchmarks.bench_forced import Timed, difference, timed
 from evidence.models.two_blades import two_blades
-from stickslip.harmonic.selection import STRATEGIES
+from stickslip.harmonic.strategies import STRATEGIES
 from stickslip.response.forced.response import accepted_points
 
 REPEATS = 3

@@ -15,8 +15,8 @@ from evidence.strategies.cases import (
     two_blades_strong,
     two_blades_stuck,
 )
+from stickslip.response.forced.choices import RUNGS
 from stickslip.response.forced.response import forced_problem, forced_response
-from stickslip.response.forced.sweep import RUNGS
 from stickslip.study.analyses.forced.points import collect
 
 SYSTEMS, SEED = 12, 7

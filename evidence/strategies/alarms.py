@@ -15,7 +15,8 @@ from evidence.strategies.cases import CASES, HZ, SelectionCase
 from evidence.strategies.random_systems import HELD_OUT, SYSTEMS, THIRD, random_two_blade_system
 from evidence.strategies.truth import low_order_points, truths
 from stickslip.arrays import FloatArray
-from stickslip.harmonic.selection import STRATEGIES, strategy_named
+from stickslip.harmonic.selection import strategy_named
+from stickslip.harmonic.strategies import STRATEGIES
 from stickslip.response.forced.problem import forced_problem
 
 PAGE = Path(__file__).parents[2] / "docs" / "strategies_alarms.md"

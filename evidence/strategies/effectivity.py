@@ -20,8 +20,9 @@ from evidence.strategies.random_systems import HELD_OUT, random_two_blade_system
 from evidence.strategies.truth import Truth, judging_problem, low_order_points, truths
 from stickslip.arrays import FloatArray
 from stickslip.harmonic.balance import HarmonicBalance
-from stickslip.harmonic.selection import STRATEGIES, strategy_named
+from stickslip.harmonic.selection import strategy_named
 from stickslip.harmonic.selection.adjoint import estimate, outputs_of
+from stickslip.harmonic.strategies import STRATEGIES
 from stickslip.response.forced.problem import ForcedPoint, ForcedProblem, forced_problem
 from stickslip.solve.newton_method import Newton, newton
 

@@ -14,6 +14,7 @@ from rich.table import Table
 from stickslip import __version__
 from stickslip.errors import InputError, StickslipError, input_error, printable
 from stickslip.front.output import TRACEBACK, output_that_may_fail, unforeseen
+from stickslip.front.reading import read
 from stickslip.front.screen import Screen, on_screen
 
 if TYPE_CHECKING:
@@ -105,17 +106,8 @@ def run(
 ) -> None:
     """Answer the questions of a study; an interrupted run goes on where it stopped."""
     with _errors_as_text():
-        from stickslip.study.file.toml import read_toml
-        from stickslip.study.keep.threads import one_blas_thread
-
-        one_blas_thread()
-        read_toml(
-            study
-        )  # what is no TOML is refused before the libraries are loaded, which takes some seconds
-        from stickslip.front.study import Study
-
         with on_screen(Screen(_console(), workers, warnings=False)):
-            result = Study.from_file(study).run(
+            result = read(study).run(
                 workers=workers,
                 only=only or (),
                 fresh=fresh,
@@ -135,13 +127,8 @@ def run(
 def check(study: StudyFile) -> None:
     """Do everything but the computation: read, mesh, reduce, find the static state and the natural frequencies."""
     with _errors_as_text():
-        from stickslip.study.file.toml import read_toml
-
-        read_toml(study)
-        from stickslip.front.study import Study
-
         with on_screen(Screen(_console(), warnings=False)):
-            warnings = Study.from_file(study).check()
+            warnings = read(study).check()
         for text in warnings:
             _say(f"WARNING: {text}")
         _say(f"{study}: good to run")

@@ -1,7 +1,6 @@
 """Facets at the rim of a surface that have clamped nodes, which readers take out of its set."""
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.assembly.places import Places, Spot
@@ -20,6 +19,8 @@ def clamped_rim(places: Places, spot: Spot) -> tuple[IntArray, IntArray]:
     facets : (m, k), none where the surface has no facets of its own or holds clamped nodes itself
     nodes : the clamped ones among them
     """
+    from scipy.spatial import cKDTree
+
     part, word = places.parts[spot.part], spot.name.partition(".")[2]
     mesh, none = part.mesh, (np.zeros((0, 3), dtype=np.int64), NONE)
     if mesh is None or spot.surface is None or not len(spot.surface.facets):

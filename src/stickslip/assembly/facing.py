@@ -6,7 +6,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 import scipy.sparse
-from scipy.spatial import cKDTree
 
 from stickslip.arrays import FloatArray, Matrix
 from stickslip.assembly.clamped_rim import clamped_rim
@@ -99,6 +98,8 @@ def tilt_warning(
 
 def _from_opposite(mine: Normals, theirs: Normals) -> FloatArray:
     """Return by how many degrees the normals of points differ from the opposite of those nearest on the other side."""
+    from scipy.spatial import cKDTree
+
     near = cKDTree(theirs[0]).query(mine[0])[1]
     cosine = np.clip(-np.einsum("pc,pc->p", mine[1], theirs[1][near]), -1.0, 1.0)
     return np.asarray(np.degrees(np.arccos(cosine)))
@@ -232,6 +233,8 @@ def with_hint(error: InputError, places: Places, first: Surface, second: Spot) -
 
 def _distance(surface: Surface, points: FloatArray) -> float:
     """Return the distance of a surface's middling point to the nearest of `points`, m."""
+    from scipy.spatial import cKDTree
+
     return float(np.median(cKDTree(points).query(surface.points[surface.used])[0]))
 
 
@@ -242,6 +245,8 @@ def named(
     surfaces: tuple[Surface, Surface] | None = None,
 ) -> Found:
     """Say of which contact a complaint is, and how far its surfaces lie apart."""
+    from scipy.spatial import cKDTree
+
     try:
         found = pair()
     except InputError as error:

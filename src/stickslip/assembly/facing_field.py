@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.contact.facets import centres, normals, positions
@@ -131,6 +130,8 @@ def between_sides(surface: Surface, feet: Feet, points: FloatArray, reach: float
 
 
 def _near(middle: FloatArray, points: FloatArray) -> IntArray:
+    from scipy.spatial import cKDTree
+
     count = min(NEAR, len(middle))
     return np.asarray(cKDTree(middle).query(points, k=count)[1]).reshape(len(points), count)
 

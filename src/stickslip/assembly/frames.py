@@ -4,7 +4,6 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from stickslip.arrays import FloatArray
 from stickslip.assembly.contact import Contact
@@ -26,6 +25,8 @@ def with_normals(
     key: str, contact: Contact, first: Spot, a: Surface, second: Spot | None, b: Surface | None
 ) -> Surface:
     """Return side A with its normals: of its own frames or facets, those that the contact names, or against those of side B."""
+    from scipy.spatial import cKDTree
+
     if contact.normal is not None:
         return replace(a, facets=NO_FACETS, normals=_named(key, contact.normal, first, a))
     if first.frame is not None:
@@ -80,6 +81,8 @@ def direction(
     b: Surface | None,
 ) -> Any:
     """Return the direction of t: the contact's, that of the frames, or any where that makes no difference."""
+    from scipy.spatial import cKDTree
+
     if contact.tangent is not None:
         return contact.tangent
     if first.frame is not None:

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse
-from scipy.spatial import cKDTree
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.assembly.clamped_rim import with_rim
@@ -230,6 +229,8 @@ def _interpolated(
     Points count as nearer where the normals of their facets, `theirs`, are alike to those of the places, `outward`: a thin body has
     another pressure on its other side. The plane lies along the surface, so that points may stand off it.
     """
+    from scipy.spatial import cKDTree
+
     count = min(AROUND, len(given.points))
     apart = cKDTree(given.points).query(given.points, k=count)[0][:, -1]
     far = float(np.median(apart))

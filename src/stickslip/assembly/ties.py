@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse
-from scipy.spatial import cKDTree
 
 from stickslip.arrays import IntArray, Matrix
 from stickslip.assembly.contact import SPATIAL, Join
@@ -173,6 +172,8 @@ def _across(a: Surface) -> tuple[float, float, float]:
 
 def _towards(a: Surface, b: Surface) -> Surface:
     """Return all nodes of side A with normals towards side B; without facets of B any will do."""
+    from scipy.spatial import cKDTree
+
     normals = np.tile([0.0, 0.0, 1.0], (len(a.points), 1))
     if len(b.facets):
         near = b.used[cKDTree(b.points[b.used]).query(a.points)[1]]

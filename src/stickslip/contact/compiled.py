@@ -2,16 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.element import element
+from stickslip.contact.evaluators import Evaluator, check_evaluator
 from stickslip.contact.law import UNCOUPLED_TANGENTS, ContactLaw, PiecewiseLinear, PlanarFriction
-from stickslip.errors import check_choice, input_error
-
-Evaluator = Literal["intervals", "march", "events"]
+from stickslip.errors import input_error
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,11 +80,6 @@ class CompiledContacts:
         moved = gap_coefficients.copy()
         moved[0] -= self.sliders.reshape(-1)
         return moved
-
-
-def check_evaluator(evaluator: str) -> None:
-    """Raise `InputError` unless there is such an evaluator."""
-    check_choice("evaluator", evaluator, get_args(Evaluator), "'events' has no sampling error.")
 
 
 def checked_weights(weights: FloatArray, n: int) -> FloatArray:

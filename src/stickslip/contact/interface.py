@@ -8,12 +8,8 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
-from stickslip.contact.compiled import (
-    CompiledContacts,
-    Evaluator,
-    checked_weights,
-    compile_contacts,
-)
+from stickslip.contact.compiled import CompiledContacts, checked_weights, compile_contacts
+from stickslip.contact.evaluators import Evaluator
 from stickslip.contact.law import PAIRS, ContactLaw
 from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.errors import input_error

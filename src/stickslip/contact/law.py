@@ -7,6 +7,7 @@ signature, and takes the step as a first-class function; a law of a user's scrip
 
 from collections.abc import Callable
 from dataclasses import fields, replace
+from functools import cached_property
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numba
@@ -127,15 +128,28 @@ def law_kernel(step: Callable[..., None]) -> Any:
 
     Returns
     -------
-    staticmethod
-        To be stored as the class attribute `kernel` of the law.
+    object
+        To be stored as the class attribute `kernel` of the law, without an annotation; the step is compiled when that is first read.
 
     Notes
     -----
     The compiled code is kept on disk beside the file of the step. A step typed at a prompt has no file and is compiled anew.
     """
-    try:
-        compiled = numba.njit(STEP_SIGNATURE, cache=True)(step)
-    except RuntimeError:  # numba finds no place for the cache of code without a file
-        compiled = numba.njit(STEP_SIGNATURE)(step)
-    return staticmethod(compiled)  # a compiled function on a class would be bound like a method
+    return _Kernel(step)
+
+
+class _Kernel:
+    """Compiles a step when a law's kernel is first asked for: a study file is judged before."""
+
+    def __init__(self, step: Callable[..., None]) -> None:
+        self.step = step
+
+    def __get__(self, law: object, cls: type) -> Any:
+        return self.compiled
+
+    @cached_property
+    def compiled(self) -> Any:
+        try:
+            return numba.njit(STEP_SIGNATURE, cache=True)(self.step)
+        except RuntimeError:  # numba finds no place for the cache of code without a file
+            return numba.njit(STEP_SIGNATURE)(self.step)

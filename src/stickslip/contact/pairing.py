@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse
-from scipy.spatial import cKDTree
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.contact.facets import (
@@ -118,6 +117,8 @@ def node_to_node(
     InputError
         If a node has no partner, or shares it.
     """
+    from scipy.spatial import cKDTree
+
     nodes, others = a.used, b.used
     distance, nearest = cKDTree(b.points[others]).query(a.points[nodes])
     partner = others[nearest]

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.contact.facets import (
@@ -55,6 +54,8 @@ def near_pairs(
     reach
         Largest distance between two of them, m.
     """
+    from scipy.spatial import cKDTree
+
     around = radius + radii.max(initial=0.0) + reach
     found = cKDTree(others).query_ball_point(centre, around)
     first = np.repeat(np.arange(len(centre)), [len(f) for f in found])

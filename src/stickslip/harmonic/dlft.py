@@ -12,7 +12,8 @@ from time import perf_counter
 import numpy as np
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from stickslip.contact.compiled import CompiledContacts, Evaluator, compile_contacts
+from stickslip.contact.compiled import CompiledContacts, compile_contacts
+from stickslip.contact.evaluators import Evaluator
 from stickslip.contact.interface import Interface, SparseRows, sparse_rows
 from stickslip.contact.intervals import prefix_sums
 from stickslip.contact.law import TN, TT, UNCOUPLED_TANGENTS

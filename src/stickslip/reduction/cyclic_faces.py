@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.spatial
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import InputError, input_error
@@ -163,7 +162,9 @@ def _nearest(points: FloatArray, among: FloatArray) -> tuple[FloatArray, IntArra
         return np.full(len(points), np.inf), np.zeros(len(points), dtype=np.int64)
     if not len(points):
         return np.zeros(0), np.zeros(0, dtype=np.int64)
-    distance, index = scipy.spatial.KDTree(among).query(points)
+    from scipy.spatial import cKDTree
+
+    distance, index = cKDTree(among).query(points)
     return np.asarray(distance), np.asarray(index)
 
 

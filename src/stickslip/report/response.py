@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.harmonic.selection import STRATEGIES, strategy_named
+from stickslip.harmonic.selection import strategy_named
 from stickslip.harmonic.selection.strategy import always_kept
+from stickslip.harmonic.strategies import STRATEGIES
 from stickslip.harmonic.support import named
 from stickslip.report.cases import ShownCase, cases_of, varied
 from stickslip.report.content import Table

@@ -81,9 +81,8 @@ def compile_ahead(workers: int) -> Iterator[str]:
     str
         What is compiled.
     """
-    _ = list(
-        LAWS.values()
-    )  # a law is compiled when its file is loaded: here, and not in each process
+    for law in LAWS.values():  # compiled here, and not in each process
+        _ = law.kernel  # type: ignore[attr-defined]
     yield "contact laws"
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         tasks = {pool.submit(task): name for name, task in TASKS.items()}

@@ -1,7 +1,7 @@
 """Springs that neither slip nor open."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -36,7 +36,7 @@ class Bonded:
     k_w: float = axial_stiffness()
     k_n: float = normal_stiffness()
 
-    kernel: ClassVar[Any] = element_step
+    kernel = element_step
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:

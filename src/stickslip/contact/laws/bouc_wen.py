@@ -1,7 +1,7 @@
 """Smooth hysteresis of Bouc (1967) and Wen (1976)."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numba
 import numpy as np
@@ -179,7 +179,7 @@ class BoucWen:
     k_w: float = axial_stiffness(default=0.0)
     k_n: float = normal_stiffness(default=0.0)
 
-    kernel: ClassVar[Any] = law_kernel(_step)
+    kernel = law_kernel(_step)
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:

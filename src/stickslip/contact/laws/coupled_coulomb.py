@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numba
 import numpy as np
@@ -235,7 +235,7 @@ class CoupledCoulomb:
     )
     slider: tuple[float, float] | None = None
 
-    kernel: ClassVar[Any] = law_kernel(_step)
+    kernel = law_kernel(_step)
     pairs: ClassVar[int] = COUPLED_TANGENTS
 
     def __post_init__(self) -> None:

@@ -1,7 +1,7 @@
 """Linear and cubic spring, as of the Duffing oscillator."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -59,7 +59,7 @@ class CubicSpring:
     k_w: float = axial_stiffness(default=0.0)
     k_n: float = normal_stiffness(default=0.0)
 
-    kernel: ClassVar[Any] = polynomial_step
+    kernel = polynomial_step
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:

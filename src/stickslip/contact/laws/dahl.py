@@ -1,7 +1,7 @@
 """Friction that approaches its limit exponentially (Dahl 1968)."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -69,7 +69,7 @@ class Dahl:
     k_w: float = axial_stiffness(default=0.0)
     k_n: float = normal_stiffness(default=0.0)
 
-    kernel: ClassVar[Any] = law_kernel(_step)
+    kernel = law_kernel(_step)
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:

@@ -1,7 +1,7 @@
 """Unilateral normal spring with two independent Jenkins springs whose limit follows the normal force."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -63,7 +63,7 @@ class ElasticCoulomb:
     )
     slider: tuple[float, float] | None = None
 
-    kernel: ClassVar[Any] = element_step
+    kernel = element_step
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:

@@ -1,7 +1,7 @@
 """Iwan's parallel-series element: many Jenkins elements side by side."""
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -82,7 +82,7 @@ class Iwan:
     k_n: float = normal_stiffness(default=0.0)
     population: Population = field(default_factory=UniformBand)
 
-    kernel: ClassVar[Any] = law_kernel(_step)
+    kernel = law_kernel(_step)
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:

@@ -1,7 +1,7 @@
 """Jenkins element: a spring in series with a slider of constant limit."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -49,7 +49,7 @@ class Jenkins:
     k_n: float = normal_stiffness(default=0.0)
     slider: tuple[float, float] | None = None
 
-    kernel: ClassVar[Any] = element_step
+    kernel = element_step
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:

@@ -1,7 +1,7 @@
 """Elastic springs with a polynomial characteristic."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -62,7 +62,7 @@ class PolynomialSpring:
         shared=True,
     )
 
-    kernel: ClassVar[Any] = polynomial_step
+    kernel = polynomial_step
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:

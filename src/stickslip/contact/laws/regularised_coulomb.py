@@ -1,7 +1,7 @@
 """Coulomb friction smoothed over the velocity."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -60,7 +60,7 @@ class RegularisedCoulomb:
     k_n: float = normal_stiffness(default=0.0)
     preload: float = 0.0
 
-    kernel: ClassVar[Any] = law_kernel(_step)
+    kernel = law_kernel(_step)
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:

@@ -1,7 +1,7 @@
 """Coulomb friction on a rigid unilateral contact: no stiffness anywhere."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, NoReturn
+from typing import ClassVar, NoReturn
 
 from stickslip.arrays import FloatArray
 from stickslip.contact.element import element_step
@@ -42,7 +42,7 @@ class RigidCoulomb:
     preload: float | None = None
     initial_gap: float = 0.0
 
-    kernel: ClassVar[Any] = element_step
+    kernel = element_step
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:

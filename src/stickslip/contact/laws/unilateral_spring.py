@@ -1,7 +1,7 @@
 """Normal spring that pushes and cannot pull, without friction."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -37,7 +37,7 @@ class UnilateralSpring:
     preload: float = 0.0
     initial_gap: float = 0.0
 
-    kernel: ClassVar[Any] = element_step
+    kernel = element_step
     pairs: ClassVar[int] = UNCOUPLED_TANGENTS
 
     def __post_init__(self) -> None:

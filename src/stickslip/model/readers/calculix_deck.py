@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import scipy.sparse
-from scipy.spatial import cKDTree
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import InputError, did_you_mean, input_error
@@ -316,6 +315,8 @@ def _oriented(
     points: FloatArray, faces: tuple[IntArray, IntArray], axis: Axis, sectors: int
 ) -> tuple[IntArray, IntArray]:
     """Return the faces such that the first, turned by one pitch, comes to lie on the second."""
+    from scipy.spatial import cKDTree
+
     pitch = 2 * math.pi / sectors
     misses = [
         float(cKDTree(points[faces[1]]).query(axis.turned(points[faces[0]], angle))[0].max())
@@ -332,6 +333,8 @@ def _held_by_tie(
     CalculiX takes no support on the dependent face: its nodes are held because their partners are. With
     ``u_high = R u_low`` a component of one is held if all components of the other are that it is made of.
     """
+    from scipy.spatial import cKDTree
+
     low, high = faces
     distance, partner = cKDTree(mesh.points[high]).query(axis.turned(mesh.points[low], pitch))
     near = distance <= PAIRED * float(np.ptp(mesh.points[high], axis=0).max())

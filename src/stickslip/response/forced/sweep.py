@@ -7,18 +7,17 @@ from typing import Literal, get_args
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.contact.compiled import Evaluator, check_evaluator
+from stickslip.contact.evaluators import Evaluator, check_evaluator
 from stickslip.errors import check_choice, input_error
-from stickslip.harmonic.selection import STRATEGIES, strategy_named
+from stickslip.harmonic.selection import strategy_named
 from stickslip.harmonic.selection.strategy import Strategy, always_kept, check_strategy
+from stickslip.harmonic.strategies import STRATEGIES
 from stickslip.harmonic.support import Harmonics, harmonics_of
 from stickslip.response.branch import steps_through
+from stickslip.response.forced.choices import PUBLISHED, RUNGS, SELECTION, Passages
 from stickslip.solve.continuation import StepControl
 from stickslip.solve.newton_method import Newton
 
-Passages = Literal["double", "single"]
-RUNGS = (5, 9, 15, 25, 41)  # highest harmonics that "auto" goes through
-PUBLISHED = 5  # highest harmonic of the repeats in the papers
 Direction = Literal["up", "down"]
 
 
@@ -74,7 +73,7 @@ class Sweep:
     samples: int = 256
     evaluator: Evaluator = "events"
     threshold: float = 0.05
-    selection: str | Strategy = "guarded_alert"
+    selection: str | Strategy = SELECTION
     passages: Passages = "double"
     error_harmonics: Sequence[int] | None = None
     points: int = 40

@@ -1,10 +1,9 @@
 """Natural frequencies against rotor speed, and where engine orders cross them."""
 
 from collections.abc import Sequence
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
-from pydantic import Field, model_validator
 
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
@@ -17,50 +16,17 @@ from stickslip.study.analyses.waves.left_out import in_still_fluid
 from stickslip.study.analyses.waves.numbers import Wheel
 from stickslip.study.analyses.waves.results import WaveBranches
 from stickslip.study.analyses.waves.solve import Question, follow_wave
-from stickslip.study.analyses.waves.tables import Diameter, Order, Speed, WaveTable
+from stickslip.study.analyses.waves.tables import CampbellTable
 from stickslip.study.analyses.waves.texts import campbell_tables
-from stickslip.study.file.section import once, rising_pair
 from stickslip.study.keep.netcdf import variable
 from stickslip.units import RPM
 
 
-class CampbellTable(WaveTable):
-    """Frequencies against rotor speed and their crossings with engine orders."""
-
-    speeds_rpm: list[Speed] = Field(
-        min_length=2,
-        max_length=2,
-        description="the range [lowest, highest] of the speed in rpm, the lower first",
-    )
-    points: int = Field(9, ge=2, le=1000, description="number of speeds in the range, 2 to 1000")
-    engine_orders: list[Order] = Field(
-        min_length=1, max_length=200, description="engine orders, a list of whole numbers from 1"
-    )
-    modes: int = Field(4, ge=1, le=100, description="number of modes that are followed, 1 to 100")
-    nodal_diameters: list[Diameter] | None = Field(
-        None,
-        min_length=1,
-        max_length=501,
-        description="nodal diameters; left out: those that the engine orders excite",
-    )
-
-    @model_validator(mode="after")
-    def _agrees(self) -> Self:
-        once(self.engine_orders, "engine_orders")
-        once(self.nodal_diameters or [], "nodal_diameters")
-        rising_pair(self.speeds_rpm, "speeds_rpm", "speed")
-        return self
-
-    @property
-    def speeds(self) -> tuple[float, ...]:
-        """In rad/s."""
-        return tuple(RPM * np.linspace(self.speeds_rpm[0], self.speeds_rpm[1], self.points))
-
-    def numbers(self, wheel: Wheel) -> tuple[int, ...]:
-        """Return the wave numbers of the nodal diameters asked for; else those that the engine orders excite."""
-        if self.nodal_diameters is not None:
-            return wheel.numbers(self.nodal_diameters)
-        return tuple(sorted({wheel.diagram(m) for m in self.engine_orders}))
+def _numbers(asked: CampbellTable, wheel: Wheel) -> tuple[int, ...]:
+    """Return the wave numbers of the nodal diameters asked for; else those that the engine orders excite."""
+    if asked.nodal_diameters is not None:
+        return wheel.numbers(asked.nodal_diameters)
+    return tuple(sorted({wheel.diagram(m) for m in asked.engine_orders}))
 
 
 def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
@@ -69,7 +35,9 @@ def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
     told = solved.notes["model"]
     wheel = Wheel(int(told["sectors"]), bool(told["parted"]))
     beyond = _unfollowed(waves, wheel, asked)
-    unseen = sorted(m for m in asked.engine_orders if wheel.diagram(m) not in asked.numbers(wheel))
+    unseen = sorted(
+        m for m in asked.engine_orders if wheel.diagram(m) not in _numbers(asked, wheel)
+    )
     doubts = [*basis_doubts(waves), *campbell_doubts(beyond, unseen, waves)]
     return _curves(waves, asked) | _crossings(waves) | _beyond(beyond), doubts
 
@@ -153,7 +121,7 @@ class Campbell(WaveAnalysis):
             still,
             asked.contacts,
             wheel,
-            asked.numbers(wheel),
+            _numbers(asked, wheel),
             asked.modes,
             asked.speeds,
             engine_orders=tuple(asked.engine_orders),

@@ -2,10 +2,9 @@
 
 from collections.abc import Iterator, Sequence
 from time import perf_counter
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
-from pydantic import Field, model_validator
 
 from stickslip.arrays import ComplexArray, FloatArray
 from stickslip.assembly.flow import flow_around
@@ -23,9 +22,8 @@ from stickslip.study.analyses.waves.in_flow import wave_in_flow
 from stickslip.study.analyses.waves.numbers import Wheel, label
 from stickslip.study.analyses.waves.results import WaveFlutter
 from stickslip.study.analyses.waves.solve import Question
-from stickslip.study.analyses.waves.tables import Diameter, WaveTable
+from stickslip.study.analyses.waves.tables import FlutterTable
 from stickslip.study.analyses.waves.texts import flutter_tables
-from stickslip.study.file.section import once
 from stickslip.study.keep.netcdf import variable
 from stickslip.units import HZ, RPM
 
@@ -38,34 +36,6 @@ APART = 0.1  # of the largest damping: energy method and eigenvalue differ by mo
 PERCENT = 100.0
 FLUTTERS = "The wheel flutters: friction may limit the vibration, more damping or another blade prevent it."
 MORE = "Add damping, or change the blade."
-
-
-class FlutterTable(WaveTable):
-    """Aerodynamic damping and flutter margin of each wave, by the energy method and by eigenvalues."""
-
-    number: int | None = Field(
-        None,
-        ge=1,
-        le=200,
-        description="number of modes of each wave, 1 to 200; left out: up to the highest that [aero] has coefficients of",
-    )
-    nodal_diameters: list[Diameter] | None = Field(
-        None,
-        min_length=1,
-        max_length=501,
-        description="nodal diameters, a list of whole numbers from 0 to half the number of sectors; left out: all. Both directions of each are looked at",
-    )
-    required_percent: float = Field(
-        0.0,
-        ge=-100,
-        le=100,
-        description="damping ratio in % that every wave must have, that of the structure with it; 0: none may grow",
-    )
-
-    @model_validator(mode="after")
-    def _agrees(self) -> Self:
-        once(self.nodal_diameters or [], "nodal_diameters")
-        return self
 
 
 def _of_wave(asked: Question, wave_number: int) -> WaveFlutter:

@@ -2,10 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Self
 
 import numpy as np
-from pydantic import Field, model_validator
 
 from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
@@ -28,53 +26,17 @@ from stickslip.study.analyses.waves.stages import (
     stages_question,
     unreached,
 )
-from stickslip.study.analyses.waves.tables import Diameter, WaveTable
+from stickslip.study.analyses.waves.tables import ModesTable
 from stickslip.study.analyses.waves.texts import modes_tables
-from stickslip.study.file.section import FilePath, custom_error, once
 from stickslip.study.keep.netcdf import variable
 from stickslip.units import HZ, RPM
 
 
-class ModesTable(WaveTable):
-    """Natural frequencies and mode shapes for each nodal diameter."""
-
-    number: int = Field(
-        6, ge=1, le=200, description="number of modes of each nodal diameter, 1 to 200"
-    )
-    nodal_diameters: list[Diameter] | None = Field(
-        None,
-        min_length=1,
-        max_length=501,
-        description="nodal diameters, a list of whole numbers from 0 to half the number of sectors; left out: all",
-    )
-    shapes: bool = Field(True, description="store the mode shapes on the skin: true or false")
-    reference: FilePath | None = Field(
-        None,
-        description="CSV file of frequencies to compare with, relative to the study; columns nodal_diameter, mode (1 is the "
-        "lowest), frequency_hz, and speed_rpm if it shall be told where that is another speed",
-    )
-    reference_case: str | None = Field(
-        None,
-        max_length=100,
-        description="keep only the rows of the reference whose column 'case' has this value",
-    )
-
-    @model_validator(mode="after")
-    def _agrees(self) -> Self:
-        once(self.nodal_diameters or [], "nodal_diameters")
-        if self.reference_case is not None and self.reference is None:
-            raise custom_error(
-                "is given without a reference",
-                "Name the CSV file, or leave it out.",
-                "reference_case",
-            )
-        return self
-
-    def compared_with(self, home: Path) -> Reference | None:
-        """Return the frequencies to compare with; None if there are none."""
-        if self.reference is None:
-            return None
-        return read_reference(home / self.reference, self.reference_case)
+def _compared_with(asked: ModesTable, home: Path) -> Reference | None:
+    """Return the frequencies to compare with; None if there are none."""
+    if asked.reference is None:
+        return None
+    return read_reference(home / asked.reference, asked.reference_case)
 
 
 def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:
@@ -122,7 +84,7 @@ def _in_flow(waves: Sequence[WaveModes]) -> Variables:
 
 def _compared(solved: Solved, hertz: FloatArray) -> Variables:
     asked: ModesTable = solved.case.settings.modes
-    known = asked.compared_with(solved.case.home)
+    known = _compared_with(asked, solved.case.home)
     if known is None:
         return {}
     numbers = [w.wave_number for w in solved.records]
@@ -137,7 +99,7 @@ def _compared(solved: Solved, hertz: FloatArray) -> Variables:
 def _of_other_speed(solved: Solved) -> list[Verdict]:
     """Tell of frequencies to compare with that are of another speed."""
     asked: ModesTable = solved.case.settings.modes
-    known, rpm = asked.compared_with(solved.case.home), float(solved.notes["model"]["speed_rpm"])
+    known, rpm = _compared_with(asked, solved.case.home), float(solved.notes["model"]["speed_rpm"])
     others = known.not_at(rpm) if known is not None else ()
     if not others:
         return []
@@ -176,7 +138,7 @@ class Modes(WaveAnalysis):
         wheel.require(asked.nodal_diameters, "modes.nodal_diameters")
         _refuse_too_many(model, asked.number)
         numbers = wheel.numbers(asked.nodal_diameters)
-        known = asked.compared_with(case.home)
+        known = _compared_with(asked, case.home)
         if known is not None:
             known.of_waves(numbers, asked.number, model.sectors)
         question = Question(

@@ -19,11 +19,11 @@ from stickslip.study.analyses.tractions.dataset import dataset
 from stickslip.study.analyses.tractions.question import (
     MOTIONS,
     Question,
-    ResidualTractionsTable,
     cost_of,
     question_of,
 )
 from stickslip.study.analyses.tractions.records import TractionRecord, of_record, to_record
+from stickslip.study.analyses.tractions.table import ResidualTractionsTable
 from stickslip.study.analyses.tractions.words import tables
 from stickslip.study.analyses.verdict import Verdict, stored
 from stickslip.study.keep.progress import advance

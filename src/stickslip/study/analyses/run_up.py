@@ -17,7 +17,8 @@ from stickslip.study.analyses.running.question import (
     of_order,
     question_of,
 )
-from stickslip.study.analyses.running.table import RunUpTable, sweep_along
+from stickslip.study.analyses.running.sweeps import sweep_along
+from stickslip.study.analyses.running.table import RunUpTable
 from stickslip.study.analyses.running.values import dataset, values_of
 from stickslip.study.analyses.running.words import UNKNOWN, tables, verdicts_of
 from stickslip.study.analyses.verdict import (

@@ -1,10 +1,8 @@
 """Which modes engine orders can excite at one speed: the SAFE or interference diagram."""
 
 from collections.abc import Sequence
-from typing import Self
 
 import numpy as np
-from pydantic import Field, model_validator
 
 from stickslip.arrays import FloatArray
 from stickslip.assembly.model import Model
@@ -20,36 +18,10 @@ from stickslip.study.analyses.waves.left_out import in_still_fluid
 from stickslip.study.analyses.waves.numbers import Wheel
 from stickslip.study.analyses.waves.results import WaveModes
 from stickslip.study.analyses.waves.solve import Question, solve_wave
-from stickslip.study.analyses.waves.tables import Order, Speed, WaveTable
+from stickslip.study.analyses.waves.tables import SafeTable
 from stickslip.study.analyses.waves.texts import safe_tables
-from stickslip.study.file.section import once
 from stickslip.study.keep.netcdf import variable
 from stickslip.units import HZ, RPM
-
-
-class SafeTable(WaveTable):
-    """Which modes engine orders can excite at one speed (SAFE, interference diagram)."""
-
-    speed_rpm: Speed | None = Field(
-        None, description="speed in rpm, above zero; left out: that of [rotation]"
-    )
-    engine_orders: list[Order] = Field(
-        min_length=1, max_length=200, description="engine orders, a list of whole numbers from 1"
-    )
-    margin_percent: float = Field(
-        5.0,
-        gt=0,
-        lt=100,
-        description="a mode that an engine order would meet within this change of speed is called a near resonance, in percent",
-    )
-    modes: int = Field(
-        6, ge=1, le=200, description="number of modes of each nodal diameter, 1 to 200"
-    )
-
-    @model_validator(mode="after")
-    def _differ(self) -> Self:
-        once(self.engine_orders, "engine_orders")
-        return self
 
 
 def _of_case(solved: Solved) -> tuple[Variables, list[Verdict]]:

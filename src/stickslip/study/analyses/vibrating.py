@@ -8,7 +8,7 @@ import numpy as np
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
 from stickslip.assembly.reduced import Store
-from stickslip.contact.compiled import Evaluator
+from stickslip.contact.evaluators import Evaluator
 from stickslip.errors import InputError, input_error
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.at_rest import pressed_by

@@ -1,23 +1,20 @@
 """The table [harmonics] of a study file: which harmonics are kept, and what chooses them at each frequency."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import fields
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from stickslip.errors import InputError, did_you_mean
-from stickslip.harmonic.selection import OPTIONS, STRATEGIES, options_of, strategy_named
-from stickslip.harmonic.selection.strategy import Strategy, always_kept
+from stickslip.harmonic.strategies import FIXED, OPTIONS, STRATEGIES, VERIFYING, options_of
 from stickslip.harmonic.support import Harmonics as Support
 from stickslip.harmonic.support import harmonics_of
-from stickslip.response.forced.sweep import PUBLISHED, RUNGS, Passages, Sweep
+from stickslip.response.forced.choices import PUBLISHED, RUNGS, SELECTION, Passages
 from stickslip.study.file.section import Positive, Section, custom_error, refuse_all, shown
 
 HIGHEST = 200  # harmonic that a study may keep
 SELECTIONS = tuple(STRATEGIES)
-DEFAULT_SELECTION = str({f.name: f.default for f in fields(Sweep)}["selection"])
 SAMPLES_A_HARMONIC = 8  # of a period, at least
 PLACES = ("along", "outputs", "contacts")
 
@@ -41,7 +38,7 @@ class Harmonics(Section):
     )
     samples: int = Field(256, ge=16, le=8192, description="time samples of a period, 16 to 8192")
     selection: Selection = Field(
-        DEFAULT_SELECTION,
+        SELECTION,
         description="what chooses the harmonics of a frequency: " + ", ".join(SELECTIONS),
     )
     passages: Passages = Field(
@@ -134,31 +131,23 @@ class Harmonics(Section):
         return harmonics_of(self.high)
 
     @property
-    def strategy(self) -> Strategy:
+    def strategy(self) -> Any:
         """What chooses, with this table's threshold where it has one."""
-        strategy = strategy_named(self.selection, **self._options)
-        if strategy.verifies:
-            return strategy_named(self.selection, self.alert_threshold_percent / 100)
-        if self.strategy_threshold is None:
-            return strategy
-        return strategy_named(self.selection, self.strategy_threshold, **self._options)
+        from stickslip.harmonic.selection import strategy_named  # loads the contact kernels
+
+        verifies = self.selection in VERIFYING
+        threshold = self.alert_threshold_percent / 100 if verifies else self.strategy_threshold
+        return strategy_named(self.selection, threshold, **self._options)
 
     @property
     def _options(self) -> dict[str, bool]:
         return {name: True for name in options_of(self.selection) if getattr(self, name)}
 
     @property
-    def chooser(self) -> str | Strategy:
+    def chooser(self) -> Any:
         """What a sweep takes as its selection: the name, or the strategy with this table's own threshold."""
         as_named = self.strategy_threshold is None and not self._options
         return self.selection if as_named else self.strategy
-
-    @property
-    def single(self) -> bool:
-        """Whether each frequency is settled before the next one."""
-        strategy = self.strategy
-        decides = always_kept(strategy) is None
-        return decides and (self.passages == "single" or not strategy.verifies)
 
 
 def _harmonic(given: Any) -> bool:
@@ -227,8 +216,9 @@ def _of_options(table: Harmonics) -> Iterator[PydanticCustomError]:
 
 
 def _of_threshold(table: Harmonics) -> Iterator[PydanticCustomError]:
-    verifies = strategy_named(table.selection).verifies
-    if table.strategy_threshold is not None and always_kept(strategy_named(table.selection)):
+    verifies = table.selection in VERIFYING
+    given = {"alert_threshold_percent", "strategy_threshold"} & table.model_fields_set
+    if table.strategy_threshold is not None and table.selection in FIXED:
         yield custom_error(
             f"has no meaning for selection = {table.selection!r}, got {table.strategy_threshold:g}",
             "Remove it: nothing is decided.",
@@ -240,7 +230,7 @@ def _of_threshold(table: Harmonics) -> Iterator[PydanticCustomError]:
             "Give alert_threshold_percent instead.",
             "strategy_threshold",
         )
-    else:
+    elif given:
         try:
             _ = table.strategy
         except InputError as error:  # a strategy's own limits

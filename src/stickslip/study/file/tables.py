@@ -2,13 +2,13 @@
 
 import json
 from functools import cache
+from importlib import import_module
 from typing import Any, Literal
 
 from pydantic import Field, create_model
 
-from stickslip.contact.compiled import Evaluator
-from stickslip.study.analyses import ANALYSES
-from stickslip.study.analyses.analysis import named
+from stickslip.contact.evaluators import Evaluator
+from stickslip.study.analyses import ANALYSES, TABLES
 from stickslip.study.file.aero import AeroTable
 from stickslip.study.file.contacts import ContactTable, JoinTable
 from stickslip.study.file.harmonics import Harmonics
@@ -102,12 +102,17 @@ class Tables(Section):
     )
 
 
+def _table(place: str) -> Any:
+    module, _, name = place.partition(":")
+    return getattr(import_module(module), name)
+
+
 @cache
 def study_tables() -> type[Tables]:
     """Return the section of the whole file, with one optional table for each analysis."""
     asked: dict[str, Any] = {
-        name: (named(name).table | None, Field(None, description=f"the table [{name}]"))
-        for name in ANALYSES
+        name: (_table(place) | None, Field(None, description=f"the table [{name}]"))
+        for name, place in TABLES.items()
     }
     made: type[Tables] = create_model(
         "StudyTables", __base__=Tables, __doc__="Everything a study file may hold.", **asked

@@ -7,7 +7,7 @@ from typing import Any
 
 from stickslip.assembly.contact import GROUND, NEXT
 from stickslip.assembly.forces import engine_order
-from stickslip.errors import InputError, did_you_mean, input_error, nearest_and_known
+from stickslip.errors import InputError, did_you_mean, input_error, nearest_and_known, together
 from stickslip.model.dofs import is_numbered
 from stickslip.study.file.bodies import (
     BODIES,
@@ -25,6 +25,7 @@ from stickslip.study.file.parts import (
     Sector,
 )
 from stickslip.study.file.section import Section
+from stickslip.study.file.study import StudyFile
 from stickslip.study.file.tables import Tables, original
 from stickslip.study.models.aero import knows_speeds
 from stickslip.study.models.areas import without_areas
@@ -32,8 +33,8 @@ from stickslip.study.models.cost import too_large
 from stickslip.study.models.diameters import diameter_refusals
 from stickslip.study.models.files import MESHES
 from stickslip.study.models.fluid import fluid_refusals
-from stickslip.study.models.mistuning import mistuning_refusals
 from stickslip.study.models.running import run_up_refusals
+from stickslip.study.models.spares import mistuning_refusals
 from stickslip.study.models.stages import stage_refusals, staged
 
 BLADES = ("root", "force", "tip1", "edge1", "tip2")
@@ -41,6 +42,22 @@ SECTOR = ("root", "cyclic_low", "cyclic_high", "tip")
 SIDES = ("flat", "curved")
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
 OF_SECTOR = re.compile(r"\[\d+\](?=\.)")  # of one blade of a mistuned wheel
+
+
+def refuse(file: StudyFile) -> None:
+    """Refuse what can be refused without a mesh.
+
+    Raises
+    ------
+    InputError
+        Naming every problem of the file, one a line.
+    """
+    found: dict[str, InputError] = {}
+    for case in file.cases:
+        for error in refusals(case.tables, file.home):
+            found.setdefault(str(error), error.inside(str(file.path)))
+    if found:
+        raise together(found.values())
 
 
 def refusals(tables: Tables, home: Path) -> Iterator[InputError]:

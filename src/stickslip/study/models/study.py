@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from stickslip.assembly.model import Model
-from stickslip.errors import InputError, input_error, together
+from stickslip.errors import InputError, input_error
 from stickslip.study.analyses.analysis import Case
 from stickslip.study.file.study import StudyFile, TablesOfCase, read_file, validated
 from stickslip.study.file.tables import OF_THE_MODEL, Tables, asked_of
 from stickslip.study.file.vary import with_values
-from stickslip.study.models.checks import refusals
+from stickslip.study.models.checks import refuse
 from stickslip.study.models.measured import MeasuredPeaks, measured_peaks
 from stickslip.study.models.model import model_of, newton
 from stickslip.study.models.parts import Memo, digest, digest_of
@@ -195,6 +195,18 @@ def _drive(tables: Tables) -> float:
     return harmonic / (static or 1.0)
 
 
+def judged(file: StudyFile) -> Study:
+    """Return the study of a file that `refuse` has found good.
+
+    Raises
+    ------
+    InputError
+        If the file of measured peaks that it names is not.
+    """
+    measured_peaks(file)
+    return Study(file)
+
+
 def model_digests(tables: Tables, home: Path) -> tuple[str, str]:
     """Return the hash of all that a model depends on, and of what is left of it without harmonic loads and outputs."""
     own = tables.model_dump(mode="json", include=set(OF_THE_MODEL) - {"load"})
@@ -225,11 +237,6 @@ def _hash(content: object) -> str:
 
 
 def _checked(study: Study) -> Study:
-    found: dict[str, InputError] = {}
-    for case in study.file.cases:
-        for error in refusals(case.tables, study.file.home):
-            found.setdefault(str(error), error.inside(str(study.path)))
-    if found:
-        raise together(found.values())
+    refuse(study.file)
     measured_peaks(study.file)
     return study

@@ -6,7 +6,7 @@ from typing import Any
 
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
-from stickslip.contact.compiled import Evaluator
+from stickslip.contact.evaluators import Evaluator
 from stickslip.reduction.tuned import TunedWheel
 from stickslip.response.nonlinear_modes.backbone import ModeSweep
 from stickslip.response.parameter import Discretisation

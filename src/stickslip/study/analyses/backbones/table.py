@@ -1,10 +1,9 @@
 """The table [nonlinear_mode] of a study file."""
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from stickslip.response.nonlinear_modes.backbone import Concept
 from stickslip.study.file.harmonics import HIGHEST
 from stickslip.study.file.section import Positive, Section, once, rising_pair
 
@@ -50,7 +49,7 @@ class NonlinearModeTable(Section):
         False,
         description="whether a mode ends where every contact that can slip has slipped, of several sliders all of them, or opened",
     )
-    concept: Concept = Field(
+    concept: Literal["periodic", "decaying"] = Field(
         "periodic",
         description="what motions a mode is made of: periodic ones that a damping in proportion to the mass keeps going (Krack 2015), or those that are "
         "decaying as they are (Laxalde and Thouverez 2009); both agree where damping is small",

@@ -9,11 +9,11 @@ import numpy as np
 
 from stickslip.arrays import BoolArray
 from stickslip.assembly.mistuned import listed
-from stickslip.harmonic.selection import STRATEGIES
 from stickslip.harmonic.selection.strategy import Strategy, always_kept
+from stickslip.harmonic.strategies import STRATEGIES
 from stickslip.harmonic.support import Harmonics, named
+from stickslip.response.forced.choices import RUNGS
 from stickslip.response.forced.response import ForcedPoint, Sweep
-from stickslip.response.forced.sweep import RUNGS
 from stickslip.study.analyses.forced.points import Response
 from stickslip.units import HZ
 

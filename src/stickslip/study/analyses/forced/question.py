@@ -23,7 +23,7 @@ from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.forced.chooser import Chooser, chooser_of
 from stickslip.study.analyses.forced.estimate import check_limits, estimate, within_limits
 from stickslip.study.analyses.forced.examination import examines_every_wave
-from stickslip.study.analyses.forced.section import sweep_of
+from stickslip.study.analyses.forced.sweeps import sweep_of
 from stickslip.study.analyses.verdict import said
 from stickslip.units import RPM
 

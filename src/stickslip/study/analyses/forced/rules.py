@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from stickslip.response.forced.sweep import RUNGS
+from stickslip.response.forced.choices import RUNGS
 from stickslip.solve.status import Status
 from stickslip.study.analyses.forced.chooser import error_text
 from stickslip.study.analyses.forced.curve import ATTAINED, Curve, motion_of

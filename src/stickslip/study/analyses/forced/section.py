@@ -1,22 +1,14 @@
-"""The table [forced_response] of a study file, and the sweep that it becomes."""
+"""The table [forced_response] of a study file."""
 
-from collections.abc import Iterable
-from dataclasses import replace
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from stickslip.errors import input_error
-from stickslip.response.forced.response import Sweep
-from stickslip.response.forced.sweep import RUNGS
 from stickslip.study.file.section import Positive, Section, custom_error, rising_pair
-from stickslip.units import HZ, RPM
 
 Range = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 RANGES = ("frequency_hz", "frequencies_hz", "speed_rpm")
-MULTIPLE = 3  # of the highest harmonic that loads drive, which friction answers with
-ALONE = 1e-3  # of a frequency that stands alone: half the width of its range
 
 
 class ForcedResponse(Section):
@@ -111,64 +103,6 @@ class ForcedResponse(Section):
         return self
 
 
-def sweep_of(settings: Any, engine_order: int | None, driven: Iterable[int] = (1,)) -> Sweep:
-    """Return the sweep that a study's tables ask for.
-
-    Parameters
-    ----------
-    settings
-        With the tables ``forced_response``, ``harmonics`` and ``solver``.
-    engine_order
-        Of the frequency, for a response over speed; None: the loads have none.
-    driven
-        Harmonics that loads act in.
-
-    Raises
-    ------
-    InputError
-        If a response over speed is asked for and no load has an engine order.
-    """
-    table = settings.forced_response
-    sweep = sweep_through(settings, table, _range(table, engine_order), driven)
-    own = tuple(HZ * f for f in table.frequencies_hz or ())
-    return replace(sweep, at=own, frequencies=table.frequencies or 0)
-
-
-def sweep_through(
-    settings: Any, table: Any, omega_range: tuple[float, float], driven: Iterable[int]
-) -> Sweep:
-    """Return the sweep of a table with ``direction``, ``points`` and ``peak_points``, harmonics and solver as the study says.
-
-    Parameters
-    ----------
-    settings
-        With the tables ``harmonics`` and ``solver``.
-    table
-        Whose response it is.
-    omega_range
-        Lowest and highest frequency, rad/s.
-    driven
-        Harmonics that loads act in.
-    """
-    h = settings.harmonics
-    low = h.beginning(driven)
-    return Sweep(
-        omega_range=omega_range,
-        direction=table.direction,
-        low=low,
-        high="auto" if h.high == "auto" else h.high_harmonics,
-        samples=h.samples,
-        evaluator=settings.solver.evaluator,
-        cap=max(RUNGS[-1], MULTIPLE * low[-1]),
-        threshold=h.alert_threshold_percent / 100,
-        selection=h.chooser,
-        passages=h.passages,
-        error_harmonics=h.alert_harmonics,
-        points=table.points,
-        peak_points=table.peak_points,
-    )
-
-
 def _check_list(own: list[float] | None, count: int | None) -> None:
     if own is None:
         return
@@ -178,21 +112,3 @@ def _check_list(own: list[float] | None, count: int | None) -> None:
         )
     if any(b <= a for a, b in pairwise(own)):
         raise custom_error("must grow", "Sort them, and give each once.", "frequencies_hz")
-
-
-def _range(table: ForcedResponse, engine_order: int | None) -> tuple[float, float]:
-    """Return the lowest and the highest excitation frequency, rad/s."""
-    if table.speed_rpm is not None:
-        if not engine_order:
-            raise input_error(
-                "forced_response.over",
-                "is speed, and no load has an engine order",
-                "Give the loads engine_order, or a range frequency_hz.",
-            )
-        lowest, highest = (engine_order * RPM * n for n in table.speed_rpm)
-        return lowest, highest
-    given = table.frequency_hz or table.frequencies_hz or []
-    lowest, highest = HZ * given[0], HZ * given[-1]
-    if lowest == highest:
-        return lowest * (1 - ALONE), highest * (1 + ALONE)
-    return lowest, highest

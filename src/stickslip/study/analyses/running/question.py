@@ -24,7 +24,8 @@ from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.forced.estimate import check_limits, estimate, within_limits
 from stickslip.study.analyses.forced.question import peak_first
-from stickslip.study.analyses.running.table import RunUpTable, sweep_along
+from stickslip.study.analyses.running.sweeps import sweep_along
+from stickslip.study.analyses.running.table import RunUpTable
 from stickslip.study.analyses.verdict import said
 
 DRAWN = 9  # speeds at which natural frequencies are shown

@@ -1,12 +1,9 @@
-"""The table [run_up] of a study file, and the sweep along each of its engine orders."""
+"""The table [run_up] of a study file."""
 
-from collections.abc import Iterable
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from stickslip.response.forced.response import Sweep
-from stickslip.study.analyses.forced.section import sweep_through
 from stickslip.study.analyses.waves.tables import Order
 from stickslip.study.file.section import Positive, Section, custom_error, once, rising_pair
 from stickslip.units import RPM
@@ -75,20 +72,3 @@ class RunUpTable(Section):
         """In rad/s."""
         lowest, highest = (RPM * n for n in self.speeds_rpm)
         return lowest, highest
-
-
-def sweep_along(settings: Any, engine_order: int, driven: Iterable[int] = (1,)) -> Sweep:
-    """Return the sweep along an engine order that a study's tables ask for.
-
-    Parameters
-    ----------
-    settings
-        With the tables ``run_up``, ``harmonics`` and ``solver``.
-    engine_order
-        Times the speed it is the frequency of the first harmonic.
-    driven
-        Harmonics that loads act in.
-    """
-    table = settings.run_up
-    lowest, highest = (engine_order * speed for speed in table.speeds)
-    return sweep_through(settings, table, (lowest, highest), driven)

@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
-from stickslip.contact.compiled import Evaluator
+from stickslip.contact.evaluators import Evaluator
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.response.nonlinear_modes.backbone import ModeSweep

@@ -2,15 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
-from pydantic import Field, model_validator
 
 from stickslip.arrays import FloatArray
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
-from stickslip.contact.compiled import Evaluator
+from stickslip.contact.evaluators import Evaluator
 from stickslip.contact.starts import starts_of
 from stickslip.errors import InputError, input_error
 from stickslip.response.forced.sweep import Sweep
@@ -20,9 +19,8 @@ from stickslip.study.analyses.analysis import Case
 from stickslip.study.analyses.facts import facts_of
 from stickslip.study.analyses.forced.estimate import Estimate, estimate
 from stickslip.study.analyses.forced.question import peak_first
+from stickslip.study.analyses.tractions.table import ResidualTractionsTable
 from stickslip.study.analyses.vibrating import represented
-from stickslip.study.file.harmonics import HIGHEST
-from stickslip.study.file.section import Positive, Section, rising_pair
 from stickslip.study.models.cost import above
 from stickslip.units import HZ, RPM
 
@@ -31,36 +29,6 @@ MOTIONS = (
     100,
 )  # solved at a frequency: where hardly a spring keeps a traction, and where many do
 STEPS = 0.5  # Newton steps that one of them takes, over those of a point of a response
-
-
-class ResidualTractionsTable(Section):
-    """How far the response depends on the tractions that sticking contacts have kept from before."""
-
-    frequency_hz: list[Positive] = Field(
-        min_length=2,
-        max_length=2,
-        description="the range [lowest, highest] in which the bounds are computed, Hz; it should hold the resonance",
-    )
-    points: int = Field(25, ge=3, le=2000, description="frequencies in the range, 3 to 2000")
-    harmonics: int = Field(
-        5, ge=1, le=HIGHEST, description=f"harmonics of the motions, 1 to {HIGHEST}"
-    )
-    starts: int = Field(
-        4,
-        ge=0,
-        le=10_000,
-        description="random starts of the search at each frequency, beside those that are always taken, 0 to 10000",
-    )
-    seed: int = Field(0, ge=0, le=2**32 - 1, description="seed of the random starts")
-    in_time: bool = Field(
-        True,
-        description="whether both ends of the resonance are followed in time with the tractions they stand for; a tuned wheel is not",
-    )
-
-    @model_validator(mode="after")
-    def _agrees(self) -> Self:
-        rising_pair(self.frequency_hz, "frequency_hz")
-        return self
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,12 @@
+"""How contact forces are evaluated over a period, by name."""
+
+from typing import Literal, get_args
+
+from stickslip.errors import check_choice
+
+Evaluator = Literal["intervals", "march", "events"]
+
+
+def check_evaluator(evaluator: str) -> None:
+    """Refuse a name that is not known."""
+    check_choice("evaluator", evaluator, get_args(Evaluator), "'events' has no sampling error.")

@@ -1,0 +1,27 @@
+"""Strategies by name, and what a study file is judged by before any of them is loaded; `stickslip.harmonic.selection` has them."""
+
+# name → file and class
+STRATEGIES = {
+    "jacobian_alert": ("jacobian_alert", "JacobianAlert"),
+    "guarded_alert": ("guarded_alert", "GuardedAlert"),
+    "goal_oriented": ("goal_oriented", "GoalOriented"),
+    "grolet": ("grolet", "Grolet"),
+    "jaumouille": ("jaumouille", "Jaumouille"),
+    "laxalde": ("laxalde", "Laxalde"),
+    "maple": ("maple", "Maple"),
+    "suess_jacobian": ("suess_jacobian", "SuessJacobian"),
+    "suess_spectral": ("suess_spectral", "SuessSpectral"),
+    "always_low": ("fixed", "AlwaysLow"),
+    "always_high": ("fixed", "AlwaysHigh"),
+}
+VERIFYING = frozenset({"jacobian_alert", "guarded_alert", "goal_oriented"})  # they predict an error
+FIXED = frozenset({"always_low", "always_high"})  # they decide nothing
+OPTIONS = {  # option → strategies that have it
+    "per_dof": ("grolet", "maple"),
+    "repeats": ("grolet", "laxalde", "suess_jacobian", "suess_spectral"),
+}
+
+
+def options_of(name: str) -> tuple[str, ...]:
+    """Return which of the options ``per_dof`` and ``repeats`` a strategy has."""
+    return tuple(option for option, having in OPTIONS.items() if name in having)

@@ -1,0 +1,8 @@
+"""Names and numbers that a forced response is asked for with."""
+
+from typing import Literal
+
+Passages = Literal["double", "single"]
+RUNGS = (5, 9, 15, 25, 41)  # highest harmonics that "auto" goes through
+PUBLISHED = 5  # highest harmonic of the repeats in the papers
+SELECTION = "guarded_alert"  # what chooses harmonics where nothing else is said
