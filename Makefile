@@ -20,7 +20,7 @@ LOCK := $(BIN)/uv pip compile pyproject.toml --quiet --universal --python-versio
 # Two test workers on two cores: a threaded BLAS under each would only make them wait for each other.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help install run test coverage optional test-optional lint docs release figures second-damper reconstruction bench bench-rival calculix validate baseline strategies alarms sections lock clean
+.PHONY: help install run test coverage optional test-optional test-cluster lint docs release figures second-damper reconstruction bench bench-rival calculix validate baseline strategies alarms sections lock clean
 .DELETE_ON_ERROR:
 
 help:  ## list the targets
@@ -58,6 +58,9 @@ $(OPTIONAL_INSTALLED): $(INSTALLED) optional-requirements.lock
 test-optional: $(OPTIONAL_INSTALLED)  ## run the tests of these, none skipped
 	$(ONE_THREAD) STICKSLIP_OPTIONAL=required $(BIN)/python -m pytest tests/test_readers_ansys.py tests/test_readers_nastran.py \
 		tests/test_factorisation.py tests/test_modes.py
+
+test-cluster: $(OPTIONAL_INSTALLED)  ## run jobs on a Dask cluster whose workers are killed, and with executorlib (three minutes)
+	$(ONE_THREAD) STICKSLIP_CLUSTER=required $(BIN)/python -m pytest tests/test_cluster.py
 
 lint: $(INSTALLED)  ## style, types and the direction of imports
 	$(BIN)/ruff check .
