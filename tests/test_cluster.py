@@ -28,9 +28,13 @@ from stickslip.study.run import run_study
 if "STICKSLIP_CLUSTER" not in os.environ and not all(map(find_spec, ("distributed", "executorlib"))):  # fmt: skip
     pytest.skip("the extra cluster is not installed", allow_module_level=True)
 
+# executorlib asks pydantic for a name that is deprecated: shown, and no error of ours
+pytestmark = pytest.mark.filterwarnings(
+    "default::DeprecationWarning:pydantic", "default::DeprecationWarning:executorlib"
+)
 HERE = Path(__file__).parent
 PORT = 18786
-FACTORS = (1.5, 2.5, 3.5, 4.5, 5.5, 6.5)
+FACTORS = (1.5, 2.5, 3.5, 4.5)
 POISON = 1  # the case that kills its process, at its fourth record
 EVERY = 10.0  # seconds between two kills of a worker
 RUN = """
@@ -79,9 +83,7 @@ def expected(tmp_path_factory: pytest.TempPathFactory) -> np.ndarray:
         made = ToyStudy(folder / "study.toml", FACTORS)
         run_study(made)
     tree = xr.load_datatree(made.folder / "result.nc", engine="h5netcdf")
-    values = np.array(tree["toy"].value.values)
-    values[POISON, 3:] = np.nan
-    return values
+    return np.delete(tree["toy"].value.values, POISON, axis=0)
 
 
 def listening(processes: list[int]) -> set[str]:
@@ -156,7 +158,7 @@ def test_executorlib_on_one_node(tmp_path: Path, expected: np.ndarray) -> None:
     over = threading.Event()
 
     def listen() -> None:
-        while not over.wait(0.2):
+        while not over.wait(1.0):
             heard.update(listening([os.getpid()]))
 
     listener = threading.Thread(target=listen)

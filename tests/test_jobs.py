@@ -165,8 +165,7 @@ def bits(study: ToyStudy) -> np.ndarray:
 def test_last_shard_puts_the_result_together(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    together = jobs.worked
-    monkeypatch.setattr(run, "worked", lambda *given, apart: together(*given, apart=False))
+    monkeypatch.setattr(run, "executor", lambda kind, workers, apart=False: executor(kind, workers))
     factors = (1.5, 2.5, 3.5, 4.5, 5.5)
     whole = ToyStudy(tmp_path / "whole.toml", factors)
     run_study(whole)
@@ -247,7 +246,8 @@ def test_job_whose_workers_are_lost_stops_no_other(tmp_path: Path, caplog: pytes
         made = order(tmp_path), order(tmp_path, 1)
         for own in made:
             jobs.set_aside(own, "for the sake of its notes")
-        ended = list(jobs.worked(made, Losing(), 1, tmp_path, apart=False))  # type: ignore[arg-type]
+        with executor(Losing(), 1) as hands:  # type: ignore[arg-type]
+            ended = list(jobs.worked(made, hands, tmp_path))
     assert sorted(ended) == [own.sealed for own in made]
     assert caplog.text.count("it is given to another") == 4
     notes = read_sealed(made[0].sealed, made[0].analysis.record)[1]

@@ -14,12 +14,13 @@ from toy_analysis import Toy, ToyStudy
 
 from stickslip.errors import InputError
 from stickslip.study.analyses import ANALYSES
-from stickslip.study.analyses.verdict import Verdict, of_tree
+from stickslip.study.analyses.verdict import Verdict, conclusion, of_tree
 from stickslip.study.keep.cell import Limits
 from stickslip.study.keep.folder import locked_folder
 from stickslip.study.keep.progress import LOG, Interrupted
 from stickslip.study.keep.workers import executor
 from stickslip.study.run import answer, run_study
+from stickslip.study.shard import Shard
 
 HERE = Path(__file__).parent
 
@@ -119,31 +120,38 @@ from stickslip.study.run import run_study
 from toy_analysis import ToyStudy
 if __name__ == "__main__":
     ANALYSES["toy"] = "toy_analysis:TOY"
-    run_study(ToyStudy(Path({path!r}), stop_at=2, how="kill", stop_in=0), workers={workers})
+    run_study(ToyStudy(Path({path!r}), stop_at=2, how="kill", stop_in=0))
 """
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_killed_run_goes_on_to_the_same_numbers(
-    tmp_path: Path, whole: ToyStudy, workers: int
-) -> None:
-    path = str(tmp_path / "study.toml")
+def test_killed_run_goes_on_to_the_same_numbers(tmp_path: Path, whole: ToyStudy) -> None:
     script = tmp_path / "run.py"
-    script.write_text(KILLED.format(here=str(HERE), path=path, workers=workers))
+    script.write_text(KILLED.format(here=str(HERE), path=str(tmp_path / "study.toml")))
     ended = subprocess.run(
-        [sys.executable, str(script)], check=False, capture_output=True, text=True, timeout=60
+        [sys.executable, str(script)], check=False, capture_output=True, text=True, timeout=120
     )
-    if workers == 1:
-        assert ended.returncode == -9
-    else:  # it is the process of a job that was killed, twice
-        assert ended.returncode == 0, ended.stderr
-        (verdict,) = (v for v in of_tree(result(study(tmp_path))) if v.level == "wrong")
-        assert verdict.sentence == (
-            "factor = 1.5: toy was set aside: its process was ended by signal SIGKILL, as a rule for lack of memory, "
-            "twice at the same place. The same command goes on with it: give it more time or memory, or leave the case out."
-        )
+    assert ended.returncode == -9
     again = study(tmp_path)
     run_study(again)
+    same(result(again), result(whole))
+
+
+def test_job_that_kills_its_process_is_set_aside_and_taken_up_by_the_next_run(
+    tmp_path: Path, whole: ToyStudy
+) -> None:
+    poisoned = study(tmp_path, stop_at=2, how="kill", stop_in=0)
+    outcome = run_study(poisoned, shard=Shard(1, 1))
+    assert outcome.failed == 1
+    (verdict,) = (v for v in of_tree(result(poisoned)) if v.level == "wrong")
+    assert verdict.sentence == (
+        "factor = 1.5: toy was set aside: its process was ended by signal SIGKILL, as a rule for lack of memory, twice at the same "
+        "place. The same command goes on with it: give it more time or memory, or leave the case out."
+    )
+    assert conclusion(result(poisoned)).startswith("Not to be trusted as it stands: 1 of the jobs")
+    assert list(result(poisoned)["toy"].case_label.values) == ["factor = 2.5"]
+    again = study(tmp_path)
+    run_study(again)
+    assert again.built == [1.5]
     same(result(again), result(whole))
 
 
@@ -157,8 +165,13 @@ def interrupted_while_they_talk(heard: threading.Event) -> None:
     with executor("", 2) as hands:
         assert hands.cell is not None
         cell, here = hands.cell, (Limits(), hands.over.is_set)
+
+        def speak() -> None:
+            with cell() as own:
+                own.answer(talk, -1, *here)
+
         for _ in range(2):
-            hands.pool.submit(lambda: cell().answer(talk, -1, *here))
+            hands.pool.submit(speak)
         assert heard.wait(60)
         raise KeyboardInterrupt
 

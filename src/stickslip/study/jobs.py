@@ -6,7 +6,7 @@ import socket
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import monotonic
@@ -22,7 +22,7 @@ from stickslip.study.keep.folder import token_file
 from stickslip.study.keep.journal import JobJournal
 from stickslip.study.keep.progress import LOG, at_work
 from stickslip.study.keep.provenance import library_versions
-from stickslip.study.keep.workers import Hands, executor
+from stickslip.study.keep.workers import Hands
 from stickslip.study.outcome import ASIDE, CHECKED, UNSOLVED, checked
 
 NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
@@ -72,24 +72,22 @@ class Answer:
     error: Exception | None = None
 
 
-def worked(
-    orders: Sequence[Order], kind: str | Executor, workers: int, folder: Path, *, apart: bool
-) -> Generator[Path]:
+def worked(orders: Sequence[Order], hands: Hands, folder: Path) -> Generator[Path]:
     """Work jobs off, in their order; give the file of each when it is sealed.
 
     Parameters
     ----------
     orders
         The jobs.
-    kind, workers, apart
-        Where they run, see `executor`.
+    hands
+        What they are given to.
     folder
         Of the results.
     """
     left, running = deque(orders), dict[Future[Answer], Order]()
     lost: dict[Path, tuple[int, int]] = {}
     silent = monotonic()
-    with executor(kind, workers, apart=apart) as hands, _sender(hands, folder) as send:
+    with _sender(hands, folder) as send:
         try:
             while left or running:
                 while left and len(running) < hands.room:
@@ -106,6 +104,7 @@ def worked(
                     else:
                         left.append(order)
         finally:
+            hands.over.set()
             for future in running:
                 future.cancel()
 
@@ -200,8 +199,11 @@ def solve_job(asked: Analysis, job: Job, journal: JobJournal, checks: frozenset[
     journal.put(CHECKED, {"names": sorted(checks | checked(journal.get(CHECKED)))})
 
 
-def _watched_here(order: Order, cell: Callable[[], Cell], stopped: Callable[[], bool]) -> None:
-    watched(order, cell(), stopped, LOG.handle)
+def _watched_here(
+    order: Order, cell: Callable[[], AbstractContextManager[Cell]], stopped: Callable[[], bool]
+) -> None:
+    with cell() as own:
+        watched(order, own, stopped, LOG.handle)
 
 
 def watched(

@@ -1,6 +1,6 @@
 """What a run has found, put together: the only place that makes a result of what jobs have left."""
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from stickslip.study.models.measured import MeasuredPeaks
 
 # notes that the runner itself puts down
 UNSOLVED, ASIDE, CHECKED = "no solution", "set aside", "checks"
-NOT_SOLVED = {
+REMEDIES = {
     UNSOLVED: "Check what holds the parts, and the size of the loads.",
     ASIDE: "The same command goes on with it: give it more time or memory, or leave the case out.",
 }
@@ -90,6 +90,7 @@ class Book:
     origin: Provenance
     solved: dict[Path, tuple[list[Any], dict[str, dict[str, Any]]]] = field(default_factory=dict)
     nodes: dict[str, xr.Dataset] = field(default_factory=dict)
+    aside: dict[str, list[Verdict]] = field(default_factory=dict)
     told: set[str] = field(default_factory=set)
     measured: MeasuredPeaks | None = None
 
@@ -103,21 +104,28 @@ class Book:
                 self.enter(asked, [Solved(t.case, *self.solved[t.sealed]) for t in own])
 
     def enter(self, asked: Analysis, solved: Sequence[Solved]) -> None:
-        """Make the node of an analysis from what its cases have found."""
+        """Make the node of an analysis from what its cases have found; those set aside are told of alone."""
+        self.aside[asked.name] = [_unsolved(s, ASIDE) for s in solved if ASIDE in s.notes]
+        self._tell(self.aside[asked.name])
+        solved = [s for s in solved if ASIDE not in s.notes]
+        if not solved:
+            return
         node = asked.dataset(solved).assign(case_variables([s.case for s in solved]))
         if asked.name == "forced_response":
             node = with_regimes(with_measured(node, self.measured))
-        unsolved = [
-            _unsolved(s, *why) for s in solved for why in NOT_SOLVED.items() if why[0] in s.notes
-        ]
+        unsolved = [_unsolved(s, UNSOLVED) for s in solved if UNSOLVED in s.notes]
         found = (*unsolved, *asked.verdicts(node))
+        self._tell(found)
+        failed = int(node.attrs.get("failed", 0)) + len(unsolved)
+        own = {ATTRIBUTE: to_json(found), "failed": failed}
+        self.nodes[asked.name] = node.assign_attrs(own)
+
+    def _tell(self, found: Iterable[Verdict]) -> None:
+        """Tell verdicts that have not been told."""
         for verdict in found:
             if verdict.told and verdict.sentence not in self.told:
                 self.told.add(verdict.sentence)
                 tell(verdict.word, verdict.sentence)
-        failed = int(node.attrs.get("failed", 0)) + len(unsolved)
-        own = {ATTRIBUTE: to_json(found), "failed": failed}
-        self.nodes[asked.name] = node.assign_attrs(own)
 
     @property
     def _names(self) -> list[str]:
@@ -127,6 +135,9 @@ class Book:
     def tree(self, *, complete: bool) -> xr.DataTree:
         """Return the tree of all nodes, with what it comes from."""
         attributes = self.origin.attributes(complete=complete)
+        aside = [verdict for found in self.aside.values() for verdict in found]
+        if aside:
+            attributes[ATTRIBUTE] = to_json(aside)
         root = xr.Dataset(attrs=attributes)
         return xr.DataTree.from_dict({"/": root, **{n: self.nodes[n] for n in self._names}})
 
@@ -134,14 +145,20 @@ class Book:
         """Return what a run has found that has answered everything it was asked."""
         return Outcome(
             tree=self.tree(complete=True),
-            summaries={a.name: a.summary(self.nodes[a.name]) for a in asked},
-            failed=sum(int(self.nodes[a.name].attrs["failed"]) for a in asked),
+            summaries={
+                a.name: a.summary(self.nodes[a.name]) for a in asked if a.name in self.nodes
+            },
+            failed=sum(
+                int(self.nodes[a.name].attrs["failed"]) for a in asked if a.name in self.nodes
+            )
+            + sum(map(len, self.aside.values())),
             files=(),
         )
 
 
-def _unsolved(solved: Solved, note: str, remedy: str) -> Verdict:
-    return Verdict("wrong", solved.case.label, None, str(solved.notes[note]["text"]), remedy)
+def _unsolved(solved: Solved, note: str) -> Verdict:
+    why = str(solved.notes[note]["text"])
+    return Verdict("wrong", solved.case.label, None, why, REMEDIES[note])
 
 
 def case_variables(cases: Sequence[Case]) -> dict[str, Any]:

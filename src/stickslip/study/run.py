@@ -1,9 +1,9 @@
 """From a study to its results: every job of every analysis, each record safe on the disk. The only runner."""
 
 import json
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from hashlib import sha256
@@ -27,7 +27,7 @@ from stickslip.study.keep.progress import LOG, Interrupted, written_down
 from stickslip.study.keep.provenance import Provenance, library_versions
 from stickslip.study.keep.store import PartStore
 from stickslip.study.keep.whole import whole_file
-from stickslip.study.keep.workers import check_kind
+from stickslip.study.keep.workers import Hands, check_kind, executor
 from stickslip.study.models.study import Study
 from stickslip.study.outcome import Book, Outcome, Task
 from stickslip.study.shard import Shard
@@ -50,6 +50,10 @@ class Place:
     workers: int = 1
     kind: str | Executor = ""
     shard: Shard | None = None
+
+    def log(self, folder: Path) -> Path:
+        """Return the file of what the run says."""
+        return folder / (LOG_FILE if self.shard is None else self.shard.log)
 
     def check(self, *, fresh: bool) -> None:
         """Refuse what cannot be, before anything is computed."""
@@ -158,7 +162,7 @@ def _run(
 ) -> Outcome:
     origin = Provenance(study.title, study.text, library_versions())
     book = Book(origin, measured=study.measured)
-    store = PartStore(study.folder / PARTS, fresh=fresh)
+    store, target = PartStore(study.folder / PARTS, fresh=fresh), study.folder / RESULT
     cases = [replace(c, build=cache(c.build), store=store.kept) for c in study.cases()]
     tasks = _tasks(study, asked, cases, checks, book.origin.versions)
     # tasks whose numbers depend on the same things share a job; those not asked for are shown where they are finished
@@ -170,26 +174,27 @@ def _run(
         )
         to_do = [t for t in to_do if t.sealed in {o.sealed for o in own}]
     LOG.info(f"jobs to do: {len(to_do)}, answers: {len(tasks)}")
-    # all refusals come before any long computation, and before anything is given up
-    jobs = [_order(study, t, place) for t in to_do]
-    if not fresh:
-        _check_files(to_do)
-        if place.shard is None:
-            book.read(tasks, unfinished)
-    meshes = _meshes(t.case for t in to_do)
-    if fresh:
-        empty_folder(study.folder, [f"{name}.vtu" for name in meshes], store.written)
-    for name, mesh in meshes.items():
-        with whole_file(study.folder / f"{name}.vtu") as temporary:
-            write_mesh(mesh, temporary)
-    files = [study.folder / f"{name}.vtu" for name in meshes]
-    target = study.folder / RESULT
-    with closing(_worked(study, jobs, place)) as finished:
-        for sealed in finished:
-            del unfinished[sealed]
+    files: list[Path] = []
+    with _hands(to_do, place) as hands:
+        # all refusals come before any long computation, and before anything is given up
+        jobs = [_order(study, t, place) for t in to_do]
+        if not fresh:
+            _check_files(to_do)
             if place.shard is None:
                 book.read(tasks, unfinished)
-                write_tree(book.tree(complete=False), target)
+        meshes = _meshes(t.case for t in to_do)
+        if fresh:
+            empty_folder(study.folder, [f"{name}.vtu" for name in meshes], store.written)
+        for name, mesh in meshes.items():
+            files.append(study.folder / f"{name}.vtu")
+            with whole_file(files[-1]) as temporary:
+                write_mesh(mesh, temporary)
+        with closing(worked(jobs, hands, study.folder)) as finished:
+            for sealed in finished:
+                del unfinished[sealed]
+                if place.shard is None:
+                    book.read(tasks, unfinished)
+                    write_tree(book.tree(complete=False), target)
     if place.shard is not None:
         left = {t.sealed for t in tasks if t.analysis in asked and not t.ended()}
         if left:
@@ -199,8 +204,7 @@ def _run(
     book.read(tasks, unfinished)
     outcome = book.outcome(asked)
     write_tree(outcome.tree, target)
-    log = LOG_FILE if place.shard is None else place.shard.log
-    return replace(outcome, files=(target, *files, study.folder / log))
+    return replace(outcome, files=(target, *files, place.log(study.folder)))
 
 
 def _longest_first(tasks: Iterable[Task]) -> list[Task]:
@@ -208,21 +212,28 @@ def _longest_first(tasks: Iterable[Task]) -> list[Task]:
     return sorted(tasks, key=lambda t: (t.analysis.linear, -t.case.drive))
 
 
+def _limits(task: Task) -> Limits:
+    own = getattr(task.case.settings, "limits", None)
+    return Limits(*(getattr(own, name, None) or inf for name in ("job_s", "job_memory_gb")))
+
+
 def _order(study: Study, task: Task, place: Place) -> Order:
     """Return the job of a task, as it is given to whoever does it."""
-    own = getattr(task.case.settings, "limits", None)
-    limits = Limits(*(getattr(own, name, None) or inf for name in ("job_s", "job_memory_gb")))
-    with of_task(study, task.case):
-        check_memory_limit(limits)
     job = Job(_label(task.analysis, task.case), _inputs(study, task))
     owner = "" if place.shard is None else new_owner()
-    return Order(task.analysis, job, task.sealed, task.case.checks, limits, owner)
+    return Order(task.analysis, job, task.sealed, task.case.checks, _limits(task), owner)
 
 
-def _worked(study: Study, orders: Sequence[Order], place: Place) -> Generator[Path]:
-    """Work jobs off; those with limits, and those of a shard, in a process of their own even where it is one at a time."""
-    apart = place.shard is not None or any(order.limits for order in orders)
-    return worked(orders, place.kind, place.workers, study.folder, apart=apart)
+def _hands(tasks: Sequence[Task], place: Place) -> AbstractContextManager[Hands]:
+    """Return what jobs are given to; those with limits and those of a shard run in a process of their own even one at a time."""
+    limits = [_limits(task) for task in tasks]
+    for one in limits:
+        check_memory_limit(one)
+    if not tasks:
+        return executor("", 1)
+    workers = min(place.workers, len(tasks)) if not place.kind else place.workers
+    apart = place.workers > 1 or place.shard is not None or any(limits)
+    return executor(place.kind, workers, apart=apart)
 
 
 def _tasks(

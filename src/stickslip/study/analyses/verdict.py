@@ -149,7 +149,8 @@ def of_tree(tree: xr.DataTree) -> tuple[Verdict, ...]:
 
 def not_trusted(tree: xr.DataTree) -> str:
     """Say in a line which analyses, and which of their cases, are doubtful or wrong; empty where all are trusted."""
-    each = [INCOMPLETE] * _incomplete(tree)
+    aside = len(stored(tree.attrs))
+    each = [INCOMPLETE] * _incomplete(tree) + [f"{aside} of the jobs set aside"] * (aside > 0)
     each += [_not_trusted(str(name), node.to_dataset()) for name, node in tree.children.items()]
     told = "; ".join(text for text in each if text)
     return f"Not to be trusted as it stands: {told}. See the verdicts." if told else ""

@@ -11,6 +11,7 @@ import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib import import_module
 from importlib.util import find_spec
 from math import inf
 from multiprocessing.spawn import get_preparation_data, prepare
@@ -76,10 +77,12 @@ class Cell:
     ----------
     threads
         Environment variables that say how many threads BLAS takes; those left out are not set there.
+    modules
+        What it imports at its start.
     """
 
-    def __init__(self, threads: dict[str, str]) -> None:
-        self._threads = threads
+    def __init__(self, threads: dict[str, str], modules: tuple[str, ...] = ()) -> None:
+        self._threads, self._modules = threads, modules
         self._process: subprocess.Popen[bytes] | None = None
         self._said: SimpleQueue[tuple[str, Any]] = SimpleQueue()
 
@@ -98,7 +101,7 @@ class Cell:
         Ended
             If the process has ended before, by itself or by the limits.
         """
-        process = self._started()
+        process = self.started()
         _send(process.stdin, pickle.dumps((work, given)))
         began = looked = monotonic()
         while True:
@@ -146,7 +149,8 @@ class Cell:
             self.close()
             raise Ended(f"took {taken:.2f} GB of memory, the limit of a job is {limits.memory_gb:g} GB")  # fmt: skip
 
-    def _started(self) -> subprocess.Popen[bytes]:
+    def started(self) -> subprocess.Popen[bytes]:
+        """Return the process, which is started where there is none; it may be given work before it is ready."""
         if self._process is not None and self._process.poll() is None:
             return self._process
         self.close()
@@ -163,7 +167,7 @@ class Cell:
         # what multiprocessing tells a new process: with the user's script imported, classes of it are known there
         told = get_preparation_data("stickslip")
         told.pop("authkey", None)
-        _send(self._process.stdin, pickle.dumps(told))
+        _send(self._process.stdin, pickle.dumps((told, self._modules)))
         return self._process
 
 
@@ -237,7 +241,7 @@ def serve() -> None:
     LOG.addHandler(_Lines(say))
     LOG.setLevel(logging.INFO)
     LOG.propagate = False
-    trouble = _prepared(pickle.loads(heard.get()))
+    trouble = _prepared(*pickle.loads(heard.get()))
     while True:
         message = heard.get()
         if trouble is not None:
@@ -252,10 +256,12 @@ def serve() -> None:
         say(*answer)
 
 
-def _prepared(told: dict[str, Any]) -> StickslipError | None:
-    """Prepare this process as multiprocessing does: search path, folder, the user's script."""
+def _prepared(told: dict[str, Any], modules: tuple[str, ...]) -> StickslipError | None:
+    """Prepare this process as multiprocessing does, with search path, folder and the user's script; import modules."""
     try:
         prepare(told)
+        for name in modules:
+            import_module(name)
     except BaseException as error:  # noqa: BLE001  the script may do anything
         return StickslipError(
             f"a worker process cannot import {told.get('init_main_from_path', 'the script')} ({error}). Put what it does below "

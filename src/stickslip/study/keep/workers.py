@@ -10,9 +10,10 @@ import socket
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from importlib.util import find_spec
+from queue import SimpleQueue
 from typing import Any, TypeVar
 
 from stickslip.errors import StickslipError, did_you_mean, input_error, missing_package
@@ -22,6 +23,7 @@ from stickslip.study.keep.threads import one_blas_thread
 T = TypeVar("T")
 
 LOOPBACK = "127.0.0.1"
+WARM = ("stickslip.study.jobs",)  # what a process for jobs imports while models are built
 ALL = 1_000_000  # jobs at a time, where the other side puts them into a queue
 PATIENCE = 15  # seconds for a scheduler to answer, and for its first worker
 
@@ -48,7 +50,7 @@ class Hands:
     room
         Jobs that it is given at a time.
     cell
-        Returns the process that the calling thread lets jobs run in; None: they run where they are submitted to.
+        Lends a process for a job to run in; None: it runs where it is submitted to.
     far
         Whether jobs may run on other machines, and what they say comes back when they have ended.
     over
@@ -59,7 +61,7 @@ class Hands:
 
     pool: Executor
     room: int
-    cell: Callable[[], Cell] | None = None
+    cell: Callable[[], AbstractContextManager[Cell]] | None = None
     far: bool = False
     over: threading.Event = field(default_factory=threading.Event)
     trouble: Callable[[], str] = str
@@ -73,18 +75,23 @@ def here() -> Iterator[Hands]:
 
 @contextmanager
 def cells(workers: int) -> Iterator[Hands]:
-    """Give processes of this machine; they end with the block, and with this process however it ends."""
+    """Give processes of this machine, which begin at once; they end with the block, and with this process however it ends."""
     one_blas_thread()  # the processes inherit it
-    made: list[Cell] = []
-    own, over = threading.local(), threading.Event()
+    made = [Cell(blas_threads(), WARM) for _ in range(workers)]
+    free: SimpleQueue[Cell] = SimpleQueue()
+    for one in made:
+        one.started()
+        free.put(one)
 
-    def cell() -> Cell:
-        if not hasattr(own, "cell"):
-            own.cell = Cell(blas_threads())
-            made.append(own.cell)
-        found: Cell = own.cell
-        return found
+    @contextmanager
+    def cell() -> Iterator[Cell]:
+        own = free.get()
+        try:
+            yield own
+        finally:
+            free.put(own)
 
+    over = threading.Event()
     pool = ThreadPoolExecutor(workers)
     try:
         yield Hands(pool, workers, cell, over=over)
@@ -131,8 +138,10 @@ def dask(address: str) -> Iterator[Hands]:
 def single_node(workers: int) -> Iterator[Hands]:
     """Give processes of this machine that executorlib starts."""
     made = _imported("executorlib", "executorlib").SingleNodeExecutor
-    with _bound(LOOPBACK), _far(made(max_workers=workers, hostname_localhost=True), workers) as h:
-        yield h
+    with _bound(LOOPBACK):
+        pool = made(max_workers=workers, hostname_localhost=True, disable_dependencies=True)
+        with _far(pool, workers) as hands:
+            yield hands
 
 
 @contextmanager
@@ -148,7 +157,7 @@ def allocated(kind: str, address: str, workers: int) -> Iterator[Hands]:
         made, more = library.FluxJobExecutor, {}
     near = not address
     with _bound(address or LOOPBACK):
-        pool = made(max_workers=workers, hostname_localhost=near, **more)
+        pool = made(max_workers=workers, hostname_localhost=near, disable_dependencies=True, **more)
         with _far(pool, workers) as hands:
             yield hands
 
