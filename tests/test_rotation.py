@@ -306,7 +306,9 @@ def test_turned_and_mirrored_solids_have_the_same_frequencies(mirror):
     np.testing.assert_allclose(
         natural_frequencies(second, 6), natural_frequencies(first, 6), rtol=1e-9
     )
-    everywhere = scipy.sparse.block_diag([turn] * (first.n // 3), format="csr")
+    everywhere = scipy.sparse.block_diag(
+        [scipy.sparse.csr_array(turn)] * (first.n // 3), format="csr"
+    )
     for name in ("mass", "damping", "stiffness"):
         a, b = getattr(first, name), getattr(second, name)
         assert relative(dense(everywhere.T @ b @ everywhere), dense(a)) < 1e-11

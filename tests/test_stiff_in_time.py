@@ -132,15 +132,16 @@ def stop(k: float, steps: int) -> ShootingResult:
 
 @pytest.mark.parametrize("k", [1e2, 1e3])
 def test_the_error_of_the_step_is_known(k: float) -> None:
-    # a mass that hits a stop, whose stiffness the steps follow well, hardly or not at all
+    # a mass that hits a stop, whose stiffness the steps follow well, hardly or not at all; with 64 steps it depends on rounding, and
+    # so on the versions of NumPy, whether the motion of the stiffest becomes periodic
     exact = stop(k, 8192).harmonics[1:]
     statuses = []
-    for steps in (64, 256, 1024):
+    for steps in (80, 256, 1024):
         found = stop(k, steps)
         error = np.max(np.abs(found.harmonics[1:] - exact)) / np.max(np.abs(exact))
         statuses.append(found.status)
         assert found.converged == (found.step_error <= 0.01)
-        if steps > 64:
+        if steps > 80:
             assert found.step_error == pytest.approx(error, rel=0.6)
     assert statuses[:2] == ["coarse", "coarse"]
     assert statuses[2] == ("converged" if k == 1e2 else "coarse")
