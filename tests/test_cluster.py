@@ -121,7 +121,11 @@ def dask_cluster(folder: Path) -> Iterator[tuple[str, list[int]]]:
             for process in processes:
                 process.terminate()
             for process in processes:
-                process.wait(60)
+                try:
+                    process.wait(30)
+                except subprocess.TimeoutExpired:
+                    process.kill()  # its worker ends with it
+                    process.wait()
 
 
 def kill_workers(nannies: list[int], killed: list[int], over: threading.Event) -> None:

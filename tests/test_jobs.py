@@ -1,6 +1,5 @@
 """Jobs that run apart: limits, deaths, shards, files that several processes write, and what cannot be asked for."""
 
-import logging
 import shutil
 import signal
 import time
@@ -233,25 +232,34 @@ def test_machine_that_would_give_other_numbers_is_refused(tmp_path: Path) -> Non
 
 
 class Losing:
-    """An executor whose workers are lost with every job."""
+    """An executor whose workers are lost with every job, after they have begun it or before."""
 
-    def submit(self, fn, *args):
+    def __init__(self, *, begun: bool) -> None:
+        self.begun, self.given = begun, 0
+
+    def submit(self, fn, order, *others):
+        self.given += 1
         future = jobs.Future()
         future.set_exception(OSError("the machine is gone"))
+        if self.begun:
+            with JobJournal(file_at_work(order.sealed, str(self.given)), order.analysis.record):
+                pass
         return future
 
 
-def test_job_whose_workers_are_lost_stops_no_other(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:  # fmt: skip
-    with caplog.at_level(logging.INFO, "stickslip"):
-        made = order(tmp_path), order(tmp_path, 1)
-        for own in made:
-            jobs.set_aside(own, "for the sake of its notes")
-        with executor(Losing(), 1) as hands:  # type: ignore[arg-type]
-            ended = list(jobs.worked(made, hands, tmp_path))
+@pytest.mark.parametrize(("begun", "given"), [(True, 3), (False, 30)])
+def test_job_whose_workers_are_lost_stops_no_other(tmp_path: Path, *, begun: bool, given: int) -> None:  # fmt: skip
+    made = order(tmp_path), order(tmp_path, 1)
+    losing = Losing(begun=begun)
+    with executor(losing, 1) as hands:  # type: ignore[arg-type]
+        ended = list(jobs.worked(made, hands, tmp_path))
     assert sorted(ended) == [own.sealed for own in made]
-    assert caplog.text.count("it is given to another") == 4
-    notes = read_sealed(made[0].sealed, made[0].analysis.record)[1]
-    assert notes["set aside"]["text"].startswith("toy was set aside: 3 workers were lost with it at the same place (OSError")  # fmt: skip
+    assert losing.given == 2 * given
+    for own in made:
+        why = read_sealed(own.sealed, own.analysis.record)[1]["set aside"]["text"]
+        assert why == (
+            f"toy was set aside: {given} workers were lost with it at the same place (OSError: the machine is gone)"
+        )
 
 
 def test_one_process_and_none_of_its_own_by_default() -> None:

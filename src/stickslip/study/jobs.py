@@ -28,6 +28,7 @@ from stickslip.study.outcome import ASIDE, CHECKED, UNSOLVED, checked
 NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
 TWICE = 2  # deaths of a job's process at the same place, after which it is set aside
 LOST = 3  # workers lost at the same place: they may be lost for reasons of their own
+EARLY = 30  # and before they had begun, which is hardly the job's fault
 LOOK = 5.0  # seconds between two looks whether anything may be going on
 SILENCE = 60.0  # seconds that it may not
 ON = 1.0  # seconds between two looks whether the run is still on
@@ -72,6 +73,37 @@ class Answer:
     error: Exception | None = None
 
 
+@dataclass
+class Loss:
+    """Workers that were lost with a job since it last went on.
+
+    Parameters
+    ----------
+    begun
+        Those that had opened a file for it.
+    early
+        Those that had not.
+    size, files
+        Of what they have left.
+    """
+
+    begun: int = 0
+    early: int = 0
+    size: int = 0
+    files: int = 0
+
+    def count(self, left: Sequence[Path]) -> None:
+        """Count one more."""
+        size, files = max((p.stat().st_size for p in left), default=0), len(left)
+        if size > self.size > 0:
+            self.begun = self.early = 0
+        if files > self.files:
+            self.begun += 1
+        else:
+            self.early += 1
+        self.size, self.files = size, files
+
+
 def worked(orders: Sequence[Order], hands: Hands, folder: Path) -> Generator[Path]:
     """Work jobs off, in their order; give the file of each when it is sealed.
 
@@ -85,7 +117,7 @@ def worked(orders: Sequence[Order], hands: Hands, folder: Path) -> Generator[Pat
         Of the results.
     """
     left, running = deque(orders), dict[Future[Answer], Order]()
-    lost: dict[Path, tuple[int, int]] = {}
+    lost: dict[Path, Loss] = {}
     silent = monotonic()
     with _sender(hands, folder) as send:
         try:
@@ -136,9 +168,7 @@ def _gone(why: str) -> StickslipError:
     )
 
 
-def _ended(
-    future: Future[Any], order: Order, lost: dict[Path, tuple[int, int]], *, far: bool
-) -> bool:
+def _ended(future: Future[Any], order: Order, lost: dict[Path, Loss], *, far: bool) -> bool:
     """Raise what a job raised, and hand on what it said; say whether it has ended, which one whose worker was lost has not."""
     if not far:
         future.result()
@@ -152,18 +182,16 @@ def _ended(
             "installed where workers run."
         ) from error
     except Exception as error:  # noqa: BLE001  each library has its own for a worker that is lost
-        far_size = max((p.stat().st_size for p in left_behind(order.sealed)), default=0)
-        count, size = lost.get(order.sealed, (0, -1))
-        count = count + 1 if size == far_size else 1
-        lost[order.sealed] = count, far_size
-        if count < LOST:
+        loss = lost.setdefault(order.sealed, Loss())
+        loss.count(left_behind(order.sealed))
+        if loss.begun < LOST and loss.early < EARLY:
             LOG.info(
                 f"{label}: its worker was lost ({type(error).__name__}); it is given to another"
             )
             return False
         own = replace(order, owner=new_owner())
         begin(own.sealed, own.file, own.analysis.record)
-        set_aside(own, f"{count} workers were lost with it at the same place ({type(error).__name__}: {error})")  # fmt: skip
+        set_aside(own, f"{loss.begun + loss.early} workers were lost with it at the same place ({type(error).__name__}: {error})")  # fmt: skip
         return True
     for line in answer.lines:
         LOG.handle(logging.makeLogRecord(line))
