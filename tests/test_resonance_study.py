@@ -115,7 +115,7 @@ def test_the_example_of_two_peaks_tells_where_one_overtakes_the_other(tmp_path: 
     assert amplitude[-1] == pytest.approx(float(np.nanmax(case["amplitude"].values[:, 2])), rel=1e-5)  # fmt: skip
     view = Peaks(case)
     assert "Overtaken: peak 1 by peak 2 at 67" in amplitudes(view).caption
-    assert "mm" in peak_table(view)
+    assert "mm" in str(peak_table(view))
 
 
 def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
