@@ -1,28 +1,24 @@
 """The commands. Everything heavy is imported inside them, so that ``--help`` is quick."""
 
 import os
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from stickslip import __version__
-from stickslip.errors import InputError, StickslipError, input_error, printable
+from stickslip.errors import InputError, StickslipError, input_error
 from stickslip.front.output import TRACEBACK, output_that_may_fail, unforeseen
+from stickslip.front.printed import console, say, say_columns, say_lines, say_table
 from stickslip.front.reading import read
 from stickslip.front.screen import Screen, on_screen
 
 if TYPE_CHECKING:
     from stickslip.front.result import Result
-    from stickslip.front.table import Table as Columns
-    from stickslip.study.analyses.analysis import TextTable
 
-PLAIN_WIDTH = 130  # columns of a table that is not on a terminal
+FILES_TOLD = 4  # of an export
 DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 app = typer.Typer(
@@ -106,7 +102,7 @@ def run(
 ) -> None:
     """Answer the questions of a study; an interrupted run goes on where it stopped."""
     with _errors_as_text():
-        with on_screen(Screen(_console(), workers, warnings=False)):
+        with on_screen(Screen(console(), workers, warnings=False)):
             result = read(study).run(
                 workers=workers,
                 only=only or (),
@@ -127,11 +123,11 @@ def run(
 def check(study: StudyFile) -> None:
     """Do everything but the computation: read, mesh, reduce, find the static state and the natural frequencies."""
     with _errors_as_text():
-        with on_screen(Screen(_console(), warnings=False)):
+        with on_screen(Screen(console(), warnings=False)):
             warnings = read(study).check()
         for text in warnings:
-            _say(f"WARNING: {text}")
-        _say(f"{study}: good to run")
+            say(f"WARNING: {text}")
+        say(f"{study}: good to run")
 
 
 @app.command()
@@ -172,6 +168,39 @@ def report(
 
 
 @app.command()
+def export(
+    result: Annotated[
+        Path, typer.Argument(metavar="RESULT", help="A result's file, or the folder that holds it.")
+    ],
+    *,
+    to: Annotated[
+        Literal["vtu", "frd", "uff"],
+        typer.Option(help="vtu: ParaView; frd: CalculiX's viewer; uff: test software."),
+    ] = "vtu",
+    case: Annotated[int, typer.Option(min=0, help="Which case of \\[vary], from 0.")] = 0,
+    hz: Annotated[
+        float | None, typer.Option(help="The point nearest to this frequency; left out: the peak.")
+    ] = None,
+    steps: Annotated[int, typer.Option(min=1, max=1000, help="Instants of the period (vtu).")] = 24,
+    wheel: Annotated[bool, typer.Option("--wheel", help="Write all sectors, not one.")] = False,
+    out: Annotated[Path | None, typer.Option(help="The folder; left out: beside the file.")] = None,
+    units: Annotated[str, typer.Option(help="Unit system of an frd file, such as mm-t-s.")] = "SI",
+    of: Annotated[
+        Path | None, typer.Option(help="Folder of the study, where the result was moved away.")
+    ] = None,
+) -> None:
+    """Write how every node and contact moves at the peak, for ParaView and other programs."""
+    with _errors_as_text():
+        from stickslip.front.result import Result
+
+        files = Result.open(result).export(
+            to, out, case=case, hz=hz, steps=steps, wheel=wheel, units=units, of=of
+        )
+        more = f"and {len(files) - FILES_TOLD} more" if len(files) > FILES_TOLD else ""
+        say_lines("Files", [*map(str, files[:FILES_TOLD]), *filter(None, [more])])
+
+
+@app.command()
 def compare(
     compared: Annotated[
         list[Path],
@@ -196,8 +225,9 @@ def compare(
 
         found = compared_designs(*compared, names=name or ())
         for title, table in (("Peaks", found.peaks), ("What differs", found.inputs)):
-            _print_columns(title, table)
-        _print_lines("Files", [str(found.report(page))])
+            if len(table):
+                say_columns(title, table, table.rows())
+        say_lines("Files", [str(found.report(page))])
 
 
 @app.command()
@@ -218,10 +248,10 @@ def inspect(
     with _errors_as_text():
         from stickslip.study.inspect_file import inspect_file
 
-        with on_screen(Screen(_console())):
+        with on_screen(Screen(console())):
             lines = inspect_file(file, units, frequencies, mesh)
         for line in lines:
-            _say(line)
+            say(line)
 
 
 @app.command()
@@ -259,7 +289,7 @@ def fit(
     with _errors_as_text():
         from stickslip.study.fit_file import estimates, fit_file, study_lines
 
-        with on_screen(Screen(_console())):
+        with on_screen(Screen(console())):
             found = fit_file(
                 loops,
                 normal_load=normal_load,
@@ -274,12 +304,12 @@ def fit(
         told, lines = estimates(found), study_lines(found)
         write_loop_page(found, loops, target, told, lines)
         for line in told:
-            _say(line)
-        _print_lines(
+            say(line)
+        say_lines(
             "What the loops cannot tell, and what is doubtful", [f"{n}." for n in found.notes]
         )
-        _print_lines("For the table of a contact in the study file", lines)
-        _print_lines("Files", [str(target)])
+        say_lines("For the table of a contact in the study file", lines)
+        say_lines("Files", [str(target)])
 
 
 @app.command(name="compile")
@@ -291,7 +321,7 @@ def compile_() -> None:
 
         one_blas_thread()
         for done in compile_ahead(os.cpu_count() or 1):
-            _say(f"compiled: {done}")
+            say(f"compiled: {done}")
 
 
 @app.command()
@@ -326,58 +356,17 @@ def _code(error: StickslipError) -> int:
     return BAD_INPUT if isinstance(error, InputError) else NOT_CONVERGED
 
 
-def _console() -> Console:
-    """Return the screen, or a wide page where the output goes to a file."""
-    return Console(width=None if sys.stdout.isatty() else PLAIN_WIDTH)
-
-
-def _say(text: str) -> None:
-    _console().print(printable(text), markup=False, highlight=False, soft_wrap=True)
-
-
 def _print_result(result: "Result", files: Sequence[Path]) -> None:
     """Print the tables of all analyses, the verdicts, which files there are, and last whether to trust it."""
     from stickslip.study.analyses.verdict import worst_first
 
     for table in (t for tables in result.summaries.values() for t in tables):
-        _print_table(table)
-    _print_lines("Verdicts", [str(v) for v in worst_first(result.verdicts)])
+        say_table(table.title, table.head, table.rows, table.lines)
+    say_lines("Verdicts", [str(v) for v in worst_first(result.verdicts)])
     if result.failed:
         told = (
             f"{result.failed} of the points: marked in the result and in the report, not filled in"
         )
-        _print_lines("Not converged", [told])
-    _print_lines("Files", [str(f) for f in files])
-    _say(f"\n{result.conclusion}")
-
-
-def _print_table(found: "TextTable") -> None:
-    if not found.rows:
-        _print_lines(found.title, found.lines)
-        return
-    _say(f"\n{found.title}")
-    table = Table()
-    told = [k for k in range(len(found.head)) if any(row[k] for row in found.rows)]
-    for name in (found.head[k] for k in told):
-        table.add_column(name, justify="right")
-    for cells in found.rows:
-        table.add_row(*(cells[k] for k in told))
-    _console().print(table)
-    for line in found.lines:
-        _say(f"  {line}")
-
-
-def _print_columns(title: str, found: "Columns") -> None:
-    if len(found):
-        _say(f"\n{title}")
-        table = Table()
-        for name in found:
-            table.add_column(name, overflow="fold")
-        for cells in found.rows():
-            table.add_row(*(printable(cell) for cell in cells))
-        _console().print(table)
-
-
-def _print_lines(title: str, texts: Sequence[str]) -> None:
-    for text in [f"\n{title}", *(f"  {text}" for text in texts)] if texts else []:
-        _say(text)
+        say_lines("Not converged", [told])
+    say_lines("Files", [str(f) for f in files])
+    say(f"\n{result.conclusion}")

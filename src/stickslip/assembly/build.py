@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
-from stickslip.assembly.asked import asked, centrifugal_of_bodies, excitation, static_forces
+from stickslip.assembly.asked import Asked, asked, centrifugal_of_bodies, excitation, static_forces
 from stickslip.assembly.assembled import Assembled, ContactTable, Frequencies
 from stickslip.assembly.coordinates import coordinates
 from stickslip.assembly.flow import about_static_state, fluid_of
@@ -62,6 +62,8 @@ class Linear:
         parts.
     field
         From the name of a load of `Model.spread` and a harmonic to the load on the coordinates; None where there is none.
+    expand
+        From coordinates and a harmonic to all dofs of all parts; only where `with_ways_back` was the store.
     """
 
     side: LinearSide
@@ -71,6 +73,7 @@ class Linear:
     load: Any
     of_wave: Any
     field: Any = None
+    expand: Any = None
 
 
 def assemble(
@@ -88,16 +91,7 @@ def assemble(
     order = what.order if wave_number is None else wave_number
     more = range(model.sectors) if every_wave else ()
     linear = linear_side(model, order or 0, harmonics, what.kept, what.stay, store, more)
-    refuse_mixed_gaps(model, linear.gaps)
-    system = System(
-        linear.side,
-        Interface(model.pairs.names, model.pairs.laws, linear.gaps),
-        linear.of_dofs(labels.dofs, "output.points"),
-        alert_dofs=linear.of_dofs(what.watched, "alert_over"),
-        free=free_coordinates(model, linear),
-    )
-    held = system.with_retention(model.retention)
-    load = about_static_state(held, loads_on(model, linear, what.forces), fluid_of(linear.side))
+    system, held, load = system_of(model, linear, what)
     gap, force = static_state(held, load.static)
     pressed = pressed_by(system.springs.laws, force)
     stiffness = system.springs.stuck_stiffness()
@@ -130,6 +124,21 @@ def assemble(
         warnings=(*model.warnings, *held_warnings(model, pressed), *compared.warnings()),
         orders=what.orders,
     )
+
+
+def system_of(model: Model, linear: Linear, what: Asked) -> tuple[System, System, HarmonicLoad]:
+    """Return the system without and with the retention, and the loads on it."""
+    refuse_mixed_gaps(model, linear.gaps)
+    system = System(
+        linear.side,
+        Interface(model.pairs.names, model.pairs.laws, linear.gaps),
+        linear.of_dofs(what.labels.dofs, "output.points"),
+        alert_dofs=linear.of_dofs(what.watched, "alert_over"),
+        free=free_coordinates(model, linear),
+    )
+    held = system.with_retention(model.retention)
+    load = about_static_state(held, loads_on(model, linear, what.forces), fluid_of(linear.side))
+    return system, held, load
 
 
 def linear_side(
@@ -191,7 +200,10 @@ def linear_side(
         number = excited_wave(order, model.sectors, harmonic)
         return found.field(model.spread.index(name), number)
 
-    return Linear(found.wheel, found.gaps, found.steady, of_dofs, load, of_wave, field)
+    def expand(q: Matrix, harmonic: int) -> Matrix:
+        return at.untied(found.expand(q, excited_wave(order, model.sectors, harmonic)))
+
+    return Linear(found.wheel, found.gaps, found.steady, of_dofs, load, of_wave, field, expand)
 
 
 def physical(model: Model, kept: IntArray) -> tuple[IntArray, IntArray]:
@@ -234,7 +246,15 @@ def _of_one(model: Model, dofs: tuple[IntArray, IntArray, IntArray], store: Stor
     def of_wave(_number: int) -> tuple[Structure, Matrix, Any]:
         return structure, gaps, lambda dofs: of_dofs(dofs, "part")
 
-    return Linear(structure, gaps, found.load(few.load(steady)), of_dofs, load, of_wave)
+    def expand(q: Matrix, _harmonic: int) -> Matrix:
+        own = q if found.place is None else structure.expand(q)
+        own = at.untied(own if few.way is None else few.way @ own)
+        sizes = np.cumsum([part.structure.n for part in parts.values()])[:-1]
+        each = zip(parts.values(), np.split(own, sizes), strict=True)
+        return np.concatenate([part.structure.expand(piece) for part, piece in each])
+
+    steady = found.load(few.load(steady))
+    return Linear(structure, gaps, steady, of_dofs, load, of_wave, expand=expand)
 
 
 def free_coordinates(model: Model, linear: Linear) -> IntArray | None:

@@ -56,6 +56,10 @@ class Coordinates:
         own = scipy.sparse.csr_array(entries, shape=(operator.shape[0], self.ids.size))
         return own if self.tie is None else scipy.sparse.csr_array(own @ self.tie)
 
+    def untied(self, q: Matrix) -> Matrix:
+        """Return the untied coordinates (n0,) from those that stay."""
+        return q if self.tie is None else np.asarray(self.tie @ q)
+
     def load(self, untied: Matrix) -> Matrix:
         """Return a load (n0,) on the untied coordinates as one on those that stay."""
         return untied if self.tie is None else np.asarray(self.tie.T @ untied)

@@ -96,7 +96,7 @@ class ReducedPart:
     Parameters
     ----------
     structure
-        Kept dofs, then modal coordinates; without the way back.
+        Kept dofs, then modal coordinates; without the way back unless `with_ways_back` asks for it.
     kept
         (k,) dofs of the part that the first coordinates are.
     steady
@@ -110,6 +110,11 @@ class ReducedPart:
 
 def in_memory(_content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
     """Keep nothing: the store of a model that no study has."""
+    return make()
+
+
+def with_ways_back(_content: str, make: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
+    """Keep nothing either: the store that asks reductions for their way back to all dofs."""
     return make()
 
 
@@ -211,13 +216,15 @@ def _reduced(
     changes = part.solid is not None or part.body is not None
     spin, rest = turning if changes else (Spin(), ALONE)
     shared = None if rest.unit is None else rest.unit.tobytes()
-    key = (spin, shared, kept.tobytes())
+    whole = store is with_ways_back
+    key = (spin, shared, kept.tobytes(), whole)
     if key not in part.memo:
 
         def make() -> ReducedPart:
-            return _reduce(name, part, kept, spin, rest)
+            made = _reduce(name, part, kept, spin, rest)
+            return made if whole else replace(made, structure=replace(made.structure, basis=None))
 
-        if part.reduction is None or part.body is not None:
+        if part.reduction is None or part.body is not None or whole:
             made = make()
         else:
             content = _content(part, spin, rest, kept)
@@ -260,7 +267,7 @@ def _reduce(name: str, part: Part, kept: IntArray, spin: Spin, rest: Steady) -> 
         raise error.inside(f"part.{name}") from None
     except SingularError as error:
         raise SingularError(f"part.{name}: {error}") from None
-    return ReducedPart(replace(small, basis=None), kept, np.asarray(small.project(steady)))
+    return ReducedPart(small, kept, np.asarray(small.project(steady)))
 
 
 def _placed(made: ReducedPart, part: Part) -> ReducedPart:
@@ -268,6 +275,10 @@ def _placed(made: ReducedPart, part: Part) -> ReducedPart:
     assert part.place is not None
     structure = turned_structure(made.structure, part.place)
     turn = turned_dofs(made.structure.dofs, part.place)
+    if made.structure.basis is not None:
+        assert part.template is not None
+        whole = turned_dofs(part.template.structure.dofs, part.place)
+        structure = replace(structure, basis=whole @ made.structure.basis @ turn.T)
     return ReducedPart(structure, made.kept, np.asarray(turn @ made.steady))
 
 

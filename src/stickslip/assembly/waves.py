@@ -22,6 +22,7 @@ from stickslip.assembly.reduced import (
     packed,
     steady_load,
     unpacked,
+    with_ways_back,
 )
 from stickslip.assembly.wave_damping import DampingOfParts
 from stickslip.assembly.wheel import (
@@ -99,6 +100,8 @@ class SectorWaves:
         Wave number -> aerodynamic force on it, which the structures do not hold; empty: none.
     fields
         Wave number -> (n, l) loads of `Model.spread`.
+    bases
+        Wave number -> (n_sector, n) way back to the sector's dofs; None unless `with_ways_back` asks for it.
     """
 
     sector: CyclicSector
@@ -106,11 +109,12 @@ class SectorWaves:
     waves: Mapping[int, tuple[Structure, Matrix]]
     forces: Mapping[int, Feedback] = field(default_factory=dict)
     fields: Mapping[int, Matrix] = field(default_factory=dict)
+    bases: Mapping[int, Matrix] = field(default_factory=dict)
 
     def with_forces(self, found: ReducedSector) -> ReducedSector:
         """Return the waves in other coordinates with the aerodynamic forces and the pressure fields on them."""
         spread = {k: found.ways[k].conj().T @ own for k, own in self.fields.items()}
-        found = replace(found, fields=spread)
+        found = replace(found, fields=spread, bases=self.bases)
         if not self.forces:
             return found
         forces = {k: own.in_coordinates(found.ways[k]) for k, own in self.forces.items()}
@@ -175,12 +179,9 @@ def sector_waves(
     def made(k: int, reduction: Reduction | None) -> tuple[Structure, Matrix]:
         columns, more = _columns(at, loads, flow, spread, k)
         key = f"{content} {reduction} {k}{more}"
-        if key not in memo:
-            how, known = (reduction, damping), partial(others, k, reduction)
-            memo[key] = _kept(sector, kept, k, how, columns, (key, store), known)
-            forget(memo, tuple, REMEMBERED)
-        found: tuple[Structure, Matrix] = memo[key]
-        return found
+        how, known = (reduction, damping), partial(others, k, reduction)
+        make = partial(_kept, sector, kept, k, how, columns, (key, store), known)
+        return _remembered(memo, key, store, make)
 
     def wave(k: int, reduction: Reduction | None) -> tuple[Structure, Matrix]:
         if 2 * k <= sector.sectors or not mirrored:
@@ -194,7 +195,23 @@ def sector_waves(
         # all waves have the coordinates of the one that needs most
         alike = replace(reduction, n_modes=most - kept.size)
         waves = {k: wave(k, alike) for k in numbers}
-    return SectorWaves(sector, kept, *_parted(waves, flow, spread.shape[1], alone=loads.ndim == 1))
+    bases = {k: own.basis for k, (own, _) in waves.items()}
+    waves = {k: (replace(own, basis=None), load) for k, (own, load) in waves.items()}
+    parted = _parted(waves, flow, spread.shape[1], alone=loads.ndim == 1)
+    return SectorWaves(sector, kept, *parted, bases)
+
+
+def _remembered(
+    memo: dict[Any, Any], key: str, store: Store, make: Callable[[], tuple[Structure, Matrix]]
+) -> tuple[Structure, Matrix]:
+    """Return a wave, from memory where it is there; ways back are large, and not remembered."""
+    if store is with_ways_back:
+        return make()
+    if key not in memo:
+        memo[key] = make()
+        forget(memo, tuple, REMEMBERED)
+    found: tuple[Structure, Matrix] = memo[key]
+    return found
 
 
 def _spread(model: Model) -> FloatArray:
@@ -332,11 +349,13 @@ def _kept(
 ) -> tuple[Structure, Matrix]:
     def make() -> tuple[Structure, Matrix]:
         try:
-            return reduced_wave(sector, kept, k, how, steady, others())
+            made = reduced_wave(sector, kept, k, how, steady, others())
         except InputError as error:
             raise error.inside(f"wave {k}") from None
+        whole = where[1] is with_ways_back
+        return made if whole else (replace(made[0], basis=None), made[1])
 
-    if how[0] is None:
+    if how[0] is None or where[1] is with_ways_back:
         return make()
     values = where[1](where[0], lambda: packed(*make()))
     return unpacked(values, sector.structure, kept)

@@ -230,6 +230,8 @@ class ReducedSector:
         (n,) load of steady rotation.
     fields
         Wave number -> (n, l) loads of `Model.spread` on its coordinates; empty: there are none.
+    bases
+        Wave number -> way back, as of `SectorWaves`.
     """
 
     sector: CyclicSector
@@ -240,6 +242,12 @@ class ReducedSector:
     gaps: Matrix
     steady: FloatArray
     fields: Mapping[int, Matrix] = field(default_factory=dict)
+    bases: Mapping[int, Matrix] = field(default_factory=dict)
+
+    def expand(self, q: Matrix, wave_number: int) -> Matrix:
+        """Return the motion (n_sector,) of all dofs of the sector from coordinates of a wave of which there is the way back."""
+        k = wave_number % self.sector.sectors
+        return np.asarray(self.bases[k] @ (self.ways[k] @ q))
 
     def field(self, index: int, wave_number: int) -> Matrix:
         """Return the (n,) load on the coordinates of a wave of one that was projected with it."""
@@ -288,14 +296,14 @@ def reduced_wave(
     steady: Matrix,
     others: Sequence[Matrix] = (),
 ) -> tuple[Structure, Matrix]:
-    """Return a wave, its first coordinates the kept dofs, without its way back, and the load of steady rotation, or several, on it.
+    """Return a wave, its first coordinates the kept dofs, and the load of steady rotation, or several, on it.
 
     It is reduced, and damped by its modes, as the two of `how` say; None: not. Modal coordinates are those that its modes at
     other speeds ask for, see `on_modes_of_others`.
     """
     moving = _with_way_back(sector, kept, k, how, others)
     load = moving.project(steady)
-    return replace(moving, basis=None), load.toarray() if scipy.sparse.issparse(load) else load
+    return moving, load.toarray() if scipy.sparse.issparse(load) else load
 
 
 def modes_of_wave(sector: CyclicSector, kept: IntArray, k: int, reduction: Reduction) -> Matrix:

@@ -10,7 +10,9 @@ import pandas as pd
 import plotly.graph_objects as go
 import xarray as xr
 
+from stickslip.assembly.model import Model
 from stickslip.errors import did_you_mean, input_error
+from stickslip.front.export import Format, Wanted, export_result
 from stickslip.front.frame_of import dataframe
 from stickslip.front.table import Table
 from stickslip.report.page import plots, write_report
@@ -117,6 +119,52 @@ class Result:
             )
         write_tree(self.data, target)
         return target
+
+    def export(
+        self,
+        to: Format = "vtu",
+        folder: str | Path | None = None,
+        *,
+        case: int = 0,
+        hz: float | None = None,
+        steps: int = 24,
+        wheel: bool = False,
+        units: str = "SI",
+        of: Model | str | Path | None = None,
+    ) -> tuple[Path, ...]:
+        """Write how every node moves at the peak of a forced response, for another program; return the files.
+
+        Parameters
+        ----------
+        to
+            ``vtu``: one period as a series of files for ParaView (open ``motion.pvd`` and ``contacts.pvd``), and all harmonics in
+            ``harmonics.vtu``; ``frd``: harmonics for CalculiX's viewer; ``uff``: deflection shapes and response functions for test
+            software.
+        folder
+            Made where it is not there; left out: a folder such as ``vtu_0`` beside the result's file.
+        case
+            Position among the cases of [vary].
+        hz
+            The converged point of the response nearest to this frequency; None: the peak.
+        steps
+            Instants of the period.
+        wheel
+            Whether all sectors of a wheel are written, not one.
+        units
+            Of an ``frd`` file, such as ``mm-t-s``.
+        of
+            The model that was asked, where it was made in Python; of a study it is made again from the study's text and files: the
+            folder of these, where the result has been moved away from it.
+
+        Raises
+        ------
+        InputError
+            If there is no such point, or the model is no longer the one that was asked.
+        """
+        place = None if folder is None else Path(folder)
+        source = Path(of) if isinstance(of, str) else of
+        wanted = Wanted(to, case, hz, steps, wheel, units)
+        return export_result(self.data, self.path, place, wanted, source)
 
     def report(self, path: str | Path | None = None) -> Path:
         """Write the page of all figures and tables; return it.

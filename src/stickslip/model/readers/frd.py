@@ -26,6 +26,7 @@ WIDTHS = {0: 5, 1: 10}  # of a node number in the short and the long format
 VALUE = 12  # characters of a value
 PER_LINE = 6  # values of a line
 MODAL = 2  # kind of a result: 0 static, 1 time step, 2 frequency, 3 load step
+RESPONSE = "RESPONSE"  # the text of a block at a frequency that is no mode shape but a motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +41,7 @@ class NodalField:
         Names of the columns, e.g. ``("D1", "D2", "D3")``.
     values
         (n, k) in SI for ``DISP`` and ``DISPI`` (m), ``STRESS`` (Pa) and ``FORC`` (N), else as in the file. Mode shapes are those of
-        unit modal mass in SI.
+        unit modal mass in SI; a response that stickslip wrote is in m.
     nodes
         (n,) node numbers.
     step
@@ -277,7 +278,7 @@ class _Frd:
 
     def _read_field(self, header: str) -> None:
         layout = self._format(header[74:75])
-        modal = header[56:58].strip() == str(MODAL)
+        at_frequency = header[56:58].strip() == str(MODAL)
         try:
             value = float(header[12:24])
         except ValueError as error:
@@ -295,6 +296,7 @@ class _Frd:
                 components.append(line[5:13].strip())
             self.at += 1
         nodes, values = self._rows(header, len(components), layout)
-        frequency = value if modal else None
+        frequency = value if at_frequency else None
+        modal = at_frequency and header[36:56].strip() != RESPONSE
         field = NodalField(name, tuple(components), values, nodes, step, frequency, self.diameter)
         self.fields.append((field, modal))

@@ -35,9 +35,20 @@ def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
         If it cannot be read, is no TOML, or is larger in any way than studies are.
     """
     text = _text(path)
+    return text, parsed(text, path)
+
+
+def parsed(text: str, path: Path) -> dict[str, Any]:
+    """Return what a text of TOML holds; `path` is what messages call it.
+
+    Raises
+    ------
+    InputError
+        If it is no TOML, or is larger in any way than studies are.
+    """
     _check_size(path, text)
     try:
-        return text, tomllib.loads(text)
+        return tomllib.loads(text)
     # the parser leaves impossible dates and numbers to the types that they become
     except (ValueError, RecursionError) as error:
         raise _no_toml(path, text, str(error)) from None

@@ -1,0 +1,148 @@
+"""The motion of every node from what a response solves for: the reductions made again with their way back."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
+from stickslip.assembly.asked import asked
+from stickslip.assembly.build import linear_side, system_of
+from stickslip.assembly.model import Model
+from stickslip.assembly.places import AXES
+from stickslip.assembly.reduced import with_ways_back
+from stickslip.assembly.skin import mesh_dofs
+from stickslip.errors import input_error
+from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.reduction.waves import wave
+from stickslip.response.system import System
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """The nodes of a part.
+
+    Parameters
+    ----------
+    part
+        Its name.
+    numbers
+        (n,) node numbers; 0 of the centre of a rigid body.
+    points
+        (n, 3) in m.
+    cells
+        (m, k) nodes of each cell in VTK order; None where the part has no mesh.
+    cell_numbers
+        (m,) of the cells; None without a mesh.
+    dofs
+        (n, 3) displacements among the dofs of all parts; -1 where a node is held.
+    """
+
+    part: str
+    numbers: IntArray
+    points: FloatArray
+    cells: IntArray | None
+    cell_numbers: IntArray | None
+    dofs: IntArray
+
+    def of(self, field: Matrix) -> Matrix:
+        """Return displacements (..., n, 3) from fields (..., N) on the dofs of all parts."""
+        held = np.zeros((*field.shape[:-1], 1), dtype=field.dtype)
+        return np.concatenate([field, held], axis=-1)[..., self.dofs]
+
+
+def nodes_of(model: Model) -> tuple[Nodes, ...]:
+    """Return the nodes of all parts that have a place in space.
+
+    Raises
+    ------
+    InputError
+        If none has.
+    """
+    found = [own for name in model.parts if (own := _nodes(model, name)) is not None]
+    if not found:
+        raise input_error(
+            "export", "no part has nodes with a place in space", "Give the matrices their nodes."
+        )
+    return tuple(found)
+
+
+def _nodes(model: Model, name: str) -> Nodes | None:
+    part, first = model.parts[name], model.places.offset(name)
+    mesh, table = part.mesh, part.structure.dofs
+    if mesh is not None:
+        dofs = np.full((len(mesh.points), 3), -1)
+        own, nodes, components = mesh_dofs(part, mesh)
+        dofs[nodes, components] = own + first
+        return Nodes(name, mesh.numbers, mesh.points, mesh.cells, mesh.cell_numbers, dofs)
+    placed = np.isin(table.component, AXES) & np.isfinite(table.position).all(axis=1)
+    rows = np.flatnonzero(placed & ((table.node >= 0) | (part.body is not None)))
+    if not rows.size:
+        return None
+    numbers, where, place = np.unique(table.node[rows], return_index=True, return_inverse=True)
+    dofs = np.full((numbers.size, 3), -1)
+    dofs[place, [AXES.index(table.component[row]) for row in rows]] = rows + first
+    return Nodes(name, np.maximum(numbers, 0), table.position[rows[where]], None, None, dofs)
+
+
+@dataclass(frozen=True, eq=False)
+class Everywhere:
+    """From the coordinates that a response solves for to all dofs of all parts.
+
+    Parameters
+    ----------
+    system, load
+        As those of `Assembled`.
+    output_labels, outputs
+        What is reported, and the dofs of all parts that these are.
+    order, sectors
+        Engine order and number of sectors of a wheel; 0 and 1 of a single structure.
+    """
+
+    system: System
+    load: HarmonicLoad
+    output_labels: tuple[str, ...]
+    outputs: IntArray
+    order: int
+    sectors: int
+    _expand: Callable[[Matrix, int], Matrix]
+
+    def field(self, omega: float, retained: ComplexArray) -> ComplexArray:
+        """Return the (H+1, N) motion of all dofs at a frequency in rad/s from that of the retained coordinates (H+1, n)."""
+        condensed = self.system.condensed(self.load, len(retained) - 1)
+        every = condensed.recover(omega, retained)
+        return np.array([self._expand(own, h) for h, own in enumerate(every)])
+
+    def phase(self, harmonic: int, sector: int) -> complex:
+        """Return what the motion of a sector is ahead of that of sector 0, in its own axes, in a harmonic."""
+        return complex(wave(harmonic * self.order, self.sectors).phase) ** sector
+
+
+def everywhere(model: Model, harmonics: int, *, every_wave: bool = False) -> Everywhere:
+    """Reduce a model again, with the way back to all its dofs.
+
+    Parameters
+    ----------
+    model
+        As it was solved.
+    harmonics, every_wave
+        As in `Model.assembled`: with others of a wheel the number of modes may be another one.
+
+    Raises
+    ------
+    InputError
+        If the sectors of the model differ: its reduction has no way back.
+    """
+    if model.mistuning is not None:
+        raise input_error(
+            "mistuning",
+            "is given, and fields are written of tuned wheels and single structures",
+            "Export a case without it.",
+        )
+    what = asked(model, harmonics)
+    order = what.order or 0
+    more = range(model.sectors) if every_wave else ()
+    linear = linear_side(model, order, harmonics, what.kept, what.stay, with_ways_back, more)
+    _, held, load = system_of(model, linear, what)
+    labels = what.labels
+    return Everywhere(held, load, labels.names, labels.dofs, order, model.sectors, linear.expand)

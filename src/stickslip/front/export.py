@@ -1,0 +1,101 @@
+"""A result written for other programs: which point of which case, and the model that it was computed of."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, get_args
+
+import xarray as xr
+
+from stickslip.assembly.model import Model
+from stickslip.errors import input_error
+from stickslip.model.readers.units import Units
+from stickslip.study.exchange.contacts import contacts_of
+from stickslip.study.exchange.frd import write_frd
+from stickslip.study.exchange.motion import motion_of, point_of
+from stickslip.study.exchange.uff import write_uff
+from stickslip.study.exchange.vtu import write_vtu
+from stickslip.study.file.study import StudyFile, validated
+from stickslip.study.file.toml import parsed
+from stickslip.study.keep.whole import unwritable
+from stickslip.study.models.study import Study
+
+Format = Literal["vtu", "frd", "uff"]
+OF = "forced_response"
+MOST_STEPS = 1000
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is written of a result; see `Result.export`."""
+
+    to: Format = "vtu"
+    case: int = 0
+    hz: float | None = None
+    steps: int = 24
+    wheel: bool = False
+    units: str = "SI"
+
+    def __post_init__(self) -> None:
+        if self.to not in get_args(Format):
+            remedy = f"Give one of {', '.join(get_args(Format))}."
+            raise input_error("export: to", f"is {self.to!r}", remedy)
+        if not 1 <= self.steps <= MOST_STEPS:
+            remedy = f"Give 1 to {MOST_STEPS} instants."
+            raise input_error("export: steps", f"is {self.steps}", remedy)
+        if self.units != "SI" and self.to != "frd":
+            what = f"is {self.units}, and only frd takes other units"
+            remedy = "Leave it out: vtu and uff are in m, N and Hz."
+            raise input_error("export: units", what, remedy)
+
+
+def export_result(
+    tree: xr.DataTree,
+    path: Path | None,
+    folder: Path | None,
+    wanted: Wanted,
+    of: Model | Path | None,
+) -> tuple[Path, ...]:
+    """Write the motion at a point of a result, which lies at `path`; return the files."""
+    if OF not in tree.children:
+        raise input_error("export", f"the result has no {OF}", f"Ask for it: [{OF}].")
+    data, case, units = tree[OF].to_dataset(), wanted.case, Units.named(wanted.units)
+    point = point_of(data, case, wanted.hz)
+    model = of if isinstance(of, Model) else _model(tree, path, of, case)
+    if wanted.wheel and model.sectors == 1:
+        remedy = "Leave it out: a structure that is no sector is written whole."
+        raise input_error("export: wheel", "is asked of a single structure", remedy)
+    motion = motion_of(data, model, case, point, wheel=wanted.wheel)
+    place = _place(path, f"{wanted.to}_{case}", folder)
+    if wanted.to == "vtu":
+        return write_vtu(motion, contacts_of(data, motion, case, point), place, wanted.steps)
+    if wanted.to == "frd":
+        return (write_frd(motion, place / "motion.frd", units),)
+    return (write_uff(motion, data, case, place / "motion.uff"),)
+
+
+def _place(path: Path | None, name: str, folder: Path | None) -> Path:
+    beside = Path() if path is None else path.parent
+    place = beside / name if folder is None else folder
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise unwritable(place, error) from None
+    return place
+
+
+def _model(tree: xr.DataTree, path: Path | None, home: Path | None, case: int) -> Model:
+    """Return the model of a case by the study's text in the result."""
+    text = str(tree.attrs.get("study_toml", ""))
+    if not text:
+        remedy = "Give the model that was asked: result.export(..., of=model)."
+        raise input_error("export", "the result is of a model made in Python", remedy)
+    raw = parsed(text, Path("study.toml"))
+    if home is None:
+        inner = Path(str(raw.get("output", {}).get("folder", "results")))
+        last = () if path is None else path.resolve().parent.parts
+        if last[-len(inner.parts) :] != inner.parts:
+            remedy = "Say in which folder the study's files lie: --of FOLDER, or of=..."
+            raise input_error("export", "the result does not lie where its study put it", remedy)
+        home = Path(*last[: -len(inner.parts)])
+    place = home / "study.toml"
+    return Study(StudyFile(place, text, raw, validated(place, raw))).model(case)

@@ -1,0 +1,1 @@
+"""Results for other programs: fields on all nodes, states of contacts, response functions."""
