@@ -45,7 +45,7 @@ class ModePoint:
     amplitude
         Of the followed coordinate in the first harmonic, m.
     omega
-        rad/s; of a decaying motion |λ|.
+        rad/s; of a decaying motion ``|λ|``.
     ratio
         Damping ratio ``ξ / 2ω``, linear damping included: that at which the motion decays where nothing feeds it; of a decaying motion
         ``-Re λ / |λ|``.
