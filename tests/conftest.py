@@ -3,6 +3,10 @@
 Property tests are repeatable and have no time limit per example.
 """
 
+from collections.abc import Iterator
+
+import pytest
+from browser import Browser
 from hypothesis import HealthCheck, settings
 
 settings.register_profile(
@@ -13,3 +17,10 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("repeatable")
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """One browser for all pages; see `needs_browser`."""
+    with Browser(tmp_path_factory.mktemp("profile")) as started:
+        yield started

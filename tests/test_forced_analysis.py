@@ -33,7 +33,7 @@ from stickslip.response.forced.response import (
     forced_problem,
     forced_response,
 )
-from stickslip.response.recovery import fields
+from stickslip.response.recovery import equivalent_damping, fields
 from stickslip.response.system import System
 from stickslip.solve.newton_method import Newton
 from stickslip.study.analyses import forced_response as analysis_module
@@ -70,6 +70,33 @@ def question(system: System, load: HarmonicLoad, sweep: Sweep, **others: object)
     )  # fmt: skip
     asked = {"label": "", "limit": 0.05} | others
     return Question(model=replace(model, **asked.pop("model", {})), sweep=sweep, **asked)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("limit", [1e6, 0.5])
+def test_equivalent_damping_is_that_of_a_linear_oscillator_and_counts_what_friction_takes(
+    limit: float,
+) -> None:
+    """Mass 1 on springs 1 and 0.5, of which the second one sticks or slips, with a dashpot."""
+    dashpot = 0.03
+    structure = Structure(np.eye(1), dashpot * np.eye(1), np.eye(1), table(("a.x",)))
+    law = ElasticCoulomb(k_t=0.5, k_w=0.0, k_n=1.0, mu=0.5, preload=2.0 * limit)
+    gap = np.array([[1.0], [0.0], [0.0]])
+    system = System(structure, Interface(("1",), (law,), gap), np.array([0]))
+    load = HarmonicLoad(np.zeros(1), {1: np.array([0.2 + 0j])})
+    sweep = Sweep(omega_range=(0.8, 1.4), points=12, peak_points=6, high=5, selection="always_high")
+    problem = forced_problem(system, load, sweep)
+    points = accepted_points(list(forced_response(system, load, sweep)))
+    top = max(points, key=lambda p: abs(p.coefficients[1, 0]))
+    found, sticks = equivalent_damping(problem, top), limit > 1.0
+    if sticks:  # ζ = c / 2√(km), where the frequency is that of resonance
+        assert found == pytest.approx(dashpot / (2 * np.sqrt(1.5)), rel=5e-3)
+    moved, energy = fields(problem, top).outputs[:, 0], fields(problem, top).energy.sum()
+    h = np.arange(moved.size)
+    lost = energy + np.pi * dashpot * top.omega * np.sum(h**2 * np.abs(moved) ** 2)
+    assert (energy > 0.1 * lost) == (not sticks)
+    # the largest energy beside the work: kinetic, which at a peak is all there is as the springs are relaxed
+    kinetic = 0.5 * top.omega**2 * np.sum(h**2 * np.abs(moved) ** 2)
+    assert found == pytest.approx(lost / (4 * np.pi * kinetic), rel=0.02 if sticks else 0.2)
 
 
 def solved(asked: Question, done: int | None = None, first: Solved | None = None) -> Solved:

@@ -2,8 +2,6 @@
 
 import json
 import re
-import shutil
-import subprocess
 from collections.abc import Callable
 from dataclasses import dataclass
 from html import unescape
@@ -12,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from browser import CHROMIUM, Browser
 from synthetic_result import HIGH, KEY, provenance, synthetic_result, tree_of, write_result
 
 from stickslip.errors import InputError
@@ -31,18 +30,9 @@ from stickslip.report.response import NEEDED, Response
 from stickslip.report.skin import edges
 from stickslip.study.analyses.verdict import Verdict, to_json
 
-CHROMIUM = (
-    shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-)
 needs_browser = pytest.mark.skipif(
     CHROMIUM is None, reason="no chromium on the path: the page is not opened"
 )
-FLAGS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--enable-logging=stderr", "--v=0",
-    "--window-size=1200,2000", "--virtual-time-budget=20000", "--dump-dom",
-)  # fmt: skip
 FIGURES = (
     "response", "low_order", "harmonics", "errors", "error_scatter", "optimisation", "loops_t", "loops_w", "states",
     "motion_damper", "energy", "mesh",
@@ -63,34 +53,18 @@ class Opened:
         return found[0]
 
 
-# inserted ahead of everything: the log of the browser does not tell console.error from console.log
-RECORDER = """<script>
-const failures = [];
-const record = text => {
-  failures.push(String(text));
-  document.documentElement.dataset.failures = JSON.stringify(failures);
-};
-console.error = (...words) => record(words.join(" "));
-addEventListener("error", event => record(event.message || "a resource did not load"), true);
-addEventListener("unhandledrejection", event => record(event.reason));
-</script>"""
-
-
-def open_page(html: Path, folder: Path, probe: str = "") -> Opened:
-    """Open a page in headless Chromium, with a probe at its end, and record what goes wrong in it."""
+def open_page(
+    browser: Browser, html: Path, folder: Path, probe: str = "", wait: str = "true"
+) -> Opened:
+    """Open a page with a probe at its end until something is true, and record what goes wrong in it."""
     text = html.read_text(encoding="utf-8")
-    assert text.count("<head>") >= 1
-    head, body = text.split("<head>", 1)
-    watched = folder / "watched.html"
-    end = body.rindex("</body>")
-    watched.write_text(f"{head}<head>{RECORDER}{body[:end]}{probe}{body[end:]}", encoding="utf-8")
-    command = [str(CHROMIUM), *FLAGS, f"--user-data-dir={folder / 'profile'}", watched.as_uri()]
-    ran = subprocess.run(command, capture_output=True, text=True, timeout=180, check=True)
-    assert "</html>" in ran.stdout
-    recorded = re.search(r'<html[^>]* data-failures="([^"]*)"', ran.stdout)
-    errors = json.loads(unescape(recorded[1])) if recorded else []
-    errors += re.findall(r"CONSOLE[:(]\d+\)?\] \"(Uncaught.*?)\", source", ran.stderr)
-    return Opened(ran.stdout, errors)
+    watched, end = folder / "watched.html", text.rindex("</body>")
+    watched.write_text(f"{text[:end]}{probe}{text[end:]}", encoding="utf-8")
+    browser.errors.clear()
+    browser.width(1200, 2000)
+    browser.open(watched)
+    browser.until(wait)
+    return Opened(browser.run("document.documentElement.outerHTML"), list(browser.errors))
 
 
 def marks(figure: str) -> int:
@@ -117,6 +91,27 @@ def page_text(html: Path) -> str:
         r"<(script|style)\b.*?</\1>", " ", html.read_text(encoding="utf-8"), flags=re.DOTALL
     )
     return re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]+>", "", text)))
+
+
+# least ratio of luminances between text and the nearest background behind it, plotly's figures left out
+CONTRAST = """(() => {
+  const parts = text => text.match(/[\\d.]+/g).map(Number);
+  const light = rgb => rgb.slice(0, 3).map(v => v / 255).map(v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
+    .reduce((sum, v, k) => sum + v * [0.2126, 0.7152, 0.0722][k], 0);
+  const behind = own => {
+    for (let e = own; e; e = e.parentElement) {
+      const found = parts(getComputedStyle(e).backgroundColor);
+      if (found.length < 4 || found[3] > 0) return found;
+    }
+    return [255, 255, 255];
+  };
+  const texts = [...document.querySelectorAll("main *")].filter(e => !e.closest(".js-plotly-plot, figcaption b[style], option")
+    && [...e.childNodes].some(n => n.nodeType === 3 && n.textContent.trim()) && e.checkVisibility());
+  return Math.min(...texts.map(e => {
+    const [a, b] = [light(parts(getComputedStyle(e).color)), light(behind(e))];
+    return (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+  }));
+})()"""
 
 
 @pytest.fixture(scope="module")
@@ -146,14 +141,43 @@ document.body.dataset.shown = shown.map(t => t.meta).join();
 </script>"""
 
 
+@dataclass(frozen=True)
+class Tried:
+    """What came of a page in windows of several widths, in the dark, and on paper."""
+
+    sideways: dict[int, int]  # width of the window -> pixels by which the page is wider
+    contrasts: dict[str, float]  # colour scheme -> least contrast of text to what is behind it
+    sheets: int
+    folded: int  # chapters folded away while it was printed
+
+
 @pytest.fixture(scope="module")
-def opened(page: Path, tmp_path_factory: pytest.TempPathFactory) -> Opened:
-    return open_page(page, tmp_path_factory.mktemp("browser"), PROBE)
+def opened(
+    browser: Browser, page: Path, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Opened, Tried]:
+    drawn = "document.body.dataset.colours"
+    seen = open_page(browser, page, tmp_path_factory.mktemp("browser"), PROBE, drawn)
+    contrasts = {}
+    for scheme in ("light", "dark"):
+        browser.scheme(scheme)
+        contrasts[scheme] = browser.run(CONTRAST)
+    browser.scheme("light")
+    sideways = {}
+    for width in (400, 760, 1600):
+        browser.width(width)
+        wider = "document.documentElement.scrollWidth - innerWidth"
+        browser.until(f"{wider} <= 0")
+        sideways[width] = browser.run(wider)
+    browser.run("addEventListener('beforeprint', () => { window.folded = document.querySelectorAll('details:not([open])').length; })")  # fmt: skip
+    sheets = len(re.findall(rb"/Type\s*/Page\b", browser.pdf()))
+    tried = Tried(sideways, contrasts, sheets, browser.run("window.folded ?? -1"))
+    dom = browser.run("document.documentElement.outerHTML")
+    return Opened(dom, [*seen.errors, *browser.errors]), tried
 
 
 def test_page_is_one_small_file_without_network(page: Path) -> None:
     html = page.read_text(encoding="utf-8")
-    assert page.stat().st_size < 8e6
+    assert page.stat().st_size < 6.4e6
     outside = re.sub(r"<script\b.*?</script>", "", html, flags=re.DOTALL)
     assert not re.search(r"(src|href)\s*=", outside)
     assert "@import" not in outside
@@ -162,39 +186,50 @@ def test_page_is_one_small_file_without_network(page: Path) -> None:
 
 
 @needs_browser
-def test_page_opens_without_console_error(opened: Opened) -> None:
-    assert opened.errors == []
+def test_page_opens_without_console_error(opened: tuple[Opened, Tried]) -> None:
+    assert opened[0].errors == []
+
+
+@needs_browser
+def test_the_page_fits_narrow_and_wide_windows_light_and_dark_and_paper(
+    opened: tuple[Opened, Tried],
+) -> None:
+    tried = opened[1]
+    assert max(tried.sideways.values()) <= 0, tried.sideways
+    assert min(tried.contrasts.values()) >= 4.5, tried.contrasts  # of WCAG AA
+    assert tried.sheets >= 5
+    assert tried.folded == 0
 
 
 @needs_browser
 @pytest.mark.parametrize("key", FIGURES)
-def test_every_figure_has_marks(opened: Opened, key: str) -> None:
-    assert marks(opened.figure(key)) > 0
+def test_every_figure_has_marks(opened: tuple[Opened, Tried], key: str) -> None:
+    assert marks(opened[0].figure(key)) > 0
 
 
 @needs_browser
-def test_the_mesh_is_drawn_by_webgl(opened: Opened) -> None:
+def test_the_mesh_is_drawn_by_webgl(opened: tuple[Opened, Tried]) -> None:
     """An export of the picture shows lit steel, edges and contact points: many colours."""
-    colours = re.search(r'data-colours="(\d+)"', opened.dom)
+    colours = re.search(r'data-colours="(\d+)"', opened[0].dom)
     assert colours, "the picture could not be exported"
     # axes and text alone make some hundred shades by antialiasing; a lit mesh makes thousands
     assert int(colours[1]) > 500
 
 
 @needs_browser
-def test_choosing_a_load_case_changes_figures_and_captions(opened: Opened) -> None:
-    assert 'data-shown="0"' in opened.dom
+def test_choosing_a_load_case_changes_figures_and_captions(opened: tuple[Opened, Tried]) -> None:
+    assert 'data-shown="0"' in opened[0].dom
     for key in ("loops_t", "loops_w", "states", "motion_damper", "energy"):
-        assert re.findall(r'<span data-case="(\d)">', opened.figure(key)) == ["0"]
+        assert re.findall(r'<span data-case="(\d)">', opened[0].figure(key)) == ["0"]
 
 
 @needs_browser
-def test_the_browser_check_sees_a_broken_page(page: Path, tmp_path: Path) -> None:
+def test_the_browser_check_sees_a_broken_page(browser: Browser, page: Path, tmp_path: Path) -> None:
     breakage = (
         "<script>console.error('on purpose')</script><script>undefinedFunction()</script>"
         "<script>Plotly.restyle('plot-response', {visible: false})</script>"
     )
-    seen = open_page(page, tmp_path, breakage)
+    seen = open_page(browser, page, tmp_path, breakage)
     assert any("on purpose" in error for error in seen.errors)
     assert any("undefinedFunction" in error for error in seen.errors)
     assert marks(seen.figure("response")) == 0
@@ -551,9 +586,11 @@ def test_optimisation_follows_the_first_varied_number_one_curve_for_each_other_v
 
 @needs_browser
 @pytest.mark.parametrize("name", ["bare", "nothing converged", "one harmonic"])
-def test_partial_pages_open_without_console_error(name: str, tmp_path: Path) -> None:
+def test_partial_pages_open_without_console_error(
+    browser: Browser, name: str, tmp_path: Path
+) -> None:
     data = _without("surface")(PARTIAL[name][0](small_result()))
-    seen = open_page(report(data, tmp_path), tmp_path)
+    seen = open_page(browser, report(data, tmp_path), tmp_path)
     assert seen.errors == []
     drawn = re.findall(r'<figure id="fig-([\w-]+)" class="(?:by|all)-case', seen.dom)
     assert [key for key in drawn if marks(seen.figure(key)) == 0] == []

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from browser import Browser
 from synthetic_result import provenance, tree_of, write_result
 from synthetic_wheel import (
     SECTORS,
@@ -57,15 +58,16 @@ setTimeout(() => {
   document.body.dataset.x = JSON.stringify(Array.from(trace.x));
   document.body.dataset.y = JSON.stringify(Array.from(trace.y));
   document.body.dataset.title = document.getElementById("plot-shapes").layout.title.text;
-}, 3000);
+}, 1000);
 </script>"""
 
 
 @needs_browser
 def test_page_draws_every_figure_and_the_wheel_moves_as_the_wave_says(
-    folder: Path, tmp_path: Path
+    browser: Browser, folder: Path, tmp_path: Path
 ) -> None:
-    opened = open_page(folder / "report.html", tmp_path, PROBE)
+    moved = "document.body.dataset.title"
+    opened = open_page(browser, folder / "report.html", tmp_path, PROBE, moved)
     assert opened.errors == []
     for key in ("diameters", "campbell", "safe"):
         assert marks(opened.figure(key)) > 10
@@ -129,13 +131,13 @@ def test_cases_that_are_alike_are_drawn_once() -> None:
 
 
 @needs_browser
-def test_choosing_a_case_shows_its_chapter(tmp_path: Path) -> None:
+def test_choosing_a_case_shows_its_chapter(browser: Browser, tmp_path: Path) -> None:
     data = modes_result()
     two = xr.concat([data, data.assign(frequency_hz=2 * data["frequency_hz"])], "case")
     two["case_label"] = "case", ["span = 1", "span = 2"]
     write_result(tree_of(provenance(), modes=two), tmp_path / "result.nc")
     probe = """<script>document.querySelector('.chooser button[data-case="1"]').click();</script>"""
-    opened = open_page(report_file(tmp_path), tmp_path, probe)
+    opened = open_page(browser, report_file(tmp_path), tmp_path, probe)
     assert opened.errors == []
     assert '<div data-case="0" hidden' in opened.dom
     assert marks(opened.figure("diameters_1")) > 10

@@ -1,4 +1,4 @@
-"""The chapter on the model: its skin and contact points, how well the reduced model stands for it, and its facts."""
+"""The model: a picture of its skin and contact points, how well the reduced model stands for it, and its facts."""
 
 from collections.abc import Mapping
 
@@ -10,7 +10,6 @@ from stickslip.report.content import Table
 from stickslip.report.node import Node
 from stickslip.report.plot import Plot
 from stickslip.report.quantities import NONE, fixed, number, percent, quantity
-from stickslip.report.response import Response
 from stickslip.report.skin import skin_picture
 
 _CHECKED = (
@@ -33,7 +32,7 @@ def reduction(nodes: Mapping[str, Node]) -> Table | None:
     rows, off = [], []
     for name, full, reduced in _CHECKED:
         if node.has(full, reduced):
-            a, b = (_first(node, n) for n in (full, reduced))
+            a, b = (of_first_case(node, n) for n in (full, reduced))
             with np.errstate(divide="ignore", invalid="ignore"):
                 difference = np.where(a > 0, b / a - 1, np.nan)
             cells = zip(a, b, difference, strict=True)
@@ -49,24 +48,10 @@ def reduction(nodes: Mapping[str, Node]) -> Table | None:
     return Table(head, rows, "Reduction", (text,)) if rows else None
 
 
-def _first(node: Node, name: str) -> FloatArray:
+def of_first_case(node: Node, name: str) -> FloatArray:
     """Return a variable of the first case."""
     found = node.data[name]
     return np.asarray((found.isel(case=0) if "case" in found.dims else found).values, dtype=float)
-
-
-def contacts(nodes: Mapping[str, Node]) -> Table | None:
-    """Return a row a contact of the model: its points, law, and force under the static loads."""
-    node = next((n for n in nodes.values() if isinstance(n, Response) and n.groups), None)
-    if not isinstance(node, Response) or not node.has("contact_law", "static_force"):
-        return None
-    laws, static = node.labels_of("contact_law"), _first(node, "static_force")
-    rows = [
-        [group, str(len(at)), ", ".join(dict.fromkeys(laws[k] for k in at)), quantity(-float(static[at, 2].sum()), "N", 4)]
-        for group, at in node.groups.items()
-    ]  # fmt: skip
-    head = ["contact", "points", "law", "normal force at rest"]
-    return Table(head, rows, "Contacts", numeric=False)
 
 
 def facts(nodes: Mapping[str, Node]) -> Table | None:
@@ -128,4 +113,4 @@ def _lengths(values: np.ndarray) -> str:
     return f"({', '.join(number(float(v) * 1e3, 5) for v in values)}) mm"
 
 
-PARTS = (picture, contacts, reduction, facts)
+PARTS = (reduction, facts)

@@ -14,6 +14,7 @@ from stickslip.report.cases import cases_of, varied
 from stickslip.report.content import Table, Words, chooser
 from stickslip.report.forced.tractions import with_bands
 from stickslip.report.frame import CaseBody, Chapter, Placing, concluded, page_html, write_page
+from stickslip.report.inputs import inputs, study_of
 from stickslip.report.node import Node
 from stickslip.report.plot import Plot
 from stickslip.report.quantities import NONE, fixed, quantity
@@ -70,7 +71,7 @@ def _views(section: Section, data: xr.Dataset) -> list[Any]:
     n = data.sizes["case"]
     drawn = range(n) if len(alike(data)) > 1 else [0]
     each = [one_case(data, k) for k in drawn] if n > 1 else [data.isel(case=0)]
-    views = [section.view(own) for own in each]
+    views = [section.view(own.assign_attrs(drawn_cases=len(each))) for own in each]
     return [views[0], *(replace(view, key=f"_{k}") for k, view in enumerate(views[1:], 1))]
 
 
@@ -148,14 +149,18 @@ def report_html(tree: xr.DataTree) -> str:
     tree
         A result: a node an analysis, provenance in the attributes of the root. What is missing is left out.
     """
-    placing, chapters = Placing(), []
+    placing, nodes = Placing(), _nodes(tree)
+    root = Node(tree.to_dataset())
+    given = inputs(study_of(root.text("study_toml")), nodes)
+    drawing = model.picture(nodes)
+    body = placing([*([drawing] if drawing else []), *given])
+    chapters = [Chapter("inputs", "What was computed", body)] if body else []
     cards: list[Card] = []
     for section, data in _shown(tree):
         views = _views(section, data)
         cards += section.cards(views[0])
         own = (_chapter(section, block, data, views, placing) for block in section.blocks)
         chapters += [chapter for chapter in own if chapter is not None]
-    nodes = _nodes(tree)
     for key, title, parts in (
         ("backbones", "Responses and modes", (nonlinear_mode.over_responses,)),
         ("model", "Model", model.PARTS),
@@ -163,7 +168,6 @@ def report_html(tree: xr.DataTree) -> str:
         body = placing(_contents(parts, nodes))
         chapters += [Chapter(key, title, body)] if body else []
     chapters.append(Chapter("provenance", "Provenance", placing(_provenance(tree))))
-    root = Node(tree.to_dataset())
     made = f"stickslip {root.text('stickslip_version')} · {root.text('created')}"
     told = concluded(of_tree(tree), conclusion(tree), bad=bool(not_trusted(tree)))
     return page_html(root.text("title") or "Result", made, chapters, cards=cards, conclusion=told)

@@ -66,20 +66,24 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
 
 
 def column(values: FloatArray, unit: str, digits: int = 4) -> tuple[str, list[str]]:
-    """Write numbers of one column with one unit and the same decimals; the smallest keeps two digits where five decimals do.
+    """Write numbers of one column with one unit and the same decimals, as `aligned` does.
 
     Returns
     -------
     unit, cells
     """
     scale = scale_for(values, unit)
-    scaled = np.asarray(values) * scale.factor
-    sizes = np.abs(scaled[np.isfinite(scaled) & (scaled != 0.0)])
+    return scale.unit, aligned(np.asarray(values) * scale.factor, digits)
+
+
+def aligned(values: FloatArray, digits: int = 4) -> list[str]:
+    """Write numbers of one column with the same decimals; the smallest keeps two digits where five decimals do."""
+    sizes = np.abs(values[np.isfinite(values) & (values != 0.0)])
     if not sizes.size:
-        return scale.unit, [fixed(float(v), 0) for v in scaled]
+        return [fixed(float(v), 0) for v in values]
     of_largest, of_smallest = (math.floor(math.log10(v)) for v in (sizes.max(), sizes.min()))
     decimals = min(max(0, digits - 1 - of_largest, 1 - of_smallest), 5)
-    return scale.unit, [fixed(float(v), decimals) for v in scaled]
+    return [fixed(float(v), decimals) for v in values]
 
 
 def percent(value: float, digits: int = 2) -> str:

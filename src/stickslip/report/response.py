@@ -147,6 +147,10 @@ class Response(Node):
         """Level of the verdict on a case; empty where the result tells none."""
         return LEVELS[int(self.number_of("case_verdict", case))] if self.has("case_verdict") else ""
 
+    def trust(self, case: ShownCase) -> int:
+        """Position of the verdict on a case among `LEVELS`: 0 where it is trusted, or the result tells none."""
+        return LEVELS.index(self.level(case)) if self.level(case) else 0
+
     @cached_property
     def alert(self) -> Alert:
         """Where the strategy was asked; the accepted points that have an indicator where harmonics were raised, or the file does not say."""
@@ -317,10 +321,9 @@ class Response(Node):
         """The case whose contacts are shown first: of those with the best verdict the one with the smallest peak of resonance; -1 for none."""
         if not self.peaked:
             return -1
-        levels = {c: LEVELS.index(self.level(c)) if self.level(c) else 0 for c in self.peaked}
 
         def rank(case: ShownCase) -> tuple[int, bool, float]:
-            return levels[case], not self.resonates(case), self.peak_response(case)
+            return self.trust(case), not self.resonates(case), self.peak_response(case)
 
         return min(self.peaked, key=rank).index
 

@@ -19,7 +19,7 @@ from stickslip.report.quantities import counted
 from stickslip.report.skin import edges, segments, surface
 from stickslip.report.waves import Waves
 
-_SHAPE_BYTES = 3_200_000  # of all shapes together, before they become text
+_SHAPE_BYTES = 600_000  # of all shapes of a page together, before they become text
 _POINT_BYTES = 12  # x, y, z, real and imaginary, 16 bits each
 _WHEEL_POINTS = 26_000  # of the whole wheel, so that it turns and moves without waiting
 _FEWEST_POINTS = 250
@@ -32,10 +32,11 @@ def mode_shapes(view: Waves) -> Plot | None:
     if not view.has("shape", "skin_point", "skin_triangle"):
         return None
     waves, there = view.data.sizes["wave"], view.data.sizes["mode"]
-    room = _SHAPE_BYTES // (_POINT_BYTES * _FEWEST_POINTS * waves)
+    most_bytes = _SHAPE_BYTES // int(view.scalar("drawn_cases", 1))
+    room = most_bytes // (_POINT_BYTES * _FEWEST_POINTS * waves)
     modes = max(1, min(there, room))
     points, triangles = view.floats("skin_point") * _MM, view.integers("skin_triangle")
-    most = max(_FEWEST_POINTS, _SHAPE_BYTES // (_POINT_BYTES * waves * modes))
+    most = max(_FEWEST_POINTS, most_bytes // (_POINT_BYTES * waves * modes))
     kept, faces = coarse_skin(points, triangles, most)
     data = _payload(view, modes, kept, faces)
     fine = "" if len(kept) == len(np.unique(triangles)) else ", coarser than the mesh"

@@ -8,16 +8,16 @@ from plotly.subplots import make_subplots
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.report.forced.bodies import group_colours, rigid_bodies
-from stickslip.report.forced.contact import contact_lines
+from stickslip.report.forced.contact import contact_lines, states
 from stickslip.report.node import Node
-from stickslip.report.plot import INK, Plot, styled
+from stickslip.report.plot import INK, STATE_COLOURS, Plot, styled
 from stickslip.report.quantities import NARROW_SPACE, counted, joined, number
 from stickslip.report.response import Response
 
-_MANY_EDGES = 40_000  # above it only the sharp edges are drawn, to keep the page small
+_MANY_EDGES = 4_000  # of a panel; above it only the sharp edges are drawn, to keep the page small
 _SHARP = np.cos(np.radians(30.0))
 _STEEL, _EDGES = "#b9c4d0", "#6f7f91"
-_MOST_NAMES = 30  # of contact points that do not cover each other
+_MOST_NAMES = 15  # of contact points that do not cover each other
 
 
 def edges(points: FloatArray, triangles: IntArray) -> tuple[IntArray, np.ndarray]:
@@ -59,7 +59,8 @@ def segments(points: FloatArray, pairs: IntArray, colour: str, width: float) -> 
 def surface(points: FloatArray, triangles: IntArray, **look: Any) -> go.Mesh3d:
     """Draw a triangulated surface."""
     x, y, z = points.astype(np.float32).T
-    i, j, k = triangles.astype(np.int32).T
+    whole = np.uint16 if len(points) <= np.iinfo(np.uint16).max else np.int32
+    i, j, k = triangles.astype(whole).T
     shared = {"flatshading": True, "hoverinfo": "skip", "showlegend": False}
     return go.Mesh3d(x=x, y=y, z=z, i=i, j=j, k=k, **shared, **look)
 
@@ -76,23 +77,53 @@ def _inside(points: FloatArray, parts: IntArray, low: FloatArray, high: FloatArr
     return np.asarray(parts[meets.all(axis=1)])
 
 
-def _contacts(response: Response, position: FloatArray, *, named: bool) -> list[go.Scatter3d]:
+def _contacts(
+    response: Response, position: FloatArray, *, named: bool, keyed: bool = False
+) -> list[go.Scatter3d]:
     """Draw the contact points, coloured by the contact of the model that they belong to."""
     names, colours = np.array(response.labels("contact"), dtype=object), group_colours(response)
-    # names of neighbouring contact lines go above and below their points, so that they do not cover each other
-    place = np.full(len(names), "top center", dtype=object)
-    for line, members in enumerate(contact_lines(response)):
-        place[members] = "bottom center" if line % 2 else "top center"
+    place = _places(response)
     mode = "markers+text" if named and len(names) <= _MOST_NAMES else "markers"
     return [
         go.Scatter3d(
-            x=position[at, 0], y=position[at, 1], z=position[at, 2], mode=mode, name=group, legendgroup=group, showlegend=named,
+            x=position[at, 0], y=position[at, 1], z=position[at, 2], mode=mode, name=group, legendgroup=group, showlegend=keyed,
             text=names[at], textposition=place[at], textfont={"size": 12, "color": INK},
             marker={"size": 5 if named else 3, "color": colours[group]},
             hovertemplate="%{text}: x %{x:.2f}, y %{y:.2f}, z %{z:.2f} mm<extra></extra>",
         )
         for group, at in response.groups.items()
     ]  # fmt: skip
+
+
+def _states(response: Response, position: FloatArray) -> list[go.Scatter3d]:
+    """Draw the contact points, coloured by what they do in a cycle at the peak of the case that is shown first."""
+    case = response.cases[response.chosen]
+    state = states(response, case)
+    open_, slips = ((state == k).any(axis=(1, 2)) for k in (2, 1))
+    each = np.where(open_, 2, np.where(slips, 1, 0))
+    names = np.array(response.labels("contact"), dtype=object)
+    mode = "markers+text" if len(names) <= _MOST_NAMES else "markers"
+    place = _places(response)
+    said = ("sticks all the time", "slips", "lifts off")
+    return [
+        go.Scatter3d(
+            x=position[at, 0], y=position[at, 1], z=position[at, 2], mode=mode, name=said[k],
+            legendgroup="states", legendgrouptitle={"text": f"at the peak{case.where}"},
+            text=names[at], textposition=place[at], textfont={"size": 12, "color": INK},
+            marker={"size": 5, "color": STATE_COLOURS[k], "line": {"width": 1, "color": INK}},
+            hovertemplate="%{text} " + said[k] + ": x %{x:.2f}, y %{y:.2f}, z %{z:.2f} mm<extra></extra>",
+        )
+        for k in range(3)
+        if (at := np.flatnonzero(each == k)).size
+    ]  # fmt: skip
+
+
+def _places(response: Response) -> np.ndarray:
+    """Return where the names of contact points stand: of neighbouring lines above and below, so that they do not cover each other."""
+    place = np.full(len(response.labels("contact")), "top center", dtype=object)
+    for line, members in enumerate(contact_lines(response)):
+        place[members] = "bottom center" if line % 2 else "top center"
+    return place
 
 
 def _sections(response: Response, position: FloatArray) -> go.Scatter3d:
@@ -142,6 +173,8 @@ def _caption(node: Node, points: FloatArray, triangles: IntArray) -> str:
         return text
     each = [f"{counted(len(at), 'point')} of {group}" for group, at in node.groups.items()]
     text += f" Contact points, coloured by contact: {joined(each)}." if each else ""
+    if node.has("peak_state", "contact_position") and node.chosen >= 0:
+        text += " Near the contacts they are coloured by what they do in a cycle at the peak of the case shown first."
     unmeshed = list(rigid_bodies(node))
     verb = "is rigid and has" if len(unmeshed) == 1 else "are rigid and have"
     return text + (f" Not drawn: {joined(unmeshed)}, which {verb} no mesh." if unmeshed else "")
@@ -164,16 +197,27 @@ def skin_picture(node: Node) -> Plot | None:
     figure.add_traces(whole, rows=1, cols=1)
     if contacts and isinstance(node, Response):
         low, high = _neighbourhood(position)
+        close, rough = (_inside(points, own, low, high) for own in (pairs, drawn))
         near = [
             _skin(points, _inside(points, triangles, low, high), 0.35),
-            segments(points, _inside(points, drawn, low, high), _EDGES, 1.0),
+            segments(points, close if len(close) <= _MANY_EDGES else rough, _EDGES, 1.0),
             _sections(node, position),
         ]
-        figure.add_traces(_contacts(node, position, named=False), rows=1, cols=1)
-        figure.add_traces([*near, *_contacts(node, position, named=True)], rows=1, cols=2)
+        stated = node.has("peak_state") and node.chosen >= 0
+        whole = _contacts(node, position, named=False, keyed=True)
+        figure.add_traces(whole, rows=1, cols=1)
+        points_near = _states(node, position) if stated else _contacts(node, position, named=True)
+        figure.add_traces([*near, *points_near], rows=1, cols=2)
         figure.update_layout(scene2=_scene(low, high, close=True))
-    styled(figure, 620)
-    legend = {"orientation": "h", "x": 1, "xanchor": "right", "y": 0, "yanchor": "bottom"}
+    styled(figure, 480)
+    legend = {
+        "orientation": "h",
+        "x": 1,
+        "xanchor": "right",
+        "y": 0,
+        "yanchor": "bottom",
+        "itemsizing": "constant",
+    }
     scene = _scene(points.min(axis=0), points.max(axis=0), close=False)
     figure.update_layout(scene=scene, margin={"l": 0, "r": 0, "t": 40, "b": 10}, legend=legend)
     title = "The mesh and the contact points" if contacts else "The mesh"

@@ -69,6 +69,23 @@ def fields(problem: ForcedProblem, point: ForcedPoint) -> Fields:
     return Fields(outputs, gaps.reshape(shape), forces.reshape(shape), energy)
 
 
+def equivalent_damping(problem: ForcedProblem, point: ForcedPoint) -> float:
+    """Return the damping ratio of a linear oscillator that loses as much: at a peak, half the inverse of the quality factor.
+
+    ``ζ = W / (4π U)`` with the work W of the harmonic loads in a cycle, which at a steady motion is all that friction, structure and fluid
+    take, and the largest energy U that structure and contacts store of the vibration: twice its mean. NaN where nothing vibrates.
+    """
+    linear, every = problem.low.linear, fields(problem, point)
+    h = np.arange(len(point.coefficients))
+    moved = linear.recover(point.omega, point.coefficients)
+    load = linear.load_at(point.omega).coefficients(int(h[-1]))
+    work = np.pi * np.sum(h[:, None] * np.imag(load * np.conj(moved)))
+    strain = linear.strain_energy(point.omega, point.coefficients)[1:].sum()
+    springs = 0.25 * np.real(np.conj(every.gaps[1:]) * every.forces[1:]).sum()
+    stored = 2.0 * (strain + springs)
+    return float(work / (4.0 * np.pi * stored)) if stored > 0.0 else float("nan")
+
+
 def signals(problem: ForcedProblem, point: ForcedPoint) -> Signals:
     """Return one period of gaps, forces and states at the contacts, at the samples of the sweep."""
     period = _period(problem, point)

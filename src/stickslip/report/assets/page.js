@@ -34,4 +34,7 @@ document.querySelectorAll("button.csv").forEach(button => button.addEventListene
   link.click();
 }));
 // paper shows what is folded away
-addEventListener("beforeprint", () => document.querySelectorAll("details").forEach(folded => { folded.open = true; }));
+addEventListener("beforeprint", () => document.querySelectorAll("details:not([open])").forEach(folded => {
+  folded.open = true;
+  addEventListener("afterprint", () => { folded.open = false; }, {once: true});
+}));

@@ -30,7 +30,7 @@ def rigid_bodies(response: Response) -> dict[str, list[int]]:
 
 
 def body_motion(
-    response: Response, case: ShownCase, at: list[int], samples: int = 128
+    response: Response, case: ShownCase, at: list[int], samples: int = 96
 ) -> tuple[FloatArray, FloatArray]:
     """Coordinates of a rigid body over one period at the peak.
 

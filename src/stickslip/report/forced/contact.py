@@ -15,6 +15,8 @@ _ROUNDING = 1e-9  # area of a loop over that of its bounding box, below which it
 _MOST_LOOPS = 24  # panels
 _MOST_ROW = 4  # of them beside each other, where contact lines have more points
 _MOST_STATES = 40  # rows with a name of their own
+_MOST_SAMPLES = 40_000  # of all loops of a figure, and of all rows of states
+_FEWEST_SAMPLES = 32  # of a period
 _STATE_SCALE = [[a, colour] for k, colour in enumerate(STATE_COLOURS) for a in (k / 3, (k + 1) / 3)]
 
 
@@ -73,12 +75,25 @@ def _state_keys() -> list[go.Scatter]:
     ]  # fmt: skip
 
 
+def _drawn_samples(curves: int, samples: int) -> slice:
+    """Return which samples of a period are drawn: every second or fourth ... of many curves, so that the page stays small."""
+    step = 2 if samples >= 2 * 64 else 1
+    while curves * samples // step > _MOST_SAMPLES and samples // (2 * step) >= _FEWEST_SAMPLES:
+        step *= 2
+    return slice(None, None, step)
+
+
 def _loop(gap: FloatArray, force: FloatArray, state: IntArray | None, name: str) -> go.Scatter:
     """One closed loop, its points coloured by state."""
     closed = np.append(np.arange(len(gap)), 0)
     colour: dict[str, object] = {"color": MUTED}
     if state is not None:
-        colour = {"color": state[closed], "colorscale": _STATE_SCALE, "cmin": -0.5, "cmax": 2.5}
+        colour = {
+            "color": state[closed].astype(np.int8),
+            "colorscale": _STATE_SCALE,
+            "cmin": -0.5,
+            "cmax": 2.5,
+        }
     return go.Scatter(
         x=gap[closed].astype(np.float32), y=force[closed].astype(np.float32), mode="lines+markers",
         line={"color": MUTED, "width": 1}, marker={"size": 4, **colour}, name=name, showlegend=False,
@@ -135,9 +150,10 @@ def _hysteresis(response: Response, direction: str) -> Plot | None:
     titles = [names[r[k]] if k < len(r) else "" for r in rows for k in range(width)]
     space = {"horizontal_spacing": 0.21 / width, "vertical_spacing": 0.23 / len(rows)}
     figure = make_subplots(len(rows), width, subplot_titles=titles, **space)
+    at = _drawn_samples(len(cases) * sum(map(len, rows)), response.data.sizes["sample"])
     for case in cases:
-        gap, force = period(response, case, "peak_gap"), period(response, case, "peak_force")
-        state = states(response, case) if response.has("peak_state") else None
+        gap, force = (period(response, case, f"peak_{n}")[..., at] for n in ("gap", "force"))
+        state = states(response, case)[..., at] if response.has("peak_state") else None
         for i, row in enumerate(rows):
             for j, k in enumerate(row):
                 known = state[k, column] if state is not None else None
@@ -212,15 +228,15 @@ def state_map(response: Response) -> Plot | None:
     if not cases:
         return None
     rows, labels = _state_rows(response, cases)
+    at = _drawn_samples(len(cases) * len(rows), response.data.sizes["sample"])
     figure = go.Figure()
     for case in cases:
-        state = states(response, case)
+        state = states(response, case)[..., at]
         values = state.reshape(-1, state.shape[-1])[rows]
         figure.add_heatmap(
             x=(np.arange(values.shape[1]) + 0.5) / values.shape[1], y=labels, z=values.astype(np.int8),
             zmin=-0.5, zmax=2.5, colorscale=_STATE_SCALE, showscale=False, ygap=2 if len(rows) <= _MOST_STATES else 0,
-            meta=case.index, customdata=np.array(STATE_NAMES, dtype=object)[values],
-            hovertemplate="%{y}: %{customdata} at %{x:.3f} T<extra></extra>",
+            meta=case.index, hovertemplate="%{y} at %{x:.3f} T: %{z} (0 stick, 1 slip, 2 open)<extra></extra>",
         )  # fmt: skip
     figure.add_traces(_state_keys())
     styled(figure, 130 + min(21 * len(rows), 900))

@@ -22,7 +22,9 @@ def _peak_card(response: Response) -> Card:
         return Card(NONE, "peak", "no case has its peak yet")
     within = [c for c in cases if response.resonates(c)]
     peaks = np.array([response.peak_response(c) for c in within or cases])
-    best = int(np.argmin(peaks))
+    least = min((response.trust(c) for c in within or cases), default=0)
+    counts = np.array([response.trust(c) == least for c in within or cases])
+    best = int(np.argmin(np.where(counts, peaks, np.inf)))
     scale = scale_for(peaks[best : best + 1], response.unit)
     size = f"{number(float(peaks[best]) * scale.factor)} {scale.unit}"
     no_resonance = "the largest amplitude stands at the end of the sweep: no resonance"
@@ -37,9 +39,15 @@ def _peak_card(response: Response) -> Card:
         return Card(size, cases[best].label, f"in every case {no_resonance}")
     left_out = len(cases) - len(within)
     blade = response.blade_at_peak(within[best])
-    note = f"smallest peak of {counted(len(within), 'case')}{blade}, {percent(100 * float(peaks[best] / peaks.max()))} of the largest"
+    kind = counted(int(counts.sum()), "case")
+    if not counts.all():
+        kind = f"{int(counts.sum())} {LEVELS[least]} of {counted(len(within), 'case')}"
+    note = f"smallest peak of {kind}{blade}, at {number(response.peak_hz(within[best]), 5)} Hz, {percent(100 * float(peaks[best] / peaks.max()))} of the largest"
     if within[best] in (response.cases[0], response.cases[-1]):
         note += f"; the {'first' if within[best] is response.cases[0] else 'last'} case, so that a smaller one may lie beyond"
+    lower = int(np.argmin(peaks))
+    if peaks[lower] < peaks[best]:
+        note += f"; {number(float(peaks[lower]) * scale.factor)} {scale.unit} is {response.level(within[lower])}{within[lower].where}"
     if left_out:
         note += f"; of {counted(left_out, 'other')} the largest amplitude stands at the end of the sweep"
     return Card(size, within[best].label, note)
@@ -55,6 +63,22 @@ def _shift_card(response: Response) -> Card | None:
     note = f"from {number(a, 5)} Hz{blades[0]}{first.where} to {number(b, 5)} Hz{blades[1]}{last.where}"
     label = f"shift of the peak over the cases ({percent(100 * (b / a - 1))})"
     return Card(f"{number(b - a)} Hz", label, note)
+
+
+def _damping_card(response: Response) -> Card | None:
+    """Return quality factor and equivalent damping ratio of the case that is shown first, and the range of all."""
+    ratios = {c: response.number_of("peak_damping", c) for c in response.peaked}
+    known = {c: z for c, z in ratios.items() if z > 0 and response.resonates(c)}
+    shown = next((c for c in known if c.index == response.chosen), None)
+    if shown is None:
+        return None
+    note = f"equivalent damping ratio {percent(100 * known[shown])}{shown.where}"
+    if response.level(shown):
+        note += f", {response.level(shown)}"
+    if len(known) > 1:
+        ends = [percent(100 * z) for z in (min(known.values()), max(known.values()))]
+        note += f"; {ends[0]} to {ends[1]} over {len(known)} cases"
+    return Card(number(0.5 / known[shown]), "quality factor at the peak", note)
 
 
 def _blade_card(response: Response) -> Card | None:
@@ -143,6 +167,7 @@ def cards(response: Response) -> list[Card]:
         _blade_card(response),
         _verdict_card(response),
         _shift_card(response),
+        _damping_card(response),
         _loss_card(response),
     )
     alert = response.is_error and response.decides and not response.auto

@@ -2,18 +2,34 @@
 
 import numpy as np
 
+from stickslip.arrays import FloatArray
 from stickslip.harmonic.support import named
 from stickslip.report.content import Table
-from stickslip.report.quantities import NONE, fixed, number, percent, predicted, quantity, scale_for
+from stickslip.report.quantities import (
+    NONE,
+    aligned,
+    column,
+    fixed,
+    number,
+    percent,
+    predicted,
+    quantity,
+)
 from stickslip.report.response import Response
 from stickslip.study.analyses.verdict import said
 
 
 def peaks(response: Response) -> Table:
     """One row a case: peak, points, work."""
-    scale = scale_for(np.array([response.peak_response(c) for c in response.cases]), response.unit)
+    cases = response.cases
+    value = np.array([response.peak_response(c) for c in cases])
+    force = np.array([c.excitation for c in cases])
+    newton, forces = column(force, "N")
+    length, sizes = column(value * (force if response.per_force else 1.0), response.length)
+    unit, ratios = column(value if response.per_force else value * np.nan, response.unit)
+    zeta = np.array([response.number_of("peak_damping", c) for c in cases])
     head = [
-        "excitation", "peak", f"peak / force ({scale.unit})", "at (Hz)", "verdict", "points", f"with H = {response.first_name}",
+        f"excitation ({newton})", f"peak ({length})", f"peak / force ({unit})", "at (Hz)", "damping ratio (%)", "quality factor", "verdict", "points", f"with H = {response.first_name}",
         f"with {response.more_name if response.decides else 'other H'}", "failed", "Newton steps", "unknowns solved", "contact (s)", "linear (s)", "rest (s)",
     ]  # fmt: skip
     counts = [
@@ -23,18 +39,25 @@ def peaks(response: Response) -> Table:
         "unknowns_solved",
     ]
     clocks = ("seconds_contact", "seconds_linear", "seconds_rest")
-    rows = []
-    for case in response.cases:
-        value = response.peak_response(case)
-        rows.append(
-            [case.short, quantity(case.excitation, "N"),
-             quantity(value * (case.excitation if response.per_force else 1.0), response.length),
-             number(value * scale.factor, 4) if response.per_force else NONE, fixed(response.peak_hz(case), 2),
-             response.level(case) or NONE]
-            + [fixed(response.number_of(name, case), 0) for name in counts]
-            + [fixed(response.number_of(name, case), 2) for name in clocks]
-        )  # fmt: skip
-    return response.table("", _work_sentence(response), head, rows)
+    dampings, qualities = aligned(100 * zeta, 3), aligned(0.5 / zeta, 3)
+    rows = [
+        [case.short, *own, fixed(response.peak_hz(case), 2), damping, quality, response.level(case) or NONE]
+        + [fixed(response.number_of(name, case), 0) for name in counts]
+        + [fixed(response.number_of(name, case), 2) for name in clocks]
+        for case, *own, damping, quality in zip(cases, forces, sizes, ratios, dampings, qualities, strict=True)
+    ]  # fmt: skip
+    told = [*_damping_sentence(zeta), *_work_sentence(response)]
+    return response.table("", told, head, rows)
+
+
+def _damping_sentence(zeta: FloatArray) -> list[str]:
+    if not np.isfinite(zeta).any():
+        return []
+    text = (
+        "The damping ratio is that of a linear oscillator which loses as much at the peak: the work of the load in a cycle over 4π "
+        "times the largest energy that structure and contacts store. The quality factor is half its inverse."
+    )
+    return [text]
 
 
 def _work_sentence(response: Response) -> list[str]:

@@ -35,6 +35,7 @@ _OF = {
         "peak_amplitude": ("m", "largest amplitude of the report output"),
         "peak_frequency_hz": ("Hz", "frequency of the peak"),
         "peak_point": ("1", "index of the peak into point, -1 if none"),
+        "peak_damping": ("1", "equivalent damping ratio at the peak: work of the load in a cycle over 4π times the largest energy stored by structure and contacts; half the inverse of the quality factor"),
         "points": ("1", "accepted points"),
         "points_low": ("1", "accepted points with the harmonics of the first passage"),
         "points_high": ("1", "accepted points with other harmonics"),

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
 from stickslip.response.forced.response import ForcedPoint
-from stickslip.response.recovery import signals
+from stickslip.response.recovery import equivalent_damping, signals
 from stickslip.study.analyses.forced.comparison import Check
 from stickslip.study.analyses.forced.more_harmonics import ReferenceDoubt
 from stickslip.study.analyses.forced.points import Response
@@ -129,6 +129,7 @@ def _of_case(question: Question, response: Response, shift: tuple[float, float])
         "peak_amplitude": response.peak_amplitude,
         "peak_frequency_hz": response.peak_hz,
         "peak_point": response.peak,
+        "peak_damping": _damping(question, response),
         "points": len(response.accepted),
         "points_low": response.points_low,
         "points_high": len(response.accepted) - response.points_low,
@@ -142,6 +143,11 @@ def _of_case(question: Question, response: Response, shift: tuple[float, float])
         "retention_peak_shift": shift[0],
         "retention_frequency_shift_hz": shift[1],
     }
+
+
+def _damping(question: Question, response: Response) -> float:
+    top = response.top
+    return float("nan") if top is None else equivalent_damping(question.problem, top.point)
 
 
 def _of_points(question: Question, response: Response) -> Values:

@@ -1,0 +1,182 @@
+"""What went in, as the head of the page tells it: loads, contacts with the values of their laws, damping, cases, names."""
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from stickslip.report.content import Table
+from stickslip.report.model import of_first_case
+from stickslip.report.node import Node
+from stickslip.report.quantities import NONE, aligned, number, quantity, scale_for
+from stickslip.report.response import Response
+
+# endings of keys, the longer ones first; True: with a prefix such as µ or M
+_UNITS = (
+    ("n_per_m3", "N/m³", True), ("kg_per_m3", "kg/m³", False), ("n_per_m", "N/m", True), ("n_s_per_m", "N s/m", True),
+    ("kg_m2", "kg m²", False), ("pa", "Pa", True), ("rpm", "rpm", False), ("hz", "Hz", False), ("deg", "°", False),
+    ("kg", "kg", False), ("n", "N", True), ("m", "m", True), ("s", "s", True),
+)  # fmt: skip
+_SETTINGS = ("material", "damping", "rotation", "retention", "aero", "mistuning", "measured")
+_QUESTIONS = {"frequency_hz", "speed_rpm", "points", "modes", "nodal_diameters", "levels", "span", "orders"}  # fmt: skip
+_BLADE = re.compile(r"\[(\d+)\]$")
+_FEW_NAMES, _MOST_NAMES = 4, 24
+_LONGEST = 12  # entries of a list that are told
+
+
+def study_of(text: str) -> Mapping[str, Any]:
+    """Return the tables of a study file's text; none where there is no text, or no TOML."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        return {}
+
+
+def inputs(study: Mapping[str, Any], nodes: Mapping[str, Node]) -> list[Table]:
+    """Return the tables of what went in.
+
+    Parameters
+    ----------
+    study
+        Tables of the study file; empty for a model made in Python, whose contacts and outputs the result knows.
+    nodes
+        The analyses by their names.
+    """
+    response = next((n for n in nodes.values() if isinstance(n, Response)), None)
+    found = (_given(study, nodes), _contacts(study, response), _names(study, nodes))
+    return [table for table in found if table is not None]
+
+
+def told(key: str, value: Any) -> str:
+    """Write a key of a study file and its value in words: ``normal_stiffness_n_per_m = 5.2e8`` as ``normal stiffness 520 MN/m``."""
+    for ending, unit, scaled in _UNITS:
+        if key.endswith(f"_{ending}") and _numbers(value):
+            name = key.removesuffix(f"_{ending}").replace("_", " ")
+            each = value if isinstance(value, list) else [value]
+            if len(each) > 1 and scaled:
+                scale = scale_for(np.array(each, dtype=float), unit)
+                return f"{name} {_joined([number(v * scale.factor, 5) for v in each])} {scale.unit}"
+            if scaled:
+                return f"{name} {quantity(each[0], unit, 5)}"
+            return f"{name} {_joined([number(v, 5) for v in each])} {unit}"
+    return f"{key.replace('_', ' ')} {_plain(value)}"
+
+
+def _numbers(value: Any) -> bool:
+    each = value if isinstance(value, list) and value else [value]
+    return all(isinstance(v, int | float) and not isinstance(v, bool) for v in each)
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{k} = {_plain(v)}" for k, v in value.items())
+    if isinstance(value, list):
+        return _joined([_plain(v) for v in value])
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return number(value, 6) if isinstance(value, int | float) else str(value)
+
+
+def _joined(each: list[str]) -> str:
+    if len(each) <= _LONGEST:
+        return ", ".join(each)
+    return f"{', '.join(each[:4])}, ... {each[-1]} ({len(each)} values)"
+
+
+def _table(study: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """Return a table of the study, empty where it is missing or none."""
+    found = study.get(name, {})
+    return found if isinstance(found, dict) else {}
+
+
+def _flat(given: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in given.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{before}{key}.")
+        else:
+            yield f"{before}{key}", value
+
+
+def _given(study: Mapping[str, Any], nodes: Mapping[str, Node]) -> Table | None:
+    rows = [[f"load {name}", _load(own)] for name, own in _table(study, "load").items() if isinstance(own, dict)]  # fmt: skip
+    for name in _SETTINGS:
+        own = _table(study, name)
+        if own:
+            rows.append([name, "; ".join(told(key, value) for key, value in _flat(own))])
+    for name in nodes:
+        own = {k: v for k, v in _table(study, name).items() if k in _QUESTIONS}
+        if own:
+            rows.append([name.replace("_", " "), "; ".join(told(k, v) for k, v in own.items())])
+    varied = study.get("vary", {})
+    for own in varied if isinstance(varied, list) else [varied]:
+        rows += [[f"cases: {key}", _plain(v)] for key, v in _flat(own if isinstance(own, dict) else {})]  # fmt: skip
+    return Table((), rows, "Loads, damping, cases", numeric=False) if rows else None
+
+
+def _load(own: Mapping[str, Any]) -> str:
+    """Say where and how a load acts."""
+    along = own.get("direction", "")
+    along = f" along {_plain(along)}" if along else ""
+    size = next((told(k, own[k]) for k in ("force_n", "pressure") if k in own), "")
+    if "ratio_of" in own:
+        size = f"{own['ratio_of']} over {_plain(own.get('ratio', NONE))}"
+    static = own.get("harmonic", 1) == 0
+    rest = [told(k, v) for k, v in own.items() if k in ("engine_order", "phase_deg", "frequency_hz", "frequency_ratio")]  # fmt: skip
+    kind = "static" if static else f"harmonic {_plain(own.get('harmonic', 1))}"
+    return "; ".join([f"{size.removeprefix('force ')} on {own.get('on', NONE)}{along}", kind, *rest])  # fmt: skip
+
+
+def _contacts(study: Mapping[str, Any], response: Response | None) -> Table | None:
+    """Return a row a contact: what touches what, the values of its law, its points, and its force under the static loads."""
+    written = {n: o for n, o in _table(study, "contact").items() if isinstance(o, dict)}
+    known = dict(response.groups) if response and response.has("contact_law") else {}
+    names = list(dict.fromkeys([*known, *written]))
+    if not names or response is None:
+        return None
+    laws = response.labels_of("contact_law") if known else ()
+    forces = np.full(len(names), np.nan)
+    if response.has("static_force"):
+        normal = of_first_case(response, "static_force")[:, 2]
+        forces = np.array([-float(normal[known[n]].sum()) if n in known else np.nan for n in names])
+    rows = []
+    for name, force in zip(names, aligned(forces), strict=True):
+        own = dict(written.get(name, {}))
+        between = _plain(own.pop("between", NONE))
+        law = ", ".join(dict.fromkeys(laws[k] for k in known.get(name, ()))) or _plain(own.get("law", NONE))  # fmt: skip
+        values = "; ".join(told(k, v) for k, v in own.items() if k != "law") or NONE
+        rows.append([name, between, law, values, str(len(known.get(name, ()))), force])
+    head = ["contact", "between", "law", "values", "points", "normal force at rest (N)"]
+    kept = [k for k in range(len(head)) if any(row[k] != NONE for row in rows)]
+    cells = [[row[k] for k in kept] for row in rows]
+    return Table([head[k] for k in kept], cells, "Contacts", numeric=False)
+
+
+def _names(study: Mapping[str, Any], nodes: Mapping[str, Node]) -> Table | None:
+    """Say what each output is."""
+    node = next((n for n in nodes.values() if "output" in n.data.coords), None)
+    if node is None:
+        return None
+    output = _table(study, "output")
+    points, labels = _table(output, "points"), node.labels("output")
+    wanted = node.text("report_output")
+    rows = [[label, _meaning(label, points) + "; **its peak counts**" * (label == wanted)] for label in labels]  # fmt: skip
+    text = "Amplitudes are those of the harmonic that the load drives: half of peak to peak, where nothing else vibrates."
+    shown = sorted(rows, key=lambda row: row[0] != wanted)[:_MOST_NAMES]
+    more = [f"{len(rows) - len(shown)} more of the same kind."] if len(rows) > len(shown) else []
+    folded = "" if len(shown) < _FEW_NAMES else f"Names of {len(rows)} outputs, and what they are"
+    heading = "" if folded else "Names"
+    return Table(
+        ("name", "what it is"), shown, heading, (text,), numeric=False, items=more, folded=folded
+    )
+
+
+def _meaning(label: str, points: Mapping[str, Any]) -> str:
+    name, _, component = label.rpartition(".")
+    blade = _BLADE.search(name)
+    name = name[: blade.start()] if blade else name
+    turns = component.startswith("r") and len(component) == 2
+    way = f"rotation about {component[-1]}" if turns else f"motion along {component}"
+    of = f"node set or dof {_plain(points[name])}" if name in points else name
+    return f"{way} of {of}" + (f", in sector {blade[1]}" if blade else "")
