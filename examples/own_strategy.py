@@ -39,24 +39,25 @@ class Unbalanced:
 
 # A mass with a friction damper of a constant limit, shaken below its resonance: it sticks, then it slips.
 
-one = np.ones((1, 1))
-structure = ss.model.lumped(mass=one, stiffness=one, damping=0.02 * one, names=("blade",))
-friction = ss.Interface(
-    ("damper",), (ss.Jenkins(k_t=0.5, limit=0.035),), np.array([[1.0], [0.0], [0.0]])
-)
-system = ss.System(structure, friction, outputs=np.array([0]))
-shaker = ss.HarmonicLoad(np.zeros(1), {1: np.array([0.1 + 0j])})
-sweep = ss.Sweep(
-    omega_range=(0.1, 0.7), high=5, frequencies=13, peak_points=0, selection=Unbalanced()
-)  # high="auto" would ask it only where there are fewest harmonics, and go its own way beyond
-problem = ss.response.forced_problem(system, shaker, sweep)
-solved = list(ss.forced_response(system, shaker, sweep))
-points = ss.response.accepted_points(solved)
-for point in points:
-    kept = ", ".join(str(h) for h in point.support)
-    blade = abs(
-        ss.response.fields(problem, point).outputs[1, 0]
-    )  # point.coefficients: retained coordinates
-    print(f"{point.omega:.3f} rad/s: {blade:.4f} m with harmonics {kept}")
-unknowns = sum(system.retained.size * (2 * len(point.support) - 1) for point in solved)
-print(f"{unknowns} unknowns solved at {len(points)} frequencies")
+if __name__ == "__main__":
+    one = np.ones((1, 1))
+    structure = ss.model.lumped(mass=one, stiffness=one, damping=0.02 * one, names=("blade",))
+    friction = ss.Interface(
+        ("damper",), (ss.Jenkins(k_t=0.5, limit=0.035),), np.array([[1.0], [0.0], [0.0]])
+    )
+    system = ss.System(structure, friction, outputs=np.array([0]))
+    shaker = ss.HarmonicLoad(np.zeros(1), {1: np.array([0.1 + 0j])})
+    sweep = ss.Sweep(
+        omega_range=(0.1, 0.7), high=5, frequencies=13, peak_points=0, selection=Unbalanced()
+    )  # high="auto" would ask it only where there are fewest harmonics, and go its own way beyond
+    problem = ss.response.forced_problem(system, shaker, sweep)
+    solved = list(ss.forced_response(system, shaker, sweep))
+    points = ss.response.accepted_points(solved)
+    for point in points:
+        kept = ", ".join(str(h) for h in point.support)
+        blade = abs(
+            ss.response.fields(problem, point).outputs[1, 0]
+        )  # point.coefficients: retained coordinates
+        print(f"{point.omega:.3f} rad/s: {blade:.4f} m with harmonics {kept}")
+    unknowns = sum(system.retained.size * (2 * len(point.support) - 1) for point in solved)
+    print(f"{unknowns} unknowns solved at {len(points)} frequencies")

@@ -1,0 +1,109 @@
+"""The three doors of the documentation: what they show runs as it stands, on models that are made small."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from small_v2 import SECTOR_DECK, _written, write_four_masses
+from typer.testing import CliRunner
+
+from stickslip.cli import app
+from stickslip.front.study import Study
+from stickslip.study.analyses import ANALYSES
+
+ROOT = Path(__file__).parents[1]
+EXAMPLES = ROOT / "examples"
+
+
+def blocks(page: str, language: str) -> list[str]:
+    """Return the code of a page in a language, block by block."""
+    text = (ROOT / "docs" / "start" / f"{page}.md").read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
+
+
+def commands(page: str) -> list[list[str]]:
+    """Return the words of the commands of a page."""
+    lines = "".join(blocks(page, "console")).splitlines()
+    assert all(line.startswith("$ ") for line in lines)
+    return [line.partition("#")[0].split()[1:] for line in lines]
+
+
+def told(words: list[str]) -> None:
+    """Do a command."""
+    if words[0] == "cp":
+        shutil.copytree(words[2], words[3])
+        return
+    assert words[0] == "stickslip"
+    found = CliRunner().invoke(app, words[1:])
+    assert found.exit_code == 0, found.output
+
+
+def test_researcher(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(EXAMPLES)
+    code = blocks("researcher", "python")
+    assert len([line for line in code[0].splitlines() if line.strip()]) <= 30
+    names: dict[str, object] = {}
+    exec(compile("\n".join(code), "researcher.md", "exec"), names)  # our own page
+    said = capsys.readouterr().out
+    text = (ROOT / "docs" / "start" / "researcher.md").read_text(encoding="utf-8")
+    hertz, metres = re.search(r"5 +([\d.]+) +([\d.]+) +trusted", said).groups()
+    assert f"{1e3 * float(metres):.2f} mm at {float(hertz):.2f} Hz" in text
+    rows = dict(re.findall(r"^(\w+) +(\d+ [\d.]+ mm)$", said, flags=re.MULTILINE))
+    assert rows["always_low"].endswith("1.825 mm")
+    assert rows["grolet"].endswith("1.825 mm")
+    assert rows["guarded_alert"] == "400 1.648 mm"
+    assert rows["always_high"] == "660 1.648 mm"
+    own = re.findall(r"^(\w+): (\d+) unknowns, ([\d.]+) mm$", said, flags=re.MULTILINE)
+    assert [(kind, peak) for kind, _, peak in own] == [("str", "1.648"), ("Unbalanced", "1.648"), ("str", "1.648")]  # fmt: skip
+    assert int(own[1][1]) < int(own[2][1])
+    assert {p.name for p in tmp_path.iterdir()} >= {"response.html", "strategies.html", "curve.csv"}
+
+
+def test_designer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    first, *others = commands("designer")
+    told(first)
+    text = Path("my_damper/study.toml").read_text(encoding="utf-8")
+    wedge, vary, harmonics = blocks("designer", "toml")
+    assert "[vary]\nload.shaker.ratio" in vary
+    changed = re.sub(r"\[vary\].*?\n\n", vary + "\n", text, flags=re.DOTALL)
+    changed = re.sub(r"\[harmonics\].*?\n\n", harmonics + "\n", changed, flags=re.DOTALL)
+    Path("my_damper/study.toml").write_text(changed, encoding="utf-8")
+    assert len(Study.from_file("my_damper/study.toml").cases) == 6
+    own = (EXAMPLES / "own_blades" / "study.toml").read_text(encoding="utf-8")
+    assert all(re.sub(r"\s+#.*", "", line) in own for line in wedge.splitlines())
+    # the commands, on the smallest study in place of the blades
+    shutil.rmtree("my_damper")
+    write_four_masses(Path("my_damper"))
+    for words in others:
+        told(words)
+    assert Path("both.html").is_file()
+    exec(compile("\n".join(blocks("designer", "python")), "designer.md", "exec"), {})
+
+
+def test_analyst(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(EXAMPLES / "sector_deck" / "sector.inp", tmp_path)
+    *whole, vary = blocks("analyst", "toml")
+    Path("study.toml").write_text("\n".join([*whole, vary]), encoding="utf-8")
+    assert len(Study.from_file("study.toml").cases) == 3
+    inspect, _, few, _ = commands("analyst")  # the others are journeys of test_cli.py
+    few_points = {k: v for k, v in SECTOR_DECK.items() if not k.startswith("safe.")}
+    Path("study.toml").unlink()
+    _written(tmp_path, "\n".join(whole), few_points)
+    told(inspect)
+    told(few)
+    exec(compile("\n".join(blocks("analyst", "python")), "analyst.md", "exec"), {})
+
+
+def test_the_task_map_has_every_question_and_every_command() -> None:
+    page = (ROOT / "docs" / "tasks.md").read_text(encoding="utf-8")
+    assert [name for name in ANALYSES if f"`[{name}]`" not in page] == []
+    names = [c.name or c.callback.__name__ for c in app.registered_commands]
+    assert [name for name in names if not re.search(rf"`stickslip {name}\b", page)] == []
+    links = re.findall(r"\]\(([^)#]+)\)", page) + [f"../{e}" for e in re.findall(r"`(examples/\w+)`", page)]  # fmt: skip
+    assert [link for link in links if not (ROOT / "docs" / link).exists()] == []
