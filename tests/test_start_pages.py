@@ -107,3 +107,7 @@ def test_the_task_map_has_every_question_and_every_command() -> None:
     assert [name for name in names if not re.search(rf"`stickslip {name}\b", page)] == []
     links = re.findall(r"\]\(([^)#]+)\)", page) + [f"../{e}" for e in re.findall(r"`(examples/\w+)`", page)]  # fmt: skip
     assert [link for link in links if not (ROOT / "docs" / link).exists()] == []
+    told_of = page + (ROOT / "docs" / "journeys.md").read_text(encoding="utf-8")
+    assert [
+        f.name for f in EXAMPLES.iterdir() if f.is_dir() and f"examples/{f.name}" not in told_of
+    ] == []
