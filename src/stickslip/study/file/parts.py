@@ -37,6 +37,7 @@ from stickslip.study.file.section import (
     once,
     shown,
 )
+from stickslip.study.file.sets import SetTable
 
 
 class PartTable(Section):
@@ -205,6 +206,10 @@ class FileModel(PartTable):
     axis_origin_m: Triple = Field(
         [0.0, 0.0, 0.0],
         description="a point [x, y, z] of the axis in m, whatever the file's units; goes with axis_direction",
+    )
+    sets: dict[Name, SetTable] = Field(
+        default_factory=dict,
+        description="the tables sets.NAME: further node sets, picked by names, in a box or in a cylinder",
     )
     quadrature: Literal["exact", "calculix"] = Field(
         "exact",

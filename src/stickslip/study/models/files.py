@@ -22,6 +22,7 @@ from stickslip.model.readers.open_model import read_model
 from stickslip.model.readers.units import Units
 from stickslip.model.structure import Structure
 from stickslip.study.file.parts import FileModel
+from stickslip.study.models.sets import with_sets
 from stickslip.units import RPM
 
 ROOT = "root"
@@ -172,6 +173,7 @@ def _solid(
     clamped_sets: tuple[str, ...] = (),
     **others: Any,
 ) -> Part:
+    mesh = replace(mesh, node_sets=with_sets(key, table.sets, mesh.points, mesh.node_sets))
     faces = _faces(key, table, mesh.node_sets, sectors)
     free = _clamped(key, table, mesh)
     gone = *clamped_sets, *(name for name in mesh.node_sets if name not in free.node_sets)
@@ -198,6 +200,8 @@ def _from_matrices(key: str, table: FileModel, home: Path, others: dict[str, Any
     sectors = _sectors(key, table)
     files = {name: home / file for name, file in table.files().items()}
     structure = _matrices(key, table, files)
+    picked = with_sets(key, table.sets, structure.dofs.position, structure.sets)
+    structure = replace(structure, sets=picked)
     if table.plausible:
         refuse_indefinite(structure, str(files["file"]))
     mesh = None
