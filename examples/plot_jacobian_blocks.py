@@ -21,18 +21,15 @@ stiffness = np.diag([3e5] * 4 + [0.0, 0.0])
 for a, b, k in ((0, 1, 3e5), (2, 3, 3e5), (0, 2, 7e5), (1, 3, 7e5), (4, 5, 3e5)):
     stiffness[[a, b], [a, b]] += k
     stiffness[[a, b], [b, a]] -= k
-structure = ss.model.lumped(
-    np.array([1.0, 1, 1, 1, 0.1, 0.1]), stiffness, np.diag([20.0, 20, 20, 20, 0, 0])
-)
+mass, damping = np.array([1.0, 1, 1, 1, 0.1, 0.1]), np.diag([20.0, 20, 20, 20, 0, 0])
+structure = ss.model.lumped(mass, stiffness, damping)
 cos, sin = np.cos(np.pi / 6), np.sin(np.pi / 6)
 gap = np.zeros((6, 6))  # rows t, w, n of two contacts
 for contact, (blade, turn) in enumerate(((0, sin), (2, -sin))):
     local = np.array([[cos, turn], [turn, -cos]])
     gap[[3 * contact, 3 * contact + 2], 4:] = local
     gap[[3 * contact, 3 * contact + 2], blade : blade + 2] = -local
-load = ss.HarmonicLoad(
-    np.array([0, 0, 0, 0, 0, 120.0]), {1: -1j * np.array([0, -20.0, 5, 0, 0, 0])}
-)
+load = ss.HarmonicLoad(120.0 * np.eye(6)[5], {1: -1j * np.array([0, -20.0, 5, 0, 0, 0])})
 
 
 def solved(hertz, mu):
@@ -40,13 +37,9 @@ def solved(hertz, mu):
     law = ss.ElasticCoulomb(k_t=3e5, k_w=0.0, k_n=3e5, mu=mu)
     interface = ss.Interface(("left", "right"), (law, law), gap)
     system = ss.System(structure, interface, outputs=np.arange(4), free=np.array([4, 5]))
-    sweep = ss.Sweep(
-        omega_range=(2 * np.pi * (hertz - 1.0), 2 * np.pi * hertz),
-        high=5,
-        selection=ss.harmonic.JacobianAlert(threshold=-1.0),  # repeat whatever it says
-        frequencies=5,
-        peak_points=0,
-    )
+    alert = ss.harmonic.JacobianAlert(threshold=-1.0)  # repeat whatever it says
+    omega = 2 * np.pi * (hertz - 1.0), 2 * np.pi * hertz
+    sweep = ss.Sweep(omega_range=omega, high=5, selection=alert, frequencies=5, peak_points=0)
     points = list(ss.forced_response(system, load, sweep))
     low, high = (next(p for p in points[::-1] if p.stage == s) for s in ("low", "high"))
     return ss.response.forced_problem(system, load, sweep), low, high
@@ -60,41 +53,32 @@ def solved(hertz, mu):
 # :math:`\mu = 0.5` the left one slides in the first period to where the load pushes it, and sticks from then on. Its mean force depends on the
 # place where it stopped and so on all harmonics: the first row. None but the static one feels it.
 
-cases = {
-    "never slid": (155.0, 3.0),
-    "slid into place": (155.0, 0.5),
-    "weak": (220.0, 0.5),
-    "strong": (161.0, 0.5),
-}
+cases = {"never slid": (155.0, 3.0), "slid into place": (155.0, 0.5), "weak": (220.0, 0.5), "strong": (161.0, 0.5)}  # fmt: skip
 pictures, rows = {}, []
 for name, (hertz, mu) in cases.items():
     problem, low, high = solved(hertz, mu)
     balance = problem.high
     x, exact = (balance.unknowns(p.coefficients) for p in (low, high))
-    pictures[f"$J$, {name}: {hertz:g} Hz, $\\mu$ = {mu:g}"] = ss.harmonic.harmonic_block_norms(
-        balance, x, low.omega
-    )
+    norms = ss.harmonic.harmonic_block_norms
+    pictures[f"$J$, {name}: {hertz:g} Hz, $\\mu$ = {mu:g}"] = norms(balance, x, low.omega)
     if name in {"weak", "strong"}:
-        pictures[f"$\\Delta J$, {name}"] = ss.harmonic.harmonic_block_norms(
-            balance, x, low.omega, "missing", low.support
-        )
+        pictures[f"$\\Delta J$, {name}"] = norms(balance, x, low.omega, "missing", low.support)
     alike = ss.harmonic.jacobian_similarity(balance, x, exact, low.omega)
     rows.append((name, 100 * low.predicted_error, 100 * problem.real_error(low, high), alike))
 
 figure, axes = plt.subplots(2, 3, figsize=(13, 8.2), layout="constrained")
-order = [0, 2, 3, 1, 4, 5]  # stick on the left, then weak above strong
-titles = list(pictures)
-scale = LogNorm(1e-2, 40.0)
-for ax, title in zip(axes.flat, (titles[i] for i in order), strict=True):
-    norms = pictures[title]
+scale, titles = LogNorm(1e-2, 40.0), list(pictures)
+for ax, i in zip(
+    axes.flat, [0, 2, 3, 1, 4, 5], strict=True
+):  # stick on the left, then weak above strong
+    title, norms = titles[i], pictures[titles[i]]
     image = ax.imshow(np.ma.masked_less(norms, 1e-9), norm=scale, cmap="YlGnBu")
     for (h, k), value in np.ndenumerate(norms):
         if value > 1e-9:
-            color = "w" if value > 1.0 else "k"
-            ax.text(k, h, f"{value:.2g}", ha="center", va="center", color=color, fontsize=9)
-    ax.set(title=title, xlabel="motion in harmonic $k$", ylabel="force in harmonic $h$")
-    ax.set_xticks(range(len(norms)))
-    ax.set_yticks(range(len(norms)))
+            ax.text(
+                k, h, f"{value:.2g}", ha="center", va="center", color="w" if value > 1.0 else "k"
+            )
+    ax.set(title=title, xlabel="motion in harmonic $k$", ylabel="force in harmonic $h$", xticks=range(len(norms)), yticks=range(len(norms)))  # fmt: skip
 figure.colorbar(image, ax=axes, label="norm of the block", shrink=0.7)
 plt.show()
 
@@ -104,7 +88,5 @@ plt.show()
 
 print("                 predicted   real   dJ%   trace of Gamma  mean  zeros off the diagonal")
 for name, predicted, true, alike in rows:
-    print(
-        f"{name:15s}  {predicted:8.3f} % {true:6.3f} % {100 * alike.change:5.2f}  "
-        f"{alike.trace:8.3f} of {alike.size}  {alike.mean_diagonal:.4f}  {100 * alike.zero_share:.1f} %"
-    )
+    print(f"{name:15s}  {predicted:8.3f} % {true:6.3f} % {100 * alike.change:5.2f}", end="  ")
+    print(f"{alike.trace:8.3f} of {alike.size}  {alike.mean_diagonal:.4f}  {100 * alike.zero_share:.1f} %")  # fmt: skip

@@ -63,9 +63,7 @@ axes.semilogx(penalties, same / exact - 1.0, "o-", label=f"{2 * order + 1} sampl
 axes.semilogx(moderate, more / exact - 1.0, "s-", label=f"{64 * order} samples")
 axes.axhline(0.0, color="0.6", linewidth=0.8)
 axes.set(
-    xlabel=r"penalty $\varepsilon$ of the method, N/m",
-    ylabel="relative error of the amplitude",
-    title=f"Rigid contact, H = {order}",
+    xlabel=r"penalty $\varepsilon$ of the method, N/m", ylabel="relative error of the amplitude"
 )
 axes.legend()
 
@@ -91,10 +89,6 @@ axes.loglog(
     stiffnesses, differences[0] * (stiffnesses / stiffnesses[0]) ** -0.5, ":", label="$k^{-1/2}$"
 )
 axes.axhline(abs(abs(limit) / exact - 1.0), color="C1", label=f"rigid contact, H = {order}")
-axes.set(
-    xlabel="tangential stiffness $k$ of the contact, N/m",
-    ylabel="relative error of the amplitude",
-    title="The penalty law tends to the rigid one",
-)
+axes.set(xlabel="tangential stiffness $k$ of the contact, N/m", ylabel="relative error of the amplitude")  # fmt: skip
 axes.legend()
 plt.show()

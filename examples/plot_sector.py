@@ -8,18 +8,13 @@ diameter at rest and at speed, and one mode of the whole wheel. No solver and no
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 import stickslip as ss
 
-wheel = ss.BladedSector(
-    sectors=24,
-    shroud=ss.model.Shroud(gap=0.0004),  # 0.4 mm: the shrouds do not touch
-    disk_size=0.020,
-    platform_size=0.012,
-    airfoil_size=0.015,
-)
+shroud = ss.model.Shroud(gap=0.0004)  # 0.4 mm: the shrouds do not touch
+sizes = {"disk_size": 0.020, "platform_size": 0.012, "airfoil_size": 0.015}
+wheel = ss.BladedSector(sectors=24, shroud=shroud, **sizes)
 mesh = ss.model.mesh_sector(wheel)
 print(f"{len(mesh.points)} nodes, {len(mesh.cells)} second-order tetrahedra")
 
@@ -29,14 +24,10 @@ print(f"{len(mesh.points)} nodes, {len(mesh.cells)} second-order tetrahedra")
 # so do the side faces of the platforms and the contact faces of the shrouds, where neighbours meet.
 
 
-def draw(
-    axes: Axes, points: np.ndarray, triangles: np.ndarray, colors: np.ndarray, **view: float
-) -> None:
+def draw(axes, points, triangles, colors, **view):
     """Draw a skin, `triangles` (k, 3) of `points` (n, 3), with true proportions."""
-    skin = Poly3DCollection(
-        points[triangles], facecolors=colors, edgecolors="#0004", linewidths=0.2
-    )
-    axes.add_collection3d(skin)
+    paint = {"facecolors": colors, "edgecolors": "#0004", "linewidths": 0.2}
+    axes.add_collection3d(Poly3DCollection(points[triangles], **paint))
     low, high = points.min(axis=0), points.max(axis=0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_box_aspect(high - low, zoom=1.1)
