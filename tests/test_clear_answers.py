@@ -148,11 +148,17 @@ def test_a_deck_says_what_of_it_is_not_taken(tmp_path: Path) -> None:
     deck = write_deck(tmp_path / "deck.inp")
     more = "*BOUNDARY\nFOOT, 1, 3\n*STEP, NLGEOM\n*STATIC\n*DLOAD\nE, CENTRIF, 10000., 0., 0., 0., 0., 0., 1.\n*END STEP\n"
     deck.write_text(deck.read_text() + more)
-    path = file_study(tmp_path)
+    assert (
+        "rotation.speed_rpm: is missing, and the file of part.stub turns at 954.93 rpm"
+        in refused("check", str(file_study(tmp_path)))
+    )
+    path = file_study(tmp_path, "[rotation]\nspeed_rpm = 954.93")
+    assert "rpm" not in done("check", str(path))
+    path = file_study(tmp_path, "[rotation]\nspeed_rpm = 0.0")
     for command in ("check", "run"):
         said = done(command, str(path))
         assert "NLGEOM of *STEP (deck.inp: line 29): statics is linear here" in said
-        assert "its CENTRIF load of 954.93 rpm is not taken" in said
+        assert "its file turns at 954.93 rpm, the model at 0 rpm" in said
     assert "NLGEOM" in done("inspect", str(deck))
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from solid_models import box
+from test_readers_ansys import cube
 
 import stickslip as ss
 from stickslip.errors import InputError
@@ -90,3 +91,62 @@ def test_sets_of_matrices_hold_the_dofs_of_what_is_picked(block, tmp_path):
 def test_sets_that_pick_nothing_are_refused(block, tmp_path, key, message):
     with pytest.raises(InputError, match=message):
         study(tmp_path, "block.inp", key).model()
+
+
+ARCHIVE = """
+schema_version = 2
+[part.cube]
+file = "cube.cdb"
+units = "mm-t-s"
+sectors = 4
+"""
+PAIRS = "CP,1,UX,40,20\nCP,2,UY,40,20\nCP,3,UX,80,60 ! from CPCYC\n"
+
+
+def archive(folder, commands, keys=""):
+    (folder / "cube.cdb").write_text(cube() + commands)
+    (folder / "study.toml").write_text(ARCHIVE + keys)
+    return ss.Study.from_file(folder / "study.toml").model()
+
+
+def test_coupled_pairs_and_rotation_of_an_archive_are_taken(tmp_path):
+    speed = "\n[rotation]\nspeed_rpm = 9000.0"
+    model = archive(tmp_path, PAIRS + "OMEGA,0,0,942.477796\n", speed)
+    mesh = model.parts["cube"].mesh
+    low, high = (
+        mesh.numbers[mesh.node_sets[name]].tolist() for name in ("cyclic_low", "cyclic_high")
+    )
+    assert (low, high) == ([10, 20, 50, 60], [10, 40, 50, 80])  # two of them on the axis
+    assert model.neighbours is not None
+    assert not any("turns" in text for text in model.warnings)
+    model = archive(tmp_path, PAIRS + "OMEGA,0,0,942.477796\n", speed.replace("9000", "100"))
+    assert "part.cube: its file turns at 9000 rpm, the model at 100 rpm." in model.warnings
+
+
+@pytest.mark.parametrize(
+    ("commands", "keys", "message"),
+    [
+        (
+            PAIRS + "OMEGA,0,0,942.477796",
+            "",
+            r"rotation\.speed_rpm: is missing, .*part\.cube turns at 9000 rpm",
+        ),
+        (PAIRS + "CMOMEGA,ROTOR,0,0,9", "", r"line \d+: rotates by CMOMEGA"),
+        (PAIRS + "CE,R5.0,DEFI,1,2,0.0", "", r"line \d+: constrains the model \(CE\)"),
+        ("CP,1,UX,20,40,60", "", r"constrains the model \(CP\)"),
+        ("CP,1,UX,20,60", "", r"part\.cube\.sectors: is 4, and the file couples 1 pairs"),
+    ],
+)
+def test_what_an_archive_says_is_not_dropped(tmp_path, commands, keys, message):
+    with pytest.raises(InputError, match=message):
+        archive(tmp_path, commands, keys)
+
+
+def test_rotation_of_a_deck_in_other_words_is_refused(block, tmp_path):
+    deck = tmp_path / "block.inp"
+    deck.write_text(
+        deck.read_text()
+        + "*STEP\n*STATIC\n*DLOAD\nEALL, ROTA, 9., 0., 0., 0., 1., 0., 0.\n*END STEP\n"
+    )
+    with pytest.raises(InputError, match="rotates by ROTA, and rotation is read as CENTRIF alone"):
+        study(tmp_path, "block.inp").model()

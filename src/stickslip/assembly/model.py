@@ -30,7 +30,7 @@ from stickslip.contact.laws.rigid_coulomb import RigidCoulomb
 from stickslip.errors import input_error
 from stickslip.harmonic.rigid_contacts import STIFF
 from stickslip.model.axis import Axis
-from stickslip.model.facts import Facts, facts_of_parts, unlike_units
+from stickslip.model.facts import Facts, facts_of_parts, other_speeds, unlike_units
 from stickslip.model.modes import with_springs
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure, join
@@ -228,8 +228,9 @@ class Model:
         of_units = unlike_units(self.parts)
         of_outputs = far_outputs(self.places, self.outputs)
         of_fields = doubtful_fields(self.places, self.loads)
+        of_speeds = other_speeds(self.parts, self.speed)
         orders = beyond_sectors(self.loads, self.sectors)
-        own = [*of_parts, *of_units, *of_outputs, *of_wheel, *orders, *of_fields]
+        own = [*of_parts, *of_units, *of_speeds, *of_outputs, *of_wheel, *orders, *of_fields]
         return tuple(dict.fromkeys([*own, *self.pairs.warnings]))
 
     def spin(self, speed: float) -> Spin:

@@ -11,8 +11,10 @@ from stickslip.model.fe.solid import Material, Materials
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.part import Part
 from stickslip.model.structure import Structure
+from stickslip.units import RPM
 
 UNLIKE = 300.0  # times as large: millimetres and metres are 1000 apart
+SAME_SPEED = 1e-4  # relative: speeds are written with few digits
 DEGREE = 4  # integrates volume and first moment of straight-edged cells of second order exactly
 
 
@@ -92,6 +94,15 @@ def unlike_units(parts: Mapping[str, Part]) -> list[str]:
                         f"part.{one} has {what} {a:.3g} {unit}, part.{other} {b:.3g} {unit}: is a unit of one of them wrong?"
                     )
     return found
+
+
+def other_speeds(parts: Mapping[str, Part], speed: float) -> list[str]:
+    """Return a sentence on each part whose file turns at another speed than the model, rad/s."""
+    return [
+        f"part.{name}: its file turns at {part.own_speed / RPM:.6g} rpm, the model at {speed / RPM:.6g} rpm."
+        for name, part in parts.items()
+        if part.template is None and abs(part.own_speed - speed) > SAME_SPEED * part.own_speed > 0
+    ]
 
 
 def _size(part: Part) -> float:

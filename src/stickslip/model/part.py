@@ -166,6 +166,8 @@ class Part:
         What the user should know.
     clamped_sets
         Names of sets of which every node is held, so that nothing can act there.
+    own_speed
+        At which its file turns it, rad/s; 0: the file says nothing of it. A model has one speed of its own.
     """
 
     structure: Structure
@@ -183,6 +185,7 @@ class Part:
     place: Place | None = None
     warnings: tuple[str, ...] = ()
     clamped_sets: tuple[str, ...] = ()
+    own_speed: float = 0.0
     memo: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)  # its reductions
 
     def __repr__(self) -> str:

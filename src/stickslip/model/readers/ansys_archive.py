@@ -9,8 +9,10 @@ from stickslip.errors import InputError, input_error
 from stickslip.model.fe.solid import Material
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.readers.ansys_blocks import (
+    CONSTRAINTS,
     CUT_SHORT,
     NUMBER,
+    ROTATIONS,
     TYPE,
     WRITE,
     Blocks,
@@ -18,6 +20,7 @@ from stickslip.model.readers.ansys_blocks import (
 )
 from stickslip.model.readers.units import Units, check_material
 
+COUPLED = ("coupled_1", "coupled_2")
 NODES_OF_SOLID = {
     185: (8, 4),
     186: (20,),
@@ -42,7 +45,8 @@ def read_ansys_archive(path: Path | str, *, units: Units | None = None) -> Solid
     Returns
     -------
     SolidMesh
-        In metres, with the numbers of nodes and elements; node components are node sets in lower case.
+        In metres, with the numbers of nodes and elements; node components are node sets in lower case, and ``coupled_1`` and
+        ``coupled_2`` the first and the second nodes of coupled pairs (CP), as between the faces of a sector.
 
     Raises
     ------
@@ -64,9 +68,8 @@ def read_ansys_archive(path: Path | str, *, units: Units | None = None) -> Solid
             str(path), f"has elements at node {missing[0]}, which is not there", CUT_SHORT
         )
     points = blocks.points[order][np.searchsorted(numbers, used)]
-    sets = {
-        name: np.flatnonzero(np.isin(used, members)) for name, members in blocks.node_sets.items()
-    }
+    named = dict(blocks.node_sets) | dict(zip(COUPLED, _coupled(blocks).T, strict=True))
+    sets = {name: np.flatnonzero(np.isin(used, members)) for name, members in named.items()}
     return SolidMesh(
         units.length * points,
         np.searchsorted(used, cells),
@@ -121,6 +124,50 @@ def read_ansys_materials(
             check_material(material.density, material.young_modulus, units, place)
         materials[number] = material
     return materials
+
+
+def ansys_speed(path: Path, units: Units) -> float:
+    """Return the speed in rad/s that an archive turns at (OMEGA); 0 where it says none.
+
+    Raises
+    ------
+    InputError
+        If it turns otherwise than by OMEGA.
+    """
+    speed = 0.0
+    for place, (command, *rest) in read_blocks(path).commands:
+        if command.upper() not in ROTATIONS:
+            continue
+        try:
+            own = np.array([float(word or 0) for word in (*rest, "", "", "")[:3]])
+        except ValueError:
+            own = np.full(3, np.nan)  # CMOMEGA names a component first
+        if command.upper() == "OMEGA" and np.isfinite(own).all():
+            speed = float(np.linalg.norm(own)) / units.time
+        elif np.any(own != 0):
+            raise input_error(
+                place,
+                f"rotates by {command.upper()}, and rotation is read as OMEGA and three numbers alone",
+                "Turn all of the model about one axis with OMEGA, or delete the command.",
+            )
+    return speed
+
+
+def _coupled(blocks: Blocks) -> IntArray:
+    """Return the (k, 2) numbers of nodes that are coupled in pairs (CP); others, and constraint equations, are refused."""
+    pairs: dict[tuple[int, int], None] = {}
+    for place, (command, *words) in blocks.commands:
+        if command.upper() not in CONSTRAINTS:
+            continue
+        nodes = words[2:] if command.upper() == "CP" else []
+        if len(nodes) != 2 or not all(word.isdigit() for word in nodes):
+            raise input_error(
+                place,
+                f"constrains the model ({command.upper()}), and only coupled pairs of nodes are read (CP)",
+                "Delete it (CEDELE, CPDELE), or let ANSYS write its matrices (read_ansys_full).",
+            )
+        pairs[int(nodes[0]), int(nodes[1])] = None
+    return np.array([*pairs], dtype=np.int64).reshape(-1, 2)
 
 
 def _solids(path: Path, blocks: Blocks) -> IntArray:

@@ -23,6 +23,10 @@ CUT_SHORT = "The file was cut short: write or copy it again."
 WRITE = "Select the solids, then write: ESEL,S,ENAME,,185,187 then NSLE then CDWRITE,DB,model,cdb."
 
 
+ROTATIONS = ("OMEGA", "CMOMEGA", "CGOMGA", "DOMEGA", "CMDOMEGA", "DCGOMG")
+CONSTRAINTS = ("CE", "CP")
+
+
 @dataclass(frozen=True, eq=False)
 class Blocks:
     """What an archive holds, in its own units and numbers.
@@ -45,6 +49,8 @@ class Blocks:
         Node component, in lower case -> node numbers.
     properties
         Material number -> property -> value.
+    commands
+        (place, words) of commands that change the model: rotation, coupled dofs, constraint equations.
     """
 
     numbers: IntArray
@@ -55,6 +61,7 @@ class Blocks:
     types: Mapping[int, int]
     node_sets: Mapping[str, IntArray]
     properties: Mapping[int, Mapping[str, float]]
+    commands: tuple[tuple[str, list[str]], ...]
 
 
 def read_blocks(path: Path) -> Blocks:
@@ -72,6 +79,7 @@ def read_blocks(path: Path) -> Blocks:
     types: dict[int, int] = {}
     sets: dict[str, IntArray] = {}
     properties: dict[int, dict[str, float]] = {}
+    commands: list[tuple[str, list[str]]] = []
     at = 0
     while at < len(lines):
         words = [word.strip() for word in lines[at].split(",")]
@@ -90,6 +98,10 @@ def read_blocks(path: Path) -> Blocks:
             _property(path, at, words, properties)
             at += 1
         else:
+            if command in (*ROTATIONS, *CONSTRAINTS):
+                commands.append(
+                    (f"{path}: line {at + 1}", [w.split("!")[0].strip() for w in words])
+                )
             at += 1
     if not nodes:
         raise input_error(
@@ -105,6 +117,7 @@ def read_blocks(path: Path) -> Blocks:
         types,
         sets,
         properties,
+        tuple(commands),
     )
 
 

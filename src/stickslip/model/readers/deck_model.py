@@ -268,10 +268,19 @@ def _boundary(model: DeckModel, block: Block) -> None:
                 model.fixed[component].append(nodes)
 
 
+ROTATIONS = ("CENT", "CORIO", "ROTA", "ROTDYNF")  # of Abaqus
+
+
 def _distributed_load(model: DeckModel, block: Block) -> None:
     """Take rotation: ``elements, CENTRIF, speed², point of the axis, direction``; list other loads as ignored."""
     for place, fields in block.rows():
         kind = fields[1].upper() if len(fields) > 1 else ""
+        if kind in ROTATIONS:
+            raise input_error(
+                place,
+                f"rotates by {kind}, and rotation is read as CENTRIF alone",
+                "Write: elements, CENTRIF, speed², a point of the axis, its direction.",
+            )
         if kind != "CENTRIF":
             model.ignored.append(f"load {kind or '?'} ({place})")
             continue

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from stickslip.arrays import IntArray
 from stickslip.errors import InputError, input_error, nearest_and_known
@@ -15,7 +16,12 @@ from stickslip.model.fe.elements import EXACT, Quadrature
 from stickslip.model.fe.solid import Material, Materials
 from stickslip.model.mesh.solid_mesh import SolidMesh
 from stickslip.model.part import FACES, Part, solid_part, structure_part
-from stickslip.model.readers.ansys_archive import read_ansys_archive, read_ansys_materials
+from stickslip.model.readers.ansys_archive import (
+    COUPLED,
+    ansys_speed,
+    read_ansys_archive,
+    read_ansys_materials,
+)
 from stickslip.model.readers.calculix_deck import Deck, read_deck
 from stickslip.model.readers.definite import negative_damping, refuse_indefinite
 from stickslip.model.readers.open_model import read_model
@@ -23,11 +29,11 @@ from stickslip.model.readers.units import Units
 from stickslip.model.structure import Structure
 from stickslip.study.file.parts import FileModel
 from stickslip.study.models.sets import with_sets
-from stickslip.units import RPM
 
 ROOT = "root"
 DECKS, ARCHIVES = (".inp", ".inp.gz"), (".cdb",)
 MESHES = (*DECKS, *ARCHIVES)
+PITCH = 1e-4  # of the size of a sector, by which partners may lie beside each other
 COMPANIONS = (".mas", ".dof")  # what CalculiX writes beside a stiffness
 _KEPT = "Read it in Python, keep it with save_structure (.npz) and give that: use"
 
@@ -121,22 +127,10 @@ def _from_deck(
         held=deck.held if partly.any() else None,
         quadrature=deck.quadrature if table.quadrature == "calculix" else EXACT,
         clamped_sets=deck.clamped_sets,
-        warnings=(
-            *(f"{table.file}: passed over {text}" for text in deck.ignored),
-            *_own_speed(table, deck),
-        ),
+        warnings=(*(f"{table.file}: passed over {text}" for text in deck.ignored),),
+        own_speed=deck.speed or 0.0,
         **others,
     )
-
-
-def _own_speed(table: FileModel, deck: Deck) -> list[str]:
-    """Say that a deck's own speed is not taken."""
-    if not deck.speed:
-        return []
-    rpm = deck.speed / RPM
-    return [
-        f"{table.file}: its CENTRIF load of {rpm:.6g} rpm is not taken; the speed is that of [rotation]."
-    ]
 
 
 def _materials(deck: Deck) -> Materials:
@@ -158,9 +152,40 @@ def _from_archive(
                 "Add the table [material].",
             )
         given = next(iter(found.values()))
-    quadrature = Quadrature.calculix() if table.quadrature == "calculix" else EXACT
     sectors = _sectors(key, table)
-    return _solid(key, table, mesh, given, sectors, None, quadrature=quadrature, **others)
+    mesh = _cyclic_pairs(key, mesh, sectors, table.axis() or Axis())
+    quadrature = Quadrature.calculix() if table.quadrature == "calculix" else EXACT
+    speed = ansys_speed(path, _units(table))
+    return _solid(
+        key, table, mesh, given, sectors, None, quadrature=quadrature, own_speed=speed, **others
+    )
+
+
+def _cyclic_pairs(key: str, mesh: SolidMesh, sectors: int, axis: Axis) -> SolidMesh:
+    """Return a mesh with the cyclic faces that its coupled pairs are, and with them the nodes on the axis.
+
+    Raises
+    ------
+    InputError
+        If the pairs are no pitch apart: what they couple is not read.
+    """
+    sets = {name: own for name, own in mesh.node_sets.items() if name not in COUPLED}
+    if len(sets) == len(mesh.node_sets):
+        return mesh
+    near = PITCH * float(np.ptp(mesh.points, axis=0).max())
+    on_axis = np.flatnonzero(np.linalg.norm(axis.arm(mesh.points), axis=1) < near)
+    one, other = (mesh.node_sets[name] for name in COUPLED)
+    for low, high in ((one, other), (other, one)):
+        moved = axis.turned(mesh.points[low], 2 * np.pi / sectors)
+        distance, _ = cKDTree(mesh.points[high]).query(moved)
+        if sectors > 1 and distance.max() < near:
+            both = (np.union1d(own, on_axis) for own in (low, high))
+            return replace(mesh, node_sets=sets | dict(zip(FACES, both, strict=True)))
+    raise input_error(
+        f"{key}.sectors",
+        f"is {sectors}, and the file couples {one.size} pairs of nodes (CP) that lie no such pitch apart",
+        "Give the number of sectors, or delete the coupling (CPDELE).",
+    )
 
 
 def _solid(

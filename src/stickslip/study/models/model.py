@@ -10,6 +10,7 @@ from stickslip.assembly.aerodynamics import Aerodynamics
 from stickslip.assembly.contact import GROUND, NEXT, Contact, Join
 from stickslip.assembly.load import Load, Output
 from stickslip.assembly.model import Model
+from stickslip.errors import input_error
 from stickslip.model.part import Part
 from stickslip.study.file.loads import LoadTable
 from stickslip.study.file.tables import Tables
@@ -46,6 +47,7 @@ def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
     spare = spare_parts(tables)
     parts = {name: part for name, part in every.items() if name not in spare}
     rotation = tables.rotation
+    _require_speed(tables, parts)
     alike = Model(
         parts=parts,
         contacts={name: _contact(parts, table) for name, table in tables.contact.items()},
@@ -76,6 +78,20 @@ def model_of(tables: Tables, home: Path, memo: Memo) -> Model:
 
     mistuning = mistuning_of(tables, home, alike, every, own_name)
     return alike if mistuning is None else replace(alike, mistuning=mistuning)
+
+
+def _require_speed(tables: Tables, parts: Mapping[str, Part]) -> None:
+    """Refuse a study that does not say at which speed it is where a file turns."""
+    if "speed_rpm" in tables.rotation.model_fields_set:
+        return
+    for name, part in parts.items():
+        if part.own_speed:
+            rpm = part.own_speed / RPM
+            raise input_error(
+                "rotation.speed_rpm",
+                f"is missing, and the file of part.{name} turns at {rpm:.6g} rpm",
+                f"Write speed_rpm = {rpm:.6g} under [rotation], or 0 for the wheel at rest.",
+            )
 
 
 def _aerodynamics(tables: Tables, parts: Mapping[str, Part], home: Path) -> Aerodynamics | None:
