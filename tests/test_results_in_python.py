@@ -42,6 +42,25 @@ def test_entries_that_are_not_there_are_left_out_and_any_variable_may_be_asked_f
         result.to_dataframe("modes")
 
 
+def test_points_beyond_the_end_of_a_curve_are_no_rows_but_unsolved_points_are() -> None:
+    data = xr.Dataset({
+        "amplitude": (("case", "branch", "point"), [[[1.0, np.nan, np.nan]]]),
+        "frequency_hz": (("case", "branch", "point"), [[[5.0, 6.0, np.nan]]]),
+        "status": (("case", "branch", "point"), [[[0, 1, -1]]]),
+    })  # fmt: skip
+    frame = ss.Result(tree_of(nonlinear_mode=data)).to_dataframe()
+    assert frame["frequency_hz"].tolist() == [5.0, 6.0]
+
+
+def test_a_variable_may_be_called_as_its_dimension() -> None:
+    data = xr.Dataset({
+        "amplitude": (("case", "level", "point"), np.ones((1, 2, 2))),
+        "level": (("case", "level"), [[0.5, 3.0]]),
+    })  # fmt: skip
+    frame = ss.Result(tree_of(modal_synthesis=data)).to_dataframe()
+    assert frame["level"].tolist() == [0.5, 0.5, 3.0, 3.0]
+
+
 @pytest.mark.parametrize("name", ["forced_response", "nonlinear_mode", "safe"])
 def test_the_signature_of_a_question_has_the_keys_of_its_tables(name: str) -> None:
     told = signature(getattr(ss.Model, name)).parameters

@@ -8,7 +8,7 @@ from stickslip.errors import did_you_mean, input_error
 from stickslip.study.analyses.varied import varied_values
 
 # what the rows of a table are of, the first that an analysis has, that with most dimensions
-_CHIEF = ("amplitude", "largest", "damping", "pair_margin", "level", "frequency_hz", "linear_damping_ratio")  # fmt: skip
+_CHIEF = ("amplitude", "largest", "damping", "pair_margin", "level", "frequency_hz", "linear_damping_ratio", "answer")  # fmt: skip
 
 
 def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
@@ -41,9 +41,14 @@ def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
     per_case = {"case"} if dims != {"case"} else set()  # facts of a case stand in the dataset
     kept = [v for v in names if set(data[v].dims) <= dims and set(data[v].dims) - per_case]
     own = data[[chief, *(v for v in kept if v != chief)]]
-    frame = own.to_dataframe().reset_index()
-    if "status" not in own and frame[chief].dtype.kind == "f":
-        frame = frame[np.isfinite(frame[chief])].reset_index(drop=True)
+    frame = own.to_dataframe()
+    places = [n for n in frame.index.names if n not in frame.columns]  # a variable may be called as its dimension
+    frame = frame.reset_index(places).reset_index(drop=True)
+    if frame[chief].dtype.kind == "f":
+        there = np.isfinite(frame[chief])
+        if "status" in own and "frequency_hz" in own:  # a point without a solution has its frequency
+            there |= np.isfinite(frame["frequency_hz"])
+        frame = frame[there].reset_index(drop=True)
     case = frame["case"].to_numpy() if "case" in dims else None
     if at_case is not None:
         case = at_case[frame["point"].to_numpy()]
