@@ -128,6 +128,7 @@ def test_every_attempt_goes_on_from_the_furthest_and_damages_no_other(tmp_path: 
         assert [p.index for p in journal.records()] == [0, 1, 2]
         journal.seal()
     assert {p.name for p in left_behind(sealed)} == {f"a.{o}.part" for o in ("one", "two", "three")}  # fmt: skip
+    sealed.with_name("a.four.part-journal").touch()  # whose file another process has removed
     clear(sealed)
     assert [p.name for p in tmp_path.iterdir()] == ["a.job"]
     assert len(read_sealed(sealed, Point)[0]) == 3

@@ -42,9 +42,9 @@ def begin(sealed: Path, own: Path, record: type) -> None:
 
 
 def clear(sealed: Path) -> None:
-    """Remove what is left of a job that is sealed."""
-    for path in left_behind(sealed):
-        for file in (path, path.with_name(f"{path.name}{BESIDE}")):
+    """Remove what is left of a job that is sealed, files beside one that another process has removed meanwhile, too."""
+    for end in (AT_WORK, f"{AT_WORK}{BESIDE}"):
+        for file in sealed.parent.glob(f"{sealed.stem}.*{end.removeprefix('.')}"):
             with suppress(OSError):  # the next run in the folder does
                 file.unlink(missing_ok=True)
 
