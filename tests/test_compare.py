@@ -35,8 +35,43 @@ def pair() -> Comparison:
 def test_peaks_are_held_against_the_first_design_case_by_case(pair: Comparison) -> None:
     cases = list(zip(pair.peaks["case"], pair.peaks["design"], strict=True))
     assert cases == [(f"{KEY} = 50", "a"), (f"{KEY} = 50", "b"), (f"{KEY} = 5", "a"), (f"{KEY} = 20", "b")]  # fmt: skip
-    assert pair.peaks["against the first (%)"].tolist() == ["–", "20.00", "–", "–"]
-    assert pair.peaks["shift (Hz)"].tolist() == ["–", "0.000", "–", "–"]
+    nan = np.nan
+    np.testing.assert_allclose(pair.peaks["against the first (%)"], [nan, 20.0, nan, nan])
+    np.testing.assert_allclose(pair.peaks["shift (Hz)"], [nan, 0.0, nan, nan])
+
+
+def test_a_design_with_one_case_is_held_against_the_case_whose_values_its_study_has() -> None:
+    one, varied = design((20,), 1.5, 0.6), design((50, 20), 1.0, 0.6)
+    data = one.data["forced_response"].to_dataset().drop_vars(["vary", "vary_value"])
+    data["case_label"] = ("case", [""])
+    single = ss.Result(tree_of(forced_response=data))
+    single.data.attrs["study_toml"] = "[load.shaker]\nratio = 20\n"
+    found = ss.compare(varied, single, names=("varied", "one")).peaks
+    assert found["case"].tolist() == [f"{KEY} = 50", f"{KEY} = 20", ""]
+    np.testing.assert_allclose(found["against the first (%)"], [np.nan, np.nan, 50.0])
+    single.data.attrs["study_toml"] = "[load.shaker]\nratio = 30\n"
+    found = ss.compare(varied, single, names=("varied", "one")).peaks
+    assert np.isnan(found["against the first (%)"]).all()
+    found = ss.compare(single, varied, names=("one", "varied")).peaks
+    assert np.isfinite(found["against the first (%)"]).tolist() == [False, True, True]
+
+
+def test_numbers_that_are_written_otherwise_are_no_difference() -> None:
+    studies = [design((5,), 1.0, 0.6) for _ in range(2)]
+    for own, text in zip(studies, ("a = 2\nb = [1, 2.0]", "a = 2.0\nb = [1.0, 2]"), strict=True):
+        own.data.attrs["study_toml"] = text
+    assert len(ss.compare(*studies, names=("a", "b")).inputs) == 0
+
+
+def test_rotations_have_their_unit_and_stand_against_no_displacements() -> None:
+    own = design((5,), 1.0, 0.6)
+    turned = ss.Result(own.data.copy(deep=True))
+    data = turned.data["forced_response"].to_dataset()
+    names = [str(n).replace(".x", ".rx") for n in data["output"].values]
+    turned = ss.Result(tree_of(forced_response=data.assign_coords(output=names).assign_attrs(report_output=names[0])))  # fmt: skip
+    assert "amplitude (rad/N)" in ss.compare(turned, turned, names=("a", "b")).peaks
+    with pytest.raises(ss.InputError, match="are displacements and rotations"):
+        ss.compare(own, turned, names=("a", "b"))
 
 
 def test_only_what_differs_in_the_study_files_is_told(pair: Comparison) -> None:
@@ -79,6 +114,7 @@ def test_a_curve_from_a_file_is_held_against_the_best_case(tmp_path: Path) -> No
         ("frequency_hz,amplitude_um\n1,2\n2,-3\n", r"line 3: amplitude_um: is no amplitude"),
         ("hz,amplitude_um\n1,2\n", r"has no column frequency_hz"),
         ("frequency_hz,height\n1,2\n", r"has no column amplitude_m"),
+        ("frequency_hz,amplitude_um\n1,0\n", r"amplitude_um: is zero everywhere"),
     ],
 )
 def test_a_bad_curve_is_refused_by_its_line(tmp_path: Path, text: str, match: str) -> None:
@@ -97,6 +133,8 @@ def test_what_cannot_be_compared_is_refused(tmp_path: Path) -> None:
         ss.compare(one, one, names=("a", "a"))
     with pytest.raises(ss.InputError, match=r"none: no such file|none.*no such file"):
         ss.compare(one, tmp_path / "none")
+    with pytest.raises(ss.InputError, match="has no forced response to be held against"):
+        ss.compare(ss.Result(tree_of(modes=synthetic_result(ratios=(5,), n=8))), file)
     other = tmp_path / "per.csv"
     other.write_text("frequency_hz,amplitude_um_per_n\n1,2\n")
     with pytest.raises(ss.InputError, match=r"are amplitudes and amplitudes per newton"):

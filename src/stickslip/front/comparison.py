@@ -12,12 +12,11 @@ from stickslip.errors import did_you_mean, input_error
 from stickslip.front.result import Result
 from stickslip.front.study import Study
 from stickslip.front.table import Table
-from stickslip.report.content import Table as Shown
 from stickslip.report.designs import Design, MeasuredCurve, differences, per_force, read_curve
 from stickslip.report.frame import write_page
 from stickslip.report.plot import Plot
 from stickslip.report.result import RESULT
-from stickslip.report.side_by_side import comparison_html, contents
+from stickslip.report.side_by_side import comparison_html, contents, peak_rows, unit_of
 
 Compared = str | Path | Result
 _FOLDER = "results"  # of a study that names no other
@@ -65,15 +64,23 @@ class Comparison:
 
     @property
     def peaks(self) -> Table:
-        """A row for each case of each design: its peak, and how far it is from that of the first design."""
-        found = (own for own in self._contents.get("peaks", ()) if isinstance(own, Shown))
-        return _columns(next(found, None))
+        """A row for each case of each design: its peak, and how far it is from that of the first design; NaN where that has no such case."""
+        divided = per_force(self.designs, self.curves)
+        found = peak_rows(self.designs, divided=divided)
+        if not found:
+            return Table({})
+        columns = {
+            "case": "case", "design": "design", "frequency (Hz)": "hz", f"amplitude ({unit_of(self.designs, divided=divided)})": "height",
+            "verdict": "level", "against the first (%)": "off_percent", "shift (Hz)": "shift_hz",
+        }  # fmt: skip
+        return Table({n: np.array([getattr(row, own) for row in found]) for n, own in columns.items()})  # fmt: skip
 
     @property
     def inputs(self) -> Table:
         """What differs between the study files: a row a key, a column a design."""
-        head = ["key", *(d.name for d in self.designs)]
-        return _columns(Shown(head, differences(self.designs)))
+        head, rows = ["key", *(d.name for d in self.designs)], differences(self.designs)
+        columns = zip(*rows, strict=True) if rows else [() for _ in head]
+        return Table({n: np.array(own) for n, own in zip(head, columns, strict=True)})
 
     def report(self, path: str | Path = "comparison.html") -> Path:
         """Write the page; return it."""
@@ -84,13 +91,6 @@ class Comparison:
     def __repr__(self) -> str:
         names = ", ".join(d.name for d in self.designs)
         return f"Comparison of {names}\n{self.peaks!r}"
-
-
-def _columns(table: Shown | None) -> Table:
-    if table is None:
-        return Table({})
-    columns = zip(*table.rows, strict=True) if table.rows else [() for _ in table.head]
-    return Table({n: np.array(own) for n, own in zip(table.head, columns, strict=True)})
 
 
 def compare(*compared: Compared, names: Sequence[str] = ()) -> Comparison:

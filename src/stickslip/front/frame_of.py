@@ -42,11 +42,15 @@ def dataframe(data: xr.Dataset, name: str, of: str) -> pd.DataFrame:
     kept = [v for v in names if set(data[v].dims) <= dims and set(data[v].dims) - per_case]
     own = data[[chief, *(v for v in kept if v != chief)]]
     frame = own.to_dataframe()
-    places = [n for n in frame.index.names if n not in frame.columns]  # a variable may be called as its dimension
+    places = [
+        n for n in frame.index.names if n not in frame.columns
+    ]  # a variable may be called as its dimension
     frame = frame.reset_index(places).reset_index(drop=True)
     if frame[chief].dtype.kind == "f":
         there = np.isfinite(frame[chief])
-        if "status" in own and "frequency_hz" in own:  # a point without a solution has its frequency
+        if (
+            "status" in own and "frequency_hz" in own
+        ):  # a point without a solution has its frequency
             there |= np.isfinite(frame["frequency_hz"])
         frame = frame[there].reset_index(drop=True)
     case = frame["case"].to_numpy() if "case" in dims else None

@@ -18,6 +18,7 @@ from stickslip.report.plot import colour
 from stickslip.report.response import NEEDED, Response
 from stickslip.report.result import analysis
 from stickslip.report.waves import Waves
+from stickslip.study.analyses.varied import as_number, varied_values
 
 NAME = "forced_response"
 _PER_NEWTON = {f"{unit}_per_n": factor for unit, factor in LENGTHS.items()}
@@ -65,7 +66,7 @@ class Design:
         return Waves(data.isel(case=0) if "case" in data.dims else data)
 
     @cached_property
-    def inputs(self) -> dict[str, str]:
+    def inputs(self) -> dict[str, Any]:
         """All values of its study file by their dotted keys; empty for a model of Python."""
         try:
             return flattened(tomllib.loads(str(self.tree.attrs.get("study_toml", ""))))
@@ -73,18 +74,30 @@ class Design:
             return {}
 
     def case(self, label: str) -> ShownCase | None:
-        """Return the case of a label; the only one whatever its label; None where there is none."""
+        """Return the case of a label; None where there is none."""
         cases = self.response.cases if self.response else ()
-        if len(cases) == 1:
-            return cases[0]
         return next((c for c in cases if c.label == label), None)
 
-    @property
-    def best(self) -> ShownCase | None:
-        """Of its cases with the best verdict, the one with the smallest peak."""
+    def held_against(self, case: ShownCase, other: "Design") -> ShownCase | None:
+        """Return the case that one of another design is held against: the only one, that of its label, or that whose varied values the other's study file has."""
+        cases = self.response.cases if self.response else ()
+        own = self.case(case.label)
+        if self.response is None or own is not None or len(cases) == 1:
+            return own or next(iter(cases), None)
+        keys, values = varied_values(self.response.data)
+        given = [other.inputs.get(key) for key in keys]
+        same = (c for c in cases if all(map(_alike, given, values[c.index])))
+        return None if case.label else next(same, None)
+
+    def best(self, *, divided: bool) -> ShownCase | None:
+        """Of its cases with the best verdict, the one with the smallest peak, per newton of its load where it is `divided`."""
         if self.response is None or self.response.chosen < 0:
             return None
-        return self.response.cases[self.response.chosen]
+        first, own = self.response.cases[self.response.chosen], self.response
+        if divided or not own.per_force:
+            return first
+        alike = [c for c in own.peaked if own.level(c) == own.level(first) and own.resonates(c) == own.resonates(first)]  # fmt: skip
+        return min(alike, key=lambda c: own.peak_response(c) * c.excitation)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,14 +122,18 @@ class MeasuredCurve:
     per_force: bool
 
 
-def flattened(table: Mapping[str, Any], before: str = "") -> dict[str, str]:
+def _alike(given: object, value: object) -> bool:
+    return str(given) == str(value) or as_number(given) == as_number(value)
+
+
+def flattened(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
     """Return the values of nested tables by their dotted keys."""
-    found: dict[str, str] = {}
+    found: dict[str, Any] = {}
     for key, value in table.items():
         if isinstance(value, Mapping):
             found |= flattened(value, f"{before}{key}.")
         else:
-            found[f"{before}{key}"] = str(value)
+            found[f"{before}{key}"] = value
     return found
 
 
@@ -124,7 +141,7 @@ def differences(designs: Sequence[Design]) -> list[list[str]]:
     """Return a row for each key of the study files that is not the same in all: the key, then its value in each design."""
     keys = dict.fromkeys(key for d in designs for key in d.inputs)
     rows = [[key, *(d.inputs.get(key, MISSING) for d in designs)] for key in keys]
-    return [row for row in rows if len(set(row[1:])) > 1]
+    return [[str(cell) for cell in row] for row in rows if any(cell != row[1] for cell in row[2:])]
 
 
 def read_curve(path: Path) -> MeasuredCurve:
@@ -143,6 +160,9 @@ def read_curve(path: Path) -> MeasuredCurve:
     for row in np.flatnonzero(amplitude < 0)[:1]:
         name = columns.named("amplitude", units)[0]
         raise columns.wrong(int(row), name, "is no amplitude: it is below zero", "Give its size.")
+    if not np.any(amplitude):
+        name = columns.named("amplitude", units)[0]
+        raise input_error(f"{path}: {name}", "is zero everywhere", "Give the measured amplitudes.")
     order = np.argsort(hz, kind="stable")
     return MeasuredCurve(path.stem, hz[order], amplitude[order], per_force)
 
@@ -153,9 +173,15 @@ def per_force(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> boo
     Raises
     ------
     InputError
-        If curves cannot be compared with what the designs have.
+        If curves cannot be compared with what the designs have, or the designs' outputs not with each other.
     """
-    able = all(d.response.per_force for d in designs if d.response)
+    known = [d.response for d in designs if d.response]
+    if curves and not known:
+        raise input_error(curves[0].name, "has no forced response to be held against", "Give a result with [forced_response].")  # fmt: skip
+    if len({r.length for r in known}) > 1:
+        told = ", ".join(f"{d.name}: {d.response.output_name}" for d in designs if d.response)
+        raise input_error(told, "are displacements and rotations", "Compare results with the same kind of [output] peak.")  # fmt: skip
+    able = all(r.per_force for r in known)
     kinds = {c.per_force for c in curves}
     if len(kinds) > 1:
         raise input_error(

@@ -1,6 +1,7 @@
 """The page that holds designs against each other: peaks, responses, optimisation curves, inputs."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import plotly.graph_objects as go
@@ -40,6 +41,17 @@ def amplitudes(design: Response, *, divided: bool) -> FloatArray:
     return np.where(design.converged, whole / force if divided else whole, np.nan)
 
 
+def unit_of(designs: Sequence[Design], *, divided: bool) -> str:
+    """Return the unit of `amplitudes`."""
+    length = next((d.response.length for d in designs if d.response), "m")
+    return f"{length}/N" if divided else length
+
+
+def over_first(value: float, first: float) -> float:
+    """Return how far a value is from the first one in percent; NaN where that is zero."""
+    return 100.0 * (value / first - 1.0) if first else float("nan")
+
+
 def choices(designs: Sequence[Design]) -> tuple[ShownCase, ...]:
     """Return what the reader chooses between: the best case of each design, then each case that any of them has; nothing where each has one case."""
     labels = dict.fromkeys(
@@ -54,8 +66,11 @@ def choices(designs: Sequence[Design]) -> tuple[ShownCase, ...]:
     )
 
 
-def _case(design: Design, choice: ShownCase) -> ShownCase | None:
-    return design.best if choice.index == 0 else design.case(choice.label)
+def _case(design: Design, choice: ShownCase, *, divided: bool) -> ShownCase | None:
+    cases = design.response.cases if design.response else ()
+    if choice.index == 0:
+        return design.best(divided=divided)
+    return cases[0] if len(cases) == 1 else design.case(choice.label)
 
 
 def responses(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Plot | None:
@@ -64,7 +79,7 @@ def responses(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Plo
     if not told:
         return None
     divided, figure, offered = per_force(designs, curves), go.Figure(), choices(designs)
-    unit = told[0].response.length + ("/N" if divided else "") if told[0].response else "m"
+    unit = unit_of(designs, divided=divided)
     every = [amplitudes(d.response, divided=divided) for d in told if d.response]
     scale = scale_for(np.concatenate([*every, *(c.amplitude for c in curves)]), unit)
     for design, own in zip(told, every, strict=True):
@@ -72,7 +87,7 @@ def responses(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Plo
         if response is None:
             continue
         pairs: list[tuple[int | None, ShownCase | None]]
-        pairs = [(choice.index, _case(design, choice)) for choice in offered]
+        pairs = [(choice.index, _case(design, choice, divided=divided)) for choice in offered]
         if not offered or len(response.cases) == 1:
             pairs = [(None, response.cases[0])]
         for k, case in pairs:
@@ -90,7 +105,7 @@ def responses(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Plo
     figure.update_yaxes(title_text=f"amplitude{over} ({scale.unit})", type="log", **log_ticks(drawn))  # fmt: skip
     figure.update_xaxes(title_text="frequency (Hz)")
     caption = f"Amplitude of {joined([_output(d) for d in told])}. Open symbols are doubtful points, crosses wrong ones."
-    captions = {c.index: _shown(told, c) for c in offered}
+    captions = {c.index: _shown(told, c, divided=divided) for c in offered}
     return Plot("compared_responses", "Responses over each other", caption, figure, captions, 0 if offered else -1)  # fmt: skip
 
 
@@ -98,9 +113,9 @@ def _output(design: Design) -> str:
     return f"{design.response.output_name} ({design.name})" if design.response else design.name
 
 
-def _shown(designs: Sequence[Design], choice: ShownCase) -> str:
+def _shown(designs: Sequence[Design], choice: ShownCase, *, divided: bool) -> str:
     """Say which case of each design is drawn, and which have none."""
-    own = [(d, _case(d, choice)) for d in designs]
+    own = [(d, _case(d, choice, divided=divided)) for d in designs]
     there = [f"{d.name}: {c.label or 'its only case'}" for d, c in own if c is not None]
     without = [d.name for d, c in own if c is None]
     lacks = f" Without this case: {', '.join(without)}." if without else ""
@@ -134,7 +149,8 @@ def optimisation(designs: Sequence[Design], *, divided: bool) -> Plot | None:
         peak = np.array([_peak(response, c, divided=divided) for c in cases])
         heights.append(peak)
         curves.append((design, [c.value for c in cases], peak, [response.peak_hz(c) for c in cases]))  # fmt: skip
-    scale = scale_for(np.concatenate(heights), "m/N" if divided else "m")
+    unit_drawn = unit_of(designs, divided=divided)
+    scale = scale_for(np.concatenate(heights), unit_drawn)
     for design, values, peak, hz in curves:
         for panel, (y, unit) in enumerate(((scale.factor * peak, scale.unit), (hz, "Hz")), 1):
             figure.add_scatter(
@@ -151,7 +167,7 @@ def optimisation(designs: Sequence[Design], *, divided: bool) -> Plot | None:
     figure.update_yaxes(title_text=f"peak amplitude{over} ({scale.unit})", type="log", **log_ticks(drawn), col=1)  # fmt: skip
     figure.update_yaxes(title_text="peak frequency (Hz)", col=2)
     lowest = min(((float(np.nanmin(p)), d.name, v[int(np.nanargmin(p))]) for d, v, p, _ in curves), key=lambda t: t[0])  # fmt: skip
-    caption = f"Peak and its frequency over {key}. The smallest peak of all is that of {lowest[1]}, {quantity(lowest[0], 'm/N' if divided else 'm')} at {number(lowest[2], 4)}."
+    caption = f"Peak and its frequency over {key}. The smallest peak of all is that of {lowest[1]}, {quantity(lowest[0], unit_drawn)} at {number(lowest[2], 4)}."
     return Plot("compared_optimisation", "Optimisation curves over each other", caption, figure)
 
 
@@ -160,45 +176,62 @@ def _peak(response: Response, case: ShownCase, *, divided: bool) -> float:
     return float(amplitudes(response, divided=divided)[at]) if at >= 0 else float("nan")
 
 
-def peaks(designs: Sequence[Design], *, divided: bool) -> Table | None:
-    """Return a row for each case of each design: its peak, and how far it is from that of the first design."""
-    told = [d for d in designs if d.response is not None]
-    if not told:
-        return None
-    labels = [c.label for c in choices(designs)][1:] or [""]
-    unit = "m/N" if divided else "m"
-    rows, heights = [], []
+@dataclass(frozen=True)
+class PeakRow:
+    """The peak of a case of a design, in Hz and SI units, and how far it is from that of the first design: NaN where that has no such case."""
+
+    case: str
+    design: str
+    hz: float
+    height: float
+    level: str
+    off_percent: float
+    shift_hz: float
+
+
+def peak_rows(designs: Sequence[Design], *, divided: bool) -> list[PeakRow]:
+    """Return a row for each case of each design, case by case in the order of the first that has it."""
+    told = [(d, d.response) for d in designs if d.response is not None]
+    labels = dict.fromkeys(c.label for _, r in told for c in r.cases)
+    found = []
     for label in labels:
-        own = told[0].case(label)
-        of_first = (_peak(told[0].response, own, divided=divided), told[0].response.peak_hz(own)) if own and told[0].response else None  # fmt: skip
-        for design in told:
-            case, response = design.case(label), design.response
-            if case is None or response is None:
+        for design, response in told:
+            case, (first, of_first) = design.case(label), told[0]
+            if case is None:
                 continue
             height, hz = _peak(response, case, divided=divided), response.peak_hz(case)
-            off = [NONE, NONE]
-            if of_first and design is not told[0]:
-                off = [fixed(100 * (height / of_first[0] - 1), 2), fixed(hz - of_first[1], 3)]
-            heights.append(height)
-            rows.append([label or NONE, design.name, fixed(hz, 3), response.level(case) or NONE, *off])  # fmt: skip
-    prefixed, cells = column(np.array(heights), unit)
-    head = ["case", "design", f"peak ({prefixed})", "at (Hz)", "verdict", "against the first (%)", "shift (Hz)"]  # fmt: skip
-    return Table(head, [[*row[:2], cell, *row[2:]] for row, cell in zip(rows, cells, strict=True)])
+            like, off, shift = first.held_against(case, design), float("nan"), float("nan")
+            if design is not first and like is not None:
+                off = over_first(height, _peak(of_first, like, divided=divided))
+                shift = hz - of_first.peak_hz(like)
+            found.append(PeakRow(label, design.name, hz, height, response.level(case), off, shift))
+    return found
+
+
+def peaks(designs: Sequence[Design], *, divided: bool) -> Table | None:
+    """Return a row for each case of each design: its peak, and how far it is from that of the first design."""
+    found = peak_rows(designs, divided=divided)
+    if not found:
+        return None
+    unit, cells = column(np.array([p.height for p in found]), unit_of(designs, divided=divided))
+    head = ["case", "design", f"peak ({unit})", "at (Hz)", "verdict", "against the first (%)", "shift (Hz)"]  # fmt: skip
+    return Table(head, [
+        [p.case or NONE, p.design, cell, fixed(p.hz, 3), p.level or NONE, fixed(p.off_percent, 2), fixed(p.shift_hz, 3)]
+        for p, cell in zip(found, cells, strict=True)
+    ])  # fmt: skip
 
 
 def against_curves(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Table | None:
-    """Return how far the best case of each design is from each curve that was read: at the peak, and along it."""
+    """Return how far each case of each design is from each curve that was read: at the peak, and along it."""
     if not curves:
         return None
     divided, rows = per_force(designs, curves), []
     for curve in curves:
         top = int(np.argmax(curve.amplitude))
-        for design in designs:
-            case, response = design.best, design.response
-            if case is None or response is None:
-                continue
+        every = [(d, d.response, c) for d in designs if d.response for c in d.response.cases]
+        for design, response, case in every:
             height, hz = _peak(response, case, divided=divided), response.peak_hz(case)
-            off = percent(100 * (height / curve.amplitude[top] - 1), 3)
+            off = percent(over_first(height, float(curve.amplitude[top])), 3)
             rows.append([curve.name, design.name, case.label or NONE, off, fixed(hz - float(curve.hz[top]), 3), _along(response, case, curve, divided=divided)])  # fmt: skip
     head = ["curve", "design", "case", "peak off by", "frequency off by (Hz)", "largest difference along it"]  # fmt: skip
     told = "Along a curve: the difference of the amplitudes over the curve's peak, where frequencies of both overlap, with straight lines between the points of the design."
@@ -232,9 +265,11 @@ def frequencies(designs: Sequence[Design]) -> Table | None:
     for wave, mode in known[0]:
         if all((wave, mode) in each for each in known):
             own = [each[wave, mode] for each in known]
-            rows.append([f"{wave}, mode {mode + 1}", *(number(f, 7) for f in own), *(percent(100 * (f / own[0] - 1), 3) for f in own[1:])])  # fmt: skip
+            rows.append([f"{wave}, mode {mode + 1}", *(number(f, 7) for f in own), *(percent(over_first(f, own[0]), 3) for f in own[1:])])  # fmt: skip
     head = ["", *(f"{d.name} (Hz)" for d, _ in told), *(f"{d.name} off by" for d, _ in told[1:])]
-    return Table(head, rows, "Natural frequencies") if rows else None
+    several = any(d.tree["modes"].sizes.get("case", 1) > 1 for d, _ in told)
+    said = ("Of the first case of each design.",) if several else ()
+    return Table(head, rows, "Natural frequencies", said) if rows else None
 
 
 def inputs(designs: Sequence[Design]) -> Table | Words:
@@ -251,18 +286,19 @@ def inputs(designs: Sequence[Design]) -> Table | Words:
 
 
 def _cards(designs: Sequence[Design], *, divided: bool) -> list[Card]:
-    found, first = [], None
+    found: list[Card] = []
+    first, name = float("nan"), ""
     for design in designs:
-        case, response = design.best, design.response
+        case, response = design.best(divided=divided), design.response
         if case is None or response is None:
             continue
         height = _peak(response, case, divided=divided)
         note = f"at {number(response.peak_hz(case), 5)} Hz{case.where}; {response.level(case) or 'no verdict'}"
-        if first is None:
-            first = height
+        if not name:
+            first, name = height, design.name
         else:
-            note += f"; {percent(100 * (height / first - 1), 3)} against {designs[0].name}"
-        found.append(Card(quantity(height, "m/N" if divided else "m"), f"smallest peak of {design.name}", note))  # fmt: skip
+            note += f"; {percent(over_first(height, first), 3)} against {name}"
+        found.append(Card(quantity(height, unit_of(designs, divided=divided)), f"smallest peak of {design.name}", note))  # fmt: skip
     return found
 
 
