@@ -15,9 +15,12 @@ from synthetic_wheel import campbell_result, modes_result, safe_result
 
 from stickslip.errors import InputError
 from stickslip.front.model import Model
+from stickslip.front.printed import aligned
 from stickslip.front.result import Result
 from stickslip.front.screen import LOG, Screen, by_default, on_screen
 from stickslip.front.study import Study
+from stickslip.study.file.keys import REQUIRED, table_keys
+from stickslip.study.keep.progress import advance, at_work, sum_up
 
 ROOT = Path(__file__).parents[1]
 
@@ -186,13 +189,27 @@ def test_two_blades_in_fifteen_lines(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert here == pytest.approx(there, rel=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("cells", "same"),
+    [
+        (["0.25035", "0.40891", "1.1868"], ["0.2504", "0.4089", "1.1868"]),
+        (["13.954", "180.777"], ["13.954", "180.777"]),
+        (["12", "7"], ["12", "7"]),
+        (["123.45", "", "0.012"], ["123.450", "", "0.012"]),
+        (["0.5", "-"], ["0.5", "-"]),
+    ],
+)
+def test_numbers_of_a_column_have_the_same_decimals(cells: list[str], same: list[str]) -> None:
+    assert aligned(cells) == same
+
+
 def said(width: int = 200, **options: bool) -> tuple[Screen, io.StringIO]:
     stream = io.StringIO()
     return Screen(Console(file=stream, width=width), **options), stream
 
 
 def test_the_screen_writes_lines_and_every_tenth_of_a_job() -> None:
-    screen, stream = said(warnings=False)
+    screen, stream = said(warnings=False, verbose=True)
     with on_screen(screen):
         LOG.info("reading")
         for step in range(101):
@@ -203,6 +220,31 @@ def test_the_screen_writes_lines_and_every_tenth_of_a_job() -> None:
     assert len(lines) == 1 + 11
     assert lines[-1] == "  modes 100 %: step 100"
     assert LOG.handlers == []
+
+
+def test_a_job_leaves_one_line_and_points_are_said_where_they_are_asked_for() -> None:
+    for verbose, count in ((False, 2), (True, 5)):
+        screen, stream = said(warnings=False, verbose=verbose)
+        with on_screen(screen):
+            LOG.info("reading")
+            with at_work("response: a = 1"):
+                advance(0.5, "point 3")
+                sum_up("peak 2 mm", "a = 1: peak 2 mm, 3 Newton steps")
+        lines = stream.getvalue().splitlines()
+        assert len(lines) == count, lines
+        assert lines[-1] == "response: a = 1: peak 2 mm (0 s)"
+
+
+def test_keys_of_a_table_are_told_with_defaults_and_meanings() -> None:
+    (found,) = table_keys("forced_response")
+    told = {key: (default, meaning) for key, default, meaning in found.rows}
+    assert told["peak_points"][0] == "8"
+    assert told["points"][1]
+    (law,) = table_keys("contact.elastic_coulomb")
+    assert law.title == '[contact.NAME] with law = "elastic_coulomb"'
+    assert ("friction_coefficient", REQUIRED) in [row[:2] for row in law.rows]
+    with pytest.raises(InputError, match="forced_response"):
+        table_keys("forced_responses")
 
 
 def test_silence_is_a_matter_of_the_logging_level(

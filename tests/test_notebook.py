@@ -23,8 +23,7 @@ class Output:
 def test_each_job_has_a_line_and_what_is_doubtful_stands_below() -> None:
     output = Output()
     with on_screen(NotebookScreen(output)):
-        with at_work("case <1>"):
-            advance(0.5, "150.00 Hz")
+        LOG.info("150.00 Hz", extra={"fraction": 0.5, "job": "case <1>"})
         with at_work("case <2>"):
             LOG.info("a line that nobody needs")
             tell("doubtful", "too few harmonics")
@@ -32,7 +31,7 @@ def test_each_job_has_a_line_and_what_is_doubtful_stands_below() -> None:
     last = output.shown[-1]
     first, second, told = last["text/plain"].splitlines()
     assert first == f"case <1> {'█' * 12}{'░' * 12}  50 % 150.00 Hz"
-    assert second == f"case <2> {'█' * 24} 100 %"
+    assert second == f"case <2> {'█' * 24} 100 % done"
     assert told == "DOUBTFUL: too few harmonics"
     assert "case &lt;1&gt;" in last["text/html"]
 

@@ -184,6 +184,10 @@ RULES: dict[str, tuple[dict[str, object], str, dict[int, str], str]] = {
         {"frequency_hz": np.array([10.0, 11.0, 12.0, 13.0, 13.5, 12.7]), "lowest_hz": [10.0], "highest_hz": [13.0]}, "doubtful", {},
         "stands at the end of the sweep (13.00 Hz)",
     ),
+    "peak at the end of the range, a smaller one inside": (
+        {"amplitude": [1.0, 2.0, 1.8, 2.4, 2.3, 2.2], "lowest_hz": [10.0], "highest_hz": [13.0]}, "doubtful", {},
+        "inside the sweep the largest maximum is 2000 mm at 11.00 Hz",
+    ),
     "peak within the range, a fold beyond it": (
         {"frequency_hz": np.array([10.0, 11.0, 12.0, 13.0, 14.2, 14.0]), "lowest_hz": [10.0], "highest_hz": [14.0]}, "trusted", {},
         "folds between 14.00 and 14.20",

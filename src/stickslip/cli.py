@@ -99,10 +99,14 @@ def run(
     report: Annotated[
         bool, typer.Option("--report/--no-report", help="Write the HTML report.")
     ] = True,
+    verbose: Annotated[
+        bool,
+        typer.Option("--verbose", "-v", help="Say what jobs say on their way: points, checks."),
+    ] = False,
 ) -> None:
     """Answer the questions of a study; an interrupted run goes on where it stopped."""
     with _errors_as_text():
-        with on_screen(Screen(console(), workers, warnings=False)):
+        with on_screen(Screen(console(), workers, warnings=False, verbose=verbose)):
             result = read(study).run(
                 workers=workers,
                 only=only or (),
@@ -126,7 +130,7 @@ def check(study: StudyFile) -> None:
         with on_screen(Screen(console(), warnings=False)):
             warnings = read(study).check()
         for text in warnings:
-            say(f"WARNING: {text}")
+            say(f"DOUBTFUL: {text}")
         say(f"{study}: good to run")
 
 
@@ -322,6 +326,27 @@ def compile_() -> None:
         one_blas_thread()
         for done in compile_ahead(os.cpu_count() or 1):
             say(f"compiled: {done}")
+
+
+@app.command()
+def keys(
+    table: Annotated[
+        str,
+        typer.Argument(
+            metavar="TABLE",
+            help="Such as forced_response, or a kind of one: contact.elastic_coulomb. Left out: which tables there are.",
+        ),
+    ] = "",
+) -> None:
+    """Say what a table of a study file may hold: keys, defaults, meanings."""
+    with _errors_as_text():
+        from stickslip.study.file.keys import table_keys, tables_of_file
+
+        for found in table_keys(table) if table else [tables_of_file()]:
+            head = ("key", "default", "meaning") if table else ("table or key", "", "meaning")
+            kept = [k for k in range(3) if head[k]]
+            rows = [[row[k] for k in kept] for row in found.rows]
+            say_columns(found.title, [head[k] for k in kept], rows)
 
 
 @app.command()

@@ -1,13 +1,18 @@
 """What commands print: lines and tables, on a terminal or a wide page."""
 
+import math
+import re
 import sys
 from collections.abc import Iterable, Sequence
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from stickslip.errors import printable
 
+_NUMBER = re.compile(r"-?\d+(\.\d+)?")
+_DIGITS = 5  # of the largest number of a column
 PLAIN_WIDTH = 130  # columns of a table that is not on a terminal
 
 
@@ -27,6 +32,20 @@ def say_lines(title: str, texts: Sequence[str]) -> None:
         say(text)
 
 
+def aligned(cells: Sequence[str]) -> list[str]:
+    """Return the cells of a column of numbers with the same decimals: those of the largest, more where the smallest needs them for two digits."""
+    numbers = [c for c in cells if c]
+    if not numbers or not all(_NUMBER.fullmatch(c) for c in numbers):
+        return list(cells)
+    sizes = [abs(float(c)) for c in numbers if float(c) != 0.0]
+    each = {len(c.partition(".")[2]) for c in numbers}
+    if not sizes or len(each) == 1:
+        return list(cells)
+    of_largest, of_smallest = (math.floor(math.log10(v)) for v in (max(sizes), min(sizes)))
+    decimals = min(max(each), max(0, _DIGITS - 1 - of_largest, 1 - of_smallest))
+    return [f"{float(c):.{decimals}f}" if c else c for c in cells]
+
+
 def say_table(
     title: str, head: Sequence[str], rows: Sequence[Sequence[str]], lines: Sequence[str]
 ) -> None:
@@ -39,8 +58,9 @@ def say_table(
     told = [k for k in range(len(head)) if any(row[k] for row in rows)]
     for name in (head[k] for k in told):
         table.add_column(name, justify="right")
-    for cells in rows:
-        table.add_row(*(cells[k] for k in told))
+    columns = [aligned([row[k] for row in rows]) for k in told]
+    for cells in zip(*columns, strict=True):
+        table.add_row(*cells)
     console().print(table)
     for line in lines:
         say(f"  {line}")
@@ -53,5 +73,5 @@ def say_columns(title: str, names: Iterable[str], rows: Iterable[Sequence[str]])
     for name in names:
         table.add_column(name, overflow="fold")
     for cells in rows:
-        table.add_row(*(printable(cell) for cell in cells))
+        table.add_row(*(Text(printable(cell)) for cell in cells))
     console().print(table)

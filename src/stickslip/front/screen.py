@@ -3,37 +3,48 @@
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
+from time import monotonic
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from stickslip.errors import printable
 from stickslip.front.notebook import NotebookScreen, in_notebook
-from stickslip.study.keep.progress import head
+from stickslip.study.keep.progress import DONE, head
 
 LOG = logging.getLogger("stickslip")
 STEPS = 10  # plain lines that a job writes on its way
+BETWEEN = 60.0  # seconds between plain lines of a job, where points are not asked for
+FULL = "━" * 10  # the bar of a job that is done
 
 
 class Screen(logging.Handler):
-    """Draws records of progress as bars, or writes some of them as lines; writes all others as lines.
+    """Draws a bar for each job at work and leaves a line of it when it is done; writes all that belongs to no job as lines.
 
     Parameters
     ----------
     console
-        Where to write.
+        Where to write; where it is no terminal, lines stand in place of bars.
     bars
         Most bars at a time: one a worker.
     warnings
         Whether to write warnings and verdicts: not where they are listed at the end.
+    verbose
+        Whether to write what jobs say on their way, too, as the log of a run has it.
     """
 
-    def __init__(self, console: Console, bars: int = 1, *, warnings: bool = True) -> None:
+    def __init__(
+        self, console: Console, bars: int = 1, *, warnings: bool = True, verbose: bool = False
+    ) -> None:
         super().__init__()
-        self._console, self._bars, self._warnings = console, bars, warnings
+        self._console, self._bars = console, bars
+        self._warnings, self._verbose = warnings, verbose
         self._progress: Progress | None = None
         self._tasks: dict[str, TaskID] = {}
         self._steps: dict[str, int] = {}
+        self._begun: dict[str, float] = {}
+        self._told: dict[str, float] = {}
+        self._sums: dict[str, str] = {}
 
     @contextmanager
     def shown(self) -> Iterator[None]:
@@ -53,29 +64,57 @@ class Screen(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Show a record."""
-        text, fraction = record.getMessage(), getattr(record, "fraction", None)
+        text, job = record.getMessage(), str(getattr(record, "job", ""))
+        fraction = getattr(record, "fraction", None)
+        if job and job not in self._begun:
+            self._begun[job] = self._told[job] = monotonic()
         if fraction is not None:
-            self._advance(str(getattr(record, "job", "")), float(fraction), text)
-        elif self._warnings or not head(record):
-            self._line(f"{head(record)}{text}")
+            self._advance(job, float(fraction), text)
+            return
+        if hasattr(record, "sums_up"):
+            self._sums[job] = str(record.sums_up)
+        if head(record):
+            if self._warnings:
+                self._line(f"{head(record)}{text}")
+        elif self._verbose or not job:
+            self._line(text)
 
     def _line(self, text: str) -> None:
         self._console.print(printable(text), markup=False, highlight=False, soft_wrap=True)
 
     def _advance(self, job: str, fraction: float, text: str) -> None:
-        if self._progress is None:
-            step = int(STEPS * fraction)
-            if step > self._steps.get(job, -1):
-                self._steps[job] = step
-                self._line(text if step == 0 else f"  {job} {100 * fraction:.0f} %: {text}")
+        if text == DONE:
+            self._done(job)
+        elif self._progress is None:
+            self._plain(job, fraction, text)
+        else:
+            if job not in self._tasks:
+                while len(self._tasks) >= self._bars:  # of workers that were lost
+                    self._progress.remove_task(self._tasks.pop(next(iter(self._tasks))))
+                self._tasks[job] = self._progress.add_task(job or "model", total=1.0, state="")
+            state = "" if text == job or not self._verbose else text
+            self._progress.update(self._tasks[job], completed=fraction, state=state)
+
+    def _plain(self, job: str, fraction: float, text: str) -> None:
+        """Write some of the states of a job: without `verbose` no more than one a minute."""
+        if not self._verbose:
+            if monotonic() - self._told.get(job, monotonic()) > BETWEEN:
+                self._told[job] = monotonic()
+                self._line(f"  {job} {100 * fraction:.0f} %")
             return
-        if job not in self._tasks:
-            # the oldest is done: a worker does one job after the other
-            while len(self._tasks) >= self._bars:
-                self._progress.remove_task(self._tasks.pop(next(iter(self._tasks))))
-            self._tasks[job] = self._progress.add_task(job or "model", total=1.0, state="")
-        state = "" if text == job else text
-        self._progress.update(self._tasks[job], completed=fraction, state=state)
+        step = int(STEPS * fraction)
+        if step > self._steps.get(job, -1):
+            self._steps[job] = step
+            self._line(text if step == 0 else f"  {job} {100 * fraction:.0f} %: {text}")
+
+    def _done(self, job: str) -> None:
+        """Leave the line of a job that is done."""
+        seconds = monotonic() - self._begun.get(job, monotonic())
+        told = f"{job}: {self._sums.get(job, DONE)} ({seconds:.0f} s)"
+        if self._progress is not None and job in self._tasks:
+            self._progress.remove_task(self._tasks.pop(job))
+            told = f"{FULL} {told}"
+        self._line(told)
 
 
 @contextmanager

@@ -20,7 +20,7 @@ from stickslip.study.keep.attempts import begin, clear, file_at_work, left_behin
 from stickslip.study.keep.cell import Cell, Ended, Limits, OutOfTime, Stopped, blas_threads
 from stickslip.study.keep.folder import token_file
 from stickslip.study.keep.journal import JobJournal
-from stickslip.study.keep.progress import LOG, at_work
+from stickslip.study.keep.progress import LOG, OF_RECORDS, at_work
 from stickslip.study.keep.provenance import library_versions
 from stickslip.study.keep.workers import Hands
 from stickslip.study.outcome import ASIDE, CHECKED, UNSOLVED, checked
@@ -317,7 +317,7 @@ def _over(token: Path) -> Callable[[], bool]:
 def _keep(record: logging.LogRecord, lines: list[dict[str, Any]]) -> None:
     """Keep a line for the way back; progress is of no use then."""
     if not hasattr(record, "fraction"):
-        more = {"verdict": record.__dict__["verdict"]} if hasattr(record, "verdict") else {}
+        more = {key: vars(record)[key] for key in OF_RECORDS if key in vars(record)}
         own = {"name": record.name, "levelno": record.levelno, "levelname": record.levelname}
         lines.append({**own, **more, "msg": record.getMessage()})
 

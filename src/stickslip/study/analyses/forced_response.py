@@ -69,7 +69,7 @@ from stickslip.study.analyses.forced.values import (
 )
 from stickslip.study.analyses.forced.verdicts import verdicts
 from stickslip.study.analyses.verdict import Verdict, to_json
-from stickslip.study.keep.progress import LOG, advance
+from stickslip.study.keep.progress import LOG, advance, sum_up
 from stickslip.units import HZ
 
 NO_SOLUTION = (SingularError, FloatingPointError, np.linalg.LinAlgError)
@@ -199,12 +199,10 @@ def _put_down(question: Question, response: Response, notes: Notes) -> None:
     notes.put("model", of_model(question, response.output))
     told = {"known_verdicts": to_json(known(question, response, shift))}
     notes.put("response", of_response(question, response, shift) | told)
-    LOG.info(
-        question.said(
-            f"peak {response.peak_amplitude:.4e} m at {response.peak_hz:.3f} Hz, {len(response.accepted)} points, "
-            f"{response.failed} not converged, {response.newton_steps} Newton steps"
-        )
-    )
+    peak = f"peak {1e3 * response.peak_amplitude:.4g} mm at {response.peak_hz:.3f} Hz, {len(response.accepted)} points"
+    lost = f"{response.failed} not converged"
+    line = question.said(f"{peak}, {lost}, {response.newton_steps} Newton steps")
+    sum_up(f"{peak}, {lost}" if response.failed else peak, line)
 
 
 def _judge(question: Question, response: Response, notes: Notes) -> None:

@@ -160,7 +160,7 @@ def _problem(spot: Spot, details: ErrorDetails, context: dict[str, Any]) -> tupl
     said = _KINDS.get(kind) or details["msg"]
     for of_pydantic, ours in _WORDS:
         said = said.replace(of_pydantic, ours)
-    return f"{said[0].lower()}{said[1:]}, got {got}", f"Give {spot.about}."
+    return f"{said[0].lower()}{said[1:]}, got {got}", f"It says {spot.about}."
 
 
 def _one_of(word: str, known: list[str], about: str) -> str:

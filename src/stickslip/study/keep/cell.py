@@ -21,7 +21,7 @@ from time import monotonic
 from typing import IO, Any
 
 from stickslip.errors import StickslipError, input_error
-from stickslip.study.keep.progress import LOG
+from stickslip.study.keep.progress import LOG, OF_RECORDS
 from stickslip.study.keep.threads import BLAS_THREADS
 
 EVERY = 0.1  # seconds between two looks at a process
@@ -303,6 +303,5 @@ class _Lines(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         own = {"name": record.name, "levelno": record.levelno, "levelname": record.levelname}
-        more = ("fraction", "job", "verdict")
-        found = {key: vars(record)[key] for key in more if key in vars(record)}
+        found = {key: vars(record)[key] for key in OF_RECORDS if key in vars(record)}
         self._say("line", {**own, "msg": record.getMessage(), **found})

@@ -1,6 +1,6 @@
 """What a run says, by the standard logging: lines, warnings, and how much of a job is done.
 
-Records of progress carry ``fraction`` (0 to 1) and ``job`` (what is being computed); all others are lines.
+Records of progress carry ``fraction`` (0 to 1); all others are lines. ``job`` says what is being computed, ``sums_up`` what came of it.
 """
 
 import logging
@@ -16,6 +16,13 @@ from stickslip.errors import StickslipError
 from stickslip.study.keep.whole import unwritable
 
 LOG = logging.getLogger("stickslip")
+DONE = "done"  # what is told of a job at its end
+OF_RECORDS = (
+    "fraction",
+    "job",
+    "verdict",
+    "sums_up",
+)  # what records of ours carry beside their text
 _JOB = ContextVar("job", default="")
 
 
@@ -34,6 +41,21 @@ def tell(word: str, text: str) -> None:
     LOG.log(level, text, extra={"verdict": word.upper()})
 
 
+def sum_up(text: str, line: str) -> None:
+    """Tell what came out of the job at work: in few words, and as a line."""
+    LOG.info(line, extra={"sums_up": text})
+
+
+def _of_job(record: logging.LogRecord) -> bool:
+    """Give a record the job that it is of."""
+    if not hasattr(record, "job"):
+        record.job = _JOB.get()
+    return True
+
+
+LOG.addFilter(_of_job)
+
+
 def head(record: logging.LogRecord) -> str:
     """Return what a line begins with: the word of a verdict, ``WARNING`` of other warnings, or nothing."""
     plain = "WARNING" if record.levelno >= logging.WARNING else ""
@@ -48,6 +70,7 @@ def at_work(job: str) -> Iterator[None]:
     advance(0.0, job)
     try:
         yield
+        advance(1.0, DONE)
     finally:
         _JOB.reset(token)
 

@@ -15,6 +15,7 @@ from stickslip.study.analyses.forced.question import RIGID
 
 DEFAULT_LIMIT = 5.0  # percent, where a dataset does not say
 ATTAINED = 1.0  # percent between a settled time integration and the balance
+HUMP = 1.05  # a maximum over the least amplitude on either side of it, to stand out
 SAME = 1e-9  # relative difference of frequencies that are one
 
 
@@ -151,6 +152,19 @@ class Curve:
         top = self.number("peak_point")
         found = np.flatnonzero(self.at == top)
         return int(found[0]) if found.size else -1
+
+    @cached_property
+    def hump(self) -> int:
+        """Position of the largest maximum inside the sweep, -1 if there is none that stands out on both sides."""
+        order = np.flatnonzero(self.converged & np.isfinite(self.amplitude))
+        order = order[np.argsort(self.hz[order], kind="stable")]
+        size = self.amplitude[order]
+        inner = np.arange(1, len(size) - 1)
+        inner = inner[(size[inner] >= size[inner - 1]) & (size[inner] >= size[inner + 1])]
+        for k in sorted(inner, key=lambda k: -size[k]):
+            if order[k] != self.peak and size[k] > HUMP * max(size[:k].min(), size[k:].min()):
+                return int(order[k])
+        return -1
 
     @property
     def peak_hz(self) -> float:

@@ -286,6 +286,9 @@ def at_the_end(case: Curve) -> Iterator[Finding]:
         yield Finding("doubtful", why, f"Widen forced_response.{case.range_key}.")
     elif case.at_the_end and case.hz.size > 1:  # of a frequency alone nobody asked for a peak
         why = f"the largest amplitude stands at the end of the sweep ({case.peak_hz:.2f} Hz); it is no resonance"
+        if case.hump >= 0:
+            size, hz = 1e3 * case.amplitude[case.hump], case.hz[case.hump]
+            why += f"; inside the sweep the largest maximum is {size:.4g} mm at {hz:.2f} Hz"
         yield Finding("doubtful", why, f"Widen forced_response.{case.range_key}.")
 
 

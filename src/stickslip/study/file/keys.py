@@ -1,0 +1,118 @@
+"""The keys of a table of the study file with their defaults and meanings, as text."""
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from stickslip.contact.laws import ALL_LAWS
+from stickslip.errors import did_you_mean, input_error
+from stickslip.study.file.contacts import keys_of
+from stickslip.study.file.tables import study_tables
+
+REQUIRED = "required"
+_LONGEST = 24  # characters of a default that a cell shows
+
+
+@dataclass(frozen=True)
+class Keys:
+    """Keys of one table.
+
+    Parameters
+    ----------
+    title
+        The table as the file has it, with the key that chooses its kind.
+    rows
+        Key, default and meaning of each.
+    """
+
+    title: str
+    rows: tuple[tuple[str, str, str], ...]
+
+
+def tables_of_file() -> Keys:
+    """Return the tables that a study file may have."""
+    schema = study_tables().model_json_schema()
+    rows = [(key, "", entry.get("description", "")) for key, entry in schema["properties"].items()]
+    return Keys("A study file", tuple(rows))
+
+
+def table_keys(name: str) -> list[Keys]:
+    """Return the keys of a table; one entry for each kind of it.
+
+    Parameters
+    ----------
+    name
+        Of the table, such as ``forced_response``; ``contact.elastic_coulomb`` is one kind of a table alone.
+    """
+    schema = study_tables().model_json_schema()
+    table, _, kind = name.strip("[]").partition(".")
+    if table not in schema["properties"]:
+        known = list(schema["properties"])
+        raise input_error(name, "is no table of a study file", did_you_mean(table, known))
+    entry = schema["properties"][table]
+    below = entry.get("additionalProperties")
+    title = f"{table}.NAME" if isinstance(below, dict) else table
+    found = dict(_kinds(schema, below if isinstance(below, dict) else entry))
+    if table == "contact":
+        return [_of_contact(title, found[""], kind)]
+    if kind and kind not in found:
+        raise input_error(name, f"is no kind of [{title}]", did_you_mean(kind, list(found)))
+    chosen = {word: node for word, node in found.items() if not kind or word == kind}
+    return [Keys(_title(title, word, node), _rows(node)) for word, node in chosen.items()]
+
+
+def _of_contact(title: str, node: Mapping[str, Any], law: str) -> Keys:
+    """Return the keys that all contacts have, and with a law those of it."""
+    every = {n: {**keys_of(n, per_area=True), **keys_of(n, per_area=False)} for n in ALL_LAWS}
+    if law and law not in every:
+        raise input_error(f"contact.{law}", "is no law", did_you_mean(law, list(every)))
+    of_laws = {key for own in every.values() for key in own}
+    rows = [row for row in _rows(node) if row[0] not in of_laws]
+    if not law:
+        told = f"'stickslip keys contact.LAW' adds those of a law: {', '.join(every)}"
+        return Keys(f"[{title}]: keys of all laws; {told}", tuple(rows))
+    per_area = keys_of(law, per_area=True).keys() - keys_of(law, per_area=False).keys()
+    for key, default, meaning in _rows(node):
+        if key in every[law]:
+            needed = REQUIRED if every[law][key] else default
+            rows.append((key, 'with per = "area"' if key in per_area else needed, meaning))
+    return Keys(f'[{title}] with law = "{law}"', tuple(rows))
+
+
+def _kinds(
+    schema: Mapping[str, Any], entry: Mapping[str, Any]
+) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the kinds of a table by the word that chooses each, empty where there is one."""
+    for node in _nodes(schema, entry):
+        words = [str(own["const"]) for own in node["properties"].values() if "const" in own]
+        yield words[0] if words else "", node
+
+
+def _nodes(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+    if "$ref" in entry:
+        entry = schema["$defs"][entry["$ref"].rpartition("/")[2]]
+    for option in (*entry.get("anyOf", ()), *entry.get("oneOf", ())):
+        yield from _nodes(schema, option)
+    if "properties" in entry:
+        yield entry
+
+
+def _title(table: str, word: str, node: Mapping[str, Any]) -> str:
+    keys = [k for k, own in node["properties"].items() if word and own.get("const") == word]
+    return f'[{table}] with {keys[0]} = "{word}"' if keys else f"[{table}]"
+
+
+def _rows(node: Mapping[str, Any]) -> tuple[tuple[str, str, str], ...]:
+    required = node.get("required", ())
+    return tuple(
+        (key, REQUIRED if key in required else _default(own), own.get("description", ""))
+        for key, own in node["properties"].items()
+        if "const" not in own
+    )
+
+
+def _default(entry: Mapping[str, Any]) -> str:
+    value = entry.get("default")
+    text = "" if value is None else json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= _LONGEST else "..."
