@@ -246,7 +246,7 @@ def test_masses_from_new_to_the_page(tmp_path: Path) -> None:
     for v in found.verdicts:
         assert v.why in told
         assert not v.told or str(v) in said
-    assert page.count("<h2>") == 7  # the checks are those of stability, which nobody has to ask for
+    assert page.count("<h2>") == 8  # the checks are those of stability, which nobody has to ask for
     # what is finished is not computed again, and --fresh computes it again
     assert "jobs to do: 0" in done("run", str(path), "--no-report")
     assert "jobs to do: 1" in done("run", str(path), "--no-report", "--fresh")

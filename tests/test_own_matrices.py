@@ -148,7 +148,10 @@ def test_damping_in_the_file_is_kept_and_a_table_of_the_part_replaces_it(tmp_pat
         ),
         ({"limits.memory_gb": "0.01"}, "the parts, some 2 nodes"),
         ({"damping.ratio": "1.0"}, "from 0 to below 1 (0.01 is 1 %)"),
-        ({"reduction.fixed_interface_modes": "0"}, "Give number of modes that craig_bampton keeps"),
+        (
+            {"reduction.fixed_interface_modes": "0"},
+            "It means: number of modes that craig_bampton keeps",
+        ),
         ({"output.peak": '"end.x"'}, "no output 'end.x'. Known: end.dof20, middle.dof10."),
     ],
 )

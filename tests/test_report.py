@@ -23,6 +23,7 @@ from stickslip.report.forced.harmonics import kept_harmonics
 from stickslip.report.forced.head import cards
 from stickslip.report.forced.stability import stability
 from stickslip.report.forced.tables import peaks
+from stickslip.report.inputs import told
 from stickslip.report.page import plots, report_file, report_html
 from stickslip.report.plot import log_ticks
 from stickslip.report.quantities import number, percent, quantity, runs, scale_for
@@ -778,3 +779,51 @@ def test_every_logarithmic_axis_has_ticks(ends):
     inside = [t for t in ticks["tickvals"] if ends[0] <= t <= ends[1]]
     assert len(inside) >= 3
     assert len(set(ticks["ticktext"])) == len(ticks["tickvals"]) <= 14
+
+
+def test_keys_of_a_study_are_told_in_words() -> None:
+    assert told("normal_stiffness_n_per_m", 5.2e8) == "normal stiffness 520 MN/m"
+    assert told("between_hz", [150.0, 300.0]) == "between 150 and 300 Hz"
+    assert told("frequency_hz", [150.0, 184.0]) == "frequency 150 to 184 Hz"
+    assert told("dashpots_n_s_per_m", [["a", "b", 2.0]]) == "dashpots (a, b, 2) N s/m"
+    assert told("coriolis", True) == "coriolis yes"
+
+
+def test_the_head_of_the_page_tells_what_went_in(tmp_path: Path) -> None:
+    study = """
+[load.shaker]
+on = "blades.force"
+direction = "x"
+ratio_of = "load.pull"
+ratio = 20
+[contact.flat]
+between = ["damper.flat", "blades.under"]
+friction_coefficient = 0.6
+[damping]
+ratio = 0.003
+[output]
+points = { tip1 = "blades.tip1" }
+[vary]
+load.shaker.ratio = [20, 5]
+"""
+    text = page_text(report(synthetic_result(ratios=(20, 5)), tmp_path, study_toml=study))
+    assert "load shakerload.pull over 20 on blades.force along x; harmonic 1" in text
+    assert "flatdamper.flat, blades.under" in text
+    assert "friction coefficient 0.6" in text
+    assert "cases: load.shaker.ratio20, 5" in text
+    assert "tip1.xmotion along x of node set or dof blades.tip1; its peak counts" in text
+    assert text.index("What was computed") < text.index("Frequency response of all cases")
+
+
+def test_tile_and_table_tell_the_quality_factor_of_the_case_shown() -> None:
+    data = synthetic_result(ratios=(20, 5))
+    data["peak_damping"] = "case", [0.004, 0.02]
+    view = Response(data)
+    (card,) = (c for c in cards(view) if c.label == "quality factor at the peak")
+    shown = next(c for c in view.cases if c.index == view.chosen)
+    assert card.value == {0: "125", 1: "25"}[shown.index]
+    assert "0.4 % to 2 % over 2 cases" in card.note
+    found = peaks(view)
+    at = list(found.head).index("quality factor")
+    assert [row[at] for row in found.rows] == ["125", "25"]
+    assert [row[at - 1] for row in found.rows] == ["0.40", "2.00"]

@@ -144,7 +144,7 @@ def test_every_strategy_from_a_file_to_result_and_page(base: Study, name: str) -
         marks = set(zip(drawn.figure.data[0].x, drawn.figure.data[0].y, strict=True))
         assert marks == {(hz[i], h) for i, h in zip(*np.nonzero(kept), strict=True) if h > 0}
     assert (errors(response) is None) == (not decides)
-    page = choice(response) or ""
+    page = str(choice(response))  # tables and words as data
     assert name in page
     for told in (ran.said, page):
         assert (cost in told) == (f" = {everywhere} (an estimate" in told) == decides
@@ -294,7 +294,7 @@ REFUSED = {
     "threshold below nothing": (
         {"alert_threshold_percent": -5},
         (
-            "harmonics.alert_threshold_percent: must be greater than 0, got -5. Give a percentage greater than zero: "
+            "harmonics.alert_threshold_percent: must be greater than 0, got -5. It means: a percentage greater than zero: "
             "frequencies whose predicted error is larger get more harmonics (for selections that predict an error)."
         ),
     ),

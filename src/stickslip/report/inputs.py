@@ -23,6 +23,7 @@ _SETTINGS = ("material", "damping", "rotation", "retention", "aero", "mistuning"
 _QUESTIONS = {"frequency_hz", "speed_rpm", "points", "modes", "nodal_diameters", "levels", "span", "orders"}  # fmt: skip
 _BLADE = re.compile(r"\[(\d+)\]$")
 _FEW_NAMES, _MOST_NAMES = 4, 24
+_ENDS = 2  # numbers of a range
 _LONGEST = 12  # entries of a list that are told
 
 
@@ -60,7 +61,11 @@ def told(key: str, value: Any) -> str:
                 return f"{name} {_joined([number(v * scale.factor, 5) for v in each])} {scale.unit}"
             if scaled:
                 return f"{name} {quantity(each[0], unit, 5)}"
-            return f"{name} {_joined([number(v, 5) for v in each])} {unit}"
+            ends = [number(v, 5) for v in each]
+            between = " and " if name == "between" else " to "
+            return f"{name} {between.join(ends) if len(each) == _ENDS else _joined(ends)} {unit}"
+        if key.endswith(f"_{ending}") and isinstance(value, list):
+            return f"{key.removesuffix(f'_{ending}').replace('_', ' ')} {_plain(value)} {unit}"
     return f"{key.replace('_', ' ')} {_plain(value)}"
 
 
@@ -73,7 +78,7 @@ def _plain(value: Any) -> str:
     if isinstance(value, dict):
         return ", ".join(f"{k} = {_plain(v)}" for k, v in value.items())
     if isinstance(value, list):
-        return _joined([_plain(v) for v in value])
+        return _joined([f"({_plain(v)})" if isinstance(v, list) else _plain(v) for v in value])
     if isinstance(value, bool):
         return "yes" if value else "no"
     return number(value, 6) if isinstance(value, int | float) else str(value)
@@ -100,7 +105,8 @@ def _flat(given: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any
 
 
 def _given(study: Mapping[str, Any], nodes: Mapping[str, Node]) -> Table | None:
-    rows = [[f"load {name}", _load(own)] for name, own in _table(study, "load").items() if isinstance(own, dict)]  # fmt: skip
+    rows = [[f"part {name}", _part(own)] for name, own in _table(study, "part").items() if isinstance(own, dict)]  # fmt: skip
+    rows += [[f"load {name}", _load(own)] for name, own in _table(study, "load").items() if isinstance(own, dict)]  # fmt: skip
     for name in _SETTINGS:
         own = _table(study, name)
         if own:
@@ -113,6 +119,14 @@ def _given(study: Mapping[str, Any], nodes: Mapping[str, Node]) -> Table | None:
     for own in varied if isinstance(varied, list) else [varied]:
         rows += [[f"cases: {key}", _plain(v)] for key, v in _flat(own if isinstance(own, dict) else {})]  # fmt: skip
     return Table((), rows, "Loads, damping, cases", numeric=False) if rows else None
+
+
+def _part(own: Mapping[str, Any]) -> str:
+    """Say what a part is made of, and how it is damped by itself."""
+    kind = own.get("shape") or own.get("file") or own.get("of") or "matrices"
+    words = ("damp", "dashpot", "sectors", "mass_kg", "material")
+    rest = [told(k, v) for k, v in _flat(own) if k.startswith(words)]
+    return "; ".join([_plain(kind), *rest])
 
 
 def _load(own: Mapping[str, Any]) -> str:
@@ -141,7 +155,7 @@ def _contacts(study: Mapping[str, Any], response: Response | None) -> Table | No
         normal = of_first_case(response, "static_force")[:, 2]
         forces = np.array([-float(normal[known[n]].sum()) if n in known else np.nan for n in names])
     rows = []
-    for name, force in zip(names, aligned(forces), strict=True):
+    for name, force in zip(names, aligned(forces + 0.0), strict=True):
         own = dict(written.get(name, {}))
         between = _plain(own.pop("between", NONE))
         law = ", ".join(dict.fromkeys(laws[k] for k in known.get(name, ()))) or _plain(own.get("law", NONE))  # fmt: skip

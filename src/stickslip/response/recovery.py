@@ -76,10 +76,12 @@ def equivalent_damping(problem: ForcedProblem, point: ForcedPoint) -> float:
     take, and the largest energy U that structure and contacts store of the vibration: twice its mean. NaN where nothing vibrates.
     """
     linear, every = problem.low.linear, fields(problem, point)
-    h = np.arange(len(point.coefficients))
+    order = len(point.coefficients) - 1
     moved = linear.recover(point.omega, point.coefficients)
-    load = linear.load_at(point.omega).coefficients(int(h[-1]))
-    work = np.pi * np.sum(h[:, None] * np.imag(load * np.conj(moved)))
+    load = linear.load_at(point.omega).coefficients(order)
+    work = np.pi * np.sum(
+        np.imag(load * np.conj(moved))[1:]
+    )  # of each harmonic in a cycle of its own
     strain = linear.strain_energy(point.omega, point.coefficients)[1:].sum()
     springs = 0.25 * np.real(np.conj(every.gaps[1:]) * every.forces[1:]).sum()
     stored = 2.0 * (strain + springs)

@@ -164,10 +164,10 @@ def cards(response: Response) -> list[Card]:
     """Return the numbers that sum the response up."""
     first = (
         _peak_card(response),
+        _damping_card(response),
         _blade_card(response),
         _verdict_card(response),
         _shift_card(response),
-        _damping_card(response),
         _loss_card(response),
     )
     alert = response.is_error and response.decides and not response.auto

@@ -160,14 +160,14 @@ def _problem(spot: Spot, details: ErrorDetails, context: dict[str, Any]) -> tupl
     said = _KINDS.get(kind) or details["msg"]
     for of_pydantic, ours in _WORDS:
         said = said.replace(of_pydantic, ours)
-    return f"{said[0].lower()}{said[1:]}, got {got}", f"It says {spot.about}."
+    return f"{said[0].lower()}{said[1:]}, got {got}", f"It means: {spot.about}."
 
 
 def _one_of(word: str, known: list[str], about: str) -> str:
     """Return the word that was meant, or all that are known with what they mean, where the list alone is not that."""
     remedy = did_you_mean(word, known)
     listed = about == NO_ABOUT or about.endswith(", ".join(known))
-    return remedy if listed or not remedy.startswith("Known: ") else f"{remedy} It says {about}."
+    return remedy if listed or not remedy.startswith("Known: ") else f"{remedy} It means: {about}."
 
 
 _KINDS = {
