@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from synthetic_result import KEY, synthetic_result, tree_of
 from typer.testing import CliRunner
 
@@ -54,6 +55,27 @@ def test_a_design_with_one_case_is_held_against_the_case_whose_values_its_study_
     assert np.isnan(found["against the first (%)"]).all()
     found = ss.compare(single, varied, names=("one", "varied")).peaks
     assert np.isfinite(found["against the first (%)"]).tolist() == [False, True, True]
+
+
+def test_nonlinear_modes_are_drawn_over_each_other_and_told_in_one_table(tmp_path: Path) -> None:
+    def mode(hz: float) -> ss.Result:
+        along = ("case", "branch", "point")
+        data = xr.Dataset({
+            "amplitude": (along, [[[1e-6, 1e-5, np.nan]]]), "frequency_hz": (along, [[[hz, 0.9 * hz, np.nan]]]),
+            "damping_ratio": (along, [[[0.01, 0.05, np.nan]]]), "status": (along, [[[0, 0, -1]]]), "harmonics": (along, [[[3, 5, -1]]]),
+            **{name: (("case", "branch"), [[v]]) for name, v in {
+                "wave_number": -1, "mode": 1, "mode_frequency_hz": hz, "mode_damping_ratio": 0.01, "largest_damping_ratio": 0.05,
+                "largest_damping_amplitude": 1e-5, "gross_slip_amplitude": np.nan, "problem": "", "end": "reached",
+            }.items()},
+            "output": ("case", ["tip.x"]), "case_label": ("case", [""]),
+        })  # fmt: skip
+        return ss.Result(tree_of(nonlinear_mode=data))
+
+    found = ss.compare(mode(100.0), mode(80.0), names=("a", "b"))
+    drawn = {t.name: np.asarray(t.y) for t in found.plot("compared_nonlinear_modes").data if t.showlegend}  # fmt: skip
+    assert drawn["b, mode 1"].tolist() == [80.0, 72.0]
+    page = found.report(tmp_path / "c.html").read_text(encoding="utf-8")
+    assert page.count("reached") == 2
 
 
 def test_numbers_that_are_written_otherwise_are_no_difference() -> None:

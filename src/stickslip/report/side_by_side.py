@@ -9,6 +9,7 @@ from plotly.subplots import make_subplots
 
 from stickslip.arrays import FloatArray
 from stickslip.report.cases import ShownCase, first_number
+from stickslip.report.compared_waves import flutter, limit_cycles, nonlinear_modes
 from stickslip.report.content import Table, Words, chooser
 from stickslip.report.designs import Design, MeasuredCurve, differences, per_force
 from stickslip.report.frame import Chapter, Placing, page_html
@@ -320,6 +321,9 @@ def contents(
         ("optimisation", "Optimisation curves", [optimisation(designs, divided=divided)]),
         ("peaks", "Peaks", [peaks(designs, divided=divided)]),
         ("modes", "Modes", [frequencies(designs)]),
+        ("nonlinear_modes", "Nonlinear modes", [*nonlinear_modes(designs)]),
+        ("flutter", "Flutter", [*flutter(designs)]),
+        ("limit_cycles", "Limit cycles", [*limit_cycles(designs)]),
         ("inputs", "Inputs", [inputs(designs)]),
     ]  # fmt: skip
     kept = [(key, title, [c for c in own if c is not None]) for key, title, own in each]
