@@ -92,7 +92,7 @@ def scaled(law: Law, factor: float) -> Law:
         raise input_error(
             type(law).__name__,
             "does not say which of its parameters are shared among contact points",
-            "Mark stiffnesses and forces with quantity(..., shared=True), or give the law of each point.",
+            "Mark stiffnesses and forces with stickslip.units.quantity(..., shared=True), or give the law of each point.",
         )
     return replace(law, **changed)  # type: ignore[type-var]
 

@@ -50,10 +50,10 @@ class ContactMotion:
             "gap_m": gap[:, 2],
             "sliding_m": np.einsum("pxd,pd->px", self.frame, gap * tangential),
             "force_n": np.einsum("pxd,pd->px", self.frame, force),
-            "normal_force_n": force[:, 2],
+            "normal_force_n": -force[:, 2],
             "friction_force_n": np.hypot(force[:, 0], force[:, 1]),
-            "pressure_pa": force[:, 2] / self.area,
-            "static_pressure_pa": self.static_force[:, 2] / self.area,
+            "pressure_pa": -force[:, 2] / self.area,
+            "static_pressure_pa": -self.static_force[:, 2] / self.area,
             "energy_j": self.energy,
         }
         if self.state is not None:

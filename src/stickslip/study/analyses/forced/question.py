@@ -30,6 +30,7 @@ from stickslip.units import RPM
 IN_TIME, HARMONICS = "verify", "verify_harmonics"  # checks that a run may ask for
 STABLE = "stability"  # what every run finds out unless the study says no
 RIGID = "rigid_coulomb"  # the law that the balance solves without springs
+TOO_MANY = "are more than"  # in the sentence of a motion that was not integrated
 MOST_IN_TIME = 600  # coordinates of all sectors: half a second a period, hundreds of periods
 FACTOR = 2  # times the highest harmonic that is kept: what solutions are held against
 

@@ -11,6 +11,7 @@ from stickslip.solve.status import Status
 from stickslip.study.analyses.forced.chooser import error_text
 from stickslip.study.analyses.forced.curve import ATTAINED, Curve, motion_of
 from stickslip.study.analyses.forced.jumps import jumps
+from stickslip.study.analyses.forced.question import MOST_IN_TIME, TOO_MANY
 from stickslip.study.analyses.verdict import Level, from_json
 
 LARGE_SHIFT = 0.01  # relative change of the peak with a tenth of the retention stiffness
@@ -20,6 +21,7 @@ LEAVING = dict.fromkeys(
     ("period doubling", "branch point"),
     'forced_response.bifurcations = "branches" follows what leaves there.',
 )
+FEWER = f"No more time helps: fewer modes in [reduction] or fewer contact points may bring the model below {MOST_IN_TIME} coordinates; else it stays open."
 IN_TIME = "--verify integrates in time at the peak"
 IN_TIME_TELLS = (
     "; an integration in time (--verify) tells more"  # what a verdict says as its remedy
@@ -194,7 +196,8 @@ def stability(case: Curve) -> Iterator[Finding]:
             yield Finding("wrong", why, remedy, (point,))
         elif said["stability_verdict"] == "undecided" and not case.attained[point]:
             why = f"whether it is stable: {why}"
-            remedy = f"{_in_time(case, point)}, and sees whether the motion stays."
+            large = any(_too_large(str(s["not_periodic_sentence"])) for s in case.rows("not_periodic"))  # fmt: skip
+            remedy = FEWER if large else f"{_in_time(case, point)}, and sees whether the motion stays."  # fmt: skip
             yield Finding("doubtful", why, remedy, (point,))
 
 
@@ -261,12 +264,17 @@ def not_periodic(case: Curve) -> Iterator[Finding]:
         hz, sentence = float(said["not_periodic_frequency_hz"]), str(said["not_periodic_sentence"])
         why = f"at {hz:.2f} Hz {without_place(sentence)}"
         settled = bool(said["not_periodic_settled"])
-        remedy = (
-            "That is time integration, no balance."
-            if settled
-            else "Give it more time: forced_response.not_periodic_s."
-        )
+        remedy = "Give it more time: forced_response.not_periodic_s."
+        if settled:
+            remedy = "That is time integration, no balance."
+        elif _too_large(sentence):
+            remedy = FEWER
         yield Finding("trusted" if settled else "doubtful", why, remedy)
+
+
+def _too_large(sentence: str) -> bool:
+    """Whether a motion was not integrated because the model has too many coordinates, which no more time helps."""
+    return f"coordinates {TOO_MANY} {MOST_IN_TIME}" in sentence
 
 
 def at_the_end(case: Curve) -> Iterator[Finding]:
