@@ -74,6 +74,20 @@ def _case(design: Design, choice: ShownCase, *, divided: bool) -> ShownCase | No
     return cases[0] if len(cases) == 1 else design.case(choice.label)
 
 
+def opening(
+    designs: Sequence[Design], offered: Sequence[ShownCase], *, divided: bool
+) -> ShownCase | None:
+    """Return the choice that the page opens on: a case that all designs have, that of the first one's smallest peak if it is one; else the best of each.
+
+    The best cases of two designs may be those of different loads, which say nothing of the designs.
+    """
+    told = [d for d in designs if d.response is not None]
+    common = [c for c in offered[1:] if all(_case(d, c, divided=divided) for d in told)]
+    best = told[0].best(divided=divided) if told else None
+    of_first = [c for c in common if best is not None and c.label == best.label]
+    return next(iter([*of_first, *common, *offered]), None)
+
+
 def responses(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Plot | None:
     """Draw the responses of all designs over each other, a case at a time."""
     told = [d for d in designs if d.response is not None]
@@ -107,7 +121,9 @@ def responses(designs: Sequence[Design], curves: Sequence[MeasuredCurve]) -> Plo
     figure.update_xaxes(title_text="frequency (Hz)")
     caption = f"Amplitude of {joined([_output(d) for d in told])}. Open symbols are doubtful points, crosses wrong ones."
     captions = {c.index: _shown(told, c, divided=divided) for c in offered}
-    return Plot("compared_responses", "Responses over each other", caption, figure, captions, 0 if offered else -1)  # fmt: skip
+    first = opening(designs, offered, divided=divided)
+    chosen = first.index if first else -1
+    return Plot("compared_responses", "Responses over each other", caption, figure, captions, chosen)  # fmt: skip
 
 
 def _output(design: Design) -> str:
@@ -289,8 +305,13 @@ def inputs(designs: Sequence[Design]) -> Table | Words:
 def _cards(designs: Sequence[Design], *, divided: bool) -> list[Card]:
     found: list[Card] = []
     first, name = float("nan"), ""
+    offered = choices(designs)
+    shown = opening(designs, offered, divided=divided)
+    word = "smallest peak" if shown is None or shown.index == 0 else "peak"
     for design in designs:
         case, response = design.best(divided=divided), design.response
+        if shown is not None:
+            case = _case(design, shown, divided=divided)
         if case is None or response is None:
             continue
         height = _peak(response, case, divided=divided)
@@ -299,7 +320,7 @@ def _cards(designs: Sequence[Design], *, divided: bool) -> list[Card]:
             first, name = height, design.name
         else:
             note += f"; {percent(over_first(height, first), 3)} against {name}"
-        found.append(Card(quantity(height, unit_of(designs, divided=divided)), f"smallest peak of {design.name}", note))  # fmt: skip
+        found.append(Card(quantity(height, unit_of(designs, divided=divided)), f"{word} of {design.name}", note))  # fmt: skip
     return found
 
 
@@ -314,10 +335,11 @@ def contents(
         If curves cannot be compared with what the designs have.
     """
     divided, offered = per_force(designs, curves), choices(designs)
+    first = opening(designs, offered, divided=divided)
     verdicts = Words(items=[f"**{d.name}**: {conclusion(d.tree)}" for d in designs])
     each: list[tuple[str, str, list[Content | None]]] = [
         ("verdicts", "Verdicts", [verdicts]),
-        ("responses", "Forced response", [chooser("case", offered, 0), responses(designs, curves), against_curves(designs, curves)]),
+        ("responses", "Forced response", [chooser("case", offered, first.index if first else -1), responses(designs, curves), against_curves(designs, curves)]),
         ("optimisation", "Optimisation curves", [optimisation(designs, divided=divided)]),
         ("peaks", "Peaks", [peaks(designs, divided=divided)]),
         ("modes", "Modes", [frequencies(designs)]),
