@@ -383,7 +383,7 @@ def test_safe_needs_a_speed(tmp_path: Path) -> None:
 
 def test_nodal_diameters_are_judged_by_the_number_of_sectors_of_the_deck(tmp_path: Path) -> None:
     write_decks(tmp_path)
-    text = 'schema_version = 2\n[part.blade]\nfile = "speed.inp"\nunits = "SI"\n[modes]\nnodal_diameters = [13]\n'
+    text = 'schema_version = 2\n[rotation]\nspeed_rpm = 8000.0\n[part.blade]\nfile = "speed.inp"\nunits = "SI"\n[modes]\nnodal_diameters = [13]\n'
     made = study(tmp_path, text=text)
     said = r"modes\.nodal_diameters: 13 is above half of 24 sectors\. The nodal diameters go from 0 to 12"
     with pytest.raises(InputError, match=said):
