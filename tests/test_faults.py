@@ -115,7 +115,9 @@ def test_damaged_results_are_refused_by_name_or_give_the_same_numbers(
     assert set(counted) <= {"refused", "same"}, counted
 
 
-@pytest.mark.parametrize("name", ["jobs", "run.log", "result.ab12.part.nc", "report.html", "run.lock"])
+@pytest.mark.parametrize(
+    "name", ["jobs", "run.log", "result.ab12.part.nc", "report.html", "run.lock"]
+)
 def test_links_in_the_results_folder_are_not_followed(
     finished: tuple[Path, xr.DataTree], tmp_path: Path, name: str
 ) -> None:
