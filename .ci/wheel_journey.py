@@ -62,7 +62,7 @@ def interpreter(name: str) -> str | None:
             ["pyenv", "prefix", name], check=False, capture_output=True, text=True
         )
         tried.append(f"{prefix.stdout.strip()}/bin/python" if prefix.returncode == 0 else None)
-    for path in filter(None, tried):
+    for path in map(os.path.abspath, filter(None, tried)):  # used from other folders
         said = subprocess.run([path, "-c", "import venv"], check=False, capture_output=True)
         if said.returncode == 0:
             return path
