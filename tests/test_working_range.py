@@ -10,6 +10,8 @@ import stickslip as ss
 from stickslip.report.forced.curves import optimisation
 from stickslip.report.forced.working import where_friction_works
 from stickslip.report.response import Response
+from stickslip.study.analyses.forced.curve import Curve
+from stickslip.study.analyses.forced.rules import not_periodic
 from stickslip.study.analyses.forced.working_range import (
     REGIMES,
     ContactsAtPeak,
@@ -259,3 +261,13 @@ def test_the_page_shades_where_friction_works() -> None:
     text = where_friction_works(response)
     assert text is not None
     assert len(text.items) == len(range_sentences(own))
+
+
+def test_time_integration_of_a_point_beside_the_peak_doubts_that_point_alone() -> None:
+    data = synthetic_result(ratios=(5,), n=12)
+    peak = int(data["peak_point"][0])
+    for at, hit in ((peak + 1, [peak + 1]), (peak, [peak])):
+        row = {"case": 0, "frequency_hz": float(data["frequency_hz"][at]), "sentence": "1 Hz: it rings on", "settled": 0}  # fmt: skip
+        told = data.assign({f"not_periodic_{k}": ("not_periodic", [v]) for k, v in row.items()})
+        (found,) = not_periodic(Curve(told, 0))
+        assert (found.level, list(found.points)) == ("doubtful", hit)

@@ -259,17 +259,19 @@ def in_time(case: Curve) -> Iterator[Finding]:
 
 
 def not_periodic(case: Curve) -> Iterator[Finding]:
-    """Tell what a motion in time is like where no balance stands for it."""
+    """Tell what a motion in time is like where no balance stands for it: a doubt of that point, which is one of the case where it is the peak."""
     for said in case.rows("not_periodic"):
         hz, sentence = float(said["not_periodic_frequency_hz"]), str(said["not_periodic_sentence"])
-        why = f"at {hz:.2f} Hz {without_place(sentence)}"
+        why, off = without_place(sentence), np.abs(case.hz - hz)
+        # where a fold passes a frequency twice the peak is meant, as by other checks
+        point = case.peak if case.peak >= 0 and off[case.peak] == off.min() else int(off.argmin())
         settled = bool(said["not_periodic_settled"])
         remedy = "Give it more time: forced_response.not_periodic_s."
         if settled:
             remedy = "That is time integration, no balance."
         elif _too_large(sentence):
             remedy = FEWER
-        yield Finding("trusted" if settled else "doubtful", why, remedy)
+        yield Finding("trusted" if settled else "doubtful", why, remedy, (point,))
 
 
 def _too_large(sentence: str) -> bool:
