@@ -367,10 +367,10 @@ def test_tables_of_residues_and_their_products_are_the_same(kind, monkeypatch):
     structure = structure_of(kind)
     linear, terms = decomposed(structure)
     few = linear.condensed(OMEGA, ORDER)
-    assert "residues" not in vars(terms)
+    assert "table" not in vars(terms)
     monkeypatch.setattr(spectral, "FEWEST", 1)
     many = linear.condensed(OMEGA, ORDER)
-    assert "residues" in vars(terms)
+    assert "table" in vars(terms)
     for name in ("stiffness", "derivative"):
         theirs = getattr(few, name)
         np.testing.assert_allclose(getattr(many, name), theirs, atol=1e-12 * np.abs(theirs).max())

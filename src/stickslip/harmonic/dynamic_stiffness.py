@@ -107,15 +107,10 @@ class CondensedStiffness:
 
     def _summed(self, sums: "_Sums", omega: float, order: int) -> Condensed:
         """Condense by the spectral decomposition of the interior."""
-        h = np.arange(1, order + 1)[:, None]
-        load, source, direct = (padded(a, order) for a in (sums.load, sums.source, sums.direct))
-        found = summed(sums.terms, 1j * omega * h, source[1:], direct[1:])
-        load[1:] += found.load
-        stiffness = np.concatenate([sums.terms.polynomial[:1].astype(complex), found.stiffness])
-        derivative, load_derivative = np.zeros_like(stiffness), np.zeros_like(load)
-        derivative[1:] = 1j * h[:, :, None] * found.slope
-        load_derivative[1:] = 1j * h * found.load_slope
-        return Condensed(stiffness, derivative, load, load_derivative)
+        matrices, loads = summed(sums.terms, omega, order, sums.source, sums.direct)
+        own = min(order + 1, len(sums.load))
+        loads[0, :own] += sums.load[:own]
+        return Condensed(matrices[0], matrices[1], loads[0], loads[1])
 
     def _factorised(self, omega: float, order: int) -> Condensed:
         """Condense by solving the interior at each harmonic."""

@@ -15,7 +15,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
 Blocks = tuple[FloatArray, FloatArray, FloatArray]  # K, C, M
 LARGEST_STATE_SPACE = 2000  # interior coordinates; beyond, the eigenproblem takes many minutes
@@ -27,16 +27,6 @@ FEWEST = 200  # terms below which such a table gains nothing
 FAST = (
     10.0  # lowest interior frequencies: poles below are divided out of p = 1/ν, others out of p = 0
 )
-
-
-@dataclass(frozen=True, eq=False)
-class Sums:
-    """Condensed stiffness and load of the harmonics above zero, and their derivatives by ``p = iΩ``."""
-
-    stiffness: ComplexArray  # (H, n, n)
-    slope: ComplexArray  # (H, n, n)
-    load: ComplexArray  # (H, n), of the interior
-    load_slope: ComplexArray  # (H, n)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,27 +42,39 @@ class ModeTerms:
     mass: FloatArray  # (l,)
     symmetric: bool = True
 
-    def weights(self, p: ComplexArray) -> tuple[ComplexArray, ...]:
-        """Return w, dw/dp, v and dv/dp, each (H, J), at `p` (H, 1)."""
-        d = 1.0 + p * self.damping + p**2 * self.mass
-        d_slope = self.damping + 2.0 * p * self.mass
-        v = p * (self.ratio + p) / d
-        v_slope = (self.ratio + 2.0 * p - v * d_slope) / d
-        return v**2 * d, v * (2.0 * v_slope * d + v * d_slope), v, v_slope
+    def weights(self, p: ComplexArray) -> ComplexArray:
+        """Return w and dw/dp, (2, H, J), at `p` (H, 1)."""
+        inverse, rate = self._inverse_and_rate(p)
+        v = p * (self.ratio + p)
+        w = v * v * inverse
+        return np.array([w, v * inverse * (2.0 * (self.ratio + 2.0 * p) - v * rate)])
+
+    def load_weights(self, p: ComplexArray) -> ComplexArray:
+        """Return v and dv/dp, (2, H, J), at `p` (H, 1)."""
+        inverse, rate = self._inverse_and_rate(p)
+        v = p * (self.ratio + p) * inverse
+        return np.array([v, (self.ratio + 2.0 * p) * inverse - v * rate])
+
+    def _inverse_and_rate(self, p: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return 1 / d and its negative derivative by p over itself."""
+        scaled = p * self.mass
+        inverse = 1.0 / (1.0 + p * (self.damping + scaled))
+        return inverse, (self.damping + 2.0 * scaled) * inverse
 
     def source(self, load: ComplexArray) -> ComplexArray:
         """Return the (H, J) amplitudes of the terms under interior modal loads (H, l)."""
         return load
 
     @cached_property
-    def residues(self) -> FloatArray:
-        """(J, n (n + 1) / 2) upper triangles of the products of columns of `left` and rows of `right`."""
+    def table(self) -> FloatArray:
+        """(4 + J, n (n + 1) / 2) upper triangles of `polynomial`, and less the products of columns of `left` and rows of `right`."""
         rows, columns = np.triu_indices(self.left.shape[0])
-        return np.ascontiguousarray((self.left[rows] * self.left[columns]).T)
+        residues = (self.left[rows] * self.left[columns]).T
+        return np.concatenate([self.polynomial[:, rows, columns], -residues])
 
-    def on_residues(self, weights: ComplexArray) -> ComplexArray:
-        """Return what the `weights` (k, J) are for the rows of `residues`."""
-        return weights
+    def on_table(self, p: ComplexArray) -> ComplexArray:
+        """Return the `weights` of the rows of `table` beyond the polynomial."""
+        return self.weights(p)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,35 +110,66 @@ class Poles:
     states: StateSpace
     symmetric: bool
 
-    def weights(self, p: ComplexArray) -> tuple[ComplexArray, ...]:
-        """Return w, dw/dp, v and dv/dp, each (H, J), at `p` (H, 1)."""
+    def weights(self, p: ComplexArray) -> ComplexArray:
+        """Return w and dw/dp, (2, H, J), at `p` (H, 1)."""
         e = 1.0 / (1.0 - p * self.states.nu)
-        rate = self.states.nu * e
+        w = np.where(self.power == 2, p**4, p * p) * e
+        return np.array([w, w * (2.0 * self.power / p + self.states.nu * e)])
+
+    def load_weights(self, p: ComplexArray) -> ComplexArray:
+        """Return ``v = p^a / (1 - p ν)`` and dv/dp, (2, H, J), at `p` (H, 1)."""
+        e = 1.0 / (1.0 - p * self.states.nu)
         v = np.where(self.power == 2, p * p, p) * e
-        w = v * np.where(self.power == 2, p * p, p)
-        per_p = self.power / p
-        return w, w * (2.0 * per_p + rate), v, v * (per_p + rate)
+        return np.array([v, v * (self.power / p + self.states.nu * e)])
 
     def source(self, load: ComplexArray) -> ComplexArray:
         """Return the (H, J) amplitudes of the terms under interior modal loads (H, l)."""
         return np.asarray(load @ self.states.backward.T)
 
     @cached_property
-    def residues(self) -> FloatArray:
-        """(J, n (n + 1) / 2) upper triangles: real parts for real poles and one of each pair, then imaginary parts for the pairs."""
+    def table(self) -> FloatArray:
+        """(4 + J, n (n + 1) / 2) upper triangles of `polynomial`, less the residues R of real poles, ``2 Re R`` and ``-2 Re(ν* R)`` of pairs."""
         rows, columns = np.triu_indices(self.left.shape[0])
         single, pair = self._single_and_pairs
         kept = np.concatenate([single, pair])
         left, right = self.left[:, kept], self.right[kept].T
         # only the sum of residues is symmetric where poles repeat; their symmetric parts have the same sum
         each = 0.5 * (left[rows] * right[columns] + left[columns] * right[rows]).T
-        return np.concatenate([each.real, each[single.size :].imag])
+        own, paired = each[: single.size].real, each[single.size :]
+        turned = self.states.nu[pair, None].conj() * paired
+        polynomial = self.polynomial[:, rows, columns]
+        return np.concatenate([polynomial, -own, -2.0 * paired.real, 2.0 * turned.real])
 
-    def on_residues(self, weights: ComplexArray) -> ComplexArray:
-        """Return what the `weights` (k, J) are for the rows of `residues`: ``w R + w' R* = (w + w') Re R + i (w - w') Im R``."""
+    def on_table(self, p: ComplexArray) -> ComplexArray:
+        """Return what the `weights` are for the rows of `table` beyond the polynomial.
+
+        A pair of poles adds up to ``g (2 Re R - 2 p Re(ν* R))`` with ``g = p^2a / (1 - 2 p Re ν + p² |ν|²)``.
+        """
+        fast, sums, size, twice = self._denominators
+        x, own = p.imag * size, fast.size
+        inverse = 1.0 / np.subtract((1.0 - x) * (1.0 + x), p * sums, dtype=complex)
+        out = np.empty((2, p.shape[0], self.power.size), dtype=complex)
+        (value, turned), (slope, turned_slope) = ((a[:, :own], a[:, own:]) for a in out)
+        square = (p * p).real
+        np.multiply(np.where(fast, square * square, square), inverse, out=value)
+        inverse *= sums - p * twice
+        inverse += np.where(fast, 4.0, 2.0) / p
+        np.multiply(value, inverse, out=slope)
+        pairs = slice(own - turned.shape[1], own)
+        np.multiply(p, value[:, pairs], out=turned)
+        np.multiply(p, slope[:, pairs], out=turned_slope)
+        turned_slope += value[:, pairs]
+        return out
+
+    @cached_property
+    def _denominators(self) -> tuple[BoolArray, FloatArray, FloatArray, FloatArray]:
+        """Return where a is 2, and s, m and 2 m² of the ``1 - p s + p² m²`` of real poles and of pairs, which share one."""
         single, pair = self._single_and_pairs
-        first, second = weights[:, pair], weights[:, pair + 1]
-        return np.concatenate([weights[:, single], first + second, 1j * (first - second)], axis=1)
+        nu = self.states.nu
+        size = np.concatenate([np.zeros(single.size), np.abs(nu[pair])])
+        sums = np.concatenate([nu.real[single], 2.0 * nu.real[pair]])
+        fast = self.power[np.concatenate([single, pair])] == 2
+        return fast, sums, size, 2.0 * size**2
 
     @cached_property
     def _single_and_pairs(self) -> tuple[IntArray, IntArray]:
@@ -284,43 +317,64 @@ def _poles(interior: Interior, states: StateSpace) -> Poles:
     )  # fmt: skip
 
 
-def summed(terms: Terms, p: ComplexArray, source: ComplexArray, direct: ComplexArray) -> Sums:
-    """Evaluate the sums at the harmonics above zero.
+def summed(
+    terms: Terms, omega: float, order: int, source: ComplexArray, direct: ComplexArray
+) -> tuple[ComplexArray, ComplexArray]:
+    """Evaluate the sums of harmonics 0..`order` at `omega` (rad/s), which is not zero.
 
     Parameters
     ----------
     terms
         From `Interior.terms`.
-    p
-        (H, 1) ``ihω``, none of them zero.
+    omega
+        Frequency.
+    order
+        Highest harmonic.
     source, direct
-        (H, J) amplitudes of the terms under the load of the interior, and (H, n) its product with `Terms.direct`.
+        (L + 1, J) amplitudes of the terms under the load of the interior, and (L + 1, n) its product with `Terms.direct`, of the
+        harmonics that the load has.
+
+    Returns
+    -------
+    matrices
+        (2, order + 1, n, n) condensed stiffness and its derivative by ω.
+    loads
+        (2, order + 1, n) what the load of the interior adds, and its derivative.
     """
     n = terms.left.shape[0]
-    w, w_slope, v, v_slope = terms.weights(p)
-    both = _products(terms, np.concatenate([w, w_slope])).reshape(2, -1, n, n)
-    powers = np.concatenate([p**k for k in range(4)], axis=1)
-    slopes = np.concatenate([np.zeros_like(p), np.ones_like(p), 2.0 * p, 3.0 * p**2], axis=1)
-    static = terms.polynomial.reshape(4, -1)
-    stiffness = (powers @ static).reshape(-1, n, n) - both[0]
-    slope = (slopes @ static).reshape(-1, n, n) - both[1]
-    return Sums(
-        stiffness,
-        slope,
-        -(v * source) @ terms.left.T - p * direct,
-        -(v_slope * source) @ terms.left.T - direct,
-    )
+    rate = 1j * np.arange(1, order + 1)[:, None]
+    p = omega * rate
+    matrices = np.empty((2, order + 1, n, n), dtype=complex)
+    matrices[0, 0], matrices[1, 0] = terms.polynomial[0], 0.0
+    _fill(terms, p, rate, matrices[:, 1:])
+    loads = np.zeros((2, order + 1, n), dtype=complex)
+    own = slice(1, min(order + 1, len(source)))
+    if len(source) > 1:
+        p, rate = p[: own.stop - 1], rate[: own.stop - 1]
+        v, v_slope = terms.load_weights(p)
+        loads[0, own] = -(v * source[own]) @ terms.left.T - p * direct[own]
+        loads[1, own] = rate * (-(v_slope * source[own]) @ terms.left.T - direct[own])
+    return matrices, loads
 
 
-def _products(terms: Terms, weights: ComplexArray) -> ComplexArray:
-    """Return ``left diag(weights) right`` for each row of `weights` (k, J)."""
-    k, (n, size) = weights.shape[0], terms.left.shape
+def _fill(terms: Terms, p: ComplexArray, rate: ComplexArray, out: ComplexArray) -> None:
+    """Write ``Σ_k P_k p^k - Σ w R`` and `rate` times its derivative by `p` (H, 1) to `out` (2, H, n, n)."""
+    n, size = terms.left.shape
+    one = np.ones_like(p)
+    powers = np.array([[one, p, p * p, p**3], [0.0 * p, one, 2.0 * p, 3.0 * p * p]])[..., 0]
+    powers = powers.transpose(0, 2, 1)
     if not terms.symmetric or size < FEWEST or size * n * (n + 1) / 2 > LARGEST_TABLE:
-        scaled = (terms.left * weights[:, None, :]).reshape(k * n, size)
-        return np.asarray(scaled @ terms.right).reshape(k, n, n)
-    on_rows = terms.on_residues(weights)
-    triangles = np.concatenate([on_rows.real, on_rows.imag]) @ terms.residues
-    return np.asarray((triangles[:k] + 1j * triangles[k:])[:, _places(n)])
+        weights = terms.weights(p)
+        scaled = (terms.left * weights[:, :, None]).reshape(2 * p.size * n, size)
+        products = (scaled @ terms.right).reshape(out.shape)
+        np.subtract((powers @ terms.polynomial.reshape(4, -1)).reshape(out.shape), products, out)
+        out[1] *= rate[:, :, None]
+        return
+    weights = np.concatenate([powers, terms.on_table(p)], axis=2)
+    weights[1] *= rate
+    rows = np.array([weights.real, weights.imag]).reshape(-1, weights.shape[2])
+    full = (rows @ terms.table).take(_places(n), axis=1).reshape(2, *out.shape)
+    out.real, out.imag = full
 
 
 @lru_cache(maxsize=8)
