@@ -1,5 +1,7 @@
 """Rigid contacts by the dynamic Lagrangian method: exact derivatives, laws that hold, an answer that knows no penalty."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -18,9 +20,11 @@ from stickslip.harmonic.dlft import dynamic_lagrangian
 from stickslip.harmonic.dynamic_stiffness import condense
 from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.harmonic.fourier import to_complex
+from stickslip.harmonic.rigid_jacobian import RigidJacobian
 from stickslip.model.matrices import lumped
 from stickslip.model.structure import Structure
 from stickslip.solve.continuation import Following, StepControl, start_point, trace
+from stickslip.solve.krylov import Automatic, Krylov
 from stickslip.solve.newton_method import Newton, newton
 
 TWO_MASSES = lumped(
@@ -77,6 +81,68 @@ def assert_derivatives(problem, x, omega, step=1e-6):
 def test_jacobian_in_stick_slip_and_lift_off(seed, size):
     x = size * np.random.default_rng(seed).standard_normal(2 * 7)
     assert_derivatives(pressed(3, 32, 2.0, shake=4.0), x, 0.7)
+
+
+def by_products(problem):
+    return replace(problem, balance=replace(problem.balance, jacobian="structured"))
+
+
+def mixed(order=3, samples=64):
+    """A rigid contact beside one with a stiffness."""
+    load = HarmonicLoad(np.zeros(2), {1: np.array([20.0 + 0j, 0.0])})
+    gap = np.zeros((6, 2))
+    gap[0, 1], gap[3, 0] = 1.0, 1.0
+    spring = ElasticCoulomb(k_t=0.5, k_w=0.0, k_n=0.0, mu=1.0, preload=2.0)
+    laws = (RigidCoulomb(mu=0.9, preload=9.0), spring)
+    interface = Interface(("r", "s"), laws, gap)
+    return dynamic_lagrangian(condense(TWO_MASSES, np.arange(2), load), interface, order, samples)
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    size=st.sampled_from([1e-4, 0.05, 1.0, 5.0]),
+    made=st.sampled_from([lambda: pressed(3, 32, 2.0, shake=4.0), mixed]),
+)
+def test_products_of_the_jacobian_are_those_of_the_array(seed, size, made):
+    problem, rng = made(), np.random.default_rng(seed)
+    x, v = rng.standard_normal((2, problem.size)) * [[size], [1.0]]
+    at, other = by_products(problem).linearise(x, 0.7), problem.linearise(x, 0.7)
+    jac, array = at.jac, other.jac
+    assert isinstance(jac, RigidJacobian)
+    assert isinstance(array, np.ndarray)
+    for found, expected in (
+        (at.residual, other.residual), (at.jac_p, other.jac_p), (jac.dense(), array), (at.dense_jac(), array),
+        (jac.matvec(v), array @ v), (jac.rmatvec(v), v @ array), (jac.transposed.matvec(v), v @ array),
+    ):  # fmt: skip
+        np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
+    if np.linalg.cond(array) < 1e6:
+        exact = Krylov(tolerance=1e-13)
+        for one, matrix in ((jac, array), (jac.transposed, array.T)):
+            expected = np.linalg.solve(matrix, v)
+            size = np.abs(expected).max()
+            np.testing.assert_allclose(exact.solve(one, v), expected, atol=1e-9 * size)
+
+
+@pytest.mark.parametrize("made", [mixed, lambda: pressed(7, 64), lambda: rubbing(7, 64)])
+def test_newton_by_products_finds_the_same_motion(made):
+    problem, krylov = made(), Krylov()
+    options = Newton(max_iterations=100, tolerance=1e-12, linear=Automatic(krylov=krylov))
+    expected, _ = solution(problem, 1.5)
+    for order in (
+        problem.order,
+        problem.order + 2,
+    ):  # factors are those of each number of harmonics
+        own = by_products(problem.with_order(order))
+        found = newton(lambda v: own.linearise(v, 1.5), own.unknowns(expected), options)  # noqa: B023
+        assert found.status.converged
+    start = np.zeros(problem.size)
+    own = by_products(problem)
+    found = newton(lambda v: own.linearise(v, 1.5), start, options)
+    assert found.status.converged
+    assert krylov.counts.products > 0
+    motion = own.coefficients(found.x)
+    np.testing.assert_allclose(motion, expected, atol=1e-9 * np.abs(expected).max())
 
 
 def test_jacobian_of_a_contact_that_sticks_throughout():
@@ -256,14 +322,7 @@ def test_initial_gap_shifts_the_floor_and_interference_presses():
 
 
 def test_contacts_with_and_without_stiffness_in_one_interface():
-    load = HarmonicLoad(np.zeros(2), {1: np.array([20.0 + 0j, 0.0])})
-    gap = np.zeros((6, 2))
-    gap[0, 1], gap[3, 0] = 1.0, 1.0
-    spring = ElasticCoulomb(k_t=0.5, k_w=0.0, k_n=0.0, mu=1.0, preload=2.0)
-    laws = (RigidCoulomb(mu=0.9, preload=9.0), spring)
-    problem = dynamic_lagrangian(
-        condense(TWO_MASSES, np.arange(2), load), Interface(("r", "s"), laws, gap), 3, 64
-    )
+    problem = mixed()
     _, found = solution(problem, 1.5)
     at = problem.contacts(found.x, 1.5)
     assert np.max(np.abs(at.force[0, 0])) == pytest.approx(8.1)

@@ -24,13 +24,18 @@ from stickslip.errors import input_error
 from stickslip.harmonic.aft import ContactPeriod, contact_forces
 from stickslip.harmonic.balance import (
     HarmonicBalance,
-    Linearisation,
     check_retained,
     harmonic_balance,
 )
 from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.harmonic.penalty import Penalty, dynamic_penalty
 from stickslip.harmonic.rigid_contacts import NORMAL, STIFF, RigidContacts, rigid_contacts
+from stickslip.harmonic.rigid_jacobian import (
+    GapLaws,
+    RigidJacobian,
+    RigidLinearisation,
+    derivative,
+)
 from stickslip.harmonic.support import Harmonics, harmonics_of
 
 SAMPLES_OF_OTHERS = 8  # per harmonic, least number at which contacts with stiffness are evaluated
@@ -119,30 +124,38 @@ class DynamicLagrangian:
         """Return the same problem with harmonics 0..`order`."""
         samples = _checked_samples(self.samples, order)
         inner = replace(
-            self.balance, harmonics=harmonics_of(order), samples=_samples_of_others(samples, order)
+            self.balance,
+            harmonics=harmonics_of(order),
+            samples=_samples_of_others(samples, order),
+            rows=replace(self.balance.rows),
         )
         own = rigid_contacts(self.interface, self.rigid.index, inner)
         return replace(self, balance=inner, rigid=own, samples=samples)
 
-    def linearise(self, x: FloatArray, omega: float) -> Linearisation:
+    def linearise(self, x: FloatArray, omega: float) -> RigidLinearisation:
         """Return residual, Jacobian and ω-derivative at scaled unknowns `x` (size,) and `omega` (rad/s)."""
         at = self.balance.linearise(x, omega)
         start = perf_counter()
         rigid = self.rigid
-        rows = rigid.column[:, None] + self.linear.n * np.arange(2 * self.order + 1)
         found = self._corrected(x, omega, at.residual)
-        # derivatives of the predictions by x and, in the last column, by ω
-        jac = at.dense_jac()
-        slope = -np.concatenate([jac[rows], at.jac_p[rows][:, :, None]], axis=2)
-        slope /= rigid.factor[:, None, None]
-        _add_penalty(slope, rows, rigid, found)
-        change = rigid.factor[:, None, None] * _chain(found.period.blocks, slope, rigid)
-        residual, jac_p = at.residual.copy(), at.jac_p.copy()
-        own = found.coefficients[:, rigid.contact, rigid.direction].T
-        residual[rows] += rigid.factor[:, None] * own
-        jac[rows] += change[:, :, :-1]
-        jac_p[rows] += change[:, :, -1]
-        return Linearisation(residual, jac, jac_p, at.seconds_contact + perf_counter() - start)
+        laws = _gap_laws(rigid, found)
+        residual, jac_p = (
+            v.reshape(2 * self.order + 1, -1).copy() for v in (at.residual, at.jac_p)
+        )
+        own = found.coefficients[:, rigid.contact, rigid.direction]
+        residual[:, rigid.column] += rigid.factor * own
+        # derivatives of the predictions by ω
+        predicted = (found.penalty.slope / found.penalty.value * found.forbidden).T
+        predicted -= (jac_p[:, rigid.column] / rigid.factor).T
+        jac_p[:, rigid.column] += laws.forces(predicted[:, :, None])[:, :, 0].T
+        jac: FloatArray | RigidJacobian
+        if isinstance(at.jac, np.ndarray):
+            jac = at.jac
+            laws.correct(jac)
+        else:
+            jac = RigidJacobian(at.jac, laws)
+        seconds = at.seconds_contact + perf_counter() - start
+        return RigidLinearisation(residual.reshape(-1), jac, jac_p.reshape(-1), seconds)
 
     def contacts(self, x: FloatArray, omega: float) -> ContactPeriod:
         """Return gaps, forces and states of all contacts over one period, at the scaled unknowns `x` and `omega` (rad/s).
@@ -215,15 +228,6 @@ class _Corrected:
     forbidden: FloatArray  # (m, n_gaps) penalty times what the laws forbid
 
 
-def derivative(order: int) -> FloatArray:
-    """Return the (2 order + 1, 2 order + 1) matrix that differentiates real Fourier coefficients by τ = ωt."""
-    out = np.zeros((2 * order + 1, 2 * order + 1))
-    h = np.arange(1, order + 1)
-    out[2 * h - 1, 2 * h] = h
-    out[2 * h, 2 * h - 1] = -h
-    return out
-
-
 def _in_time(coefficients: FloatArray, samples: int) -> FloatArray:
     """Return (n, samples) values of real Fourier coefficients (m, n)."""
     basis = _basis((coefficients.shape[0] - 1) // 2, samples)
@@ -269,28 +273,21 @@ def _slider(mu: float, constant: float) -> ElasticCoulomb:
     return ElasticCoulomb(k_t=1.0, k_w=1.0, k_n=0.0, mu=mu, preload=constant)
 
 
-def _add_penalty(
-    slope: FloatArray, rows: IntArray, rigid: RigidContacts, found: _Corrected
-) -> None:
-    """Add the derivatives of what the laws forbid: of displacements along the normal and where a tangent is held, else of velocities."""
-    m = rows.shape[1]
-    sliding = derivative((m - 1) // 2)
-    penalty = found.penalty
-    for g, by_place in enumerate((rigid.direction == NORMAL) | found.stuck):
-        slope[g][:, rows[g]] += (
-            penalty.value[g] * rigid.factor[g] * (np.eye(m) if by_place else sliding)
-        )
-    slope[:, :, -1] += (penalty.slope / penalty.value * found.forbidden).T
-
-
-def _chain(blocks: FloatArray, slope: FloatArray, rigid: RigidContacts) -> FloatArray:
-    """Return the derivatives of the corrected forces (n_gaps, m, k) from those of the predicted ones."""
-    change = blocks[rigid.contact, TT + rigid.direction] @ slope
-    for g in np.flatnonzero(rigid.direction != NORMAL):
-        normal = np.flatnonzero((rigid.contact == rigid.contact[g]) & (rigid.direction == NORMAL))
-        for k in normal:
-            change[g] += blocks[rigid.contact[g], TN + rigid.direction[g]] @ slope[k]
-    return change
+def _gap_laws(rigid: RigidContacts, found: _Corrected) -> GapLaws:
+    """Return the derivatives of the corrected forces by gap; penalties are on displacements along the normal and where a tangent is held."""
+    blocks, along = found.period.blocks, rigid.direction == NORMAL
+    pairs = (rigid.contact[:, None] == rigid.contact) & ~along[:, None] & along
+    tangent, normal = np.nonzero(pairs)
+    return GapLaws(
+        rigid.column,
+        rigid.factor,
+        blocks[rigid.contact, TT + rigid.direction],
+        tangent,
+        normal,
+        blocks[rigid.contact[tangent], TN + rigid.direction[tangent]],
+        found.penalty.value * rigid.factor,
+        ~(along | found.stuck),
+    )
 
 
 def dynamic_lagrangian(

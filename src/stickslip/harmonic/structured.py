@@ -6,8 +6,9 @@ it do at the contacts: block Gauss-Seidel, ``P = D + Bᵀ K̂_lower B``, which h
 ``J = P + Bᵀ(K̂ - K_P)B`` no product with Z is needed where D was made at the same frequency.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from stickslip.harmonic.small_blocks import (
     dynamic_stiffness,
     small_blocks,
 )
+from stickslip.operators import JacobianOperator
 
 Solve = Callable[[FloatArray], FloatArray]
 Product = Callable[[FloatArray, FloatArray], FloatArray]
@@ -103,9 +105,9 @@ class StructuredJacobian:
         return self.scale * self._add_contacts(self.blocks, q, True, out)
 
     @property
-    def transposed(self) -> "TransposedJacobian":
+    def transposed(self) -> "Transposed":
         """Its transpose."""
-        return TransposedJacobian(self)
+        return Transposed(self)
 
     def dense(self) -> FloatArray:
         """Return the Jacobian as an array."""
@@ -114,18 +116,23 @@ class StructuredJacobian:
         add_contact_jacobian(self.blocks, self.rows.columns, self.rows.values, n, self.scale, jac)
         return jac
 
+    def own_blocks(self) -> Iterator[tuple[ComplexArray, ComplexArray]]:
+        """Yield of each harmonic the contact stiffness (n_contacts, 3, 3), N/m, and ``scale (Z_h + K̂ʰʰ)`` (n, n), to be changed at will."""
+        means = harmonic_means(self.blocks)
+        for mean, h in zip(means, self.linear.harmonics, strict=True):
+            block = self.linear.block(h)
+            add_stiffness(mean, self.rows.columns, self.rows.values, block)
+            block *= self.scale
+            yield mean, block
+
     def preconditioner(self) -> HarmonicFactors | None:
         """Return the factors of ``Z_h + K̂ʰʰ``; None where one of the matrices is singular."""
-        means = harmonic_means(self.blocks)
-        factors = []
-        for place, h in enumerate(self.linear.harmonics):
-            block = self.linear.block(h)
-            add_stiffness(means[place], self.rows.columns, self.rows.values, block)
-            block *= self.scale
-            matrix = np.array(block.real, order="F") if h == 0 else block
-            own = factorise(matrix)
+        factors, means = [], []
+        for h, (mean, matrix) in enumerate(self.own_blocks()):
+            own = factorise(np.array(matrix.real, order="F") if h == 0 else matrix)
             if own is None:
                 return None
+            means.append(mean)
             factors.append(own)
         inverses = None
         if self.linear.n <= SMALL:
@@ -133,7 +140,7 @@ class StructuredJacobian:
             inverses = small_blocks(
                 [np.stack([own.solve(e) for e in unit], axis=1) for own in factors]
             )
-        return HarmonicFactors(self.linear, means, tuple(factors), inverses)
+        return HarmonicFactors(self.linear, np.array(means), tuple(factors), inverses)
 
     def preconditioned_by(self, kept: HarmonicFactors) -> tuple[Solve, Product]:
         """Return how to solve ``P x = y`` with kept factors and the coupling of this Jacobian, and ``J v`` as a function of v and ``P v``."""
@@ -188,9 +195,7 @@ class StructuredJacobian:
         before = first = 0
         for h, factors in enumerate(kept.factors):
             last = 2 * h + 1
-            subtract_lower(
-                self.blocks, self.rows.columns, self.rows.values, rows, before, first, last, self.scale, gap, rows
-            )  # fmt: skip
+            self.subtract_below((before, first, last), gap, rows)
             if h == 0:
                 rows[0] = factors.solve(rows[0])
             else:
@@ -198,6 +203,12 @@ class StructuredJacobian:
                 rows[first], rows[first + 1] = solved.real, -solved.imag
             before, first = first, last
         return rows.reshape(-1)
+
+    def subtract_below(self, span: tuple[int, int, int], gap: FloatArray, rows: FloatArray) -> None:
+        """Subtract from a harmonic of the right side `rows` what the solved harmonics below it do at the contacts; see `subtract_lower`."""
+        subtract_lower(
+            self.blocks, self.rows.columns, self.rows.values, rows, *span, self.scale, gap, rows
+        )
 
     def _by_row(self, v: FloatArray) -> FloatArray:
         return np.ascontiguousarray(v.reshape(-1, self.linear.n))
@@ -212,11 +223,22 @@ class StructuredJacobian:
         return out.reshape(-1)
 
 
+class Transposable(JacobianOperator, Protocol):
+    """A Jacobian that makes a preconditioner, for its transpose too."""
+
+    @property
+    def problem(self) -> object: ...  # noqa: D102
+
+    def preconditioner(self) -> Any: ...  # noqa: D102
+
+    def solve_transposed(self, kept: Any, right: FloatArray) -> FloatArray: ...  # noqa: D102
+
+
 @dataclass(frozen=True, eq=False)
-class TransposedJacobian:
+class Transposed:
     """The transpose of a Jacobian, known by its products; both share the factors of a preconditioner."""
 
-    transposed: StructuredJacobian
+    transposed: Transposable
 
     @property
     def problem(self) -> object:
@@ -236,15 +258,17 @@ class TransposedJacobian:
         """Return ``J v``."""
         return self.transposed.matvec(v)
 
-    def preconditioner(self) -> HarmonicFactors | None:
+    def preconditioner(self) -> Any:
         """Return the factors that the Jacobian makes."""
         return self.transposed.preconditioner()
 
-    def preconditioned_by(self, kept: HarmonicFactors) -> tuple[Solve, Product]:
+    def preconditioned_by(self, kept: Any) -> tuple[Solve, Product]:
         """Return how to solve ``Pᵀ x = y``, and ``Jᵀ v``."""
-        return lambda right: self.transposed.solve_transposed(
-            kept, right
-        ), lambda v, _: self.matvec(v)
+
+        def solve(right: FloatArray) -> FloatArray:
+            return self.transposed.solve_transposed(kept, right)
+
+        return solve, lambda v, _: self.matvec(v)
 
 
 def real_matrix(blocks: list[ComplexArray] | ComplexArray) -> FloatArray:

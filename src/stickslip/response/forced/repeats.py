@@ -8,10 +8,10 @@ from time import perf_counter
 import numpy as np
 
 from stickslip.arrays import FloatArray
-from stickslip.harmonic.balance import Linearisation
 from stickslip.harmonic.selection.strategy import judged
 from stickslip.response.forced.problem import Balance, ForcedPoint, ForcedProblem, forced_point
 from stickslip.response.homotopies import homotopies
+from stickslip.solve.branch import ParameterEvaluation
 from stickslip.solve.linear import factorised
 from stickslip.solve.natural import NaturalLevel
 from stickslip.solve.newton_method import Newton, Solution, charged, newton
@@ -118,7 +118,7 @@ def _nearest_first(
     q: FloatArray,
     others: Sequence[FloatArray],
     options: Newton,
-) -> list[tuple[Linearisation, FloatArray]]:
+) -> list[tuple[ParameterEvaluation, FloatArray]]:
     """Sort starts by the Newton correction that the Jacobian at the padded low-order solution `q` foretells from each.
 
     The residual is no measure: a contact that has changed its state adds its stiffness times the motion to it, however near the
@@ -128,7 +128,7 @@ def _nearest_first(
     jac = starts[0][0].jac
     solve = factorised(options.linear, jac.copy(order="F") if isinstance(jac, np.ndarray) else jac)
 
-    def away(start: tuple[Linearisation, FloatArray]) -> float:
+    def away(start: tuple[ParameterEvaluation, FloatArray]) -> float:
         residual = start[0].residual
         step = None if solve is None else solve(residual)
         size = float(np.linalg.norm(residual if step is None else step))
@@ -140,13 +140,13 @@ def _nearest_first(
 def _from_start(
     balance: Balance,
     omega: float,
-    start: tuple[Linearisation, FloatArray],
+    start: tuple[ParameterEvaluation, FloatArray],
     options: Newton,
 ) -> Solution:
     """Solve from a start that is evaluated already."""
     first, begin = start
 
-    def evaluate(x: FloatArray) -> Linearisation:
+    def evaluate(x: FloatArray) -> ParameterEvaluation:
         return first if x is begin else balance.linearise(x, omega)
 
     return newton(evaluate, begin, options, NaturalLevel())

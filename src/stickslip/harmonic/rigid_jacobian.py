@@ -1,0 +1,257 @@
+"""The Jacobian of a periodic problem with rigid contacts, by its products.
+
+A rigid gap is predicted a force ``p = -r/f + ε D g``: what equilibrium asks for, from the residual r without rigid contacts, and a penalty on its
+displacement or velocity. Its law returns the part ``E p`` of it. With S the Jacobian without rigid contacts, R its rows at the gaps and f
+the gap over its coordinate, ``J = S + Rᵀ f E (ε D f R - R S / f)``: rows of full matrices, whose product costs no more than that of S.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from stickslip.contact.product import harmonic_means
+from stickslip.harmonic.factors import Factors, factorise
+from stickslip.harmonic.structured import StructuredJacobian, Transposed
+
+Solve = Callable[[FloatArray], FloatArray]
+Product = Callable[[FloatArray, FloatArray], FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class GapLaws:
+    """Derivatives of the corrected forces at one motion, by gap.
+
+    Attributes
+    ----------
+    column, factor
+        (n_gaps,) retained coordinate of a gap, and the gap over it.
+    own
+        (n_gaps, m, m) derivatives of the forces by the predicted ones of the same gap.
+    tangent, normal
+        (k,) gaps whose force depends on the normal prediction of their contact, and the gaps along that normal.
+    by_normal
+        (k, m, m) the derivatives.
+    penalty
+        (n_gaps,) of the coordinate.
+    slides
+        (n_gaps,) whether the penalty is on the velocity, by τ = ωt.
+    """
+
+    column: IntArray
+    factor: FloatArray
+    own: FloatArray
+    tangent: IntArray
+    normal: IntArray
+    by_normal: FloatArray
+    penalty: FloatArray
+    slides: BoolArray
+
+    @property
+    def order(self) -> int:
+        """Highest harmonic."""
+        return int(self.own.shape[1] - 1) // 2
+
+    def forces(self, predicted: FloatArray) -> FloatArray:
+        """Return the forces on the coordinates that a change of the predicted ones makes; (n_gaps, m, k) both."""
+        out = self.own @ predicted
+        out[self.tangent] += self.by_normal @ predicted[self.normal]
+        return self.factor[:, None, None] * out
+
+    def predictions(self, forces: FloatArray) -> FloatArray:
+        """Return the transposed product, (n_gaps, m) both."""
+        given = (self.factor[:, None] * forces)[:, :, None]
+        out = self.own.transpose(0, 2, 1) @ given
+        back = self.by_normal.transpose(0, 2, 1) @ given[self.tangent]
+        np.add.at(out, self.normal, back)
+        return np.asarray(out[:, :, 0])
+
+    def penalised(self, q: FloatArray) -> FloatArray:
+        """Return ``ε D q`` of the coefficients (n_gaps, m) of the coordinates at the gaps."""
+        rate = q @ derivative(self.order).T
+        return self.penalty[:, None] * np.where(self.slides[:, None], rate, q)
+
+    def penalised_transposed(self, q: FloatArray) -> FloatArray:
+        """Return ``Dᵀ ε q``."""
+        scaled = self.penalty[:, None] * q
+        return np.where(self.slides[:, None], scaled @ derivative(self.order), scaled)
+
+    def correct(self, jac: FloatArray) -> None:
+        """Make of a Jacobian without rigid contacts, (size, size), that with them, in place."""
+        m = self.own.shape[1]
+        rows = self.column[:, None] + jac.shape[0] // m * np.arange(m)
+        predicted = -jac[rows] / self.factor[:, None, None]
+        rate, unit = derivative(self.order), np.eye(m)
+        for g, own in enumerate(rows):
+            predicted[g][:, own] += self.penalty[g] * (rate if self.slides[g] else unit)
+        jac[rows] += self.forces(predicted)
+
+    @cached_property
+    def means(self) -> tuple[ComplexArray, ComplexArray]:
+        """(H+1, n_gaps) and (H+1, k) numbers by which each harmonic of a prediction acts on the same one of the force."""
+        own, other = (harmonic_means(b[:, None])[:, :, 0, 0] for b in (self.own, self.by_normal))
+        return own, other
+
+
+@dataclass(frozen=True, eq=False)
+class RigidFactors:
+    """What of the preconditioner is worth keeping.
+
+    Attributes
+    ----------
+    factors
+        Of each harmonic.
+    rows
+        (H+1, n_gaps, n) rows at the gaps of the harmonics without rigid contacts.
+    """
+
+    factors: tuple[Factors, ...]
+    rows: ComplexArray
+
+
+@dataclass(frozen=True, eq=False)
+class RigidJacobian:
+    """The Jacobian with rigid contacts.
+
+    Parameters
+    ----------
+    soft
+        That without them.
+    laws
+        What the rigid contacts make of it.
+    """
+
+    soft: StructuredJacobian
+    laws: GapLaws
+
+    @property
+    def problem(self) -> object:
+        """What Jacobians have in common that can share a preconditioner."""
+        return self.soft.problem
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.soft.shape
+
+    @property
+    def transposed(self) -> Transposed:
+        """Its transpose."""
+        return Transposed(self)
+
+    def matvec(self, v: FloatArray) -> FloatArray:
+        """Return ``J v``."""
+        laws = self.laws
+        out, q = self._by_row(self.soft.matvec(v)), self._by_row(v)
+        predicted = laws.penalised(q[:, laws.column].T)
+        predicted -= out[:, laws.column].T / laws.factor[:, None]
+        out[:, laws.column] += laws.forces(predicted[:, :, None])[:, :, 0].T
+        return out.reshape(-1)
+
+    def rmatvec(self, v: FloatArray) -> FloatArray:
+        """Return ``Jᵀ v``."""
+        laws = self.laws
+        w = self._by_row(v).copy()
+        back = laws.predictions(w[:, laws.column].T)
+        w[:, laws.column] -= (back / laws.factor[:, None]).T
+        out = self._by_row(self.soft.rmatvec(w.reshape(-1)))
+        out[:, laws.column] += laws.penalised_transposed(back).T
+        return out.reshape(-1)
+
+    def dense(self) -> FloatArray:
+        """Return the Jacobian as an array."""
+        jac = self.soft.dense()
+        self.laws.correct(jac)
+        return jac
+
+    def preconditioner(self) -> RigidFactors | None:
+        """Return the factors of what each harmonic does to itself; None where one of the matrices is singular."""
+        laws, factors, rows = self.laws, [], []
+        (own, other), factor = laws.means, laws.factor[:, None]
+        for h, (_, matrix) in enumerate(self.soft.own_blocks()):
+            rows.append(matrix[laws.column])
+            predicted = -rows[-1] / factor
+            predicted[np.arange(factor.size), laws.column] += self._penalty(h)
+            force = own[h][:, None] * predicted
+            force[laws.tangent] += other[h][:, None] * predicted[laws.normal]
+            matrix[laws.column] += factor * force
+            made = factorise(np.array(matrix.real, order="F") if h == 0 else matrix)
+            if made is None:
+                return None
+            factors.append(made)
+        return RigidFactors(tuple(factors), np.array(rows))
+
+    def preconditioned_by(self, kept: RigidFactors) -> tuple[Solve, Product]:
+        """Return how to solve ``P x = y``, and ``J v`` as a function of v and ``P v``."""
+        return lambda right: self._sweep(kept, right), lambda v, _: self.matvec(v)
+
+    def solve_transposed(self, kept: RigidFactors, right: FloatArray) -> FloatArray:
+        """Solve with the transpose of what each harmonic does to itself."""
+        rows = self._by_row(right).copy()
+        for h, factors in enumerate(kept.factors):
+            if h == 0:
+                rows[0] = factors.solve_transposed(rows[0])
+                continue
+            # the transpose of a real form is that of the conjugate transpose
+            solved = factors.solve_transposed(rows[2 * h - 1] + 1j * rows[2 * h])
+            rows[2 * h - 1], rows[2 * h] = solved.real, solved.imag
+        return rows.reshape(-1)
+
+    def _sweep(self, kept: RigidFactors, right: FloatArray) -> FloatArray:
+        """Solve harmonic by harmonic, from the static one up, each with what those below it do at the contacts."""
+        laws, soft = self.laws, self.soft
+        rows = self._by_row(right).copy()
+        predicted = np.zeros((laws.column.size, len(rows)))
+        gap = np.zeros((len(soft.blocks), 3, len(rows)))
+        before = first = 0
+        for h, factors in enumerate(kept.factors):
+            last = 2 * h + 1
+            soft.subtract_below((before, first, last), gap, rows)
+            below = predicted[:, :first, None]
+            force = laws.own[:, first:last, :first] @ below
+            force[laws.tangent] += laws.by_normal[:, first:last, :first] @ below[laws.normal]
+            rows[first:last, laws.column] -= laws.factor * force[:, :, 0].T
+            right_side = rows[0] if h == 0 else rows[first] - 1j * rows[first + 1]
+            x = factors.solve(right_side)
+            found = self._penalty(h) * x[laws.column] - kept.rows[h] @ x / laws.factor
+            if h == 0:
+                rows[0], predicted[:, 0] = x.real, found.real
+            else:
+                rows[first], rows[first + 1] = x.real, -x.imag
+                predicted[:, first], predicted[:, first + 1] = found.real, -found.imag
+            before, first = first, last
+        return rows.reshape(-1)
+
+    def _penalty(self, harmonic: int) -> ComplexArray:
+        """Return ``ε`` of each coordinate at a gap in a harmonic, times ih where it is on the velocity."""
+        rate: ComplexArray = np.where(self.laws.slides, 1j * harmonic, 1.0)
+        return self.laws.penalty * rate
+
+    def _by_row(self, v: FloatArray) -> FloatArray:
+        return np.ascontiguousarray(v.reshape(2 * self.laws.order + 1, -1))
+
+
+@dataclass(frozen=True, eq=False)
+class RigidLinearisation:
+    """Residual and derivatives at one state, all scaled, and the time the contacts took; as `Linearisation`."""
+
+    residual: FloatArray  # (size,)
+    jac: FloatArray | RigidJacobian  # (size, size)
+    jac_p: FloatArray  # (size,), by ω
+    seconds_contact: float
+    events: None = None
+
+    def dense_jac(self) -> FloatArray:
+        """Return the Jacobian as an array."""
+        return self.jac if isinstance(self.jac, np.ndarray) else self.jac.dense()
+
+
+def derivative(order: int) -> FloatArray:
+    """Return the (2 order + 1, 2 order + 1) matrix that differentiates real Fourier coefficients by τ = ωt."""
+    out = np.zeros((2 * order + 1, 2 * order + 1))
+    h = np.arange(1, order + 1)
+    out[2 * h - 1, 2 * h] = h
+    out[2 * h, 2 * h - 1] = -h
+    return out
