@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 import stickslip as ss
 from stickslip.assembly.everywhere import nodes_of
 from stickslip.assembly.forces import force_of
+from stickslip.assembly.mistuning import BladeMistuning, Mistuning
 from stickslip.cli import app
 from stickslip.contact.laws.elastic_coulomb import ElasticCoulomb
 from stickslip.errors import InputError
@@ -28,8 +29,9 @@ from stickslip.model.part import solid_part
 from stickslip.model.readers.frd import read_frd
 from stickslip.model.readers.units import Units
 from stickslip.reduction.choice import Reduction
+from stickslip.study.exchange.chosen import chosen, point_of
 from stickslip.study.exchange.contacts import contacts_of
-from stickslip.study.exchange.motion import motion_of, point_of
+from stickslip.study.exchange.motion import expanded, motion_of
 
 CCX = Path(__file__).parent / "data" / "calculix" / "brick_static.frd"  # written by ccx 2.20
 BEAMS = """
@@ -121,7 +123,7 @@ def solved(model, hz, wave=0):
 def test_every_node_of_copies_moves_as_the_unreduced_model_says(beams):
     _, result, model = beams
     data = result["forced_response"]
-    motion = motion_of(data, model, 0, point_of(data, 0, None), wheel=False)
+    motion = motion_of(chosen(result.data), model, wheel=False)
     wanted = solved(model, motion.hz)
     full = model.at(model.speed, 0, "stuck")
     # the mean: contacts open, under the weight and the mean forces of the contacts
@@ -138,7 +140,7 @@ def test_every_node_of_copies_moves_as_the_unreduced_model_says(beams):
         assert np.abs(body.mean - body.nodes.of(still)).max() < 1e-8 * np.abs(still).max()
     z = data["output"].values.tolist().index("middle.z")
     reported = data["output_displacement"].values[point_of(data, 0, None), 1, z]
-    place = nodes_of(model)[1].numbers.tolist().index(motion.outputs["middle.z"][1])
+    place = nodes_of(model)[1].numbers.tolist().index(motion.outputs["middle.z"][2])
     own = motion.bodies[1].amplitudes[1, place, 2]
     assert abs(own - complex(*reported)) < 1e-10 * abs(own)
 
@@ -146,7 +148,7 @@ def test_every_node_of_copies_moves_as_the_unreduced_model_says(beams):
 def test_every_sector_moves_as_the_wave_of_the_unreduced_wheel_and_faces_stay_together(wheel):
     result, model = wheel
     data = result["forced_response"]
-    motion = motion_of(data, model, 0, point_of(data, 0, 500.0), wheel=True)
+    motion = motion_of(chosen(result.data, hz=500.0), model, wheel=True)
     wanted = solved(model, 500.0, ORDER)
     first = motion.bodies[0]
     assert np.abs(first.amplitudes[1] - first.nodes.of(wanted)).max() < 1e-8 * np.abs(wanted).max()
@@ -169,9 +171,13 @@ def test_paraview_files_hold_one_period_read_by_meshio(beams):
     folder, result, model = beams
     told = CliRunner().invoke(app, ["export", str(folder / "results"), "--steps", "5"])
     assert told.exit_code == 0, told.output
+    words = " ".join(told.output.split())
+    assert words.startswith("[forced_response] its peak at ")
+    assert " of middle.z reading beam.inp reducing the model again" in words
     place = folder / "results" / "vtu_0"
-    data = result["forced_response"]
-    motion = motion_of(data, model, 0, point_of(data, 0, None), wheel=False)
+    motion = motion_of(chosen(result.data), model, wheel=False)
+    count = 2 * len(model.parts["one"].mesh.points)
+    assert f"writing {count} nodes to " in words
     series = ET.parse(place / "motion.pvd").getroot().findall(".//DataSet")
     assert [one.get("file") for one in series] == [f"motion_{k:03d}.vtu" for k in range(5)]
     assert float(series[1].get("timestep")) == pytest.approx(0.2 / motion.hz)
@@ -222,8 +228,7 @@ def test_frd_files_have_the_columns_of_ccx_and_are_read_back(beams, tmp_path):
     _, result, model = beams
     (file,) = result.export("frd", tmp_path, units="mm-t-s")
     found = read_frd(file, units=Units.mm_t_s())
-    data = result["forced_response"]
-    motion = motion_of(data, model, 0, point_of(data, 0, None), wheel=False)
+    motion = motion_of(chosen(result.data), model, wheel=False)
     own = np.vstack([body.amplitudes[1] for body in motion.bodies])
     read = found.field("DISP", 2).values + 1j * found.field("DISPI", 2).values
     assert np.abs(read - own).max() < 1e-5 * np.abs(own).max()  # six digits
@@ -247,7 +252,7 @@ def test_universal_files_are_read_back_by_pyuff(beams, tmp_path):
     uff = pyuff.UFF(str(file))
     sets = {kind: [s for s in uff.read_sets() if s["type"] == kind] for kind in (164, 2411, 55, 58)}
     data = result["forced_response"]
-    motion = motion_of(data, model, 0, point_of(data, 0, None), wheel=False)
+    motion = motion_of(chosen(result.data), model, wheel=False)
     (nodes,), (shape,) = sets[2411], sets[55]
     points = np.vstack([body.nodes.points for body in motion.bodies])
     assert np.allclose(np.column_stack([nodes[c] for c in "xyz"]), points, rtol=1e-14)
@@ -273,6 +278,10 @@ def test_what_cannot_be_written_is_said(beams, wheel, tmp_path):
     folder, result, _model = beams
     with pytest.raises(InputError, match=r"goes from .* to .* Hz"):
         result.export(hz=5.0)
+    with pytest.raises(InputError, match=r"\[limit_cycle\]; this result has \[forced_response\]"):
+        result.export(analysis="modes")
+    with pytest.raises(InputError, match="points of a forced response are picked by"):
+        result.export(amplitude_mm=1.0)
     with pytest.raises(InputError, match="the result has 1"):
         result.export(case=3)
     with pytest.raises(InputError, match="single structure"):
@@ -286,3 +295,96 @@ def test_what_cannot_be_written_is_said(beams, wheel, tmp_path):
     with pytest.raises(InputError, match="--of FOLDER"):
         moved.export("frd")
     assert moved.export("frd", of=folder)[0].is_file()
+
+
+def test_every_sector_of_a_mistuned_wheel_moves_as_the_unreduced_wheel_says(wheel):
+    model = replace(wheel[1], speed=0.0)
+    more = np.array([0.04, -0.03, 0.0, 0.02, -0.05])
+    blades = BladeMistuning(of="blade", deviations=more, quantity="stiffness")
+    mistuned = replace(model, mistuning=Mistuning(blades={"more": blades}))
+    result = mistuned.forced_response(
+        (500.0,), low=1, high=1, selection="always_low", stability="off", peak_points=0
+    )
+    motion = motion_of(chosen(result.data, hz=500.0), mistuned, wheel=False)
+    assert [body.sector for body in motion.bodies] == list(range(SECTORS))
+    waves = [model.at(0.0, k, "stuck", with_damping=True) for k in range(SECTORS)]
+    ways = [full.expand(np.eye(full.n)) for full in waves]
+    stiffness = model.parts["blade"].structure.stiffness
+    omega, first = 2 * math.pi * 500.0, np.cumsum([0, *(full.n for full in waves)])
+    whole = np.zeros((first[-1], first[-1]), dtype=complex)
+    share = np.fft.fft(more) / SECTORS  # of the deviations, by the difference of two waves
+    for j, k in np.ndindex(SECTORS, SECTORS):
+        own = share[(j - k) % SECTORS] * (ways[j].conj().T @ (stiffness @ ways[k]))
+        if j == k:
+            full = waves[k]
+            own += full.stiffness + 1j * omega * full.damping - omega**2 * full.mass
+        whole[first[j] : first[j + 1], first[k] : first[k + 1]] = own
+    force = np.zeros(first[-1], dtype=complex)
+    gas = force_of(model.places, "gas", model.loads["gas"])
+    force[first[ORDER] : first[ORDER + 1]] = waves[ORDER].project(gas)
+    q = np.split(np.linalg.solve(whole, force), first[1:-1])
+    fields = SECTORS * np.fft.ifft([way @ own for way, own in zip(ways, q, strict=True)], axis=0)
+    for n, body in enumerate(motion.bodies):
+        wanted = body.nodes.of(fields[n]) @ model.axis.rotation(n * 2 * math.pi / SECTORS).T
+        assert np.abs(body.amplitudes[1] - wanted).max() < 1e-8 * np.abs(fields).max()
+    data = result["forced_response"]
+    assert len(contacts_of(data, motion, 0, point_of(data, 0, 500.0))) == 1  # those of all sectors
+
+
+CHAIN = """
+schema_version = 2
+[part.chain]
+shape = "lumped"
+masses_kg = [1.0, 0.4, 0.3]
+springs_n_per_m = [["ground", 1, 1.0], [1, 2, 2.0], [2, 3, 3.0]]
+dashpots_n_s_per_m = [["ground", 1, -0.1]]
+[contact.damper]
+between = ["chain.m1", "ground"]
+law = "jenkins"
+tangential_stiffness_n_per_m = 0.5
+slip_limit_n = 0.1
+[output]
+points = { root = "chain.m1" }
+[limit_cycle]
+harmonics = 3
+most_harmonics = 3
+points = 8
+amplitude_mm = [150.0, 3000.0]
+"""
+
+
+@pytest.mark.parametrize("asked", ["limit_cycle", "periodic", "decaying"])
+def test_free_motions_hold_the_balance_of_a_mass_that_is_not_solved_for(asked, tmp_path):
+    (tmp_path / "study.toml").write_text(CHAIN)
+    study = ss.Study.from_file(tmp_path / "study.toml")
+    model = study.model()
+    if asked == "limit_cycle":
+        picked = chosen(study.run().data)
+        s = 1j * picked.omega
+        own = s**2
+    else:
+        keys = {"modes": [1], "amplitude_mm": (150.0, 900.0), "points": 5, "harmonics": 3}
+        result = model.nonlinear_mode(concept=asked, most_harmonics=3, **keys)
+        picked = chosen(result.data, amplitude_mm=600.0)
+        told = result["nonlinear_mode"].isel(case=0, branch=0)
+        near = int(np.nanargmin(np.abs(told["amplitude"].values - 0.6)))
+        ratio, omega = float(told["damping_ratio"][near]), 2 * math.pi * float(told["frequency_hz"][near])  # fmt: skip
+        assert abs(ratio) > 1e-3
+        s = 1j * omega if asked == "periodic" else omega * (1j * math.sqrt(1 - ratio**2) - ratio)
+        own = s**2 - 2 * ratio * omega * s if asked == "periodic" else s**2
+    _, fields = expanded(picked, model.undriven)
+    assert "chain.m3" not in " ".join(picked.labels)
+    x = fields[0, 1]
+    assert abs((3.0 + 0.3 * own) * x[2] - 3.0 * x[1]) < 1e-9 * abs(x[1])
+    assert abs(x[0]) == pytest.approx(abs(picked.reported[1, 0]), rel=1e-12)
+    (body,) = motion_of(picked, model, wheel=False).bodies
+    assert np.array_equal(body.amplitudes[1, :, 0], x)
+
+
+def test_a_page_is_no_result_and_the_refusal_names_what_can_be_written(tmp_path):
+    page = tmp_path / "both.html"
+    page.write_text("<!doctype html>")
+    told = CliRunner().invoke(app, ["export", str(page)])
+    assert told.exit_code == 2
+    assert told.output.strip().endswith("both.html: is a page, and no result. Give the folder of a run, or the result.nc in it.")  # fmt: skip
+    assert told.output.count("\n") == 1

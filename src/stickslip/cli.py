@@ -1,22 +1,19 @@
 """The commands. Everything heavy is imported inside them, so that ``--help`` is quick."""
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
 from stickslip import __version__
 from stickslip.errors import InputError, StickslipError, input_error
 from stickslip.front.output import TRACEBACK, output_that_may_fail, unforeseen
-from stickslip.front.printed import console, say, say_columns, say_lines, say_table
+from stickslip.front.printed import console, say, say_answers, say_columns, say_lines, say_table
 from stickslip.front.reading import read
 from stickslip.front.screen import Screen, on_screen
-
-if TYPE_CHECKING:
-    from stickslip.front.result import Result
 
 FILES_TOLD = 4  # of an export
 DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -119,7 +116,11 @@ def run(
         if result.waits:
             raise typer.Exit(DONE)
         files = [*result.files, *([result.report()] if report else [])]
-        _print_result(result, files)
+        from stickslip.study.analyses.verdict import worst_first
+
+        for table in (t for tables in result.summaries.values() for t in tables):
+            say_table(table.title, table.head, table.rows, table.lines)
+        say_answers(worst_first(result.verdicts), result.failed, files, result.conclusion)
     raise typer.Exit(NOT_CONVERGED if result.failed else DONE)
 
 
@@ -192,14 +193,24 @@ def export(
     of: Annotated[
         Path | None, typer.Option(help="Folder of the study, where the result was moved away.")
     ] = None,
+    analysis: Annotated[
+        str,
+        typer.Option(help="forced_response, nonlinear_mode or limit_cycle; left out: the first."),
+    ] = "",
+    number: Annotated[int, typer.Option(min=0, help="Which mode or limit cycle, from 0.")] = 0,
+    amplitude_mm: Annotated[
+        float | None, typer.Option(help="Of a nonlinear mode; left out: the most damped motion.")
+    ] = None,
 ) -> None:
-    """Write how every node and contact moves at the peak, for ParaView and other programs."""
+    """Write how every node and contact moves, for ParaView and other programs."""
     with _errors_as_text():
         from stickslip.front.result import Result
 
-        files = Result.open(result).export(
-            to, out, case=case, hz=hz, steps=steps, wheel=wheel, units=units, of=of
-        )
+        with on_screen(Screen(console())):
+            files = Result.open(result).export(
+                to, out, case=case, hz=hz, steps=steps, wheel=wheel, units=units, of=of,
+                analysis=analysis, number=number, amplitude_mm=amplitude_mm,
+            )  # fmt: skip
         more = f"and {len(files) - FILES_TOLD} more" if len(files) > FILES_TOLD else ""
         say_lines("Files", [*map(str, files[:FILES_TOLD]), *filter(None, [more])])
 
@@ -379,19 +390,3 @@ def _code(error: StickslipError) -> int:
     if type(error).__name__ == "Interrupted":
         return INTERRUPTED
     return BAD_INPUT if isinstance(error, InputError) else NOT_CONVERGED
-
-
-def _print_result(result: "Result", files: Sequence[Path]) -> None:
-    """Print the tables of all analyses, the verdicts, which files there are, and last whether to trust it."""
-    from stickslip.study.analyses.verdict import worst_first
-
-    for table in (t for tables in result.summaries.values() for t in tables):
-        say_table(table.title, table.head, table.rows, table.lines)
-    say_lines("Verdicts", [str(v) for v in worst_first(result.verdicts)])
-    if result.failed:
-        told = (
-            f"{result.failed} of the points: marked in the result and in the report, not filled in"
-        )
-        say_lines("Not converged", [told])
-    say_lines("Files", [str(f) for f in files])
-    say(f"\n{result.conclusion}")

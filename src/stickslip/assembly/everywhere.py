@@ -8,14 +8,23 @@ import numpy as np
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.asked import asked
 from stickslip.assembly.build import linear_side, system_of
+from stickslip.assembly.mistuned import of_all, system_of_all
 from stickslip.assembly.model import Model
 from stickslip.assembly.places import AXES
 from stickslip.assembly.reduced import with_ways_back
 from stickslip.assembly.skin import mesh_dofs
 from stickslip.errors import input_error
 from stickslip.harmonic.excitation import HarmonicLoad
+from stickslip.harmonic.linear import DynamicStiffness
 from stickslip.reduction.waves import wave
 from stickslip.response.system import System
+
+Felt = Callable[[DynamicStiffness], DynamicStiffness]
+
+
+def as_it_is(side: DynamicStiffness) -> DynamicStiffness:
+    """Return what vibrates as a steady motion feels it."""
+    return side
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,16 +96,18 @@ def _nodes(model: Model, name: str) -> Nodes | None:
 
 @dataclass(frozen=True, eq=False)
 class Everywhere:
-    """From the coordinates that a response solves for to all dofs of all parts.
+    """From the coordinates that a motion is solved for to all dofs of all parts.
 
     Parameters
     ----------
     system, load
         As those of `Assembled`.
     output_labels, outputs
-        What is reported, and the dofs of all parts that these are.
+        What is reported, and the (k, 2) sector and dof of all parts of each.
     order, sectors
-        Engine order and number of sectors of a wheel; 0 and 1 of a single structure.
+        Engine order or wave number, and number of sectors of a wheel; 0 and 1 of a single structure.
+    alike
+        Whether all sectors do what one does, later; else each has a motion of its own.
     """
 
     system: System
@@ -105,20 +116,38 @@ class Everywhere:
     outputs: IntArray
     order: int
     sectors: int
+    alike: bool
     _expand: Callable[[Matrix, int], Matrix]
 
-    def field(self, omega: float, retained: ComplexArray) -> ComplexArray:
-        """Return the (H+1, N) motion of all dofs at a frequency in rad/s from that of the retained coordinates (H+1, n)."""
-        condensed = self.system.condensed(self.load, len(retained) - 1)
+    def fields(
+        self, omega: float, retained: ComplexArray, more: IntArray, felt: Felt = as_it_is
+    ) -> ComplexArray:
+        """Return the (s, H+1, N) motion of all dofs: of each sector on the axes of the first one turned to it, of one where they are alike.
+
+        Parameters
+        ----------
+        omega
+            In rad/s.
+        retained
+            (H+1, n) motion of the retained coordinates of the system and of `more`, in rising order.
+        more
+            Coordinates that are known, too.
+        felt
+            What vibrates as the motion feels it, from what vibrates in steady motion.
+        """
+        condensed = felt(self.system.condensed(self.load, len(retained) - 1, more))
         every = condensed.recover(omega, retained)
-        return np.array([self._expand(own, h) for h, own in enumerate(every)])
+        each = [np.atleast_2d(self._expand(own, h)) for h, own in enumerate(every)]
+        return np.stack(each, axis=1)
 
     def phase(self, harmonic: int, sector: int) -> complex:
-        """Return what the motion of a sector is ahead of that of sector 0, in its own axes, in a harmonic."""
+        """Return what the motion of a sector is ahead of that of sector 0, on its own axes, in a harmonic, where sectors are alike."""
         return complex(wave(harmonic * self.order, self.sectors).phase) ** sector
 
 
-def everywhere(model: Model, harmonics: int, *, every_wave: bool = False) -> Everywhere:
+def everywhere(
+    model: Model, harmonics: int, *, every_wave: bool = False, wave_number: int | None = None
+) -> Everywhere:
     """Reduce a model again, with the way back to all its dofs.
 
     Parameters
@@ -127,22 +156,20 @@ def everywhere(model: Model, harmonics: int, *, every_wave: bool = False) -> Eve
         As it was solved.
     harmonics, every_wave
         As in `Model.assembled`: with others of a wheel the number of modes may be another one.
-
-    Raises
-    ------
-    InputError
-        If the sectors of the model differ: its reduction has no way back.
+    wave_number
+        Of a tuned wheel that no load drives; None: that of the loads.
     """
-    if model.mistuning is not None:
-        raise input_error(
-            "mistuning",
-            "is given, and fields are written of tuned wheels and single structures",
-            "Export a case without it.",
-        )
     what = asked(model, harmonics)
-    order = what.order or 0
+    names, dofs = what.labels.names, what.labels.dofs
+    if model.mistuning is not None:
+        n = model.sectors
+        wheel, (_, held), load = system_of_all(model, what, with_ways_back)
+        outputs = np.column_stack([np.repeat(np.arange(n), dofs.size), np.tile(dofs, n)])
+        named, order = of_all(names, n), what.order or 0
+        return Everywhere(held, load, named, outputs, order, n, False, lambda q, _: wheel.expand(q))
+    order = (what.order if wave_number is None else wave_number) or 0
     more = range(model.sectors) if every_wave else ()
     linear = linear_side(model, order, harmonics, what.kept, what.stay, with_ways_back, more)
     _, held, load = system_of(model, linear, what)
-    labels = what.labels
-    return Everywhere(held, load, labels.names, labels.dofs, order, model.sectors, linear.expand)
+    outputs = np.column_stack([np.zeros_like(dofs), dofs])
+    return Everywhere(held, load, names, outputs, order, model.sectors, True, linear.expand)

@@ -35,6 +35,7 @@ from stickslip.contact.interface import Interface
 from stickslip.contact.law import ContactLaw
 from stickslip.contact.laws import law_name
 from stickslip.errors import InputError, input_error
+from stickslip.harmonic.excitation import HarmonicLoad
 from stickslip.model.dofs import Dofs
 from stickslip.model.structure import Structure
 from stickslip.reduction.cyclic import CyclicSector
@@ -56,34 +57,18 @@ RELATIVE = {
 def assemble_mistuned(model: Model, harmonics: int, store: Store) -> Assembled:
     """Return a wheel with all its sectors as solvers see it; see `Model.assembled`."""
     assert model.mistuning is not None
-    alike = replace(model, mistuning=None)
+    alike, n = replace(model, mistuning=None), model.sectors
     tuned = assemble(alike, harmonics, store)
     what = asked(alike, harmonics)
-    wheel = all_sectors(model, what, store)
-    n, order = model.sectors, what.order
-    refuse_mixed_gaps(alike, wheel.gaps[: 3 * len(alike.pairs.names)])
-    pairs = pairs_of_all(model)
-    linear = wheel.linear(order or 0)
-    bodies = model.places.bodies(model.ties.weights.nonzero()[1])
-    system = System(
-        wheel.side,
-        Interface(pairs.names, pairs.laws, wheel.gaps),
-        wheel.of_dofs(what.labels.dofs, "output.points"),
-        alert_dofs=wheel.of_dofs(what.watched, "alert_over"),
-        free=wheel.of_dofs(bodies, "part") if bodies.size else None,
-        peak_of=_peak(what, model, of_all(what.labels.names, n)),
-    )
-    held = system.with_retention(model.retention)
-    load = about_static_state(held, loads_on(alike, linear, what.forces), wheel.fluid)
+    wheel, (system, held), load = system_of_all(model, what, store)
     gap, force = static_state(held, load.static)
     pressed = pressed_by(system.springs.laws, force)
-    names = of_all(what.labels.names, n)
     return Assembled(
         system=held,
         bare=system,
         load=load,
-        contacts=contact_table(pairs),
-        output_labels=names,
+        contacts=contact_table(pairs_of_all(model)),
+        output_labels=of_all(what.labels.names, n),
         peak_output=0,
         error_labels=of_all(what.names, n),
         retention=model.retention,
@@ -93,7 +78,7 @@ def assemble_mistuned(model: Model, harmonics: int, store: Store) -> Assembled:
         frequencies=tuned.frequencies,
         skin=model.skin,
         sectors=n,
-        engine_order=order,
+        engine_order=what.order,
         counts={
             "nodes": model.facts.nodes,
             "dofs": model.places.n,
@@ -108,6 +93,27 @@ def assemble_mistuned(model: Model, harmonics: int, store: Store) -> Assembled:
         blades=Blades(n, what.labels.names, tuned, model.mistuning.patterns),
         orders=what.orders,
     )
+
+
+def system_of_all(
+    model: Model, what: Asked, store: Store
+) -> tuple["AllSectors", tuple[System, System], HarmonicLoad]:
+    """Return a wheel with all its sectors, its system without and with the retention, and the loads on it."""
+    alike, wheel = replace(model, mistuning=None), all_sectors(model, what, store)
+    refuse_mixed_gaps(alike, wheel.gaps[: 3 * len(alike.pairs.names)])
+    pairs = pairs_of_all(model)
+    bodies = model.places.bodies(model.ties.weights.nonzero()[1])
+    system = System(
+        wheel.side,
+        Interface(pairs.names, pairs.laws, wheel.gaps),
+        wheel.of_dofs(what.labels.dofs, "output.points"),
+        alert_dofs=wheel.of_dofs(what.watched, "alert_over"),
+        free=wheel.of_dofs(bodies, "part") if bodies.size else None,
+        peak_of=_peak(what, model, of_all(what.labels.names, model.sectors)),
+    )
+    held = system.with_retention(model.retention)
+    own = loads_on(alike, wheel.linear(what.order or 0), what.forces)
+    return wheel, (system, held), about_static_state(held, own, wheel.fluid)
 
 
 def of_all(names: Sequence[str], sectors: int) -> tuple[str, ...]:
@@ -185,6 +191,13 @@ class AllSectors:
         at = self.model.coordinates
         own = self.sector.of_dofs(at.of_dofs(dofs, self.model.places.dofs, place), place)
         return np.asarray((np.arange(self.model.sectors)[:, None] * self.size + own).ravel())
+
+    def expand(self, q: Matrix) -> Matrix:
+        """Return the (n_s, N) motion of all dofs of each sector, on the axes of sector 0 turned to it, from all coordinates (n,); only with ways back."""
+        n, at = self.model.sectors, self.model.coordinates
+        waves = np.fft.fft(q.reshape(n, self.size), axis=0)
+        every = [at.untied(self.sector.expand(own, k)) for k, own in enumerate(waves)]
+        return np.asarray(np.fft.ifft(np.array(every), axis=0))
 
     def linear(self, order: int) -> Linear:
         """Return the wheel as the linear side of a model under an engine order."""

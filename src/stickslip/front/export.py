@@ -1,4 +1,4 @@
-"""A result written for other programs: which point of which case, and the model that it was computed of."""
+"""A result written for other programs: which motion of which case, and the model that it was computed of."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,18 +9,19 @@ import xarray as xr
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
 from stickslip.model.readers.units import Units
+from stickslip.study.exchange.chosen import chosen
 from stickslip.study.exchange.contacts import contacts_of
 from stickslip.study.exchange.frd import write_frd
-from stickslip.study.exchange.motion import motion_of, point_of
+from stickslip.study.exchange.motion import motion_of
 from stickslip.study.exchange.uff import write_uff
 from stickslip.study.exchange.vtu import write_vtu
 from stickslip.study.file.study import StudyFile, validated
 from stickslip.study.file.toml import parsed
+from stickslip.study.keep.progress import LOG
 from stickslip.study.keep.whole import unwritable
 from stickslip.study.models.study import Study
 
 Format = Literal["vtu", "frd", "uff"]
-OF = "forced_response"
 MOST_STEPS = 1000
 
 
@@ -34,6 +35,9 @@ class Wanted:
     steps: int = 24
     wheel: bool = False
     units: str = "SI"
+    analysis: str = ""
+    number: int = 0
+    amplitude_mm: float | None = None
 
     def __post_init__(self) -> None:
         if self.to not in get_args(Format):
@@ -55,22 +59,34 @@ def export_result(
     wanted: Wanted,
     of: Model | Path | None,
 ) -> tuple[Path, ...]:
-    """Write the motion at a point of a result, which lies at `path`; return the files."""
-    if OF not in tree.children:
-        raise input_error("export", f"the result has no {OF}", f"Ask for it: [{OF}].")
-    data, case, units = tree[OF].to_dataset(), wanted.case, Units.named(wanted.units)
-    point = point_of(data, case, wanted.hz)
+    """Write a motion of a result, which lies at `path`; return the files."""
+    case, units = wanted.case, Units.named(wanted.units)
+    picked = chosen(
+        tree,
+        wanted.analysis,
+        case,
+        number=wanted.number,
+        hz=wanted.hz,
+        amplitude_mm=wanted.amplitude_mm,
+    )
+    LOG.info(f"[{picked.analysis}] {picked.told}")
     model = of if isinstance(of, Model) else _model(tree, path, of, case)
     if wanted.wheel and model.sectors == 1:
         remedy = "Leave it out: a structure that is no sector is written whole."
         raise input_error("export: wheel", "is asked of a single structure", remedy)
-    motion = motion_of(data, model, case, point, wheel=wanted.wheel)
-    place = _place(path, f"{wanted.to}_{case}", folder)
+    motion = motion_of(picked, model, wheel=wanted.wheel)
+    forced = tree[picked.analysis].to_dataset() if picked.point is not None else None
+    name = f"{wanted.to}_{case}" if forced is not None else f"{wanted.to}_{picked.analysis}_{case}_{wanted.number}"  # fmt: skip
+    place = _place(path, name, folder)
+    count = sum(len(body.nodes.points) for body in motion.bodies)
+    sectors = f" of {motion.sectors} sectors" if motion.sectors > 1 else ""
+    LOG.info(f"writing {count} nodes{sectors} to {place}")
     if wanted.to == "vtu":
-        return write_vtu(motion, contacts_of(data, motion, case, point), place, wanted.steps)
+        contacts = contacts_of(forced, motion, case, picked.point) if forced is not None and picked.point is not None else ()  # fmt: skip
+        return write_vtu(motion, contacts, place, wanted.steps)
     if wanted.to == "frd":
         return (write_frd(motion, place / "motion.frd", units),)
-    return (write_uff(motion, data, case, place / "motion.uff"),)
+    return (write_uff(motion, forced, case, place / "motion.uff"),)
 
 
 def _place(path: Path | None, name: str, folder: Path | None) -> Path:

@@ -4,6 +4,7 @@ import math
 import re
 import sys
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
@@ -75,3 +76,13 @@ def say_columns(title: str, names: Iterable[str], rows: Iterable[Sequence[str]])
     for cells in rows:
         table.add_row(*(Text(printable(cell)) for cell in cells))
     console().print(table)
+
+
+def say_answers(verdicts: Sequence[object], failed: int, files: Sequence[Path], last: str) -> None:
+    """Print the verdicts, how many points have no solution, which files there are, and last whether to trust it."""
+    say_lines("Verdicts", [str(v) for v in verdicts])
+    if failed:
+        told = f"{failed} of the points: marked in the result and in the report, not filled in"
+        say_lines("Not converged", [told])
+    say_lines("Files", [str(f) for f in files])
+    say(f"\n{last}")

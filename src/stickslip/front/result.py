@@ -14,6 +14,7 @@ from stickslip.assembly.model import Model
 from stickslip.errors import did_you_mean, input_error
 from stickslip.front.export import Format, Wanted, export_result
 from stickslip.front.frame_of import dataframe
+from stickslip.front.screen import by_default
 from stickslip.front.table import Table
 from stickslip.report.page import plots, write_report
 from stickslip.report.result import RESULT, open_result
@@ -120,7 +121,7 @@ class Result:
         write_tree(self.data, target)
         return target
 
-    def export(
+    def export(  # noqa: PLR0913
         self,
         to: Format = "vtu",
         folder: str | Path | None = None,
@@ -131,8 +132,11 @@ class Result:
         wheel: bool = False,
         units: str = "SI",
         of: Model | str | Path | None = None,
+        analysis: str = "",
+        number: int = 0,
+        amplitude_mm: float | None = None,
     ) -> tuple[Path, ...]:
-        """Write how every node moves at the peak of a forced response, for another program; return the files.
+        """Write how every node moves at the peak of a forced response, in a nonlinear mode or a limit cycle, for another program; return the files.
 
         Parameters
         ----------
@@ -149,22 +153,29 @@ class Result:
         steps
             Instants of the period.
         wheel
-            Whether all sectors of a wheel are written, not one.
+            Whether all sectors of a tuned wheel are written, not one; a wheel whose sectors differ is always written whole.
         units
             Of an ``frd`` file, such as ``mm-t-s``.
         of
             The model that was asked, where it was made in Python; of a study it is made again from the study's text and files: the
             folder of these, where the result has been moved away from it.
+        analysis
+            ``forced_response``, ``nonlinear_mode`` or ``limit_cycle``; left out: the first of these that the result has.
+        number
+            Which nonlinear mode or limit cycle of the case, from 0 in the order of the result.
+        amplitude_mm
+            The motion of the nonlinear mode nearest to this amplitude of its output; None: the most damped one.
 
         Raises
         ------
         InputError
-            If there is no such point, or the model is no longer the one that was asked.
+            If there is no such motion, or the model is no longer the one that was asked.
         """
         place = None if folder is None else Path(folder)
         source = Path(of) if isinstance(of, str) else of
-        wanted = Wanted(to, case, hz, steps, wheel, units)
-        return export_result(self.data, self.path, place, wanted, source)
+        wanted = Wanted(to, case, hz, steps, wheel, units, analysis, number, amplitude_mm)
+        with by_default():
+            return export_result(self.data, self.path, place, wanted, source)
 
     def report(self, path: str | Path | None = None) -> Path:
         """Write the page of all figures and tables; return it.

@@ -23,6 +23,9 @@ def open_result(path: Path) -> xr.DataTree:
     if not file.is_file():
         remedy = f"Give the {RESULT} that 'stickslip run' wrote, or its folder."
         raise input_error(str(file), "no such file", remedy)
+    if file.suffix.lower() in (".html", ".htm"):
+        remedy = f"Give the folder of a run, or the {RESULT} in it."
+        raise input_error(str(file), "is a page, and no result", remedy)
     return read_tree(file)
 
 

@@ -1,10 +1,12 @@
 """What analyses ask of a model in the same way: the waves that may vibrate by themselves, modes with stuck contacts, how motions are represented."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from stickslip.arrays import FloatArray
 from stickslip.assembly.assembled import Assembled
 from stickslip.assembly.model import Model
 from stickslip.assembly.reduced import Store
@@ -95,6 +97,37 @@ def modes_of(model: Assembled, count: int, wave: int | None = None) -> list[Stuc
     holds = pressed_by(model.system.springs.laws, model.static_force)
     system = model.system if wave is None else as_wave(model.system, wave)
     return stuck_modes(system, count, holds)
+
+
+def known_coordinates(model: Assembled) -> dict[str, Any]:
+    """Return positions and labels of what results keep of free motions: retained coordinates with that of the first output, and outputs."""
+    system = model.system
+    retained = np.union1d(system.retained, coordinate(system))
+    labels = system.structure.dofs.labels
+    return {
+        "retained": retained,
+        "retained_label": np.array([labels[i] for i in retained]),
+        "outputs": system.outputs,
+        "output_label": np.array(model.output_labels),
+    }
+
+
+KEPT = {  # labels of what `kept_motions` returns
+    "retained_label": ("coordinate", "1", "names of the retained coordinates"),
+    "output_label": ("reported", "1", "names of the outputs"),
+}
+
+
+def kept_motions(coefficients: FloatArray, known: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what results keep of motions (..., harmonics, n, 2) of all coordinates: for other programs, which expand them to all nodes."""
+    if not coefficients.shape[-2]:  # none was found
+        return {}
+    return {
+        "retained_label": known["retained_label"],
+        "output_label": known["output_label"],
+        "retained_displacement": coefficients[..., known["retained"], :],
+        "output_displacement": coefficients[..., known["outputs"], :],
+    }
 
 
 def coordinate(system: System) -> int:

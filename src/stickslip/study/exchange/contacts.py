@@ -6,7 +6,8 @@ import numpy as np
 import xarray as xr
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
-from stickslip.study.exchange.motion import Motion, as_complex
+from stickslip.study.exchange.chosen import as_complex
+from stickslip.study.exchange.motion import Motion
 
 SLIP = 1  # word of `peak_state`
 
@@ -93,8 +94,8 @@ def contacts_of(
         )
         state = None
     found = []
-    for n in range(motion.sectors):
-        ahead, angle = n * motion.lag, n * motion.pitch
+    for n in range(1 if motion.lag is None else motion.sectors):  # else points are those of all
+        ahead, angle = n * (motion.lag or 0.0), n * motion.pitch
         turn = motion.axis.rotation(angle)
         found.append(
             ContactMotion(

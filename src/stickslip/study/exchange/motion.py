@@ -1,18 +1,25 @@
-"""The motion of every node at one point of a response: what a result holds, expanded by the model that it was computed of."""
+"""The motion of every node: what a result holds, expanded by the model that it was computed of."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-import xarray as xr
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
-from stickslip.assembly.everywhere import Everywhere, Nodes, everywhere, nodes_of
+from stickslip.assembly.everywhere import (
+    Everywhere,
+    Felt,
+    Nodes,
+    as_it_is,
+    everywhere,
+    nodes_of,
+)
 from stickslip.assembly.model import Model
 from stickslip.errors import input_error
+from stickslip.harmonic.decaying import DecayingStiffness
 from stickslip.model.axis import Axis
-from stickslip.study.analyses.forced.question import FACTOR
-from stickslip.units import HZ
+from stickslip.study.exchange.chosen import Chosen
+from stickslip.study.keep.progress import LOG
 
 AGREE = 1e-6  # relative, of the outputs: the model is that of the result, not another one
 CHANGED = (
@@ -52,7 +59,7 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """How everything moves at one point of a response.
+    """How everything moves.
 
     Parameters
     ----------
@@ -65,11 +72,11 @@ class Motion:
     bodies
         Part by part, sector by sector.
     outputs
-        Label of each output -> its part and node number.
+        Label of each output -> its sector, part and node number.
     sectors
         How many sectors of a wheel there are: 1 or all.
     lag
-        Share of the period by which a sector is ahead of the one before it.
+        Share of the period by which a sector is ahead of the one before it; None where each has a motion of its own.
     axis
         That sectors are turned about.
     pitch
@@ -80,143 +87,118 @@ class Motion:
     hz: float
     harmonics: tuple[int, ...]
     bodies: tuple[Body, ...]
-    outputs: dict[str, tuple[str, int]]
+    outputs: dict[str, tuple[int, str, int]]
     sectors: int
-    lag: float
+    lag: float | None
     axis: Axis
     pitch: float
 
 
-def point_of(data: xr.Dataset, case: int, hz: float | None) -> int:
-    """Return the index of the peak of a case, or of its converged point nearest to a frequency.
-
-    Raises
-    ------
-    InputError
-        If there is no such case, or no point of it has converged.
-    """
-    cases = data.sizes["case"]
-    if not 0 <= case < cases:
-        remedy = f"Give a number from 0 to {cases - 1}, in the order of [vary]."
-        raise input_error("export: case", f"is {case}, and the result has {cases}", remedy)
-    values = data["retained_displacement"].values
-    solved = np.isfinite(values).all(axis=tuple(range(1, values.ndim)))
-    mine = np.flatnonzero((data["point_case"].values == case) & solved)
-    if not mine.size:
-        raise input_error(
-            "export", f"no point of case {case} has converged", "Export another case."
-        )
-    if hz is None:
-        peak = int(data["peak_point"].values[case])
-        if peak in mine:
-            return peak
-        raise input_error("export", f"case {case} has no peak", "Give a frequency: hz = ...")
-    every = data["frequency_hz"].values[mine]
-    if not every.min() <= hz <= every.max():
-        raise input_error(
-            "export: hz",
-            f"is {hz:g}, and case {case} goes from {every.min():.6g} to {every.max():.6g} Hz",
-            "Give a frequency of the response; the nearest point that was computed is taken.",
-        )
-    return int(mine[np.argmin(np.abs(every - hz))])
-
-
-def as_complex(values: FloatArray) -> ComplexArray:
-    """Return the complex numbers that a result holds as pairs in its last dimension."""
-    return np.asarray(values[..., 0] + 1j * values[..., 1])
-
-
-def motion_of(data: xr.Dataset, model: Model, case: int, point: int, *, wheel: bool) -> Motion:
-    """Return how everything moves at a point.
+def motion_of(chosen: Chosen, model: Model, *, wheel: bool) -> Motion:
+    """Return how everything moves.
 
     Parameters
     ----------
-    data
-        The forced response.
+    chosen
+        The motion of a result.
     model
-        Of the case.
-    case, point
-        Position among the cases, and among all points.
+        Of its case.
     wheel
-        Whether all sectors are wanted, not one.
+        Whether all sectors are wanted, not one; a wheel whose sectors differ is always whole.
 
     Raises
     ------
     InputError
         If the model is not that of the result.
     """
-    hz = float(data["frequency_hz"].values[point])
-    retained = as_complex(data["retained_displacement"].values[point])
-    most = int(np.flatnonzero(np.abs(retained).max(axis=1, initial=0.0)).max(initial=1))
-    retained = retained[: most + 1]
-    reported = as_complex(data["output_displacement"].values[point])[: most + 1]
-    labels = [str(label) for label in data["output"].values]
-    whole, field = _expanded(data, model, hz, retained, (labels, reported))
-    sectors = whole.sectors if wheel else 1
+    whole, fields = expanded(chosen, model.undriven if chosen.free else model)
+    sectors = whole.sectors if wheel or not whole.alike else 1
     pitch = 2 * np.pi / whole.sectors
     bodies = tuple(
-        _turned(Body(nodes, 0, nodes.of(field)), whole, n, model.axis, pitch * n)
+        _turned(nodes, _of_sector(whole, fields, n), n, model.axis, pitch * n)
         for n in range(sectors)
         for nodes in nodes_of(model)
     )
     return Motion(
-        label=str(data["case_label"].values[case]) if "case_label" in data else "",
-        hz=hz,
-        harmonics=tuple(h for h in range(most + 1) if np.any(field[h])),
+        label=chosen.label,
+        hz=chosen.hz,
+        harmonics=tuple(h for h in range(fields.shape[1]) if np.any(fields[:, h])),
         bodies=bodies,
         outputs=dict(_places(model, whole)),
         sectors=sectors,
-        lag=whole.order / whole.sectors % 1.0,
+        lag=whole.order / whole.sectors % 1.0 if whole.alike else None,
         axis=model.axis,
         pitch=pitch,
     )
 
 
-def _expanded(
-    data: xr.Dataset,
-    model: Model,
-    hz: float,
-    retained: ComplexArray,
-    reported: tuple[list[str], ComplexArray],
-) -> tuple[Everywhere, ComplexArray]:
-    """Return the model with its way back and the motion of all dofs, which has to hold the outputs of the result."""
-    most, labels = len(retained) - 1, [str(label) for label in data["retained"].values]
-    highest = FACTOR * int(data.attrs.get("high_order", most))
+def expanded(chosen: Chosen, model: Model) -> tuple[Everywhere, ComplexArray]:
+    """Return the model with its way back and the motion of all dofs of its sectors, which has to hold the outputs of the result."""
     # how many modes the waves of a wheel keep may depend on the other waves
-    ways = [(most, False)]
-    ways += [(highest, False), (highest, True)] if model.sectors > 1 else []
-    names, wanted = reported
+    ways = [(chosen.orders[0], chosen.wave_number is not None)]
+    if model.sectors > 1 and model.mistuning is None and not chosen.free:
+        ways += [(chosen.orders[-1], False), (chosen.orders[-1], True)]
     worst = np.inf
-    for harmonics, every_wave in ways:
-        whole = everywhere(model, harmonics, every_wave=every_wave)
-        if list(whole.system.retained_labels) != labels or not set(names) <= {*whole.output_labels}:
-            raise input_error("export", "the model has other contacts or outputs than the result", CHANGED)  # fmt: skip
-        field = whole.field(hz * HZ, retained)
-        order = [whole.output_labels.index(name) for name in names]
-        found = field[:, whole.outputs[order]]
-        worst = min(worst, float(np.abs(found - wanted).max() / max(np.abs(wanted).max(), 1e-300)))
+    for k, (harmonics, every_wave) in enumerate(ways):
+        LOG.info("reducing the model again, with the way back to all nodes" if k == 0 else "with other waves")  # fmt: skip
+        whole = everywhere(model, harmonics, every_wave=every_wave, wave_number=chosen.wave_number)
+        more, order = _coordinates(chosen, whole)
+        fields = whole.fields(chosen.omega, chosen.retained[:, order], more, _felt(chosen))
+        at = whole.outputs[[whole.output_labels.index(name) for name in chosen.outputs]]
+        found = fields[at[:, 0], :, at[:, 1]].T
+        size = max(np.abs(chosen.reported).max(), 1e-300)
+        worst = min(worst, float(np.abs(found - chosen.reported).max() / size))
         if worst <= AGREE:
-            return whole, field
+            return whole, fields
     what = (
         f"the outputs of the model move otherwise than those of the result, by {100 * worst:.2g} %"
     )
     raise input_error("export", what, CHANGED)
 
 
-def _turned(body: Body, whole: Everywhere, sector: int, axis: Axis, angle: float) -> Body:
-    """Return what a body is in another sector."""
+def _coordinates(chosen: Chosen, whole: Everywhere) -> tuple[IntArray, IntArray]:
+    """Return the coordinates beside those that contacts retain, and the order of those of the result."""
+    names = whole.system.structure.dofs.labels
+    known = {label: k for k, label in enumerate(chosen.labels)}
+    retained = [int(i) for i in whole.system.retained]
+    extra = sorted({*known} - {names[i] for i in retained})
+    more = np.array([i for i, name in enumerate(names) if name in extra], dtype=np.int64)
+    every = np.union1d(retained, more).astype(np.int64)
+    if {names[i] for i in every} != {*known} or not {*chosen.outputs} <= {*whole.output_labels}:
+        what = "the model has other contacts or outputs than the result"
+        raise input_error("export", what, CHANGED)
+    return more, np.array([known[names[i]] for i in every], dtype=np.int64)
+
+
+def _felt(chosen: Chosen) -> Felt:
+    """Return what vibrates as a motion feels it."""
+    if chosen.decays:
+        return lambda side: DecayingStiffness(side, chosen.decays)
+    if chosen.rate:
+        return lambda side: side.with_mass_damping(chosen.rate)
+    return as_it_is
+
+
+def _of_sector(whole: Everywhere, fields: ComplexArray, sector: int) -> ComplexArray:
+    """Return the (H+1, N) motion of a sector, on the axes of the first one turned to it."""
+    if not whole.alike:
+        return np.asarray(fields[sector])
+    phases = np.array([whole.phase(h, sector) for h in range(fields.shape[1])])
+    return np.asarray(phases[:, None] * fields[0] if sector else fields[0])
+
+
+def _turned(nodes: Nodes, field: ComplexArray, sector: int, axis: Axis, angle: float) -> Body:
+    """Return the nodes of a part in a sector, and how they move."""
     if sector == 0:
-        return body
-    phases = np.array([whole.phase(h, sector) for h in range(len(body.amplitudes))])
-    nodes = replace(body.nodes, points=axis.turned(body.nodes.points, angle))
-    moved = phases[:, None, None] * body.amplitudes @ axis.rotation(angle).T
-    return Body(nodes, sector, moved)
+        return Body(nodes, 0, nodes.of(field))
+    moved = replace(nodes, points=axis.turned(nodes.points, angle))
+    return Body(moved, sector, nodes.of(field) @ axis.rotation(angle).T)
 
 
-def _places(model: Model, whole: Everywhere) -> Iterator[tuple[str, tuple[str, int]]]:
+def _places(model: Model, whole: Everywhere) -> Iterator[tuple[str, tuple[int, str, int]]]:
     table = model.places.dofs
-    for label, dof in zip(whole.output_labels, whole.outputs, strict=True):
-        yield label, (table.part[dof], max(int(table.node[dof]), 0))
+    for label, (sector, dof) in zip(whole.output_labels, whole.outputs, strict=True):
+        yield label, (int(sector), table.part[dof], max(int(table.node[dof]), 0))
 
 
 def numbers_of(motion: Motion) -> tuple[list[IntArray], list[IntArray]]:

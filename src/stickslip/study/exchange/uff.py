@@ -9,25 +9,27 @@ import xarray as xr
 
 from stickslip.arrays import BoolArray, IntArray
 from stickslip.errors import missing_package
-from stickslip.study.exchange.motion import Motion, as_complex, numbers_of
+from stickslip.study.exchange.chosen import as_complex
+from stickslip.study.exchange.motion import Motion, numbers_of
 from stickslip.study.keep.whole import whole_file
 
 SI = {"length": 1.0, "force": 1.0, "temp": 1.0, "temp_offset": 273.15}
 DIRECTIONS = {name: k for k, name in enumerate(("x", "y", "z", "rx", "ry", "rz"), 1)}
 GENERAL, RESPONSE_FUNCTION = 0, 4  # of dataset 58
 DISPLACEMENT, FORCE, FREQUENCY = 8, 13, 18  # specific data types
+NOWHERE = (0, "", 0)
 AT_FREQUENCY, TRANSLATIONS = 5, 2  # of dataset 55
 
 
-def write_uff(motion: Motion, data: xr.Dataset, case: int, path: Path) -> Path:
+def write_uff(motion: Motion, data: xr.Dataset | None, case: int, path: Path) -> Path:
     """Write nodes, a shape a harmonic, and of every output its response over frequency in each harmonic.
 
     Parameters
     ----------
     motion
-        At one point of a response.
+        At one point of a response, or one that nothing drives.
     data, case
-        The forced response, and which case.
+        The forced response, and which case; None of a motion that nothing drives, which has no response functions.
     path
         The file.
     """
@@ -36,7 +38,9 @@ def write_uff(motion: Motion, data: xr.Dataset, case: int, path: Path) -> Path:
     except ModuleNotFoundError as error:
         raise missing_package("pyuff", error, "exchange") from error
     nodes = np.concatenate(numbers_of(motion)[0])
-    sets = [_units(), _nodes(motion, nodes), *_shapes(motion, nodes), *_functions(motion, data, case)]  # fmt: skip
+    sets = [_units(), _nodes(motion, nodes), *_shapes(motion, nodes)]
+    if data is not None:
+        sets += _functions(motion, data, case)
     with whole_file(path) as temporary:
         pyuff.UFF(str(temporary)).write_sets(sets, "overwrite")
     return path
@@ -72,9 +76,9 @@ def _shapes(motion: Motion, numbers: IntArray) -> Iterator[dict[str, Any]]:
 def _functions(motion: Motion, data: xr.Dataset, case: int) -> Iterator[dict[str, Any]]:
     """Return the response of every output over frequency, per newton in the harmonics that loads drive."""
     outputs = as_complex(data["output_displacement"].values)
-    mine = (data["point_case"].values == case) & np.isfinite(outputs).all(axis=(1, 2))
+    mine = (data["point_case"].values == case) & np.isfinite(outputs).any(axis=(1, 2))
     order = in_order(data, mine)
-    hertz, outputs = data["frequency_hz"].values[order], outputs[order]
+    hertz, outputs = data["frequency_hz"].values[order], np.nan_to_num(outputs[order])
     force = float(data["excitation_n"].values[case])
     driven = {int(h) for h in np.atleast_1d(data.attrs["driven_harmonics"])}
     if hertz.size < 2 or not np.isfinite(force):
@@ -92,7 +96,7 @@ def _functions(motion: Motion, data: xr.Dataset, case: int) -> Iterator[dict[str
                 "id1": f"{label}, harmonic {h}", "id2": motion.label or "NONE",
                 "id3": "displacement over force amplitude" if function else "displacement",
                 "id4": "over the frequency of the excitation", "rsp_ent_name": point[:10],
-                "rsp_node": numbers.get(motion.outputs.get(label, ("", 0)), 0),
+                "rsp_node": numbers.get(motion.outputs.get(label, NOWHERE), 0),
                 "rsp_dir": DIRECTIONS.get(component, 0), "ref_ent_name": "load" if function else "NONE", "ref_node": 0,
                 "ref_dir": 0, "abscissa_spacing": 0, "abscissa_spec_data_type": FREQUENCY, "abscissa_axis_lab": "Frequency",
                 "abscissa_axis_units_lab": "Hz", "ordinate_spec_data_type": DISPLACEMENT,
@@ -115,11 +119,10 @@ def in_order(data: xr.Dataset, mine: BoolArray) -> IntArray:
     return np.asarray(branch)
 
 
-def _numbers(motion: Motion) -> Mapping[tuple[str, int], int]:
-    """Return the number in the file of each node of sector 0, by part and own number."""
-    found: dict[tuple[str, int], int] = {}
+def _numbers(motion: Motion) -> Mapping[tuple[int, str, int], int]:
+    """Return the number in the file of each node by sector, part and own number."""
+    found: dict[tuple[int, str, int], int] = {}
     for body, numbers in zip(motion.bodies, numbers_of(motion)[0], strict=True):
-        if body.sector == 0:
-            own = zip(body.nodes.numbers, numbers, strict=True)
-            found |= {(body.nodes.part, int(a)): int(b) for a, b in own}
+        own = zip(body.nodes.numbers, numbers, strict=True)
+        found |= {(body.sector, body.nodes.part, int(a)): int(b) for a, b in own}
     return found

@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from stickslip.arrays import FloatArray
 from stickslip.reduction.waves import wave
 from stickslip.study.analyses.analysis import Solved
 from stickslip.study.analyses.backbones.records import ModeBranch, branches_of
 from stickslip.study.analyses.backbones.words import case_verdicts
 from stickslip.study.analyses.collected import Variables, described, each, of_cases, rows
-from stickslip.study.analyses.vibrating import ONE
+from stickslip.study.analyses.vibrating import KEPT, ONE, kept_motions
 from stickslip.units import HZ
 
 ABOUT = {
@@ -37,6 +38,10 @@ ABOUT = {
     "slipping": ("branch point", "1", "share of the contact points that slip or open at some time; of a contact of several sliders the share that slips"),
     "open_for": ("branch point", "1", "largest share of the period for which a contact point is open"),
     "change": ("branch point", "1", "relative change of frequency or damping ratio that more harmonics are foretold to make; with the most harmonics that of fewer; NaN with one set alone"),
+    **KEPT,
+    "retained_displacement": ("branch point harmonic coordinate part", "m", "the motion in each harmonic: the real and the imaginary part"),
+    "output_displacement": ("branch point harmonic reported part", "m", "the same of the outputs"),
+    "concept": ("", "1", "which motions the modes are made of"),
 }  # fmt: skip
 POINTS = {
     "amplitude": "amplitude", "damping_ratio": "motion_ratio", "modal_amplitude": "modal_amplitude", "energy": "energy",
@@ -60,7 +65,22 @@ def _of_case(solved: Solved) -> Variables:
     values: dict[str, Any] = {"output": str(model.get("output", ""))}
     if branches:
         values |= _of_branches(branches, sectors)
+        if "coordinates" in solved.notes:
+            known = solved.notes["coordinates"]
+            values |= {"concept": str(known["concept"])}
+            values |= kept_motions(_motions(branches), known)
     return described(ABOUT, values, model)
+
+
+def _motions(branches: Sequence[ModeBranch]) -> FloatArray:
+    """Return (branches, most points, most harmonics, n, 2) the motions of all modes, NaN where there is none."""
+    most = np.max([b.motions.shape for b in branches], axis=0)
+    out = np.full((len(branches), *most), np.nan)
+    for own, branch in zip(out, branches, strict=True):
+        points, harmonics, n, _ = branch.motions.shape
+        own[:points, :, :n] = 0.0
+        own[:points, :harmonics, :n] = branch.motions
+    return out
 
 
 def _of_branches(branches: Sequence[ModeBranch], sectors: int) -> dict[str, Any]:

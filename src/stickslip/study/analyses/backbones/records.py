@@ -40,6 +40,8 @@ class ModeRecord:
         How the solver ended.
     told
         (8,) what results tell of a motion, in the order of `NUMBERS`; NaN of what is no point of the mode.
+    motion
+        (order + 1, n, 2) displacement of all coordinates, real and imaginary, m; empty of what is no point of the mode.
     order
         Highest harmonic.
     mode_omega, mode_ratio, tolerance, end, problem
@@ -63,6 +65,7 @@ class ModeRecord:
     iterations: int = 0
     residual_norm: float = np.nan
     told: FloatArray = field(default_factory=_nothing)
+    motion: FloatArray = field(default_factory=_nothing)
     order: int = -1
     mode_omega: float = np.nan
     mode_ratio: float = np.nan
@@ -84,15 +87,16 @@ class ModeRecord:
 def record_of(wave: int, mode: StuckMode, way: ModeWay, found: Followed) -> ModeRecord:
     """Return what is kept of what was found on the way along a mode of a wave."""
     point, solution = found.point, found.point.solution
-    told = np.full(len(NUMBERS), np.nan)
+    told, moved = np.full(len(NUMBERS), np.nan), _nothing()
     if found.converged and found.kind in ("point", "found"):
         motion = mode_point(way.curve, found)
         told[:] = [getattr(motion, name) for name in NUMBERS]
+        moved = np.stack([motion.coefficients.real, motion.coefficients.imag], axis=-1)
     return ModeRecord(
         wave, mode.number, found.kind, found.index, found.level, found.seconds, found.judged.bound,
         point.x, point.p, point.tangent, point.step, point.orientation, point.bend,
         solution.status, solution.iterations, solution.residual_norm,
-        told, way.curve.problems[found.level].balance.order,
+        told, moved, way.curve.problems[found.level].balance.order,
     )  # fmt: skip
 
 
@@ -117,6 +121,8 @@ class ModeBranch:
     slipping, open_for, change
         (points,) share of contact points that slip or open (of several sliders the share that slips), largest share of the period for which one is open, and relative change that
         more harmonics are foretold to make.
+    motions
+        (points, harmonics, n, 2) displacement of all coordinates, real and imaginary, m; NaN where none was found.
     tolerance
         Relative change of frequency or damping ratio that was asked for.
     end
@@ -139,6 +145,7 @@ class ModeBranch:
     slipping: FloatArray
     open_for: FloatArray
     change: FloatArray
+    motions: FloatArray
     tolerance: float
     end: str
     problem: str = ""
@@ -161,6 +168,17 @@ def _branch(way: Sequence[ModeRecord], last: ModeRecord) -> ModeBranch:
     order, status = (np.array([int(getattr(r, name)) for r in points], dtype=np.int64) for name in ("order", "status"))  # fmt: skip
     return ModeBranch(
         last.wave_number, last.mode, last.mode_omega, last.mode_ratio,
-        amplitude, omega, ratio, modal_amplitude, energy, order, status, slipping, open_for, change,
+        amplitude, omega, ratio, modal_amplitude, energy, order, status, slipping, open_for, change, _motions(points),
         last.tolerance, last.end, last.problem,
     )  # fmt: skip
+
+
+def _motions(points: Sequence[ModeRecord]) -> FloatArray:
+    found = [r.motion for r in points if r.motion.ndim == 3]
+    shape = max((m.shape[0] for m in found), default=1), *(found[0].shape[1:] if found else (0, 2))
+    out = np.full((len(points), *shape), np.nan)
+    for own, record in zip(out, points, strict=True):
+        if record.motion.ndim == 3:
+            own[:] = 0.0
+            own[: len(record.motion)] = record.motion
+    return out

@@ -8,7 +8,7 @@ from stickslip.response.self_excited.modes import StuckMode
 from stickslip.study.analyses.analysis import Notes
 from stickslip.study.analyses.backbones.question import Question
 from stickslip.study.analyses.backbones.records import END, ModeRecord, record_of
-from stickslip.study.analyses.vibrating import ONE, as_wave
+from stickslip.study.analyses.vibrating import ONE, as_wave, known_coordinates
 from stickslip.study.keep.progress import LOG, advance
 from stickslip.units import HZ
 
@@ -16,13 +16,15 @@ from stickslip.units import HZ
 def solve(question: Question, done: Sequence[ModeRecord], notes: Notes) -> Iterator[ModeRecord]:
     """Yield what is found on the way along each mode, and its end, of that what is not done."""
     notes.put("model", dict(question.facts) | {"output": question.model.output_labels[0]})
+    known = known_coordinates(question.model)
+    notes.put("coordinates", known | {"concept": question.asked.concept})
     tasks = [(wave, mode) for wave in question.waves for mode in question.followed(wave)]
     for i, (wave, mode) in enumerate(tasks):
-        known = [r for r in done if (r.wave_number, r.mode) == (wave, mode.number)]
-        if known and known[-1].kind == END:
+        before = [r for r in done if (r.wave_number, r.mode) == (wave, mode.number)]
+        if before and before[-1].kind == END:
             continue
         name = _named(question, wave, mode)
-        for record in follow_mode(question, wave, mode, known):
+        for record in follow_mode(question, wave, mode, before):
             if record.kind == END:
                 LOG.info(f"{name}: {record.problem or record.end}")
             yield record

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from stickslip.arrays import FloatArray
 from stickslip.reduction.waves import wave
 from stickslip.study.analyses.analysis import Solved
 from stickslip.study.analyses.collected import Variables, described, each, of_cases, rows
 from stickslip.study.analyses.cycles.records import CycleBranch
 from stickslip.study.analyses.cycles.words import case_verdicts
-from stickslip.study.analyses.vibrating import ONE
+from stickslip.study.analyses.vibrating import KEPT, ONE, kept_motions
 from stickslip.units import HZ
 
 ABOUT = {
@@ -49,6 +50,9 @@ ABOUT = {
     "cycle_growing_frequency_hz": ("cycle", "Hz", "its frequency"),
     "cycle_time_amplitude": ("cycle", "m", "amplitude that time integration goes to"),
     "cycle_time_frequency_hz": ("cycle", "Hz", "its frequency"),
+    **KEPT,
+    "retained_displacement": ("cycle harmonic coordinate part", "m", "its motion in each harmonic: the real and the imaginary part"),
+    "output_displacement": ("cycle harmonic reported part", "m", "the same of the outputs"),
     "time": ("window", "s", "time since the mixed start of all unstable waves"),
     "wave_amplitude": ("window wave", "m", "amplitude of each wave number at the output"),
     "outcome": ("", "1", "what became of the mixed start"),
@@ -77,6 +81,8 @@ def _of_case(solved: Solved) -> Variables:
     if branches:
         values |= _of_branches(branches, sectors)
         values |= _of_cycles(branches)
+        if "coordinates" in notes:
+            values |= kept_motions(_motions(branches), notes["coordinates"])
         values |= _in_time(branches, notes)
     return described(ABOUT, values, model)
 
@@ -124,6 +130,19 @@ def _of_cycles(branches: Sequence[CycleBranch]) -> dict[str, Any]:
         "cycle_growing_wave": every("grows_as"),
         "cycle_growing_frequency_hz": every("grows_omega") / HZ,
     }
+
+
+def _motions(branches: Sequence[CycleBranch]) -> FloatArray:
+    """Return (cycles, most harmonics + 1, n, 2) the motions of all limit cycles."""
+    every = [b.coefficients for b in branches if len(b.cycle_amplitude)]
+    if not every:
+        return np.zeros((0, 1, 0, 2))
+    out = np.zeros((sum(map(len, every)), max(c.shape[1] for c in every), *every[0].shape[2:]))
+    first = 0
+    for own in every:
+        out[first : first + len(own), : own.shape[1]] = own
+        first += len(own)
+    return out
 
 
 def _in_time(

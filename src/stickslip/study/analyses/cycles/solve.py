@@ -27,14 +27,14 @@ from stickslip.study.analyses.cycles.question import Question
 from stickslip.study.analyses.cycles.records import CycleBranch
 from stickslip.study.analyses.cycles.time import compete, settle_cycles
 from stickslip.study.analyses.forced.examination import too_long
-from stickslip.study.analyses.vibrating import ONE, as_wave, coordinate
+from stickslip.study.analyses.vibrating import ONE, as_wave, coordinate, known_coordinates
 from stickslip.study.keep.progress import LOG, advance
 from stickslip.units import HZ
 
 NOT_EXAMINED = "not examined"
 BEGINS = 0.5  # of the amplitude at which slip begins: where the curve begins
 ENDS = 300.0  # times that amplitude: where it ends
-MODEL, LINEAR = "model", "linear"  # names of notes
+MODEL, LINEAR, COORDINATES = "model", "linear", "coordinates"  # names of notes
 
 
 def solve(question: Question, done: Sequence[CycleBranch], notes: Notes) -> Iterator[CycleBranch]:
@@ -42,6 +42,7 @@ def solve(question: Question, done: Sequence[CycleBranch], notes: Notes) -> Iter
     modes = {wave: question.modes(wave) for wave in question.waves}
     notes.put(MODEL, dict(question.facts) | {"output": question.model.output_labels[0]})
     notes.put(LINEAR, _linear(modes))
+    notes.put(COORDINATES, known_coordinates(question.model))
     tasks = [(w, m) for w, own in modes.items() for m in question.followed(own)]
     found = list(done)
     for i, (wave, mode) in enumerate(tasks):
