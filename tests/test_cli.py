@@ -93,7 +93,7 @@ def test_a_wrong_study_is_refused_before_what_computes_and_draws_is_loaded(tmp_p
     text = part.read_text(encoding="utf-8")
     part.write_text(text.replace('"chain.m2", "ground"', '"chian.m2", "ground"'), encoding="utf-8")
     late = (
-        "xarray", "pandas", "plotly", "stickslip.front.study", "stickslip.assembly.model",
+        "numba", "scipy.sparse", "xarray", "pandas", "plotly", "stickslip.front.study", "stickslip.assembly.model",
         "stickslip.response.system", "stickslip.harmonic.balance",
     )  # fmt: skip
     program = (

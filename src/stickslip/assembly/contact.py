@@ -13,6 +13,8 @@ SPATIAL: Literal["spatial_harmonics"] = (
     "spatial_harmonics"  # wheels of different numbers of sectors
 )
 Share = Literal["interface", "point", "area"]
+# of stages that such a join couples
+ALONE = "Ask for [modes], at rest and without contacts; study one stage alone for anything else."
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -5,7 +5,7 @@ from itertools import combinations
 from typing import Any, TypeVar
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import FloatArray, Matrix
 from stickslip.assembly.clamped_rim import clamped_rim

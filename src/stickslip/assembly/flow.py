@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.assembly.aerodynamics import Aerodynamics

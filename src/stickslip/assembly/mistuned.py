@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import IntArray, Matrix
 from stickslip.assembly.asked import Asked, asked, excitation

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import FloatArray, Matrix
 from stickslip.assembly.assembled import Assembled

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.assembly.contact import GROUND, NEXT, Contact, Join

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from stickslip.assembly.clamped_rim import with_rim

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 import numpy as np
-import scipy.optimize
+import scipy
 
 from stickslip.arrays import FloatArray
 from stickslip.assembly.held import free_motions

@@ -1,7 +1,7 @@
 """Displacements of steady rotation that joined parts share."""
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import IntArray
 from stickslip.assembly.coordinates import Coordinates

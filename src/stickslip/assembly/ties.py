@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import IntArray, Matrix
-from stickslip.assembly.contact import SPATIAL, Join
+from stickslip.assembly.contact import ALONE, SPATIAL, Join
 from stickslip.assembly.facing import named
 from stickslip.assembly.pairs import Turn, match, sides
 from stickslip.assembly.places import NO_FACETS, Places, Spot, picked
@@ -15,7 +15,6 @@ from stickslip.contact.mortar import mortar_tie
 from stickslip.contact.surface import Surface
 from stickslip.errors import InputError, input_error
 
-ALONE = "Ask for [modes], at rest and without contacts; study one stage alone for anything else."
 MEAN = "segment_to_segment"
 TINY = 1e-12  # weights of partners below are rounding
 

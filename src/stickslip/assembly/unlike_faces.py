@@ -1,7 +1,7 @@
 """Cyclic faces whose meshes do not match: the high face follows the low face of the next sector in the mean."""
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import BoolArray, IntArray
 from stickslip.assembly.places import node_rows

@@ -4,6 +4,7 @@ Numba fetches the address of a function that is an argument by Python code at ev
 would be lost. Here it is fetched once and handed over as a number.
 """
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -11,8 +12,12 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from stickslip.contact.law import STEP_SIGNATURE
+from stickslip.contact.cache import njit
 
+_vector = types.float64[::1]
+STEP_SIGNATURE = types.void(
+    _vector, _vector, _vector, _vector, _vector, _vector, types.float64[:, ::1], types.int64[::1]
+)
 _structure: Any = cgutils.create_struct_proxy
 
 
@@ -48,3 +53,11 @@ law_at = function_at(STEP_SIGNATURE)  # the step of a law
 def law_address(kernel: Any) -> int:
     """Return where the compiled step of a law begins, for `law_at`."""
     return address_of(kernel, STEP_SIGNATURE)
+
+
+def compiled_step(step: Callable[..., None]) -> Any:
+    """Compile the step of a law, see `contact.law.law_kernel`."""
+    try:
+        return njit(STEP_SIGNATURE, cache=True)(step)
+    except RuntimeError:  # numba finds no place for the cache of code without a file
+        return njit(STEP_SIGNATURE)(step)

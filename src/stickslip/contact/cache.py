@@ -1,4 +1,7 @@
-"""Where compiled functions are kept for the next start; without any place they are compiled at every start."""
+"""numba as this package uses it: whoever takes `njit` from here has the cache of compiled functions looked after, and long compiling said.
+
+Nothing that is needed to judge a study file imports this module: numba takes a quarter of a second to load.
+"""
 
 import hashlib
 import logging
@@ -8,8 +11,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numba
 from numba.core.caching import FunctionCache, _SourceFileBackedLocatorMixin
 from numba.core.dispatcher import Dispatcher
+
+from stickslip.contact.compiling import say_what_is_compiled
 
 LOG = logging.getLogger("stickslip")
 _PACKAGE = Path(__file__).parents[1]
@@ -17,9 +23,8 @@ _IMPORT = re.compile(r"^\s*from stickslip\.([\w.]+) import", re.MULTILINE)
 _TOLD = "STICKSLIP_UNCACHED"  # in the environment: worker processes need not say it again
 
 
-@cache
-def allow_no_cache() -> None:
-    """Let numba compile functions that ask for a cache also where it may write to no folder: it refuses to load them otherwise.
+def _look_after_the_cache() -> None:
+    """Let numba compile functions that ask for a cache also where it may write to no folder, at every start: it refuses to load them otherwise.
 
     What another version of this package has left in the cache, with types that are gone, is compiled again. So is a function whose file
     imports one that has changed: numba looks at the function's own file only, and would go on with the constants and functions of before.
@@ -81,3 +86,9 @@ def _tell() -> None:
             "compiled functions cannot be kept for the next start, as neither this package's folder nor a home can be written: "
             "every start compiles them again, which takes a minute. Name a folder in NUMBA_CACHE_DIR."
         )
+
+
+# before any function is compiled
+_look_after_the_cache()
+say_what_is_compiled()
+njit = numba.njit

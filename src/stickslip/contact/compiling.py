@@ -1,7 +1,6 @@
 """What is said while functions are compiled: on a first run that lasts, and a silent program looks as if it hung."""
 
 import logging
-from functools import cache
 from threading import Timer
 from typing import Any
 
@@ -44,7 +43,6 @@ class _Compiling(event.Listener):
 _LISTENER = _Compiling()
 
 
-@cache
 def say_what_is_compiled() -> None:
     """Log a line where a function takes seconds to compile."""
     event.register("numba:compile", _LISTENER)  # type: ignore[no-untyped-call]

@@ -6,10 +6,10 @@ harmonics than the gaps have, which gives the forces on these harmonics and all 
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
+from stickslip.contact.cache import njit
 from stickslip.contact.element import K_N, MU, PRELOAD, UNILATERAL
 from stickslip.contact.law import NN, SLIP, STICK, TN, TT
 from stickslip.contact.slider import (
@@ -77,7 +77,7 @@ def room_for_events(order: int, elements: int) -> Events:
     )
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _basis_row(at, weight, out):  # type: ignore[no-untyped-def]
     """Fill `out` with cos and sin in the order of coefficients, times `weight` from the first harmonic on."""
     out[0] = at[0, 0]
@@ -86,7 +86,7 @@ def _basis_row(at, weight, out):  # type: ignore[no-untyped-def]
         out[2 * h] = weight * at[1, h]
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _add_stuck(segment, at_start, k, work, coefficients, block_x, block_n):  # type: ignore[no-untyped-def]
     """Add what the resting slider of one segment takes off the force ``k x``."""
     _basis_row(work.means[0], 2.0, work.row)
@@ -111,7 +111,7 @@ def _add_stuck(segment, at_start, k, work, coefficients, block_x, block_n):  # t
                 block_n[p, q] -= by_gap * work.anchor[q]
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _apply(means, factor, polynomial, slope, work, coefficients, block):  # type: ignore[no-untyped-def]
     """Add the integral of ``factor * polynomial`` over intervals to the force and that of ``slope * b b^T`` to the block."""
     product_matrix(means, work.matrix)
@@ -126,7 +126,7 @@ def _apply(means, factor, polynomial, slope, work, coefficients, block):  # type
                 block[p, q] += slope * work.matrix[p, q]
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def integrate_spring(x, k, limit_slope, count, work, coefficients, block_x, block_n):  # type: ignore[no-untyped-def]
     """Add the force coefficients and derivatives of one tangential spring from its segments."""
     segments = work.segments
@@ -153,7 +153,7 @@ def integrate_spring(x, k, limit_slope, count, work, coefficients, block_x, bloc
         _apply(slip, 1.0, work.limit, limit_slope, work, coefficients, block_n)
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def add_normal_force(g, row, n_roots, starts_open, work, coefficients, block):  # type: ignore[no-untyped-def]
     """Add the normal force ``-N`` and its derivative from the intervals in which the contact is closed."""
     k_n = row[K_N]
@@ -179,7 +179,7 @@ def add_normal_force(g, row, n_roots, starts_open, work, coefficients, block):  
     _apply(closed, -1.0, work.normal, k_n, work, coefficients, block)
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def fill_limit(g, row, work):  # type: ignore[no-untyped-def]
     """Fill pressure and friction limit; return the derivative of the limit by the normal gap."""
     mu, k_n = row[MU], row[K_N]
@@ -192,7 +192,7 @@ def fill_limit(g, row, work):  # type: ignore[no-untyped-def]
     return slope
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def keep_rows(values, count, kept):  # type: ignore[no-untyped-def]
     """Copy the first `count` rows of `values` to `kept`; return their number, or `UNKEPT` where there is no room."""
     if count > kept.shape[0]:
@@ -202,7 +202,7 @@ def keep_rows(values, count, kept):  # type: ignore[no-untyped-def]
     return count
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _integrate_events(  # type: ignore[no-untyped-def]
     polynomials, elements, first, crossings, n_crossings, starts_open, segments, n_segments, coefficients, blocks
 ):  # fmt: skip

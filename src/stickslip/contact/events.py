@@ -11,11 +11,12 @@ with the normal gap.
 
 from functools import lru_cache
 
-import numba
 import numpy as np
+from numba import prange
 
 from stickslip.arrays import FloatArray, IntArray
-from stickslip.contact.element import UNILATERAL, normal_contact
+from stickslip.contact.cache import njit
+from stickslip.contact.element import UNILATERAL
 from stickslip.contact.event_integrals import (
     UNKEPT,
     Events,
@@ -36,13 +37,14 @@ from stickslip.contact.slider import (
     scratch,
     zeros,
 )
+from stickslip.contact.steps.element import normal_contact
 from stickslip.contact.threads import thread_shares
 from stickslip.contact.trigonometric import search_grid
 
 LARGEST = 1e152  # of a gap's Fourier coefficients; its square is still finite
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def sample_normal(gap, row, limit, force, state):  # type: ignore[no-untyped-def]
     """Add the normal force on samples; fill the limit there and the state that a direction without stiffness has."""
     for i in range(gap.size):
@@ -51,7 +53,7 @@ def sample_normal(gap, row, limit, force, state):  # type: ignore[no-untyped-def
         state[0, i] = state[1, i] = OPEN if is_open else STICK
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _sample_tangent(gap, k, limit, count, segments, force, state):  # type: ignore[no-untyped-def]
     """Add the tangential force on samples and fill the states."""
     n = gap.size
@@ -69,7 +71,7 @@ def _sample_tangent(gap, k, limit, count, segments, force, state):  # type: igno
             i += 1
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _element(  # type: ignore[no-untyped-def]
     polynomials, row, e, gap, grid, n_x, work, coefficients, blocks, force, state, kept
 ):  # fmt: skip
@@ -98,7 +100,7 @@ def _element(  # type: ignore[no-untyped-def]
         _sample_tangent(gap[d], k, work.pressure, count, work.segments, force[d], state[d])
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _contact(  # type: ignore[no-untyped-def]
     polynomials, elements, start, end, gap, grid, work, n_x, other, coefficients, blocks, force, state, kept
 ):  # fmt: skip
@@ -130,7 +132,7 @@ def _contact(  # type: ignore[no-untyped-def]
                         state[d, i] = SLIP
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _contacts(  # type: ignore[no-untyped-def]
     start, end, polynomials, elements, first, grid, gap, coefficients, blocks, force, state, kept
 ):  # fmt: skip
@@ -146,7 +148,7 @@ def _contacts(  # type: ignore[no-untyped-def]
         )  # fmt: skip
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def contact_events(  # type: ignore[no-untyped-def]
     polynomials, elements, first, grid, gap, coefficients, blocks, force, state, kept
 ):  # fmt: skip
@@ -182,13 +184,13 @@ def contact_events(  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@numba.njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True)
 def contact_events_threads(  # type: ignore[no-untyped-def]
     shares, polynomials, elements, first, grid, gap, coefficients, blocks, force, state, kept
 ):  # fmt: skip
     """Do the same as `contact_events` in `shares` that threads take in turn."""
     n = gap.shape[0]
-    for share in numba.prange(shares):
+    for share in prange(shares):
         _contacts(
             share * n // shares, (share + 1) * n // shares,
             polynomials, elements, first, grid, gap, coefficients, blocks, force, state, kept,

@@ -3,11 +3,11 @@
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-import numba
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
+from stickslip.contact.cache import njit
 from stickslip.contact.compiled import CompiledContacts, checked_weights, compile_contacts
 from stickslip.contact.evaluators import Evaluator
 from stickslip.contact.law import PAIRS, ContactLaw
@@ -157,7 +157,7 @@ def sparse_rows(gap_operator: Matrix) -> SparseRows:
     return SparseRows(columns, values)
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def add_gaps(columns, values, vector, gap):  # type: ignore[no-untyped-def]
     """Add the gaps of coordinates `vector` (m, n) to `gap` (m, 3 n_contacts); `columns` and `values` from `sparse_rows`."""
     for q in range(vector.shape[0]):
@@ -169,7 +169,7 @@ def add_gaps(columns, values, vector, gap):  # type: ignore[no-untyped-def]
                 gap[q, 3 * c + d] += total
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def add_forces(columns, values, force, out):  # type: ignore[no-untyped-def]
     """Add what contact forces `force` (m, 3 n_contacts) do at the coordinates to `out` (m, n); the rest from `sparse_rows`."""
     for q in range(out.shape[0]):
@@ -181,7 +181,7 @@ def add_forces(columns, values, force, out):  # type: ignore[no-untyped-def]
                 out[q, columns[c, j]] += total
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def add_contact_jacobian(blocks, columns, values, n, factor, jac):  # type: ignore[no-untyped-def]
     """Add ``factor * Bᵀ K B`` to the harmonic-major matrix `jac`.
 

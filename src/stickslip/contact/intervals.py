@@ -10,10 +10,11 @@ Two periods are marched. That is enough, not an approximation: one period maps t
 composed over the samples, which is again a clip, and the net Δx over a period is zero, so the map is idempotent.
 """
 
-import numba
 import numpy as np
+from numba import prange
 
 from stickslip.arrays import FloatArray
+from stickslip.contact.cache import njit
 from stickslip.contact.element import K_N, MU, PRELOAD, RESIDUAL, UNILATERAL
 from stickslip.contact.law import NN, OPEN, SLIP, STICK, TN, TT
 
@@ -49,7 +50,7 @@ def prefix_sums(order: int, samples: int) -> tuple[FloatArray, FloatArray, Float
     )
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _product_matrix(cos_sum, sin_sum, order, factor, out):  # type: ignore[no-untyped-def]
     """Add ``factor * W sum b b^T`` to `out`, from the sums of cos(m τ) and sin(m τ); W weights rows 1, 2, 2, ..."""
     out[0, 0] += factor * cos_sum[0]
@@ -70,7 +71,7 @@ def _product_matrix(cos_sum, sin_sum, order, factor, out):  # type: ignore[no-un
             out[2 * h - 1, 2 * k] += factor * (s_s - s_d)
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _outer(cos_row, sin_row, basis_row, order, factor, out):  # type: ignore[no-untyped-def]
     """Add ``factor * W (sum b_i) b_a^T`` to `out`; the sums of the interval are given as cos and sin sums."""
     m = 2 * order + 1
@@ -83,7 +84,7 @@ def _outer(cos_row, sin_row, basis_row, order, factor, out):  # type: ignore[no-
             out[2 * h, q] += s * basis_row[q]
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _first_period(x, limit, is_open, k, start):  # type: ignore[no-untyped-def]
     """March one Jenkins spring over the first period; return its anchor, the sign of the slip there, and the force there.
 
@@ -106,7 +107,7 @@ def _first_period(x, limit, is_open, k, start):  # type: ignore[no-untyped-def]
     return a, sign, held
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _march_tangent(x, limit, is_open, k, start, force, state, spans, signs):  # type: ignore[no-untyped-def]
     """March one Jenkins spring with the limit of each sample over two periods; add the force of the second one to `force`.
 
@@ -141,7 +142,7 @@ def _march_tangent(x, limit, is_open, k, start, force, state, spans, signs):  # 
     return count
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _tangent_blocks(  # type: ignore[no-untyped-def]
     spans, signs, count, k, limit_slope, basis, cos_table, sin_table, sums, block_x, block_n
 ):  # fmt: skip
@@ -177,7 +178,7 @@ def _tangent_blocks(  # type: ignore[no-untyped-def]
         _product_matrix(cos_slip, sin_slip, order, limit_slope / n, block_n)
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _normal(gap, row, force, limit, is_open):  # type: ignore[no-untyped-def]
     """Add the normal force; fill the limit of friction and where the contact is open. Return the slope of the limit by the gap."""
     k_n, mu, preload = row[K_N], row[MU], row[PRELOAD]
@@ -196,7 +197,7 @@ def _normal(gap, row, force, limit, is_open):  # type: ignore[no-untyped-def]
     return -mu * k_n
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _closed_sums(is_open, cos_table, sin_table, cos_sum, sin_sum):  # type: ignore[no-untyped-def]
     """Sum cosines and sines over the samples at which the contact is closed."""
     n = is_open.size
@@ -213,7 +214,7 @@ def _closed_sums(is_open, cos_table, sin_table, cos_sum, sin_sum):  # type: igno
         i = j
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _element_period(gap, row, basis, cos_table, sin_table, force, state, blocks, work):  # type: ignore[no-untyped-def]
     """Add the force and the blocks of one elementary contact; `work` holds the arrays it needs on the way."""
     n = gap.shape[1]
@@ -238,7 +239,7 @@ def _element_period(gap, row, basis, cos_table, sin_table, force, state, blocks,
         )  # fmt: skip
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _merge(state, other):  # type: ignore[no-untyped-def]
     """Merge the state of one more element into that of the contact: what is neither all stuck nor all open slips."""
     for d in range(2):
@@ -247,7 +248,7 @@ def _merge(state, other):  # type: ignore[no-untyped-def]
                 state[d, i] = SLIP
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _contacts(  # type: ignore[no-untyped-def]
     start, end, gap, elements, first, basis, cos_table, sin_table, force, state, blocks
 ):  # fmt: skip
@@ -271,7 +272,7 @@ def _contacts(  # type: ignore[no-untyped-def]
                 _merge(state[c], other)
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def contact_period(gap, elements, first, basis, cos_table, sin_table, force, state, blocks):  # type: ignore[no-untyped-def]
     """Evaluate all contacts over one period.
 
@@ -298,13 +299,13 @@ def contact_period(gap, elements, first, basis, cos_table, sin_table, force, sta
     )
 
 
-@numba.njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True)
 def contact_period_threads(  # type: ignore[no-untyped-def]
     shares, gap, elements, first, basis, cos_table, sin_table, force, state, blocks
 ):  # fmt: skip
     """Do the same as `contact_period` in `shares` that threads take in turn."""
     n = gap.shape[0]
-    for share in numba.prange(shares):
+    for share in prange(shares):
         _contacts(
             share * n // shares, (share + 1) * n // shares,
             gap, elements, first, basis, cos_table, sin_table, force, state, blocks,

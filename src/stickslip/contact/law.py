@@ -8,22 +8,16 @@ signature, and takes the step as a first-class function; a law of a user's scrip
 from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import cached_property
+from importlib import import_module
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
-import numba
 import numpy as np
-from numba import types
 
 from stickslip.arrays import FloatArray
 from stickslip.errors import input_error
 from stickslip.units import quantity_of
 
 STICK, SLIP, OPEN = 0, 1, 2  # what a step says of each tangent
-
-_vector = types.float64[::1]
-STEP_SIGNATURE = types.void(
-    _vector, _vector, _vector, _vector, _vector, _vector, types.float64[:, ::1], types.int64[::1]
-)
 
 # Derivative blocks of a contact, force by gap, in the order of `ContactPeriod.blocks`; a law fills the first 5, 7 or 9.
 TT, WW, NN, TN, WN, TW, WT, NT, NW = range(9)
@@ -138,10 +132,15 @@ def law_kernel(step: Callable[..., None]) -> Any:
     return _Kernel(step)
 
 
-class _Kernel:
-    """Compiles a step when a law's kernel is first asked for: a study file is judged before."""
+def kernel_in(name: str) -> Any:
+    """Return the same for a step in ``contact/steps``, which is loaded when it is first asked for, and numba with it."""
+    return _Kernel(name)
 
-    def __init__(self, step: Callable[..., None]) -> None:
+
+class _Kernel:
+    """Compiles a step, or loads it, when a law's kernel is first asked for: a study file is judged before."""
+
+    def __init__(self, step: Callable[..., None] | str) -> None:
         self.step = step
 
     def __get__(self, law: object, cls: type) -> Any:
@@ -149,7 +148,8 @@ class _Kernel:
 
     @cached_property
     def compiled(self) -> Any:
-        try:
-            return numba.njit(STEP_SIGNATURE, cache=True)(self.step)
-        except RuntimeError:  # numba finds no place for the cache of code without a file
-            return numba.njit(STEP_SIGNATURE)(self.step)
+        if isinstance(self.step, str):
+            return import_module(f"stickslip.contact.steps.{self.step}").step
+        from stickslip.contact.addresses import compiled_step
+
+        return compiled_step(self.step)

@@ -11,11 +11,11 @@ start for ever, as a spring that only sticks, is left where marching brought it.
 from functools import cache
 from typing import Any
 
-import numba
 import numpy as np
 from numba import types
 
 from stickslip.contact.addresses import law_at
+from stickslip.contact.cache import njit
 from stickslip.contact.law import PAIRS
 
 MAX_PERIODS = 400
@@ -44,7 +44,7 @@ _SIGNATURE = types.void(
 )
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _carry(jac, basis_row, rate_row, v_by_omega, rows, by_omega, out, out_omega, first, count):  # type: ignore[no-untyped-def]
     """Chain the derivatives of a step, `count` rows of its jac from row `first`, with those of the state (`rows`, `by_omega`)."""
     n_state, m = rows.shape[0], basis_row.size
@@ -69,7 +69,7 @@ def _carry(jac, basis_row, rate_row, v_by_omega, rows, by_omega, out, out_omega,
                         out[a, b, p] += share * rows[s, b, p]
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _blocks_of(rows, basis, blocks):  # type: ignore[no-untyped-def]
     """Fill the (P, m, m) blocks of a contact from the (P, samples, m) derivatives of its force on samples."""
     n_samples, m = basis.shape
@@ -81,7 +81,7 @@ def _blocks_of(rows, basis, blocks):  # type: ignore[no-untyped-def]
                 blocks[k, p, q] *= share
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _load(c, i, gap, velocity, omega, u, v, v_by_omega):  # type: ignore[no-untyped-def]
     """Take displacement, velocity and its derivative by ω out of the period."""
     for a in range(3):
@@ -90,7 +90,7 @@ def _load(c, i, gap, velocity, omega, u, v, v_by_omega):  # type: ignore[no-unty
         v_by_omega[a] = v[a] / omega if omega > 0.0 else 0.0
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _carry_map(jac, period_map, new_map):  # type: ignore[no-untyped-def]
     """Chain the derivative of the state by the state at the beginning of the period."""
     n_state = period_map.shape[0]
@@ -104,7 +104,7 @@ def _carry_map(jac, period_map, new_map):  # type: ignore[no-untyped-def]
     period_map[:] = new_map
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _workspace(n_state, n_pairs, n_samples, m):  # type: ignore[no-untyped-def]
     """Arrays that a march writes on: of a sample, of derivatives, the ranges of the state, and derivatives of the force on samples."""
     of_state = (n_state, 3, m)
@@ -117,7 +117,7 @@ def _workspace(n_state, n_pairs, n_samples, m):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _one_period(  # type: ignore[no-untyped-def]
     step, parameters, c, first, gap, velocity, basis, basis_rate, omega, s, rows, s_omega, period_map, work,
     record, track, force, state, by_omega,
@@ -155,7 +155,7 @@ def _one_period(  # type: ignore[no-untyped-def]
             low[a], high[a] = np.minimum(low[a], s[a]), np.maximum(high[a], s[a])
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _scales(ranges, largest_gap, scale, row_scale, rows):  # type: ignore[no-untyped-def]
     """Set the size of each state and of its derivatives, below which rounding hides a change."""
     low, high = ranges
@@ -167,7 +167,7 @@ def _scales(ranges, largest_gap, scale, row_scale, rows):  # type: ignore[no-unt
             row_scale[a] = 1.0
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _largest(change, scale):  # type: ignore[no-untyped-def]
     """Return the largest entry of (n_state, ...) `change` in units of each state's `scale`."""
     out = 0.0
@@ -178,7 +178,7 @@ def _largest(change, scale):  # type: ignore[no-untyped-def]
     return out
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _to_fixed_point(period_map, scale, change, row_change, omega_change):  # type: ignore[no-untyped-def]
     """Turn the changes over a period into the steps that bring state and derivatives to those that repeat, in place.
 
@@ -205,7 +205,7 @@ def _to_fixed_point(period_map, scale, change, row_change, omega_change):  # typ
     row_change[:] = (inverse @ flat).reshape(row_change.shape)
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _settle(  # type: ignore[no-untyped-def]
     step, parameters, c, first, gap, velocity, basis, basis_rate, omega, s, rows, s_omega, work,
     force, state, by_omega,
@@ -254,7 +254,7 @@ def _settle(  # type: ignore[no-untyped-def]
 @cache
 def period_march() -> Any:
     """Return `march_period`, compiled when it is first asked for: half a minute that exact events never need."""
-    return numba.njit(_SIGNATURE, cache=True)(march_period)
+    return njit(_SIGNATURE, cache=True)(march_period)
 
 
 def march_period(  # type: ignore[no-untyped-def]

@@ -1,7 +1,7 @@
 """Two surfaces tied in the mean: the nodes of one follow those of the other (mortar method, standard multipliers; Puso 2004)."""
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.contact.facets import interpolation, lumped_areas

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.contact.interface import Interface

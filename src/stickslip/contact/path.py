@@ -3,12 +3,12 @@
 from functools import cache
 from typing import Any
 
-import numba
 import numpy as np
 from numba import types
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.addresses import law_address, law_at
+from stickslip.contact.cache import njit
 from stickslip.contact.law import ContactLaw
 
 _SIGNATURE = types.void(
@@ -50,7 +50,7 @@ def forces_along(
 @cache
 def _walk() -> Any:
     """Return `_march`, compiled when it is first asked for."""
-    return numba.njit(_SIGNATURE, cache=True)(_march)
+    return njit(_SIGNATURE, cache=True)(_march)
 
 
 def _march(address, parameters, state, gap, force, status):  # type: ignore[no-untyped-def]

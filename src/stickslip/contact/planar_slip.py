@@ -14,7 +14,7 @@ All derivatives are those of the angle of e.
 
 import math
 
-import numba
+from stickslip.contact.cache import njit
 
 SHALLOW = 1e-3  # relative change of the limit below which the series of its logarithm is better than the logarithm
 FAINT = 1e-290  # of a turning below which it has no direction
@@ -22,7 +22,7 @@ UNKNOWN = 1e-16  # rounding of an angle
 _MOST = 60  # Newton steps of a scalar equation; it is nearly linear, and most take three
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _towards(half, left):  # type: ignore[no-untyped-def]
     """Return cosine and sine of the angle from b behind, from the tangent of half of it before, and parts of its derivatives."""
     whole = 1.0 + (left * half) ** 2
@@ -34,7 +34,7 @@ def _towards(half, left):  # type: ignore[no-untyped-def]
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _away_from(half, left):  # type: ignore[no-untyped-def]
     """Return the same from the cotangent of half the angle.
 
@@ -54,7 +54,7 @@ def _away_from(half, left):  # type: ignore[no-untyped-def]
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def turned(e_t, e_w, b_t, b_w):  # type: ignore[no-untyped-def]
     """Turn the direction e by ``e' = b - (e·b) e`` over the time one.
 
@@ -89,7 +89,7 @@ def turned(e_t, e_w, b_t, b_w):  # type: ignore[no-untyped-def]
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _inverse_mean(first, last, share):  # type: ignore[no-untyped-def]
     """Return ∫ ds/L over the first `share` of a straight limit, and its derivatives by both ends."""
     end = last if share == 1.0 else first + share * (last - first)
@@ -106,7 +106,7 @@ def _inverse_mean(first, last, share):  # type: ignore[no-untyped-def]
     return mean, -(mean + last * by_last) / first, by_last
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _pull(k_t, k_w, e_t, e_w, way_t, way_w, rise):  # type: ignore[no-untyped-def]
     """Return V, its derivative by the angle of e, and e·K e."""
     q = k_t * e_t * e_t + k_w * e_w * e_w
@@ -116,7 +116,7 @@ def _pull(k_t, k_w, e_t, e_w, way_t, way_w, rise):  # type: ignore[no-untyped-de
     return v_t, v_w, uneven * e_w / q - v_t * q_angle, uneven * e_t / q - v_w * q_angle, q
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def slipped(k_t, k_w, e_t, e_w, way_t, way_w, first, last):  # type: ignore[no-untyped-def]
     """Turn the direction of a slipping force over a straight way, while its size goes from `first` to `last`, both positive.
 
@@ -160,7 +160,7 @@ def slipped(k_t, k_w, e_t, e_w, way_t, way_w, first, last):  # type: ignore[no-u
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def grown(k_t, k_w, way_t, way_w, last):  # type: ignore[no-untyped-def]
     """Return the direction of a force that grows from nothing over a straight way, slipping, to the size `last`.
 

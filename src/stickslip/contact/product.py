@@ -3,17 +3,17 @@
 The derivative of a contact's forces by its gaps is a few (m, m) blocks, m = 2H+1, in the order of `PAIRS`.
 """
 
-import numba
 import numpy as np
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray
+from stickslip.contact.cache import njit
 from stickslip.contact.law import PAIRS
 
 _PAIRS = np.array(PAIRS)  # force and gap direction of each block
 _SUMS = {"reassoc", "contract"}  # sums in any order: else no sum is vectorised
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def _gap(columns, values, vector, gap):  # type: ignore[no-untyped-def]
     """Set `gap` (3, m) to what `vector` (m, n) makes it at one contact."""
     gap[:] = 0.0
@@ -25,7 +25,7 @@ def _gap(columns, values, vector, gap):  # type: ignore[no-untyped-def]
                     gap[d, q] += value * vector[q, columns[j]]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=_SUMS)
+@njit(cache=True, nogil=True, fastmath=_SUMS)
 def _force(blocks, gap, transposed, force):  # type: ignore[no-untyped-def]
     """Set `force` (3, m) to the product of the blocks of one contact with `gap`."""
     m = gap.shape[1]
@@ -43,7 +43,7 @@ def _force(blocks, gap, transposed, force):  # type: ignore[no-untyped-def]
                 force[row, p] += total
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def contact_product(blocks, columns, values, vector, transposed, gap, force, out):  # type: ignore[no-untyped-def]
     """Add ``Bᵀ K B v`` to `out`, or ``Bᵀ Kᵀ B v`` if `transposed`.
 
@@ -73,7 +73,7 @@ def contact_product(blocks, columns, values, vector, transposed, gap, force, out
                         out[p, columns[c, j]] += value * force[d, p]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=_SUMS)
+@njit(cache=True, nogil=True, fastmath=_SUMS)
 def subtract_lower(blocks, columns, values, vector, before, first, last, factor, gap, out):  # type: ignore[no-untyped-def]
     """Subtract from the rows `first` to `last` of `out` what the coefficients before them contribute to ``factor Bᵀ K B v``.
 
@@ -105,7 +105,7 @@ def subtract_lower(blocks, columns, values, vector, before, first, last, factor,
                         out[p, columns[c, j]] -= factor * values[c, row, j] * total
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def _multiply(real, imaginary, h, rows, out):  # type: ignore[no-untyped-def]
     """Set the rows of harmonic `h` of `out` to the product with those of `rows`; both may be the same array for one row alone."""
     n = rows.shape[1]
@@ -126,14 +126,14 @@ def _multiply(real, imaginary, h, rows, out):  # type: ignore[no-untyped-def]
             out[first + 1, j] += a * s - b * c
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def multiply_blocks(real, imaginary, rows, out):  # type: ignore[no-untyped-def]
     """Set `out` (m, n) to the products with `rows` (m, n); see `stickslip.harmonic.small_blocks`."""
     for h in range(real.shape[0]):
         _multiply(real, imaginary, h, rows, out)
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def sweep(real, imaginary, blocks, columns, values, scale, rows, gap, out):  # type: ignore[no-untyped-def]
     """Solve harmonic by harmonic, from the static one up, each with what those below it do at the contacts.
 

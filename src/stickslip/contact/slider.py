@@ -9,10 +9,10 @@ holds at most one beginning of slip. Two periods are enough, as in `contact.inte
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.contact.cache import njit
 from stickslip.contact.element import K_N, MU, RESIDUAL
 from stickslip.contact.law import OPEN, SLIP, STICK
 from stickslip.contact.trigonometric import (
@@ -57,7 +57,7 @@ class Scratch(NamedTuple):
     pressure: FloatArray  # (samples,)
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def scratch(m, width, samples):  # type: ignore[no-untyped-def]
     """Allocate for polynomials of `m` coefficients, a search grid of `width` columns and `samples`; every array is bounded by the order."""
     most = most_sign_changes((m - 1) // 2)
@@ -71,7 +71,7 @@ def scratch(m, width, samples):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def zeros(polynomial, grid, work, roots):  # type: ignore[no-untyped-def]
     """Return the number of sign changes, put into `roots`, and whether the polynomial begins negative."""
     derivative(polynomial, work.slope)
@@ -79,7 +79,7 @@ def zeros(polynomial, grid, work, roots):  # type: ignore[no-untyped-def]
     return count, work.values[0] < 0.0
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def extrema(polynomial, grid, work, roots):  # type: ignore[no-untyped-def]
     """Return the number of extrema, put into `roots`."""
     derivative(polynomial, work.slope)
@@ -89,7 +89,7 @@ def extrema(polynomial, grid, work, roots):  # type: ignore[no-untyped-def]
     )
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _merge(first, n_first, low, n_low, high, n_high, starts_open, tau, kinds):  # type: ignore[no-untyped-def]
     """Sort three ascending lists (changes of the sign of N, extrema of both walls) into nodes from 0 to 2π; return their number."""
     i = j = k = 0
@@ -117,7 +117,7 @@ def _merge(first, n_first, low, n_low, high, n_high, starts_open, tau, kinds):  
     return count + 1
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _evaluate_walls(low, high, nodes, kinds, count):  # type: ignore[no-untyped-def]
     """Evaluate both walls at the nodes; they meet where the contact opens or closes."""
     for i in range(count - 1):
@@ -134,7 +134,7 @@ def _evaluate_walls(low, high, nodes, kinds, count):  # type: ignore[no-untyped-
     nodes[1, count - 1], nodes[2, count - 1] = nodes[1, 0], nodes[2, 0]
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _clipped(z, i, nodes, anchor, by_normal, slip_by_normal):  # type: ignore[no-untyped-def]
     """Return the slider's place at node `i` of a closed contact, its anchor, and its derivative by the normal gap there."""
     if nodes[1, i] > z:
@@ -144,7 +144,7 @@ def _clipped(z, i, nodes, anchor, by_normal, slip_by_normal):  # type: ignore[no
     return z, anchor, by_normal
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _closing_by_normal(x, normal, k, row, tau):  # type: ignore[no-untyped-def]
     """Return the derivative of ``k x`` at the time of closing by the normal gap there: that time moves with the gap.
 
@@ -157,7 +157,7 @@ def _closing_by_normal(x, normal, k, row, tau):  # type: ignore[no-untyped-def]
     return rate * row[K_N] / closing_rate
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _settle(z, anchor, by_normal, nodes, kinds, count, starts_open, slip_by_normal):  # type: ignore[no-untyped-def]
     """Return the slider after one period: place, anchor, its derivative by the normal gap there (NaN: it closed there)."""
     is_open = starts_open
@@ -172,7 +172,7 @@ def _settle(z, anchor, by_normal, nodes, kinds, count, starts_open, slip_by_norm
     return z, anchor, by_normal
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _append(segments, count, start, state, sign, z, anchor, by_normal):  # type: ignore[no-untyped-def]
     """Append a segment unless it goes on in the state of the last; one without length is replaced."""
     if count > 0:
@@ -190,7 +190,7 @@ def _append(segments, count, start, state, sign, z, anchor, by_normal):  # type:
     return count + 1
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _slip_start(wall, z, left, f_left, right, f_right):  # type: ignore[no-untyped-def]
     """Return when the wall, monotone from `left` to `right`, passes the resting slider."""
     size, second, _ = bounds(wall)
@@ -200,7 +200,7 @@ def _slip_start(wall, z, left, f_left, right, f_right):  # type: ignore[no-untyp
     return root_between(wall, z, left, f_left - z, right, f_right - z, guess, size + abs(z), second)
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _cell(i, z, anchor, by_normal, slip_by_normal, work, count):  # type: ignore[no-untyped-def]
     """Append the segments of the closed cell after node `i`; return their number and the slider at its end."""
     nodes, segments = work.nodes, work.segments
@@ -220,7 +220,7 @@ def _cell(i, z, anchor, by_normal, slip_by_normal, work, count):  # type: ignore
     return count, moved, new_anchor, new_by_normal
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _march(x, k, row, z, anchor, by_normal, slip_by_normal, starts_open, n_nodes, work):  # type: ignore[no-untyped-def]
     """Fill ``work.segments`` with the states of the second period; return their number."""
     nodes, kinds = work.nodes, work.kinds
@@ -248,7 +248,7 @@ def _march(x, k, row, z, anchor, by_normal, slip_by_normal, starts_open, n_nodes
     return count
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _start(row, slip_by_normal, starts_open, low, high):  # type: ignore[no-untyped-def]
     """Return the slider just before t = 0: place, anchor, its derivative by the normal gap there."""
     share = row[RESIDUAL]
@@ -264,7 +264,7 @@ def _start(row, slip_by_normal, starts_open, low, high):  # type: ignore[no-unty
     return 0.5 * (z + share * difference), 0.0, share * slip_by_normal
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def find_segments(x, d, row, limit_slope, n_roots, starts_open, n_x, grid, work):  # type: ignore[no-untyped-def]
     """Find the states of the spring along one tangent over the steady cycle.
 

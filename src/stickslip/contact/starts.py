@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.element import K_N, K_T, K_W, PRELOAD

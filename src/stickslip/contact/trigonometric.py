@@ -5,10 +5,10 @@ cell of the period is cut in two until bounds on the second and third derivative
 monotone there, exactly one, so that none is missed (as Petrov & Ewins 2003 bracket the times of transition by extrema).
 """
 
-import numba
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.contact.cache import njit
 
 CELLS_PER_ORDER = (
     8  # of the grid on which the search begins; fewer leave more cells to be cut in two
@@ -21,7 +21,7 @@ _MOST_STEPS = 60
 DEEPEST = 40  # parts of a cell waiting to be searched; each cut adds one, and 2π is cut to 1e-8 in 30 cuts
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def most_sign_changes(order):  # type: ignore[no-untyped-def]
     """Return the size of the array of sign changes: 2H exact ones, and what round-off makes of double roots."""
     return 8 * order + 16
@@ -48,7 +48,7 @@ def search_grid(order: int) -> FloatArray:
     return table
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def value_and_slope(polynomial, tau):  # type: ignore[no-untyped-def]
     """Return the polynomial and its derivative at `tau`."""
     c1, s1 = np.cos(tau), np.sin(tau)
@@ -62,7 +62,7 @@ def value_and_slope(polynomial, tau):  # type: ignore[no-untyped-def]
     return value, slope
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def derivative(polynomial, out):  # type: ignore[no-untyped-def]
     """Fill `out` with the coefficients of the derivative by τ."""
     out[0] = 0.0
@@ -71,7 +71,7 @@ def derivative(polynomial, out):  # type: ignore[no-untyped-def]
         out[2 * h] = -h * polynomial[2 * h - 1]
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def bounds(polynomial):  # type: ignore[no-untyped-def]
     """Return bounds of the polynomial and of its second and third derivative."""
     zeroth, second, third = abs(polynomial[0]), 0.0, 0.0
@@ -83,7 +83,7 @@ def bounds(polynomial):  # type: ignore[no-untyped-def]
     return zeroth, second, third
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def root_between(polynomial, level, left, f_left, right, f_right, guess, size, second):  # type: ignore[no-untyped-def]
     """Return where ``polynomial - level`` vanishes between `left` and `right`, where it has opposite signs.
 
@@ -119,7 +119,7 @@ def root_between(polynomial, level, left, f_left, right, f_right, guess, size, s
     return tau
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _guess(left, f_left, d_left, right, f_right, d_right):  # type: ignore[no-untyped-def]
     """Root of the cubic τ(f) through both ends of a cell in which f is monotone."""
     width = right - left
@@ -129,7 +129,7 @@ def _guess(left, f_left, d_left, right, f_right, d_right):  # type: ignore[no-un
     return left + u * (a + u * ((3.0 * width - 2.0 * a - b) + u * (a + b - 2.0 * width)))
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def sign_changes(polynomial, slope, grid, values, slopes, cells, roots):  # type: ignore[no-untyped-def]
     """Find where a polynomial changes its sign in [0, 2π], in ascending order; zero counts as positive.
 
@@ -189,7 +189,7 @@ def sign_changes(polynomial, slope, grid, values, slopes, cells, roots):  # type
     return count - count % 2
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def on_grid(polynomial, grid, values):  # type: ignore[no-untyped-def]
     """Fill `values` with the polynomial on the columns of `grid`."""
     for i in range(grid.shape[1]):
@@ -200,7 +200,7 @@ def on_grid(polynomial, grid, values):  # type: ignore[no-untyped-def]
             values[i] += p * grid[j, i]
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _search(  # type: ignore[no-untyped-def]
     polynomial, left, f_left, d_left, right, f_right, d_right, size, second, third, cells, roots, count
 ):  # fmt: skip
@@ -242,7 +242,7 @@ def _search(  # type: ignore[no-untyped-def]
         right, f_right, d_right = cells[waiting, 0], cells[waiting, 1], cells[waiting, 2]
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def harmonics_at(tau, out):  # type: ignore[no-untyped-def]
     """Fill both rows of `out` with cos(mτ) and sin(mτ), m = 0, 1, ..."""
     cos, sin = out[0], out[1]
@@ -253,7 +253,7 @@ def harmonics_at(tau, out):  # type: ignore[no-untyped-def]
         sin[m] = sin[m - 1] * c1 + cos[m - 1] * s1
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def add_means(left, at_left, right, at_right, factor, means):  # type: ignore[no-untyped-def]
     """Add ``factor / 2π`` times the integrals of cos(mτ) and sin(mτ) from `left` to `right`, given `harmonics_at` both."""
     factor = factor / (2.0 * np.pi)
@@ -263,7 +263,7 @@ def add_means(left, at_left, right, at_right, factor, means):  # type: ignore[no
         means[1, m] += factor / m * (at_left[0, m] - at_right[0, m])
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def product_matrix(means, out):  # type: ignore[no-untyped-def]
     """Fill `out` with W times the integral of ``b b^T`` over the intervals of `means`; W weights rows 1, 2, 2, ..."""
     cos_sum, sin_sum = means[0], means[1]

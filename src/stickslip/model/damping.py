@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import FloatArray, Matrix
 from stickslip.errors import input_error

@@ -6,7 +6,7 @@ F. Tisseur and K. Meerbergen, "The quadratic eigenvalue problem", SIAM Review 43
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.errors import input_error

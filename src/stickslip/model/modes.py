@@ -5,9 +5,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse
-import scipy.sparse.csgraph
+import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import SingularError, input_error

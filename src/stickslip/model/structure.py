@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import input_error, nearest_and_known

@@ -8,7 +8,7 @@ Layout: ``format``, ``version``; each matrix dense under its name or as ``name.d
 from pathlib import Path
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import input_error

@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 import stickslip
 from stickslip.arrays import Matrix

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import IntArray, Matrix
 from stickslip.model.structure import Structure

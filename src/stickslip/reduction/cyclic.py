@@ -8,8 +8,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import BoolArray, IntArray, Matrix
 from stickslip.errors import input_error

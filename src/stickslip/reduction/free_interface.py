@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import SingularError, input_error

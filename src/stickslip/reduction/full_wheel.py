@@ -1,7 +1,7 @@
 """The whole wheel from one sector: assembled, or as the shape of a travelling wave."""
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.errors import input_error

@@ -9,7 +9,7 @@ of the coordinates, the same ones in all waves and so in all harmonics.
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error

@@ -7,7 +7,7 @@ Computational Methods in Engineering 24 (2017) 589-636, appendix 1.
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 

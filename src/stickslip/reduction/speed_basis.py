@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.model.dofs import modal_dofs

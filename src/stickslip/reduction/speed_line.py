@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import ComplexArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error

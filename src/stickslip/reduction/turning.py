@@ -1,7 +1,7 @@
 """Rotation of the coordinates of nodes: vectors turn, everything else stays."""
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error

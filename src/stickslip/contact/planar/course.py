@@ -5,10 +5,10 @@ The memory of the start travels along: the derivative of the slider's place z, o
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.contact.cache import njit
 from stickslip.contact.law import SLIP, STICK
 from stickslip.contact.planar.motion import (
     AT_LIMIT,
@@ -82,7 +82,7 @@ class Course(NamedTuple):
     counts: IntArray  # (4,) segments, pieces, 1 where there was no room for all, and 1 where a rough course will do
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def course_room(m):  # type: ignore[no-untyped-def]
     """Allocate for polynomials of `m` coefficients.
 
@@ -95,7 +95,7 @@ def course_room(m):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def begin_at(course, tau, z_x, z_y):  # type: ignore[no-untyped-def]
     """Set the state with the slider at z: on its limit, or beyond, the contact slips unless it moves inward."""
     x, y, limit = place(course.motion, tau)
@@ -115,7 +115,7 @@ def begin_at(course, tau, z_x, z_y):  # type: ignore[no-untyped-def]
         state[MODE] = SLIP
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def begin_closed(course, tau):  # type: ignore[no-untyped-def]
     """Set the state of a contact that closes: it sticks where its limit grows faster than the force of a slider at rest."""
     x_rate, y_rate, limit_rate = rates(course.motion, tau)
@@ -128,7 +128,7 @@ def begin_closed(course, tau):  # type: ignore[no-untyped-def]
         state[Z_X], state[Z_Y], _ = place(course.motion, tau)
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def _start_to_slip(course, tau):  # type: ignore[no-untyped-def]
     """Turn the state from stick to slip."""
     x, y, _ = place(course.motion, tau)
@@ -143,7 +143,7 @@ def _start_to_slip(course, tau):  # type: ignore[no-untyped-def]
     state[MODE], state[ANGLE] = SLIP, np.arctan2(y, x)
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def stop_slipping(course, tau):  # type: ignore[no-untyped-def]
     """Turn the state from slip to stick: the slider rests where it is."""
     x, y, limit = place(course.motion, tau)
@@ -156,7 +156,7 @@ def stop_slipping(course, tau):  # type: ignore[no-untyped-def]
     state[MODE], state[Z_X], state[Z_Y] = STICK, x - limit * cos, y - limit * sin
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def closing_turn(motion, tau, angle):  # type: ignore[no-untyped-def]
     """Return θ' of a contact that closes into slip."""
     x_rate, y_rate, limit_rate = rates(motion, tau)
@@ -165,7 +165,7 @@ def closing_turn(motion, tau, angle):  # type: ignore[no-untyped-def]
     return across / max(limit_rate + np.hypot(x_rate, y_rate), TINY)
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _first_piece(course, tau, origin, widest):  # type: ignore[no-untyped-def]
     """Prepare the prediction of the first piece of slip; return its width."""
     motion, piece, angle = course.motion, course.piece, course.state[ANGLE]
@@ -183,7 +183,7 @@ def _first_piece(course, tau, origin, widest):  # type: ignore[no-untyped-def]
     return min(0.6 * widest, 3.0 * limit / max(speed, TINY))
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _attempt(course, tau, width, kind):  # type: ignore[no-untyped-def]
     """Collocate a piece; return the estimate of its error in units of the tolerance, infinite where nothing was found."""
     piece, motion = course.piece, course.motion
@@ -201,7 +201,7 @@ def _attempt(course, tau, width, kind):  # type: ignore[no-untyped-def]
     return abs(highest) * weight / (ROUGH if course.counts[3] == 1 else TOLERANCE)
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def _store(course, tau, width, kind):  # type: ignore[no-untyped-def]
     """Append the piece, carry the memory over it, and move the state to its end."""
     counts, piece = course.counts, course.piece
@@ -219,7 +219,7 @@ def _store(course, tau, width, kind):  # type: ignore[no-untyped-def]
     remember_end(width, piece)
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _cut(course, tau, width, kind, share):  # type: ignore[no-untyped-def]
     """Collocate the piece anew up to where slip ends; z is stationary there, so that the place needs no further correction."""
     piece = course.piece
@@ -235,7 +235,7 @@ def _cut(course, tau, width, kind, share):  # type: ignore[no-untyped-def]
     return short
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _constant(piece):  # type: ignore[no-untyped-def]
     """Leave the direction as it is on a piece that is too short to matter."""
     for j in range(1, STAGES + 1):
@@ -245,7 +245,7 @@ def _constant(piece):  # type: ignore[no-untyped-def]
         piece.matrix[:] = np.eye(STAGES)
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def _next_width(width, error, widest):  # type: ignore[no-untyped-def]
     """Return the width that the next piece should have after one whose error was `error`, in units of the tolerance."""
     if not np.isfinite(error):
@@ -254,7 +254,7 @@ def _next_width(width, error, widest):  # type: ignore[no-untyped-def]
     return min(width * min(max(change, 0.2), _GROWTH), widest)
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def _slip(course, tau, end, origin, opens, widest):  # type: ignore[no-untyped-def]
     """Slip from `tau` on until slip ends or the time does, and with `opens` the contact; return when."""
     piece, counts = course.piece, course.counts
@@ -295,7 +295,7 @@ def _slip(course, tau, end, origin, opens, widest):  # type: ignore[no-untyped-d
     return end
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def run(course, tau, end, origin):  # type: ignore[no-untyped-def]
     """Follow the closed contact from `tau` to `end`; segments and pieces are appended, state and memory are those at the end."""
     motion, state, counts, segments = course.motion, course.state, course.counts, course.segments

@@ -5,9 +5,9 @@ start in its slip; its periods are followed from a slider at zero displacement, 
 repeats. A direction that forgets nothing is left where the first periods dragged it.
 """
 
-import numba
 import numpy as np
 
+from stickslip.contact.cache import njit
 from stickslip.contact.law import SLIP
 from stickslip.contact.planar.course import (
     ANGLE,
@@ -36,7 +36,7 @@ _LEAST_SHARE = 0.1  # of a step of Newton's method that is tried
 _KEPT = 1e-9  # singular value below which a direction keeps its memory for ever
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def follow_closings(run, course, roots, n_roots, starts_open):  # type: ignore[no-untyped-def]
     """Follow a contact that opens, from each closing to the next opening."""
     course.counts[:] = 0
@@ -48,7 +48,7 @@ def follow_closings(run, course, roots, n_roots, starts_open):  # type: ignore[n
         run(course, closes, opens, np.int64(CLOSED))
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def _place_of(course, x, y, limit):  # type: ignore[no-untyped-def]
     """Return the slider's place at the end or the start of a period, where the motion is x, y, limit."""
     state = course.state
@@ -57,7 +57,7 @@ def _place_of(course, x, y, limit):  # type: ignore[no-untyped-def]
     return state[Z_X], state[Z_Y]
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def one_period(run, course, x, y, limit):  # type: ignore[no-untyped-def]
     """Follow one period from the state that is there; its memory is the derivative of the place at the end by that at the start."""
     course.counts[:3] = 0
@@ -76,7 +76,7 @@ def one_period(run, course, x, y, limit):  # type: ignore[no-untyped-def]
             memory[0, s], memory[1, s] = limit * sin * turned, -limit * cos * turned
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def forgets(memory):  # type: ignore[no-untyped-def]
     """Return the pseudo-inverse of ``1 - M``, and whether no direction keeps its memory."""
     a, b, c, d = 1.0 - memory[0, 0], -memory[0, 1], -memory[1, 0], 1.0 - memory[1, 1]
@@ -103,7 +103,7 @@ def forgets(memory):  # type: ignore[no-untyped-def]
     return inverse, False
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def _step(course, x, y, limit, dx, dy):  # type: ignore[no-untyped-def]
     """Move the state at the start of a period."""
     state = course.state
@@ -114,7 +114,7 @@ def _step(course, x, y, limit, dx, dy):  # type: ignore[no-untyped-def]
     begin_at(course, 0.0, state[Z_X] + dx, state[Z_Y] + dy)
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def _follow(run, course, x, y, limit, follow_rows, k, slope, rows, carries):  # type: ignore[no-untyped-def]
     """Follow one period from the state that is there, with `carries` the rows of the place, too; return how far the place moves."""
     before_x, before_y = _place_of(course, x, y, limit)
@@ -125,7 +125,7 @@ def _follow(run, course, x, y, limit, follow_rows, k, slope, rows, carries):  # 
     return after_x - before_x, after_y - before_y
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _measures(motion):  # type: ignore[no-untyped-def]
     """Return the smaller of motion and limit, by which distances are measured, and the change over a period that counts as none."""
     size = np.hypot(motion.waves[X, 0], motion.waves[Y, 0]) + motion.bounds[0]
@@ -133,14 +133,14 @@ def _measures(motion):  # type: ignore[no-untyped-def]
     return small, _ROUNDING * small + _ROUND_OFF * size
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _newton(memory, dx, dy):  # type: ignore[no-untyped-def]
     """Return the pseudo-inverse of ``1 - M`` and the step from the place at the start of a period to that which repeats."""
     inverse, _ = forgets(memory)
     return inverse, inverse[0, 0] * dx + inverse[0, 1] * dy, inverse[1, 0] * dx + inverse[1, 1] * dy
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _slips(course):  # type: ignore[no-untyped-def]
     """Return how often the contact slipped over the period."""
     count = 0
@@ -150,7 +150,7 @@ def _slips(course):  # type: ignore[no-untyped-def]
     return count
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _rows_of_step(inverse, before, after, leap):  # type: ignore[no-untyped-def]
     """Fill what the rows at the end of a period lack of those of the place that Newton's method goes on from."""
     for p in range(before.shape[1]):
@@ -159,7 +159,7 @@ def _rows_of_step(inverse, before, after, leap):  # type: ignore[no-untyped-def]
         leap[1, p] = inverse[1, 0] * dx + inverse[1, 1] * dy - dy
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def _leap(course, x, y, limit, share, safe, leap, safe_rows, rows_leap, rows):  # type: ignore[no-untyped-def]
     """Go on from the safe state and a share of the step that was made from it."""
     course.state[:] = safe
@@ -169,7 +169,7 @@ def _leap(course, x, y, limit, share, safe, leap, safe_rows, rows_leap, rows):  
             rows.place[s, p] = safe_rows[s, p] + share * rows_leap[s, p]
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _touch(run, course, correction):  # type: ignore[no-untyped-def]
     """Follow the one period of a contact whose normal force touches zero where it begins: nothing is remembered."""
     course.counts[:] = 0
@@ -179,7 +179,7 @@ def _touch(run, course, correction):  # type: ignore[no-untyped-def]
     return 1
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _lead(run, course, x, y, limit, follow_rows, k, slope, rows, carries):  # type: ignore[no-untyped-def]
     """Follow the first period from zero displacement, roughly where its end only leads near a state that forgets it."""
     begin_at(course, 0.0, 0.0, 0.0)
@@ -188,7 +188,7 @@ def _lead(run, course, x, y, limit, follow_rows, k, slope, rows, carries):  # ty
     course.counts[3] = 0
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def settle(run, course, correction, follow_rows, k, slope, rows, carries):  # type: ignore[no-untyped-def]
     """Follow periods until the state repeats.
 

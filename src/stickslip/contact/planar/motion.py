@@ -2,10 +2,10 @@
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from stickslip.arrays import FloatArray
+from stickslip.contact.cache import njit
 from stickslip.contact.planar.radau import INNER, PACE, STAGES, TIMES
 
 TINY = 1e-300
@@ -21,7 +21,7 @@ class Motion(NamedTuple):
     bounds: FloatArray  # (8,) of |X| without its mean, X', X'', X''', and of L, L', L'', L'''
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def fill_motion(gaps, k, limit, motion):  # type: ignore[no-untyped-def]
     """Fill `motion` from the (3, m) coefficients of the gaps, the stiffness and the coefficients of the limit."""
     waves, bounds = motion.waves, motion.bounds
@@ -43,7 +43,7 @@ def fill_motion(gaps, k, limit, motion):  # type: ignore[no-untyped-def]
             factor *= h
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def _three(waves, first, tau):  # type: ignore[no-untyped-def]
     """Return the values of three rows from `first` on."""
     c1, s1 = np.cos(tau), np.sin(tau)
@@ -57,19 +57,19 @@ def _three(waves, first, tau):  # type: ignore[no-untyped-def]
     return x, y, z
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def place(motion, tau):  # type: ignore[no-untyped-def]
     """Return X, Y and L at `tau`."""
     return _three(motion.waves, X, tau)
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def rates(motion, tau):  # type: ignore[no-untyped-def]
     """Return X', Y' and L' at `tau`."""
     return _three(motion.waves, X_RATE, tau)
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def place_and_rates(motion, tau):  # type: ignore[no-untyped-def]
     """Return X, Y and L at `tau`, their derivatives, and second derivatives."""
     waves = motion.waves
@@ -91,7 +91,7 @@ def place_and_rates(motion, tau):  # type: ignore[no-untyped-def]
     return x, y, limit, x_rate, y_rate, limit_rate, x_bend, y_bend, limit_bend
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def accelerations(motion, tau):  # type: ignore[no-untyped-def]
     """Return X'', Y'' and L'' at `tau`."""
     waves = motion.waves
@@ -107,7 +107,7 @@ def accelerations(motion, tau):  # type: ignore[no-untyped-def]
     return x, y, limit
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def fill_stages(motion, start, width, kind, at):  # type: ignore[no-untyped-def]
     """Evaluate the motion at the stages of the piece that begins at `start`; no limit is below zero."""
     waves = motion.waves

@@ -7,12 +7,12 @@ Stick is linear, and begins and ends at zeros of trigonometric polynomials or of
 from functools import cache, lru_cache
 from typing import Any
 
-import numba
 import numpy as np
-from numba import types
+from numba import prange, types
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.addresses import address_of, function_at
+from stickslip.contact.cache import njit
 from stickslip.contact.element import K_T
 from stickslip.contact.event_integrals import add_normal_force, fill_limit
 from stickslip.contact.events import LARGEST, sample_normal
@@ -31,7 +31,7 @@ from stickslip.contact.trigonometric import product_matrix, search_grid
 _BLOCKS = np.array([[TT, TW, TN], [WT, WW, WN]])
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _dragged(run, follow_rows, course, k, slope, rows, correction, out):  # type: ignore[no-untyped-def]
     """Follow a slider that begins at zero displacement to where it is dragged; fill `out` with the rows of that place. Return the periods."""
     motion = course.motion
@@ -52,7 +52,7 @@ def _dragged(run, follow_rows, course, k, slope, rows, correction, out):  # type
     return periods
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _closed_for_ever(run, follow_rows, course, k, slope, rows, correction, start_rows):  # type: ignore[no-untyped-def]
     """Integrate a contact that never opens; fill the rows of its place at the start. Return whether its state repeats."""
     # a literal would be compiled once more
@@ -79,7 +79,7 @@ def _closed_for_ever(run, follow_rows, course, k, slope, rows, correction, start
     return periods > 0
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _assemble(motion, k, rows, correction, start_rows, work, coefficients, blocks):  # type: ignore[no-untyped-def]
     """Fill coefficients and blocks from the integrals, and what the start of the period adds."""
     m = motion.waves.shape[1]
@@ -104,7 +104,7 @@ def _assemble(motion, k, rows, correction, start_rows, work, coefficients, block
                 own[j] += k * work.matrix[p, j]
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _contact(run, follow_rows, gaps, row, gap, grid, room, coefficients, blocks, force, state):  # type: ignore[no-untyped-def]
     """Evaluate one contact; return whether its state repeats."""
     work, course, rows, correction, start_rows = room
@@ -167,7 +167,7 @@ def _shared(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Do the same as `_some` for all contacts, in `shares` that threads take in turn."""
     n = gap.shape[0]
-    for share in numba.prange(shares):
+    for share in prange(shares):
         some = _some_at(some_address)
         some(
             share * n // shares, (share + 1) * n // shares,
@@ -178,13 +178,13 @@ def _shared(  # type: ignore[no-untyped-def]
 @cache
 def _compiled() -> Any:
     """Compile when a planar contact is evaluated first."""
-    return numba.njit(_SOME, cache=True, error_model="numpy")(_some)
+    return njit(_SOME, cache=True, error_model="numpy")(_some)
 
 
 @cache
 def _threads() -> Any:
     """Compile when there are contacts enough to be shared."""
-    return numba.njit(types.void(types.int64, types.int64, *_ARRAYS), cache=True, parallel=True)(_shared)  # fmt: skip
+    return njit(types.void(types.int64, types.int64, *_ARRAYS), cache=True, parallel=True)(_shared)  # fmt: skip
 
 
 @lru_cache(maxsize=32)

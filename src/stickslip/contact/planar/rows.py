@@ -7,10 +7,10 @@ where slip ends; only a contact that closes takes along the motion of the time a
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.contact.cache import njit
 from stickslip.contact.law import SLIP, STICK
 from stickslip.contact.planar.course import (
     CLOSED,
@@ -69,7 +69,7 @@ class Rows(NamedTuple):
     stick: FloatArray  # (2, 2 m - 1) means over all stick
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def rows_room(m):  # type: ignore[no-untyped-def]
     """Allocate `Rows` for `m` coefficients."""
     q = 3 * m + 2
@@ -82,13 +82,13 @@ def rows_room(m):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def basis_at(tau, out):  # type: ignore[no-untyped-def]
     """Fill both rows of `out` with the basis and its derivative by τ."""
     _turned_basis(np.cos(tau), np.sin(tau), out)
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def _turned_basis(c1, s1, out):  # type: ignore[no-untyped-def]
     """Do so from cosine and sine of τ."""
     c, s = 1.0, 0.0
@@ -99,7 +99,7 @@ def _turned_basis(c1, s1, out):  # type: ignore[no-untyped-def]
         out[1, 2 * h - 1], out[1, 2 * h] = -h * s, h * c
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _close(motion, row, tau, k, slope, rows):  # type: ignore[no-untyped-def]
     """Set the rows of a contact that closes at `tau`; `slope` is the derivative of the limit by the normal gap."""
     m = motion.waves.shape[1]
@@ -125,7 +125,7 @@ def _close(motion, row, tau, k, slope, rows):  # type: ignore[no-untyped-def]
         rows.angle[2 * m + p] = by_n * b[p]
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def _to_slip(motion, angle, tau, k, rows):  # type: ignore[no-untyped-def]
     """Turn the rows of the place into that of the angle, where the force reaches its limit in that direction."""
     m = motion.waves.shape[1]
@@ -140,7 +140,7 @@ def _to_slip(motion, angle, tau, k, rows):  # type: ignore[no-untyped-def]
         rows.angle[m + p] += k * c * rows.basis[0, p]
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def to_stick(motion, angle, tau, k, slope, rows):  # type: ignore[no-untyped-def]
     """Turn the row of the angle into those of the place."""
     m = motion.waves.shape[1]
@@ -159,7 +159,7 @@ def to_stick(motion, angle, tau, k, slope, rows):  # type: ignore[no-untyped-def
         rows.place[1, 2 * m + p] -= slope * sin * b
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def _flush(rows, count):  # type: ignore[no-untyped-def]
     """Add the products of the nodes that wait."""
     if count > 0:
@@ -167,7 +167,7 @@ def _flush(rows, count):  # type: ignore[no-untyped-def]
         rows.sums[:] += rows.products
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _fill_nodes(motion, piece, k, slope, count, rows):  # type: ignore[no-untyped-def]
     """Solve for the rows of the angle at the stages of a piece and store those of the force from node `count` on."""
     m = motion.waves.shape[1]
@@ -209,7 +209,7 @@ def _fill_nodes(motion, piece, k, slope, count, rows):  # type: ignore[no-untype
     rows.angle[:] = rows.stages[STAGES - 1]
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _move_end(motion, piece, slope, count, rows):  # type: ignore[no-untyped-def]
     """Add that a piece ends where the contact opens, at a time that moves with the normal gap; its nodes move along."""
     m = motion.waves.shape[1]
@@ -251,7 +251,7 @@ def _move_end(motion, piece, slope, count, rows):  # type: ignore[no-untyped-def
             sums[q + 2 * m + j] += by_n * moved[1, p] * at_end[j]
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _turn_forces(count, rows):  # type: ignore[no-untyped-def]
     """Add what the turning of the force changes at the stages of a piece."""
     q = rows.angle.size
@@ -263,7 +263,7 @@ def _turn_forces(count, rows):  # type: ignore[no-untyped-def]
             force[q + p] += x * own[p]
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _stuck(segment, rows):  # type: ignore[no-untyped-def]
     """Add what the resting slider takes off the force ``X`` over a segment."""
     left, right = segment[START], segment[END]
@@ -286,7 +286,7 @@ def _stuck(segment, rows):  # type: ignore[no-untyped-def]
         sums[2 * q + 1] -= weight * segment[PLACE_Y]
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _follow_slip(course, segment, k, slope, waiting, rows, adds):  # type: ignore[no-untyped-def]
     """Carry the rows through the pieces of a segment in slip; return how many nodes wait for their products."""
     motion, angle = course.motion, segment[DIRECTION]
@@ -304,7 +304,7 @@ def _follow_slip(course, segment, k, slope, waiting, rows, adds):  # type: ignor
     return waiting
 
 
-@numba.njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def follow_rows(course, k, slope, rows, adds):  # type: ignore[no-untyped-def]
     """Carry the rows along the stored segments; with `adds` the integrals of the force and its rows are added to `sums`.
 

@@ -1,8 +1,8 @@
 """Forces and states of a planar contact on samples, from its stored course."""
 
-import numba
 import numpy as np
 
+from stickslip.contact.cache import njit
 from stickslip.contact.law import STICK
 from stickslip.contact.planar.course import (
     COUNT,
@@ -23,7 +23,7 @@ from stickslip.contact.planar.slip import interpolated
 from stickslip.contact.slider import PERIOD
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def sample_plane(course, gap, k, force, state):  # type: ignore[no-untyped-def]
     """Fill the force in the plane and the states where the contact is closed."""
     n = gap.shape[1]

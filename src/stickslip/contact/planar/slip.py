@@ -6,10 +6,10 @@ follows the direction of the motion: Radau IIA is stiffly accurate, and its stag
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.contact.cache import njit
 from stickslip.contact.planar.motion import (
     AT_LIMIT_RATE,
     AT_X_RATE,
@@ -47,7 +47,7 @@ class Piece(NamedTuple):
     speed: FloatArray  # (stages + 1,) X'·e - L', positive while it slips
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def piece_room():  # type: ignore[no-untyped-def]
     """Allocate a `Piece`."""
     return Piece(
@@ -56,7 +56,7 @@ def piece_room():  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def factorise(a, pivots):  # type: ignore[no-untyped-def]
     """Factorise `a` in place with row exchanges; return whether it is regular."""
     for k in range(STAGES):
@@ -79,7 +79,7 @@ def factorise(a, pivots):  # type: ignore[no-untyped-def]
     return True
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def solve_vector(a, pivots, b):  # type: ignore[no-untyped-def]
     """Solve with the factors `a` in place."""
     for k in range(STAGES):
@@ -95,7 +95,7 @@ def solve_vector(a, pivots, b):  # type: ignore[no-untyped-def]
         b[k] /= a[k, k]
 
 
-@numba.njit(**PART)
+@njit(**PART)
 def _forward(a, pivots, b):  # type: ignore[no-untyped-def]
     """Exchange the rows of `b` and solve with the lower factor."""
     for k in range(STAGES):
@@ -110,7 +110,7 @@ def _forward(a, pivots, b):  # type: ignore[no-untyped-def]
                 b[k, q] -= factor * b[i, q]
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def solve_rows(a, pivots, b):  # type: ignore[no-untyped-def]
     """Solve for the rows of `b` in place."""
     _forward(a, pivots, b)
@@ -124,7 +124,7 @@ def solve_rows(a, pivots, b):  # type: ignore[no-untyped-def]
             b[k, q] *= inverse
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def linearise(at, angle, matrix, right):  # type: ignore[no-untyped-def]
     """Fill the derivative of the collocation equations by θ at the stages, and minus their values."""
     for j in range(STAGES):
@@ -141,7 +141,7 @@ def linearise(at, angle, matrix, right):  # type: ignore[no-untyped-def]
         right[j] = across - share * rate
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def predict(width, kind, piece):  # type: ignore[no-untyped-def]
     """Begin with the parabola of the piece before."""
     slope, bend = piece.guess[0] * width, 0.5 * piece.guess[1] * width * width
@@ -152,7 +152,7 @@ def predict(width, kind, piece):  # type: ignore[no-untyped-def]
         piece.angle[j] = piece.angle[0] + share * c * (slope + c * bend)
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def collocate(piece):  # type: ignore[no-untyped-def]
     """Find θ at the stages of a piece whose motion is known, from what stands there; return whether Newton's method did."""
     for _ in range(_MOST_STEPS):
@@ -170,7 +170,7 @@ def collocate(piece):  # type: ignore[no-untyped-def]
     return False
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def remember_end(width, piece):  # type: ignore[no-untyped-def]
     """Keep what the next piece begins with."""
     slope = bend = 0.0
@@ -180,7 +180,7 @@ def remember_end(width, piece):  # type: ignore[no-untyped-def]
     piece.guess[0], piece.guess[1] = slope / width, bend / (width * width)
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def decay(piece):  # type: ignore[no-untyped-def]
     """Return the derivative of θ at the end of a piece by θ at its start."""
     for j in range(STAGES):
@@ -189,7 +189,7 @@ def decay(piece):  # type: ignore[no-untyped-def]
     return piece.right[STAGES - 1]
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def interpolated(values, c):  # type: ignore[no-untyped-def]
     """Return the polynomial through `values` at the nodes, at `c` in [0, 1]."""
     above = below = 0.0
@@ -203,7 +203,7 @@ def interpolated(values, c):  # type: ignore[no-untyped-def]
     return above / below
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def slip_speed(piece):  # type: ignore[no-untyped-def]
     """Fill the speed of slip at the stages."""
     at = piece.at
@@ -212,7 +212,7 @@ def slip_speed(piece):  # type: ignore[no-untyped-def]
         piece.speed[j + 1] = at[AT_X_RATE, j] * np.cos(angle) + at[AT_Y_RATE, j] * np.sin(angle) - at[AT_LIMIT_RATE, j]  # fmt: skip
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def slip_ends(speed):  # type: ignore[no-untyped-def]
     """Return the share of the piece after which slip ends, 2 where it goes on.
 
@@ -230,7 +230,7 @@ def slip_ends(speed):  # type: ignore[no-untyped-def]
     return 2.0
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def _zero(values, left, f_left, right, f_right):  # type: ignore[no-untyped-def]
     """Return where the polynomial through `values` falls to zero, by the Illinois method."""
     side = 0

@@ -5,9 +5,9 @@ turning. Steps of that length go from the beginning of stick to the first zero, 
 of F, from which the search goes on without seeing it again.
 """
 
-import numba
 import numpy as np
 
+from stickslip.contact.cache import njit
 from stickslip.contact.planar.motion import TINY, L, X, Y, place, place_and_rates
 from stickslip.contact.planar.radau import INNER
 
@@ -16,7 +16,7 @@ _MOST_STEPS = 4000
 _CLOSE = 1e-8
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def never_reached(motion, z_x, z_y):  # type: ignore[no-untyped-def]
     """Whether bounds alone tell that the force of a spring whose slider is at z stays inside the limit for ever."""
     bounds = motion.bounds
@@ -24,7 +24,7 @@ def never_reached(motion, z_x, z_y):  # type: ignore[no-untyped-def]
     return reach <= motion.waves[L, 0] - (bounds[4] - abs(motion.waves[L, 0]))
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def _square(motion, z_x, z_y, tau):  # type: ignore[no-untyped-def]
     """Return ``|X - z|² - L²`` at `tau`."""
     x, y, limit = place(motion, tau)
@@ -32,7 +32,7 @@ def _square(motion, z_x, z_y, tau):  # type: ignore[no-untyped-def]
     return (size - limit) * (size + limit)
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def _root(motion, z_x, z_y, left, right):  # type: ignore[no-untyped-def]
     """Return the zero between `left` and `right`, where F rises from below to above zero."""
     tau = 0.5 * (left + right)
@@ -60,7 +60,7 @@ def _root(motion, z_x, z_y, left, right):  # type: ignore[no-untyped-def]
     return tau
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def _below(gap, slope, bend, third):  # type: ignore[no-untyped-def]
     """Return a step over which ``-gap + slope h + bend h²/2 + third h³/6`` stays below zero, or 0."""
     curved = max(bend, 0.0)
@@ -77,7 +77,7 @@ def _below(gap, slope, bend, third):  # type: ignore[no-untyped-def]
     return max(h, -3.0 * bend / third)
 
 
-@numba.njit(**INNER)
+@njit(**INNER)
 def slip_begins(motion, z_x, z_y, tau, end, after_slip):  # type: ignore[no-untyped-def]
     """Return when a contact that sticks from `tau` on reaches its limit; `end` if it does not before.
 

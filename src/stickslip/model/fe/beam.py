@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.errors import input_error

@@ -8,8 +8,7 @@ covers the edges of the cut (Kőnig), which a maximum matching gives.
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse
-from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
+import scipy
 
 from stickslip.arrays import BoolArray, IntArray, Matrix
 
@@ -96,7 +95,7 @@ def dissected(pattern: Matrix, kept: IntArray) -> Dissection:
     pieces: list[tuple[IntArray, tuple[int, ...]]] = []
     size = np.array([rows.size for rows in members])
     inner = np.flatnonzero(~whole)
-    _, label = connected_components(graph[inner][:, inner], directed=False)
+    _, label = scipy.sparse.csgraph.connected_components(graph[inner][:, inner], directed=False)
     for part in range(int(label.max(initial=-1)) + 1):
         _cut(graph, inner[label == part], size, pieces)
     return _symbolic(graph, pieces, members, group, kept)
@@ -192,7 +191,9 @@ def _separator(graph: Matrix, inside: BoolArray) -> BoolArray:
     edges = scipy.sparse.csr_array(
         (np.ones(row.size), (row, column)), shape=(left.size, right.size)
     )
-    match = maximum_bipartite_matching(edges, perm_type="column")  # of each left vertex
+    match = scipy.sparse.csgraph.maximum_bipartite_matching(
+        edges, perm_type="column"
+    )  # of each left vertex
     partner = np.full(right.size, -1)
     partner[match[match >= 0]] = np.flatnonzero(match >= 0)
     # Kőnig: what alternating paths from unmatched left vertices reach

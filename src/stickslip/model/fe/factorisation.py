@@ -7,9 +7,7 @@ from dataclasses import dataclass, field
 from importlib.util import find_spec
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse
-import scipy.sparse.linalg
+import scipy
 
 from stickslip.arrays import Matrix
 from stickslip.errors import SingularError, StickslipError, input_error, missing_package
@@ -216,8 +214,10 @@ def _by_feral(matrix: Matrix, say: Say) -> int | None:
 
 def _superlu(matrix: Matrix, threshold: float = PIVOTS) -> Factorisation:
     """Factorise a real or complex matrix."""
+    from scipy.sparse.linalg import splu
+
     try:
-        lu = scipy.sparse.linalg.splu(
+        lu = splu(
             matrix,
             permc_spec="MMD_AT_PLUS_A",
             diag_pivot_thresh=threshold,

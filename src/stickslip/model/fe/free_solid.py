@@ -1,8 +1,7 @@
 """The static state of a rotating solid that nothing holds: a ring in a groove, a damper of finite elements below platforms."""
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import FloatArray, Matrix
 from stickslip.model.fe.factorisation import factorise

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import SingularError

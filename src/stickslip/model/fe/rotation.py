@@ -10,7 +10,7 @@ from hashlib import sha256
 from typing import Literal
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.errors import SingularError, StickslipError, did_you_mean, input_error

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray, Matrix
 from stickslip.errors import input_error, nearest_and_known

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error

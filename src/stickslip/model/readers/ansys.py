@@ -7,7 +7,7 @@ others use ends the whole program on a file that was cut short.
 from pathlib import Path
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import BoolArray, IntArray, Matrix
 from stickslip.errors import input_error

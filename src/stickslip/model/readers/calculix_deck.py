@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import BoolArray, FloatArray, IntArray
 from stickslip.errors import InputError, did_you_mean, input_error

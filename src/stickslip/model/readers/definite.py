@@ -1,7 +1,7 @@
 """Matrices that no passive structure has: what of them is refused, and what is told."""
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import Matrix
 from stickslip.errors import input_error

@@ -1,7 +1,7 @@
 """Symmetric matrices from lists of entries (row, column, value), checked."""
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error

@@ -5,7 +5,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import IntArray, Matrix
 from stickslip.errors import input_error, missing_package

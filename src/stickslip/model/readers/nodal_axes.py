@@ -1,7 +1,7 @@
 """Nodes with axes of their own: the rotation that brings a model's coordinates into the global axes."""
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import input_error

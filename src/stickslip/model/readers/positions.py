@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import scipy.sparse
+import scipy
 
 from stickslip.errors import input_error
 from stickslip.model.mesh.solid_mesh import SolidMesh

@@ -1,8 +1,7 @@
 """Rigid motions of bodies, and the bodies that nothing holds."""
 
 import numpy as np
-import scipy.sparse
-import scipy.sparse.csgraph
+import scipy
 
 from stickslip.arrays import FloatArray, IntArray, Matrix
 from stickslip.errors import SingularError

@@ -11,10 +11,10 @@ force begins, and on from there.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from stickslip.arrays import FloatArray, IntArray
 from stickslip.contact.addresses import law_at
+from stickslip.contact.cache import njit
 from stickslip.contact.law import OPEN
 
 # what compiled code alone calls is compiled with it, and needs no door to Python

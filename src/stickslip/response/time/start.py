@@ -8,10 +8,11 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from stickslip.arrays import ComplexArray, FloatArray, Matrix
 from stickslip.contact.addresses import law_at
+from stickslip.contact.cache import njit
 from stickslip.contact.law import ContactLaw
 from stickslip.errors import input_error
 from stickslip.response.time.contact_step import KERNEL, PARAMETERS, STATES

@@ -11,9 +11,10 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, typeof, types
+from numba import typeof, types
 
 from stickslip.arrays import FloatArray, IntArray
+from stickslip.contact.cache import njit
 from stickslip.contact.law import OPEN
 from stickslip.response.time.contact_step import (
     FORCE,

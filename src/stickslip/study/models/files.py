@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from stickslip.arrays import IntArray
 from stickslip.errors import InputError, input_error, nearest_and_known
@@ -169,6 +168,8 @@ def _cyclic_pairs(key: str, mesh: SolidMesh, sectors: int, axis: Axis) -> SolidM
     InputError
         If the pairs are no pitch apart: what they couple is not read.
     """
+    from scipy.spatial import cKDTree
+
     sets = {name: own for name, own in mesh.node_sets.items() if name not in COUPLED}
     if len(sets) == len(mesh.node_sets):
         return mesh

@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator
 
-from stickslip.assembly.contact import SPATIAL
-from stickslip.assembly.ties import ALONE
+from stickslip.assembly.contact import ALONE, SPATIAL
 from stickslip.errors import InputError, input_error
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.file.tables import Tables
