@@ -35,9 +35,9 @@ class Factors:
     upper: tuple[FloatArray | ComplexArray, ...]
 
     def solve(self, right: FloatArray | ComplexArray) -> FloatArray | ComplexArray:
-        """Solve with one right side (n,)."""
-        x = right[self.order]
-        n = x.size
+        """Solve with one right side (n,) or several (n, k)."""
+        x = right[self.order].astype(self.lu.dtype, copy=False)
+        n = len(x)
         starts = range(0, n, BLOCK)
         for inverse, first in zip(self.lower, starts, strict=True):
             last = min(first + BLOCK, n)
