@@ -36,7 +36,7 @@ class Factors:
 
     def solve(self, right: FloatArray | ComplexArray) -> FloatArray | ComplexArray:
         """Solve with one right side (n,) or several (n, k)."""
-        x = right[self.order].astype(self.lu.dtype, copy=False)
+        x = right[self.order]
         n = len(x)
         starts = range(0, n, BLOCK)
         for inverse, first in zip(self.lower, starts, strict=True):

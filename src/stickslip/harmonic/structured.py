@@ -136,8 +136,8 @@ class StructuredJacobian:
             factors.append(own)
         inverses = None
         if self.linear.n <= SMALL:
-            unit = np.eye(self.linear.n)
-            inverses = small_blocks([own.solve(unit) for own in factors])
+            unit = np.eye(self.linear.n, dtype=complex)
+            inverses = small_blocks([np.asarray(own.solve(unit), dtype=complex) for own in factors])
         return HarmonicFactors(self.linear, np.array(means), tuple(factors), inverses)
 
     def preconditioned_by(self, kept: HarmonicFactors) -> tuple[Solve, Product]:
