@@ -60,7 +60,7 @@ def test_nodes_are_exact_within_the_hyperbola():
     np.testing.assert_allclose(0.5 * found, np.exp(inside), atol=5e-13)
 
 
-@pytest.mark.parametrize("length", [1e-3, 0.05, 1.0])
+@pytest.mark.parametrize("length", [0.0, 1e-3, 0.05, 1.0])
 def test_intervals_are_those_of_the_full_matrix(length):
     modes, contacts = states()
     flow, full = flow_of(modes, contacts), FullFlow(modes, contacts)

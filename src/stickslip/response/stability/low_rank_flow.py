@@ -89,6 +89,8 @@ class LowRankFlow:
         self, interval: int, length: float, states: FloatArray, sliders: FloatArray
     ) -> FloatArray:
         """Propagate by eigenvalues where the contacts are in the base's state, else by the exponential that thin matrices make."""
+        if length == 0.0:  # two changes of state at one time
+            return states
         stuck = self.contacts.sticks[interval]
         pulled = self.pull[:, self.contacts.rows[stuck]] * self.contacts.springs[stuck]
         columns, rows = self._difference(self.contacts.stiffness[interval] - self.base)
