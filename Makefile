@@ -59,7 +59,7 @@ test-optional: $(OPTIONAL_INSTALLED)  ## run the tests of these, none skipped
 	$(ONE_THREAD) STICKSLIP_OPTIONAL=required $(BIN)/python -m pytest tests/test_readers_ansys.py tests/test_readers_nastran.py \
 		tests/test_factorisation.py tests/test_modes.py
 
-test-cluster: $(OPTIONAL_INSTALLED)  ## run jobs on a Dask cluster whose workers are killed, and with executorlib (three minutes)
+test-cluster: $(OPTIONAL_INSTALLED)  ## run jobs on a Dask cluster whose workers are killed, and with executorlib (a minute and a half)
 	$(ONE_THREAD) STICKSLIP_CLUSTER=required $(BIN)/python -m pytest tests/test_cluster.py
 
 lint: $(INSTALLED)  ## style, types and the direction of imports

@@ -7,12 +7,13 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from threading import Event, Thread
 
 import numpy as np
 import pytest
@@ -22,11 +23,14 @@ from toy_analysis import ToyStudy
 from stickslip.errors import InputError
 from stickslip.study.analyses import ANALYSES
 from stickslip.study.analyses.verdict import of_tree
-from stickslip.study.keep.workers import LOOPBACK, executor
+from stickslip.study.keep import workers
+from stickslip.study.keep.attempts import reached
+from stickslip.study.keep.workers import LOOPBACK
 from stickslip.study.run import run_study
 
 if "STICKSLIP_CLUSTER" not in os.environ and not all(map(find_spec, ("distributed", "executorlib"))):  # fmt: skip
     pytest.skip("the extra cluster is not installed", allow_module_level=True)
+psutil = import_module("psutil")  # comes with the extra
 
 # executorlib asks pydantic for a name that is deprecated: shown, and no error of ours
 pytestmark = pytest.mark.filterwarnings(
@@ -37,6 +41,8 @@ PORT = 18786
 FACTORS = (1.5, 2.5, 3.5, 4.5)
 POISON = 1  # the case that kills its process, at its fourth record
 EVERY = 10.0  # seconds between two kills of a worker
+MOST = 6  # of them
+LIMIT = 300.0  # seconds of a run, after which it is ended and the test has failed
 RUN = """
 import sys
 from pathlib import Path
@@ -46,21 +52,39 @@ from stickslip.study.shard import Shard
 from toy_analysis import ToyStudy
 if __name__ == "__main__":
     ANALYSES["toy"] = "slow_toy:TOY"
-    study = ToyStudy(Path(sys.argv[1]), {factors}, stop_at=3, how="kill", stop_in={poison})
-    run_study(study, shard=Shard.read(sys.argv[2]))
+    path, kind, processes, shard = sys.argv[1:]
+    study = ToyStudy(Path(path), {factors}, stop_at=3, how="kill", stop_in={poison})
+    run_study(study, kind=kind, workers=int(processes), shard=Shard.read(shard) if shard else None)
 """
 
 
 @pytest.fixture(autouse=True)
-def slow_toy_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(ANALYSES, "toy", "slow_toy:TOY")
+def modules_of_tests_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     paths = [str(HERE), str(HERE.parent / "src"), os.environ.get("PYTHONPATH", "")]
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(paths))
 
 
-def study(folder: Path) -> ToyStudy:
-    folder.mkdir(exist_ok=True)
-    return ToyStudy(folder / "study.toml", FACTORS, stop_at=3, how="kill", stop_in=POISON)
+def start(
+    folder: Path, *, kind: str = "", processes: int = 1, shard: str = ""
+) -> subprocess.Popen[str]:
+    """Start a run of the study, in which one case kills its process."""
+    script = folder / "run.py"
+    if not script.exists():  # another run may be reading it
+        script.write_text(RUN.format(factors=FACTORS, poison=POISON))
+    own = [str(folder / "study.toml"), kind, str(processes), shard]
+    return subprocess.Popen([sys.executable, str(script), *own], stderr=subprocess.PIPE, text=True)
+
+
+def end(run: subprocess.Popen[str], folder: Path) -> None:
+    """Wait for a run; end one that goes on for too long."""
+    try:
+        _, said = run.communicate(timeout=LIMIT)
+    except subprocess.TimeoutExpired:
+        run.kill()  # processes of its jobs end with it
+        logs = [*folder.glob("results/*.log"), *folder.glob("dask.log")]
+        told = "\n".join(log.read_text()[-3000:] for log in logs)
+        pytest.fail(f"not done in {LIMIT:g} s, jobs as far as {recorded(folder)}:\n{told}")
+    assert run.returncode == 0, said
 
 
 def found(folder: Path) -> np.ndarray:
@@ -86,17 +110,23 @@ def expected(tmp_path_factory: pytest.TempPathFactory) -> np.ndarray:
     return np.delete(tree["toy"].value.values, POISON, axis=0)
 
 
+@pytest.fixture
+def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ToyStudy:
+    monkeypatch.setitem(ANALYSES, "toy", "toy_analysis:TOY")
+    return ToyStudy(tmp_path / "study.toml", FACTORS)
+
+
 def listening(processes: list[int]) -> set[str]:
     """Return the addresses at which processes, and those that they started, listen."""
-    import psutil
-
-    every = [c for p in processes for c in [psutil.Process(p), *psutil.Process(p).children(True)]]
     found = set()
-    for one in every:
-        try:
-            found |= {c.laddr.ip for c in one.net_connections("tcp") if c.status == "LISTEN"}
-        except psutil.Error:
-            continue  # it has ended
+    for number in processes:
+        with suppress(psutil.Error):  # one has ended
+            first = psutil.Process(number)
+            for one in [first, *first.children(True)]:
+                with suppress(psutil.Error):
+                    found |= {
+                        c.laddr.ip for c in one.net_connections("tcp") if c.status == "LISTEN"
+                    }
     return found
 
 
@@ -128,85 +158,101 @@ def dask_cluster(folder: Path) -> Iterator[tuple[str, list[int]]]:
                     process.wait()
 
 
-def kill_workers(nannies: list[int], killed: list[int], over: threading.Event) -> None:
-    """Kill a worker every ten seconds, one after the other."""
-    import psutil
+def recorded(folder: Path) -> dict[str, tuple[int, ...]]:
+    """Return how far each job has come."""
+    files = sorted((folder / "results/jobs").glob("*"), key=reached)
+    return {path.name.partition(".")[0]: reached(path) for path in files}
 
-    while not over.wait(EVERY):
+
+def kill_workers(nannies: list[int], folder: Path, killed: list[int], over: Event) -> None:
+    """Kill a worker every ten seconds, one after the other, but none before a job has come further since the last kill.
+
+    An overloaded machine may need more than ten seconds to start a worker, and with a bare clock no job would ever end there. A
+    quiet one is done after three kills.
+    """
+    before: dict[str, tuple[int, ...]] = {}
+    while len(killed) < MOST and not over.wait(EVERY):
+        while (now := recorded(folder)) == before:
+            if over.wait(0.2):
+                return
+        before = now
         nanny = nannies[len(killed) % len(nannies)]
-        workers = [p for p in psutil.Process(nanny).children() if "spawn_main" in str(p.cmdline())]
-        killed += [p.pid for p in workers]
-        for worker in workers:
-            worker.send_signal(signal.SIGKILL)
+        victims = [p for p in psutil.Process(nanny).children() if "spawn_main" in str(p.cmdline())]
+        killed += [p.pid for p in victims]
+        for victim in victims:
+            victim.send_signal(signal.SIGKILL)
 
 
-def test_dask_cluster_whose_workers_are_killed(tmp_path: Path, expected: np.ndarray) -> None:
+@contextmanager
+def meanwhile(work: Callable[..., object], *given: object) -> Iterator[None]:
+    """Let a thread work while the block runs; its last argument tells it that the block has ended."""
+    over = Event()
+    thread = Thread(target=work, args=(*given, over))
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+def test_dask_cluster_whose_workers_are_killed(
+    tmp_path: Path, expected: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(workers, "PATIENCE", 60)
     killed: list[int] = []
-    over = threading.Event()
     with dask_cluster(tmp_path) as (address, processes):
-        with executor(f"dask={address}", 1):
+        with workers.executor(f"dask={address}", 1):
             assert listening([*processes, os.getpid()]) == {LOOPBACK}
-        killer = threading.Thread(target=kill_workers, args=(processes[1:], killed, over))
-        killer.start()
-        try:
-            run_study(study(tmp_path / "dask"), kind=f"dask={address}")
-        finally:
-            over.set()
-            killer.join()
-    np.testing.assert_array_equal(found(tmp_path / "dask"), expected)
+        with meanwhile(kill_workers, processes[1:], tmp_path, killed):
+            end(start(tmp_path, kind=f"dask={address}"), tmp_path)
+    np.testing.assert_array_equal(found(tmp_path), expected)
     assert len(killed) > 1
 
 
 def test_executorlib_on_one_node(tmp_path: Path, expected: np.ndarray) -> None:
     heard: set[str] = set()
-    over = threading.Event()
 
-    def listen() -> None:
+    def listen(over: Event) -> None:
         while not over.wait(1.0):
-            heard.update(listening([os.getpid()]))
+            heard.update(listening([run.pid]))
 
-    listener = threading.Thread(target=listen)
-    listener.start()
-    try:
-        run_study(study(tmp_path / "one"), kind="executorlib", workers=2)
-    finally:
-        over.set()
-        listener.join()
-    np.testing.assert_array_equal(found(tmp_path / "one"), expected)
+    run = start(tmp_path, kind="executorlib", processes=2)
+    with meanwhile(listen):
+        end(run, tmp_path)
+    np.testing.assert_array_equal(found(tmp_path), expected)
     assert heard == {LOOPBACK}
 
 
 def test_shards_that_run_at_once(tmp_path: Path, expected: np.ndarray) -> None:
-    script, path = tmp_path / "run.py", tmp_path / "study.toml"
-    script.write_text(RUN.format(factors=FACTORS, poison=POISON))
     shares = ["1/3", "2/3", "2/3", "3/3"]  # one of them is started twice
-    commands = [[sys.executable, str(script), str(path), share] for share in shares]
-    started = [subprocess.Popen(c, stderr=subprocess.PIPE, text=True) for c in commands]
-    for one in started:
-        _, said = one.communicate(timeout=300)
-        assert one.returncode == 0, said
+    for run in [start(tmp_path, shard=share) for share in shares]:
+        end(run, tmp_path)
     np.testing.assert_array_equal(found(tmp_path), expected)
     assert {p.suffix for p in (tmp_path / "results/jobs").iterdir()} == {".job"}
 
 
-def test_scheduler_that_does_not_answer_is_told(tmp_path: Path) -> None:
+def test_scheduler_that_does_not_answer_is_told(
+    study: ToyStudy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(workers, "PATIENCE", 2)
     began = time.monotonic()
     with pytest.raises(InputError, match="no scheduler answers there"):
-        run_study(study(tmp_path), kind=f"dask=tcp://{LOOPBACK}:1")
+        run_study(study, kind=f"dask=tcp://{LOOPBACK}:1")
     assert time.monotonic() - began < 60.0
     with pytest.raises(InputError, match="no scheduler answers there"):
-        run_study(study(tmp_path), kind="dask=nonsense")
+        run_study(study, kind="dask=nonsense")
 
 
-def test_slurm_outside_of_it_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_slurm_outside_of_it_is_told(study: ToyStudy, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("SLURM_JOB_ID", raising=False)
     monkeypatch.setattr("stickslip.study.keep.workers.shutil.which", lambda _name: None)
     with pytest.raises(InputError, match=r"--executor slurm: finds no srun here"):
-        run_study(study(tmp_path), kind="slurm")
+        run_study(study, kind="slurm")
     monkeypatch.setattr("stickslip.study.keep.workers.shutil.which", str)
     with pytest.raises(InputError, match=r"is not inside an allocation\. Begin with it: salloc"):
-        run_study(study(tmp_path), kind="slurm")
+        run_study(study, kind="slurm")
     monkeypatch.setenv("SLURM_JOB_ID", "1")
     monkeypatch.setenv("SLURM_JOB_NODELIST", "node[1-4]")
     with pytest.raises(InputError, match=r"Name the address of this machine .*slurm=10\.0\.0\.5"):
-        run_study(study(tmp_path), kind="slurm")
+        run_study(study, kind="slurm")

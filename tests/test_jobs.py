@@ -1,5 +1,6 @@
 """Jobs that run apart: limits, deaths, shards, files that several processes write, and what cannot be asked for."""
 
+import pickle
 import shutil
 import signal
 import time
@@ -20,6 +21,7 @@ from stickslip.study.keep.attempts import begin, clear, file_at_work, left_behin
 from stickslip.study.keep.cell import Cell, Ended, Limits, OutOfTime, Stopped
 from stickslip.study.keep.folder import locked_folder
 from stickslip.study.keep.journal import JobJournal, read_sealed
+from stickslip.study.keep.watch import solve_far, watched
 from stickslip.study.keep.workers import check_kind, executor
 from stickslip.study.run import run_study
 from stickslip.study.shard import Shard
@@ -78,9 +80,10 @@ class Dying(Cell):
         life = self.lives.pop(0)
         if isinstance(life, Exception):
             raise life
-        begin(given.sealed, given.file, given.analysis.record)
-        with JobJournal(given.file, given.analysis.record) as journal:
-            new = given.analysis.solve(given.job.inputs, journal.records(), journal)
+        _, made = pickle.loads(given.content)
+        begin(given.sealed, given.file, made.analysis.record)
+        with JobJournal(given.file, made.analysis.record) as journal:
+            new = made.analysis.solve(made.job.inputs, journal.records(), journal)
             for _, record in zip(range(life), new, strict=False):
                 journal.add(record)
         raise Ended("was ended by signal SIGKILL")
@@ -90,7 +93,7 @@ def test_job_is_set_aside_that_dies_twice_at_the_same_place(tmp_path: Path) -> N
     said: list[str] = []
     cell = Dying(1, 2, 0)  # the second life went on
     made = order(tmp_path)
-    jobs.watched(made, cell, never, lambda record: said.append(record.getMessage()))
+    watched(made.packed(), cell, never, lambda record: said.append(record.getMessage()))
     records, notes = read_sealed(made.sealed, made.analysis.record)
     assert len(records) == 3
     assert not cell.lives
@@ -98,15 +101,29 @@ def test_job_is_set_aside_that_dies_twice_at_the_same_place(tmp_path: Path) -> N
     why = "toy was set aside: its process was ended by signal SIGKILL, twice at the same place"
     assert notes["set aside"]["text"] == why
     # the next run takes it up
-    jobs.solve(made)
+    jobs.solve(made, made.file)
     records, notes = read_sealed(made.sealed, made.analysis.record)
     assert len(records) == 5
     assert "set aside" not in notes
 
 
+def test_deaths_are_counted_over_workers_that_are_lost(tmp_path: Path) -> None:
+    made = order(tmp_path)
+    with pytest.raises(Stopped):  # the first worker is lost after one death
+        watched(made.packed("first"), Dying(3, Stopped()), never, print)
+    assert len(left_behind(made.sealed)) == 1
+    with JobJournal(file_at_work(made.sealed, "elder"), made.analysis.record) as journal:
+        done = made.analysis.solve(made.job.inputs, [], journal)
+        for _, record in zip(range(3), done, strict=False):
+            journal.add(record)  # as far, but nothing has died
+    watched(made.packed("second"), Dying(0), never, print)
+    notes = read_sealed(made.sealed, made.analysis.record)[1]
+    assert "twice at the same place" in notes["set aside"]["text"]
+
+
 def test_job_that_takes_too_long_is_set_aside_at_once(tmp_path: Path) -> None:
     made = order(tmp_path)
-    jobs.watched(made, Dying(OutOfTime("it took more than 5 s")), never, print)
+    watched(made.packed(), Dying(OutOfTime("it took more than 5 s")), never, print)
     assert "took more than 5 s" in read_sealed(made.sealed, made.analysis.record)[1]["set aside"]["text"]  # fmt: skip
 
 
@@ -225,10 +242,10 @@ def test_executor_that_is_none_is_refused(tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_machine_that_would_give_other_numbers_is_refused(tmp_path: Path) -> None:
     made, token = order(tmp_path), tmp_path / "run.on"
-    answer = jobs.solve_far(made, token, {}, {})
+    answer = solve_far(made.packed(), token, {}, {})
     assert f"does not see {tmp_path}. Put the study into a folder that all machines share" in str(answer.error)  # fmt: skip
     token.touch()
-    answer = jobs.solve_far(made, token, {"numpy": "0.9"}, {})
+    answer = solve_far(made.packed(), token, {"numpy": "0.9"}, {})
     assert f"has other versions, whose numbers may differ: numpy {np.__version__} for 0.9" in str(answer.error)  # fmt: skip
 
 
@@ -238,12 +255,12 @@ class Losing:
     def __init__(self, *, begun: bool) -> None:
         self.begun, self.given = begun, 0
 
-    def submit(self, fn, order, *others):
+    def submit(self, fn, parcel, *others):
         self.given += 1
         future = jobs.Future()
         future.set_exception(OSError("the machine is gone"))
         if self.begun:
-            with JobJournal(file_at_work(order.sealed, str(self.given)), order.analysis.record):
+            with JobJournal(file_at_work(parcel.sealed, str(self.given))):
                 pass
         return future
 

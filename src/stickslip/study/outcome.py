@@ -15,11 +15,12 @@ from stickslip.study.keep.journal import read_note, read_sealed
 from stickslip.study.keep.netcdf import variable
 from stickslip.study.keep.progress import tell
 from stickslip.study.keep.provenance import Provenance
+from stickslip.study.keep.watch import ASIDE
 from stickslip.study.measured_variables import with_measured
 from stickslip.study.models.measured import MeasuredPeaks
 
 # notes that the runner itself puts down
-UNSOLVED, ASIDE, CHECKED = "no solution", "set aside", "checks"
+UNSOLVED, CHECKED = "no solution", "checks"
 REMEDIES = {
     UNSOLVED: "Check what holds the parts, and the size of the loads.",
     ASIDE: "The same command goes on with it: give it more time or memory, or leave the case out.",

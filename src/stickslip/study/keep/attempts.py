@@ -10,7 +10,7 @@ from pathlib import Path
 from uuid import uuid4
 
 from stickslip.errors import InputError
-from stickslip.study.keep.journal import AT_WORK, JobJournal
+from stickslip.study.keep.journal import AT_WORK, JobJournal, read_place
 from stickslip.study.keep.progress import LOG
 
 BESIDE = "-journal"  # what SQLite needs to undo a write that was cut off
@@ -29,13 +29,18 @@ def new_owner() -> str:
 def left_behind(sealed: Path) -> list[Path]:
     """Return all files of a job at work, the furthest first: they only grow."""
     found = [p for p in sealed.parent.glob(f"{sealed.stem}.*") if p.suffix == AT_WORK]
-    return sorted(found, key=_size, reverse=True)
+    return sorted(found, key=reached, reverse=True)
+
+
+def reached(path: Path) -> tuple[int, int, int]:
+    """Return how far a file has come: its size, and, as several small records fit into a page of it, what it holds."""
+    return (_size(path), *read_place(path))
 
 
 def begin(sealed: Path, own: Path, record: type) -> None:
     """Make a file of a job at work from the furthest that is there, of this process or of any other."""
-    for path in sorted([*left_behind(sealed), sealed], key=_size, reverse=True):
-        if path == own or _size(path) <= _size(own):
+    for path in sorted([*left_behind(sealed), sealed], key=reached, reverse=True):
+        if path == own or reached(path) <= reached(own):
             return
         if _copied(path, own, record):
             return

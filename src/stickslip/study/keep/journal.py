@@ -7,7 +7,7 @@ several machines share the folder; sealed, it is ``<key>.job``.
 
 import sqlite3
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -19,6 +19,8 @@ from stickslip.study.keep.whole import unwritable
 FORMAT = 6  # raised whenever the tables or the archives change
 AT_WORK, SEALED = ".part", ".job"
 WHOLE = "whole"  # what a file says of itself that has been sealed
+DEATHS, DIED_AT = "deaths", "died at"  # of processes at work, and at which record and note
+PLACE = "select (select count(*) from record) || ' ' || (select count(*) from note)"
 FRESH = (
     "If its disk is full, make room. Otherwise delete it, or start over with --fresh, which removes what runs wrote into the "
     "folder and no other file."
@@ -40,7 +42,7 @@ class JobJournal:
     path
         The file, ``<key>.part``; created when it does not exist.
     record_type
-        Dataclass of the records, of arrays, numbers, texts, enumerations and None.
+        Dataclass of the records, of arrays, numbers, texts, enumerations and None; where records are read.
 
     Raises
     ------
@@ -48,7 +50,7 @@ class JobJournal:
         If the file is in use, or cannot be read.
     """
 
-    def __init__(self, path: Path, record_type: type[Any]) -> None:
+    def __init__(self, path: Path, record_type: type[Any] = object) -> None:
         self._path = path
         self._type = record_type
         with _named(path):
@@ -119,9 +121,20 @@ class JobJournal:
             _records(self._db, self._type)
             _notes(self._db)
 
+    def died(self) -> int:
+        """Count one more end of the process at work; return how many there were since the last record or note."""
+        with _named(self._path):
+            (count,) = self._db.execute(PLACE).fetchone()
+            kept = dict(self._db.execute("select key, value from meta"))
+            deaths = int(kept[DEATHS]) + 1 if kept.get(DIED_AT) == count else 1
+            rows = [(DIED_AT, count), (DEATHS, str(deaths))]
+            self._db.executemany("insert or replace into meta values (?, ?)", rows)
+        return deaths
+
     def seal(self) -> None:
         """Close the file and give it the name of a finished job."""
         with _named(self._path):
+            self._db.execute("delete from meta where key in (?, ?)", (DEATHS, DIED_AT))
             self._db.execute("insert into meta values (?, 'yes')", (WHOLE,))
             self._db.close()
             self._path.replace(self._path.with_name(f"{_key(self._path)}{SEALED}"))
@@ -145,16 +158,28 @@ def read_note(path: Path, name: str) -> dict[str, Any] | None:
         return _note(db, name)
 
 
+def read_place(path: Path) -> tuple[int, int]:
+    """Return how many records the file of a job holds, and how many processes have ended after the last; zeros where it cannot be read."""
+    try:
+        with closing(_unlocked(path)) as db:
+            (records,) = db.execute("select count(*) from record").fetchone()
+            deaths = db.execute("select value from meta where key = ?", (DEATHS,)).fetchone()
+        return records, int(deaths[0]) if deaths else 0
+    except (sqlite3.Error, ValueError):
+        return 0, 0  # another process may be writing
+
+
+def _unlocked(path: Path) -> sqlite3.Connection:
+    return sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)
+
+
 @contextmanager
 def _reading(path: Path) -> Iterator[sqlite3.Connection]:
-    db = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)
-    try:
+    with closing(_unlocked(path)) as db:
         _check_mark(db, path)
         if db.execute("select value from meta where key = ?", (WHOLE,)).fetchone() is None:
             raise input_error(str(path), "is the file of a job that has not ended", FRESH)
         yield db
-    finally:
-        db.close()
 
 
 def _opened(path: Path) -> sqlite3.Connection:
